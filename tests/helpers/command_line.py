@@ -114,10 +114,11 @@ def refusal(done: Done) -> str:
 
 def refusal_under_way(done: Done) -> str:
     """Return the one line of a mistake, after the words with which the run had begun."""
-    begun = ("driftwalk: tank: ", "driftwalk: warning: nobody stated ")
+    begun = "driftwalk: tank: "
     lines = done.err.splitlines(keepends=True)
-    assert lines[0].startswith(begun[0])
-    return refusal(done._replace(err="".join(x for x in lines if not x.startswith(begun))))
+    assert lines[0].startswith(begun)
+    kept = [line for line in lines if not line.startswith(begun) and " not stated: " not in line]
+    return refusal(done._replace(err="".join(kept)))
 
 
 def contents(folder: Path) -> dict[str, bytes | None]:

@@ -1,16 +1,17 @@
-"""A tank of blocks that keeps its state, to be looked at and changed while it runs."""
+"""Interactive simulation of a tank of blocks, advanced and changed step by step."""
 
 from __future__ import annotations
 
 import math
 from functools import cached_property
 from threading import Lock
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
+from driftwalk.assembly.lattice.joined_faces import ROUNDING
 from driftwalk.assembly.lattice.live import Lattice
 from driftwalk.assembly.runs.dataset import times_of
 from driftwalk.assembly.runs.plan import MOST_STEPS, make_plan, start_poses
@@ -25,9 +26,6 @@ if TYPE_CHECKING:
     from driftwalk.model.assembly import HiddenFaceDrag, Latching
 
 Floats = npt.NDArray[np.float64]
-
-ROUNDING: Final = 1e-9
-"""Share of a time step by which durations may miss its end."""
 
 
 class LiveEvent(NamedTuple):
@@ -67,7 +65,7 @@ class LiveTank:
     """One tank of blocks that advances by a duration and whose parameters change while it runs.
 
     The world is that of `assemble` with ``backend="reference"``: while nothing is changed, it is
-    run 0 of `assembly_path` with the same seed, bit for bit, in whatever pieces it is advanced. It
+    run 0 of `assembly_path` with the same seed, bit for bit, however it is advanced. It
     goes on when all blocks have become one assembly, and has no end.
 
     Everything may be called from several threads at once. `advance`, `part`, `events` and `restart`

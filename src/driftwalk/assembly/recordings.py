@@ -1,10 +1,10 @@
-"""Outcome classes of a recording of many blocks: what they had assembled into, at every time."""
+"""Outcome classes of a recording of many blocks over time."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -28,17 +28,26 @@ from driftwalk.schema.check import build_dataset
 if TYPE_CHECKING:
     import xarray as xr
 
-JOIN_DISTANCE: Final = 0.1
-"""Default distance of faces that are joined, in sides."""
+
+class JoinPolicy(NamedTuple):
+    """When blocks of a recording are joined, unless stated otherwise."""
+
+    join_distance: float = 0.1
+    """Distance of faces that are joined, in sides; chosen by hand."""
+    looser: float = 2.0
+    """Tolerances to let go, in units of those to join; chosen by hand."""
+    min_duration_s: float = 0.5
+    """Shortest duration that counts [s]; chosen by hand."""
+    hold_s: float = 1.0
+    """Time for which a block that is not seen keeps its joins [s]; chosen by hand."""
+    frames_held: float = 3.0
+    """The same in frames, where they are so rare that it is longer; chosen by hand."""
+
+
+JOIN_POLICY: Final = JoinPolicy()
+
 JOIN_ANGLE: Final = math.radians(10.0)
 """Default angle between faces that are joined [rad]."""
-LOOSER: Final = 2.0
-"""Default of the tolerances to let go, in units of those to join."""
-MIN_DURATION: Final = 0.5
-"""Default of the shortest duration that counts [s]."""
-HOLD: Final = 1.0
-"""Default time for which a block that is not seen keeps its joins [s], if frames are not rarer."""
-FRAMES_HELD: Final = 3.0
 UNKNOWN: Final = -1
 
 
@@ -51,7 +60,7 @@ def classify(
     join_angle: float = JOIN_ANGLE,
     release_distance: float | None = None,
     release_angle: float | None = None,
-    min_duration: float = MIN_DURATION,
+    min_duration: float = JOIN_POLICY.min_duration_s,
     hold: float | None = None,
 ) -> xr.Dataset:
     """Return the outcome class of the blocks of a recording at every time.
@@ -115,13 +124,15 @@ def classify(
     """
     require_chirality(chirality)
     poses = _checked_poses(recording)
-    join_distance = JOIN_DISTANCE * side if join_distance is None else join_distance
+    join_distance = JOIN_POLICY.join_distance * side if join_distance is None else join_distance
     rules = JoinRules(
         side=side,
         join_distance=join_distance,
         join_angle=join_angle,
-        release_distance=LOOSER * join_distance if release_distance is None else release_distance,
-        release_angle=LOOSER * join_angle if release_angle is None else release_angle,
+        release_distance=JOIN_POLICY.looser * join_distance
+        if release_distance is None
+        else release_distance,
+        release_angle=JOIN_POLICY.looser * join_angle if release_angle is None else release_angle,
         min_duration=min_duration,
         hold=_usual_hold(poses.time) if hold is None else hold,
     )
@@ -158,7 +169,7 @@ def _checked_poses(recording: xr.Dataset) -> Poses:
 
 def _usual_hold(time: Floats) -> float:
     usual = float(np.median(np.diff(time))) if time.size > 1 else 0.0
-    return max(HOLD, FRAMES_HELD * usual)
+    return max(JOIN_POLICY.hold_s, JOIN_POLICY.frames_held * usual)
 
 
 def _unknown_blocks(poses: Poses, hold: float) -> Booleans:

@@ -17,7 +17,8 @@ import numpy.typing as npt
 
 from driftwalk.calibration.grid.grid_map import Map
 from driftwalk.calibration.problem import Floats, Problem
-from driftwalk.motion.score import DENSITY_BINS, broken_worlds, excerpt_samples
+from driftwalk.comparison.density import BINS
+from driftwalk.motion.score import broken_worlds, excerpt_samples
 from driftwalk.schema import Parameter
 from driftwalk.schema.answers.calibration_facts import calibration_parts
 from driftwalk.schema.check import build_dataset
@@ -207,6 +208,6 @@ def _bin_edges(problem: Problem) -> tuple[Floats, Floats]:
     """Return the edges of the bins: of step lengths [m], of turning angles [rad]."""
     reference = problem.reference
     return (
-        np.linspace(0.0, reference.length_limit, DENSITY_BINS + 1),
-        np.linspace(-reference.angle_limit, reference.angle_limit, DENSITY_BINS + 1),
+        np.linspace(0.0, reference.length_limit, BINS + 1),
+        np.linspace(-reference.angle_limit, reference.angle_limit, BINS + 1),
     )

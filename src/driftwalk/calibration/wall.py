@@ -20,7 +20,7 @@ REACH_M: Final = 0.002
 
 
 def wall_warning(track: Track, study: Study) -> str | None:
-    """Return a warning where the block is often at a wall whose properties nobody stated.
+    """Return a warning where the block is often at a wall whose properties were not stated.
 
     A calibration by steps simulates the contacts with the wall. Where the friction of the wall is 1
     and the study says 0, C_d comes out a third too small.

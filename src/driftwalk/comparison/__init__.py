@@ -8,6 +8,7 @@ from driftwalk.comparison.autocorrelation import autocorrelation_time, memory_ti
 from driftwalk.comparison.density import joint_density, step_length_edges, turning_angle_edges
 from driftwalk.comparison.ks import (
     QUADRANTS,
+    ComparisonWarning,
     KsComparison,
     KsPlace,
     KsReference,
@@ -28,7 +29,6 @@ from driftwalk.comparison.statistic import (
     step_table,
 )
 from driftwalk.comparison.walk import steps
-from driftwalk.comparison.warn import ComparisonWarning
 
 __all__ = [
     "QUADRANTS",

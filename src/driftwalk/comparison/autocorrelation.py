@@ -1,19 +1,29 @@
-"""How long a series remembers: the integrated autocorrelation time."""
+"""Integrated autocorrelation time of a series."""
 
 from __future__ import annotations
+
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 Floats = npt.NDArray[np.float64]
 
-# Sokal's rule, five times 1/2 + sum of rho: beyond that lag there is more noise than correlation.
-WINDOW = 2.5
-# Fewer values than this have no correlation worth the name; also one more than the last of the lags
-# that tell how much of a series is correlated.
-FEWEST = 4
-# A correlation is significant beyond this many standard errors of that of white noise.
-SIGNIFICANT = 3.0
+
+class AutocorrelationPolicy(NamedTuple):
+    """How far an autocorrelation is summed, and when it counts."""
+
+    window: float = 2.5
+    """Largest lag, in autocorrelation times: five times 1/2 + sum of rho, the rule of Sokal."""
+    fewest: int = 4
+    """Values without which there is no correlation, and one more than the last lag that tells
+    how much of a series is correlated; chosen by hand."""
+    significant: float = 3.0
+    """Standard errors of white noise from which on a correlation is significant: 0.3 % of white
+    series."""
+
+
+_AUTOCORRELATION: Final = AutocorrelationPolicy()
 
 
 def autocorrelation_time(series: npt.ArrayLike) -> float:
@@ -54,10 +64,10 @@ def memory_time(series: npt.ArrayLike) -> float:
     1.0
     """
     rho = _autocorrelation(np.asarray(series, dtype=np.float64))
-    if rho.size < FEWEST:
+    if rho.size < _AUTOCORRELATION.fewest:
         return 1.0
-    share = float(rho[1:FEWEST].max())
-    significant = share > SIGNIFICANT / np.sqrt(rho.size)
+    share = float(rho[1 : _AUTOCORRELATION.fewest].max())
+    significant = share > _AUTOCORRELATION.significant / np.sqrt(rho.size)
     return _integrated(rho, share if significant else 1.0)
 
 
@@ -83,7 +93,7 @@ def _autocorrelation(values: Floats) -> Floats:
     """Return rho at every lag; empty where there is none."""
     centred = values - values.mean() if values.size else values
     power = float(centred @ centred)
-    if values.size < FEWEST or power <= 0.0:
+    if values.size < _AUTOCORRELATION.fewest or power <= 0.0:
         return np.empty(0)
     length = 1 << (2 * values.size - 1).bit_length()
     spectrum = np.abs(np.fft.rfft(centred, length)) ** 2
@@ -96,5 +106,5 @@ def _integrated(rho: Floats, share: float) -> float:
     if rho.size == 0:
         return 1.0
     tau = 1.0 + 2.0 * (np.cumsum(rho) - rho[0]) / share
-    beyond = np.arange(rho.size) >= WINDOW * tau
+    beyond = np.arange(rho.size) >= _AUTOCORRELATION.window * tau
     return max(1.0, float(tau[int(np.argmax(beyond)) if beyond.any() else -1]))

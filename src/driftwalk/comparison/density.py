@@ -10,8 +10,6 @@ from driftwalk.core.errors import InputError
 Floats = npt.NDArray[np.float64]
 
 BINS = 32
-# The bins reach over the central part of the lengths; one wild step must not squeeze the rest.
-SHOWN_FRACTION = 0.9995
 
 
 def step_length_edges(*step_length: npt.ArrayLike, bins: int = BINS) -> Floats:
@@ -32,7 +30,8 @@ def step_length_edges(*step_length: npt.ArrayLike, bins: int = BINS) -> Floats:
     pooled = np.concatenate([np.asarray(lengths, dtype=np.float64) for lengths in step_length])
     if pooled.size == 0:
         raise InputError("bin edges need at least one step length")
-    limit = float(np.quantile(pooled, SHOWN_FRACTION))
+    # The few longest steps would leave most bins empty.
+    limit = float(np.quantile(pooled, 0.9995))
     return np.linspace(0.0, limit if limit > 0 else 1.0, bins + 1)
 
 

@@ -22,8 +22,12 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
-from driftwalk.comparison.warn import ComparisonWarning
 from driftwalk.core.errors import InputError
+
+
+class ComparisonWarning(UserWarning):
+    """A comparison was made, but the data limit its meaning."""
+
 
 Points = npt.NDArray[np.float64]
 Ties = Literal["strict", "limits"]
@@ -32,9 +36,6 @@ Method = Literal["fasano-franceschini", "peacock"]
 
 QUADRANTS: tuple[str, ...] = ("left below", "right below", "left above", "right above")
 """Names of the quadrants 0 to 3, as seen from the origin."""
-
-# More points than this share a coordinate with another, and open quadrants lose sight of them.
-TIED_FRACTION = 0.05
 
 
 class KsPlace(NamedTuple):
@@ -266,7 +267,7 @@ def _comparison(raw: _core.KsResult, ties: Ties, combine: Combine) -> KsComparis
     d1, d2, n1, n2, tied, place1, place2 = raw
     product = n1 * n2
     tied_fraction = tied / (n1 + n2)
-    if ties == "strict" and tied_fraction > TIED_FRACTION:
+    if ties == "strict" and tied_fraction > 0.05:
         warnings.warn(
             f"{100 * tied_fraction:.0f} % of the points share a coordinate with another point, "
             'and open quadrants leave such points out: consider ties="limits"',

@@ -1,4 +1,4 @@
-"""Which samples of a recording form steps: decided once from the time stamps.
+"""Samples that form steps, decided once from the time stamps.
 
 The plan knows no positions. Built from a recording, it is applied to the recording and to every
 trajectory simulated at the same time stamps, so that both pass through the same function.
@@ -7,7 +7,7 @@ trajectory simulated at the same time stamps, so that both pass through the same
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -19,14 +19,26 @@ Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int32]
 Mode = Literal["exact", "interpolated"]
 
-TOLERANCE = 0.05
-# More intervals than this out of tolerance, and steps are formed by interpolation.
-IRREGULAR_FRACTION = 0.05
-# Interpolation bridges neighbours at most this many step intervals apart.
-BRIDGED_INTERVALS = 1.5
+
+class StepPlanPolicy(NamedTuple):
+    """Which intervals between samples make steps."""
+
+    tolerance: float = 0.05
+    """Share by which an interval may differ from the usual one; chosen by hand."""
+    irregular_fraction: float = 0.05
+    """Share of intervals out of tolerance above which steps are formed by interpolation; chosen
+    by hand."""
+    bridged_intervals: float = 1.5
+    """Step intervals between two neighbours over which positions are interpolated; chosen by
+    hand."""
+    largest_grid: int = 50_000_000
+    """Steps of a recording at most; chosen by hand."""
+
+
+STEP_PLAN: Final = StepPlanPolicy()
+
 # Time stamps are decimal fractions in binary: what is equal on paper differs in the last bits.
 ROUNDING = 1e-9
-LARGEST_GRID = 50_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +96,10 @@ class AppliedSteps(NamedTuple):
 
 
 def plan_steps(
-    time: npt.ArrayLike, *, step_interval: float | None = None, tolerance: float = TOLERANCE
+    time: npt.ArrayLike,
+    *,
+    step_interval: float | None = None,
+    tolerance: float = STEP_PLAN.tolerance,
 ) -> StepPlan:
     """Decide from time stamps which positions form steps.
 
@@ -131,7 +146,7 @@ def plan_steps(
     multiple = max(1, round(wanted / sampling))
     divides = abs(multiple * sampling - wanted) <= tolerance * wanted * (1 + ROUNDING)
     irregular = int((~within).sum())
-    if divides and irregular <= IRREGULAR_FRACTION * intervals.size:
+    if divides and irregular <= STEP_PLAN.irregular_fraction * intervals.size:
         mode: Mode = "exact"
         left, triple = _decimate(stamps, within, multiple, wanted, tolerance)
         weight = np.zeros(left.size)
@@ -153,7 +168,7 @@ def plan_steps(
         mode=mode,
         step_interval=wanted,
         samples=int(stamps.size),
-        gaps=int((intervals > BRIDGED_INTERVALS * sampling).sum()),
+        gaps=int((intervals > STEP_PLAN.bridged_intervals * sampling).sum()),
         irregular=irregular,
     )
 
@@ -243,10 +258,10 @@ def _interpolate(
 ) -> tuple[npt.NDArray[np.int64], Floats, npt.NDArray[np.int64], Floats]:
     """Return the points of a regular grid that lie between near neighbours."""
     steps = (stamps[-1] - stamps[0]) / wanted
-    if steps > LARGEST_GRID:
+    if steps > STEP_PLAN.largest_grid:
         raise InputError(
             f"a step interval of {wanted:.6g} s divides the {stamps[-1] - stamps[0]:.6g} s of "
-            f"the recording into more than {LARGEST_GRID} steps: choose a longer one "
+            f"the recording into more than {STEP_PLAN.largest_grid} steps: choose a longer one "
             "(`step_interval`)"
         )
     index = np.arange(int(np.floor(steps + ROUNDING)) + 1)
@@ -257,7 +272,7 @@ def _interpolate(
     on_right = weight > 1 - ROUNDING
     left, weight = left + on_right, np.where(on_right, 0.0, weight)
     weight[weight < ROUNDING] = 0.0
-    known = (weight == 0.0) | (width <= BRIDGED_INTERVALS * wanted * (1 + ROUNDING))
+    known = (weight == 0.0) | (width <= STEP_PLAN.bridged_intervals * wanted * (1 + ROUNDING))
     follows = np.diff(index[known]) == 1
     triple = np.flatnonzero(follows[:-1] & follows[1:])
     return left[known], weight[known], triple, grid[known]

@@ -1,4 +1,4 @@
-"""Is the difference more than chance? A permutation test that respects serial correlation.
+"""Permutation test in blocks, which respects serial correlation.
 
 The steps of a trajectory remember their past, so single steps must not be exchanged between two
 samples: at an autocorrelation time of 19 steps such a test rejects a true null 92 % of the time at
@@ -8,7 +8,7 @@ the 5 % level. Whole blocks, long against that memory, are exchanged instead.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -18,11 +18,20 @@ from driftwalk.comparison.autocorrelation import steps_memory_time
 from driftwalk.comparison.ks import Points, Ties, checked_points
 from driftwalk.core.errors import InputError
 
-# Blocks of six autocorrelation times: shorter ones reject too often.
-BLOCK_TIMES = 6.0
-# Fewer ways to deal out the blocks than this cannot reach a p-value of 5 %.
-FEWEST_ARRANGEMENTS = 20
-LABELS_AT_ONCE = 1 << 24
+
+class PermutationPolicy(NamedTuple):
+    """How blocks of steps are exchanged between two motions."""
+
+    block_times: float = 6.0
+    """Length of a block, in autocorrelation times: with shorter ones the test rejects too
+    often; chosen by hand."""
+    fewest_arrangements: int = 20
+    """Ways to exchange the blocks without which no p-value can reach 5 %."""
+    labels_at_once: int = 1 << 24
+    """Labels of blocks that are held at once; chosen by hand."""
+
+
+_PERMUTATION: Final = PermutationPolicy()
 
 
 class PermutationTest(NamedTuple):
@@ -100,11 +109,16 @@ def block_permutation_test(
     if seed < 0:
         raise InputError(f"seed must not be negative, got {seed}")
     memory = max(steps_memory_time(first), steps_memory_time(second))
-    length = math.ceil(BLOCK_TIMES * memory) if block_length is None else int(block_length)
+    length = (
+        math.ceil(_PERMUTATION.block_times * memory) if block_length is None else int(block_length)
+    )
     if length < 1:
         raise InputError(f"block_length must be at least 1, got {block_length}")
     blocks_a, blocks_b = first.shape[0] // length, second.shape[0] // length
-    if math.comb(blocks_a + blocks_b, blocks_a) < FEWEST_ARRANGEMENTS or not blocks_a * blocks_b:
+    if (
+        math.comb(blocks_a + blocks_b, blocks_a) < _PERMUTATION.fewest_arrangements
+        or not blocks_a * blocks_b
+    ):
         raise InputError(
             f"the series of {first.shape[0]} and {second.shape[0]} points hold only {blocks_a} and "
             f"{blocks_b} blocks of {length}, too few for a permutation test: record longer, or "
@@ -141,7 +155,7 @@ def _permuted(
     as_they_are = np.r_[np.zeros(blocks_a, np.uint8), np.ones(blocks_b, np.uint8)]
     block_of = np.repeat(np.arange(blocks, dtype=np.int32), length)
     rng = np.random.default_rng(seed)
-    rows = max(1, LABELS_AT_ONCE // blocks)
+    rows = max(1, _PERMUTATION.labels_at_once // blocks)
     parts = [as_they_are[None, :]]
     statistic: list[npt.NDArray[np.int64]] = []
     for begin in range(0, permutations, rows):

@@ -1,4 +1,4 @@
-"""The quantity that a calibration minimises: the distance of simulated steps from the recording's.
+"""Objective of a calibration: the distance of simulated steps from the recorded ones.
 
 A statistic is prepared once with the recording and is then given tables of steps, one row per
 simulated world. `StepDistance` is the paper's: the two-dimensional Kolmogorov-Smirnov distance of
@@ -23,8 +23,6 @@ from driftwalk.schema.trajectory import Track
 Floats = npt.NDArray[np.float64]
 
 FEWEST_PAIRS: Final = 30
-FARTHEST: Final = 1.0
-"""Distance of a world without a pair of steps."""
 
 
 class StepTable(NamedTuple):
@@ -206,7 +204,8 @@ class StepDistance:
         def one(row: int) -> tuple[float, float, float, int]:
             count = int(worlds.pairs[row])
             if count == 0:
-                return FARTHEST, 0.0, 0.0, -1
+                # No distance is farther than 1.
+                return 1.0, 0.0, 0.0, -1
             sample = np.column_stack([worlds.length[row, :count], worlds.angle[row, :count]])
             d1, d2, _, _, _, place1, place2 = native.compare(sample, False)
             x, y, quadrant, _ = place1 if d1 >= d2 else place2

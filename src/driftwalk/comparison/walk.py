@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import warnings
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from driftwalk.comparison.ks import ComparisonWarning
 from driftwalk.comparison.plan import AppliedSteps, StepPlan, apply_steps, plan_steps
-from driftwalk.comparison.warn import ComparisonWarning
 from driftwalk.core.errors import InputError
 from driftwalk.schema import body_track
 from driftwalk.schema.steps import build_steps
@@ -18,9 +18,18 @@ from driftwalk.schema.trajectory import Track
 if TYPE_CHECKING:
     import xarray as xr
 
-# More zero steps than this, and the step interval is too short for the file's resolution.
-ZERO_FRACTION = 0.05
-LONGEST_SUGGESTION = 64
+
+class StepChoicePolicy(NamedTuple):
+    """Which longer step is suggested where many steps have no length."""
+
+    zero_fraction: float = 0.05
+    """Share of steps without a length above which the step interval is too short for the
+    resolution of the file; chosen by hand."""
+    longest_suggestion: int = 64
+    """Samples of the longest step that is suggested; chosen by hand."""
+
+
+_CHOICE: Final = StepChoicePolicy()
 
 
 def steps(
@@ -96,7 +105,7 @@ def steps(
 
 def _warnings(track: Track, plan: StepPlan, applied: AppliedSteps) -> list[str]:
     zero = applied.zero_length / plan.pairs
-    if zero <= ZERO_FRACTION:
+    if zero <= _CHOICE.zero_fraction:
         return []
     return [
         f"{100 * zero:.0f} % of the step pairs hold a step of zero length, which has no direction, "
@@ -113,13 +122,13 @@ def _advice(track: Track, plan: StepPlan) -> str:
 def _longer_interval(track: Track, step_interval: float) -> float | None:
     """Return the first doubling of the interval at which few steps have zero length."""
     factor = 2
-    while factor <= LONGEST_SUGGESTION:
+    while factor <= _CHOICE.longest_suggestion:
         try:
             plan = plan_steps(track.time, step_interval=factor * step_interval)
         except InputError:
             return None
         applied = apply_steps(plan, track.x, track.y)
-        if applied.zero_length <= ZERO_FRACTION * plan.pairs:
+        if applied.zero_length <= _CHOICE.zero_fraction * plan.pairs:
             return float(np.round(plan.step_interval, 9))
         factor *= 2
     return None

@@ -5,7 +5,6 @@ reconciled with the study; times and gaps, start and camera; the flow.
 """
 
 from driftwalk.conditions.camera import possible_noises, recorded_camera, study_as_seen
-from driftwalk.conditions.jumps import jump_warnings
 from driftwalk.conditions.like import simulate_like
 from driftwalk.conditions.neighbours import Neighbours, neighbours_of
 from driftwalk.conditions.own_flow import recording_flow
@@ -15,14 +14,14 @@ from driftwalk.conditions.reading import (
     load_with_study,
     read_recordings,
 )
-from driftwalk.conditions.recorded import Conditions, recorded_conditions
+from driftwalk.conditions.recorded import Conditions, recorded_conditions, recorded_start
 from driftwalk.conditions.refuse import (
+    jump_warnings,
     require_motion,
     require_positions,
     require_travel,
     typical_speed,
 )
-from driftwalk.conditions.start import recorded_start
 from driftwalk.conditions.study import (
     About,
     estimated_study,

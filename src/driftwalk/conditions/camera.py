@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -15,16 +15,24 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
     from driftwalk.schema import Track
 
-NEGLIGIBLE_QUANTUM: Final = 0.05
-"""A file's resolution below this share of the noise is not simulated."""
-ROUGH_NOISE: Final = 0.05
-"""An estimated noise is not better known than to this part: the motion is not quite that of the
-estimate's model. Of bodies with a steady speed and a turning heading it came out 2 % too large."""
-CLEAR: Final = 2.0
-"""Standard errors by which an estimated noise is above zero before it counts as known."""
-DEVIATIONS: Final = (-0.3775, 1.3630, -1.3630, 0.3775)
-"""Middles of four equal parts of a normal distribution, scaled to variance 1, in an order that
-makes each pair of neighbours differ by a lot."""
+
+class CameraPolicy(NamedTuple):
+    """Which effects of a recording's camera are simulated."""
+
+    negligible_quantum: float = 0.05
+    """Resolution of the file, as a share of the noise, below which it is not simulated; chosen
+    by hand."""
+    rough_noise: float = 0.05
+    """Least relative error of an estimated noise, because the motion differs from the
+    estimate's model: 2 % with a steady speed and a turning heading; chosen by hand."""
+    clear: float = 2.0
+    """Standard errors by which an estimated noise must be above zero; chosen by hand."""
+    deviations: tuple[float, ...] = (-0.3775, 1.3630, -1.3630, 0.3775)
+    """Noises that are simulated, in standard errors: middles of four equal parts of a normal
+    distribution, scaled to variance 1, neighbours far apart."""
+
+
+_CAMERA: Final = CameraPolicy()
 
 
 def recorded_camera(track: Track, study: Study, *, position_quantum: float) -> Camera:
@@ -70,7 +78,9 @@ def recorded_camera(track: Track, study: Study, *, position_quantum: float) -> C
         if orientation == "estimate":
             orientation = estimate.orientation_noise_rad
     angle = float(orientation) if np.isfinite(orientation) else 0.0
-    if seen.position_quantum_m == "recording" and quantum < NEGLIGIBLE_QUANTUM * float(position):
+    if seen.position_quantum_m == "recording" and quantum < _CAMERA.negligible_quantum * float(
+        position
+    ):
         quantum = 0.0
     return Camera(float(position), angle, float(quantum))
 
@@ -109,11 +119,11 @@ def possible_noises(track: Track, study: Study, camera: Camera) -> tuple[float, 
         return (camera.position_noise,)
     estimate = estimate_tracking_noise(track)
     noise, error = estimate.position_noise_m, estimate.position_noise_standard_error_m
-    if not noise > CLEAR * error:
+    if not noise > _CAMERA.clear * error:
         return _unclear_noises(noise, error, noise_bound(track).position_noise_m, camera)
-    doubt = max(error / noise, ROUGH_NOISE)
+    doubt = max(error / noise, _CAMERA.rough_noise)
     return tuple(
-        float(camera.position_noise * np.exp(doubt * deviation)) for deviation in DEVIATIONS
+        float(camera.position_noise * np.exp(doubt * deviation)) for deviation in _CAMERA.deviations
     )
 
 
@@ -126,7 +136,7 @@ def _unclear_noises(noise: float, error: float, bound: float, camera: Camera) ->
     # The standard error of the noise comes from that of its variance, one way or the other.
     spread = max(2.0 * noise * error, error**2)
     low, high = ndtr(-(noise**2) / spread), ndtr((bound**2 - noise**2) / spread)
-    shares = low + (high - low) * ndtr(np.array(DEVIATIONS))
+    shares = low + (high - low) * ndtr(np.array(_CAMERA.deviations))
     variances = noise**2 + spread * ndtri(shares) - camera.position_quantum**2 / 12.0
     return tuple(float(one) for one in np.sqrt(np.maximum(variances, 0.0)))
 

@@ -1,12 +1,11 @@
-"""Simulation under the conditions of a recording."""
+"""Simulate under the conditions of a recording."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from driftwalk.conditions.camera import study_as_seen
-from driftwalk.conditions.recorded import sample_times
-from driftwalk.conditions.start import recorded_start
+from driftwalk.conditions.recorded import recorded_start, sample_times
 from driftwalk.simulation import simulate
 
 if TYPE_CHECKING:

@@ -1,9 +1,9 @@
-"""The other bodies of a recording, at the places where they were."""
+"""Neighbours: the other bodies of a recording, at their recorded positions."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -18,10 +18,6 @@ if TYPE_CHECKING:
     from driftwalk.schema import Track
 
 Floats = npt.NDArray[np.float64]
-
-LONGEST_GAP: Final = 5.0
-"""Longest time between two samples over which a body is taken to have moved straight on, in
-median intervals: trackers drop a frame or two, and after more nobody knows where it was."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +63,7 @@ def neighbours_of(recording: xr.Dataset, body: str | None, tank: Tank) -> Neighb
     """Return the other bodies of a recording that are in the tank; None where there are none.
 
     A body that is mostly beyond the wall is in another tank: one recording may show several. Where
-    each body has a tank of its own, with positions in that tank, none is another's neighbour.
+    each body has its own tank, none is another's neighbour.
 
     Parameters
     ----------
@@ -104,7 +100,9 @@ def _mostly_inside(track: Track, tank: Tank) -> bool:
 
 def _within_samples(time: Floats, wanted: Floats) -> npt.NDArray[np.bool_]:
     """Return which times lie between two samples that are no more than a gap apart."""
-    longest = LONGEST_GAP * float(np.median(np.diff(time)))
+    # Over five median intervals a body has moved straight on: trackers drop a frame or two, and
+    # after more its place is unknown.
+    longest = 5.0 * float(np.median(np.diff(time)))
     after = np.clip(np.searchsorted(time, wanted), 1, time.size - 1)
     close = time[after] - time[after - 1] <= longest
     return np.asarray((wanted >= time[0]) & (wanted <= time[-1]) & close)

@@ -1,4 +1,4 @@
-"""How recordings are read when a study says so and arguments go over it."""
+"""Read recordings by the [recording] section of a study, overridden by arguments."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ def _with_others(
 def load_for_run(
     path: Path, study: Study, given: Mapping[str, Any], *, tank: Tank
 ) -> tuple[xr.Dataset, bool]:
-    """Load a recording; where nobody said the tank, an arena that the file itself holds is used.
+    """Load a recording; without a stated tank, the arena of the file is used.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Recordings in which there is nothing to see: without a position, too short, or at rest.
+"""Refuse recordings without a motion: no position, too short, or at rest.
 
 A recording that is unfit for one estimator is unfit for all: each of them asks here.
 """
@@ -7,12 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from os import PathLike
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
 from driftwalk.conditions.camera import recorded_camera
 from driftwalk.core.errors import InputError
+from driftwalk.flow.arena import read_arena
+from driftwalk.record import arena_diagonal, impossible_steps, impossible_warning
 from driftwalk.schema import Track, body_names, body_track
 
 if TYPE_CHECKING:
@@ -20,14 +22,23 @@ if TYPE_CHECKING:
 
     from driftwalk.model import Study
 
-FEWEST_POSITIONS: Final = 3
-"""Two steps, the least that has a turning angle."""
-LEAST_MOTION: Final = 0.1
-"""A block that stays within this part of its side is at rest: it has seen one place of the flow."""
-LEAST_MOTION_IN_NOISES: Final = 3.0
-"""Standard deviation of the positions of a moving body, in tracking noises."""
-KEPT: Final = 0.99
-"""Share of the positions that tells how far a body goes: single jumps of the tracker do not."""
+
+class MotionPolicy(NamedTuple):
+    """Which recordings show a motion."""
+
+    fewest_positions: int = 3
+    """Positions of two steps, which have one turning angle."""
+    least_motion: float = 0.1
+    """Range of the positions, in sides of the block, below which it is at rest; chosen by hand."""
+    least_motion_in_noises: float = 3.0
+    """Standard deviation of the positions, in tracking noises, below which a body is at rest;
+    chosen by hand."""
+    kept: float = 0.99
+    """Share of the positions that the range contains: single jumps of the tracker are left out;
+    chosen by hand."""
+
+
+_MOTION: Final = MotionPolicy()
 
 
 def require_positions(recording: xr.Dataset, *, where: str | PathLike[str] = "") -> None:
@@ -87,11 +98,11 @@ def require_motion(
     except InputError as error:
         raise InputError(f"{_begin(recording, where)}{error}") from error
     most = max(track.time.size for track in tracks)
-    if most < FEWEST_POSITIONS:
+    if most < _MOTION.fewest_positions:
         rows = "1 position" if most == 1 else f"{most} positions"
         raise InputError(
             f"{_begin(recording, where)}holds {rows} in the time that is kept, at least "
-            f"{FEWEST_POSITIONS} are needed for a motion"
+            f"{_MOTION.fewest_positions} are needed for a motion"
         )
     if not any(_moves(track) for track in tracks):
         still = body_names(recording) if body is None else names
@@ -133,14 +144,14 @@ def require_travel(
     from driftwalk.model import apply_overrides
 
     begin = f"{where}: " if str(where) else ""
-    tail = 0.5 * (1.0 - KEPT)
+    tail = 0.5 * (1.0 - _MOTION.kept)
     width = max(float(np.ptp(np.quantile(axis, (tail, 1.0 - tail)))) for axis in (track.x, track.y))
     scatter = max(float(track.x.std()), float(track.y.std()))
     # The study may say what the tracker's noise should be; this is what it is.
     measured = apply_overrides(study, {"observation.position_noise_m": "estimate"})
     noise = recorded_camera(track, measured, position_quantum=0.0).position_noise
-    at_rest = of_block and width < LEAST_MOTION * study.block.side_m
-    if at_rest or scatter < LEAST_MOTION_IN_NOISES * noise:
+    at_rest = of_block and width < _MOTION.least_motion * study.block.side_m
+    if at_rest or scatter < _MOTION.least_motion_in_noises * noise:
         place = f"({np.median(track.x):.3f}, {np.median(track.y):.3f}) m"
         why = (
             f"less than a tenth of its side of {1e3 * study.block.side_m:g} mm"
@@ -196,3 +207,31 @@ def _begin(recording: xr.Dataset, where: str | PathLike[str]) -> str:
 
 def _moves(track: Track) -> bool:
     return bool(track.x.size and (np.ptp(track.x) > 0 or np.ptp(track.y) > 0))
+
+
+def jump_warnings(
+    recording: xr.Dataset, body: str | None = None, *, track: Track | None = None
+) -> list[str]:
+    """Return a warning where a body makes steps that it cannot have made; else nothing.
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        A `trajectory`.
+    body : str, optional
+        The body, where there are several.
+    track : Track, optional
+        What is used of the body; default: all of its samples.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> jump_warnings(dw.tank30_recording())
+    []
+    """
+    used = body_track(recording, body) if track is None else track
+    arena = read_arena(str(recording.attrs.get("arena", "{}")))
+    x, y = ([recording[axis].values.ravel()] for axis in ("x", "y"))
+    steps = impossible_steps(used.time, used.x, used.y, diagonal=arena_diagonal(x, y, arena))
+    name = str(recording["body"].values[0]) if body is None else body
+    return [] if steps is None else [impossible_warning(name, steps)]

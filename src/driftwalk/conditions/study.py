@@ -1,4 +1,4 @@
-"""The study of a piece of work: what the user states, with tank and block of the recording."""
+"""Merge the study: the user's statements, with tank and block of the recording."""
 
 from __future__ import annotations
 
@@ -27,10 +27,6 @@ LAW_KEYS: Final = {
     "force_memory_s": "force_memory",
 }
 """Keys of [forces], and the parameters of a fit that they hold."""
-STICKING: Final = 10.0
-"""Friction of a wall at which every contact sticks."""
-_SAME: Final = 1e-9
-"""Relative difference of two numbers up to which they are the same statement."""
 _BLOCK_ATTRIBUTES: Final = {
     "side_m": ("block_side_m", "m", "side", "`block` when the recording is loaded"),
     "mass_kg": ("block_mass_kg", "kg", "mass", "`block.mass_kg`"),
@@ -183,12 +179,13 @@ def _fitted_wall(found: xr.Dataset) -> dict[str, Any]:
         return {}
     return {
         "tank.wall_restitution": float(found["wall_restitution"]),
-        "tank.wall_friction": min(float(found["wall_friction"]), STICKING),
+        # With a friction of 10, every contact with the wall sticks.
+        "tank.wall_friction": min(float(found["wall_friction"]), 10.0),
     }
 
 
 def unstated_warning(study: Study, *, about: About) -> str | None:
-    """Return the warning that nobody stated what decides the numbers of some work.
+    """Return the warning about unstated values that decide the results.
 
     Parameters
     ----------
@@ -207,7 +204,7 @@ def unstated_warning(study: Study, *, about: About) -> str | None:
     --------
     >>> import driftwalk as dw
     >>> unstated_warning(dw.Study(), about="tank")[:60]
-    'nobody stated the tank: the default, a circle of diameter 0.'
+    'the tank was not stated: the default, a circle of diameter 0'
     >>> study = dw.conditions.study_for([dw.tank30_recording()])
     >>> unstated_warning(study, about="block") is None
     True
@@ -230,16 +227,17 @@ def unstated_warning(study: Study, *, about: About) -> str | None:
     if not assumed:
         return None
     names, values = zip(*assumed.values(), strict=True)
-    are = "the default, {}, is" if len(values) == 1 else "the defaults, {}, are"
+    one = len(values) == 1
+    were, are = ("was", "the default, {}, is") if one else ("were", "the defaults, {}, are")
     return (
-        f"nobody stated the {_listed(names)}: {are.format(_listed(values))} assumed, and the "
-        f"result holds for {'it' if len(values) == 1 else 'them'} alone; state "
+        f"the {_listed(names)} {were} not stated: {are.format(_listed(values))} assumed, and the "
+        f"result holds for {'it' if one else 'them'} alone; state "
         + _listed([f"`{key}`" for key in assumed])
     )
 
 
 def is_stated(study: Study, key: str) -> bool:
-    """Return whether somebody stated a key of a study; of a tank, its outline.
+    """Return whether a key of a study was stated; of a tank, its outline.
 
     Parameters
     ----------
@@ -287,7 +285,8 @@ def _with_block(study: Study, recording: xr.Dataset, *, stated: Collection[str])
         if name not in recording.attrs:
             continue
         own, ours = float(recording.attrs[name]), getattr(study.block, key)
-        is_same = abs(own - ours) <= _SAME * ours
+        # Up to rounding, two numbers are the same statement.
+        is_same = abs(own - ours) <= 1e-9 * ours
         if key in stated and not is_same:
             raise InputError(
                 f"{_name_of(recording)}the recording is of a block of {own:g} {unit}, and the "

@@ -1,4 +1,4 @@
-"""The outline of the tank as the flow stage needs it: inside, wall normals, where a ray leaves."""
+"""Geometry of the tank: inside test, wall normals, intersection of a ray with the wall."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which steps join two different particles? The normalised median test, and the own track."""
+"""False links of particle tracks: normalised median test, and continuity of the track."""
 
 from __future__ import annotations
 
@@ -12,15 +12,23 @@ from driftwalk.flow.track_steps import Steps
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
-THRESHOLD: Final = 4.0
-"""Normalised deviation of a false link. With 16 neighbours, 0.2 % of steps that scatter as a
-Gaussian around the same velocity reach it."""
-NEIGHBOURS: Final = 16
-FEWEST: Final = 8
-"""Neighbours without which a step is not judged: those of a vector on a grid of PIV."""
-_SEARCHED: Final = (32, 128)
-"""Nearest steps among which those of other tracks are looked for: few, then more."""
-_CHUNK: Final = 1 << 14
+
+class LinkPolicy(NamedTuple):
+    """Which steps are false links."""
+
+    threshold: float = 4.0
+    """Normalised deviation of a false link. With 16 neighbours, 0.2 % of steps that scatter as
+    a Gaussian around the same velocity reach it."""
+    neighbours: int = 16
+    """Steps of other tracks with which a step is compared; chosen by hand."""
+    fewest: int = 8
+    """Neighbours without which a step is not judged: as a vector on a grid of PIV has."""
+    searched: tuple[int, ...] = (32, 128)
+    """Nearest steps among which those of other tracks are looked for: few, then more; chosen by
+    hand."""
+
+
+LINKS: Final = LinkPolicy()
 
 
 class Judged(NamedTuple):
@@ -43,8 +51,8 @@ def judge_steps(steps: Steps, *, noise: float) -> Judged:
     """Compare every step with its neighbours, and with the steps before and after it.
 
     The normalised median test (Westerweel and Scarano, Exp. Fluids 39 (2005) 1096), on the
-    `NEIGHBOURS` nearest steps of other tracks, at any time: with the median m of their velocities,
-    by component, and the median r of their distances |v_i - m| from it, a step deviates by
+    nearest steps of other tracks, at any time: with the median m of their velocities, by component,
+    and the median r of their distances |v_i - m| from it, a step deviates by
     ``|v - m| / (r + e)``, where ``e = sqrt(2) noise / interval`` is the noise of a velocity.
 
     Where the velocity changes within the distance of the neighbours, a step may differ from them
@@ -65,7 +73,7 @@ def judge_steps(steps: Steps, *, noise: float) -> Judged:
     >>> x = np.arange(5.0)[:, None] + np.linspace(0.0, 1.0, 20)
     >>> x[3:, 7] += 9.0
     >>> steps = track_steps(build_trajectory(np.arange(5.0), x, 0.0 * x)).steps
-    >>> np.flatnonzero(judge_steps(steps, noise=0.01).is_false(THRESHOLD)).tolist()
+    >>> np.flatnonzero(judge_steps(steps, noise=0.01).is_false(LINKS.threshold)).tolist()
     [30]
     """
     middle, spread = _neighbourhood(steps)
@@ -96,16 +104,16 @@ def _neighbourhood(steps: Steps) -> tuple[Array, Array]:
     middle, spread = np.full((count, 2), np.nan), np.full(count, np.nan)
     tree = cKDTree(steps.position)
     left = np.arange(count)
-    for searched in _SEARCHED:
+    for searched in LINKS.searched:
         lacking = []
-        for start in range(0, left.size, _CHUNK):
-            at = left[start : start + _CHUNK]
+        for start in range(0, left.size, 1 << 14):
+            at = left[start : start + 1 << 14]
             _, near = tree.query(steps.position[at], min(searched, count))
             near = near.reshape(at.size, -1)
             other = steps.body[near] != steps.body[at][:, None]
-            enough = np.count_nonzero(other, axis=1) >= NEIGHBOURS
-            last = searched == _SEARCHED[-1]
-            judged = enough | (last & (np.count_nonzero(other, axis=1) >= FEWEST))
+            enough = np.count_nonzero(other, axis=1) >= LINKS.neighbours
+            last = searched == LINKS.searched[-1]
+            judged = enough | (last & (np.count_nonzero(other, axis=1) >= LINKS.fewest))
             lacking.append(at[~enough])
             chosen = near[judged], other[judged]
             middle[at[judged]], spread[at[judged]] = _medians(steps.velocity, *chosen)
@@ -114,8 +122,8 @@ def _neighbourhood(steps: Steps) -> tuple[Array, Array]:
 
 
 def _medians(velocity: Array, near: npt.NDArray[np.intp], other: Mask) -> tuple[Array, Array]:
-    """Return both medians over the first `NEIGHBOURS` of the near steps that are of others."""
-    first = np.argsort(~other, axis=1, kind="stable")[:, :NEIGHBOURS]
+    """Return both medians over the nearest steps of other tracks."""
+    first = np.argsort(~other, axis=1, kind="stable")[:, : LINKS.neighbours]
     there = np.take_along_axis(other, first, axis=1)
     around = velocity[np.take_along_axis(near, first, axis=1)]
     around[~there] = np.nan

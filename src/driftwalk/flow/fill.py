@@ -1,4 +1,4 @@
-"""Cells without data: a smooth continuation of the measured ones that respects the wall."""
+"""Fill empty cells by a smooth interpolation of the measured ones that respects the wall."""
 
 from __future__ import annotations
 
@@ -15,11 +15,6 @@ Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 Indices = npt.NDArray[np.intp]
 
-_NEIGHBOURS = ((0, 1), (0, -1), (1, 0), (-1, 0))
-_NEAREST_WALL = 1e-3
-"""Least distance between a node and the wall, in cells, so that a node on the wall stays finite."""
-_TOLERANCE = 1e-10
-"""Residual of the solution relative to the data."""
 _MAX_ITERATIONS = 20_000
 """Ten times what an 800 x 800 grid with one known cell in 2000 needs."""
 
@@ -92,7 +87,7 @@ def _continue(field: Array, known: Mask, domain: Mask, grid: Grid, wall: Outline
     number[unknown] = np.arange(unknown.size)
     pairs, blocks = [], np.zeros((unknown.size, 2, 2))
     right = np.zeros((unknown.size, 2))
-    for step in _NEIGHBOURS:
+    for step in ((0, 1), (0, -1), (1, 0), (-1, 0)):
         neighbour = _neighbour(unknown, step, grid.shape)
         linked = (neighbour >= 0) & domain.ravel()[neighbour]
         blocks[linked] += np.eye(2)
@@ -123,7 +118,8 @@ def _wall_blocks(node: Indices, step: tuple[int, int], grid: Grid, wall: Outline
     dy = np.full(node.size, step[0] * (grid.y[1] - grid.y[0]))
     dx = np.full(node.size, step[1] * (grid.x[1] - grid.x[0]))
     part, normal = wall.leave(grid.x[column], grid.y[row], dx, dy)
-    weight = 1.0 / np.maximum(part, _NEAREST_WALL)
+    # A node on the wall stays finite.
+    weight = 1.0 / np.maximum(part, 1e-3)
     return np.asarray(weight[:, None, None] * normal[:, :, None] * normal[:, None, :])
 
 
@@ -148,7 +144,7 @@ def _solve(pairs: npt.NDArray[np.intp], blocks: Array, right: Array) -> Array:
     solution, unfinished = cg(
         matrix,
         right.ravel(),
-        rtol=_TOLERANCE,
+        rtol=1e-10,
         maxiter=_MAX_ITERATIONS,
         M=diags(1.0 / matrix.diagonal()),
     )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -13,9 +12,6 @@ from driftwalk.flow.grid import Grid
 from driftwalk.schema import FLAGS
 
 Mask = npt.NDArray[np.bool_]
-
-SPARSE_SHARE: Final = 0.25
-"""Share of measured cells below which the field is mostly a guess, and says so."""
 
 
 def flags_of(grid: Grid, outline: Outline | None, measured: Mask) -> npt.NDArray[np.int8]:
@@ -66,7 +62,8 @@ def coverage_warnings(
     []
     """
     sentences = []
-    if share < SPARSE_SHARE:
+    # With fewer measured cells the field is mostly a guess; chosen by hand.
+    if share < 0.25:
         sentences.append(
             f"Only {100.0 * share:.0f} % of {cells} are measured, the others are filled "
             "in: record for longer, or use larger cells."

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Final, Literal, get_args
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -22,12 +22,22 @@ Array = npt.NDArray[np.float64]
 Velocity = Callable[[Array, Array], tuple[Array, Array]]
 Family = Literal["swirl", "eddies"]
 
-CELLS: Final = 60
-"""Cells across the tank: narrower than any jet or eddy that is drawn."""
-JETS: Final = 4
-WAVES: Final = 25
-WAVE_NUMBER: Final = 3.75
-"""Standard deviation of each component of a wave's number, in radians per radius of the tank."""
+
+class RandomFlowPolicy(NamedTuple):
+    """What random flows are made of."""
+
+    cells: int = 60
+    """Cells across the tank: smaller than any jet or eddy; chosen by hand."""
+    jets: int = 4
+    """Jets of a flow with jets; chosen by hand."""
+    waves: int = 25
+    """Waves of a flow of eddies; chosen by hand."""
+    wave_number: float = 3.75
+    """Standard deviation of each component of a wave's number, in radians per radius of the
+    tank; chosen by hand."""
+
+
+_RANDOM_FLOW: Final = RandomFlowPolicy()
 
 
 def random_tank_flow(
@@ -87,7 +97,7 @@ def random_tank_flow(
         velocity = _scaled(velocity, speed / _rms_speed(velocity, outline))
     parameters = {"seed": seed, "family": family, "speed": speed}
     attrs = {"method": "random tank flow", "parameters": json.dumps(parameters)}
-    return flow_from_function(velocity, arena=described, cells=CELLS, attrs=attrs)
+    return flow_from_function(velocity, arena=described, cells=_RANDOM_FLOW.cells, attrs=attrs)
 
 
 def _middle(outline: Outline) -> tuple[float, float, float]:
@@ -102,7 +112,7 @@ def _swirl(generator: np.random.Generator, outline: Outline) -> Velocity:
     rotation = generator.uniform(0.25, 0.6) * generator.choice([-1.0, 1.0])
     sink = generator.uniform(0.05, 0.25)
     jets = []
-    for _ in range(JETS):
+    for _ in range(_RANDOM_FLOW.jets):
         at = generator.uniform(0.0, 2.0 * math.pi)
         heading = at + math.pi + generator.uniform(-0.8, 0.8)
         width = generator.uniform(0.02, 0.04) / 0.15
@@ -126,9 +136,9 @@ def _swirl(generator: np.random.Generator, outline: Outline) -> Velocity:
 
 def _eddies(generator: np.random.Generator, outline: Outline) -> Velocity:
     center_x, center_y, radius = _middle(outline)
-    numbers = generator.normal(0.0, WAVE_NUMBER, (WAVES, 2))
-    heights = generator.normal(size=WAVES)
-    phases = generator.uniform(0.0, 2.0 * math.pi, WAVES)
+    numbers = generator.normal(0.0, _RANDOM_FLOW.wave_number, (_RANDOM_FLOW.waves, 2))
+    heights = generator.normal(size=_RANDOM_FLOW.waves)
+    phases = generator.uniform(0.0, 2.0 * math.pi, _RANDOM_FLOW.waves)
     typical, sink = generator.uniform(0.04, 0.07), generator.uniform(0.1, 0.3)
 
     def stirred(x: Array, y: Array) -> tuple[Array, Array]:
@@ -160,7 +170,7 @@ def _scaled(velocity: Velocity, factor: float) -> Velocity:
 
 def _rms_speed(velocity: Velocity, outline: Outline) -> float:
     """Return the root mean square speed over the nodes in the tank [m/s]."""
-    x, y = (part.ravel() for part in make_grid(outline, cells=CELLS).nodes())
+    x, y = (part.ravel() for part in make_grid(outline, cells=_RANDOM_FLOW.cells).nodes())
     inside = outline.depth(x, y) >= 0.0
     u, v = velocity(x[inside], y[inside])
     return math.sqrt(float(np.mean(u**2 + v**2)))

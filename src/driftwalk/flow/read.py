@@ -16,11 +16,10 @@ from driftwalk.core.files.file_names import text_of_name
 from driftwalk.flow.arena import Outline, outline_of, read_arena
 from driftwalk.flow.fill import fill_velocity
 from driftwalk.flow.grid import Grid
-from driftwalk.flow.readers.formats import read_raw
+from driftwalk.flow.readers import davis, insight, openpiv, pivlab, table
 from driftwalk.flow.readers.netcdf import to_si
 from driftwalk.flow.readers.pivlab import is_pivlab
-from driftwalk.flow.readers.raw import FieldOptions
-from driftwalk.flow.readers.units import raw_to_si
+from driftwalk.flow.readers.units import FieldOptions, RawField, raw_to_si
 from driftwalk.flow.rows import grid_rows
 from driftwalk.schema import FLAGS, build_flow_field, check_flow_field
 from driftwalk.schema.stores.contents import check_contents
@@ -30,9 +29,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Array = npt.NDArray[np.float64]
-
-FASTEST_M_S: Final = 1e4
-"""A few times the speed of sound in water: a wrong unit, or a number that means none."""
 
 
 def load_flow(
@@ -172,7 +168,8 @@ def _new_field(
     grid = Grid(x, y, float(x[1] - x[0]))
     frames = velocity.reshape(-1, y.size, x.size, 2)
     fastest = float(np.abs(frames[np.isfinite(frames)]).max(initial=0.0))
-    if fastest > FASTEST_M_S:
+    # Beyond a few times the speed of sound in water, the unit is wrong.
+    if fastest > 1e4:
         raise InputError(
             f"the flow reaches {fastest:.3g} m/s, as no water does: is its unit right?"
         )
@@ -208,3 +205,40 @@ def _fill(
     grid: Grid, velocity: Array, known: npt.NDArray[np.bool_], outline: Outline | None
 ) -> Array:
     return velocity if known.all() else fill_velocity(grid, velocity, known=known, outline=outline)
+
+
+_TEXTS: Final = {"davis": davis, "insight": insight, "openpiv": openpiv}
+
+
+def piv_format(path: Path) -> str | None:
+    """Return the name of the PIV program that wrote a file, None of any other file.
+
+    Raises
+    ------
+    FormatError
+        When the file cannot be opened, or is one that only its program reads.
+    """
+    davis.refuse_binary(path)
+    try:
+        if pivlab.is_pivlab(path):
+            return "pivlab"
+        with path.open("rb") as file:
+            head = file.read(1 << 14)
+    except OSError as error:
+        raise FormatError(f"cannot be opened: {error.strerror or error}", path=path) from error
+    text = head.removeprefix(b"\xef\xbb\xbf").decode("utf-8", "replace")
+    return next((name for name, reader in _TEXTS.items() if reader.sniff(text, path)), None)
+
+
+def read_raw(path: Path) -> RawField:
+    """Read a field that is no NetCDF file.
+
+    Raises
+    ------
+    FormatError
+        When it cannot be read.
+    """
+    name = piv_format(path)
+    if name == "pivlab":
+        return pivlab.read(path)
+    return table.read(path) if name is None else _TEXTS[name].read(path)

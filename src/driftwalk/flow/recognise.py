@@ -1,22 +1,18 @@
-"""Whether a file holds a flow field, and who wrote it: recordings are files of the same endings."""
+"""Recognise flow-field files and their program: recordings have the same file endings."""
 
 from __future__ import annotations
 
 from os import PathLike
 from pathlib import Path
-from typing import Final
 
 from driftwalk.core.errors import InputError
+from driftwalk.flow.read import piv_format
 from driftwalk.flow.readers import openpiv
-from driftwalk.flow.readers.formats import piv_format
 from driftwalk.flow.readers.netcdf import holds_velocities
 from driftwalk.flow.readers.pivlab import holds_velocities as holds_pivlab, is_pivlab
 from driftwalk.flow.readers.table import is_field_table
 from driftwalk.flow.rows import grid_rows
 from driftwalk.schema.stores.netcdf import is_netcdf, kind_of, open_netcdf
-
-LARGEST_BYTES: Final = 64 << 20
-"""Rows without a header in a larger file are taken for a recording."""
 
 
 def flow_format(path: str | PathLike[str]) -> str | None:
@@ -71,7 +67,8 @@ def _netcdf_format(path: Path) -> str | None:
 
 
 def _fills_a_grid(path: Path) -> bool:
-    if path.stat().st_size > LARGEST_BYTES:
+    # Rows without a header in a larger file are taken for a recording.
+    if path.stat().st_size > 64 << 20:
         return False
     try:
         grid_rows(openpiv.read(path).rows, path)

@@ -1,4 +1,4 @@
-"""From rows x, y, u, v in any order to a regular grid."""
+"""Sort rows x, y, u, v onto a regular grid."""
 
 from __future__ import annotations
 
@@ -13,11 +13,6 @@ from driftwalk.flow.grid import round_nodes
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
-
-_SAME = 1e-6
-"""Positions that differ by less than this part of the field's width are one."""
-_EVEN = 0.02
-"""How far a node may lie off an even grid, in spacings: positions are printed with few digits."""
 
 
 @dataclass(frozen=True)
@@ -81,14 +76,15 @@ def _axis(name: str, values: Array, line: Indices, path: Path) -> tuple[Array, I
     width = float(np.ptp(values))
     if width == 0.0:
         raise FormatError(f"all rows have the same {name}: a grid needs 2 at least", path=path)
-    is_new = np.concatenate([[False], np.diff(values[order]) > _SAME * width])
+    is_new = np.concatenate([[False], np.diff(values[order]) > 1e-6 * width])
     number = np.empty(values.size, dtype=np.intp)
     number[order] = np.cumsum(is_new)
     count = np.bincount(number)
     nodes = np.bincount(number, weights=values) / count
     even = np.linspace(nodes[0], nodes[-1], nodes.size)
-    if abs(nodes - even).max() > _EVEN * (even[1] - even[0]):
-        # Most likely one row has a wrong position, which makes a line of nodes of its own.
+    # Positions are printed with few digits.
+    if abs(nodes - even).max() > 0.02 * (even[1] - even[0]):
+        # Most likely one row has a wrong position, which makes a separate line of nodes.
         rarest = int(count.argmin())
         at = int(np.flatnonzero(number == rarest)[0])
         raise FormatError(

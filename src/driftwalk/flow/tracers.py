@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +13,7 @@ import numpy.typing as npt
 from driftwalk.core.errors import InputError
 from driftwalk.flow.arena import Outline, outline_of, read_arena
 from driftwalk.flow.cell_means import CellMeans, Samples, average_cells
-from driftwalk.flow.false_links import THRESHOLD, judge_steps
+from driftwalk.flow.false_links import LINKS, judge_steps
 from driftwalk.flow.fill import fill_velocity
 from driftwalk.flow.grid import Grid, make_grid
 from driftwalk.flow.measured import coverage_warnings, flags_of, measured_share
@@ -26,12 +26,20 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
-USUAL_NOISE_PX = 0.1
-"""Position noise of a tracker of particles, where the tracks are too short to tell [pixels]."""
-MANY_REJECTED = 0.1
-"""Share of false links above which the linking as a whole is in doubt."""
-LONG_STEP = 1.0
-"""Median step, in cells, above which the steps blur the field."""
+
+class TracerPolicy(NamedTuple):
+    """When tracks of tracers are in doubt."""
+
+    usual_noise_px: float = 0.1
+    """Position noise of a tracker of particles, where the tracks are too short to tell
+    [pixels]; chosen by hand."""
+    many_rejected: float = 0.1
+    """Share of false links above which the linking as a whole is in doubt."""
+    long_step: float = 1.0
+    """Median step, in cells, above which the steps blur the field; chosen by hand."""
+
+
+_TRACERS: Final = TracerPolicy()
 
 
 def flow_from_tracers(
@@ -41,7 +49,7 @@ def flow_from_tracers(
     cells: int = 50,
     cell_size: float | None = None,
     position_noise: float | None = None,
-    outlier_threshold: float = THRESHOLD,
+    outlier_threshold: float = LINKS.threshold,
     min_count: int = 1,
 ) -> xr.Dataset:
     """Estimate the velocity of the water from the tracks of passive tracers (PTV).
@@ -182,7 +190,7 @@ def _noise(trajectory: xr.Dataset, steps: Steps) -> float:
     rounding = float(trajectory.attrs.get("position_quantum_m") or 0.0) / math.sqrt(12.0)
     estimate = step_noise(steps)
     if math.isnan(estimate):
-        estimate = USUAL_NOISE_PX * float(trajectory.attrs.get("metres_per_pixel") or 0.0)
+        estimate = _TRACERS.usual_noise_px * float(trajectory.attrs.get("metres_per_pixel") or 0.0)
     return max(estimate, rounding)
 
 
@@ -199,13 +207,13 @@ def _doubts(steps: Steps, grid: Grid, means: CellMeans, settings: Mapping[str, A
     sentences = []
     rejected, judged = settings["samples_rejected"], settings["samples_used"]
     judged += rejected - settings["samples_unjudged"]
-    if rejected > MANY_REJECTED * judged:
+    if rejected > _TRACERS.many_rejected * judged:
         sentences.append(
             f"{rejected} of {judged} steps fit neither their neighbours nor their own track and "
             "were left out: are the tracks linked rightly, or are these no passive tracers?"
         )
     length = float(np.median(np.hypot(*steps.velocity.T) * steps.interval))
-    if length > LONG_STEP * grid.cell_size:
+    if length > _TRACERS.long_step * grid.cell_size:
         sentences.append(
             f"The usual step is {1e3 * length:.3g} mm long and a cell {1e3 * grid.cell_size:.3g} "
             "mm: the steps blur the field; use larger cells."

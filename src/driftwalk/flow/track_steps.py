@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -17,11 +17,6 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
 Mask = npt.NDArray[np.bool_]
-
-GAP_FACTOR: Final = 1.5
-"""Multiple of the usual interval above which an interval is a gap, as for `local_quadratic`."""
-_MIN_WINDOWS: Final = 50
-"""Fourth differences that a noise is estimated from, at least."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +68,7 @@ class FoundSteps:
 def track_steps(trajectory: xr.Dataset) -> FoundSteps:
     """Return the steps of all bodies of a recording.
 
-    An interval longer than `GAP_FACTOR` times the median one of all tracks is a gap. Where the
+    An interval longer than `1.5` times the median one of all tracks is a gap. Where the
     tracker says that identities could have been exchanged (``ambiguous``), there is no step.
 
     Parameters
@@ -99,11 +94,11 @@ def track_steps(trajectory: xr.Dataset) -> FoundSteps:
     first = np.flatnonzero(body[1:] == body[:-1])
     if first.size == 0:
         raise InputError(
-            "no body has two positions, and a velocity needs two: is each row a body of its own? "
+            "no body has two positions, and a velocity needs two: is each row a separate body? "
             "Name the column of the identities with `columns`"
         )
     interval = np.diff(time)[first]
-    near = interval <= GAP_FACTOR * float(np.median(interval))
+    near = interval <= 1.5 * float(np.median(interval))
     sure = np.ones(first.size, dtype=bool)
     if "ambiguous" in trajectory:
         unsure = (trajectory["ambiguous"].values.T > 0.0)[body, row]
@@ -152,7 +147,8 @@ def step_noise(steps: Steps) -> float:
     if steps.time.size < 4:
         return math.nan
     in_a_row = np.lib.stride_tricks.sliding_window_view(steps.goes_on, 3).all(axis=1)
-    if np.count_nonzero(in_a_row) < _MIN_WINDOWS:
+    # With fewer fourth differences the noise is not known.
+    if np.count_nonzero(in_a_row) < 50:
         return math.nan
     window = np.flatnonzero(in_a_row)[:, None] + np.arange(4)
     interval = steps.interval[window]

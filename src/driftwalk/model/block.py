@@ -63,7 +63,7 @@ class Block(Section):
         if word is not None or number is not None:
             return build(data)
         block = build({**data, "depth": "immersed"})
-        # A default is not stated: a run says which numbers nobody gave.
+        # A default is not stated: a run reports which numbers are defaults.
         block.model_fields_set.discard("depth")
         return block
 

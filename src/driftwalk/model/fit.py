@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
-from typing import Annotated, ClassVar, Final, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, field_validator, model_validator
 
@@ -12,9 +12,6 @@ from driftwalk.core.errors import ConfigurationError
 from driftwalk.model.section import Placeholder, Quantity, Section
 
 Time = Annotated[float, Quantity("s", ge=-1e12, le=1e12)]
-
-MOST_CELLS: Final = 24
-"""Most cells of knots across a tank with spacing "auto": the work grows with their fourth power."""
 
 
 class Fit(Section):
@@ -200,4 +197,5 @@ class Fit(Section):
         """Return the distance between knots [m] for a block and the larger side of a tank."""
         if self.spline_spacing_m != "auto":
             return self.spline_spacing_m
-        return max(2.0 * side_m / 3.0, widest_m / MOST_CELLS)
+        # The work grows with the fourth power of the cells of knots across the tank.
+        return max(2.0 * side_m / 3.0, widest_m / 24)

@@ -10,8 +10,6 @@ from pydantic import Field, field_validator
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.model.section import Quantity, Section
 
-LONGEST_AUTOMATIC_STEP_S = 0.010
-
 
 class Pose(Section):
     """A pose: position [m] and orientation [rad] in the frame of the tank's centre."""
@@ -93,7 +91,7 @@ def resolve_time_step(time_step_s: float | Literal["auto"], *, force_interval_s:
     """
     if time_step_s == "auto":
         # The margin keeps an interval such as 0.03, which is not a binary fraction, at three steps.
-        parts = max(1, math.ceil(force_interval_s / LONGEST_AUTOMATIC_STEP_S - 1e-9))
+        parts = max(1, math.ceil(force_interval_s / 0.010 - 1e-9))
         return force_interval_s / parts
     ratio = force_interval_s / time_step_s
     parts = round(ratio)

@@ -19,7 +19,6 @@ KEYS_OF_SHAPE: Final[dict[str, tuple[str, ...]]] = {
     "rectangle": ("width_m", "height_m"),
     "polygon": ("vertices_m",),
 }
-DEFAULT_DIAMETER_M: Final = 0.30
 
 
 class Outline(Section):
@@ -58,7 +57,7 @@ class Outline(Section):
             return build(data)
         if data.get("diameter_m") is not None:
             return build(data)
-        outline = build({**data, "diameter_m": DEFAULT_DIAMETER_M})
+        outline = build({**data, "diameter_m": 0.30})
         # A default is not stated: it gives way to the tank of a recording.
         outline.model_fields_set.discard("diameter_m")
         return outline

@@ -19,9 +19,6 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
-SLOWEST_M_S = 1e-6
-"""Mean speed in the second half of a run below which a world does not move, as in the core."""
-
 
 def observe_worlds(
     x: Floats, y: Floats, theta: Floats | None, like: Conditions, keys: Keys
@@ -87,7 +84,8 @@ def _status(
         sound &= np.isfinite(theta).all(axis=1)
     half = sample_time.size // 2
     path = sum(np.abs(np.diff(values[:, half:], axis=1)).sum(axis=1) for values in (x, y))
-    still = sound & (path < SLOWEST_M_S * (sample_time[-1] - sample_time[half]))
+    # A slower world does not move, as in the core.
+    still = sound & (path < 1e-6 * (sample_time[-1] - sample_time[half]))
     status = np.where(sound, 0, STATUS["non_finite"]) | np.where(still, STATUS["no_motion"], 0)
     return np.asarray(status, dtype=np.uint32)
 

@@ -65,7 +65,7 @@ def motion_model(
 
     A name is a member of the family and parts that are added to it, "run_rest+wall"; `models`
     lists the members with their parameters. A parameter may get a value that is known, and is then
-    not searched, or a range of its own.
+    not searched, or another range.
 
     A function is called as ``function(scene, speed=0.05, tumble_rate=1.2)``. `Scene` holds the
     times at which positions are wanted, the start, the number of worlds, and random numbers with

@@ -6,7 +6,7 @@ import hashlib
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
@@ -29,9 +29,6 @@ if TYPE_CHECKING:
 Settings = Literal["one", "many"]
 Positions = tuple[Floats, Floats] | tuple[Floats, Floats, Floats]
 MotionFunction = Callable[..., Positions]
-
-SAMPLES_PER_CALL: Final = 4_000_000
-"""Samples that one call of a function may have to return: some 100 MB of positions."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +84,8 @@ class FunctionModel:
         InputError
             When the function fails or returns something else than positions.
         """
-        most = max(SAMPLES_PER_CALL // like.sample_time.size, 1)
+        # Some 100 MB of positions for each call.
+        most = max(4_000_000 // like.sample_time.size, 1)
         batches = world_batches(
             [values[one.name] for one in self.parameters],
             most=most,

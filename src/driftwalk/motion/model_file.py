@@ -169,7 +169,7 @@ def _model(
     if isinstance(found, MotionModel):
         if parameters or ranges or settings != "one":
             raise ConfigurationError(
-                f"{where} is a model with ranges and settings of its own: change them in the file"
+                f"{where} is a model that declares its ranges and settings: change them in the file"
             )
         _require_parameters(found, where)
         return found

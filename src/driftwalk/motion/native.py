@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from driftwalk import _core
 from driftwalk.comparison import StepReference
+from driftwalk.comparison.density import BINS
 from driftwalk.conditions.recorded import Conditions
 from driftwalk.motion.protocol import Details, Floats, Keys, Scores
-from driftwalk.motion.score import DENSITY_BINS, excerpt_samples
+from driftwalk.motion.score import excerpt_samples
 
 
 def scored(
@@ -30,7 +31,7 @@ def scored(
             weight=reference.plan.weight,
             triple=reference.plan.triple,
             reference=reference.steps,
-            bins=DENSITY_BINS if full else 0,
+            bins=BINS if full else 0,
             length_limit=reference.length_limit,
             angle_limit=reference.angle_limit,
             excerpt=excerpt_samples(like) if full else 0,

@@ -4,7 +4,7 @@ Anything with these attributes and methods can be calibrated; nothing is inherit
 four promises, to which `driftwalk.testing.MotionModelContract` holds it:
 
 1. A world is a function of its values, the conditions and its key alone. The same bits come out
-   whatever else is in the batch, in whatever order, with however many threads.
+   whatever the rest of the batch, its order and the number of threads.
 2. Failure is data: a world that lost its numbers has a status, the others go on.
 3. Worlds are what the camera of the recording would have seen: at its time stamps, with its noise,
    its resolution and its field of view.

@@ -13,7 +13,7 @@ Keys = npt.NDArray[np.uint64]
 
 
 class WorldRandom:
-    """Random numbers of many worlds, each from a stream of its own.
+    """Random numbers of many worlds, each from its own stream.
 
     A stream is NumPy's Philox generator with the world's key, so a world draws the same numbers
     alone or in any batch.

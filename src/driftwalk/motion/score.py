@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk.comparison import Statistic, StepDistance, StepReference, StepTable, step_table
+from driftwalk.comparison.density import BINS
 from driftwalk.conditions.recorded import Conditions
 from driftwalk.motion.protocol import Details, Keys, MotionModel, Scores, ScoresItself, Values
 from driftwalk.simulation.backend import BROKEN
-
-DENSITY_BINS: Final = 32
-EXCERPT_S: Final = 30.0
 
 
 def score_worlds(
@@ -106,7 +102,7 @@ def broken_worlds(status: npt.NDArray[np.uint32]) -> npt.NDArray[np.bool_]:
 
 def excerpt_samples(like: Conditions) -> int:
     """Return the number of samples in the first 30 seconds."""
-    return int(np.searchsorted(like.sample_time, EXCERPT_S, side="right"))
+    return int(np.searchsorted(like.sample_time, 30.0, side="right"))
 
 
 def step_densities(reference: StepReference, table: StepTable) -> npt.NDArray[np.float32]:
@@ -114,14 +110,12 @@ def step_densities(reference: StepReference, table: StepTable) -> npt.NDArray[np
 
     The last bin of the lengths holds all longer steps, the outer bins of the angles all beyond.
     """
-    density = np.zeros((table.pairs.size, DENSITY_BINS, DENSITY_BINS), dtype=np.float32)
-    across = table.length / reference.length_limit * DENSITY_BINS
-    around = (table.angle / reference.angle_limit + 1.0) * 0.5 * DENSITY_BINS
-    row, column = (
-        np.clip(place, 0.0, DENSITY_BINS - 1.0).astype(np.int64) for place in (across, around)
-    )
+    density = np.zeros((table.pairs.size, BINS, BINS), dtype=np.float32)
+    across = table.length / reference.length_limit * BINS
+    around = (table.angle / reference.angle_limit + 1.0) * 0.5 * BINS
+    row, column = (np.clip(place, 0.0, BINS - 1.0).astype(np.int64) for place in (across, around))
     for world, count in enumerate(table.pairs):
-        cell = row[world, :count] * DENSITY_BINS + column[world, :count]
-        counts = np.bincount(cell, minlength=DENSITY_BINS**2)
-        density[world] = counts.reshape(DENSITY_BINS, DENSITY_BINS) / np.float32(max(count, 1))
+        cell = row[world, :count] * BINS + column[world, :count]
+        counts = np.bincount(cell, minlength=BINS**2)
+        density[world] = counts.reshape(BINS, BINS) / np.float32(max(count, 1))
     return density

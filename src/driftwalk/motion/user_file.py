@@ -32,7 +32,7 @@ class UserFile:
 
 
 def load_user_file(path: Path) -> UserFile:
-    """Run a Python file as a module of its own.
+    """Run a Python file as a module.
 
     Raises
     ------

@@ -6,19 +6,28 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.text.argument_text import argument_text
-from driftwalk.record.circle import ENOUGH_VISITED, fit_circle, tank_radius_bound
+from driftwalk.record.circle import CIRCLE, fit_circle, tank_radius_bound
 from driftwalk.record.raw import Array
 
-INSIDE = 0.999
-"""Share of the samples that must lie within an arena for its centre to be the file's origin."""
-MOST_BEYOND = 0.001
-"""Share of the samples that may lie farther beyond the wall than noise takes them."""
+
+class ArenaPolicy(NamedTuple):
+    """How many positions may lie outside an arena."""
+
+    inside: float = 0.999
+    """Share of the samples that must lie within an arena for its centre to be the file's
+    origin: tracking errors are rarer; chosen by hand."""
+    most_beyond: float = 0.001
+    """Share of the samples that may lie farther beyond the wall than noise takes them; chosen
+    by hand."""
+
+
+_ARENA: Final = ArenaPolicy()
 
 
 @dataclass(frozen=True)
@@ -148,7 +157,7 @@ def _fitted(x: Array, y: Array, *, block_side: float | None) -> PlacedArena:
             f"centres reach {fit.radius:.4g} m, so the tank's radius is at least {radius:.4g} m, "
             "and this if a face of the block lay against the wall"
         ]
-    if fit.coverage < ENOUGH_VISITED:
+    if fit.coverage < CIRCLE.enough_visited:
         notes.append(
             f"the body came near the rim in {fit.coverage:.0%} of the directions only: "
             "the fitted circle is uncertain"
@@ -205,15 +214,15 @@ def _rectangle(
 
 
 def _inside(inside: np.ndarray[Any, np.dtype[np.bool_]]) -> bool:
-    return bool(inside.size) and float(inside.mean()) >= INSIDE
+    return bool(inside.size) and float(inside.mean()) >= _ARENA.inside
 
 
 def _outside(beyond: Array, size: float, reach: Reach) -> list[str]:
     """Return what to say where more positions lie beyond the wall than noise takes there."""
-    if (beyond > 0.0).sum() <= MOST_BEYOND * beyond.size:
+    if (beyond > 0.0).sum() <= _ARENA.most_beyond * beyond.size:
         return []
     outside = int((beyond > reach(size)).sum())
-    if outside <= MOST_BEYOND * beyond.size:
+    if outside <= _ARENA.most_beyond * beyond.size:
         return []
     return [
         f"{outside} of {beyond.size} positions lie outside the arena: its size, or the scale, is "
@@ -223,7 +232,7 @@ def _outside(beyond: Array, size: float, reach: Reach) -> list[str]:
 
 def _polygon(path: Path) -> PlacedArena:
     from driftwalk.record.head import read_header
-    from driftwalk.record.layout import TableLayout
+    from driftwalk.record.raw import TableLayout
     from driftwalk.record.text import read_table
 
     names, delimiter, skip, has_header = read_header(path)

@@ -1,4 +1,4 @@
-"""Find the row of a text table that cannot be read, and say what is wrong with it.
+"""Find the unreadable row of a text table and its error.
 
 Slow and plain: it runs only on a block that has already failed.
 """
@@ -9,7 +9,7 @@ import csv
 from pathlib import Path
 
 from driftwalk.core.errors import FormatError
-from driftwalk.record.layout import MISSING, TableLayout
+from driftwalk.record.raw import MISSING, TableLayout
 
 DELIMITER_NAMES = {",": "a comma", "\t": "a tab", ";": "a semicolon", " ": "blanks"}
 

@@ -1,10 +1,10 @@
-"""The circle that a body's centre stays in, found robustly, and what it says about the tank."""
+"""Robust circle fit to the positions of a body, and the tank that it implies."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -13,21 +13,35 @@ from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.units import parse_quantity
 from driftwalk.record.raw import Array, RawBody
 
-DIRECTIONS = 72
-SECTORS = 36
-TRIMMED_SHARE = 2e-4
-"""Share of the samples, in every direction, that may lie outside: tracking errors."""
-STRAY = 1.15
-"""Samples beyond this many radii of a first fit are tracking errors, if they are few."""
-STRAY_SHARE = 0.01
-OUTER = 0.9
-"""Share of the directions in which the fitted circle encloses the samples."""
-RIM = 0.85
-"""A sector counts as visited when a sample lies beyond this share of the radius."""
-OUTSIDE = 0.05
-"""Percentage of the samples beyond each side of a rectangle: tracking errors."""
-ENOUGH_VISITED = 0.5
-"""Share of the sectors of a circle from which on it says something about the tank."""
+
+class CirclePolicy(NamedTuple):
+    """How the circle of a body's centres is fitted, and what it may leave out."""
+
+    directions: int = 72
+    """Directions in which the outline of the samples is taken; chosen by hand."""
+    sectors: int = 36
+    """Sectors that a body may have visited; chosen by hand."""
+    trimmed_share: float = 2e-4
+    """Share of the samples that may lie outside in each direction: tracking errors; chosen by
+    hand."""
+    stray: float = 1.15
+    """Radii of a first fit beyond which samples are tracking errors, if they are few; chosen by
+    hand."""
+    stray_share: float = 0.01
+    """Share of the samples that are few; chosen by hand."""
+    outer: float = 0.9
+    """Share of the directions in which the fitted circle encloses the samples; chosen by hand."""
+    rim: float = 0.85
+    """Share of the radius beyond which a sample visits its sector; chosen by hand."""
+    outside_percent: float = 0.05
+    """Percentage of the samples beyond each side of a rectangle: tracking errors; chosen by
+    hand."""
+    enough_visited: float = 0.5
+    """Share of the sectors that must be visited for a circle to tell about the tank; chosen by
+    hand."""
+
+
+CIRCLE: Final = CirclePolicy()
 
 
 class CircleFit(NamedTuple):
@@ -88,26 +102,26 @@ def fit_circle(x: npt.ArrayLike, y: npt.ArrayLike) -> CircleFit:
     points = _without_gross_errors(points)
     if np.ptp(points, axis=0).max() == 0.0:
         raise InputError("a circle cannot be fitted: the body never moves")
-    angle = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
-    design = np.column_stack([np.cos(angle), np.sin(angle), np.ones(DIRECTIONS)])
+    angle = 2.0 * np.pi * np.arange(CIRCLE.directions) / CIRCLE.directions
+    design = np.column_stack([np.cos(angle), np.sin(angle), np.ones(CIRCLE.directions)])
     center_x, center_y, radius = _quantile_fit(design, _extents(points, design[:, :2]), 0.5)
-    astray = np.hypot(points[:, 0] - center_x, points[:, 1] - center_y) > STRAY * radius
-    if astray.mean() < STRAY_SHARE:
+    astray = np.hypot(points[:, 0] - center_x, points[:, 1] - center_y) > CIRCLE.stray * radius
+    if astray.mean() < CIRCLE.stray_share:
         points = points[~astray]
     extent = _extents(points, design[:, :2])
-    center_x, center_y, radius = _quantile_fit(design, extent, OUTER)
+    center_x, center_y, radius = _quantile_fit(design, extent, CIRCLE.outer)
     if radius <= 0.0:
         raise InputError("a circle cannot be fitted: the positions do not fill one")
     distance = np.hypot(points[:, 0] - center_x, points[:, 1] - center_y)
     bearing = np.arctan2(points[:, 1] - center_y, points[:, 0] - center_x)
-    sector = ((bearing + np.pi) / (2.0 * np.pi) * SECTORS).astype(int) % SECTORS
-    visited = np.unique(sector[distance > RIM * radius]).size
+    sector = ((bearing + np.pi) / (2.0 * np.pi) * CIRCLE.sectors).astype(int) % CIRCLE.sectors
+    visited = np.unique(sector[distance > CIRCLE.rim * radius]).size
     residual = np.abs(extent - design @ np.array([center_x, center_y, radius]))
     return CircleFit(
         center_x,
         center_y,
         radius,
-        coverage=visited / SECTORS,
+        coverage=visited / CIRCLE.sectors,
         residual=float(np.median(residual)),
         astray=total - int((distance <= 1.02 * radius).sum()),
     )
@@ -145,7 +159,7 @@ def _without_gross_errors(points: Array) -> Array:
 
 def _extents(points: Array, directions: Array) -> Array:
     """Return the extent of the samples along each direction, its outermost few left out."""
-    last = points.shape[0] - 1 - max(3, int(TRIMMED_SHARE * points.shape[0]))
+    last = points.shape[0] - 1 - max(3, int(CIRCLE.trimmed_share * points.shape[0]))
     return np.array([np.partition(points @ direction, last)[last] for direction in directions])
 
 
@@ -189,7 +203,7 @@ def implied_scale(bodies: Sequence[RawBody], tank: str | None) -> str:
         fit = fit_circle(x, y)
     except (InputError, ValueError):
         return ""
-    if fit.coverage < ENOUGH_VISITED:
+    if fit.coverage < CIRCLE.enough_visited:
         return ""
     across = f"the positions fill a circle of {2.0 * fit.radius:.4g} units across"
     try:
@@ -215,7 +229,13 @@ def _scale_of_rectangle(x: Array, y: Array, size: str) -> str:
         return ""
     # A few tracking errors lie outside the tank.
     spans = [
-        float(np.subtract(*np.percentile(axis[known], [100.0 - OUTSIDE, OUTSIDE])))
+        float(
+            np.subtract(
+                *np.percentile(
+                    axis[known], [100.0 - CIRCLE.outside_percent, CIRCLE.outside_percent]
+                )
+            )
+        )
         for axis in (x, y)
     ]
     if min(spans) <= 0.0:

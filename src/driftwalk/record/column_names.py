@@ -182,7 +182,7 @@ class ColumnMap:
     """Times or frame numbers; None: the row number is the frame number."""
     clock_unit: str = "frame"
     bare_clock: bool = False
-    """Whether the clock is one of times whose unit nobody named."""
+    """Whether the clock has times of an unnamed unit."""
     date: int | None = None
     """Dates, which count where the clock has times of day, or where there is none."""
     bodies: dict[str, dict[str, int]] = field(default_factory=dict)

@@ -1,4 +1,4 @@
-"""From the numbers of a file to SI: clock, scale, the direction of y. The only place for units."""
+"""Convert a recording to SI: clock, scale, direction of y. The only place for units."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from driftwalk.core.errors import InputError
 from driftwalk.core.text.argument_text import argument_text
 from driftwalk.record.circle import implied_scale
+from driftwalk.record.cleaning.clock import CLOCK
 from driftwalk.record.cleaning.extent import refuse_far
 from driftwalk.record.quantum import common_quantum
 from driftwalk.record.raw import (
@@ -21,9 +22,6 @@ from driftwalk.record.raw import (
     ReadOptions,
 )
 from driftwalk.record.tables.stamps import DAY, LOCAL, UTC, moment_text
-
-EPOCH_S = 1e8
-"""A clock beyond three years counts from 1970 and is set to start at zero."""
 
 
 def convert_units(
@@ -194,7 +192,7 @@ def _convert_clocks(raw: RawRecording, ticks: float, attrs: dict[str, object]) -
     origin = min(starts, default=0.0)
     begin = float(_exactly(raw.clock_origin, origin) / Fraction(ticks))
     dated = raw.calendar in (UTC, LOCAL)
-    if raw.clock_unit == "frame" or (begin < EPOCH_S and not dated):
+    if raw.clock_unit == "frame" or (begin < CLOCK.first_day_s and not dated):
         origin = -float(raw.clock_origin)
     elif raw.calendar != LOCAL:
         attrs["time_origin_unix_s"] = begin

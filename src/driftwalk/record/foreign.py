@@ -1,4 +1,4 @@
-"""Loaders of other packages, which an entry point of the group ``driftwalk.loaders`` names.
+"""Plug-in loaders of other packages: entry points of the group ``driftwalk.loaders``.
 
 An error in one of them is one line with the name of its package, and keeps no other file from being
 read.

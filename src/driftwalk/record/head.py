@@ -7,7 +7,7 @@ from pathlib import Path
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
-from driftwalk.record.layout import MISSING
+from driftwalk.record.raw import MISSING
 from driftwalk.record.tables.stamps import stamp_form
 from driftwalk.record.text import decoded_line, header_rows, read_head
 

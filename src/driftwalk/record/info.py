@@ -17,11 +17,6 @@ from driftwalk.schema import Track, body_names, body_track, check_trajectory
 if TYPE_CHECKING:
     import xarray as xr
 
-GAP = 1.5
-"""An interval beyond this many usual ones is a gap."""
-TOLERANCE = 0.05
-"""Share by which an interval may differ from the usual one and still count as even."""
-
 
 def describe(trajectory: xr.Dataset) -> dict[str, Any]:
     """Describe every body of a recording.
@@ -115,7 +110,7 @@ def _clock(track: Track) -> dict[str, Any]:
         return {"start_s": start, "stop_s": start, "duration_s": 0.0, "rate_Hz": math.nan}
     interval = np.diff(track.time)
     usual = float(np.median(interval))
-    gaps = interval > GAP * usual
+    gaps = interval > 1.5 * usual
     low, high = np.percentile(interval, [5.0, 95.0]).tolist()
     duration = float(track.time[-1] - track.time[0])
     return {
@@ -126,7 +121,8 @@ def _clock(track: Track) -> dict[str, Any]:
         "interval_median_s": usual,
         "interval_5_percent_s": low,
         "interval_95_percent_s": high,
-        "uneven_intervals_share": float((np.abs(interval - usual) > TOLERANCE * usual).mean()),
+        # An interval that differs by up to 5 % counts as even; chosen by hand.
+        "uneven_intervals_share": float((np.abs(interval - usual) > 0.05 * usual).mean()),
         "gaps": int(gaps.sum()),
         "longest_gap_s": float(interval[gaps].max()) if gaps.any() else 0.0,
         "gap_time_share": float((interval[gaps] - usual).sum()) / duration,
@@ -163,7 +159,7 @@ def _speed(track: Track) -> dict[str, Any]:
     if track.time.size < 2:
         return {}
     interval = np.diff(track.time)
-    near = interval <= GAP * np.median(interval)
+    near = interval <= 1.5 * np.median(interval)
     speed = np.hypot(np.diff(track.x), np.diff(track.y))[near] / interval[near]
     described = {
         "speed_mean_m_s": float(speed.mean()),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -12,23 +12,37 @@ from driftwalk.core.remember import remembered
 from driftwalk.record.raw import Array
 from driftwalk.schema import Track
 
-ORDER = 4
-"""Order of the differences: a path that is a cubic over five samples leaves nothing."""
-LAGS = 6
-TRIM = 5.0
-"""Windows beyond this many robust standard deviations (glitches, wall hits) are left out."""
-BLOCK = 500
-"""Windows in a block; blocks are left out in turn for the standard error."""
-MAX_BLOCKS = 100
-MIN_WINDOWS = 50
-STILLEST = (0.01, 0.02, 0.05, 0.1, 0.2)
-"""Shares of the steps from one sample to the next, the shortest, that bound the noise."""
-SURE = 5.0
-"""Standard errors by which the estimate has to be above the bound before it gives way."""
-REACH = 4.0
-"""Standard deviations by which noise may show a body beyond a wall: one of 30,000 lies farther."""
-MOST_REACH = 0.05
-"""Share of the tank's size that such noise may have: with more, the tank or the scale is wrong."""
+
+class NoisePolicy(NamedTuple):
+    """How the tracking noise is separated from the motion of a body."""
+
+    order: int = 4
+    """Order of the differences: a path that is a cubic over five samples leaves nothing."""
+    lags: int = 6
+    """Largest lag of the products of differences; chosen by hand."""
+    trim: float = 5.0
+    """Robust standard deviations beyond which windows (glitches, wall hits) are left out;
+    chosen by hand."""
+    block: int = 500
+    """Windows in a block; blocks are left out in turn for the standard error; chosen by hand."""
+    most_blocks: int = 100
+    """Blocks that are used at most; chosen by hand."""
+    fewest_windows: int = 50
+    """Windows, or shortest steps, without which there is no estimate; chosen by hand."""
+    stillest: tuple[float, ...] = (0.01, 0.02, 0.05, 0.1, 0.2)
+    """Shares of the steps, the shortest, that bound the noise; chosen by hand."""
+    sure: float = 5.0
+    """Standard errors by which the estimate must exceed the bound to be replaced by it; chosen
+    by hand."""
+    reach: float = 4.0
+    """Standard deviations by which noise may show a body beyond a wall: one sample of 30,000
+    lies farther."""
+    most_reach: float = 0.05
+    """Largest such reach, as a share of the tank: with more, the tank or the scale is wrong;
+    chosen by hand."""
+
+
+_NOISE: Final = NoisePolicy()
 
 
 class NoiseEstimate(NamedTuple):
@@ -123,7 +137,7 @@ def noise_reach(track: Track, noise: float | None = None, *, size: float = np.in
     0.0012
     """
     known = estimate_tracking_noise(track).position_noise_m if noise is None else noise
-    return min(REACH * known, MOST_REACH * size) if np.isfinite(known) else 0.0
+    return min(_NOISE.reach * known, _NOISE.most_reach * size) if np.isfinite(known) else 0.0
 
 
 class NoiseBound(NamedTuple):
@@ -167,9 +181,9 @@ def noise_bound(track: Track) -> NoiseBound:
     apart = np.abs(step[step != 0.0])
     length = np.sort(np.hypot(*step[:, (step != 0.0).any(axis=0)]))
     found = NoiseBound(math.inf, math.inf)
-    for share in STILLEST:
+    for share in _NOISE.stillest:
         count = int(share * length.size)
-        if count < MIN_WINDOWS:
+        if count < _NOISE.fewest_windows:
             continue
         longest = float(length[count - 1]) + math.sqrt(2.0) * float(apart.min())
         bound = longest / math.sqrt(-4.0 * math.log1p(-count / length.size))
@@ -189,7 +203,7 @@ class _Estimate(NamedTuple):
 def _bounded(estimate: _Estimate, track: Track) -> _Estimate:
     """Return the estimate, or the bound on the noise where it is clearly above that."""
     bound = noise_bound(track)
-    if not estimate.noise > bound.position_noise_m + SURE * bound.standard_error_m:
+    if not estimate.noise > bound.position_noise_m + _NOISE.sure * bound.standard_error_m:
         return estimate
     return estimate._replace(noise=bound.position_noise_m, standard_error=bound.standard_error_m)
 
@@ -201,19 +215,20 @@ _NOTHING = _Estimate(math.nan, math.nan, math.nan, 0)
 def _estimate(time: Array, series: tuple[Array, ...]) -> _Estimate:
     """Fit noise and intensity to the lag products of all blocks."""
     starts = _window_starts(time)
-    if starts.size < MIN_WINDOWS:
+    if starts.size < _NOISE.fewest_windows:
         return _NOTHING
-    blocks = np.array_split(starts, max(8, starts.size // BLOCK))
-    blocks = blocks[:: math.ceil(len(blocks) / MAX_BLOCKS)]
+    blocks = np.array_split(starts, max(8, starts.size // _NOISE.block))
+    blocks = blocks[:: math.ceil(len(blocks) / _NOISE.most_blocks)]
     differences = [
         [_weights(time, block)[1] * values[_members(block)] for values in series]
         for block in blocks
     ]
     limits = [
-        TRIM * _robust_std(np.concatenate([block[axis].sum(axis=1) for block in differences]))
+        _NOISE.trim
+        * _robust_std(np.concatenate([block[axis].sum(axis=1) for block in differences]))
         for axis in range(len(series))
     ]
-    sums = np.zeros((len(blocks), LAGS + 1, 4))
+    sums = np.zeros((len(blocks), _NOISE.lags + 1, 4))
     for index, block in enumerate(blocks):
         values = np.stack([part.sum(axis=1) for part in differences[index]])
         good = np.array([np.abs(v) <= limit for v, limit in zip(values, limits, strict=True)])
@@ -233,15 +248,15 @@ def _estimate(time: Array, series: tuple[Array, ...]) -> _Estimate:
 
 def _window_starts(time: Array) -> npt.NDArray[np.int64]:
     """Return the first sample of each window of five that no gap splits."""
-    if time.size <= ORDER:
+    if time.size <= _NOISE.order:
         return np.zeros(0, dtype=np.int64)
     usual = float(np.median(np.diff(time)))
-    span = time[ORDER:] - time[:-ORDER]
-    return np.flatnonzero(span <= 1.5 * ORDER * usual)
+    span = time[_NOISE.order :] - time[: -_NOISE.order]
+    return np.flatnonzero(span <= 1.5 * _NOISE.order * usual)
 
 
 def _members(starts: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-    return starts[:, None] + np.arange(ORDER + 1)
+    return starts[:, None] + np.arange(_NOISE.order + 1)
 
 
 def _weights(time: Array, starts: npt.NDArray[np.int64]) -> tuple[Array, Array]:
@@ -251,9 +266,11 @@ def _weights(time: Array, starts: npt.NDArray[np.int64]) -> tuple[Array, Array]:
     """
     times = time[_members(starts)]
     apart = times[:, :, None] - times[:, None, :]
-    apart += np.eye(ORDER + 1)  # a sample's distance to itself is no factor
+    apart += np.eye(_NOISE.order + 1)  # a sample's distance to itself is no factor
     weights = 1.0 / apart.prod(axis=2)
-    weights *= np.sqrt(math.comb(2 * ORDER, ORDER) / (weights**2).sum(axis=1))[:, None]
+    weights *= np.sqrt(math.comb(2 * _NOISE.order, _NOISE.order) / (weights**2).sum(axis=1))[
+        :, None
+    ]
     return times, weights
 
 
@@ -262,14 +279,14 @@ def _lag_sums(
 ) -> Array:
     """Return for each lag the sums of (noise term, process term, product of differences, count)."""
     times, weights = _weights(time, starts)
-    sums = np.zeros((LAGS + 1, 4))
-    for lag in range(LAGS + 1):
+    sums = np.zeros((_NOISE.lags + 1, 4))
+    for lag in range(_NOISE.lags + 1):
         if starts.size <= lag:
             break
         first, second = slice(0, starts.size - lag), slice(lag, starts.size)
         near = starts[second] - starts[first] == lag
         noise = np.zeros(near.size)
-        for i in range(lag, ORDER + 1):
+        for i in range(lag, _NOISE.order + 1):
             noise += weights[first][:, i] * weights[second][:, i - lag]
         distance = np.abs(times[first][:, :, None] - times[second][:, None, :])
         process = np.einsum("ni,nij,nj->n", weights[first], distance**3 / 12.0, weights[second])

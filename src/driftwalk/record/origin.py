@@ -45,7 +45,7 @@ class Origin:
             return FormatError(f"is a damaged gzip file: {error}", path=self.path)
         if self.path is None or not isinstance(error, FormatError):
             return InputError(f"{self.where}: {' '.join(str(error).splitlines())}")
-        # A table that no loader of its own recognised may be one of theirs gone wrong.
+        # A table that no loader recognised may be a damaged file of one of these formats.
         hint = failed_format(self.path) if self.guessed else ""
         path = error.path or self.path
         return FormatError(error.reason + hint, path=path, line=error.line, column=error.column)

@@ -8,10 +8,6 @@ import numpy as np
 
 from driftwalk.record.raw import Array
 
-_MAX_SAMPLES = 50_000
-_MAX_DECIMALS = 9
-_ENOUGH = 30
-
 
 def detect_quantum(values: Array) -> float:
     """Return the spacing that all values are multiples of, apart from rounding; 0 when unknown.
@@ -42,9 +38,9 @@ def _some_known(values: Array) -> Array:
     """Return the finite values, of many every second, third, ... one."""
     present = np.isfinite(values)
     count = int(present.sum())
-    if count <= _MAX_SAMPLES:
+    if count <= 50_000:
         return values[present]
-    every = count // _MAX_SAMPLES + 1
+    every = count // 50_000 + 1
     return values[::every] if count == values.size else values[np.flatnonzero(present)[::every]]
 
 
@@ -66,7 +62,7 @@ def _decimal_quantum(values: Array) -> float:
     The greatest common divisor of their differences; of few values, which may have a common divisor
     by chance, the last decimal place.
     """
-    for decimals in range(_MAX_DECIMALS + 1):
+    for decimals in range(9 + 1):
         scaled = values * 10.0**decimals
         whole = np.round(scaled)
         if np.abs(whole).max() > 2.0**52:
@@ -74,7 +70,7 @@ def _decimal_quantum(values: Array) -> float:
         # One unit in the last place of the value, scaled, is all that rounding may leave.
         if (np.abs(scaled - whole) <= 4.0 * np.spacing(np.abs(scaled) + 1.0)).all():
             steps = (whole - whole[0]).astype(np.int64)
-            divisor = int(np.gcd.reduce(steps)) if values.size >= _ENOUGH else 1
+            divisor = int(np.gcd.reduce(steps)) if values.size >= 30 else 1
             return float(divisor) / 10.0**decimals
     return 0.0
 

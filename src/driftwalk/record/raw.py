@@ -1,4 +1,4 @@
-"""Result of a loader: the numbers of a file in the file's own units, and what they mean.
+"""Result of a loader: the numbers of a file in its own units, and their meaning.
 
 Units, scale, clock and the direction of y are turned into SI in one place, `record.convert_units`;
 a loader only says what the file holds.
@@ -13,6 +13,33 @@ from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
+
+MISSING = frozenset(
+    {"", "#N/A", "NaN", "nan", "NAN", "NA", "N/A", "null", "NULL", "None", "none", "-nan"}
+)
+"""Words that trackers write for a missing number."""
+
+
+@dataclass(frozen=True)
+class TableLayout:
+    """Where the numbers stand in a text file."""
+
+    delimiter: str
+    """One character, or ``" "`` for any run of blanks."""
+    names: list[str]
+    """Names of all columns, in order (for error messages)."""
+    skip_lines: int = 0
+    """Lines before the first row of data."""
+    numbers: tuple[int, ...] = ()
+    """Columns (from 0) to read as numbers."""
+    texts: tuple[int, ...] = ()
+    """Columns (from 0) to read as text."""
+    clock: int | None = None
+    """The one of the numbers whose whole values may be beyond those that float64 holds exactly."""
+    stamps: tuple[int, ...] = ()
+    """Columns (from 0) of time stamps; of several the sum counts, as of a date and a time of day.
+    It becomes the numbers of the first of them."""
+
 
 Array = npt.NDArray[np.float64]
 

@@ -1,4 +1,4 @@
-"""The readable formats: one file each under `record.loaders`, found by being there.
+"""Registry of the readable formats: one file each under `record.loaders`, found automatically.
 
 A further format joins by one file that defines ``LOADER``, an object with the members of
 `Loader`. Nothing else has to be edited. Other packages name theirs by entry points, see

@@ -15,32 +15,41 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import check_lines
-from driftwalk.record.layout import MISSING, TableLayout
-from driftwalk.record.raw import Array
+from driftwalk.record.raw import MISSING, Array, TableLayout
 from driftwalk.record.tables.encoding import WINDOWS, TranscodedText, other_encoding
 from driftwalk.record.tables.growing import GrowingColumn
 from driftwalk.record.tables.stamps import StampError, StampReader, calendar_of, clock_of_stamps
 
-BLOCK_BYTES = 4 << 20
+
+class TextPolicy(NamedTuple):
+    """How text files are read in bounded memory."""
+
+    block_bytes: int = 4 << 20
+    """Bytes that are parsed at once; chosen by hand."""
+    head_bytes: int = 1 << 16
+    """Bytes by which a file is recognised; chosen by hand."""
+    longest_line: int = 16 << 20
+    """Bytes of a line at most; chosen by hand."""
+    gzip_allowance: int = 16 << 20
+    """Bytes that any gzip file may unpack to; chosen by hand."""
+    gzip_ratio: int = 50
+    """Times its size that a gzip file may unpack to beyond that. Tables of numbers shrink to a
+    third, of mostly missing ones to a twentieth."""
+
+
+TEXT: Final = TextPolicy()
+
 GZIP_MAGIC = b"\x1f\x8b"
 DAMAGED_GZIP = (gzip.BadGzipFile, EOFError, zlib.error)
 """Exceptions raised by reading a gzip file that is cut off or damaged."""
 BOM = b"\xef\xbb\xbf"
-HEAD_BYTES = 1 << 16
-_BUFFER = 1 << 20
-_EXACT = 1 << 53
-LONGEST_LINE = 16 << 20
-GZIP_ALLOWANCE = 16 << 20
-GZIP_RATIO = 50
-"""A gzip file may unpack to this many times its size, and 16 MiB more. Tables of numbers shrink to
-a third, of mostly missing ones to a twentieth."""
 
 
 @dataclass
@@ -91,15 +100,15 @@ def _opened(path: Path) -> io.BufferedReader:
 
 
 def _buffered(raw: io.RawIOBase) -> io.BufferedReader:
-    return io.BufferedReader(raw, _BUFFER)
+    return io.BufferedReader(raw, 1 << 20)
 
 
 def _encoding(file: io.BufferedReader) -> str | None:
     """Return the encoding of a text that is not UTF-8, without moving on in it."""
     try:
-        return other_encoding(file.peek(HEAD_BYTES)[:HEAD_BYTES])
+        return other_encoding(file.peek(TEXT.head_bytes)[: TEXT.head_bytes])
     except (OSError, *DAMAGED_GZIP):
-        return None  # whoever reads it finds the damage, and says where
+        return None  # reading it reports the damage and its place
 
 
 class _BoundedGzip(io.RawIOBase):
@@ -108,7 +117,7 @@ class _BoundedGzip(io.RawIOBase):
     def __init__(self, path: Path) -> None:
         self._path = path
         self._file = gzip.open(path, "rb")  # noqa: SIM115
-        self._left = GZIP_ALLOWANCE + GZIP_RATIO * path.stat().st_size
+        self._left = TEXT.gzip_allowance + TEXT.gzip_ratio * path.stat().st_size
 
     def readable(self) -> bool:
         return True
@@ -118,7 +127,7 @@ class _BoundedGzip(io.RawIOBase):
         self._left -= len(content)
         if self._left < 0:
             raise FormatError(
-                f"unpacks to more than {GZIP_RATIO} times its size, which no recording does: "
+                f"unpacks to more than {TEXT.gzip_ratio} times its size, which no recording does: "
                 "unpack it (gzip -d) if it is one",
                 path=self._path,
             )
@@ -140,7 +149,7 @@ def lines_of(file: IO[bytes], path: Path) -> Iterator[tuple[int, bytes]]:
         When one is longer than any line of a text file.
     """
     number, rest = 1, b""
-    while block := file.read(BLOCK_BYTES):
+    while block := file.read(TEXT.block_bytes):
         if not rest and not block.strip():
             number += block.count(b"\n")
             continue
@@ -154,9 +163,9 @@ def lines_of(file: IO[bytes], path: Path) -> Iterator[tuple[int, bytes]]:
 
 def refuse_long_line(line: bytes, path: Path, number: int) -> None:
     """Refuse a line that is longer than any line of a text file."""
-    if len(line) > LONGEST_LINE:
+    if len(line) > TEXT.longest_line:
         raise FormatError(
-            f"has a line of more than {LONGEST_LINE >> 20} MiB: is it a text file?",
+            f"has a line of more than {TEXT.longest_line >> 20} MiB: is it a text file?",
             path=path,
             line=number,
         )
@@ -166,7 +175,7 @@ def read_head(path: Path) -> bytes:
     """Return the first 64 KiB of a file, uncompressed and without a byte order mark."""
     with open_binary(path) as file:
         try:
-            head = file.read(HEAD_BYTES)
+            head = file.read(TEXT.head_bytes)
         except (OSError, *DAMAGED_GZIP) as error:
             raise FormatError(f"is a damaged gzip file: {error}", path=path) from error
     return head.removeprefix(BOM)
@@ -184,7 +193,7 @@ def header_rows(path: Path, count: int) -> list[str]:
     with open_binary(path) as file:
         for number in range(1, count + 1):
             try:
-                line = file.readline(LONGEST_LINE + 1)
+                line = file.readline(TEXT.longest_line + 1)
             except (OSError, *DAMAGED_GZIP) as error:
                 raise FormatError(f"cannot be read to its end: {error}", path=path) from error
             refuse_long_line(line, path, number)
@@ -224,7 +233,7 @@ def read_table(path: Path, layout: TableLayout, *, blocks: int | None = None) ->
     layout : TableLayout
         Columns to read.
     blocks : int, optional
-        Read no more than so many blocks of 4 MiB; None: the whole file.
+        Blocks of 4 MiB to read at most; None: the whole file.
 
     Returns
     -------
@@ -396,7 +405,8 @@ def far_origin(values: npt.NDArray[Any]) -> int:
     >>> far_origin(np.array([1_700_000_000_000_000_001])), far_origin(np.array([5]))
     (1700000000000000001, 0)
     """
-    if not values.size or values.dtype.kind != "i" or np.abs(values).max() <= _EXACT:
+    # float64 holds every whole number up to 2^53.
+    if not values.size or values.dtype.kind != "i" or np.abs(values).max() <= 1 << 53:
         return 0
     return int(values[0])
 
@@ -408,14 +418,14 @@ def _blocks(path: Path, skip_lines: int) -> Iterator[tuple[int, bytes]]:
         try:
             for _ in range(skip_lines):
                 # A file may say itself how many lines to skip, and be wrong about it.
-                if not file.readline(LONGEST_LINE):
+                if not file.readline(TEXT.longest_line):
                     return
             if not skip_lines:
                 start = file.read(len(BOM))
                 rest = b"" if start == BOM else start
             else:
                 rest = b""
-            while block := file.read(BLOCK_BYTES):
+            while block := file.read(TEXT.block_bytes):
                 whole, newline, tail = (rest + block).rpartition(b"\n")
                 rest = tail
                 refuse_long_line(rest, path, line + whole.count(b"\n"))

@@ -15,7 +15,6 @@ from driftwalk.schema.stores.netcdf import netcdf_bytes
 if TYPE_CHECKING:
     import xarray as xr
 
-ROWS_AT_ONCE = 200_000
 CSV_COLUMNS = ["t_s", "x_m", "y_m", "theta_rad", "body"]
 
 
@@ -77,8 +76,8 @@ def _write_csv(dataset: xr.Dataset, path: Path) -> None:
     names = np.array(body_names(dataset), dtype=object)
     with path.open("w", encoding="utf-8", newline="") as file:
         pd.DataFrame(columns=CSV_COLUMNS).to_csv(file, index=False)
-        for first in range(0, time.size, ROWS_AT_ONCE):
-            block = slice(first, first + ROWS_AT_ONCE)
+        for first in range(0, time.size, 200_000):
+            block = slice(first, first + 200_000)
             x, y, theta = (dataset[name].values[block] for name in ("x", "y", "theta"))
             present = np.isfinite(x) & np.isfinite(y)
             present[:, 0] |= ~present.any(axis=1)

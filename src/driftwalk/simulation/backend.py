@@ -1,9 +1,9 @@
-"""The door to the native core: plain numbers and datasets in, a prepared model out."""
+"""Interface to the native core: prepare a model from plain numbers and datasets."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -27,8 +27,22 @@ STATUS: Final[dict[str, int]] = WORLD_STATUS
 BROKEN: Final = STATUS["non_finite"] | STATUS["escaped"]
 """Bits of a world that lost its numbers: it has no distance and no outcome."""
 
-MOST_NODES_PER_SIDE: Final = 16_000
-MOST_NODES: Final = 50_000_000
+
+class SizePolicy(NamedTuple):
+    """Largest work that the native core is given."""
+
+    nodes_per_side: int = 16_000
+    """Nodes along a side of a flow field; chosen by hand."""
+    nodes: int = 50_000_000
+    """Nodes of all tables of a flow field; chosen by hand."""
+    steps: int = 2_000_000_000
+    """Steps of one world: half an hour of one processor. The longest run of a study, 1e7 s, has
+    half as many steps of 10 ms"""
+    step_takes_s: float = 0.85e-6
+    """Duration of a step [s], measured on a Haswell core."""
+
+
+_SIZES: Final = SizePolicy()
 
 
 @dataclass(frozen=True)
@@ -38,12 +52,6 @@ class Camera:
     position_noise: float = 0.0
     orientation_noise: float = 0.0
     position_quantum: float = 0.0
-
-
-MOST_STEPS: Final = 2_000_000_000
-"""Steps of one world: half an hour of one processor, at 0.85 µs a step as measured on a Haswell
-core. The longest run of a study, 1e7 s, has half as many steps of 10 ms."""
-STEP_TAKES_S: Final = 0.85e-6
 
 
 def require_steps(duration: float, step: float) -> None:
@@ -66,13 +74,13 @@ def require_steps(duration: float, step: float) -> None:
     >>> require_steps(300.0, 0.008)
     """
     steps = duration / step
-    if steps <= MOST_STEPS:
+    if steps <= _SIZES.steps:
         return
     raise InputError(
         f"{duration:.4g} s in steps of {step:.3g} s are {steps:.2g} steps of every simulated "
-        f"world, some {steps * STEP_TAKES_S / 3600.0:.2g} hours each; {MOST_STEPS:.2g} at most are "
-        "simulated: take a longer interval of the force (`forces.force_interval_s`), or a shorter "
-        "time (`simulation.duration_s`)"
+        f"world, some {steps * _SIZES.step_takes_s / 3600.0:.2g} hours each; "
+        f"{_SIZES.steps:.2g} at most are simulated: take a longer interval of the force "
+        "(`forces.force_interval_s`), or a shorter time (`simulation.duration_s`)"
     )
 
 
@@ -261,13 +269,13 @@ def _require_table(flow: xr.Dataset, tank: Outline, *, accelerating: bool) -> No
         sides.append(nodes.size + 2.0 * extent / spacing)
     frames = flow.sizes.get("time", 1)
     tables = 4 * frames - 2 if accelerating else frames
-    if max(sides) > MOST_NODES_PER_SIDE or tables * sides[0] * sides[1] > MOST_NODES:
+    if max(sides) > _SIZES.nodes_per_side or tables * sides[0] * sides[1] > _SIZES.nodes:
         of_water = f" (with the water's acceleration {tables} tables)" if accelerating else ""
         raise InputError(
             f"the flow field's grid is too fine for the tank: {sides[0]:.0f} x {sides[1]:.0f} "
             f"nodes and {frames} frames{of_water} would reach its wall, at most "
-            f"{MOST_NODES_PER_SIDE} a side and {MOST_NODES:.0e} in all are possible; use a coarser "
-            "grid (a block feels nothing much finer than its strips)"
+            f"{_SIZES.nodes_per_side} a side and {_SIZES.nodes:.0e} in all are possible; use a "
+            "coarser grid (a block feels nothing much finer than its strips)"
         )
 
 

@@ -1,4 +1,4 @@
-"""Where and how a simulated block starts."""
+"""Initial pose and velocity of a simulated block."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 Backend = Literal["cpu", "reference"]
-BYTES_PER_SAMPLE: Final = 12
-"""Three numbers of 4 bytes; those of the reference are twice as large."""
 
 
 def simulate(
@@ -118,7 +116,8 @@ def simulate(
             flow_start=starts,
         )
     except MemoryError as error:
-        size = count * times.size * BYTES_PER_SAMPLE / 1e9
+        # Three numbers of 4 bytes; those of the reference are twice as large.
+        size = count * times.size * 12 / 1e9
         raise MemoryError(
             f"{count} replicates of {times.size} samples take {size:.3g} GB; take fewer "
             "(`simulation.replicates`, `simulation.sample_rate_Hz`) or a shorter time "

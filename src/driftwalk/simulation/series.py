@@ -1,4 +1,4 @@
-"""A flow in frames: how it goes on beyond them, and at which moment each world begins in it."""
+"""Unsteady flow: continuation beyond its frames, and the start time of each world."""
 
 from __future__ import annotations
 
@@ -20,12 +20,20 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
-MOST_MISSING: Final = 0.01
-"""Share of a series that may be missing at its end, and no more than one frame: 600 frames of 0.1 s
-are a minute, although the last one stands at 59.9 s."""
-CLOSED: Final = 1e-3
-"""Change from the last frame to the first, over the usual one between frames, below which both are
-the same moment of a period: a formula leaves rounding there, a measurement its noise."""
+
+class SeriesPolicy(NamedTuple):
+    """How a flow in frames continues after its last frame."""
+
+    most_missing: float = 0.01
+    """Share of a series that may be missing at its end, and no more than one frame: 600 frames
+    of 0.1 s are a minute, although the last one stands at 59.9 s; chosen by hand."""
+    closed: float = 1e-3
+    """Change from the last frame to the first, over the usual one between frames, below which
+    both are the same moment of a period: a formula leaves rounding there, a measurement its
+    noise; chosen by hand."""
+
+
+_SERIES: Final = SeriesPolicy()
 
 
 class Series(NamedTuple):
@@ -36,7 +44,7 @@ class Series(NamedTuple):
     repeat: str
     """How it goes on beyond them: "none", "loop", "mirror" or "hold"."""
     begin: float
-    """Time at which a world begins that has no moment of its own [s]."""
+    """Time at which a world without a drawn start begins [s]."""
     closing: float
     """In a loop, time from the last frame to the first one again [s]; 0 where both are the same."""
 
@@ -114,13 +122,13 @@ def continued_flow(
     repeat = stated if stated != "none" else str(flow.attrs.get("repeat", "none"))
     span, interval = float(time[-1] - time[0]), float(np.median(steps))
     if repeat == "none":
-        missing = min(interval, MOST_MISSING * span)
+        missing = min(interval, _SERIES.most_missing * span)
         first = float(time[0]) if begin is None else begin
         if first < time[0] - missing or first + duration > time[-1] + missing:
             raise InputError(_ended(time, duration, begin))
     # A series that says itself how it goes on has a clock whose 0 is the begin of a run.
     own = 0.0 if "repeat" in flow.attrs else float(time[0])
-    closing = 0.0 if _join(flow) < CLOSED else interval
+    closing = 0.0 if _join(flow) < _SERIES.closed else interval
     return flow.assign_attrs(
         repeat=repeat,
         series_begin_s=float(flow.attrs.get("series_begin_s", own)) if begin is None else begin,

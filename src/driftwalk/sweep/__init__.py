@@ -1,8 +1,7 @@
 """Any function over many settings: order, work units, resume, executors."""
 
 from driftwalk.core.files.shards import ShardStore
-from driftwalk.sweep.cut import settings_per_unit
-from driftwalk.sweep.design import Design, WorkUnit, grid
+from driftwalk.sweep.design import Design, WorkUnit, grid, settings_per_unit
 from driftwalk.sweep.handout import threads_of_unit
 from driftwalk.sweep.remote import refuse_others, this_worker
 from driftwalk.sweep.run import SweepError, run_sweep

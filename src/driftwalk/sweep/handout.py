@@ -1,11 +1,11 @@
-"""How the units of a sweep are handed to an executor: a window of them, and the slow ones again."""
+"""Scheduling of work units: a window of submitted units, and slow ones submitted again."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from concurrent.futures import Executor, Future
 from statistics import median
-from typing import Any, Final, Protocol
+from typing import Any, Final, NamedTuple, Protocol
 
 import numpy.typing as npt
 
@@ -15,14 +15,24 @@ from driftwalk.sweep.workers import UnitFunction, WorkerExecutor
 UnitFuture = Future[Any]
 Found = Mapping[str, "npt.NDArray[Any]"]
 
-FOR_EACH_WORKER: Final = 3
-"""Units handed out for each worker: one to compute, others so that it need not wait."""
-FEWEST: Final = 64
-"""Units handed out at least, where an executor does not say how many workers it has."""
-SLOW: Final = 4.0
-"""A unit is slow where it takes so many times the usual time, with nothing left to hand out."""
-SLOW_S: Final = 10.0
-"""No unit is slow before [s]."""
+
+class HandoutPolicy(NamedTuple):
+    """How many units are under way, and which are computed again."""
+
+    for_each_worker: int = 3
+    """Units handed out for each worker: it computes one and need not wait for the next; chosen
+    by hand."""
+    fewest: int = 64
+    """Units handed out at least, where an executor does not say how many workers it has; chosen
+    by hand."""
+    slow: float = 4.0
+    """Usual durations after which a unit is slow, when no other is left to hand out; chosen by
+    hand."""
+    slow_s: float = 10.0
+    """Duration below which no unit is slow [s]; chosen by hand."""
+
+
+HANDOUT: Final = HandoutPolicy()
 
 
 class Handout(Protocol):
@@ -35,7 +45,7 @@ class Handout(Protocol):
         """Return what a unit gave, or raise what it failed by."""
 
     def lost(self, future: UnitFuture, /) -> bool:
-        """Return whether a unit was with several workers that ended, so that nobody takes it."""
+        """Whether a unit was with several workers that ended, so that none takes it."""
 
     @property
     def width(self) -> int:
@@ -100,7 +110,7 @@ class _OnExecutor:
     def __init__(self, executor: Executor, function: UnitFunction) -> None:
         self._executor, self._function = executor, function
         workers = getattr(executor, "_max_workers", 0)
-        self.width = max(FOR_EACH_WORKER * workers, FEWEST)
+        self.width = max(HANDOUT.for_each_worker * workers, HANDOUT.fewest)
 
     def submit(self, unit: WorkUnit) -> UnitFuture:
         return self._executor.submit(self._function, unit)
@@ -132,7 +142,7 @@ class _OnWorkers:
 
     @property
     def width(self) -> int:
-        return max(FOR_EACH_WORKER * self._executor.workers, FOR_EACH_WORKER)
+        return max(HANDOUT.for_each_worker * self._executor.workers, HANDOUT.for_each_worker)
 
     def submit(self, unit: WorkUnit) -> UnitFuture:
         return self._executor.run(self._parcel, unit)
@@ -150,7 +160,9 @@ class _OnWorkers:
         if not self._seconds:
             return False
         # It may have waited for those that its worker got before.
-        return age_s > max((FOR_EACH_WORKER - 1 + SLOW) * median(self._seconds), SLOW_S)
+        return age_s > max(
+            (HANDOUT.for_each_worker - 1 + HANDOUT.slow) * median(self._seconds), HANDOUT.slow_s
+        )
 
     def again(self) -> None:
         self._executor.units.again += 1

@@ -1,4 +1,4 @@
-"""Processes for work that Python's threads cannot share, each on one processor."""
+"""Process executor, for work that holds the interpreter lock."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""A function that travels to other machines once, and the check of what runs it there.
+"""Send a function to remote workers once, and check the worker that runs it.
 
 A unit is a few numbers; the function of a sweep holds a flow, a recording, a model. On a Dask
-cluster the function is therefore an object of its own, which a worker fetches with its first unit.
+cluster the function is therefore a separate object, which a worker fetches with its first unit.
 """
 
 from __future__ import annotations

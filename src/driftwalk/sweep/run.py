@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Executor, as_completed, wait
 from functools import partial
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -16,17 +16,11 @@ import numpy.typing as npt
 from driftwalk.core.errors import ClusterError, DriftwalkError, InputError
 from driftwalk.core.files.shards import Arrays
 from driftwalk.sweep.design import WorkUnit
-from driftwalk.sweep.handout import FOR_EACH_WORKER, Handout, UnitFuture, handout, is_lost
+from driftwalk.sweep.handout import HANDOUT, Handout, UnitFuture, handout, is_lost
 from driftwalk.sweep.store import MemoryStore, Store, collect
 from driftwalk.sweep.workers import UnitFunction
 
 Progress = Callable[[int, int], None]
-
-LOOK_S: Final = 1.0
-"""How often units under way are looked at, where none comes back [s]."""
-MOST_SUSPECTS: Final = 2 * FOR_EACH_WORKER
-"""Units that were with several workers that ended. One that ends its workers makes suspects of as
-many as a worker holds, so beyond this there are more, or the workers end for another reason."""
 
 
 class SweepError(RuntimeError):
@@ -115,7 +109,7 @@ def run_sweep(
 
 
 class _Tally:
-    """Counts what is done and tells it to whoever listens."""
+    """Counts finished units and reports progress."""
 
     def __init__(
         self, units: Sequence[WorkUnit], missing: Sequence[WorkUnit], progress: Progress | None
@@ -172,7 +166,7 @@ class _Elsewhere:
         try:
             while self._left:
                 self._hand_out_some()
-                done, _ = wait(self._waiting, timeout=LOOK_S, return_when=FIRST_COMPLETED)
+                done, _ = wait(self._waiting, timeout=1.0, return_when=FIRST_COMPLETED)
                 for future in done:
                     self._take(self._waiting.pop(future), future)
                 if not self._queue:
@@ -226,7 +220,9 @@ class _Elsewhere:
     def _suspect(self, unit: WorkUnit) -> None:
         if unit not in self._suspects:
             self._suspects.append(unit)
-        if len(self._suspects) > MOST_SUSPECTS:
+        # A unit that ends its workers makes suspects of as many as a worker holds; more
+        # have another cause.
+        if len(self._suspects) > 2 * HANDOUT.for_each_worker:
             first = self._suspects[0].id
             raise SweepError(
                 f"{len(self._suspects)} units, the first of which is {first}, were each with "

@@ -1,4 +1,4 @@
-"""Where a sweep keeps its results. `driftwalk.core.files.shards` defines the files."""
+"""Storage of a sweep's results. `driftwalk.core.files.shards` defines the files."""
 
 from __future__ import annotations
 

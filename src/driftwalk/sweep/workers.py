@@ -1,4 +1,4 @@
-"""Workers of a Dask cluster as a sweep sees them: each gets a function once, units as they come."""
+"""Executor on a Dask cluster: each worker gets a function once, then units."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from driftwalk.sweep.remote import KEPT, Answer, Guard, packed, run_unit
 
@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     from driftwalk.sweep.design import WorkUnit
 
 UnitFunction = Callable[["WorkUnit"], Mapping[str, "npt.NDArray[Any]"]]
-
-LOOK_S: Final = 1.0
-"""How often workers are counted [s]."""
 
 
 @dataclass
@@ -70,7 +67,7 @@ class WorkerExecutor(Executor):
     def workers(self) -> int:
         """How many workers there are; counted at most once a second."""
         when, count = self._counted
-        if time.monotonic() - when > LOOK_S:
+        if time.monotonic() - when > 1.0:
             count = len(self.client.scheduler_info(n_workers=-1)["workers"])
             self._counted = (time.monotonic(), count)
         return count

@@ -23,8 +23,7 @@ from driftwalk.track.observer.observer import AssemblyObserver, AssemblySeen, Se
 from driftwalk.track.overlay import OverlayWriter, draw_states, save_picture
 from driftwalk.track.source.frames import FrameCounts, FrameSource
 from driftwalk.track.source.live_camera import LiveCamera
-from driftwalk.track.source.open import open_source
-from driftwalk.track.source.sampled import frame_count, sample_images
+from driftwalk.track.source.sampled import frame_count, open_source, sample_images
 from driftwalk.track.types import Detection, Detector, Frame, FrameResult, PixelToWorld, Rejected
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""Live output: a TCP server that sends each frame's result to whoever is connected.
+"""Live output: a TCP server that sends each frame's result to its clients.
 
 Two forms: JSON, one object a line, and SwisTrack's NMEA sentences. A client that reads slowly loses
 frames, and the stream says how many; the tracker never waits for one.
@@ -26,15 +26,22 @@ from driftwalk.core.text.json_text import json_value, parse_json
 from driftwalk.track.types import Image
 
 LOOPBACK: Final = "127.0.0.1"
-MOST_CLIENTS: Final = 32
-_LAST_PORT: Final = 65535
-WAITING_FRAMES: Final = 8
-"""Frames that wait for a client; older ones are lost to it."""
-PATIENCE_S: Final = 3.0
-"""How long clients may take for the last lines when all ends [s]."""
-_LONGEST_REQUEST: Final = 4096
+
+
+class LivePolicy(NamedTuple):
+    """What one live output serves."""
+
+    most_clients: int = 32
+    """Clients at one time; chosen by hand."""
+    waiting_frames: int = 8
+    """Frames that wait for a client; it loses older ones; chosen by hand."""
+    patience_s: float = 3.0
+    """Time for which the last lines are sent at the end [s]; chosen by hand."""
+
+
+LIVE: Final = LivePolicy()
+
 _WIDTHS: Final = range(16, 4097)
-_JPEG_QUALITY: Final = 80
 
 
 class _Message(NamedTuple):
@@ -109,7 +116,7 @@ class LiveServer:
             return len(self._clients)
 
     def wait_for_clients(self, number: int, *, timeout: float = 5.0) -> bool:
-        """Wait until so many clients are connected; False when they are not after `timeout` [s]."""
+        """Wait for this many clients; False when there are fewer after `timeout` [s]."""
         with self._changed:
             return self._changed.wait_for(lambda: len(self._clients) >= number, timeout)
 
@@ -139,7 +146,7 @@ class LiveServer:
         for client in clients:
             client.finish()
         # For them all together: one that does not read is not waited for any longer.
-        until = time.monotonic() + PATIENCE_S
+        until = time.monotonic() + LIVE.patience_s
         for client in clients:
             client.wait(until)
 
@@ -150,7 +157,7 @@ class LiveServer:
             except OSError:
                 return
             with self._changed:
-                if len(self._clients) >= MOST_CLIENTS:
+                if len(self._clients) >= LIVE.most_clients:
                     connection.close()
                     continue
                 self._clients.append(_Client(connection, self._hello, self._encode, self._leave))
@@ -187,10 +194,10 @@ class _Client:
     def put(self, message: _Message) -> None:
         """Let a message wait; the oldest one is lost when too many do."""
         with self._changed:
-            if len(self._waiting) >= WAITING_FRAMES:
+            if len(self._waiting) >= LIVE.waiting_frames:
                 self._waiting.popleft()
                 self._lost += 1
-            # An image that nobody asked for is not kept.
+            # An image is kept only if a client asked for images.
             wanted = self._width is not None
             self._waiting.append(message if wanted else message._replace(image=None))
             self._changed.notify()
@@ -231,7 +238,7 @@ class _Client:
 
     def _listen(self) -> None:
         with contextlib.suppress(OSError), self._connection.makefile("rb") as lines:
-            while line := lines.readline(_LONGEST_REQUEST):
+            while line := lines.readline(4096):
                 if not line.endswith(b"\n"):
                     break
                 width = requested_width(line)
@@ -278,7 +285,7 @@ def jpeg_text(image: Image, width: int) -> str:
     if width < columns:
         size = width, max(1, round(rows * width / columns))
         image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
-    done, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
+    done, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 80])
     return base64.b64encode(data.tobytes()).decode("ascii") if done else ""
 
 
@@ -339,8 +346,8 @@ def _checksum(line: str) -> int:
 
 
 def _listen(host: str, port: int) -> socket.socket:
-    if not 0 <= port <= _LAST_PORT:
-        raise InputError(f"a port is a number from 0 to {_LAST_PORT}, got {port}")
+    if not 0 <= port <= 65535:
+        raise InputError(f"a port is a number from 0 to 65535, got {port}")
     try:
         return socket.create_server((host, port))
     except OSError as error:

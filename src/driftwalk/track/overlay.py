@@ -25,10 +25,6 @@ _COLOURS: Final = (
     (66, 228, 240),
 )
 _DARK, _LIGHT, _WARNING = (0, 0, 0), (255, 255, 255), (0, 0, 255)
-_ARM_PX: Final = 18
-_FOR_RATE: Final = 12
-_ONE_PICTURE_RATE: Final = 10.0
-_SLOWEST, _FASTEST = 0.5, 240.0
 _CODECS: Final = {".mp4": "mp4v", ".avi": "MJPG", ".mkv": "FFV1"}
 
 
@@ -69,10 +65,10 @@ def draw_states(image: Image, states: Iterable[TrackState], camera: PixelToWorld
         cv2.circle(picture, at, 4, colour, 1 if state.measured is None else -1, cv2.LINE_AA)
         if math.isfinite(state.theta):
             ahead = np.array([math.cos(state.theta), -math.sin(state.theta)])
-            tip = _whole(middle + _ARM_PX * ahead)
+            tip = _whole(middle + 18 * ahead)
             cv2.line(picture, at, tip, colour, 2, cv2.LINE_AA)
         if state.ambiguous > 0:
-            cv2.circle(picture, at, _ARM_PX, _WARNING, 2, cv2.LINE_AA)
+            cv2.circle(picture, at, 18, _WARNING, 2, cv2.LINE_AA)
         _write(cv2, picture, state.id, (at[0] + 6, at[1] - 6))
     return picture
 
@@ -107,7 +103,7 @@ class OverlayWriter:
         self._cv2 = require_opencv()
         self._writer: Any = None
         self._first: list[tuple[float, Image]] = []
-        self._rate, self._began, self._written = _ONE_PICTURE_RATE, 0.0, 0
+        self._rate, self._began, self._written = 10.0, 0.0, 0
         self._last: Image | None = None
 
     def write(self, picture: Image, time: float) -> None:
@@ -124,7 +120,8 @@ class OverlayWriter:
             self._add(picture, time)
             return
         self._first.append((time, picture))
-        if len(self._first) == _FOR_RATE:
+        # Twelve frames tell their rate.
+        if len(self._first) == 12:
             self._open()
 
     def close(self) -> None:
@@ -139,7 +136,7 @@ class OverlayWriter:
         times = [time for time, _ in self._first]
         if len(times) > 1:
             gap = float(np.median(np.diff(times)))
-            self._rate = min(max(1.0 / gap, _SLOWEST), _FASTEST)
+            self._rate = min(max(1.0 / gap, 0.5), 240.0)
         self._began = times[0]
         code = self._cv2.VideoWriter_fourcc(*_CODECS[self._path.suffix.lower()])
         rows, columns = self._first[0][1].shape[:2]

@@ -1,4 +1,4 @@
-"""The recording that tracks make."""
+"""Build a recording from tracks."""
 
 from __future__ import annotations
 

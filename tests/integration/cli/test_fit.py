@@ -50,7 +50,7 @@ def test_json_holds_what_is_promised(fitted: tuple[Path, Done]) -> None:
 def test_defaults_that_decide_a_number_are_said_and_warned_of(fitted: tuple[Path, Done]) -> None:
     opening = "block of side 3 cm (default); mass 11.6 g (default); wetted depth 3 cm (default); "
     assert f"{opening}force redrawn every 16 ms (--force-interval)\n" in fitted[1].err
-    warnings = [text for text in answer(fitted[1])["warnings"] if "nobody stated" in text]
+    warnings = [text for text in answer(fitted[1])["warnings"] if " not stated: " in text]
     assert len(warnings) == 1
     assert warnings[0].endswith("state --mass, --side and --tank-diameter")
 

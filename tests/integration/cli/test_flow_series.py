@@ -58,7 +58,7 @@ def test_how_it_goes_on_is_said(repeat: str, series: Path, tmp_path: Path) -> No
     done = here(*words, "--json")
     assert done.code == 0, done.err
     unstated, said = json.loads(done.out)["warnings"]
-    assert unstated.startswith("nobody stated the mass and side: ")
+    assert unstated.startswith("the mass and side were not stated: ")
     assert said.startswith("the flow series of 10 s ")
     assert "the intervals hold for" in said
     with xr.open_dataset(tmp_path / "two" / "assembly.nc", engine="h5netcdf") as found:

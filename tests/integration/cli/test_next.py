@@ -96,7 +96,7 @@ def test_a_name_that_is_taken_is_not_proposed(tracks: Path) -> None:
 
 def test_the_side_that_a_fitted_tank_took_is_asked_for(tmp_path: Path) -> None:
     done = here("flow", RECORDING, "--to", "300", "--arena", "fit", "-o", tmp_path / "f.nc")
-    assert "nobody stated the mass and side" in done.err
+    assert "the mass and side were not stated" in done.err
 
 
 def test_the_lines_lead_from_a_recording_to_a_page(tracks: Path) -> None:

@@ -18,7 +18,7 @@ from twin.latch import Latch
 from twin_assembly import study as tank_study, swirl
 
 import driftwalk as dw
-from driftwalk.assembly.runs.address import stream_keys
+from driftwalk.assembly.runs.plan import stream_keys
 from driftwalk.core.errors import InputError
 
 STILL = dw.uniform_flow(0.0, 0.0)

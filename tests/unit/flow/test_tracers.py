@@ -16,7 +16,7 @@ from scipy.stats import binom, t as student
 
 from driftwalk.core.errors import InputError
 from driftwalk.flow import extract_flow, flow_from_tracers, load_flow, save_flow
-from driftwalk.flow.false_links import THRESHOLD, judge_steps
+from driftwalk.flow.false_links import LINKS, judge_steps
 from driftwalk.flow.track_steps import Steps, step_noise, track_steps
 from driftwalk.schema import FLAGS, build_trajectory
 
@@ -63,7 +63,7 @@ def test_false_links_are_left_out_and_right_ones_kept(fresh_seed: Callable[[int]
     noise = step_noise(steps)
     # The noise that was put in; its median is good to some percent.
     assert noise == pytest.approx(1e-4, rel=0.15)
-    found = judge_steps(steps, noise=noise).is_false(THRESHOLD)
+    found = judge_steps(steps, noise=noise).is_false(LINKS.threshold)
     false = seeded.false.T.ravel()
     assert found[false].mean() > 0.85
     assert found[~false].mean() < 2e-3
@@ -87,7 +87,7 @@ def test_scatter_alone_loses_two_steps_in_a_thousand(fresh_seed: Callable[[int],
     number = np.arange(n)
     steps = Steps(number, 2 * number, 0.0 * number, 1.0 + 0.0 * number, at, velocity)
     # 0.17 %: 34 of 20,000, give or take 6.
-    assert 12 <= np.count_nonzero(judge_steps(steps, noise=0.0).is_false(THRESHOLD)) <= 60
+    assert 12 <= np.count_nonzero(judge_steps(steps, noise=0.0).is_false(LINKS.threshold)) <= 60
 
 
 def test_no_step_crosses_a_gap_or_goes_from_one_body_to_another() -> None:

@@ -149,7 +149,7 @@ def test_a_fitted_arena_that_excludes_its_own_positions_is_an_error() -> None:
         arena_found=json.dumps(found), arena=json.dumps({"shape": "circle", "diameter_m": 0.05})
     )
     assumed = apply_overrides(Study(), {"tank.diameter_m": 0.05})
-    with pytest.raises(InputError, match=r"30 mm is .* nobody stated the side.*`block.side_m`"):
+    with pytest.raises(InputError, match=r"30 mm is .* the side was not stated.*`block.side_m`"):
         dw.fit_motion(dish, assumed)
     # The same tank, stated: what it leaves is the subject then.
     with pytest.raises(InputError, match="all 599 intervals are at the wall of the tank"):

@@ -15,8 +15,14 @@ from driftwalk.conditions import Neighbours
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.seeds import world_keys
 from driftwalk.motion.family import MEMBERS, PARTS, family_model
-from driftwalk.motion.family.columns import INERTIAL, SHARED, STATE, State, switching_table
-from driftwalk.motion.family.dwell import dwell_law
+from driftwalk.motion.family.columns import (
+    INERTIAL,
+    SHARED,
+    STATE,
+    State,
+    dwell_law,
+    switching_table,
+)
 from driftwalk.motion.family.particle import time_step_of
 from driftwalk.schema import Parameter, Track
 from driftwalk.testing import MotionModelContract

@@ -12,7 +12,7 @@ import pytest
 PENDULUM = '''"""Pendulum log: lines `frame|x|y`, pixels."""
 
 from driftwalk.core.errors import FormatError
-from driftwalk.record.layout import TableLayout
+from driftwalk.record.raw import TableLayout
 from driftwalk.record.raw import RawBody, RawRecording
 from driftwalk.record.text import read_table
 

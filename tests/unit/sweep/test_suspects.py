@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from driftwalk.sweep import MemoryStore, SweepError, WorkUnit, grid, run_sweep
-from driftwalk.sweep.handout import FOR_EACH_WORKER, is_lost
+from driftwalk.sweep.handout import HANDOUT, is_lost
 
 UNITS = grid(a=np.arange(60.0)).units(1)
 ENDED = 4
@@ -33,7 +33,7 @@ class Workers:
     """
 
     def __init__(self, fatal: set[int], workers: int, seed: int) -> None:
-        self.width = FOR_EACH_WORKER * workers
+        self.width = HANDOUT.for_each_worker * workers
         self.seen: Counter[int] = Counter()
         self.alone: list[int] = []
         self._fatal = fatal
@@ -52,8 +52,8 @@ class Workers:
             self.alone.append(self._under_way[0][0].start)
         order = self._random.permutation(len(self._under_way))
         held = [self._under_way[k] for k in order]
-        for first in range(0, len(held), FOR_EACH_WORKER):
-            own = held[first : first + FOR_EACH_WORKER]
+        for first in range(0, len(held), HANDOUT.for_each_worker):
+            own = held[first : first + HANDOUT.for_each_worker]
             unit, future = own[0]
             self.seen[unit.start] += 1
             if unit.start in self._fatal:
@@ -114,7 +114,7 @@ def test_the_unit_that_ends_its_workers_is_named_and_no_other(
     assert f"unit {error.unit_id}, which begins with a = {guilty:.1f}, ended all 4" in str(error)
     assert on.alone[-1] == guilty
     # It makes suspects of two others at most, which wait for their turn.
-    assert len(store.missing(UNITS)) <= FOR_EACH_WORKER
+    assert len(store.missing(UNITS)) <= HANDOUT.for_each_worker
     assert all(count == 1 for unit, count in on.seen.items() if unit != guilty)
 
 

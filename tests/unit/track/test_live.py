@@ -17,7 +17,7 @@ import pytest
 
 from driftwalk.core.errors import InputError
 from driftwalk.record import load
-from driftwalk.track.live import LiveServer, Particle, jpeg_text, nmea_frame, requested_width
+from driftwalk.track.live import LIVE, LiveServer, Particle, jpeg_text, nmea_frame, requested_width
 
 
 @pytest.fixture
@@ -113,7 +113,7 @@ def test_the_last_lines_wait_for_a_client_that_is_busy(connect) -> None:
 def test_clients_that_never_read_are_left_together(
     connect, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("driftwalk.track.live.PATIENCE_S", 1.0)
+    monkeypatch.setattr("driftwalk.track.live.LIVE", LIVE._replace(patience_s=1.0))
     server = LiveServer(0)
     _clients = [connect(server, small=True) for _ in range(8)]
     assert server.wait_for_clients(8)

@@ -1,4 +1,4 @@
-"""Results of the events of simulated runs, replayed on the lattice, all runs side by side.
+"""Replay the events of simulated runs on the lattice, all runs side by side.
 
 The native core gives, for each event, the two blocks and the faces that joined. Everything else
 follows: which assemblies they were, what shapes these had, and the outcome class of the world.

@@ -1,4 +1,4 @@
-"""A recorded world from sample to sample, and the events that lead from one state to the next."""
+"""Join history of a recorded world: its states and events."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which faces of recorded blocks are joined, and from when to when.
+"""Joined faces of recorded blocks, with start and end.
 
 Two faces fit when their centres are near each other and they look at each other. A join begins
 where they fit without a break for the shortest duration that counts, and it ends where they are

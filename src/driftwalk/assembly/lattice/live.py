@@ -1,4 +1,4 @@
-"""Where the blocks of one world are on the lattices of their assemblies, and what joining does."""
+"""Lattice positions of the blocks of a live world, updated as blocks join."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Lattice(NamedTuple):
 
     @classmethod
     def of(cls, state: dict[str, npt.NDArray[Any]]) -> Lattice:
-        """Return the lattice in what the native core says of a world."""
+        """Return the lattice of a world of the native core."""
         return cls(*(state[name].astype(np.int64) for name in cls._fields))
 
     def joined(self, blocks: npt.NDArray[np.int32], faces: npt.NDArray[np.int32]) -> Lattice:

@@ -1,4 +1,4 @@
-"""Polyominoes: shapes of unit squares joined edge to edge; their names, and all there are.
+"""Polyominoes: shapes of unit squares joined edge to edge; names and enumeration.
 
 A shape is called by its canonical code: its rows from the top, ``x`` for a cell and ``.`` for none,
 joined by ``/``. Of all the ways to turn it (and, with chirality "merged", to mirror it) the code is
@@ -25,7 +25,6 @@ LARGEST: Final = 10
 """Largest size of which all shapes are listed: there are 4655, and four times more per cell."""
 
 _MIRRORED: Final = frozenset({"Z", "J"})
-_LARGEST_NAMED: Final = 4
 # Cells before gaps, and wide shapes before narrow ones.
 _BY_CELLS: Final = str.maketrans("x/.", "012")
 
@@ -172,7 +171,8 @@ def name_of(cells: Cells, chirality: Chirality) -> str:
     if not _is_connected(cells):
         raise InputError("the cells are not joined edge to edge")
     code = _canonical_code(cells, chirality)
-    return _short_names(chirality).get(code, code) if len(cells) <= _LARGEST_NAMED else code
+    # Shapes of up to four cells have short names.
+    return _short_names(chirality).get(code, code) if len(cells) <= 4 else code
 
 
 def require_chirality(chirality: str) -> None:

@@ -1,4 +1,4 @@
-"""One world on the lattice: joins are put in one by one, as far as they agree with each other."""
+"""Lattice of one world: joins are added one by one if they are consistent."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from driftwalk.assembly.outcomes.classes import class_name
 from driftwalk.schema.shapes import Cell, moved_to_origin
 
 # From a cell to its neighbour at each face.
-_STEP: Final = ((1, 0), (0, 1), (-1, 0), (0, -1))
+STEPS: Final = ((1, 0), (0, 1), (-1, 0), (0, -1))
 
 
 class Partition:
@@ -75,7 +75,7 @@ class LatticeWorld:
         moving = self.partition.moves(join.blocks)
         stays, moves = join.blocks[1 - moving], join.blocks[moving]
         outward = (join.faces[1 - moving] + self.quarter[stays]) % 4
-        place = _sum(self.cell[stays], _STEP[outward])
+        place = _sum(self.cell[stays], STEPS[outward])
         turn = (outward + 2 - join.faces[moving] - self.quarter[moves]) % 4
         label, other = (self.partition.labels[block] for block in (stays, moves))
         if label == other:

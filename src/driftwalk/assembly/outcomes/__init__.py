@@ -1,1 +1,1 @@
-"""Outcomes of assembly, how often and when: classes, distributions, distances, survival."""
+"""Outcomes of assembly: classes, distributions, distances, survival."""

@@ -1,4 +1,4 @@
-"""Outcome classes: which shapes the blocks of a world have assembled into.
+"""Outcome classes: the multiset of shapes that the blocks of a world have formed.
 
 A class is the multiset of the shapes, written with the larger ones first: ``I3+1`` is a row of
 three and a single block. Classes are listed by the sizes of their shapes, the largest first, and
@@ -27,7 +27,7 @@ from driftwalk.assembly.lattice.polyomino import (
 from driftwalk.core.errors import InputError
 
 MOST_BLOCKS = 8
-"""Up to so many blocks all classes are listed; beyond that, those that occur."""
+"""Blocks up to which all classes are listed; of more, those that occur. Chosen by hand."""
 
 
 @lru_cache(maxsize=32)

@@ -1,4 +1,4 @@
-"""Principal components of the class proportions over settings: what varies together, and how much.
+"""Principal component analysis of the class proportions over settings.
 
 The proportions are centred and not scaled. They have one unit already, and scaling would lift a
 class that comes once in a thousand runs, which is mostly noise, to the weight of the common ones.

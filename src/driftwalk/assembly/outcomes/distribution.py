@@ -1,4 +1,4 @@
-"""How often does each outcome come? Proportions of the classes, with intervals that hold together.
+"""Proportions of the outcome classes, with simultaneous confidence intervals.
 
 A class is named by its polyominoes joined by "+", so a class without "+" is one single assembly.
 """
@@ -69,7 +69,7 @@ def outcome_distribution(
     the same construction with the normal approximation. At 1000 runs of 10 classes the widths
     differ by 2 % for common classes, but with five classes of 1e-3 and less Goodman's hold in 79 %
     of samples instead of 90 %, and rare classes are what a distribution of outcomes is full of.
-    The interval of ``complete`` answers a question of its own and is not part of the joint
+    The interval of ``complete`` answers another question and is not part of the joint
     statement. The statement covers the classes that are listed: beyond 8 blocks, where only the
     classes that occurred are listed, it says nothing of the others.
 

@@ -1,6 +1,6 @@
-"""How large do the assemblies become? Their sizes, means over time, and how compact they are.
+"""Sizes of assemblies: distribution, means over time, compactness.
 
-Of many blocks nearly every run ends in a class of its own. Sizes are what runs have in common.
+Of many blocks nearly every run ends in a different class. Sizes are what runs have in common.
 """
 
 from __future__ import annotations
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 
 METHOD: Final = "Student's t over runs, each interval on its own"
-SMALLEST_SHAPED: Final = 4
-"""Up to three blocks, all shapes are equally compact."""
 
 
 def assembly_sizes(
@@ -148,7 +146,7 @@ def assembly_sizes(
 
 
 def compactness(shape: str) -> float:
-    """Return the least perimeter of so many squares over the perimeter of a shape.
+    """Return the least perimeter of as many squares over the perimeter of a shape.
 
     Examples
     --------
@@ -190,7 +188,7 @@ def _courses(
     joined = real.cumsum(axis=1)
     freed = ((event_size[..., :2] == 1).sum(axis=2) * real).cumsum(axis=1)
     largest = np.maximum.accumulate(np.where(real, event_size[..., 2], 1), axis=1)
-    # What stands after so many events, none among them.
+    # The state after a number of events, from none on.
     start = np.zeros((event_time.shape[0], 1), dtype=np.int64)
     joined, freed, largest = (
         np.concatenate([before, after], axis=1)
@@ -206,7 +204,8 @@ def _courses(
 
 def _compactness_of_runs(event_shape: Integers, shapes: list[str], size: Integers) -> Floats:
     """Return the compactness of each run that has one."""
-    shaped = np.where(size >= SMALLEST_SHAPED, size, 0)
+    # Up to three blocks, all shapes are equally compact.
+    shaped = np.where(size >= 4, size, 0)
     weighted = shaped * np.array([compactness(name) for name in shapes])
     real = event_shape[..., 2] >= 0
     total, blocks = (

@@ -1,4 +1,4 @@
-"""When does it happen? Times to first contact and completion, and the classes over time.
+"""Survival analysis: times to first contact and completion, and the classes over time.
 
 A run ends before its blocks have met or joined: then the time is not known, only that it is longer
 than the run (right censoring), and a mean over the runs that got there would be too short.
@@ -29,9 +29,6 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
-TIMES = 201
-# A product of shares like 2/3 * 3/4 may miss one half by rounding.
-HALF = 0.5 + 1e-12
 EVENTS = ("first_contact", "completion")
 
 
@@ -267,7 +264,8 @@ def _kaplan_meier(
 
 def _reached(knot: Floats, curve: Floats) -> float:
     """Return the first time at which the curve is down to one half, NaN when it never is."""
-    down = np.flatnonzero(curve <= HALF)
+    # A half, but for rounding.
+    down = np.flatnonzero(curve <= 0.5 + 1e-12)
     return float(knot[down[0]]) if down.size else float("nan")
 
 
@@ -296,7 +294,7 @@ def class_counts(
 def checked_times(times: npt.ArrayLike | None, longest: float) -> Floats:
     """Return the times of a course, 201 where none are given; refuse those outside the runs."""
     if times is None:
-        return np.linspace(0.0, longest, TIMES)
+        return np.linspace(0.0, longest, 201)
     time = np.asarray(times, dtype=np.float64)
     if time.ndim != 1 or time.size == 0 or (np.diff(time) <= 0).any():
         raise InputError("times: expected a row of increasing numbers")

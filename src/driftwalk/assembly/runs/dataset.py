@@ -1,4 +1,4 @@
-"""The `assembly` dataset: what the runs of the native core gave, with names and units.
+"""Build the `assembly` dataset from the runs of the native core.
 
 Dimensions ``run``, ``event`` (one less than there are blocks, at least one), ``side`` (of the
 assembly that stayed, of the one that was moved), ``part`` (stayed, moved, became), ``block``,

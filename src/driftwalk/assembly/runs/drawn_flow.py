@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.runs.address import stream_keys
+from driftwalk.assembly.runs.plan import stream_keys
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -1,4 +1,4 @@
-"""Parameters drawn from what a calibration or a fit leaves open.
+"""Draw parameters from the uncertainty of a calibration or a fit.
 
 A draw from a calibration is a point of its joint region. Where D is the smooth surface of
 distances, m its minimum, L its level at the border and c the confidence of the region, a point is
@@ -14,12 +14,12 @@ A draw from a fit is one of its Gaussian posterior, `driftwalk.assembly.runs.pos
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.runs.address import stream_keys
+from driftwalk.assembly.runs.plan import stream_keys
 from driftwalk.assembly.runs.posterior import draw_posterior, has_covariance
 from driftwalk.core.errors import InputError
 from driftwalk.schema.check import refuse_other_version
@@ -29,11 +29,6 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
-
-PROPOSALS: Final = 32
-"""Points that are proposed to a run at once."""
-MOST_ROUNDS: Final = 1000
-RUNS_AT_ONCE: Final = 1024
 
 
 class DrawnParameters(NamedTuple):
@@ -96,7 +91,7 @@ def draw_parameters(
     index = np.arange(runs)
     parts = [
         _draw(region, stream_keys("parameters", seed=seed, trial=trial, index=part))
-        for part in np.array_split(index, max(1, -(-runs // RUNS_AT_ONCE)))
+        for part in np.array_split(index, max(1, -(-runs // 1024)))
     ]
     drawn = np.concatenate(parts)
     return DrawnParameters(np.ascontiguousarray(drawn[:, 0]), np.ascontiguousarray(drawn[:, 1]))
@@ -152,7 +147,7 @@ def _draw(region: _Region, keys: npt.NDArray[np.uint64]) -> Floats:
     found = np.empty((keys.size, 2))
     waiting = np.arange(keys.size)
     low, high = region.border.min(axis=0), region.border.max(axis=0)
-    for attempt in range(MOST_ROUNDS):
+    for attempt in range(1000):
         numbers = np.stack([_numbers(key, attempt) for key in keys[waiting]])
         point = low + numbers[..., :2] * (high - low)
         taken = numbers[..., 2] < _weight_at(region, point)
@@ -169,7 +164,8 @@ def _draw(region: _Region, keys: npt.NDArray[np.uint64]) -> Floats:
 def _numbers(key: Any, attempt: int) -> Floats:
     """Return three uniform numbers in [0, 1) per proposal of one attempt of one run."""
     bits = np.random.Philox(key=int(key), counter=attempt << 64)
-    return np.random.Generator(bits).random((PROPOSALS, 3))
+    # Points that are proposed to a run at once.
+    return np.random.Generator(bits).random((32, 3))
 
 
 def _weight_at(region: _Region, point: Floats) -> Floats:

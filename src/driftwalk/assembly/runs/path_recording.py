@@ -1,4 +1,4 @@
-"""The recording that a camera without noise would have made of a simulated run."""
+"""Noise-free recording of a simulated run."""
 
 from __future__ import annotations
 

@@ -11,11 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
-from driftwalk.assembly.runs.address import stream_keys
 from driftwalk.assembly.runs.cover import require_cover
 from driftwalk.assembly.runs.start import given_start, place_blocks, require_room
 from driftwalk.core.errors import InputError
 from driftwalk.core.processors import default_threads
+from driftwalk.core.seeds import world_keys
+from driftwalk.core.streams import trial_in
 from driftwalk.simulation.backend import Camera, native_model, require_steps
 from driftwalk.simulation.series import continued_flow, flow_starts
 
@@ -179,3 +180,31 @@ def simulate_rows(
         flow_start=None if plan.flow_start is None else np.ascontiguousarray(plan.flow_start[rows]),
     )
     return {name: values for name, values in found.items() if isinstance(values, np.ndarray)}
+
+
+Stream = Literal["run", "parameters", "flow"]
+
+
+def stream_keys(
+    stream: Stream, *, seed: int, trial: int, index: npt.ArrayLike
+) -> npt.NDArray[np.uint64]:
+    """Return the keys of random streams, one per index.
+
+    Parameters
+    ----------
+    stream : {"run", "parameters", "flow"}
+        Purpose of the numbers; streams of two kinds never meet.
+    seed : int
+        Seed of the whole work.
+    trial : int
+        Index of the parameter set within the work, 0 <= trial < 2**40.
+    index : array_like of int
+        Index of the run or of the draw.
+
+    Examples
+    --------
+    >>> keys = stream_keys("run", seed=1, trial=0, index=[0, 1])
+    >>> bool((keys == stream_keys("run", seed=1, trial=0, index=[1, 0])[::-1]).all())
+    True
+    """
+    return world_keys(seed, trial=trial_in(stream, trial), replicate=index)

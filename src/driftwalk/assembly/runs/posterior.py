@@ -1,4 +1,4 @@
-"""Parameters drawn from the posterior of a fit.
+"""Draw parameters from the posterior of a fit.
 
 It is Gaussian in ln C_d, in the logarithm of the force's noise intensity and in the numbers of the
 force law, with the covariance that the fit stores; numbers of the camera are left out. It holds for
@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.runs.address import stream_keys
 from driftwalk.assembly.runs.drawn_flow import RUNS_PER_FLOW
+from driftwalk.assembly.runs.plan import stream_keys
 from driftwalk.core.errors import InputError
 from driftwalk.model import declared
 from driftwalk.schema.answers.fit_facts import fitted_value
@@ -31,8 +31,6 @@ LINEAR_SHARE: Final = "linear_share"
 PLAIN: Final = {"drag_power": "drag_power", "force_memory": "force_memory_s"}
 """Numbers of a law that [forces] holds as they are, by the fit's name for them."""
 LAW_NUMBERS: Final = (LINEAR_SHARE, *PLAIN)
-LEAST_QUADRATIC: Final = 1e-6
-"""Share of the quadratic drag below which nothing is known of its C_d."""
 
 
 def has_covariance(fit: xr.Dataset) -> bool:
@@ -110,7 +108,8 @@ def draw_posterior(fit: xr.Dataset, *, runs: int, seed: int, trial: int) -> dict
     quadratic, linear = np.ones(keys.size), np.ones(keys.size)
     if LINEAR_SHARE in change:
         share = _number(fit, LINEAR_SHARE)
-        quadratic -= change[LINEAR_SHARE] / max(1.0 - share, LEAST_QUADRATIC)
+        # With a smaller share of quadratic drag, nothing is known of its C_d.
+        quadratic -= change[LINEAR_SHARE] / max(1.0 - share, 1e-6)
         linear += change[LINEAR_SHARE] / share
     drawn = {
         "drag_coefficient": fitted_value(fit, "drag_coefficient") * by_drag * quadratic,
@@ -126,7 +125,7 @@ def draw_posterior(fit: xr.Dataset, *, runs: int, seed: int, trial: int) -> dict
 
 
 def _within(key: str, values: Floats) -> Floats:
-    """Return values within what [forces] takes: a fit that leaves an end open draws beyond it."""
+    """Return values within what [forces] takes: draws of a fit may lie beyond it."""
     quantity = declared(f"forces.{key}").quantity
     return values if quantity is None else np.clip(values, quantity.ge, quantity.le)
 

@@ -344,7 +344,7 @@ def _run(
 
 @dataclass(frozen=True, eq=False)
 class _Runs:
-    """The function of the sweep: the runs of a unit, simulated wherever it is sent."""
+    """The function of the sweep: the runs of a unit, simulated by a worker."""
 
     plan: Plan
     poses: Floats

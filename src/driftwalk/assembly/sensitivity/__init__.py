@@ -1,1 +1,1 @@
-"""How much the outcomes depend on the model: maps over settings and Sobol' indices."""
+"""Sensitivity analysis: maps of the outcomes over settings, and Sobol' indices."""

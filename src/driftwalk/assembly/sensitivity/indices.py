@@ -1,4 +1,4 @@
-"""Which input matters most for what blocks build: Sobol' indices, and the share of noise."""
+"""Sobol' sensitivity indices of assembly outcomes, and the share of noise."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from driftwalk.assembly.outcomes.distribution import is_complete, sampling_varia
 from driftwalk.assembly.sensitivity.axes import KEYS
 from driftwalk.assembly.sensitivity.dataset import count_table
 from driftwalk.assembly.sensitivity.settings import (
+    FIRST_TRIALS,
     Outcomes,
     Progress,
     Settings,
@@ -32,10 +33,7 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
     from driftwalk.sweep import Store
 
-SOBOL_TRIAL: Final = 3 << 32
-"""First trial, apart from those of the map and of the reference."""
 INPUTS: Final = ("drag_coefficient", "force_std", "tank_diameter")
-MOST_SEED: Final = 2**31
 
 
 def sensitivity_indices(
@@ -140,7 +138,7 @@ def _design(
     if unknown:
         raise InputError(f"bounds: there is no '{unknown[0]}'; choose from {', '.join(INPUTS)}")
     # The seed of the study may be larger than what the scrambling takes.
-    seed = study.sensitivity.seed % MOST_SEED
+    seed = study.sensitivity.seed % 2**31
     return sobol_design(chosen, samples=samples, seed=seed)
 
 
@@ -178,7 +176,7 @@ def _settings(study: Study, flow: xr.Dataset, design: xr.Dataset, threads: int |
         world=world,
         drag_coefficient=column.get("drag_coefficient", np.full(size, forces.drag_coefficient)),
         force_std=column.get("force_std", np.full(size, forces.force_std_N)),
-        trial=SOBOL_TRIAL + np.arange(size),
+        trial=FIRST_TRIALS.sobol + np.arange(size),
     )
 
 

@@ -1,16 +1,17 @@
-"""How much does what blocks build depend on the model? Outcomes over settings, and a reference."""
+"""Sensitivity map: outcomes over settings, compared with a reference."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from concurrent.futures import Executor
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from driftwalk.assembly.sensitivity.axes import Axes, make_axes
 from driftwalk.assembly.sensitivity.dataset import map_dataset, reference_dataset
 from driftwalk.assembly.sensitivity.settings import (
+    FIRST_TRIALS,
     Progress,
     Settings,
     place_first,
@@ -24,10 +25,6 @@ if TYPE_CHECKING:
 
     from driftwalk.model import Study
     from driftwalk.sweep import Store
-
-MAP_TRIAL: Final = 1 << 32
-REFERENCE_TRIAL: Final = 2 << 32
-"""First trials: runs of the map, of the reference and of `assemble` share no random number."""
 
 
 def sensitivity_map(
@@ -199,7 +196,7 @@ def check_sensitivity(
 
 
 def _map_settings(axes: Axes, flow: xr.Dataset, threads: int | None) -> Settings:
-    return axes.settings(flow, first_trial=MAP_TRIAL, threads=threads)
+    return axes.settings(flow, first_trial=FIRST_TRIALS.map, threads=threads)
 
 
 def _reference_settings(study: Study, flow: xr.Dataset, threads: int | None) -> Settings:
@@ -209,5 +206,5 @@ def _reference_settings(study: Study, flow: xr.Dataset, threads: int | None) -> 
         world=np.zeros(number, dtype=np.int64),
         drag_coefficient=np.full(number, forces.drag_coefficient),
         force_std=np.full(number, forces.force_std_N),
-        trial=REFERENCE_TRIAL + np.arange(number),
+        trial=FIRST_TRIALS.reference + np.arange(number),
     )

@@ -1,6 +1,6 @@
 """Outcomes of many settings, each of many runs: the engine under a sensitivity analysis.
 
-Every setting has random numbers of its own, by its trial: what comes out depends neither on the
+Every setting has its own random numbers, by its trial: what comes out depends neither on the
 order of the settings nor on how they are cut into work units.
 """
 
@@ -18,9 +18,8 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.lattice.events import replay_events
-from driftwalk.assembly.runs.address import stream_keys
 from driftwalk.assembly.runs.dataset import completion_step, times_of
-from driftwalk.assembly.runs.plan import Arrays, Plan, make_plan, simulate_rows
+from driftwalk.assembly.runs.plan import Arrays, Plan, make_plan, simulate_rows, stream_keys
 from driftwalk.assembly.runs.start import place_blocks
 from driftwalk.assembly.sensitivity.times import Courses, added, courses_of, courses_to_text
 from driftwalk.core.errors import DriftwalkError
@@ -48,6 +47,20 @@ Progress = Callable[[int, int], None]
 
 NUMBERS: Final = ("left_out", "first_contact_median", "completion_median")
 """Variables with one number per setting."""
+
+
+class TrialPolicy(NamedTuple):
+    """First trials, so far apart that these runs and those of `assemble` share no random number."""
+
+    map: int = 1 << 32
+    """Of the map; chosen by hand."""
+    reference: int = 2 << 32
+    """Of the reference; chosen by hand."""
+    sobol: int = 3 << 32
+    """Of the Sobol indices; chosen by hand."""
+
+
+FIRST_TRIALS: Final = TrialPolicy()
 BLOCKS_AT_ONCE: Final = 1_000_000
 """Blocks of one call of the native core: about 100 MB."""
 
@@ -218,7 +231,7 @@ class _Piece(NamedTuple):
 
 
 def _calls(settings: list[int], runs: int, most: int) -> Iterator[list[_Piece]]:
-    """Give the runs of settings in groups of at most so many, each one call of the core."""
+    """Yield groups of runs of settings, each for one call of the core."""
     group: list[_Piece] = []
     room = most
     for setting in settings:

@@ -1,7 +1,7 @@
-"""Which input matters? Sobol' indices of outputs that are themselves estimates.
+"""Sobol' sensitivity indices of outputs that are themselves estimates.
 
 An output of the self-assembly stage is a proportion of finitely many runs, so part of its variance
-over the design is sampling noise, and noise looks like an input of its own that acts together with
+over the design is sampling noise, and noise looks like a further input that acts together with
 every other one. The indices therefore come with the share of noise, and without it.
 """
 
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
-RESAMPLES = 200
 MEASURES = (
     "first_order",
     "first_order_half_width",
@@ -167,7 +166,7 @@ def sobol_indices(
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(varies, noise[independent].mean(axis=0) / variance, np.nan)
     # The seed itself is usually that of the design; the two draws stay apart.
-    drawn = np.random.default_rng(seed + 1).integers(samples, size=(samples, RESAMPLES)).T
+    drawn = np.random.default_rng(seed + 1).integers(samples, size=(samples, 200)).T
     sigmas = _normal_quantile(confidence)
     indices = np.full((len(MEASURES), table.shape[1], inputs), np.nan)
     for i in np.flatnonzero(varies):
@@ -261,7 +260,7 @@ def _checked_noise(noise_variance: npt.ArrayLike, shape: tuple[int, ...]) -> Flo
 def _estimates(groups: Floats) -> Floats:
     """Return first and total order indices, shape (2, resample, input), of at least two resamples.
 
-    To SciPy every resample is an output of its own: its bootstrap takes no seed. One that happens
+    To SciPy every resample is a separate output: its bootstrap takes no seed. One that happens
     to hold a single value has indices of 0.
 
     Parameters

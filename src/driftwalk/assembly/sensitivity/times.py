@@ -1,4 +1,4 @@
-"""How many runs of a setting are in each outcome class over time, on one grid for all settings."""
+"""Outcome classes over time: runs of each setting in each class, on one time grid."""
 
 from __future__ import annotations
 
@@ -26,8 +26,6 @@ Courses = dict[str, Integers]
 
 TIMES: Final = 101
 """Times of the grid, from the start of the runs to their end."""
-MOST_CLASSES: Final = 24
-"""Classes that a map keeps over time: all of up to five blocks."""
 OTHER: Final = "other"
 DIMS: Final = ("time", "class_over_time")
 
@@ -142,7 +140,8 @@ def map_courses(
             largest[name] = max(largest.get(name, 0.0), float(row.max()) / runs)
     # Classes with the same share are taken in their order, so that the choice is always the same.
     ranked = sorted(sort_classes(largest), key=lambda name: -largest[name])
-    names = sort_classes(ranked[:MOST_CLASSES])
+    # All classes of up to five blocks are kept over time.
+    names = sort_classes(ranked[:24])
     listed = (*names, OTHER) if len(ranked) > len(names) else names
     count = np.stack([course_table(courses_from_text(text), listed) for text in texts])
     shape = (*dims.values(), TIMES, len(listed))
@@ -161,10 +160,10 @@ def _all_single(plan: Plan) -> str:
 
 def course_table(courses: Courses, listed: Sequence[str]) -> Integers:
     """Return courses as numbers of runs, shape (time, class); "other" at the end is the rest."""
-    nobody = np.zeros(TIMES, dtype=np.int64)
-    table = np.stack([courses.get(name, nobody) for name in listed], axis=1)
+    none = np.zeros(TIMES, dtype=np.int64)
+    table = np.stack([courses.get(name, none) for name in listed], axis=1)
     if listed[-1] == OTHER:
-        table[:, -1] = sum((row for name, row in courses.items() if name not in listed), nobody)
+        table[:, -1] = sum((row for name, row in courses.items() if name not in listed), none)
     return table
 
 

@@ -178,7 +178,7 @@ def _of_block(
 def _say_what(
     study: Study, given: StudyOptions, source: FoundSource | None, *, about: About
 ) -> None:
-    """Say which body and tank are simulated, and warn of those that nobody stated."""
+    """Say which body and tank are simulated, and warn of those that were not stated."""
     from driftwalk.conditions import unstated_warning
 
     otherwise = "recording" if source is None else str(source.folder)

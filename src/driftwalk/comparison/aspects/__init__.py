@@ -1,4 +1,4 @@
-"""How far apart are two motions in more than their steps? A set of two-dimensional distances."""
+"""Aspects of a motion: two-dimensional distances beyond those of single steps."""
 
 from driftwalk.comparison.aspects.distance import (
     BLOCKS,

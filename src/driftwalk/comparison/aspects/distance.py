@@ -1,4 +1,4 @@
-"""How far motions are apart in each aspect, and how far a recording is from itself."""
+"""Distance of two motions in each aspect, and its noise floor."""
 
 from __future__ import annotations
 
@@ -22,7 +22,6 @@ BLOCKS: Final = 20
 """Blocks of time into which a recording is cut."""
 HALVINGS: Final = 16
 """Random halves of the blocks from which the floor is taken."""
-FARTHEST: Final = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +140,7 @@ def interleaved(aspects: Sequence[Aspect], *, duration: float) -> tuple[list[Asp
 def points_distance(reference: KsReference, points: Floats) -> float:
     """Return the KS distance, without a word on ties; 1 where there is no point."""
     if not len(points):
-        return FARTHEST
+        return 1.0
     d1, d2, *_ = reference.native.compare(points, False)
     return (d1 + d2) / (2 * len(reference) * len(points))
 
@@ -180,4 +179,4 @@ def _between_halves(
             found.append(points_distance(KsReference(first.points), second.points))
     # A recording that does not differ from itself: as many steps as it takes to see a difference.
     least = 1.0 / len(aspect.points)
-    return max(float(np.mean(found)) / over, least) if found else FARTHEST
+    return max(float(np.mean(found)) / over, least) if found else 1.0

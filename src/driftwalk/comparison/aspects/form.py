@@ -22,7 +22,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.comparison.aspects.plan import LATER, LONGER, AspectPlan
+from driftwalk.comparison.aspects.plan import ASPECT_POLICY, AspectPlan
 from driftwalk.comparison.plan import StepPlan, apply_steps
 
 Floats = npt.NDArray[np.float64]
@@ -30,7 +30,13 @@ Bools = npt.NDArray[np.bool_]
 WallDistance = Callable[[Floats, Floats], Floats]
 """Distance from the wall [m] of points x, y [m]; positive inside."""
 
-ASPECTS: Final = ("steps", *(f"steps_{factor}" for factor in LONGER), "frame", "wall", "memory")
+ASPECTS: Final = (
+    "steps",
+    *(f"steps_{factor}" for factor in ASPECT_POLICY.longer),
+    "frame",
+    "wall",
+    "memory",
+)
 """All aspects, the paper's first."""
 
 
@@ -82,7 +88,7 @@ def form_aspects(
     x, y = np.asarray(x), np.asarray(y)
     names = ["steps"]
     plans = [plan.short]
-    for factor, longer in zip(LONGER, plan.longer, strict=False):
+    for factor, longer in zip(ASPECT_POLICY.longer, plan.longer, strict=False):
         names.append(f"steps_{factor}")
         plans.append(longer)
     found = [_steps(name, one, x, y) for name, one in zip(names, plans, strict=True)]
@@ -95,7 +101,9 @@ def form_aspects(
         middle = 0.5 * (px[at] + px[at + 1]), 0.5 * (py[at] + py[at + 1])
         found.append(_aspect("wall", wall(*middle), length[at], plan.time[at]))
     later = plan.later
-    found.append(_aspect("memory", length[later], length[later + LATER], plan.time[later]))
+    found.append(
+        _aspect("memory", length[later], length[later + ASPECT_POLICY.later], plan.time[later])
+    )
     return tuple(found)
 
 

@@ -1,9 +1,9 @@
-"""Which samples of a recording show which aspect of its motion: decided once from time stamps."""
+"""Samples that form each aspect of a motion, decided once from the time stamps."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,10 +14,18 @@ from driftwalk.core.errors import InputError
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 
-LONGER: Final = (3, 9)
-"""Longer steps, in step intervals."""
-LATER: Final = 3
-"""How many step intervals lie between the two steps whose lengths are compared."""
+
+class AspectPolicy(NamedTuple):
+    """Which further steps the aspects of a motion compare."""
+
+    longer: tuple[int, ...] = (3, 9)
+    """Longer steps, in step intervals; chosen by hand."""
+    later: int = 3
+    """Step intervals between the two steps whose lengths are compared; chosen by hand."""
+
+
+ASPECT_POLICY: Final = AspectPolicy()
+
 FEWEST_POINTS: Final = 30
 
 
@@ -75,7 +83,7 @@ def plan_aspects(time: npt.ArrayLike, *, step_interval: float | None = None) -> 
     stamps = np.asarray(time, dtype=np.float64)
     short = plan_steps(stamps, step_interval=step_interval)
     longer = []
-    for factor in LONGER:
+    for factor in ASPECT_POLICY.longer:
         try:
             plan = plan_steps(stamps, step_interval=factor * short.step_interval)
         except InputError:
@@ -85,9 +93,9 @@ def plan_aspects(time: npt.ArrayLike, *, step_interval: float | None = None) -> 
     # A step is there where it is the first or the second one of a pair.
     follows = np.zeros(short.points, dtype=bool)
     follows[short.triple] = follows[short.triple + 1] = True
-    count = max(follows.size - LATER, 0)
+    count = max(follows.size - ASPECT_POLICY.later, 0)
     unbroken = np.ones(count, dtype=bool)
-    for k in range(LATER + 1):
+    for k in range(ASPECT_POLICY.later + 1):
         unbroken &= follows[k : k + count]
     weight = short.weight
     right = np.minimum(short.left + (weight > 0.0), stamps.size - 1)

@@ -78,7 +78,7 @@ def movement_dataset(recording: xr.Dataset) -> xr.Dataset:
     position = np.stack([x, y], axis=1)[:, :, None, :]
     data: dict[str, Any] = {
         "position": (("time", "space", "keypoints", "individuals"), position, {"units": "m"}),
-        # movement asks for it, and nobody stated one.
+        # movement asks for it, and none was stated.
         "confidence": (("time", "keypoints", "individuals"), np.full_like(x, np.nan)[:, None, :]),
     }
     if np.isfinite(theta).any():

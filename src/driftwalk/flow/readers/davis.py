@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Final
 
 from driftwalk.core.errors import FormatError
-from driftwalk.flow.readers.raw import RawField
 from driftwalk.flow.readers.table import read_text
 from driftwalk.flow.readers.text import masked_rows, read_rows
+from driftwalk.flow.readers.units import RawField
 
 _START: Final = "#DaVis"
 _BINARY: Final = (".vc7", ".im7")

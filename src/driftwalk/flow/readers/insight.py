@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Final
 
 from driftwalk.core.errors import FormatError
-from driftwalk.flow.readers.raw import RawField
 from driftwalk.flow.readers.table import read_text
 from driftwalk.flow.readers.text import masked_rows, read_rows
+from driftwalk.flow.readers.units import RawField
 
 _NAMES: Final = re.compile(r'VARIABLES\s*=\s*((?:"[^"]*"\s*,?\s*)+)', re.IGNORECASE)
 _INTERVAL: Final = re.compile(r'MicrosecondsPerDeltaT\s*=\s*"([\d.eE+-]+)"')

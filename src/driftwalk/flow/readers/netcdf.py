@@ -11,8 +11,7 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.flow.grid import round_nodes
-from driftwalk.flow.readers.raw import FieldOptions
-from driftwalk.flow.readers.units import FieldScale
+from driftwalk.flow.readers.units import FieldOptions, FieldScale
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -75,7 +74,7 @@ def to_si(dataset: xr.Dataset, path: Path, options: FieldOptions) -> SiField:
             raise FormatError(f"'{name}' holds no numbers", path=path)
         if name in ("x", "y") and named[name].dims != (name,):
             raise FormatError(
-                f"'{name}' needs one dimension of its own, got {named[name].dims}: is the grid "
+                f"'{name}' must have exactly one dimension, got {named[name].dims}: is the grid "
                 "curved, or in longitude and latitude? Interpolate it to an even one in metres",
                 path=path,
             )

@@ -7,9 +7,9 @@ from typing import Final
 
 import numpy as np
 
-from driftwalk.flow.readers.raw import RawField
 from driftwalk.flow.readers.table import read_text
 from driftwalk.flow.readers.text import masked_rows, read_rows
+from driftwalk.flow.readers.units import RawField
 
 _FIRST: Final = ["x", "y", "u", "v"]
 _MARKS: Final = ("flags", "mask")

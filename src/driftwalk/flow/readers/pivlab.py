@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError, reason_of
-from driftwalk.flow.readers.raw import RawField
 from driftwalk.flow.readers.text import masked_rows
+from driftwalk.flow.readers.units import RawField
 from driftwalk.schema.stores.heap import refuse_endless_texts
 from driftwalk.schema.stores.matlab import HDF5_BASED, OLD, matlab_variables, read_old
 from driftwalk.schema.stores.netcdf import HDF5, declared_bytes, refuse_elsewhere, refuse_huge
@@ -24,8 +24,6 @@ _ENDINGS: Final = ("_filtered", "_original", "")
 """Of what PIVlab saves of the velocities, the first that is there is read."""
 _NUMBERED: Final = re.compile(r"u_(\d+)")
 _MOST_FRAMES: Final = 10_000
-_REGULAR: Final = 1
-"""Type of a vector that was measured; 0 is masked, 2 was replaced by its neighbours."""
 
 
 class _Names(NamedTuple):
@@ -192,7 +190,8 @@ def _frame(file: _File, names: _Names, path: Path) -> Iterator[Array]:
             )
         frame = np.column_stack([array.ravel().astype(np.float64) for array in arrays])
         if kinds and kinds[number].shape == arrays[0].shape:
-            frame[kinds[number].ravel() != _REGULAR, 2:] = np.nan
+            # Type 1 was measured; 0 is masked, 2 was replaced by its neighbours.
+            frame[kinds[number].ravel() != 1, 2:] = np.nan
         yield frame
 
 
@@ -200,7 +199,7 @@ def _units(file: _File) -> tuple[str, str, Array]:
     """Return the units of positions and velocities, and the factors to them.
 
     An export says its units and is calibrated. A session has pixels, and factors to m and m/s that
-    are 1 where nobody has calibrated it.
+    are 1 without a calibration.
     """
     if "units" in file.names:
         text = _text(file.read("units"))

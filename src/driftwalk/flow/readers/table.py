@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError
-from driftwalk.flow.readers.raw import RawField
+from driftwalk.flow.readers.units import RawField
 from driftwalk.flow.rows import FieldRows
 
 Array = npt.NDArray[np.float64]

@@ -18,7 +18,6 @@ from driftwalk.model.section import (
 from driftwalk.model.study import Study
 from driftwalk.model.study_file.toml import toml_text
 
-_WIDTH = 96
 _HEAD = """\
 # Study file of driftwalk. Every parameter is here with its default; a line that starts with
 # "# key =" is a parameter that is not set. SI units; a number may also be text with a unit, such
@@ -149,5 +148,5 @@ def _number_text(quantity: Quantity) -> str:
 
 def _comment(text: str) -> list[str]:
     return textwrap.wrap(
-        text, _WIDTH, initial_indent="# ", subsequent_indent="# ", break_long_words=False
+        text, 96, initial_indent="# ", subsequent_indent="# ", break_long_words=False
     )

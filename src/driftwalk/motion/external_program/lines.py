@@ -24,10 +24,6 @@ if TYPE_CHECKING:
     from driftwalk.conditions.recorded import Conditions
 
 VERSION: Final = 1
-SHOWN: Final = 80
-"""Characters of an answer that a message shows."""
-BYTES_PER_NUMBER: Final = 64
-"""Room in an answer for a number: 25 are enough for 17 digits, more is for those who indent."""
 UNITS: Final = {
     "x": "x_m",
     "y": "y_m",
@@ -87,7 +83,8 @@ def world_request(
     if flow is not None:
         asked["flow_file"] = flow
     shape = keys.size, like.sample_time.size
-    most = MIB + 3 * BYTES_PER_NUMBER * keys.size * like.sample_time.size
+    # 17 digits need 25 bytes; 64 leave room for indentation.
+    most = MIB + 3 * 64 * keys.size * like.sample_time.size
     line = json.dumps(asked, separators=(",", ":")).encode() + b"\n"
     return WorldRequest(line, f"at {in_words(setting)}", most, number, shape)
 
@@ -201,8 +198,8 @@ def _parameter(given: Any) -> Parameter:
 
 
 def _fault(where: str, reason: str, line: bytes) -> ProgramFault:
-    begun = line[: 4 * SHOWN].decode("utf-8", "replace")
-    shown = begun[:SHOWN] + ("…" if len(begun) > SHOWN else "")
+    begun = line[:320].decode("utf-8", "replace")
+    shown = begun[:80] + ("…" if len(begun) > 80 else "")
     return ProgramFault(where, f"{reason}; the answer begins {shown!r}")
 
 

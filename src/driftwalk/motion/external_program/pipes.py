@@ -14,17 +14,25 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from threading import Condition, Thread
-from typing import IO, Final, Protocol
+from typing import IO, Final, NamedTuple, Protocol
 
-CHUNK: Final = 1 << 16
-KEPT_ERRORS: Final = 4096
-"""Bytes of standard error that are kept, the last ones."""
-MOST_CHUNKS: Final = 16
-"""Chunks that a thread reads ahead."""
-JOIN_S: Final = 1.0
-"""Time that a thread has to end once its program has."""
-LAST_WORDS_S: Final = 0.1
-"""Time that a thread has to read what a program wrote last."""
+
+class PipePolicy(NamedTuple):
+    """How the pipes of a program are read, and how long it may take to end."""
+
+    chunk: int = 1 << 16
+    """Bytes that are read or written at once; chosen by hand."""
+    kept_errors: int = 4096
+    """Last bytes of standard error that are kept; chosen by hand."""
+    most_chunks: int = 16
+    """Chunks that a thread reads ahead; chosen by hand."""
+    join_s: float = 1.0
+    """Time for a thread to end after its program [s]; chosen by hand."""
+    last_words_s: float = 0.1
+    """Time to read what a program wrote last [s]; chosen by hand."""
+
+
+PIPES: Final = PipePolicy()
 
 
 class Pipes(Protocol):
@@ -53,7 +61,7 @@ class Pipes(Protocol):
         """Read standard error if something comes in time; return whether something did."""
 
     def close_input(self) -> None:
-        """Tell the program that there is nothing more to read."""
+        """Close the program's input."""
 
     def close(self) -> None:
         """Give all pipes back; the program has ended, or belongs to another process."""
@@ -100,7 +108,7 @@ class SelectedPipes:
         if self._output not in ready:
             return None
         with suppress(BlockingIOError):
-            return os.read(self._output, CHUNK)
+            return os.read(self._output, PIPES.chunk)
         return None
 
     def hear_errors(self, seconds: float) -> bool:
@@ -117,7 +125,7 @@ class SelectedPipes:
         return True
 
     def close_input(self) -> None:
-        """Tell the program that there is nothing more to read."""
+        """Close the program's input."""
         with suppress(KeyError, ValueError):
             self._selector.unregister(self._input)
         self._streams[0].close()
@@ -130,15 +138,17 @@ class SelectedPipes:
 
     def _write(self) -> None:
         with suppress(BlockingIOError):
-            self._unwritten = self._unwritten[os.write(self._input, self._unwritten[:CHUNK]) :]
+            self._unwritten = self._unwritten[
+                os.write(self._input, self._unwritten[: PIPES.chunk]) :
+            ]
         if not self.sending:
             self._selector.unregister(self._input)
 
     def _read_errors(self) -> None:
         with suppress(BlockingIOError):
-            chunk = os.read(self._errors, CHUNK)
+            chunk = os.read(self._errors, PIPES.chunk)
             if chunk:
-                self.errors = (self.errors + chunk)[-KEPT_ERRORS:]
+                self.errors = (self.errors + chunk)[-PIPES.kept_errors :]
             else:
                 self._selector.unregister(self._errors)
 
@@ -196,14 +206,14 @@ class ThreadedPipes:
             if not self._errors_ended:
                 self._changed.wait_for(
                     lambda: self._heard != before or self._errors_ended,
-                    max(seconds, LAST_WORDS_S),
+                    max(seconds, PIPES.last_words_s),
                 )
                 return self._heard != before
         time.sleep(seconds)
         return False
 
     def close_input(self) -> None:
-        """Tell the program that there is nothing more to read."""
+        """Close the program's input."""
         # A thread in the middle of a line holds the pipe until the program has ended.
         if not self.sending:
             self._streams[0].close()
@@ -214,7 +224,7 @@ class ThreadedPipes:
             self._closed = True
             self._changed.notify_all()
         for thread in self._threads:
-            thread.join(JOIN_S)
+            thread.join(PIPES.join_s)
         for pipe in self._streams:
             pipe.close()
 
@@ -228,7 +238,7 @@ class ThreadedPipes:
             broken = False
             try:
                 while unwritten:
-                    unwritten = unwritten[os.write(self._input, unwritten[:CHUNK]) :]
+                    unwritten = unwritten[os.write(self._input, unwritten[: PIPES.chunk]) :]
             except OSError:
                 broken = True
             with self._changed:
@@ -241,7 +251,9 @@ class ThreadedPipes:
         while chunk:
             chunk = _read_or_end(self._output)
             with self._changed:
-                self._changed.wait_for(lambda: len(self._chunks) < MOST_CHUNKS or self._closed)
+                self._changed.wait_for(
+                    lambda: len(self._chunks) < PIPES.most_chunks or self._closed
+                )
                 self._chunks.append(chunk)
                 self._changed.notify_all()
                 if self._closed:
@@ -250,7 +262,7 @@ class ThreadedPipes:
     def _read_errors(self) -> None:
         while chunk := _read_or_end(self._errors):
             with self._changed:
-                self.errors = (self.errors + chunk)[-KEPT_ERRORS:]
+                self.errors = (self.errors + chunk)[-PIPES.kept_errors :]
                 self._heard += 1
                 self._changed.notify_all()
         with self._changed:
@@ -260,7 +272,7 @@ class ThreadedPipes:
 
 def _read_or_end(pipe: int) -> bytes:
     try:
-        return os.read(pipe, CHUNK)
+        return os.read(pipe, PIPES.chunk)
     except OSError:
         return b""
 

@@ -17,11 +17,8 @@ from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.files.bounded import MIB
 from driftwalk.motion.external_program.pipes import pipes_of
 
-TICK_S: Final = 0.1
-"""How often a request looks whether it is still wanted."""
 GRACE_S: Final = 1.0
 """Time that a program has to end by itself."""
-SHOWN_LINES: Final = 5
 # The same on Windows, where there are no sessions.
 _OWN_GROUP: Final[int] = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
 
@@ -51,7 +48,7 @@ class ProgramEnded(ProgramFault):
 
 
 class Program:
-    """A running program, in a process group of its own.
+    """A running program, in its own process group.
 
     Parameters
     ----------
@@ -105,7 +102,7 @@ class Program:
                 most = f"{request.most / MIB:.3g} MiB"
                 raise ProgramFault(request.where, f"its answer is longer than {most}")
             try:
-                chunk = self._pipes.receive(min(left, TICK_S))
+                chunk = self._pipes.receive(min(left, 0.1))
             except BrokenPipeError:
                 raise self._ended(request) from None
             if chunk == b"":
@@ -119,7 +116,7 @@ class Program:
     def last_errors(self) -> str:
         """Return the last lines that it wrote to standard error, for the end of a message."""
         text = self._pipes.errors.decode("utf-8", "replace")
-        lines = [line.strip() for line in text.splitlines() if line.strip()][-SHOWN_LINES:]
+        lines = [line.strip() for line in text.splitlines() if line.strip()][-5:]
         if not lines:
             return ""
         shown = " | ".join(lines)

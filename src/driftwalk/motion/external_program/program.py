@@ -34,11 +34,9 @@ from driftwalk.motion.external_program.process import Program, ProgramFault
 from driftwalk.motion.protocol import Keys, Values, Worlds
 from driftwalk.motion.ranges import Given, with_given
 
-TIMEOUT_S: Final = 60.0
-SAMPLES_PER_REQUEST: Final = 200_000
-"""Samples that one request asks for: some 10 MB of JSON."""
+TIMEOUT_S = 60.0
+
 PROBED_WORLDS: Final = np.array([1, 2], dtype=np.uint64)
-PROBED_SAMPLES: Final = 8
 SCRIPTS: Final = (".py", ".jl", ".r", ".m", ".js", ".lua", ".rb", ".sh")
 """Names of files that an interpreter runs, by which a program is called rather than by that."""
 
@@ -110,7 +108,8 @@ class ProgramModel:
         """
         batches = world_batches(
             [values[one.name] for one in self.parameters],
-            most=max(SAMPLES_PER_REQUEST // like.sample_time.size, 1),
+            # Some 10 MB of JSON for each request.
+            most=max(200_000 // like.sample_time.size, 1),
             one_setting=True,
         )
         stop = Event()
@@ -192,7 +191,7 @@ class ProgramModel:
         """
         with self._lock:
             if self._probed_like is None:
-                self._probed_like = replace(like, sample_time=like.sample_time[:PROBED_SAMPLES])
+                self._probed_like = replace(like, sample_time=like.sample_time[:8])
             short = self._probed_like
         middle = {
             one.name: float(one.to_value(one.to_coordinate([one.low, one.high]).mean()))

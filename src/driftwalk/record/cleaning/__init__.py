@@ -1,1 +1,1 @@
-"""Rows that no body gives: wrong clocks, jumps, several bodies read as one."""
+"""Cleaning: wrong clocks, outliers (jumps), duplicate times, several bodies read as one."""

@@ -1,9 +1,8 @@
-"""Duplicate and unsorted times, jumps and gaps: found, handled and counted."""
+"""Clean a track: duplicate and unsorted times, outliers and gaps."""
 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -17,10 +16,6 @@ from driftwalk.record.cleaning.several_bodies import (
     times_in_two_places,
 )
 from driftwalk.record.raw import RawBody
-
-SHORTEST_STEP_S: Final = 1e-12
-"""A million times shorter than any camera's; powers of its inverse are still within float64."""
-_PART: Final = 1 << 20
 
 
 @dataclass
@@ -156,10 +151,11 @@ def _in_order(body: RawBody, counts: Counts, *, sort: str, columns: BodyColumns 
 def _refuse_closest(body: RawBody) -> None:
     """Refuse two times by whose difference no speed can be divided."""
     # In parts: a recording may have millions of times.
-    for start in range(0, body.clock.size - 1, _PART):
-        steps = np.diff(body.clock[start : start + _PART + 1])
+    for start in range(0, body.clock.size - 1, 1 << 20):
+        steps = np.diff(body.clock[start : start + 1 << 20 + 1])
         at = int(steps.argmin())
-        if steps[at] < SHORTEST_STEP_S:
+        # No camera is that fast; powers of 1e12 are still within float64.
+        if steps[at] < 1e-12:
             raise InputError(
                 f"two times of body '{body.name}' are {steps[at]:.3g} s apart, at "
                 f"{body.clock[start + at]:.6g} s: one of them is wrong"

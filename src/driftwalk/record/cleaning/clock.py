@@ -1,6 +1,8 @@
-"""Whether the times of a file can be true: above all those whose unit it does not say."""
+"""Plausibility of a clock, above all of one without a unit."""
 
 from __future__ import annotations
+
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -8,20 +10,31 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.text.argument_text import argument_text
 from driftwalk.record.raw import CLOCK_UNITS, Array, RawRecording
 
-LONGEST_INTERVAL_S = 1e4
-"""Beyond this, an interval between samples is another unit's, unless it is whole hours."""
-SHORTEST_INTERVAL_S = 1e-6
-"""No camera takes a million frames a second for long."""
-USUAL_INTERVAL_S = 10.0
-"""Beyond this, milliseconds of a video are likelier than a camera with such a long interval."""
-LAST_DAY_S = 1e10
-"""Seconds since 1970 until the year 2286."""
-LONGEST_RECORDING_S = 1e12
-"""30 000 years; powers of much longer times are beyond float64."""
-_FIRST_DAY_S = 1e8
-_FASTEST_S, _SLOWEST_S = 1e-4, 2.0
-_HOUR_S = 3600.0
-_ENOUGH = 100_000
+
+class ClockPolicy(NamedTuple):
+    """Which times of a clock without a unit can be seconds."""
+
+    longest_interval_s: float = 1e4
+    """Interval between samples beyond which the unit is another, unless it is whole hours;
+    chosen by hand."""
+    shortest_interval_s: float = 1e-6
+    """No camera takes a million frames a second for long; chosen by hand."""
+    usual_interval_s: float = 10.0
+    """Interval beyond which milliseconds of a video are likelier than so slow a camera; chosen
+    by hand."""
+    last_day_s: float = 1e10
+    """Seconds since 1970 until the year 2286."""
+    first_day_s: float = 1e8
+    """Three years: a clock beyond them counts from 1970; chosen by hand."""
+    longest_recording_s: float = 1e12
+    """30,000 years; powers of much longer times are beyond float64."""
+    fastest_s: float = 1e-4
+    """Shortest interval of a likely camera [s]; chosen by hand."""
+    slowest_s: float = 2.0
+    """Longest interval of a likely camera [s]; chosen by hand."""
+
+
+CLOCK: Final = ClockPolicy()
 
 
 def check_clock(raw: RawRecording) -> list[str]:
@@ -41,8 +54,7 @@ def check_clock(raw: RawRecording) -> list[str]:
     ------
     InputError
         When the clock names no unit and in seconds would begin after the year 2286, or have
-        intervals beyond `LONGEST_INTERVAL_S` or below `SHORTEST_INTERVAL_S`; when a clock of any
-        unit lasts longer than `LONGEST_RECORDING_S`.
+        intervals that no camera has; when a clock of any unit lasts longer than 30,000 years.
     """
     if raw.clock_unit == "frame" or not raw.bodies:
         return []
@@ -57,7 +69,7 @@ def check_clock(raw: RawRecording) -> list[str]:
     if raw.bare_clock is not None and raw.clock_unit == "s":
         notes = _check_bare(raw.bare_clock, _steps(clocks), first, last)
     lasts = (last - first) / CLOCK_UNITS[raw.clock_unit]
-    if lasts > LONGEST_RECORDING_S:
+    if lasts > CLOCK.longest_recording_s:
         raise InputError(f"the times are {lasts:.3g} s apart: one of them, or their unit, is wrong")
     return notes
 
@@ -65,15 +77,15 @@ def check_clock(raw: RawRecording) -> list[str]:
 def _check_bare(column: str, steps: Array, first: float, last: float) -> list[str]:
     """Refuse what cannot be seconds, and say what may be milliseconds."""
     interval = float(np.median(steps)) if steps.size else 0.0
-    long = interval > LONGEST_INTERVAL_S and not _whole_hours(steps)
-    short = 0.0 < interval < SHORTEST_INTERVAL_S
+    long = interval > CLOCK.longest_interval_s and not _whole_hours(steps)
+    short = 0.0 < interval < CLOCK.shortest_interval_s
     what = f"the clock{f' in column {column!r}' if column else ''} names no unit"
-    if first >= LAST_DAY_S or long or short:
+    if first >= CLOCK.last_day_s or long or short:
         raise InputError(
             f"{what}, and as seconds it would begin at {first:.3g} s, last {last - first:.3g} s "
             f"and have an interval of {interval:.3g} s: {_remedy(column, first, interval)}"
         )
-    if interval >= USUAL_INTERVAL_S and column and not _whole_hours(steps):
+    if interval >= CLOCK.usual_interval_s and column and not _whole_hours(steps):
         option = _option(column, "ms")
         return [f"{what}; read as seconds, its interval is {interval:.4g} s: if it is ms, {option}"]
     return []
@@ -81,7 +93,7 @@ def _check_bare(column: str, steps: Array, first: float, last: float) -> list[st
 
 def _steps(clocks: list[Array]) -> Array:
     """Return the sizes of the first steps of all clocks; rows at one time make none."""
-    known = [start[np.isfinite(start)] for start in (clock[:_ENOUGH] for clock in clocks)]
+    known = [start[np.isfinite(start)] for start in (clock[:100_000] for clock in clocks)]
     with np.errstate(over="ignore"):  # beyond float64 is as long as a step can be
         steps = np.concatenate([np.abs(np.diff(start)) for start in known])
     bounded: Array = np.minimum(steps[steps > 0], np.finfo(np.float64).max)
@@ -90,7 +102,7 @@ def _steps(clocks: list[Array]) -> Array:
 
 def _whole_hours(steps: Array) -> bool:
     """Whether the steps are those of a calendar: one sample every six hours, or a day."""
-    return bool((steps % _HOUR_S == 0.0).mean() > 0.9)
+    return bool((steps % 3600.0 == 0.0).mean() > 0.9)
 
 
 def _remedy(column: str, first: float, interval: float) -> str:
@@ -106,10 +118,10 @@ def _remedy(column: str, first: float, interval: float) -> str:
 
 
 def _likely(ticks: float, first: float, interval: float) -> bool:
-    """Whether a clock of so many ticks a second begins and ticks as clocks of cameras do."""
-    if first >= LAST_DAY_S and not _FIRST_DAY_S <= first / ticks < LAST_DAY_S:
+    """Whether a clock with these ticks per second starts and ticks like a camera's."""
+    if first >= CLOCK.last_day_s and not CLOCK.first_day_s <= first / ticks < CLOCK.last_day_s:
         return False
-    return interval == 0.0 or _FASTEST_S <= interval / ticks <= _SLOWEST_S
+    return interval == 0.0 or CLOCK.fastest_s <= interval / ticks <= CLOCK.slowest_s
 
 
 def _option(column: str, unit: str) -> str:

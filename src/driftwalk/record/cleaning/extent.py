@@ -1,4 +1,4 @@
-"""How many bodies and times a recording may have, and how far they may be.
+"""Limits of a recording's size: bodies, times and positions.
 
 A `trajectory` has a place for each body at each time.
 
@@ -9,25 +9,33 @@ of one megabyte then asks for a hundred gigabytes of NaN.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.raw import Array, RawBody
 
-MOST_BODIES: Final = 5000
-EMPTY_PLACES: Final = 20_000_000
-"""Places, times by bodies, that a recording of any size may have: 0.5 GB."""
-PLACES_PER_SAMPLE: Final = 50
-"""Places beyond that for each sample: bodies may come and go, as fragments of tracks do."""
 
-FARTHEST_M: Final = 1e12
-"""Beyond the planets. The noise and the speed take powers of positions, which float64 must hold."""
-NEAREST_M: Final = 1e-25
-"""Positions that all are nearer to the origin are no positions: their powers are 0 in float64."""
-LARGEST_ANGLE: Final = 1e12
-"""In the file's unit; of larger ones float64 no longer knows the fraction of a turn."""
+class ExtentPolicy(NamedTuple):
+    """How large a recording may be."""
+
+    most_bodies: int = 5000
+    """Bodies of a recording at most; chosen by hand."""
+    empty_places: int = 20_000_000
+    """Places, times by bodies, that a recording of any size may have: 0.5 GB; chosen by hand."""
+    places_per_sample: int = 50
+    """Places beyond that for each sample: bodies come and go, as fragments of tracks do; chosen
+    by hand."""
+    farthest_m: float = 1e12
+    """Farthest position, beyond the planets [m]: float64 must hold its powers."""
+    nearest_m: float = 1e-25
+    """If all positions are nearer to the origin, their powers are 0 in float64 [m]."""
+    largest_angle: float = 1e12
+    """In the file's unit; of larger angles float64 does not know the fraction of a turn."""
+
+
+EXTENT: Final = ExtentPolicy()
 
 
 def refuse_many_bodies(names: Sequence[str]) -> None:
@@ -38,11 +46,11 @@ def refuse_many_bodies(names: Sequence[str]) -> None:
     FormatError
         Names the first ones.
     """
-    if len(names) > MOST_BODIES:
+    if len(names) > EXTENT.most_bodies:
         first = ", ".join(f"'{name:.20}'" for name in names[:3])
         raise FormatError(
-            f"has {len(names)} bodies ({first}, …), more than the {MOST_BODIES} that are read: "
-            "does the column that names the body count rows?"
+            f"has {len(names)} bodies ({first}, …), more than the {EXTENT.most_bodies} that are "
+            "read: does the column that names the body count rows?"
         )
 
 
@@ -63,7 +71,7 @@ def refuse_sparse(time: Array, bodies: list[RawBody]) -> None:
     """
     samples = sum(body.clock.size for body in bodies)
     places = time.size * len(bodies)
-    if places > EMPTY_PLACES + PLACES_PER_SAMPLE * samples:
+    if places > EXTENT.empty_places + EXTENT.places_per_sample * samples:
         raise FormatError(
             f"has {len(bodies)} bodies at {time.size} different times, which is a table of "
             f"{3 * 8 * places / 1e9:.3g} GB for {samples} samples: choose bodies (`body`) or a "
@@ -74,7 +82,7 @@ def refuse_sparse(time: Array, bodies: list[RawBody]) -> None:
 def refuse_far(bodies: Sequence[RawBody], scale: float) -> None:
     """Refuse numbers that are no position and no angle: a damaged file, or a mark of what is lost.
 
-    Neither are positions that all are as good as zero.
+    Positions that all are practically zero are refused too.
 
     Parameters
     ----------
@@ -90,10 +98,10 @@ def refuse_far(bodies: Sequence[RawBody], scale: float) -> None:
     """
     for body in bodies:
         for name, values in (("x", body.x), ("y", body.y)):
-            _refuse_beyond(body, name, values, FARTHEST_M / scale)
-        _refuse_within(body, NEAREST_M / scale)
+            _refuse_beyond(body, name, values, EXTENT.farthest_m / scale)
+        _refuse_within(body, EXTENT.nearest_m / scale)
         if body.theta is not None:
-            _refuse_beyond(body, "angle", body.theta, LARGEST_ANGLE)
+            _refuse_beyond(body, "angle", body.theta, EXTENT.largest_angle)
 
 
 def _refuse_within(body: RawBody, least: float) -> None:

@@ -1,7 +1,7 @@
-"""Samples that a body cannot have been at: it would have been faster than it can be.
+"""Outliers of a track: samples that imply an impossible speed.
 
-`find_jumps` knows how fast it can be; `impossible_steps` does not: long steps, alone among short
-ones.
+`find_jumps` takes the greatest speed; `impossible_steps` needs none: it finds single long steps
+among short ones.
 """
 
 from __future__ import annotations
@@ -13,27 +13,35 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.record.cleaning.warn import SMALLEST_EXTENT_M
+from driftwalk.record.cleaning.warn import PLAUSIBLE
 from driftwalk.record.raw import Array, RawBody
 
-EFFORT: Final = 0.5
-"""Cost of a step at the greatest speed, in samples that are left out. With a half no sample is left
-out that is within reach of both its neighbours."""
-LONGEST_EXCURSION: Final = 300
-"""Samples back to which every one is tried as the one before; further back the best of all is."""
 
-ARENA_SHARE: Final = 0.25
-"""Share of the arena's diagonal from which on a step can be impossible. Of recordings without a
-fault, a fish that darts stays below 0.22, seen 1.5 to 30 times a second, and robots that kick each
-other below 0.18; trackers that slip do so by up to 0.25 to 0.8."""
-ALONE: Final = 5.0
-"""An impossible step is so many times as long as those around it. A body that is fast, or is seen
-seldom, takes long steps one after the other; a slip of a tracker was 16 times as long or more."""
-AROUND: Final = 3
-"""Steps before, and steps after, that are looked at. The longest of them does not count: it may be
-the way back."""
-NEIGHBOURS: Final = 1.5
-"""A step over more than so many usual intervals is one over a gap, in which a body may go far."""
+class JumpPolicy(NamedTuple):
+    """Which samples and steps are impossible."""
+
+    effort: float = 0.5
+    """Cost of a step at the greatest speed, in samples that are left out. With a half, no
+    sample is left out that is within reach of both its neighbours."""
+    longest_excursion: int = 300
+    """Samples back to which each is tried as the one before; earlier, only the best of all is;
+    chosen by hand."""
+    arena_share: float = 0.25
+    """Share of the arena's diagonal from which on a step can be impossible. In recordings
+    without a fault, a fish that darts stays below 0.22, seen 1.5 to 30 times a second, and
+    robots that kick each other below 0.18; trackers that slip do so by 0.25 to 0.8."""
+    alone: float = 5.0
+    """Least length of an impossible step, in lengths of the steps around it. A fast body takes
+    long steps one after the other; a slip of a tracker was 16 times as long or more."""
+    around: int = 3
+    """Steps before and after that are looked at. The longest of them does not count: it may be
+    the way back; chosen by hand."""
+    neighbours: float = 1.5
+    """Usual intervals beyond which a step is one over a gap, in which a body may go far; chosen
+    by hand."""
+
+
+JUMPS: Final = JumpPolicy()
 
 
 def find_jumps(body: RawBody, max_speed: float) -> npt.NDArray[np.int64]:
@@ -80,7 +88,7 @@ def _best_chain(
     """
     share = np.hypot(np.diff(x), np.diff(y)) / (max_speed * np.diff(t))
     suspects = np.append(np.flatnonzero(~(share <= 1.0)) + 1, t.size)
-    fall = np.append(0.0, EFFORT * share**2 - 1.0)
+    fall = np.append(0.0, JUMPS.effort * share**2 - 1.0)
     cost, before = np.zeros(t.size), np.full(t.size, -1, dtype=np.int64)
     least = np.zeros(t.size, dtype=np.int64)
     """The cheapest sample up to each."""
@@ -89,19 +97,21 @@ def _best_chain(
         last, best = at - 1, least[at - 1]
         rival = cost[least[at - 2]] if at > 1 else np.inf
         upto = int(suspects[np.searchsorted(suspects, at)])
-        if rival >= cost[last] + EFFORT and upto > at:
+        if rival >= cost[last] + JUMPS.effort and upto > at:
             # No sample of an undisturbed stretch follows another than the one before it.
             cost[at:upto] = cost[last] + np.cumsum(fall[at:upto])
             before[at:upto] = np.arange(last, upto - 1)
             least[at:upto] = np.arange(at, upto)
             at = upto
             continue
-        first = max(at - LONGEST_EXCURSION, 0)
+        first = max(at - JUMPS.longest_excursion, 0)
         tried = np.arange(first, at)
         if first and least[first - 1] >= 0:
             tried = np.append(least[first - 1], tried)
         speed = np.hypot(x[at] - x[tried], y[at] - y[tried]) / (max_speed * (t[at] - t[tried]))
-        value = np.where(speed <= 1.0, cost[tried] - 1.0 + EFFORT * (at - tried) * speed**2, np.inf)
+        value = np.where(
+            speed <= 1.0, cost[tried] - 1.0 + JUMPS.effort * (at - tried) * speed**2, np.inf
+        )
         chosen = int(np.argmin(value))
         if value[chosen] < 0.0:
             cost[at], before[at] = value[chosen], tried[chosen]
@@ -143,27 +153,27 @@ def impossible_steps(time: Array, x: Array, y: Array, *, diagonal: float) -> Imp
     >>> impossible_steps(np.arange(40.0), x, 0.0 * x, diagonal=19.0)
     Impossible(number=1, longest=19.0, first=19.0, between=4.4)
     """
-    if diagonal < math.sqrt(2.0) * SMALLEST_EXTENT_M:
+    if diagonal < math.sqrt(2.0) * PLAUSIBLE.smallest_extent_m:
         return None  # at rest, or in a wrong unit: `plausibility_warnings` speaks of it
     # Squares first: a long recording mostly has no long step, and roots take time.
     square, across = np.diff(x), np.diff(y)
     square *= square
     across *= across
     square += across
-    far = np.flatnonzero(square > (ARENA_SHARE * diagonal) ** 2)
+    far = np.flatnonzero(square > (JUMPS.arena_share * diagonal) ** 2)
     if not far.size:
         return None
     length = np.sqrt(square)
     interval = np.diff(time)
-    near = interval <= NEIGHBOURS * np.median(interval)
+    near = interval <= JUMPS.neighbours * np.median(interval)
     length[~near] = np.nan
     far = far[near[far]]
-    padded = np.pad(length, AROUND, constant_values=np.nan)
-    places = [*range(AROUND), *range(AROUND + 1, 2 * AROUND + 1)]
+    padded = np.pad(length, JUMPS.around, constant_values=np.nan)
+    places = [*range(JUMPS.around), *range(JUMPS.around + 1, 2 * JUMPS.around + 1)]
     around = np.sort(padded[far[:, None] + np.array(places)], axis=1)  # NaN go to the end
     known = np.isfinite(around).sum(axis=1)
     second = np.take_along_axis(around, np.maximum(known - 2, 0)[:, None], axis=1)[:, 0]
-    found = far[(known >= AROUND) & (length[far] > ALONE * second)]
+    found = far[(known >= JUMPS.around) & (length[far] > JUMPS.alone * second)]
     if not found.size:
         return None
     speed = length / interval

@@ -1,4 +1,4 @@
-"""Rows of one body at one time in different places: several bodies were read as one."""
+"""Detect several bodies that were read as one: rows at one time in different places."""
 
 from __future__ import annotations
 

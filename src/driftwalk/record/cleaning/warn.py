@@ -1,22 +1,35 @@
-"""Sentences about numbers that no tank and no robot would give."""
+"""Plausibility warnings about extent, speed, clock and angles."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from driftwalk.record.raw import RawBody, RawRecording
 from driftwalk.record.text import is_windows_text
 
-LARGEST_EXTENT_M = 20.0
-SMALLEST_EXTENT_M = 1e-3
-LARGEST_SPEED_M_S = 10.0
-LONGEST_RECORDING_S = 1e9
-SHORTEST_INTERVAL_S = 1e-5
-FULL_TURN = 6.2832
-LEAP = 90.0
-"""No body turns by so many radians between two samples; degrees that wrap around do."""
+
+class PlausibilityPolicy(NamedTuple):
+    """Which numbers a tank, a robot and a camera can have."""
+
+    largest_extent_m: float = 20.0
+    """Largest range of the positions [m]; chosen by hand."""
+    smallest_extent_m: float = 1e-3
+    """Smallest range of the positions [m]; chosen by hand."""
+    largest_speed_m_s: float = 10.0
+    """Largest speed [m/s]; chosen by hand."""
+    longest_recording_s: float = 1e9
+    """Longest recording, 30 years [s]; chosen by hand."""
+    shortest_interval_s: float = 1e-5
+    """Shortest interval between samples [s]; chosen by hand."""
+    leap_rad: float = 90.0
+    """Turn from one sample to the next [rad] that only degrees have, where they wrap around;
+    chosen by hand."""
+
+
+PLAUSIBLE: Final = PlausibilityPolicy()
 
 
 def plausibility_warnings(bodies: list[RawBody]) -> list[str]:
@@ -41,17 +54,21 @@ def plausibility_warnings(bodies: list[RawBody]) -> list[str]:
         if known.any()
         for values in (body.x, body.y)
     )
-    if extent > LARGEST_EXTENT_M:
+    if extent > PLAUSIBLE.largest_extent_m:
         warnings.append(f"the positions span {extent:.3g} m: is the unit, or the scale, right?")
     elif extent == 0.0:
         warnings.append("the body never moves")
-    elif extent < SMALLEST_EXTENT_M:
+    elif extent < PLAUSIBLE.smallest_extent_m:
         warnings.append(
             f"the positions span only {extent:.3g} m: is the unit, or the scale, right?"
         )
     warnings += _clock_warnings(bodies)
     speeds = [_usual_speed(body) for body in bodies]
-    if speeds and max(speeds) > LARGEST_SPEED_M_S and extent <= LARGEST_EXTENT_M:
+    if (
+        speeds
+        and max(speeds) > PLAUSIBLE.largest_speed_m_s
+        and extent <= PLAUSIBLE.largest_extent_m
+    ):
         warnings.append(f"the usual speed is {max(speeds):.3g} m/s: is the clock's unit right?")
     return warnings
 
@@ -62,15 +79,15 @@ def _clock_warnings(bodies: list[RawBody]) -> list[str]:
         return []
     last = max(float(clock[-1] - clock[0]) for clock in clocks)
     shortest = min(float(np.median(np.diff(clock), overwrite_input=True)) for clock in clocks)
-    if last > LONGEST_RECORDING_S:
+    if last > PLAUSIBLE.longest_recording_s:
         return [f"the recording lasts {last:.3g} s: is the unit of its clock right?"]
-    if shortest < SHORTEST_INTERVAL_S:
+    if shortest < PLAUSIBLE.shortest_interval_s:
         return [f"the usual interval is {shortest:.3g} s: is the unit of the clock right?"]
     return []
 
 
 def encoding_notes(path: Path) -> list[str]:
-    """Return what to say about text whose encoding nobody named.
+    """Return the warning about text of an unknown encoding.
 
     Parameters
     ----------
@@ -97,8 +114,8 @@ def angle_warnings(raw: RawRecording) -> list[str]:
     known = [body.theta[np.isfinite(body.theta)] for body in raw.bodies if body.theta is not None]
     for theta in known:
         with np.errstate(over="ignore"):  # a leap may be infinite
-            leaps = np.abs(np.diff(theta)) > LEAP
-        if theta.size and (abs(theta[0]) > FULL_TURN or leaps.any()):
+            leaps = np.abs(np.diff(theta)) > PLAUSIBLE.leap_rad
+        if theta.size and (abs(theta[0]) > 6.2832 or leaps.any()):
             low, high = float(theta.min()), float(theta.max())
             return [
                 f"angles from {low:.4g} to {high:.4g} are read as radians: if they are degrees, "

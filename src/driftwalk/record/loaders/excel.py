@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 _OLD: Final = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 """Start of Excel's format before 2007, in which workbooks with a password are stored as well."""
 _NAMED: Final = (".xlsx", ".xlsm")
-_PIECE: Final = 500
 _WORKBOOK: Final = "xl/workbook.xml"
 _OTHERS: Final = {
     "xl/workbook.bin": "is a binary workbook (.xlsb): save it as .xlsx or CSV",
@@ -120,7 +119,7 @@ def _rows(path: Path, title: str) -> Iterator[tuple[Any, ...]]:
         rows = iter(sheet.iter_rows(values_only=True))
         while True:
             with _unremarked():
-                piece = list(islice(rows, _PIECE))
+                piece = list(islice(rows, 500))
             if not piece:
                 return
             yield from piece

@@ -8,8 +8,7 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.head import read_header
-from driftwalk.record.layout import TableLayout
-from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
+from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import read_table
 
 

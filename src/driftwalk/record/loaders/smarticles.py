@@ -7,11 +7,9 @@ from pathlib import Path
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.head import first_lines, is_numeric_row, read_header
-from driftwalk.record.layout import TableLayout
-from driftwalk.record.raw import RawBody, RawRecording, ReadOptions
+from driftwalk.record.raw import RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import read_table
 
-ROBOTS = 3
 NAMES = ["sync", "t", *(f"{name}{robot}" for robot in range(1, 4) for name in ("x", "y", "theta"))]
 
 
@@ -46,7 +44,7 @@ class SmarticlesLoader:
                 table.numbers[1],
                 *(table.numbers[2 + 3 * robot + offset] for offset in range(3)),
             )
-            for robot in range(ROBOTS)
+            for robot in range(3)
         ]
         return RawRecording(
             bodies, clock_unit="s", bare_clock="", separate=True, length_unit="px", rows=table.rows

@@ -20,9 +20,6 @@ from driftwalk.record.head import first_lines
 from driftwalk.record.raw import Array, RawRecording, ReadOptions
 from driftwalk.record.text import lines_of, open_binary
 
-# Number of arguments of $PARTICLE to the places of image x, y, world x, y, orientation.
-_PLACES = {6: (1, 2, 4, 5, 3), 8: (1, 2, 3, 4, 6)}
-
 
 class SwisTrackNmeaLoader:
     """Frame numbers and poses; the frame rate has to be given."""
@@ -81,7 +78,7 @@ def _particles(path: Path) -> tuple[Array, npt.NDArray[np.int64]]:
                     if command == "FRAMENUMBER":
                         frame = float(int(arguments[0]))
                         continue
-                    places = _PLACES[len(arguments)]
+                    places = {6: (1, 2, 4, 5, 3), 8: (1, 2, 3, 4, 6)}[len(arguments)]
                     ids.append(int(arguments[0]))
                     values.append(frame)
                     values.extend(float(arguments[place]) for place in places)

@@ -14,8 +14,7 @@ import numpy as np
 from driftwalk.core.errors import FormatError
 from driftwalk.record.cleaning.stacked import order_in_frame, split_bodies
 from driftwalk.record.head import first_lines
-from driftwalk.record.layout import TableLayout
-from driftwalk.record.raw import Array, RawRecording, ReadOptions
+from driftwalk.record.raw import Array, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import Table, read_table
 
 NAMES = ["frame", "time", "x (image)", "y (image)", "x (world)", "y (world)"]

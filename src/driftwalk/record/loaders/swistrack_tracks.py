@@ -14,8 +14,7 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.head import first_lines
-from driftwalk.record.layout import TableLayout
-from driftwalk.record.raw import RawBody, RawRecording, ReadOptions
+from driftwalk.record.raw import RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import Table, read_head, read_table
 
 OLD = ["frame", "x (image)", "y (image)", "x (world)", "y (world)", "area", "orientation"]

@@ -11,15 +11,12 @@ from driftwalk.core.errors import FormatError
 from driftwalk.record.cleaning.stacked import split_bodies
 from driftwalk.record.column_names import unit_of_name
 from driftwalk.record.head import first_lines, first_row, is_numeric_row
-from driftwalk.record.layout import TableLayout
-from driftwalk.record.raw import Marks, RawRecording, ReadOptions
+from driftwalk.record.raw import Marks, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import read_table
 
 NAMES: Final = ["frame", "arena", "track", "x", "y", "label"]
 REAL_SPACE: Final = ("Time", "Arena", "Track", "Pos. X", "Pos. Y", "Label")
 """Names of the columns in real space; units follow in brackets."""
-PREDICTED: Final = 0.0
-"""Label of a position that was not seen."""
 
 
 class ToxTracLoader:
@@ -57,7 +54,8 @@ class ToxTracLoader:
             for place, number in pairs.T.tolist()
         ]
         bodies = split_bodies(codes.ravel().astype(np.int32), labels, clock=clock, x=x, y=y)
-        predicted = int((label == PREDICTED).sum())
+        # Label 0 is a position that was predicted, not seen.
+        predicted = int((label == 0.0).sum())
         return RawRecording(
             bodies,
             clock_unit=unit_of_name(header[0]) if real else "frame",

@@ -6,8 +6,7 @@ from pathlib import Path
 
 from driftwalk.record.cleaning.stacked import split_bodies
 from driftwalk.record.head import first_lines, read_header
-from driftwalk.record.layout import TableLayout
-from driftwalk.record.raw import RawBody, RawRecording, ReadOptions
+from driftwalk.record.raw import RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import read_table
 
 

@@ -10,8 +10,7 @@ import numpy as np
 from driftwalk.core.errors import FormatError
 from driftwalk.record.cleaning.stacked import split_bodies
 from driftwalk.record.head import first_lines
-from driftwalk.record.layout import TableLayout
-from driftwalk.record.raw import RawRecording, ReadOptions
+from driftwalk.record.raw import RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import read_head, read_table
 
 NAMES = ["Area", "Territory", "X", "Y", "time", "L"]

@@ -1,1 +1,1 @@
-"""From the points of a body, seen one by one, to where it is and which way it points."""
+"""Pose from keypoints: position and orientation of a body from its tracked points."""

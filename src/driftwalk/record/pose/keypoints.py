@@ -1,4 +1,4 @@
-"""Keypoints of a pose file to bodies: which point is the body, which two say where it points."""
+"""Convert keypoints of a pose file into bodies with positions and orientations."""
 
 from __future__ import annotations
 
@@ -10,8 +10,33 @@ import numpy as np
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.text.did_you_mean import listed
-from driftwalk.record.pose.markers import angle_between
 from driftwalk.record.raw import Array, RawBody, ReadOptions
+
+
+def angle_between(start: tuple[Array, Array], end: tuple[Array, Array]) -> Array:
+    """Return the direction from a point to another, in the axes of the file.
+
+    Parameters
+    ----------
+    start, end : tuple of array, shape (n,)
+        x and y of the two points.
+
+    Returns
+    -------
+    array, shape (n,)
+        Angle [rad], NaN where a point is missing or both are one.
+
+    Examples
+    --------
+    >>> one = np.array([1.0])
+    >>> angle_between((0 * one, 0 * one), (one, one)).tolist() == [np.pi / 4]
+    True
+    """
+    dx, dy = end[0] - start[0], end[1] - start[1]
+    angle: Array = np.arctan2(dy, dx)
+    angle[(dx == 0.0) & (dy == 0.0)] = np.nan
+    return angle
+
 
 Place = TypeVar("Place")
 """Where a file holds a keypoint: its columns, or its indices."""
@@ -51,7 +76,7 @@ class Poses(Generic[Place]):
     individuals: Mapping[str, Mapping[str, Place]]
     """Individual to keypoint to its place in the file."""
     read: Callable[[Place], Point]
-    """Returns a keypoint; arrays that nobody else holds."""
+    """Returns a keypoint as new arrays."""
     dropped: int = field(default=0, init=False)
     seen: int = field(default=0, init=False)
     confident: bool = field(default=False, init=False)
@@ -169,3 +194,24 @@ def _notes(
         f"{poses.seen}{change}"
     )
     return notes
+
+
+def two_names(heading: Sequence[str] | None) -> tuple[str, str] | None:
+    """Return the two points of a heading, None where there is none.
+
+    Raises
+    ------
+    InputError
+        When there are not two, or they are one.
+
+    Examples
+    --------
+    >>> two_names(["tail", "nose"])
+    ('tail', 'nose')
+    """
+    if heading is None:
+        return None
+    names = [heading] if isinstance(heading, str) else [str(name) for name in heading]
+    if len(names) != 2 or names[0] == names[1] or not all(names):
+        raise InputError(f"`heading` is two points, from and to; got {', '.join(names) or 'none'}")
+    return names[0], names[1]

@@ -1,13 +1,12 @@
-"""Markers of one robot, which a tracker follows as bodies of their own, to one body."""
+"""Merge the markers of one robot, tracked as separate bodies, into one body."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.text.did_you_mean import listed
+from driftwalk.record.pose.keypoints import angle_between
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
 
 
@@ -74,49 +73,3 @@ def _at(body: RawBody, clock: Array) -> tuple[Array, Array]:
     rows = order[place[found]]
     x[found], y[found] = body.x[rows], body.y[rows]
     return x, y
-
-
-def angle_between(start: tuple[Array, Array], end: tuple[Array, Array]) -> Array:
-    """Return the direction from a point to another, in the axes of the file.
-
-    Parameters
-    ----------
-    start, end : tuple of array, shape (n,)
-        x and y of the two points.
-
-    Returns
-    -------
-    array, shape (n,)
-        Angle [rad], NaN where a point is missing or both are one.
-
-    Examples
-    --------
-    >>> one = np.array([1.0])
-    >>> angle_between((0 * one, 0 * one), (one, one)).tolist() == [np.pi / 4]
-    True
-    """
-    dx, dy = end[0] - start[0], end[1] - start[1]
-    angle: Array = np.arctan2(dy, dx)
-    angle[(dx == 0.0) & (dy == 0.0)] = np.nan
-    return angle
-
-
-def two_names(heading: Sequence[str] | None) -> tuple[str, str] | None:
-    """Return the two points of a heading, None where there is none.
-
-    Raises
-    ------
-    InputError
-        When there are not two, or they are one.
-
-    Examples
-    --------
-    >>> two_names(["tail", "nose"])
-    ('tail', 'nose')
-    """
-    if heading is None:
-        return None
-    names = [heading] if isinstance(heading, str) else [str(name) for name in heading]
-    if len(names) != 2 or names[0] == names[1] or not all(names):
-        raise InputError(f"`heading` is two points, from and to; got {', '.join(names) or 'none'}")
-    return names[0], names[1]

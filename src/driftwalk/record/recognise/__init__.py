@@ -1,1 +1,1 @@
-"""Names in a file, and the formats that have most of them."""
+"""Recognition of formats by the names that a file holds."""

@@ -14,8 +14,6 @@ from driftwalk.record.stores.hdf5 import names_in
 from driftwalk.record.stores.npz import ZIP, members
 from driftwalk.schema.stores.netcdf import HDF5
 
-HEADER_ROWS: Final = 4
-MOST_NAMES: Final = 6
 OTHERS: Final = {
     b"CDF": "NetCDF 3",
     b"SQLite format 3": "an SQLite database",
@@ -43,8 +41,8 @@ class Contents:
 
     def described(self) -> str:
         """Return what the file is in a few words."""
-        shown = [f"'{name:.30}'" for name in self.names[:MOST_NAMES]]
-        more = ", …" if len(self.names) > MOST_NAMES else ""
+        shown = [f"'{name:.30}'" for name in self.names[:6]]
+        more = ", …" if len(self.names) > 6 else ""
         return f"{self.kind} with {', '.join(shown)}{more}" if shown else self.kind
 
 
@@ -71,7 +69,7 @@ def contents_of(path: Path, head: bytes) -> Contents:
     for start, kind in OTHERS.items():
         if head.lstrip().startswith(start):
             return Contents("", kind, ())
-    lines = first_lines(head, HEADER_ROWS)
+    lines = first_lines(head, 4)
     if not lines:
         return Contents("", "no text", ())
     if head.lstrip().startswith(b"<"):

@@ -1,4 +1,4 @@
-"""Which formats a file that is none of them is nearest to, and what it lacks of each."""
+"""Suggest formats for an unrecognised file: the nearest ones, and what it lacks of each."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import Any, Final
 from driftwalk.record.raw import Marks
 from driftwalk.record.recognise.contents import Contents, contents_of
 
-MOST_SHOWN: Final = 3
 KNOWN: Final = (
     (
         "HDF5",
@@ -18,8 +17,6 @@ KNOWN: Final = (
     ),
 )
 """Files that are no recordings, and what to do: container, names in it, advice."""
-LIKELY: Final = 0.5
-"""A plain table that has more than this share of the names of a format may be one gone wrong."""
 
 
 def unknown_file(path: Path, head: bytes, loaders: Mapping[str, Any]) -> str:
@@ -39,7 +36,7 @@ def unknown_file(path: Path, head: bytes, loaders: Mapping[str, Any]) -> str:
         if container == contents.container and names <= set(contents.names):
             return advice
     near = _near(contents, loaders)
-    found = [f"{name} ({lacks or 'it is damaged'})" for _, name, lacks in near[:MOST_SHOWN]]
+    found = [f"{name} ({lacks or 'it is damaged'})" for _, name, lacks in near[:3]]
     if found:
         nearest = f"the nearest are {', '.join(found)}; if it is one of these, name it"
     else:
@@ -56,7 +53,8 @@ def nearest_table(path: Path, head: bytes, loaders: Mapping[str, Any]) -> str:
         As in `unknown_file`.
     """
     near = _near(contents_of(path, head), loaders)
-    if not near or near[0][0] <= LIKELY:
+    # With half the names of a format or fewer, a table is just a table.
+    if not near or near[0][0] <= 0.5:
         return ""
     _, name, lacks = near[0]
     return f"; as {name} it {lacks}" if lacks else ""

@@ -1,1 +1,1 @@
-"""Poses in space, as motion capture and robots write them, laid into the plane of the water."""
+"""3-D poses of motion capture and robots, projected onto the plane of the water."""

@@ -1,4 +1,4 @@
-"""Columns of a plain table that hold a pose in space: z and the four parts of a quaternion."""
+"""Columns of a 3-D pose in a plain table: z and the four parts of a quaternion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From tracks in space to bodies in the plane of the water."""
+"""Project 3-D tracks onto the plane of the water."""
 
 from __future__ import annotations
 

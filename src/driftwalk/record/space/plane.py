@@ -1,4 +1,4 @@
-"""The plane of the water in a file's axes: seen from the end of the axis that points up."""
+"""Plane of the water in the axes of a file, seen from above."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Orientations in space, in the form that a file has them, and the angle in the plane."""
+"""3-D orientations (quaternions, Euler angles), and their angle in the plane."""
 
 from __future__ import annotations
 
@@ -17,10 +17,6 @@ if TYPE_CHECKING:
 
 QUATERNION: Final = "quaternion"
 VECTOR: Final = "vector"
-_NO_LENGTH: Final = 1e-12
-"""Of a quaternion that is none; float64 does not hold the squares of much smaller numbers."""
-_LENGTH_TOLERANCE: Final = 0.02
-"""Printed with three digits, a unit quaternion still has its length to within this."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +59,8 @@ class Turns:
         known = np.isfinite(self.values).all(axis=1)
         if self.form == QUATERNION:
             # Four zeros are how some programs write that there is none.
-            known = known & (np.abs(self.values) > _NO_LENGTH).any(axis=1)
+            # float64 does not hold the squares of much smaller numbers.
+            known = known & (np.abs(self.values) > 1e-12).any(axis=1)
         return np.asarray(known)
 
     def _rotation(self, values: Array) -> Rotation:
@@ -80,7 +77,8 @@ class Turns:
 def _require_unit_length(quaternions: Array) -> None:
     with np.errstate(over="ignore"):
         length = float(np.median(np.linalg.norm(quaternions, axis=1)))
-    if not abs(length - 1.0) <= _LENGTH_TOLERANCE:
+    # Printed with three digits, a unit quaternion keeps its length to within 2 %.
+    if not abs(length - 1.0) <= 0.02:
         raise InputError(
             f"the quaternions have a length of {length:.4g} instead of 1: are their columns "
             "x, y, z, w the right ones?"

@@ -1,4 +1,4 @@
-"""Which columns of a plain table could name the body, where rows of several were read as one.
+"""Candidate columns for the body's name, where rows of several bodies were read as one.
 
 Slow and plain: it runs only on a table that has already been refused.
 """
@@ -13,12 +13,9 @@ import numpy.typing as npt
 from driftwalk.record.bad_row import is_number
 from driftwalk.record.cleaning.several_bodies import LARGEST_SHARE
 from driftwalk.record.column_names import ColumnMap, column_meaning
-from driftwalk.record.layout import TableLayout
-from driftwalk.record.raw import Array
+from driftwalk.record.raw import Array, TableLayout
 from driftwalk.record.tables.clock import TableClock
 from driftwalk.record.tables.source import TableSource
-
-MOST_SHOWN = 3
 
 
 def body_columns(
@@ -69,7 +66,7 @@ def body_columns(
         if _are_names(table.labels[index], rows=table.rows)
         and _tells_apart(table.codes[index], times, x, y, in_order=in_order)
     }
-    return [names[index] for index in sorted(found, key=lambda index: found[index])[:MOST_SHOWN]]
+    return [names[index] for index in sorted(found, key=lambda index: found[index])[:3]]
 
 
 def _may_be_a_name(column: str) -> bool:

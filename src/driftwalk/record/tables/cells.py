@@ -12,8 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.record.bad_row import is_number
-from driftwalk.record.layout import MISSING
-from driftwalk.record.raw import Array
+from driftwalk.record.raw import MISSING, Array
 from driftwalk.record.tables.stamps import (
     MOMENT,
     OF_DAY,
@@ -40,7 +39,7 @@ class CellError(ValueError):
 
 
 def as_numbers(values: Values, name: str) -> Array:
-    """Return the values of a column as float64, which nobody else holds; NaN where one is missing.
+    """Return the values of a column as a new float64 array, NaN where one is missing.
 
     Parameters
     ----------

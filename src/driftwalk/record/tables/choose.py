@@ -1,4 +1,4 @@
-"""Which of several tables in a file is the recording."""
+"""Choose the table of a file that holds the recording."""
 
 from __future__ import annotations
 

@@ -17,8 +17,6 @@ WINDOWS: Final = "Windows-1252"
 _CODECS: Final = {UTF16: "utf-16", WINDOWS: "cp1252"}
 _MARKS: Final = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _NO_TEXT: Final = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")
-_PIECE: Final = 1 << 20
-_LONGEST_LETTER: Final = 4
 
 
 def other_encoding(start: bytes) -> str | None:
@@ -41,7 +39,8 @@ def other_encoding(start: bytes) -> str | None:
     try:
         start.decode("utf-8")
     except UnicodeDecodeError as error:
-        if error.start >= len(start) - _LONGEST_LETTER and error.reason == "unexpected end of data":
+        # A letter of UTF-8 has four bytes at most, and may be cut.
+        if error.start >= len(start) - 4 and error.reason == "unexpected end of data":
             return None
     else:
         return None
@@ -70,7 +69,7 @@ class TranscodedText(io.RawIOBase):
     def readinto(self, buffer: Any) -> int:
         """Fill a buffer with the next bytes of the text."""
         while not self._rest and not self._ended:
-            piece = self._file.read(_PIECE)
+            piece = self._file.read(1 << 20)
             self._ended = not piece
             self._rest = memoryview(self._decoded(piece))
         part = self._rest[: len(buffer)]

@@ -1,4 +1,4 @@
-"""Columns that grow block by block and are held once: no list of parts is joined at the end."""
+"""Growing arrays: columns that are appended block by block and held once."""
 
 from __future__ import annotations
 
@@ -6,8 +6,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-
-_GROWTH = 1.25
 
 
 class GrowingColumn:
@@ -22,7 +20,7 @@ class GrowingColumn:
         """Append values, which are copied."""
         stop = self._count + values.size
         if stop > self._values.size:
-            self._values.resize(max(stop, int(_GROWTH * self._values.size)), refcheck=False)
+            self._values.resize(max(stop, int(1.25 * self._values.size)), refcheck=False)
         self._values[self._count : stop] = values
         self._count = stop
 

@@ -1,4 +1,4 @@
-"""The first rows of a table: which one names its columns, below titles and above units."""
+"""Header detection: which row of a table names its columns, below titles and above units."""
 
 from __future__ import annotations
 
@@ -9,11 +9,21 @@ from driftwalk.core.errors import InputError
 from driftwalk.record.bad_row import is_number
 from driftwalk.record.column_names import map_columns, unit_of_name
 from driftwalk.record.head import is_numeric_row
-from driftwalk.record.layout import MISSING
-from driftwalk.record.raw import ReadOptions
+from driftwalk.record.raw import MISSING, ReadOptions
 
-ROWS_LOOKED_AT: Final = 12
-"""Rows among which the names of the columns and the first row of data are."""
+
+class TablePolicy(NamedTuple):
+    """How much of a table is looked at before it is read."""
+
+    heading_rows: int = 12
+    """Rows among which are the names of the columns and the first row of data; chosen by hand."""
+    sample_rows: int = 50
+    """Rows by which a table is recognised; chosen by hand."""
+    first_rows: int = 100_000
+    """Rows that are read where only the first ones are needed; chosen by hand."""
+
+
+TABLE: Final = TablePolicy()
 
 
 class Heading(NamedTuple):

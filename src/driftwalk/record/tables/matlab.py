@@ -17,7 +17,6 @@ from driftwalk.record.tables.memory import MemorySource
 
 VECTORS: Final = "variables"
 """Name of the table that the vectors of a file make."""
-_MOST_COLUMNS: Final = 20_000
 _BODY: Final = "body"
 _OF_BODIES: Final = ("x", "y", "z", "theta")
 """Quantities that a matrix may hold of several bodies."""
@@ -223,7 +222,7 @@ def _body_name(element: dict[str, Value]) -> str:
 
 
 def _refuse_wide(count: int, what: str, path: Path) -> None:
-    if count > _MOST_COLUMNS:
+    if count > 20_000:
         raise FormatError(
-            f"{what} has {count} columns, more than the {_MOST_COLUMNS} that are read", path=path
+            f"{what} has {count} columns, more than the 20000 that are read", path=path
         )

@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.record.layout import TableLayout
+from driftwalk.record.raw import TableLayout
 from driftwalk.record.tables.cells import (
     CellError,
     Values,
@@ -17,6 +17,7 @@ from driftwalk.record.tables.cells import (
     as_ticks,
     form_of,
 )
+from driftwalk.record.tables.heading import TABLE
 from driftwalk.record.tables.stamps import (
     StampError,
     StampForm,
@@ -26,7 +27,6 @@ from driftwalk.record.tables.stamps import (
 )
 from driftwalk.record.text import Table, far_origin
 
-_HEAD_ROWS: Final = 100_000
 TAKEN: Final = "a path, a DataFrame of pandas or polars, an array or a mapping of columns"
 
 
@@ -79,7 +79,7 @@ class MemorySource:
         """Read columns."""
         if not self.rows:
             raise FormatError("holds no rows of data")
-        taken = slice(_HEAD_ROWS if head else None)
+        taken = slice(TABLE.first_rows if head else None)
         try:
             return self._table(wanted, taken)
         except (CellError, StampError) as error:

@@ -1,4 +1,4 @@
-"""Times of day that go on after midnight."""
+"""Times of day across midnight."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def count_days(
     """Return bodies whose times of day have a day more after each midnight.
 
     Rows of several bodies that take turns are in the order of their times: midnight is the same row
-    for all. Where bodies stand one below the other, each has midnights of its own.
+    for all. Where bodies stand one below the other, each has its own midnights.
 
     Parameters
     ----------

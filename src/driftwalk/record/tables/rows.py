@@ -11,8 +11,7 @@ from driftwalk.core.text.argument_text import argument_text
 from driftwalk.record.cleaning.stacked import split_bodies
 from driftwalk.record.column_names import ColumnMap, map_columns, unit_of_name
 from driftwalk.record.convert_units import scale_wanted
-from driftwalk.record.layout import TableLayout
-from driftwalk.record.raw import ANGLE_UNITS, Array, RawBody, RawRecording, ReadOptions
+from driftwalk.record.raw import ANGLE_UNITS, Array, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.space.columns import body_in_plane, plane_of_columns
 from driftwalk.record.space.plane import Plane
 from driftwalk.record.tables.body_columns import body_columns

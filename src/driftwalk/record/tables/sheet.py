@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.head import is_numeric_row
-from driftwalk.record.layout import TableLayout
-from driftwalk.record.raw import ReadOptions
+from driftwalk.record.raw import ReadOptions, TableLayout
 from driftwalk.record.tables.cells import (
     CellError,
     Values,
@@ -23,7 +22,7 @@ from driftwalk.record.tables.cells import (
     text_of_cell,
 )
 from driftwalk.record.tables.growing import GrowingColumn
-from driftwalk.record.tables.heading import ROWS_LOOKED_AT, header_advice, heading_of
+from driftwalk.record.tables.heading import TABLE, header_advice, heading_of
 from driftwalk.record.tables.stamps import (
     StampError,
     StampForm,
@@ -34,11 +33,6 @@ from driftwalk.record.tables.stamps import (
 from driftwalk.record.text import Table
 
 Row = Sequence[Any]
-_PIECE: Final = 20_000
-_HEAD_ROWS: Final = 100_000
-_ROWS_LOOKED_AT: Final = 50
-_MOST_BLANK: Final = 1 << 20
-"""A sheet has no more rows, so that a row of a higher number is damage."""
 
 
 class SheetSource:
@@ -69,7 +63,7 @@ class SheetSource:
         begin = options.header_line or 1
         below = (entry for entry in _numbered(rows()) if entry[0] >= begin)
         lines, texts = [], []
-        for line, row in islice(below, ROWS_LOOKED_AT):
+        for line, row in islice(below, TABLE.heading_rows):
             lines.append(line)
             texts.append(_texts(row))
         stated = options.header_line is not None and lines[:1] == [options.header_line]
@@ -93,7 +87,7 @@ class SheetSource:
 
     def stamps(self, column: int) -> StampForm | None:
         """Return how the first time stamp of a column is written, None where it has none."""
-        rows = [row for _, row in islice(self._data(), _ROWS_LOOKED_AT)]
+        rows = [row for _, row in islice(self._data(), TABLE.sample_rows)]
         return form_of(_column(rows, column))
 
     def read(self, wanted: TableLayout, *, head: bool = False) -> Table:
@@ -101,8 +95,8 @@ class SheetSource:
         reading = _Reading(wanted)
         data = self._data()
         if head:
-            data = islice(data, _HEAD_ROWS)
-        while piece := list(islice(data, _PIECE)):
+            data = islice(data, TABLE.first_rows)
+        while piece := list(islice(data, 20_000)):
             lines = [line for line, _ in piece]
             try:
                 reading.add([row for _, row in piece])
@@ -191,5 +185,6 @@ def _numbered(rows: Iterator[Row]) -> Iterator[tuple[int, Row]]:
             yield line, row
         else:
             blank += 1
-            if blank >= _MOST_BLANK:
+            # A sheet has no more rows, so a row of a higher number is damage.
+            if blank >= 1 << 20:
                 return

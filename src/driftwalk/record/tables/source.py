@@ -1,4 +1,4 @@
-"""A table that is read column by column, wherever it lies."""
+"""Table of text, of a sheet or of arrays, read column by column."""
 
 from __future__ import annotations
 
@@ -10,13 +10,10 @@ from typing import Protocol
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import split_fields
 from driftwalk.record.head import detect_delimiter, read_header
-from driftwalk.record.layout import MISSING, TableLayout
-from driftwalk.record.raw import ReadOptions
-from driftwalk.record.tables.heading import ROWS_LOOKED_AT, header_advice, heading_of
+from driftwalk.record.raw import MISSING, ReadOptions, TableLayout
+from driftwalk.record.tables.heading import TABLE, header_advice, heading_of
 from driftwalk.record.tables.stamps import StampForm, stamp_form
 from driftwalk.record.text import Table, header_rows, read_table
-
-_ROWS_LOOKED_AT = 50
 
 
 class TableSource(Protocol):
@@ -63,7 +60,7 @@ class TextSource:
     def _find_header(self, options: ReadOptions) -> None:
         """Take the first line that names positions for the header, with the units below it."""
         begin = self._skip - 1
-        lines = header_rows(self._path, begin + ROWS_LOOKED_AT)[begin:]
+        lines = header_rows(self._path, begin + TABLE.heading_rows)[begin:]
         for at, line in enumerate(lines):
             if not line.strip():
                 continue
@@ -81,7 +78,7 @@ class TextSource:
 
     def stamps(self, column: int) -> StampForm | None:
         """Return how the first time stamp of a column is written, None where it has none."""
-        lines = header_rows(self._path, self._skip + _ROWS_LOOKED_AT)[self._skip :]
+        lines = header_rows(self._path, self._skip + TABLE.sample_rows)[self._skip :]
         rows = (split_fields(line, self._delimiter) for line in lines if line.strip())
         fields = (row[column] for row in rows if len(row) > column)
         return next((stamp_form(field) for field in fields if field not in MISSING), None)

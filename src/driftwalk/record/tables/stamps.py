@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.record.layout import MISSING
+from driftwalk.record.raw import MISSING
 
 Ticks = npt.NDArray[np.int64]
 Texts = npt.NDArray[np.bytes_]
@@ -44,12 +44,6 @@ _UNCLEAR: Final = re.compile(
     r"|\d{4}/\d.*|\d.*\d ?[AaPp]\.?[Mm]\.?|\d{1,3}:\d{2}(?:[.,]\d+)?"
 )
 """Dates and times that can be read in more than one way."""
-_YEARS: Final = (1678, 2261)
-"""Those whose nanoseconds since 1970 are 64-bit numbers."""
-
-
-LONGEST_STAMP: Final = 200
-"""Characters; a time stamp has some 40 at most."""
 
 
 class StampError(ValueError):
@@ -122,7 +116,8 @@ class StampReader:
             At a text that is no stamp, or of another kind than the first.
         """
         # One long text would make an array as wide as it of all.
-        if (longest := max(map(len, texts), default=0)) > LONGEST_STAMP:
+        # A time stamp has some 40 characters at most.
+        if (longest := max(map(len, texts), default=0)) > 200:
             row = next(row for row, text in enumerate(texts) if len(text) == longest)
             raise StampError(row, f"'{texts[row]:.40}…' is no time stamp")
         try:
@@ -209,7 +204,7 @@ def _nanoseconds(texts: Texts, match: re.Match[str], rows: npt.NDArray[np.int64]
         ticks -= SECOND_NS * offset * (-1 if zone.startswith("-") else 1)
     if wrong.any():
         at = int(np.argmax(wrong))
-        raise StampError(int(rows[at]), f"'{texts[at].decode()}' is no date and time that there is")
+        raise StampError(int(rows[at]), f"'{texts[at].decode()}' is not a valid date and time")
     return ticks
 
 
@@ -224,7 +219,7 @@ def _fraction(letters: npt.NDArray[np.uint8], match: re.Match[str]) -> Ticks:
 
 def _days(year: Ticks, month: Ticks, day: Ticks) -> tuple[Ticks, npt.NDArray[np.bool_]]:
     """Return days since 1970, and where there is no such day."""
-    wrong = (year < _YEARS[0]) | (year > _YEARS[1]) | (month < 1) | (month > 12) | (day < 1)
+    wrong = (year < 1678) | (year > 2261) | (month < 1) | (month > 12) | (day < 1)
     months = np.where(wrong, 0, 12 * (year - 1970) + month - 1).astype("datetime64[M]")
     days = months.astype("datetime64[D]") + (day - 1)
     wrong |= days.astype("datetime64[M]") != months

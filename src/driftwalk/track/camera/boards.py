@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 
@@ -12,10 +12,18 @@ from driftwalk.core.extras import require_opencv
 from driftwalk.track.detect.tags import dictionary_of
 from driftwalk.track.types import Array, Image
 
-_LEAST_CORNERS: Final = 8
-# Half the side of the window in which a corner is refined, in squares: no other corner is in it.
-_SHARE_OF_SQUARE: Final = 0.3
-_SHARE_OF_GAP: Final = 0.8
+
+class CornerPolicy(NamedTuple):
+    """How far around a corner its exact place is searched for."""
+
+    share_of_square: float = 0.3
+    """Half the side of the window, in squares: no other corner is in it; chosen by hand."""
+    share_of_gap: float = 0.8
+    """Half the side of the window, in gaps between a marker and the edge of its square; chosen
+    by hand."""
+
+
+_CORNERS: Final = CornerPolicy()
 
 
 @dataclass(frozen=True)
@@ -96,7 +104,7 @@ class Board:
         found, corners = cv2.findChessboardCornersSB(grey, size, flags=flags)
         if not found:
             return None
-        pixels = _refined(cv2, grey, corners, _SHARE_OF_SQUARE)
+        pixels = _refined(cv2, grey, corners, _CORNERS.share_of_square)
         # Turned by half a turn the grid is the same: the board's x axis points to the right.
         to_the_right = pixels[size[0] - 1 :: size[0]] - pixels[:: size[0]]
         return self.corners(), pixels if to_the_right[:, 0].sum() >= 0 else pixels[::-1].copy()
@@ -104,12 +112,13 @@ class Board:
     def _charuco(self, cv2: Any, grey: Any) -> tuple[Array, Array] | None:
         detector = cv2.aruco.CharucoDetector(self.charuco_board(cv2))
         corners, numbers, _, _ = detector.detectBoard(grey)
-        if numbers is None or len(numbers) < _LEAST_CORNERS:
+        # Four corners determine the plane; twice as many show a wrong one.
+        if numbers is None or len(numbers) < 8:
             return None
         which = np.asarray(numbers).ravel()
         # A window that reaches a tag would find the tag's corner.
-        free = _SHARE_OF_GAP * (1.0 - (self.marker_m or 0.0) / self.square_m) / 2.0
-        share = min(free, _SHARE_OF_SQUARE)
+        free = _CORNERS.share_of_gap * (1.0 - (self.marker_m or 0.0) / self.square_m) / 2.0
+        share = min(free, _CORNERS.share_of_square)
         return self.corners()[which], _refined(cv2, grey, corners, share)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -14,8 +14,6 @@ from driftwalk.core.extras import require_opencv
 from driftwalk.track.camera.boards import Board
 from driftwalk.track.camera.model import Camera, Lens
 from driftwalk.track.types import Array, Image
-
-_LEAST_IMAGES: Final = 3
 
 
 @dataclass(frozen=True)
@@ -73,10 +71,10 @@ def calibrate_lens(images: Sequence[Image], board: Board) -> LensCalibration:
         raise InputError("the images of the board differ in size: take all with the same camera")
     found = [board.find(image) for image in images]
     used = [index for index, seen in enumerate(found) if seen is not None]
-    if len(used) < _LEAST_IMAGES:
+    if len(used) < 3:
         raise InputError(
             f"the {board.kind} of {board.columns} x {board.rows} squares was found in {len(used)} "
-            f"of {len(images)} images, {_LEAST_IMAGES} are needed: {_advice(board)}"
+            f"of {len(images)} images, 3 are needed: {_advice(board)}"
         )
     places, pixels = [], []
     for seen in found:

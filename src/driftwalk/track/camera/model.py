@@ -17,8 +17,6 @@ from driftwalk.track.types import Array
 _HEAD = """\
 Camera of driftwalk: lens, and the plane of the water.
 Pixels are (column, row), centres at whole numbers, rows downwards; metres have y up."""
-_STEP_PX = 0.5
-_ITERATIONS = 20
 
 Nine = tuple[float, float, float, float, float, float, float, float, float]
 
@@ -56,7 +54,7 @@ class Lens(Section):
         """Return where pixels, shape (n, 2), would lie without distortion."""
         bent = self._normalised(points)
         straight = bent.copy()
-        for _ in range(_ITERATIONS):
+        for _ in range(20):
             radial, shift = self._factors(straight)
             update = (bent - shift) / radial[:, None]
             if np.abs(update - straight).max(initial=0.0) < 1e-12:
@@ -190,9 +188,9 @@ class Camera(Section):
     def jacobian(self, points: Array) -> Array:
         """Return d(x, y)/d(column, row) [m/px] at pixels, shape (n, 2, 2)."""
         columns = []
-        for step in (np.array([_STEP_PX, 0.0]), np.array([0.0, _STEP_PX])):
+        for step in (np.array([0.5, 0.0]), np.array([0.0, 0.5])):
             ahead, behind = self.to_world(points + step), self.to_world(points - step)
-            columns.append((ahead - behind) / (2.0 * _STEP_PX))
+            columns.append((ahead - behind) / (2.0 * 0.5))
         return np.stack(columns, axis=-1)
 
     def check_size(self, width: int, height: int) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -13,14 +13,29 @@ from driftwalk.core.extras import require_opencv
 from driftwalk.track.camera.model import Camera, Lens
 from driftwalk.track.types import Array, Image
 
-_SMALL_PX: Final = 320
-_RAYS: Final = 360
-_AROUND: Final = 0.12
-_STEP_PX: Final = 0.25
-_STRONG: Final = 0.35
-_ROUNDS: Final = 6
-_LEAST_FOUND: Final = 0.4
-_LEAST_EDGE: Final = 1.5
+
+class RimPolicy(NamedTuple):
+    """How the rim of the tank is found in an image."""
+
+    small_px: int = 320
+    """Longer side of the image in which the circle is first looked for [px]; chosen by hand."""
+    rays: int = 360
+    """Directions in which the edge is looked for; chosen by hand."""
+    around: float = 0.12
+    """Half the range in which it is first looked for, in radii; chosen by hand."""
+    step_px: float = 0.25
+    """Distance of the samples along a ray [px]; chosen by hand."""
+    strong: float = 0.35
+    """Least slope of an edge, as a share of the usual strongest slope of a ray; chosen by hand."""
+    rounds: int = 6
+    """Fits of the circle, each in a narrower range; chosen by hand."""
+    least_found: float = 0.4
+    """Share of the rays that must show the edge; chosen by hand."""
+    least_edge: float = 1.5
+    """Usual strongest slope below which there is no rim [grey levels per px]; chosen by hand."""
+
+
+_RIM: Final = RimPolicy()
 
 
 @dataclass(frozen=True)
@@ -83,14 +98,14 @@ def find_rim(image: Image, lens: Lens | None = None) -> Rim:
     smooth = cv2.GaussianBlur(grey, (0, 0), 1.0).astype(np.float32)
     circle = np.array(start)
     found, rms = 0.0, math.inf
-    around = _AROUND
-    for _ in range(_ROUNDS):
+    around = _RIM.around
+    for _ in range(_RIM.rounds):
         points = _inner_edge(cv2, smooth, circle, around, lens)
-        if len(points) < _LEAST_FOUND * _RAYS:
+        if len(points) < _RIM.least_found * _RIM.rays:
             break
         circle, kept, rms = _fit(points)
-        found, around = kept / _RAYS, max(around / 2, 0.02)
-    if found < _LEAST_FOUND:
+        found, around = kept / _RIM.rays, max(around / 2, 0.02)
+    if found < _RIM.least_found:
         raise InputError(
             "no rim of the tank was found as a circle: its edge must be seen all around; or "
             "calibrate with a board that lies on the plane of the water"
@@ -212,7 +227,7 @@ def _from_above(camera: Camera, columns: int, rows: int) -> Camera:
 def _roughly(cv2: Any, grey: Any, lens: Lens | None) -> tuple[float, float, float]:
     """Return column, row and radius of the strongest large circle, to a few pixels."""
     rows, columns = grey.shape
-    factor = max(rows, columns) / _SMALL_PX
+    factor = max(rows, columns) / _RIM.small_px
     small = cv2.resize(grey, (round(columns / factor), round(rows / factor)))
     short = min(small.shape)
     # The accumulator's limit falls until a circle is seen; the first is the strongest.
@@ -234,9 +249,9 @@ def _roughly(cv2: Any, grey: Any, lens: Lens | None) -> tuple[float, float, floa
 
 def _inner_edge(cv2: Any, grey: Any, circle: Array, around: float, lens: Lens | None) -> Array:
     """Return the innermost strong edge along rays from the centre, shape (n, 2)."""
-    angle = 2 * np.pi * np.arange(_RAYS) / _RAYS
+    angle = 2 * np.pi * np.arange(_RIM.rays) / _RIM.rays
     reach = circle[2] * np.array([1.0 - around, 1.0 + around])
-    radius = np.arange(reach[0], reach[1], _STEP_PX)
+    radius = np.arange(reach[0], reach[1], _RIM.step_px)
     ray = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
     points = circle[:2] + radius[None, :, None] * ray[:, None, :]
     flat = points.reshape(-1, 2)
@@ -252,15 +267,15 @@ def _inner_edge(cv2: Any, grey: Any, circle: Array, around: float, lens: Lens | 
     slope = np.abs(value[:, 2:] - value[:, :-2])
     slope[~(inside[:, 2:] & inside[:, :-2])] = 0.0
     usual = float(np.median(slope.max(axis=1)))
-    if usual < _LEAST_EDGE * _STEP_PX:
+    if usual < _RIM.least_edge * _RIM.step_px:
         return np.empty((0, 2))
     middle = slope[:, 1:-1]
-    peak = (middle >= slope[:, :-2]) & (middle > slope[:, 2:]) & (middle > _STRONG * usual)
+    peak = (middle >= slope[:, :-2]) & (middle > slope[:, 2:]) & (middle > _RIM.strong * usual)
     rays = np.flatnonzero(peak.any(axis=1))
     at_peak = peak[rays].argmax(axis=1)
     low, top, high = (slope[rays, at_peak + k] for k in range(3))
     part = 0.5 * (low - high) / np.minimum(low - 2 * top + high, -1e-9)
-    exact = radius[0] + (at_peak + 2 + part) * _STEP_PX
+    exact = radius[0] + (at_peak + 2 + part) * _RIM.step_px
     return np.asarray(circle[:2] + exact[:, None] * ray[rays])
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -15,11 +15,24 @@ Polarity = Literal["dark", "bright", "both"]
 """Brightness of objects, compared with their background."""
 
 _EITHER: Final[tuple[Polarity, Polarity]] = ("dark", "bright")
-_NOISE_FACTOR: Final = 6.0
-_LEAST_CONTRAST: Final = 12.0
-_OF_PEAK: Final = 0.35
-_POSITION_STD: Final = 0.1
-_SPECK_PX: Final = 4.0
+
+
+class BlobPolicy(NamedTuple):
+    """What counts as an object before a still background."""
+
+    noise_factor: float = 6.0
+    """Contrast of an object, in standard deviations of the noise; chosen by hand."""
+    least_contrast: float = 12.0
+    """Least contrast of an object [grey levels]; chosen by hand."""
+    share_of_peak: float = 0.35
+    """Least contrast of an object, as a share of the highest in the image; chosen by hand."""
+    position_std_px: float = 0.1
+    """Standard deviation of a centre, per axis [px]; chosen by hand."""
+    speck_px: float = 4.0
+    """Area below which a region is not mentioned [px^2]; chosen by hand."""
+
+
+_BLOBS: Final = BlobPolicy()
 
 
 def median_background(images: list[Image]) -> Image:
@@ -170,7 +183,7 @@ class BlobDetector:
         for index in range(1, count):
             box = tuple(int(value) for value in stats[index, :4])
             area = float(areas[index - 1])
-            if area < _SPECK_PX:
+            if area < _BLOBS.speck_px:
                 continue
             column, row = _centre(difference, label, index, box)
             reason = self._fault(area)
@@ -211,7 +224,7 @@ class BlobDetector:
         total = np.cumsum(counts)
         noise = float(np.searchsorted(total, 0.84 * total[-1]))
         peak = float(np.searchsorted(total, total[-1] - max(self._least / 32.0, 1.0)))
-        return max(_LEAST_CONTRAST, _NOISE_FACTOR * noise, _OF_PEAK * peak)
+        return max(_BLOBS.least_contrast, _BLOBS.noise_factor * noise, _BLOBS.share_of_peak * peak)
 
     def _fault(self, area: float) -> tuple[str, str] | None:
         if area < self._least:
@@ -224,7 +237,7 @@ class BlobDetector:
         if not kept:
             return []
         pixels = np.array([[column, row] for _, column, row in kept])
-        in_pixels = np.stack([np.diag([_POSITION_STD**2] * 2)] * len(kept))
+        in_pixels = np.stack([np.diag([_BLOBS.position_std_px**2] * 2)] * len(kept))
         world: Array | None = None
         if self.camera is not None:
             world = self.camera.to_world(pixels)

@@ -1,4 +1,4 @@
-"""How much of a marker's colour a pixel shows, whatever its brightness.
+"""Colour weight of a pixel by hue and chroma, independent of its brightness.
 
 Brightness scales a* and b* together, so a colour is a direction in their plane. A pixel's weight
 for a colour is its chroma along that direction, 1 on the disc itself, and 0 where the hue is
@@ -8,7 +8,7 @@ another. Both are read from a table of all (a*, b*) of an 8-bit image.
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -18,14 +18,28 @@ from driftwalk.track.types import Image
 
 Weights = npt.NDArray[np.float32]
 
-CORE: Final = 0.45
-"""Weight above which a pixel belongs to a disc: a disc in half the light keeps 0.57."""
-_FLOOR: Final = 0.15
-_MOST: Final = 1.5
+
+class ChromaPolicy(NamedTuple):
+    """Which pixels show a marker's colour."""
+
+    core: float = 0.45
+    """Weight above which a pixel belongs to a disc: a disc in half the light keeps 0.57; chosen
+    by hand."""
+    floor: float = 0.15
+    """Weight below which a pixel does not count; chosen by hand."""
+    most: float = 1.5
+    """Largest weight of a pixel: a brighter one is a reflection; chosen by hand."""
+    share_of_difference: float = 0.45
+    """Largest tolerance of the hue, as a share of the difference of the two hues; chosen by
+    hand."""
+    across: float = 0.12
+    """Allowed distance from the hue's direction at no chroma, in reference chromas: where
+    colours fade, noise turns the hue; chosen by hand."""
+
+
+_CHROMA: Final = ChromaPolicy()
+
 _LEAST_TOLERANCE: Final = math.radians(18.0)
-_MOST_OF_DIFFERENCE: Final = 0.45
-# Where colours fade into their surroundings, noise turns the hue; this much is allowed.
-_ACROSS: Final = 0.12
 
 
 class ChromaTables:
@@ -43,7 +57,7 @@ class ChromaTables:
         self.soft: list[Weights] = [_table(colour, between) for colour in pair]
         self.label: npt.NDArray[np.uint8] = np.zeros(1 << 16, dtype=np.uint8)
         for number, table in enumerate(self.soft, start=1):
-            self.label[table > CORE] = number
+            self.label[table > _CHROMA.core] = number
 
     def codes(self, cv2: Any, image: Image) -> npt.NDArray[np.uint16]:
         """Return a* and b* of every pixel as one number, the index into the tables."""
@@ -60,7 +74,7 @@ def _table(colour: MarkerColour, between: float) -> Weights:
     along = (a * cos + b * sin) / colour.chroma
     across = np.abs(b * cos - a * sin) / colour.chroma
     tolerance = max(_LEAST_TOLERANCE, 3.0 * colour.spread / colour.chroma)
-    tolerance = min(tolerance, _MOST_OF_DIFFERENCE * between)
-    fits = across <= math.tan(tolerance) * along + _ACROSS
-    weight = np.where(fits & (along > _FLOOR), np.minimum(along, _MOST), 0.0)
+    tolerance = min(tolerance, _CHROMA.share_of_difference * between)
+    fits = across <= math.tan(tolerance) * along + _CHROMA.across
+    weight = np.where(fits & (along > _CHROMA.floor), np.minimum(along, _CHROMA.most), 0.0)
     return np.asarray(weight, dtype=np.float32)

@@ -1,4 +1,4 @@
-"""A frame with the detections drawn in, and the rejected candidates with their reasons."""
+"""Draw detections into a frame, and rejected candidates with their reasons."""
 
 from __future__ import annotations
 
@@ -13,8 +13,6 @@ from driftwalk.track.types import Detection, Image, PixelToWorld, Rejected
 
 _ACCEPTED: Final = (80, 220, 80)
 _REJECTED: Final = (60, 60, 240)
-_SHADOW: Final = (0, 0, 0)
-_ARROW_RADII: Final = 1.6
 
 
 def explain_frame(
@@ -83,7 +81,7 @@ def _arrow_end(found: Detection, radius: float, camera: PixelToWorld | None) -> 
         along = np.array([math.cos(found.theta), math.sin(found.theta)])
         direction = np.linalg.solve(camera.jacobian(pixel)[0], along)
         direction = direction / np.hypot(*direction)
-    end = np.array([found.column, found.row]) + _ARROW_RADII * radius * direction
+    end = np.array([found.column, found.row]) + 1.6 * radius * direction
     return round(float(end[0])), round(float(end[1]))
 
 
@@ -95,7 +93,7 @@ def _write(picture: Image, text: str, at: tuple[int, int], colour: tuple[int, in
     (width, height), _ = cv2.getTextSize(plain, cv2.FONT_HERSHEY_SIMPLEX, 0.35, 1)
     column = max(min(at[0], picture.shape[1] - width - 2), 0)
     row = max(min(at[1], picture.shape[0] - 3), height)
-    for shade, thickness in ((_SHADOW, 3), (colour, 1)):
+    for shade, thickness in (((0, 0, 0), 3), (colour, 1)):
         cv2.putText(
             picture,
             plain,

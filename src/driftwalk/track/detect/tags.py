@@ -1,17 +1,15 @@
-"""Coded tags, which say who they are: ArUco and AprilTag, through OpenCV."""
+"""Fiducial tags with identities: ArUco and AprilTag, through OpenCV."""
 
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.extras import require_opencv
 from driftwalk.track.types import Array, Detection, Image, PixelToWorld, Rejected
-
-_CORNER_STD_PX: Final = 0.15
 
 
 def dictionary_of(cv2: Any, name: str) -> Any:
@@ -109,7 +107,8 @@ class TagDetector:
         along = edges / 2
         turn = np.array([-along[1], along[0]]) / float(along @ along)
         covariance = np.zeros((3, 3))
-        one = slopes @ slopes.T * _CORNER_STD_PX**2
+        # A corner of a tag is known to 0.15 px; chosen by hand.
+        one = slopes @ slopes.T * 0.15**2
         covariance[:2, :2] = one / 4
         # Four corners, each with half of the turn of its edge.
         covariance[2, 2] = float(turn @ one @ turn)

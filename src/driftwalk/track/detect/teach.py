@@ -1,4 +1,4 @@
-"""What do the markers look like? Two colours, a size and a spacing, proposed from a few frames."""
+"""Propose a marker description from sample frames: two colours, size and spacing."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -17,14 +17,30 @@ from driftwalk.track.detect.markers import MarkerColour, TwoColourMarker, hue_di
 from driftwalk.track.detect.two_colour.discs import Disc, find_regions
 from driftwalk.track.types import Array, Image, PixelToWorld
 
-_BINS: Final = 72
-_LEAST_CHROMA: Final = 14.0
-_LEAST_SHARE: Final = 5e-5
-_PEAK_SHARE: Final = 0.03
+
+class TeachPolicy(NamedTuple):
+    """Which colours of an image are proposed as a marker's."""
+
+    bins: int = 72
+    """Bins of the histogram of hues; chosen by hand."""
+    least_chroma: float = 14.0
+    """Chroma above which a pixel is coloured [CIELAB]; chosen by hand."""
+    least_share: float = 5e-5
+    """Least share of the pixels that a colour must have; chosen by hand."""
+    peak_share: float = 0.03
+    """Least height of a peak of the histogram, as a share of the highest; chosen by hand."""
+    most_colours: int = 5
+    """Colours that are tried, the most frequent first; chosen by hand."""
+    least_area_px: float = 12.0
+    """Least area of a disc [px^2]; chosen by hand."""
+    round: float = 0.6
+    """Least share of its bounding box that a disc fills, and least ratio of its sides; chosen
+    by hand."""
+
+
+_TEACH: Final = TeachPolicy()
+
 _HALF_WIDTH: Final = math.radians(20.0)
-_MOST_COLOURS: Final = 5
-_LEAST_AREA_PX: Final = 12.0
-_ROUND: Final = 0.6
 _LEAST_HUE_DIFFERENCE: Final = math.radians(30.0)
 _NAMES: Final = (
     ("red", 25.0),
@@ -107,23 +123,23 @@ def colours_seen(images: Sequence[Image]) -> list[ColourSeen]:
     """
     a_star, b_star = _chroma(require_opencv(), images)
     chroma = np.hypot(a_star, b_star)
-    coloured = chroma > _LEAST_CHROMA
+    coloured = chroma > _TEACH.least_chroma
     hue = np.arctan2(b_star[coloured], a_star[coloured])
     weight = chroma[coloured]
-    counts, _ = np.histogram(hue, _BINS, (-math.pi, math.pi), weights=weight)
+    counts, _ = np.histogram(hue, _TEACH.bins, (-math.pi, math.pi), weights=weight)
     # Around the circle, with the next two bins on each side.
     smooth = np.sum([np.roll(counts, k) * (3 - abs(k)) for k in range(-2, 3)], axis=0) / 9.0
     peak = (smooth >= np.roll(smooth, 1)) & (smooth > np.roll(smooth, -1))
-    peak &= smooth > _PEAK_SHARE * smooth.max(initial=0.0)
+    peak &= smooth > _TEACH.peak_share * smooth.max(initial=0.0)
     found = []
     for index in np.flatnonzero(peak):
-        centre = (index + 0.5) * 2 * math.pi / _BINS - math.pi
+        centre = (index + 0.5) * 2 * math.pi / _TEACH.bins - math.pi
         near = np.abs(np.angle(np.exp(1j * (hue - centre)))) < _HALF_WIDTH
         seen = _describe(a_star[coloured][near], b_star[coloured][near], chroma.size)
         if seen is not None:
             found.append(seen)
     found.sort(key=lambda item: -item.share)
-    return found[:_MOST_COLOURS]
+    return found[: _TEACH.most_colours]
 
 
 def missing_colours(marker: TwoColourMarker, images: Sequence[Image]) -> str | None:
@@ -162,7 +178,7 @@ def missing_colours(marker: TwoColourMarker, images: Sequence[Image]) -> str | N
     absent = [
         f"colour {number} ({_name(colour.hue_rad)})"
         for number, colour in enumerate(pair, start=1)
-        if counts[number] < _LEAST_AREA_PX
+        if counts[number] < _TEACH.least_area_px
     ]
     if not absent:
         return None
@@ -284,7 +300,7 @@ def _mutual(first: list[Disc], second: list[Disc]) -> list[tuple[Disc, Disc]]:
 
 def _least_diameters(places: Array) -> Array:
     """Return the least diameter of a disc, as long as the true one is not known [px]."""
-    return np.full(len(places), 2.0 * math.sqrt(_LEAST_AREA_PX / math.pi))
+    return np.full(len(places), 2.0 * math.sqrt(_TEACH.least_area_px / math.pi))
 
 
 def _places(discs: list[Disc]) -> Array:
@@ -295,9 +311,9 @@ def _is_round(disc: Disc) -> bool:
     width, height = disc.box[2] - disc.box[0] + 1, disc.box[3] - disc.box[1] + 1
     long, short = max(width, height), min(width, height)
     return (
-        disc.area >= _LEAST_AREA_PX
-        and disc.area > _ROUND * width * height
-        and short > _ROUND * long
+        disc.area >= _TEACH.least_area_px
+        and disc.area > _TEACH.round * width * height
+        and short > _TEACH.round * long
     )
 
 
@@ -314,7 +330,7 @@ def _chroma(cv2: Any, images: Sequence[Image]) -> tuple[Array, Array]:
 def _describe(a_star: Array, b_star: Array, pixels: int) -> ColourSeen | None:
     """Return the colour of the inner pixels of what has one hue."""
     chroma = np.hypot(a_star, b_star)
-    if a_star.size < max(_LEAST_SHARE * pixels, _LEAST_AREA_PX):
+    if a_star.size < max(_TEACH.least_share * pixels, _TEACH.least_area_px):
         return None
     # Edges are mixed with their surroundings; the strongest colour is the disc's own.
     inner = chroma > 0.8 * np.quantile(chroma, 0.9)

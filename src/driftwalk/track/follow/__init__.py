@@ -1,1 +1,1 @@
-"""From detections to tracks: which detection is which body."""
+"""Multi-object tracking: detections to tracks."""

@@ -1,4 +1,4 @@
-"""Which track a detection belongs to: solved inside connected groups of the gating graph only.
+"""Assignment of detections to tracks, within connected components of the gating graph.
 
 An edge says that a detection may belong to a track, at a cost: the negative logarithm of its
 likelihood over that of "the track was missed and the detection is something else". So an edge that
@@ -17,13 +17,17 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
 
-# exp(-12): an alternative beyond that is no alternative.
-NO_ALTERNATIVE: Final = 12.0
-# exp(-20): an exchange beyond that is out of the question, even if what was believed so far turns
-# out to be wrong.
-_OUT_OF_QUESTION: Final = 20.0
-# Costs of pairs without an edge; finite, because the solver wants that.
-_FORBIDDEN: Final = 1e9
+
+class ExchangePolicy(NamedTuple):
+    """Up to which cost another assignment is an alternative."""
+
+    alternative: float = 12.0
+    """Additional cost from which on it is none: a likelihood ratio of exp(-12); chosen by hand."""
+    exchange: float = 20.0
+    """Additional cost from which on an exchange is not noted: exp(-20); chosen by hand."""
+
+
+_EXCHANGE: Final = ExchangePolicy()
 
 
 class Assignment(NamedTuple):
@@ -69,7 +73,7 @@ def assign(cost: Floats) -> Assignment:
             alone = float(cost[rows[0], columns[0]])
             if alone < 0.0:
                 detection[rows[0]] = columns[0]
-            elif alone < NO_ALTERNATIVE:
+            elif alone < _EXCHANGE.alternative:
                 score[rows[0]] = math.exp(-alone)
             continue
         part = cost[np.ix_(rows, columns)]
@@ -126,7 +130,8 @@ def _solve(cost: Floats) -> Integers:
 
     # One spare column for each track, at cost 0: to be left alone is always possible.
     padded = np.zeros((rows, columns + rows))
-    padded[:, :columns] = np.where(np.isfinite(cost), cost, _FORBIDDEN)
+    # Costs of pairs without an edge are finite, because the solver wants that.
+    padded[:, :columns] = np.where(np.isfinite(cost), cost, 1e9)
     taken = np.asarray(linear_sum_assignment(padded)[1], dtype=np.int64)
     return np.where(taken < columns, taken, -1)
 
@@ -137,7 +142,7 @@ def _excess(cost: Floats, taken: Integers) -> Floats:
     Another assignment differs by cycles, in which each track takes the detection of the next one.
     The cheapest cycle through an edge is that edge and the shortest way back. One more node
     represents detections without a track: a track that goes there takes a detection that was left,
-    or none; from there it costs nothing to leave a track's detection to nobody.
+    or none; from there it costs nothing to leave a track's detection unassigned.
     """
     tracks = np.arange(len(cost))
     has = taken >= 0
@@ -164,7 +169,7 @@ def _scores(excess: Floats, taken: Integers) -> Floats:
     has = taken >= 0
     least = excess.min(axis=1)
     least[has] = np.minimum(least[has], excess[:, taken[has]].min(axis=0))
-    return np.where(least < NO_ALTERNATIVE, np.exp(-np.maximum(least, 0.0)), 0.0)
+    return np.where(least < _EXCHANGE.alternative, np.exp(-np.maximum(least, 0.0)), 0.0)
 
 
 def _pairs(excess: Floats, taken: Integers) -> list[tuple[int, int, float]]:
@@ -172,6 +177,6 @@ def _pairs(excess: Floats, taken: Integers) -> list[tuple[int, int, float]]:
     owner = {column: row for row, column in enumerate(taken.tolist()) if column >= 0}
     return [
         (row, owner[column], math.exp(-max(float(excess[row, column]), 0.0)))
-        for row, column in np.argwhere(excess < _OUT_OF_QUESTION).tolist()
+        for row, column in np.argwhere(excess < _EXCHANGE.exchange).tolist()
         if column in owner
     ]

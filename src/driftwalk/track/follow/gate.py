@@ -1,4 +1,4 @@
-"""Which detections a track may have, and how likely each is."""
+"""Gating: the detections that a track may have, and their likelihoods."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where identities could have been exchanged: intervals that are marked, each with a score."""
+"""Ambiguous identities: marked intervals of possible exchanges, each with a score."""
 
 from __future__ import annotations
 
@@ -13,10 +13,19 @@ from driftwalk.track.follow.tracks import Track
 
 Floats = npt.NDArray[np.float64]
 
-PARTED: Final = 0.5
-"""Score of two that were lost sight of together: which one went on being seen, nobody can say."""
-# Measurements that determine the velocity again, and so whether an assignment was right.
-_SETTLES_IN: Final = 3
+
+class MarkPolicy(NamedTuple):
+    """How exchanged identities are scored."""
+
+    parted: float = 0.5
+    """Score of two bodies that were lost together, of which one is seen again: it may be
+    either; chosen by hand."""
+    settles_in: int = 3
+    """Measurements that determine the velocity again, and so whether an assignment was right;
+    chosen by hand."""
+
+
+MARKS: Final = MarkPolicy()
 
 
 class _Mark(NamedTuple):
@@ -89,8 +98,8 @@ class Marks:
         """Mark tracks whose assignment was a close thing, or that came back near others."""
         for track in parted:
             for other in track.lost_beside if track.key is None else ():
-                track.score = max(track.score, PARTED)
-                other.score = max(other.score, PARTED)
+                track.score = max(track.score, MARKS.parted)
+                other.score = max(other.score, MARKS.parted)
         for track in tracks:
             self._doubt(track, frame)
         for track in parted:
@@ -113,7 +122,7 @@ class Marks:
         After a wrong choice the velocities are wrong too, and the way back looks certain.
         """
         if track.score >= self._settings.ambiguous_above:
-            track.doubt, track.settles_in = track.score, _SETTLES_IN
+            track.doubt, track.settles_in = track.score, MARKS.settles_in
             self.add(track, self._since(track), frame, track.score)
         elif track.settles_in > 0:
             track.settles_in -= track.measured is not None

@@ -1,26 +1,20 @@
-"""Which body a new track is: one that was lost, or one more."""
+"""Re-identification: whether a new track is a lost body or a new one."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk.track.follow.assign import assign
 from driftwalk.track.follow.gate import reach
-from driftwalk.track.follow.marks import PARTED, Marks
+from driftwalk.track.follow.marks import MARKS, Marks
 from driftwalk.track.follow.settings import TrackerSettings
 from driftwalk.track.follow.tracks import Track
 
 Floats = npt.NDArray[np.float64]
-
-# A body that could come back is taken for a lost one rather than for a new one.
-_COME_BACK: Final = -50.0
-# Cost of taking two for one that were seen at once, one of them something else for a while.
-_TOGETHER: Final = 20.0
 
 
 class Naming:
@@ -106,7 +100,7 @@ class Naming:
             beside = gone.lost_beside if came_back else {}
             if uncertain or beside or together:
                 first = min([*beside.values(), *since])
-                likely = max(score, PARTED if beside or together else 0.0)
+                likely = max(score, MARKS.parted if beside or together else 0.0)
                 for marked in (gone, *came_back, *beside):
                     self._marks.add(marked, first, len(times) - 1, likely)
         return found
@@ -117,8 +111,11 @@ class Naming:
         if first is None:
             return math.inf
         apart, limit = self._apart(gone, track, times, slice(first, first + 1))
-        cost = 0.5 * (3.0 * float(apart[0] / limit[0])) ** 2 + _COME_BACK
-        return cost + (_TOGETHER if _seen_together(gone, track) else 0.0)
+        # A body that could come back is taken for a lost one rather than for a new one.
+        cost = 0.5 * (3.0 * float(apart[0] / limit[0])) ** 2 - 50.0
+        # Two that were seen at once are one only if one of them was something else for a
+        # while.
+        return cost + (20.0 if _seen_together(gone, track) else 0.0)
 
     def _first_within_reach(self, gone: Track, track: Track, times: Sequence[float]) -> int | None:
         """Return the first sample of a new track that a lost body could have reached."""

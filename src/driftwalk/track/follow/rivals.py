@@ -1,4 +1,4 @@
-"""Detections that may be something else: taken for now, and taken back if what follows says so.
+"""Deferred decisions: uncertain detections, taken tentatively and revoked by later frames.
 
 A body that is hidden may be mistaken for something that turns up nearby. So a detection that is not
 far more likely than "the body was missed, and this is something else" is taken with a reservation:

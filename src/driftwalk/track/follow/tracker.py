@@ -1,4 +1,4 @@
-"""From detections to tracks: which detection is which body, and where that is not certain.
+"""Multi-object tracker: detections to tracks, with marks where an identity is uncertain.
 
 Each frame, the tracks are predicted over the time that has passed, detections are gated, and each
 connected group of the gating graph is assigned on its own. The output is the measurement, not the
@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -33,12 +33,6 @@ if TYPE_CHECKING:
 __all__ = ["TrackState", "Tracker"]
 
 Floats = npt.NDArray[np.float64]
-
-# Cost by which a tag that says whose it is beats every likelihood; for one that says otherwise, no
-# edge is made.
-_CERTAIN: Final = -1e4
-# Standard deviations from the prediction at which a body was pushed rather than unlucky.
-_PUSHED: Final = 3.5
 
 
 class Tracker:
@@ -253,7 +247,8 @@ class Tracker:
         total = covariance[:, :2, :2] + noise[:, :2, :2]
         off = pose[:, :2] - mean[:, :2]
         square = np.einsum("ni,ni->n", off, np.linalg.solve(total, off[..., None])[..., 0])
-        std = self.settings.speed_std * (square > _PUSHED**2)
+        # This far from the prediction [standard deviations], a body was pushed.
+        std = self.settings.speed_std * (square > 3.5**2)
         elapsed = np.array([time - track.seen for track in tracks])
         added = np.zeros_like(covariance)
         for axis in range(2):
@@ -333,6 +328,8 @@ def _obey_keys(cost: Floats, tracks: Sequence[Track], found: Sequence[Detection]
     for row, track in enumerate(tracks):
         for column, one in enumerate(found):
             if track.key is not None and track.key == one.key:
-                cost[row, column] = _CERTAIN
+                # A tag that says whose it is beats every likelihood; for another
+                # body's there is no edge.
+                cost[row, column] = -1e4
             elif track.key is not None or one.key is not None:
                 cost[row, column] = math.inf

@@ -1,4 +1,4 @@
-"""State that the tracker keeps for each body."""
+"""Track state of each body."""
 
 from __future__ import annotations
 
@@ -21,7 +21,6 @@ COVARIANCE: Final = ("xx", "xy", "yy", "xtheta", "ytheta", "thetatheta")
 _ROWS, _COLUMNS = np.array([0, 0, 1, 0, 1, 2]), np.array([0, 1, 1, 2, 2, 2])
 # Smallest variance of a measurement, so that a perfect one has a likelihood too.
 _LEAST_VARIANCE: Final = np.diag([1e-14, 1e-14, 1e-12])
-_FIRST_ROOM: Final = 8
 
 
 class TrackState(NamedTuple):
@@ -54,8 +53,8 @@ class Samples:
     """
 
     def __init__(self) -> None:
-        self._frames = np.empty(_FIRST_ROOM, dtype=np.int64)
-        self._values = np.empty((_FIRST_ROOM, 3 + len(COVARIANCE)))
+        self._frames = np.empty(8, dtype=np.int64)
+        self._values = np.empty((8, 3 + len(COVARIANCE)))
         self._count = 0
 
     def __len__(self) -> int:

@@ -1,1 +1,1 @@
-"""Who is joined to whom, frame by frame."""
+"""Joins between tracked blocks, frame by frame."""

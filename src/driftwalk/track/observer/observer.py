@@ -1,4 +1,4 @@
-"""Self-assembly as it is seen: who is joined to whom, and the outcome class, frame by frame.
+"""Online observer of self-assembly: joins and the outcome class, frame by frame.
 
 The rules, the lattice and the events are those of `driftwalk.classify`: an observer that has taken
 every frame of a recording holds the joins and events that `classify` finds in it. Live, a join or a
@@ -20,7 +20,7 @@ from driftwalk.assembly.lattice.join_history import Event, JoinHistory
 from driftwalk.assembly.lattice.joined_faces import QUARTER, ROUNDING, Join, JoinRules, PairPoses
 from driftwalk.assembly.lattice.polyomino import Chirality, require_chirality
 from driftwalk.assembly.lattice.world import LatticeWorld
-from driftwalk.assembly.recordings import HOLD, JOIN_ANGLE, JOIN_DISTANCE, LOOSER, MIN_DURATION
+from driftwalk.assembly.recordings import JOIN_ANGLE, JOIN_POLICY
 from driftwalk.core.errors import InputError
 from driftwalk.schema.check import described
 from driftwalk.track.observer.pair_state import PairState
@@ -105,20 +105,24 @@ class AssemblyObserver:
         join_angle: float = JOIN_ANGLE,
         release_distance: float | None = None,
         release_angle: float | None = None,
-        min_duration: float = MIN_DURATION,
-        hold: float = HOLD,
+        min_duration: float = JOIN_POLICY.min_duration_s,
+        hold: float = JOIN_POLICY.hold_s,
     ) -> None:
         require_chirality(chirality)
         names = [f"unseen {i}" for i in range(bodies)] if isinstance(bodies, int) else list(bodies)
         if not names:
             raise InputError("there is no block to observe")
-        distance = JOIN_DISTANCE * side if join_distance is None else join_distance
+        distance = JOIN_POLICY.join_distance * side if join_distance is None else join_distance
         self.rules = JoinRules(
             side=side,
             join_distance=distance,
             join_angle=join_angle,
-            release_distance=LOOSER * distance if release_distance is None else release_distance,
-            release_angle=LOOSER * join_angle if release_angle is None else release_angle,
+            release_distance=JOIN_POLICY.looser * distance
+            if release_distance is None
+            else release_distance,
+            release_angle=JOIN_POLICY.looser * join_angle
+            if release_angle is None
+            else release_angle,
             min_duration=min_duration,
             hold=hold,
         )

@@ -1,4 +1,4 @@
-"""Whether two blocks are joined, decided frame by frame.
+"""Join state of two blocks, decided frame by frame.
 
 The rules are those of `driftwalk.classify`, which looks at a whole recording: faces join when they
 have fitted for the shortest duration, they part when they have been beyond the looser tolerances
@@ -45,7 +45,7 @@ class PairState:
         self._streak: list[_Look] = []
 
     def joins(self, samples: int) -> list[Join]:
-        """Return all joins up to now, after so many samples; one that holds ends with them."""
+        """Return all joins up to now; one that holds ends with the last sample."""
         if self.faces is None:
             return self._over
         loose = float(np.median(self._looseness))

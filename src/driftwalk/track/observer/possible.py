@@ -1,4 +1,4 @@
-"""Which outcome classes are possible while some blocks are hidden.
+"""Possible outcome classes while some blocks are hidden.
 
 Visible blocks constrain the classes: blocks that are joined are one shape, and two shapes of seen
 blocks that do not fit on a common lattice are not one. Hidden blocks may be anywhere: alone, joined
@@ -10,18 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
-from typing import Final
 
 from driftwalk.assembly import class_name, outcome_classes
 from driftwalk.assembly.lattice.polyomino import Chirality, name_of
+from driftwalk.assembly.lattice.world import STEPS
+from driftwalk.assembly.outcomes.classes import MOST_BLOCKS
 from driftwalk.schema.shapes import Cell, moved_to_origin
 
 Lattice = dict[Cell, int]
 """From a cell to the assembly whose block stands there."""
-_STEPS: Final = ((1, 0), (0, 1), (-1, 0), (0, -1))
-MOST_HIDDEN: Final = 3
-"""With more hidden blocks than that, no class is excluded."""
-MOST_LISTED: Final = 8
 
 
 def possible_classes(
@@ -51,8 +48,9 @@ def possible_classes(
     ['2+1', 'I3', 'L3']
     """
     blocks = hidden + sum(len(lattice) for lattice in lattices)
-    if hidden > MOST_HIDDEN:
-        listed = blocks <= MOST_LISTED
+    # With more than three hidden blocks, no class is excluded.
+    if hidden > 3:
+        listed = blocks <= MOST_BLOCKS
         return frozenset(outcome_classes(blocks, chirality=chirality) if listed else ())
     frozen = tuple(tuple(sorted(lattice.items())) for lattice in lattices)
     return _enumerated(frozen, hidden, chirality)
@@ -124,5 +122,5 @@ def _connected(left: Lattice) -> list[Cell]:
 
 
 def _beside(cell: Cell) -> Iterator[Cell]:
-    for dx, dy in _STEPS:
+    for dx, dy in STEPS:
         yield cell[0] + dx, cell[1] + dy

@@ -22,14 +22,8 @@ from driftwalk.core.extras import read_image, require_opencv
 from driftwalk.track.source.gaps import FrameGaps
 from driftwalk.track.types import Frame, Image
 
-_STALE_STRIDE: Final = 16
 _IMAGES: Final = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
 _TIMES: Final = "times.csv"
-_LATEST_S: Final = 1e12
-"""30 000 years: beyond any clock, and its gaps can still be counted in frames."""
-# A file whose pictures end this long before its stated end was cut off; sound may continue a
-# little.
-_CUT_OFF_S: Final = 0.5
 _FFMPEG_LOG: Final = "OPENCV_FFMPEG_LOGLEVEL"
 
 
@@ -223,7 +217,9 @@ class VideoFile:
         if frames >= self._promised - 1 or not self._rate > 0:
             return None
         duration = self._promised / self._rate
-        if duration - end < max(_CUT_OFF_S, 2 / self._rate):
+        # A file whose pictures end this long before its stated end was cut off; sound may
+        # continue a little.
+        if duration - end < max(0.5, 2 / self._rate):
             return None
         return f"{self.name} ends after {frames} frames, at {end:.1f} s of {duration:.1f} s"
 
@@ -326,7 +322,8 @@ def _listed_images(folder: Path) -> list[tuple[Path, float]]:
     if not found:
         raise FormatError("lists no image", path=path)
     for number, (_, time) in enumerate(found, start=2):
-        if not abs(time) <= _LATEST_S:
+        # 30,000 years: beyond any clock, and its gaps can still be counted in frames.
+        if not abs(time) <= 1e12:
             raise FormatError(
                 f"has a time of {time:g} s, which no clock shows", path=path, line=number
             )
@@ -339,5 +336,6 @@ def _three_channels(image: Any) -> Image:
 
 
 def _same(first: Image, second: Image) -> bool:
-    coarse = np.s_[::_STALE_STRIDE, ::_STALE_STRIDE]
+    # Every sixteenth pixel is enough to see that a frame is repeated.
+    coarse = np.s_[::16, ::16]
     return np.array_equal(first[coarse], second[coarse]) and np.array_equal(first, second)

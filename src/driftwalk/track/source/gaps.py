@@ -1,16 +1,23 @@
-"""How many frames are missing, from the times between those there are, while they come."""
+"""Count missing frames from the intervals between frames, online."""
 
 from __future__ import annotations
 
 from bisect import bisect_right, insort
-from typing import Final
+from typing import Final, NamedTuple
 
-_LONG: Final = 1.5
-"""How many times the usual gap one has to be for a frame to be missing in it."""
-_LEARNT: Final = 8
-"""Gaps that teach the usual one: before, no frame is said to be missing."""
-_SAME: Final = 0.01
-"""Change of the usual gap, as a share of it, above which all gaps are counted again."""
+
+class FrameGapPolicy(NamedTuple):
+    """When a frame is missing between two."""
+
+    long: float = 1.5
+    """Usual gaps that one has to last for a frame to be missing in it; chosen by hand."""
+    learnt: int = 8
+    """Gaps that teach the usual one; before them no frame is missing; chosen by hand."""
+    same: float = 0.01
+    """Relative change of the usual gap above which all gaps are counted again; chosen by hand."""
+
+
+_GAPS: Final = FrameGapPolicy()
 
 
 class FrameGaps:
@@ -44,12 +51,12 @@ class FrameGaps:
     def add(self, gap: float) -> None:
         """Take in the time between a frame and the one before [s], above zero."""
         insort(self._sorted, gap)
-        if len(self._sorted) < _LEARNT:
+        if len(self._sorted) < _GAPS.learnt:
             return
         usual = self.usual
-        if abs(usual - self._counted_by) > _SAME * self._counted_by:
+        if abs(usual - self._counted_by) > _GAPS.same * self._counted_by:
             self._count_anew(usual)
-        elif gap > _LONG * self._counted_by:
+        elif gap > _GAPS.long * self._counted_by:
             self.missing += round(gap / self._counted_by) - 1
 
     def settle(self) -> None:
@@ -58,6 +65,6 @@ class FrameGaps:
             self._count_anew(self.usual)
 
     def _count_anew(self, usual: float) -> None:
-        long = self._sorted[bisect_right(self._sorted, _LONG * usual) :]
+        long = self._sorted[bisect_right(self._sorted, _GAPS.long * usual) :]
         self.missing = sum(round(gap / usual) - 1 for gap in long)
         self._counted_by = usual

@@ -1,19 +1,17 @@
-"""A camera: a thread reads it, and whoever asks gets the newest frame."""
+"""Live camera: a thread reads it and keeps the newest frame."""
 
 from __future__ import annotations
 
 import threading
 import time as clock
 from collections.abc import Callable, Iterator
-from typing import Any, Final
+from typing import Any
 from urllib.parse import urlsplit, urlunsplit
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.extras import require_opencv
 from driftwalk.track.source.frames import FrameCounts, FrameFilter, open_capture
 from driftwalk.track.types import Frame
-
-_PATIENCE_S: Final = 5.0
 
 
 class LiveCamera:
@@ -52,7 +50,7 @@ class LiveCamera:
         capture: Any,
         name: str,
         *,
-        patience: float = _PATIENCE_S,
+        patience: float = 5.0,
         now: Callable[[], float] = clock.monotonic,
     ) -> None:
         self.name, self.counts = name, FrameCounts()

@@ -1,21 +1,22 @@
-"""A few images of a source, spread over it: to find the rim, the background, the colours."""
+"""Sample images spread over a source, to find the rim, the background, the colours."""
 
 from __future__ import annotations
 
 import contextlib
 from itertools import islice
 from pathlib import Path
-from typing import Final
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.extras import require_opencv
-from driftwalk.track.source.frames import images_in, open_capture
-from driftwalk.track.source.open import open_source
+from driftwalk.track.source.frames import (
+    FrameSource,
+    ImageSequence,
+    VideoFile,
+    images_in,
+    open_capture,
+)
+from driftwalk.track.source.live_camera import LiveCamera
 from driftwalk.track.types import Image
-
-_CAMERA_STRIDE: Final = 5
-# Frames between two samples from which on seeking is quicker than reading what lies between.
-_SEEK_BEYOND: Final = 50
 
 
 def sample_images(
@@ -50,10 +51,11 @@ def sample_images(
     """
     total = frame_count(source)
     if str(source).startswith("camera:"):
-        stride = _CAMERA_STRIDE
+        stride = 5
     elif total is None or total <= number:
         stride = 1
-    elif Path(source).is_file() and total > _SEEK_BEYOND * number:
+    # Seeking is quicker than reading 50 frames between two samples.
+    elif Path(source).is_file() and total > 50 * number:
         found = _by_seeking(source, total, number)
         if found:
             return found
@@ -114,3 +116,42 @@ def _by_seeking(source: str | Path, total: int, number: int) -> list[Image]:
             images.append(image)
     capture.release()
     return images
+
+
+def open_source(
+    source: str | Path, *, rate: float | None = None, keep_stale: bool = False
+) -> FrameSource:
+    """Open a video, a folder of images, or a camera.
+
+    Parameters
+    ----------
+    source : str or path-like
+        A video file; a folder of images; ``camera:0`` for the first camera.
+    rate : float, optional
+        Images per second of a folder without a ``times.csv`` [Hz].
+    keep_stale : bool
+        Whether frames with exactly the image before are handed on.
+
+    Returns
+    -------
+    FrameSource
+        Iterate over it for `Frame` objects; then its ``counts`` and ``interrupted`` (None, or why
+        it ended early) are final.
+
+    Raises
+    ------
+    InputError
+        When it cannot be opened.
+
+    Examples
+    --------
+    >>> open_source("no/such/video.mp4")
+    Traceback (most recent call last):
+    driftwalk.core.errors.FormatError: no/such/video.mp4: no such video
+    """
+    text = str(source)
+    if text.startswith("camera:"):
+        return LiveCamera.open(text)
+    if Path(source).is_dir():
+        return ImageSequence(source, rate=rate, keep_stale=keep_stale)
+    return VideoFile(source, keep_stale=keep_stale)

@@ -163,7 +163,7 @@ def test_a_model_is_found_again_and_says_how_well() -> None:
     assert float(found["interval_stretch"]) == 1.0
     assert bool(found["explained"])
     (said,) = found["warning"].values
-    assert said.startswith("nobody stated the tank: ")
+    assert said.startswith("the tank was not stated: ")
 
 
 @pytest.mark.slow

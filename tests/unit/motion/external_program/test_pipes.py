@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from driftwalk.motion.external_program import process
-from driftwalk.motion.external_program.pipes import KEPT_ERRORS, SelectedPipes, ThreadedPipes
+from driftwalk.motion.external_program.pipes import PIPES, SelectedPipes, ThreadedPipes
 from driftwalk.motion.external_program.process import Program, ProgramEnded, ProgramFault, Request
 
 MANY = 3_000_000  # bytes: more than any pipe holds
@@ -48,7 +48,7 @@ write(f"{{len(line)}}\\n")
     one = program(source, tmp_path)
     line = b"c" * MANY + b"\n"
     assert ask(one, line) == b"a" * MANY + b"%d" % len(line)
-    assert 0 < len(one.last_errors()) <= KEPT_ERRORS + 100
+    assert 0 < len(one.last_errors()) <= PIPES.kept_errors + 100
     one.close()
 
 

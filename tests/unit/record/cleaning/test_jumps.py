@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from driftwalk.record.cleaning.jumps import EFFORT, find_jumps
+from driftwalk.record.cleaning.jumps import JUMPS, find_jumps
 from driftwalk.record.raw import RawBody
 
 COORDINATE = st.floats(-3.0, 3.0).map(lambda value: round(value, 3))
@@ -26,7 +26,7 @@ def cost(kept: tuple[int, ...], track: RawBody, max_speed: float) -> float:
     for one, other in pairwise(kept):
         way = np.hypot(track.x[other] - track.x[one], track.y[other] - track.y[one])
         share = way / (max_speed * (track.clock[other] - track.clock[one]))
-        total += EFFORT * (other - one) * share**2 if share <= 1.0 else np.inf
+        total += JUMPS.effort * (other - one) * share**2 if share <= 1.0 else np.inf
     return total
 
 

@@ -121,7 +121,7 @@ def test_without_such_a_column_the_error_says_what_to_do(tmp_path: Path) -> None
 def test_a_column_that_begins_to_tell_apart_beyond_the_first_block(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(text, "BLOCK_BYTES", 512)
+    monkeypatch.setattr(text, "TEXT", text.TEXT._replace(block_bytes=512))
     rows = sorted(circles(100, "ab"), key=lambda row: str(row[3]))
     path = write(tmp_path, "t,x,y,who", rows)
     with pytest.raises(InputError, match="'who' could name the body"):

@@ -118,11 +118,11 @@ BAD = {
     "minutes or hours": ("12:30", "several ways"),
     "minutes": ("30:01.3", "several ways"),
     "half a day": ("12:30:00 PM", "several ways"),
-    "no such day": ("2023-02-29T12:00:00", "no date and time that there is"),
-    "no such hour": ("2024-05-01T25:00:00", "no date and time that there is"),
-    "no such minute": ("12:61:00", "no date and time that there is"),
-    "no such month": ("2024-13-01T12:00:00", "no date and time that there is"),
-    "before the clock": ("0001-01-01T00:00:00", "no date and time that there is"),
+    "no such day": ("2023-02-29T12:00:00", "not a valid date and time"),
+    "no such hour": ("2024-05-01T25:00:00", "not a valid date and time"),
+    "no such minute": ("12:61:00", "not a valid date and time"),
+    "no such month": ("2024-13-01T12:00:00", "not a valid date and time"),
+    "before the clock": ("0001-01-01T00:00:00", "not a valid date and time"),
 }
 
 

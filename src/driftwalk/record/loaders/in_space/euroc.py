@@ -12,8 +12,7 @@ import numpy as np
 from driftwalk.core.errors import FormatError
 from driftwalk.record.column_names import unit_of_name
 from driftwalk.record.head import first_lines, first_row
-from driftwalk.record.layout import TableLayout
-from driftwalk.record.raw import CLOCK_UNITS, RawRecording, ReadOptions
+from driftwalk.record.raw import CLOCK_UNITS, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.space.flat import SpaceTrack, lay_flat
 from driftwalk.record.space.plane import plane_of
 from driftwalk.record.space.turns import QUATERNION, Turns

@@ -10,16 +10,13 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import split_fields
-from driftwalk.record.layout import TableLayout
-from driftwalk.record.raw import Array, RawRecording, ReadOptions
+from driftwalk.record.raw import Array, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.space.flat import SpaceTrack, lay_flat
 from driftwalk.record.space.plane import plane_of
 from driftwalk.record.space.turns import QUATERNION, Turns
 from driftwalk.record.text import Table, header_rows, read_table
 
 START: Final = b"Format Version,"
-_HEADER_ROWS: Final = 12
-"""The rows that name the columns end by then: blank, type, name, id, parent, quantity, axes."""
 _UNITS: Final = {"meters": "m", "centimeters": "cm", "millimeters": "mm"}
 _ORDERS: Final = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
 _UP: Final = "y"
@@ -94,7 +91,8 @@ class OptiTrackLoader:
 
 
 def _read_header(path: Path) -> _Header:
-    lines = header_rows(path, _HEADER_ROWS + 1)
+    # Titles end by row 12: blank, type, name, id, parent, quantity, axes.
+    lines = header_rows(path, 13)
     rows = [split_fields(line, ",") for line in lines]
     at = next((i for i, row in enumerate(rows) if row[:1] == ["Frame"]), None)
     above = [] if at is None else [row for row in rows[1:at] if any(row)]

@@ -25,10 +25,6 @@ METADATA: Final = "metadata.yaml"
 _MCAP: Final = b"\x89MCAP0\r\n"
 _SQLITE: Final = b"SQLite format 3\0"
 _UP: Final = "z"
-MOST_METADATA: Final = MIB // 4
-"""A description of a bag is no larger: it names more than a thousand files. Its reader takes
-nearly a second for that, and longer for what is damaged."""
-_SECOND: Final = 1_000_000_000
 
 
 @dataclass
@@ -108,7 +104,9 @@ def _refuse_nested(path: Path) -> None:
     description = path / METADATA if path.is_dir() else path.with_name(METADATA)
     if not description.is_file():
         return
-    content = read_bounded(description, most=MOST_METADATA)
+    # A larger description would name more than a thousand files; its reader takes a second for
+    # that.
+    content = read_bounded(description, most=MIB // 4)
     level = 0
     for mark in re.findall(rb"[\[\]{}]", content):
         level += 1 if mark in b"[{" else -1
@@ -150,7 +148,7 @@ def _collect(reader: Any, chosen: list[Any]) -> tuple[dict[str, _Track], set[str
     for connection, received, data in reader.messages(connections=chosen):
         message = reader.deserialize(data, connection.msgtype)
         for pose in READERS[connection.msgtype](message, connection.topic.strip("/")):
-            stamp = 0 if pose.stamp is None else pose.stamp.sec * _SECOND + pose.stamp.nanosec
+            stamp = 0 if pose.stamp is None else pose.stamp.sec * 1_000_000_000 + pose.stamp.nanosec
             recorded += stamp == 0
             track = tracks.setdefault((connection.topic, pose.body), _Track())
             track.stamps.append(stamp or received)

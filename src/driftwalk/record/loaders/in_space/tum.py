@@ -11,8 +11,7 @@ from typing import Final
 import numpy as np
 
 from driftwalk.record.head import first_lines, is_numeric_row
-from driftwalk.record.layout import TableLayout
-from driftwalk.record.raw import RawRecording, ReadOptions
+from driftwalk.record.raw import RawRecording, ReadOptions, TableLayout
 from driftwalk.record.space.flat import SpaceTrack, lay_flat
 from driftwalk.record.space.plane import plane_of
 from driftwalk.record.space.turns import QUATERNION, Turns
@@ -20,7 +19,6 @@ from driftwalk.record.text import header_rows, read_table
 
 _NAMES: Final = ["timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw"]
 _UP: Final = "z"
-_COMMENTS: Final = 20
 
 
 class TumLoader:
@@ -31,7 +29,7 @@ class TumLoader:
 
     def sniff(self, head: bytes, _path: Path) -> float:
         """Recognise eight numbers of which the last four make a unit quaternion."""
-        lines = first_lines(head, _COMMENTS)
+        lines = first_lines(head, 20)
         rows = [line.split() for line in lines if not line.startswith("#")][:2]
         named = any(line.lstrip("# ").split() == _NAMES for line in lines if line[:1] == "#")
         if not rows or not all(len(row) == len(_NAMES) and is_numeric_row(row) for row in rows):
@@ -40,7 +38,7 @@ class TumLoader:
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the one body."""
-        comments = takewhile(lambda line: line.startswith("#"), header_rows(path, _COMMENTS))
+        comments = takewhile(lambda line: line.startswith("#"), header_rows(path, 20))
         layout = TableLayout(" ", _NAMES, len(list(comments)), tuple(range(len(_NAMES))))
         table = read_table(path, layout)
         values = np.column_stack([table.numbers[column] for column in range(1, len(_NAMES))])

@@ -12,8 +12,14 @@ import numpy as np
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
 from driftwalk.record.head import first_lines
-from driftwalk.record.layout import TableLayout
-from driftwalk.record.raw import ANGLE_UNITS, LENGTH_UNITS, Array, RawRecording, ReadOptions
+from driftwalk.record.raw import (
+    ANGLE_UNITS,
+    LENGTH_UNITS,
+    Array,
+    RawRecording,
+    ReadOptions,
+    TableLayout,
+)
 from driftwalk.record.space.flat import SpaceTrack, lay_flat
 from driftwalk.record.space.plane import plane_of
 from driftwalk.record.space.turns import QUATERNION, VECTOR, Turns

@@ -14,7 +14,6 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
-from driftwalk.record.layout import TableLayout
 from driftwalk.record.pose.keypoints import (
     Chosen,
     Confidence,
@@ -23,7 +22,7 @@ from driftwalk.record.pose.keypoints import (
     bodies_of,
     choose_keypoints,
 )
-from driftwalk.record.raw import Array, Marks, RawRecording, ReadOptions
+from driftwalk.record.raw import Array, Marks, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.stores.hdf5 import names_in, opened_hdf5
 from driftwalk.record.stores.pandas_frame import frame_in
 from driftwalk.record.text import header_rows, read_table

@@ -15,8 +15,7 @@ import numpy as np
 from driftwalk.core.errors import FormatError
 from driftwalk.record.cleaning.stacked import split_bodies
 from driftwalk.record.head import first_lines, read_header
-from driftwalk.record.layout import TableLayout
-from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions
+from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import read_table
 
 STACKED: Final = ("Frame", "Time", "Arena", "Ind", "X", "Y")

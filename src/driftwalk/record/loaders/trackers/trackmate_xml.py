@@ -15,7 +15,6 @@ from driftwalk.record.loaders.trackers.trackmate import OUTSIDE, stated_unit
 from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions
 from driftwalk.record.text import DAMAGED_GZIP, open_binary
 
-BLOCK_BYTES: Final = 1 << 20
 _SPOT: Final = ("ID", "POSITION_X", "POSITION_Y", "POSITION_T", "FRAME")
 
 
@@ -115,7 +114,7 @@ def _parsed(path: Path) -> _Contents:
     parser.StartDoctypeDeclHandler = _refuse_doctype
     try:
         with open_binary(path) as file:
-            while block := file.read(BLOCK_BYTES):
+            while block := file.read(1 << 20):
                 parser.Parse(block)
             parser.Parse(b"", True)
     except DAMAGED_GZIP as error:

@@ -9,8 +9,7 @@ from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import split_fields
 from driftwalk.record.cleaning.stacked import split_bodies
 from driftwalk.record.head import first_lines, first_row
-from driftwalk.record.layout import TableLayout
-from driftwalk.record.raw import Marks, RawRecording, ReadOptions
+from driftwalk.record.raw import Marks, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import read_table
 
 NEEDED: Final = ("Frame", "Time", "TrackId", "x", "y")

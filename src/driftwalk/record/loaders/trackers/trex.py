@@ -19,9 +19,8 @@ from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.bad_row import split_fields
 from driftwalk.record.column_names import unit_of_name
 from driftwalk.record.head import first_lines, first_row
-from driftwalk.record.layout import TableLayout
-from driftwalk.record.pose.markers import angle_between
-from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions
+from driftwalk.record.pose.keypoints import angle_between
+from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.stores.npz import ZIP, members, opened_npz
 from driftwalk.record.text import read_table
 from driftwalk.schema.stores.netcdf import file_start
@@ -44,7 +43,7 @@ class _Individual:
     path: Path
     names: set[str]
     column: Callable[[str], Array]
-    """Returns a column by its name, an array that nobody else holds."""
+    """Returns a column by its name as a new array."""
     length_unit: str
     cm_per_pixel: float | None = None
     frame_rate_hz: float | None = None

@@ -11,12 +11,9 @@ from typing import Final
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
 from driftwalk.record.head import first_lines
-from driftwalk.record.layout import TableLayout
-from driftwalk.record.raw import RawBody, RawRecording, ReadOptions
+from driftwalk.record.raw import RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import header_rows, read_table
 
-MOST_ROWS: Final = 20
-"""Rows before the data at most."""
 AXES: Final = ("x", "y", "z")
 
 
@@ -43,7 +40,7 @@ class YupiLoader:
 
     def read(self, path: Path, _options: ReadOptions) -> RawRecording:
         """Read the trajectory."""
-        rows = [split_fields(line, ",") or [""] for line in header_rows(path, MOST_ROWS)]
+        rows = [split_fields(line, ",") or [""] for line in header_rows(path, 20)]
         second = bool(rows) and rows[0][0] == "v2"
         try:
             skip = int(rows[0][1]) if second else 2

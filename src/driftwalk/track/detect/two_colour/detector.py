@@ -1,9 +1,9 @@
-"""Two-colour markers: two discs of different hue on each block give position and orientation."""
+"""Detector of two-colour markers: two discs of different hue give position and orientation."""
 
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -13,16 +13,31 @@ from driftwalk.track.detect.markers import TwoColourMarker
 from driftwalk.track.detect.two_colour.discs import Disc, find_regions, join_pieces, sort_out
 from driftwalk.track.detect.two_colour.outline import outlined_centres
 from driftwalk.track.detect.two_colour.pairs import Pair, pair_discs
-from driftwalk.track.detect.two_colour.pose import SMOOTHING_PX, Measured, weighted_centres
+from driftwalk.track.detect.two_colour.pose import CENTRES, Measured, weighted_centres
 from driftwalk.track.types import Array, Detection, Image, PixelToWorld, Rejected
 
-_COARSE_DIAMETER_PX: Final = 6.0
-_FINE_DIAMETER_PX: Final = 12.0
-_MOST_FACTOR: Final = 4
-_WHOLE: Final = 0.93
-_LEAST_VISIBLE: Final = 0.35
-_MOST_OFF: Final = 0.06
-_MOST_UNEVEN: Final = 0.015
+
+class TwoColourPolicy(NamedTuple):
+    """When a pair of discs is measured at which resolution, and when by its outlines."""
+
+    coarse_diameter_px: float = 6.0
+    """Diameter of a disc in the reduced image in which discs are looked for [px]; chosen by
+    hand."""
+    fine_diameter_px: float = 12.0
+    """Diameter of a disc in the reduced image in which it is measured [px]; chosen by hand."""
+    most_factor: int = 4
+    """Largest factor by which an image is reduced; chosen by hand."""
+    whole: float = 0.93
+    """Share of a disc's area from which on it is whole; chosen by hand."""
+    least_visible: float = 0.35
+    """Share of both discs that must be seen; chosen by hand."""
+    most_off: float = 0.06
+    """Largest error of the spacing of two whole discs, as a share of it; chosen by hand."""
+    most_uneven: float = 0.015
+    """Largest unevenness of a whole disc beyond chance, in diameters; chosen by hand."""
+
+
+_TWO_COLOUR: Final = TwoColourPolicy()
 
 
 class TwoColourDetector:
@@ -81,7 +96,7 @@ class TwoColourDetector:
         measured: list[tuple[Pair, Measured]] = []
         for pair in pairs:
             result = self._measure(image, pair)
-            if result.visible >= _LEAST_VISIBLE:
+            if result.visible >= _TWO_COLOUR.least_visible:
                 measured.append((pair, result))
             else:
                 column, row = result.centres.mean(axis=0)
@@ -114,7 +129,13 @@ class TwoColourDetector:
     def _choose_factor(self, columns: int, rows: int) -> int:
         """Return by how much an image can be reduced with the discs still found."""
         middle = np.array([[(columns - 1) / 2, (rows - 1) / 2]])
-        return int(np.clip(self._diameter(middle)[0] / _COARSE_DIAMETER_PX, 1, _MOST_FACTOR))
+        return int(
+            np.clip(
+                self._diameter(middle)[0] / _TWO_COLOUR.coarse_diameter_px,
+                1,
+                _TWO_COLOUR.most_factor,
+            )
+        )
 
     def _diameter(self, points: Array) -> Array:
         """Return the diameter of a whole disc at points of the image [px]."""
@@ -130,7 +151,10 @@ class TwoColourDetector:
         diameter = (first.diameter + second.diameter) / 2
         spacing = diameter * self.marker.spacing_m / self.marker.size_m
         centre = np.array([first.column + second.column, first.row + second.row]) / 2
-        partly = min(first.share, second.share) < _WHOLE or abs(pair.distance - 1.0) > _MOST_OFF
+        partly = (
+            min(first.share, second.share) < _TWO_COLOUR.whole
+            or abs(pair.distance - 1.0) > _TWO_COLOUR.most_off
+        )
         reach = (spacing + diameter) / 2 * (1.6 if partly else 1.25) + 3.0
         rows, columns = image.shape[:2]
         left, top = (max(int(value - reach), 0) for value in centre)
@@ -146,8 +170,8 @@ class TwoColourDetector:
         start, diameter, spacing = start / factor, diameter / factor, spacing / factor
         result = weighted_centres(self._cv2, weights, start, diameter=diameter)
         apart = float(np.hypot(*(result.centres[1] - result.centres[0]))) / spacing
-        whole = result.shares.min() >= _WHOLE and result.uneven < _MOST_UNEVEN
-        if not whole or abs(apart - 1.0) > _MOST_OFF:
+        whole = result.shares.min() >= _TWO_COLOUR.whole and result.uneven < _TWO_COLOUR.most_uneven
+        if not whole or abs(apart - 1.0) > _TWO_COLOUR.most_off:
             outlined = outlined_centres(weights, result.centres, diameter=diameter, spacing=spacing)
             result = outlined if outlined is not None else result
         return Measured(
@@ -157,12 +181,12 @@ class TwoColourDetector:
     def _reduce(self, patch: Image, diameter: float) -> tuple[Any, int]:
         """Return a patch with less noise, reduced where its discs are large, and by how much."""
         cv2 = self._cv2
-        factor = int(np.clip(diameter / _FINE_DIAMETER_PX, 1, _MOST_FACTOR))
+        factor = int(np.clip(diameter / _TWO_COLOUR.fine_diameter_px, 1, _TWO_COLOUR.most_factor))
         if factor > 1:
             size = (patch.shape[1] // factor, patch.shape[0] // factor)
             cut = patch[: size[1] * factor, : size[0] * factor]
             patch = cv2.resize(cut, size, interpolation=cv2.INTER_AREA)
-        return cv2.GaussianBlur(patch, (3, 3), SMOOTHING_PX), factor
+        return cv2.GaussianBlur(patch, (3, 3), CENTRES.smoothing_px), factor
 
     def _place(self, measured: list[tuple[Pair, Measured]]) -> list[Detection]:
         """Return the detections in the world."""

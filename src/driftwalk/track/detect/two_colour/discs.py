@@ -4,18 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk.track.types import Array, Rejected
 
-LEAST_SHARE: Final = 0.15
-"""Least area of a region, of the whole disc's."""
-MOST_SHARE: Final = 1.7
-_SPECK_SHARE: Final = 0.03
-_PIECES_EXTENT: Final = 1.3
+
+class DiscPolicy(NamedTuple):
+    """Which regions of one colour are discs."""
+
+    least_share: float = 0.15
+    """Least area of a region, of the whole disc's; chosen by hand."""
+    most_share: float = 1.7
+    """Largest area of a region, of the whole disc's; chosen by hand."""
+    speck_share: float = 0.03
+    """Area below which a region is not mentioned, of the whole disc's; chosen by hand."""
+    pieces_extent: float = 1.3
+    """Largest extent of the pieces of one disc, in diameters; chosen by hand."""
+
+
+_DISCS: Final = DiscPolicy()
 
 
 @dataclass
@@ -82,7 +92,7 @@ def find_regions(
     areas = stats[1:, cv2.CC_STAT_AREA] * float(factor**2)
     shares = areas / (np.pi * diameters**2 / 4.0)
     # A noisy image has thousands of specks, so they go before there is an object for each.
-    kept = np.flatnonzero(shares >= _SPECK_SHARE)
+    kept = np.flatnonzero(shares >= _DISCS.speck_share)
     corners = stats[1:, :2][kept]
     ends = corners + stats[1:, 2:4][kept]
     boxes = np.concatenate([corners * factor, ends * factor - 1], axis=1).astype(float)
@@ -104,16 +114,16 @@ def join_pieces(regions: list[Disc]) -> list[Disc]:
         return regions
     joined: list[Disc] = []
     # Pieces of one disc lie in the same or in adjoining cells.
-    side = _PIECES_EXTENT * max(region.diameter for region in regions)
+    side = _DISCS.pieces_extent * max(region.diameter for region in regions)
     cells: dict[tuple[int, int], set[int]] = {}
     for region in sorted(regions, key=lambda item: -item.area):
         for index in sorted(_near(cells, region, side)):
             other = joined[index]
-            if other.share >= 1.0 or other.share + region.share > MOST_SHARE:
+            if other.share >= 1.0 or other.share + region.share > _DISCS.most_share:
                 continue
             both = _together(other, region)
             width, height = both.box[2] - both.box[0] + 1, both.box[3] - both.box[1] + 1
-            if max(width, height) <= _PIECES_EXTENT * other.diameter:
+            if max(width, height) <= _DISCS.pieces_extent * other.diameter:
                 cells[_cell(other, side)].discard(index)
                 joined[index] = both
                 break
@@ -142,9 +152,9 @@ def sort_out(regions: list[Disc], *, colour: int) -> tuple[list[Disc], list[Reje
         whole = (
             f"{region.area:.0f} px² of colour {colour}; a disc has {region.area / region.share:.0f}"
         )
-        if region.share < LEAST_SHARE:
+        if region.share < _DISCS.least_share:
             rejected.append(_reject(region, f"too small: {whole}", "too small"))
-        elif region.share > MOST_SHARE:
+        elif region.share > _DISCS.most_share:
             rejected.append(_reject(region, f"too large: {whole}", "too large"))
         else:
             kept.append(region)

@@ -1,4 +1,4 @@
-"""Where the two discs of a marker are when parts of them are hidden: from their outlines.
+"""Fit partly hidden discs by their outlines.
 
 The outline of what is seen of a disc is partly the disc's own, a circle of known size, and partly
 the edge of what hides it, which can only lie inside the circle. Both circles, at the marker's
@@ -8,7 +8,7 @@ spacing, are laid over the outlines: points inside a circle count up to a limit,
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -19,22 +19,38 @@ from driftwalk.track.types import Array
 
 Whole = npt.NDArray[np.intp]
 
-_LEVEL: Final = 0.5
-_SCALE_PX: Final = 0.6
-"""Distance at which an outline inside a circle counts a half of its limit [px]."""
-_OUTSIDE: Final = 6.0
-"""How many times more an outline outside a circle may count than one inside."""
+
+class OutlinePolicy(NamedTuple):
+    """How two circles are fitted to the outlines of partly hidden discs."""
+
+    level: float = 0.5
+    """Weight at the outline, as a share of the weight within; chosen by hand."""
+    scale_px: float = 0.6
+    """Distance at which an outline inside a circle counts a half of its limit [px]; chosen by
+    hand."""
+    outside: float = 6.0
+    """How many times more an outline outside a circle may count than one inside; chosen by
+    hand."""
+    rounds: int = 12
+    """Steps of the fit; chosen by hand."""
+    starts: int = 4
+    """Best starts from which it is done; chosen by hand."""
+    least_points: int = 6
+    """Points without which an outline says nothing; chosen by hand."""
+    least_std_px: float = 0.12
+    """Least standard deviation of a point of the outline [px]; chosen by hand."""
+    correlated: float = 12.0
+    """Neighbouring points of an outline share their pixels, so fewer are independent; measured on
+    rendered frames with hidden discs."""
+    sliver: float = 0.35
+    """Share of a disc below which what is seen of it may fit the marker in more than one
+    direction; chosen by hand."""
+
+
+_OUTLINE: Final = OutlinePolicy()
+
 _TURNS: Final = np.radians(np.arange(-40.0, 41.0, 8.0))
 _SHIFTS: Final = np.arange(-0.3, 0.31, 0.1)
-_ROUNDS: Final = 12
-_STARTS: Final = 4
-_LEAST_POINTS: Final = 6
-_LEAST_STD_PX: Final = 0.12
-_CORRELATED: Final = 12.0
-"""Neighbouring points of an outline share their pixels, so fewer are independent; measured on
-rendered frames with hidden discs."""
-_SLIVER: Final = 0.35
-"""Share of a disc below which what is seen of it may fit the marker in more than one direction."""
 _SWINGS: Final = np.radians(np.arange(-60.0, 60.1, 0.5))
 
 
@@ -58,7 +74,7 @@ def outlined_centres(
         None when too little of an outline is seen.
     """
     parts = [_outline(w, at, diameter) for w, at in zip(weights, start, strict=True)]
-    if min(map(len, parts)) < _LEAST_POINTS:
+    if min(map(len, parts)) < _OUTLINE.least_points:
         return None
     points = np.concatenate(parts)
     side = np.repeat([-0.5, 0.5], [len(part) for part in parts])
@@ -68,7 +84,7 @@ def outlined_centres(
     pose, normal, rms = _refine(points, side, tried, diameter, spacing)
     half = np.array([math.cos(pose[2]), math.sin(pose[2])]) * spacing / 2
     centres = np.stack([pose[:2] - half, pose[:2] + half])
-    noise = _CORRELATED * max(rms, _LEAST_STD_PX) ** 2
+    noise = _OUTLINE.correlated * max(rms, _OUTLINE.least_std_px) ** 2
     variance = noise * np.linalg.inv(normal)
     turned = np.array([-half[1], half[0]])
     lever = np.zeros((4, 3))
@@ -77,7 +93,7 @@ def outlined_centres(
     covariance = lever @ variance @ lever.T
     shares = _shares(weights, centres, diameter)
     least = int(np.argmin(shares))
-    if shares[least] < _SLIVER:
+    if shares[least] < _OUTLINE.sliver:
         swung = _swing_variance(parts[least], centres[1 - least], centres[least], diameter, noise)
         sway = 4.0 * np.outer(turned, turned)
         block = np.s_[2 * least : 2 * least + 2]
@@ -88,8 +104,8 @@ def outlined_centres(
 def _outline(weight: Weights, at: Array, diameter: float) -> Array:
     """Return where a colour's weight crosses half of its height, shape (n, 2)."""
     weight, near, corner = _around(weight, at, 1.2 * diameter)
-    inside = weight[near & (weight > _LEVEL)]
-    level = _LEVEL * (float(np.median(inside)) if inside.size else 1.0)
+    inside = weight[near & (weight > _OUTLINE.level)]
+    level = _OUTLINE.level * (float(np.median(inside)) if inside.size else 1.0)
     over = weight > level
     down_row, down_column = np.nonzero((over[:-1] != over[1:]) & near[:-1])
     along_row, along_column = np.nonzero((over[:, :-1] != over[:, 1:]) & near[:, :-1])
@@ -131,17 +147,17 @@ def _search(points: Array, side: Array, first: Array, diameter: float, spacing: 
     moved = shift.astype(np.float32)[:, None, None]
     across, down = (column - moved) ** 2, (row - moved) ** 2
     # A coarse grid is searched with a coarse scale.
-    scale = 2.0 * _SCALE_PX
+    scale = 2.0 * _OUTLINE.scale_px
     beyond = across[:, None] + down
     np.sqrt(beyond, out=beyond)
     beyond -= np.float32(diameter / 2)
     beyond *= np.float32(1.0 / scale)
-    limit = np.where(beyond > 0.0, np.float32(_OUTSIDE), np.float32(1.0))
+    limit = np.where(beyond > 0.0, np.float32(_OUTLINE.outside), np.float32(1.0))
     beyond *= beyond
     cost = limit * beyond
     beyond += limit
     cost /= beyond
-    best = np.argsort(cost.sum(axis=-1), axis=None)[:_STARTS]
+    best = np.argsort(cost.sum(axis=-1), axis=None)[: _OUTLINE.starts]
     i, j, k = np.unravel_index(best, cost.shape[:-1])
     return np.asarray(first + np.stack([shift[i], shift[j], _TURNS[k]], axis=-1))
 
@@ -149,7 +165,7 @@ def _search(points: Array, side: Array, first: Array, diameter: float, spacing: 
 def _cost(beyond: Array, scale: float) -> tuple[Array, Array]:
     """Return cost and weight of points at a distance beyond their circle [px]."""
     square = (beyond / scale) ** 2
-    limit = np.where(beyond > 0.0, _OUTSIDE, 1.0)
+    limit = np.where(beyond > 0.0, _OUTLINE.outside, 1.0)
     held = limit / (limit + square)
     return held * square, held**2
 
@@ -167,8 +183,8 @@ def _refine(
     steadied = np.diag([1e-3, 1e-3, 1e-3 * spacing**2])
     moving = np.arange(len(poses))
     lever = side * spacing
-    for step in range(_ROUNDS):
-        scale = _SCALE_PX * max(2.0 - step / 3.0, 1.0)
+    for step in range(_OUTLINE.rounds):
+        scale = _OUTLINE.scale_px * max(2.0 - step / 3.0, 1.0)
         pose = poses[moving]
         cos, sin = np.cos(pose[:, 2:]), np.sin(pose[:, 2:])
         out = np.empty((len(moving), 3, len(points)))
@@ -188,7 +204,7 @@ def _refine(
         poses[moving] = pose + change
         costs[moving], normals[moving] = cost.sum(axis=1), normal
         residuals[moving] = (weight * beyond**2).sum(axis=1) / np.maximum(weight.sum(axis=1), 1e-9)
-        if scale == _SCALE_PX:
+        if scale == _OUTLINE.scale_px:
             moving = moving[np.abs(change).max(axis=1) >= 1e-3]
             if not len(moving):
                 break
@@ -210,7 +226,7 @@ def _swing_variance(
     across = points[:, 0] - held[0] - (cos * column - sin * row)
     down = points[:, 1] - held[1] - (sin * column + cos * row)
     beyond = np.sqrt(across**2 + down**2) - diameter / 2
-    cost = _cost(beyond, _SCALE_PX)[0].sum(axis=1) * _SCALE_PX**2 / noise
+    cost = _cost(beyond, _OUTLINE.scale_px)[0].sum(axis=1) * _OUTLINE.scale_px**2 / noise
     likely = np.exp(-0.5 * (cost - cost.min()))
     return float(likely @ _SWINGS**2 / likely.sum())
 
@@ -220,5 +236,5 @@ def _shares(weights: list[Weights], centres: Array, diameter: float) -> Array:
     seen = []
     for weight, centre in zip(weights, centres, strict=True):
         part, disc, _ = _around(weight, centre, diameter / 2 + 1.0)
-        seen.append(float(np.count_nonzero(disc & (part > _LEVEL))))
+        seen.append(float(np.count_nonzero(disc & (part > _OUTLINE.level))))
     return np.array(seen) / (math.pi * diameter**2 / 4.0)

@@ -1,20 +1,27 @@
-"""Which disc belongs to which: the best pairing of the two colours by the marker's spacing."""
+"""Pair discs of the two colours by the marker's spacing (assignment problem)."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from driftwalk.track.detect.two_colour.discs import Disc
 from driftwalk.track.types import Array, Rejected
 
-_TOLERANCE: Final = 0.10
-"""Tolerance of the spacing of two whole discs, as a share of it."""
-_PER_MISSING: Final = 0.9
-"""How much further off, in diameters of a disc, for each missing share of a disc's area."""
-_FORBIDDEN: Final = 1e6
+
+class PairPolicy(NamedTuple):
+    """Which two discs may belong together."""
+
+    tolerance: float = 0.10
+    """Tolerance of the spacing of two whole discs, as a share of it; chosen by hand."""
+    per_missing: float = 0.9
+    """How much further off, in diameters of a disc, for each missing share of a disc's area;
+    chosen by hand."""
+
+
+_PAIRS: Final = PairPolicy()
 
 
 @dataclass(frozen=True)
@@ -61,7 +68,8 @@ def pair_discs(
         return [], [_alone(disc, f"no disc of colour {other} was seen") for disc in first + second]
     distance, misfit = _misfit(first, second, spacing_per_diameter)
     # A cost above one is no pair; the offset makes more pairs better than closer ones.
-    cost = np.where(misfit <= 1.0, misfit - _FORBIDDEN, 0.0)
+    # A sum of misfits is far below 1e6: as many allowed pairs as possible are taken.
+    cost = np.where(misfit <= 1.0, misfit - 1e6, 0.0)
     pairs, used = [], set()
     for i, j in zip(*linear_sum_assignment(cost), strict=True):
         if misfit[i, j] <= 1.0:
@@ -88,7 +96,7 @@ def _misfit(first: list[Disc], second: list[Disc], ratio: float) -> tuple[Array,
     spacing = ratio * (a[:, None, 2] + b[None, :, 2]) / 2
     apart = np.hypot(a[:, None, 0] - b[None, :, 0], a[:, None, 1] - b[None, :, 1]) / spacing
     missing = np.maximum(1.0 - a[:, None, 3], 0.0) + np.maximum(1.0 - b[None, :, 3], 0.0)
-    allowed = _TOLERANCE + _PER_MISSING * missing / ratio
+    allowed = _PAIRS.tolerance + _PAIRS.per_missing * missing / ratio
     return apart, np.abs(apart - 1.0) / allowed
 
 

@@ -1,4 +1,4 @@
-"""Where the two discs of a marker are, to a small part of a pixel.
+"""Subpixel centres of the two discs of a marker, with their covariance.
 
 Each pixel's place counts by how much of the colour it shows; discs that are partly hidden are
 measured by their outlines (`driftwalk.track.detect.two_colour.outline`).
@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -17,16 +17,26 @@ import numpy.typing as npt
 from driftwalk.track.detect.chroma import Weights
 from driftwalk.track.types import Array
 
-SMOOTHING_PX: Final = 0.6
-"""Standard deviation of the smoothing of a patch before it is measured."""
-_WINDOW: Final = 1.4
-_ROUNDS: Final = 2
-_EDGE_PX: Final = 1.2
-_FLOOR_PX: Final = 0.005
-"""Standard deviation that no centre is better than: colours have 8 bits [px]."""
-_CHANCE: Final = 2.5
-"""Standard deviations that chance explains."""
-_KERNEL: Final = np.exp(-0.5 * (np.arange(-1.0, 2.0) / SMOOTHING_PX) ** 2)
+
+class CentrePolicy(NamedTuple):
+    """How the centre of a disc is measured."""
+
+    smoothing_px: float = 0.6
+    """Standard deviation of the smoothing of a patch before it is measured [px]; chosen by hand."""
+    window: float = 1.4
+    """Size of the window around a disc, in diameters; chosen by hand."""
+    edge_px: float = 1.2
+    """Width of the disc's blurred edge [px]; chosen by hand."""
+    floor_px: float = 0.005
+    """Standard deviation that no centre is better than: colours have 8 bits [px]; chosen by
+    hand."""
+    chance: float = 2.5
+    """Standard deviations that chance explains; chosen by hand."""
+
+
+CENTRES: Final = CentrePolicy()
+
+_KERNEL: Final = np.exp(-0.5 * (np.arange(-1.0, 2.0) / CENTRES.smoothing_px) ** 2)
 
 
 @dataclass(frozen=True)
@@ -67,7 +77,7 @@ def weighted_centres(
     cv2 : module
         OpenCV.
     weights : list of array, shape (rows, columns)
-        Weight of each colour in a patch that was smoothed by `SMOOTHING_PX`.
+        Weight of each colour in a patch that was smoothed by `CENTRES.smoothing_px`.
     start : array, shape (2, 2)
         (column, row) of both in the patch, to about a pixel.
     diameter : float
@@ -75,7 +85,7 @@ def weighted_centres(
     """
     centres, variances = start.copy(), np.zeros(4)
     shares, uneven = np.zeros(2), np.zeros(2)
-    reach = _WINDOW * diameter / 2 + _EDGE_PX
+    reach = CENTRES.window * diameter / 2 + CENTRES.edge_px
     for which, weight in enumerate(weights):
         centre, share = _centre(weight, start[which], reach)
         centres[which], shares[which] = centre, share / (math.pi * diameter**2 / 4.0)
@@ -89,7 +99,7 @@ def _centre(weight: Weights, start: Array, reach: float) -> tuple[Array, float]:
     rows, columns = weight.shape
     column, row = start.tolist()
     area = 0.0
-    for _ in range(_ROUNDS):
+    for _ in range(2):
         left, right = max(int(column - reach), 0), min(int(column + reach) + 2, columns)
         top, bottom = max(int(row - reach), 0), min(int(row + reach) + 2, rows)
         across, down = np.arange(left, right) - column, np.arange(top, bottom) - row
@@ -121,9 +131,9 @@ def _variance(cv2: Any, weight: Weights, centre: Array, reach: float) -> tuple[A
     mass = max(float(around.sum()), 1.0)
     moment = np.array([noise.sum(axis=0) @ square, noise.sum(axis=1) @ square]) / 2.0
     hidden = _smoothed_by(column % 1.0) * _smoothed_by(row % 1.0)
-    variance = moment * hidden / mass**2 + _FLOOR_PX**2
+    variance = moment * hidden / mass**2 + CENTRES.floor_px**2
     uneven = float(np.sqrt((np.abs(harmonics @ around.ravel()) ** 2).mean())) / mass
-    by_chance = _CHANCE * math.sqrt(float(variance.mean()))
+    by_chance = CENTRES.chance * math.sqrt(float(variance.mean()))
     return np.asarray(variance), uneven if uneven > by_chance else 0.0
 
 
