@@ -51,6 +51,7 @@ def export(
         typer.Option(
             "--seed",
             min=0,
+            metavar="N",
             help="Seed of the stochastic force (default: that of the study).",
             show_default=False,
         ),
@@ -60,6 +61,7 @@ def export(
         typer.Option(
             "--world",
             min=0,
+            metavar="N",
             help="The one simulated world to take, counted from 0 (default: all; of a film the "
             "first).",
             show_default=False,

@@ -64,8 +64,8 @@ def recover(
         typer.Option(
             "--truth",
             metavar="FILE",
-            help="Study file with the true values and \\[recover], or the run directory of a fit "
-            "or a calibration; with --model its tank, camera and \\[recover].",
+            help="Study file with the true values and [recover], or the run directory of a fit "
+            "or a calibration; with --model its tank, camera and [recover].",
             show_default=False,
         ),
     ] = None,
@@ -95,6 +95,7 @@ def recover(
         typer.Option(
             "--threads",
             min=1,
+            metavar="N",
             help="Recordings to fit at the same time; threads of a calibration with --model "
             "(default: one per core).",
             show_default=False,

@@ -85,6 +85,7 @@ def classify(
         typer.Option(
             "--run",
             min=0,
+            metavar="N",
             help="Run of a simulated path.nc (default: its first).",
             show_default=False,
         ),
@@ -103,8 +104,8 @@ def classify(
     """Say what the blocks of a recording assembled into, and when.
 
     Blocks are joined if two faces stay close to each other and face each other. The outcome class
-    is the multiset of the shapes that they form. The side of the blocks is that of the study, by
-    default 3 cm.
+    is the multiset of the shapes that they form. The side of the blocks comes from the recording or
+    the study; the default is 3 cm.
     """
     from driftwalk.assembly import classify as classify_recording
     from driftwalk.core.files.atomic import require_target
@@ -187,7 +188,11 @@ def _load(
         # Without a study nobody has said how large the tank is: the blocks need not fit into it.
         stated = given.overrides.get(STUDY_KEYS["side"])
         own = Block().side_m if stated is None else stated
-        return how.load(path, side=own), own, stated is None
+        recording = how.load(path, side=own)
+        # A circle that is fitted was widened by the default side, which the recording does not say.
+        if stated is None and how.tank != "fit" and "block_side_m" in recording.attrs:
+            return recording, float(recording.attrs["block_side_m"]), False
+        return recording, own, stated is None
     resolved = given.study()
     with explained():
         return load_with_study(path, resolved, how.arguments()), resolved.block.side_m, False
