@@ -80,16 +80,6 @@ def classify(
         float | None,
         _tolerance("--hold", "s", "Time for which an unseen block keeps its joins (default: 1s)."),
     ] = None,
-    run: Annotated[
-        int | None,
-        typer.Option(
-            "--run",
-            min=0,
-            metavar="N",
-            help="Run of a simulated path.nc (default: its first).",
-            show_default=False,
-        ),
-    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -112,7 +102,7 @@ def classify(
 
     if out is not None:
         require_target(out, existing="replace" if overwrite else "error", endings=(".nc",))
-    recording, block_side, is_default = _load(poses, how, given, run)
+    recording, block_side, is_default = _load(poses, how, given)
     tolerances = {
         "join_distance": join_distance,
         "join_angle": join_angle,
@@ -170,9 +160,7 @@ def summarise(found: xr.Dataset) -> dict[str, Any]:
     }
 
 
-def _load(
-    path: Path, how: RecordingOptions, given: StudyOptions, run: int | None
-) -> tuple[xr.Dataset, float, bool]:
+def _load(path: Path, how: RecordingOptions, given: StudyOptions) -> tuple[xr.Dataset, float, bool]:
     """Return the recording or simulated run, the side of its blocks [m], and if it is a default."""
     from driftwalk.assembly import path_recording
     from driftwalk.conditions import load_with_study
@@ -180,10 +168,8 @@ def _load(
 
     simulated = _simulated_path(path)
     if simulated is not None:
-        chosen = int(simulated["run"][0]) if run is None else run
+        chosen = int(simulated["run"][0]) if how.replicate is None else how.replicate
         return path_recording(simulated, run=chosen), float(simulated.attrs["block_side_m"]), False
-    if run is not None:
-        raise InputError(f"{path}: --run is for a simulated path.nc of driftwalk assemble")
     if given.file is None:
         # Without a study nobody has said how large the tank is: the blocks need not fit into it.
         stated = given.overrides.get(STUDY_KEYS["side"])

@@ -24,7 +24,7 @@ MAIN_OPTIONS: Final[dict[str, str]] = {
     "report": "out fps scale tank overwrite",
     "sensitivity": "out flow vary blocks runs sobol threads",
     "simulate": "out flow model parameter like duration replicates",
-    "study recover": "truth out recordings duration model parameter threads",
+    "study recover": "study out recordings duration model parameter threads",
     "track": "markers out camera tank scale bodies side",
     "watch": "markers bodies side camera tank scale out",
 }
