@@ -174,7 +174,7 @@ def test_bad_study(study: str, command: str, folder: Path) -> None:
         (["--mass", "3cm"], "--mass"),
         (["--side", "40cm"], "--side over the default study: the block does not fit"),
         (["--side", "4"], "the block does not fit into the tank"),
-        (["--tank", "2cm"], "--tank"),
+        (["--tank", "2cm"], "does not fit into the tank"),
         (["--depth", "deep"], "(or immersed, archimedes)"),
         (["--time-step", "7ms"], "--time-step"),
         (["--force-interval", "0"], "--force-interval"),

@@ -73,7 +73,7 @@ def test_what_was_said_of_tank_and_body_is_said_again(tmp_path: Path) -> None:
     study.write_text('[block]\ndepth = "archimedes"\n', encoding="utf-8")
     said = ("--study", study, "--tank", "31cm", "--side", "2.9cm", "--mass", "12g")
     words = next_of(here("flow", RECORDING, "--to", "60", *said, "--cells", "30", "-o", out))
-    said_again = ["--study", str(study), "--tank", "0.31", "--side", "0.029"]
+    said_again = ["--tank", "31cm", "--study", str(study), "--side", "0.029"]
     assert words[:-2] == [
         *("calibrate", str(RECORDING), "--to", "60", *said_again, "--mass", "0.012"),
         *("--flow", str(out)),

@@ -18,7 +18,7 @@ from driftwalk.cli.options.shared import Json
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.core import study_keys
 from driftwalk.core.errors import ConfigurationError
-from driftwalk.core.study_keys import FIT_KEYS, RECOVER_KEYS, STUDY_KEYS
+from driftwalk.core.study_keys import FIT_KEYS, RECOVER_KEYS, STUDY_KEYS, option_of
 from driftwalk.model import Study, declared
 from driftwalk.model.section import SMALLEST
 
@@ -62,7 +62,7 @@ def test_what_is_typed_reaches_the_key(
 ) -> None:
     keys = TABLES[table]
     typed, expected = data.draw(values_of(keys[name]))
-    given = probe(keys, f"--{name.replace('_', '-')}", typed, *with_it(keys, name))
+    given = probe(keys, option_of(name), typed, *with_it(keys, name))
     section, _, key = keys[name].partition(".")
     if key == "depth" and not isinstance(expected, str):
         key = "depth_m"

@@ -149,7 +149,11 @@ def _option(match: re.Match[str]) -> str:
     if value is None:
         return option
     try:
-        return f"{option} {shlex.quote(_words(json.loads(value)))}"
+        words = _words(json.loads(value))
+        if name == "tank":
+            # The command line takes a bare size.
+            words = words.removeprefix("circle:").removeprefix("rect:")
+        return f"{option} {shlex.quote(words)}"
     except json.JSONDecodeError:
         return match[0]
 
