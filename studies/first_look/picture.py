@@ -1,6 +1,6 @@
 """The picture of README.md: a recording, the flow that `driftwalk fit` finds, what blocks build.
 
-$ driftwalk fit recording.csv --tank-diameter 30cm --force-interval 16ms -o fit/
+$ driftwalk fit recording.csv --tank 30cm --force-interval 16ms -o fit/
 $ driftwalk assemble --flow fit/flow.nc --drag-coefficient 0.3928 --force-std 0.6154mN \
     --force-interval 16ms -o four/
 $ python studies/first_look/picture.py fit/ four/ docs/images/first_look.png

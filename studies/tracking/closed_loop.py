@@ -16,7 +16,7 @@ from driftwalk.schema import build_trajectory
 if TYPE_CHECKING:
     import xarray as xr
 
-TANK: Final = ("--tank-diameter", "30cm")
+TANK: Final = ("--tank", "30cm")
 ANGLES: Final = ("auto", "given")
 PARAMETERS: Final = ("drag_coefficient", "force_std_N")
 KEPT: Final = (

@@ -15,7 +15,7 @@ SIZE_PX: Final = (640, 480)
 FRAMES_PER_S: Final = 30.0
 FAR_PX: Final = 20.0
 """Half a mouse."""
-TRACK: Final = ("--markers", "blob", "--px-per-m", f"{PX_PER_M:g}", "--bodies", "1")
+TRACK: Final = ("--markers", "blob", "--scale", f"{PX_PER_M:g}px/m", "--bodies", "1")
 STUDY: Final = ("--study", Path(__file__).with_suffix(".toml"))
 
 

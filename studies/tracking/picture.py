@@ -29,7 +29,7 @@ def main() -> None:
     parts = []
     for level in ("moderate", "heavy"):
         name = f"{level}-{SEED}"
-        words = (options.out / "videos" / f"{name}.mkv", "--tank-diameter", "30cm")
+        words = (options.out / "videos" / f"{name}.mkv", "--tank", "30cm")
         markers = options.out / "recordings" / f"{name}.toml"
         target = options.out / f"{name}.nc"
         driftwalk(

@@ -27,7 +27,7 @@ from score import score
 import driftwalk as dw
 from driftwalk.core.provenance import plain
 
-TANK: Final = ("--tank-diameter", "30cm")
+TANK: Final = ("--tank", "30cm")
 
 
 def main() -> None:

@@ -9,9 +9,10 @@ from typing import Any
 
 import pytest
 
-from driftwalk.cli.main import COMMANDS, load_command
+from driftwalk.cli.main import COMMANDS, load_command, main
 from driftwalk.cli.options.shared import PANEL
 from driftwalk.cli.options.study import PANELS
+from driftwalk.cli.terminal.help import MAIN_OPTIONS
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "reference" / "command-line.md"
 READING = "Reading a recording"
@@ -43,7 +44,7 @@ def options_of(command: Any) -> set[str]:
 @pytest.mark.parametrize("name", [name for name, _ in commands()])
 def test_command_is_on_the_page(name: str) -> None:
     page, options = sections(), options_of(dict(commands())[name])
-    reading = page[READING] if "--metres-per-pixel" in options else set()
+    reading = page[READING] if "--y-axis" in options else set()
     assert page[name] | reading == options
 
 
@@ -52,11 +53,21 @@ def test_page_has_no_other_commands() -> None:
 
 
 @pytest.mark.parametrize("name", [name for name, _ in commands()])
-def test_no_help_is_taken_for_a_style(name: str) -> None:
-    """Rich drops an unescaped ``[recover]`` from the text that it prints."""
-    command = dict(commands())[name]
-    for text in (command.help, *(getattr(one, "help", "") for one in command.params)):
-        assert not re.search(r"(?<!\\)\[[a-z/]", text or ""), text
+def test_help_shows_the_main_options_and_help_all_shows_every_one(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = options_of(dict(commands())[name])
+    assert main([*name.split(), "--help"]) == 0
+    short = capsys.readouterr().out
+    assert main([*name.split(), "--help-all"]) == 0
+    assert options <= set(re.findall(r"(?<![\w-])--?[\w-]+", capsys.readouterr().out))
+    rows = re.findall(r"^  --\S+", short, flags=re.M)
+    assert len(rows) <= 8
+    assert len(rows) == len(options - {"-o"}) or f"driftwalk {name} --help-all" in short
+
+
+def test_main_options_are_of_commands() -> None:
+    assert MAIN_OPTIONS.keys() <= {name for name, _ in commands()}
 
 
 def test_page_says_of_a_key_of_the_study_what_the_study_declares() -> None:

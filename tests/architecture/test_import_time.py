@@ -61,7 +61,7 @@ def test_short_commands_load_what_they_need(command: str, tmp_path: Path) -> Non
 def small_run(folder: Path) -> Path:
     """Make the run of a short assembly."""
     out = folder / "run"
-    run = ("--tank-diameter", "30cm", "--blocks", "1", "--runs", "2", "--duration", "1s")
+    run = ("--tank", "30cm", "--blocks", "1", "--runs", "2", "--duration", "1s")
     done = here("assemble", "--flow", FLOW, *run, "--film", "none", "-o", out)
     assert done.code == 0, done.err
     return out

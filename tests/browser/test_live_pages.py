@@ -338,7 +338,7 @@ def test_bodies_of_a_motion_model(
 
 def test_thirty_pictures_a_second_with_64_blocks(visit: Callable[..., Visit]) -> None:
     """In a tank of 1.2 m."""
-    with served("play", "--tank-diameter", "1.2m", "--blocks", 64) as started:
+    with served("play", "--tank", "1.2m", "--blocks", 64) as started:
         page = visit(f"http://127.0.0.1:{started.port}/").open(started.address)
         until_tank(page, "frames", 10)
         assert best_of_some_seconds(page, "frames", 30.0) >= 30.0
@@ -398,7 +398,7 @@ def video(tmp_path_factory: pytest.TempPathFactory) -> Path:
     settings = dw.video_settings("moderate", width_px=480, height_px=360, px_per_m=1100.0)
     dw.write_video(place / "video.mkv", build_trajectory(time, x, y, theta), settings)
     done = here(
-        *("markers", "teach", place / "video.mkv", "--tank-diameter", "30cm", "--side", "3cm"),
+        *("markers", "teach", place / "video.mkv", "--tank", "30cm", "--side", "3cm"),
         *("-o", place / "m.toml"),
     )
     assert done.code == 0, done.err
@@ -413,13 +413,13 @@ def test_a_tracker_is_watched(
     request: pytest.FixtureRequest,
 ) -> None:
     """The tracker waits at each frame until it is told to go on: neither side is too fast."""
-    with served("view", "--live", f"127.0.0.1:{port}") as server:
+    with served("view", f"127.0.0.1:{port}") as server:
         page = visit(f"http://127.0.0.1:{server.port}/").open(server.address)
         readout = page.locator(".live-tank .readout")
         expect(readout).to_contain_text("waiting for a tracker")
         tracker = start(
             *("watch", video / "video.mkv", "--markers", video / "m.toml"),
-            *("--tank-diameter", "30cm", "--bodies", 2, "--side", "3cm", "--live", port),
+            *("--tank", "30cm", "--bodies", 2, "--side", "3cm", "--live", port),
             before=FRAME_BY_FRAME,
             stdin=subprocess.PIPE,
         )
@@ -463,7 +463,7 @@ def watched(tracker: type[socketserver.StreamRequestHandler]) -> Iterator[PageSe
     with socketserver.ThreadingTCPServer(("127.0.0.1", 0), tracker) as listening:
         listening.daemon_threads = True
         threading.Thread(target=listening.serve_forever, daemon=True).start()
-        with served("view", "--live", f"127.0.0.1:{listening.server_address[1]}") as server:
+        with served("view", f"127.0.0.1:{listening.server_address[1]}") as server:
             yield server
         listening.shutdown()
 

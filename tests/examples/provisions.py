@@ -285,7 +285,7 @@ def _assembled(folder: Path) -> Names:
 
 def _fitted(folder: Path) -> Names:
     """Provide ``fit/``: a run directory of a fit of a minute, and ``four/`` of what it builds."""
-    words = ("--to", "60s", "--tank-diameter", "30cm", "--spline-spacing", "4cm", "--no-check")
+    words = ("--to", "60s", "--tank", "30cm", "--spline-spacing", "4cm", "--no-check")
     assert here("fit", RECORDING, *words, "-o", folder / "fit").code == 0
     few = ("--runs", "20", "--duration", "20s", "--film", "none")
     assert here("assemble", folder / "fit", *few, "-o", folder / "four").code == 0
@@ -331,7 +331,7 @@ def _pendulum(folder: Path) -> Names:
 def _markers(folder: Path) -> Names:
     """Provide ``video.mp4`` with its ``markers.toml``."""
     _film(4, 4.0)(folder)
-    words = ("--tank-diameter", "30cm", "--side", "3cm", "-o", folder / "markers.toml")
+    words = ("--tank", "30cm", "--side", "3cm", "-o", folder / "markers.toml")
     done = here("markers", "teach", folder / "video.mp4", *words)
     assert done.code == 0, done.err
     return {}
@@ -521,7 +521,7 @@ PAGES: dict[str, Page] = {
             "fit recording.csv --switching-times 10min,20min": "fit --no-check second.csv "
             "--switching-times 30s,60s",
         },
-        numbers_of={"driftwalk fit recording.csv --tank-diameter *": Numbers.SAME},
+        numbers_of={"driftwalk fit recording.csv --tank *": Numbers.SAME},
         by_chance={"KS distance": KS_SCATTER},
         holds=("bool(fit['converged'])", "flow.attrs['kind'] == 'flow_field'"),
         draws=False,

@@ -95,7 +95,7 @@ def test_a_fit_on_the_front_page_states_what_no_recording_tells() -> None:
     fits = [words for words in own if words[:2] == ["driftwalk", "fit"]]
     assert fits
     for words in fits:
-        assert {"--tank-diameter", "--side", "--mass"} <= set(words)
+        assert {"--tank", "--side", "--mass"} <= set(words)
 
 
 def test_the_tutorial_begins_with_the_demo() -> None:

@@ -26,7 +26,7 @@ from driftwalk.cli.main import main
 from driftwalk.core.files.rundir import RunDirectory
 
 DATA = Path(str(files("driftwalk.datasets") / "tank30_ode_a"))
-PIXELS = ("--metres-per-pixel", "0.001")
+PIXELS = ("--scale", "0.001")
 MODEL = ("--drag-coefficient", "0.5", "--force-std", "0.6mN")
 FLOWS = ("own.nc", "other.nc", "classic.nc", "flow.csv")
 FEW_RUNS = ("--runs", "4", "--duration", "10", "--blocks", "2")
@@ -130,7 +130,7 @@ def _in_space(place: Path) -> Iterator[Seed]:
 def _of_field(file: str, options: tuple[str, ...]) -> tuple[tuple[str, ...], ...]:
     return (
         ("info", file, *options),
-        ("flow", file, "--out", "@/flow-out.nc", "--arena", "circle:0.1@0.07,0.08", *options),
+        ("flow", file, "--out", "@/flow-out.nc", "--tank", "circle:0.1@0.07,0.08", *options),
         ("simulate", "--flow", file, "--out", "@/out.nc", "--duration", "1", *MODEL),
     )
 
@@ -143,10 +143,10 @@ def _write(folder: Path, contents: dict[str, str | bytes]) -> None:
 def _reading(file: str, options: tuple[str, ...] = ()) -> tuple[tuple[str, ...], ...]:
     return (
         ("info", file, *options),
-        ("info", file, *options, "--json", "--sort", "--arena", "fit", "--max-speed", "1"),
-        ("convert", file, "@/out.nc", *options),
-        ("convert", file, "@/out.csv", *options, "--sort"),
-        ("flow", file, "--out", "@/flow-out.nc", "--tank-diameter", "30cm", *options),
+        ("info", file, *options, "--json", "--sort", "--tank", "fit", "--max-speed", "1"),
+        ("read", file, "-o", "@/out.nc", *options),
+        ("read", file, "-o", "@/out.csv", *options, "--sort"),
+        ("flow", file, "--out", "@/flow-out.nc", "--tank", "30cm", *options),
         ("report", file, "--out", "@/report.html", *options),
         ("compare", file, str(DATA / "recording.csv"), "--permutations", "0", *options),
         ("classify", file, *options),
@@ -225,7 +225,7 @@ def _settings(place: Path) -> Iterator[Seed]:
             ("simulate", "--flow", f"@/{name}", *out, *MODEL),
             ("simulate", "--flow", f"@/{name}", *out, *MODEL, "--backend", "reference"),
         ))  # fmt: skip
-    yield Seed(folder, "tank.csv", (("info", "@/a.csv", "--arena", "polygon:@/tank.csv"),))
+    yield Seed(folder, "tank.csv", (("info", "@/a.csv", "--tank", "polygon:@/tank.csv"),))
 
 
 def _images(place: Path) -> Iterator[Seed]:
@@ -243,7 +243,7 @@ def _images(place: Path) -> Iterator[Seed]:
     folder = _kept(place / "film", make)
     common = ("--out", "@/tracked.nc", "--bodies", "2")
     known = ("--markers", "@/markers.toml", "--camera", "@/camera.toml")
-    blob = ("--markers", "blob", "--px-per-m", "560")
+    blob = ("--markers", "blob", "--scale", "560px/m")
     for target in ("markers.toml", "camera.toml"):
         yield Seed(folder, target, (("track", "@/images", *known, *common),))
     for target in ("images/times.csv", "images/1.png"):
@@ -269,7 +269,7 @@ def _calibration(place: Path) -> Iterator[Seed]:
 
 def _runs(place: Path) -> Iterator[Seed]:
     def fit(folder: Path) -> None:
-        _run("fit", DATA / "recording.csv", "--out", folder, "--tank-diameter", "30cm",
+        _run("fit", DATA / "recording.csv", "--out", folder, "--tank", "30cm",
              "--to", "30", "--spline-spacing", "0.06")  # fmt: skip
 
     def assembly(folder: Path) -> None:
@@ -285,11 +285,11 @@ def _runs(place: Path) -> Iterator[Seed]:
         truth = folder.with_name("truth.toml")
         truth.write_text(small_study().to_toml())
         _run(
-            "study", "recover", "--truth", truth, "--flow", DATA / "flow_true.csv", "--out", folder
+            "study", "recover", "--study", truth, "--flow", DATA / "flow_true.csv", "--out", folder
         )
 
     yield from _of_folder(_kept(place / "fit", fit), (_report(),))
-    classify = (("classify", "@/path.nc"), ("classify", "@/path.nc", "--run", "1"))
+    classify = (("classify", "@/path.nc"), ("classify", "@/path.nc", "--replicate", "1"))
     yield from _of_folder(_kept(place / "assembly", assembly), (_report(),), {"path.nc": classify})
     yield from _of_folder(_kept(place / "sensitivity", sensitivity), (_report(),))
     yield from _of_folder(_kept(place / "recovery", recovery), (_report(),))

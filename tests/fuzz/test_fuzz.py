@@ -20,7 +20,7 @@ from driftwalk.core.text.json_text import parse_json
 from driftwalk.core.text.toml_text import parse_toml
 from driftwalk.schema.stores.netcdf import ALLOWANCE_BYTES, open_netcdf
 
-FRAMES = ("--frame-rate", "10", "--metres-per-pixel", "0.001")
+FRAMES = ("--fps", "10", "--scale", "0.001")
 DEEP, DIGITS = "[" * 5000, "9" * 5000
 
 
@@ -175,7 +175,7 @@ def test_a_gzip_bomb_is_refused(tmp_path: Path, start: bytes) -> None:
 def test_an_image_that_is_none_is_one_line(tmp_path: Path, capfd: pytest.CaptureFixture) -> None:
     (tmp_path / "images").mkdir()
     (tmp_path / "images" / "0.png").write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(50))
-    words = ("--markers", "blob", "--px-per-m", "500", "--image-rate", "10")
+    words = ("--markers", "blob", "--scale", "500px/m", "--fps", "10")
     done = here("track", tmp_path / "images", *words, "--out", tmp_path / "o.nc")
     assert "is not an image" in refusal(done)
     assert capfd.readouterr().err == ""

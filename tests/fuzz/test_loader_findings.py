@@ -15,7 +15,7 @@ import driftwalk as dw
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.tables.cells import as_numbers
 
-PIXELS = ("--metres-per-pixel", "0.001")
+PIXELS = ("--scale", "0.001")
 
 
 @pytest.mark.slow
@@ -95,7 +95,7 @@ def test_messages_about_options_name_the_file(tmp_path: Path) -> None:
     two = tmp_path / "two.csv"
     rows = [f"{0.1 * k:.1f},{0.01 * k},0.02,{name}" for k in range(9) for name in "ab"]
     two.write_text("\n".join(["t_s,x_m,y_m,id", *rows, ""]))
-    said = refusal(here("flow", two, "--out", tmp_path / "o.nc", "--tank-diameter", "30cm"))
+    said = refusal(here("flow", two, "--out", tmp_path / "o.nc", "--tank", "30cm"))
     assert "two.csv has 2 bodies: --tracers makes one flow" in said
 
 
@@ -127,7 +127,7 @@ def test_a_table_of_many_tracks_is_no_flow_field_at_once(tmp_path: Path) -> None
     rows = [f"39\t{k}\t1\t39.0\t92.9\t1\n" for k in range(40_000)]
     path.write_text("0\t0\t1\t1\t0\t1\n1\t0\t1\t1\t5\t1\n" + "".join(rows))
     begin = time.process_time()
-    assert "bodies" in refusal(here("info", path, "--frame-rate", "10", *PIXELS))
+    assert "bodies" in refusal(here("info", path, "--fps", "10", *PIXELS))
     assert time.process_time() - begin < 2.0  # 1 s beside 4 MB a second
 
 

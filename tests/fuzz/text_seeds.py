@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-PIXELS = ("--metres-per-pixel", "0.001")
-FRAMES = ("--frame-rate", "10", *PIXELS)
+PIXELS = ("--scale", "0.001")
+FRAMES = ("--fps", "10", *PIXELS)
 
 
 def text_files() -> Iterator[tuple[str, dict[str, str], tuple[str, ...]]]:
@@ -35,7 +35,7 @@ def text_files() -> Iterator[tuple[str, dict[str, str], tuple[str, ...]]]:
         "dltdv": ("xypts.csv", "pt1_cam1_X,pt1_cam1_Y\n", FRAMES),
         "points": ("points.json", "", FRAMES),
         "timed-points": ("points.json", "", ("--length-unit", "cm")),
-        "matrix": ("x.csv", "", ("--y", "@/y.csv", "--frame-rate", "10")),
+        "matrix": ("x.csv", "", ("--y", "@/y.csv", "--fps", "10")),
     }  # fmt: skip
     lines: dict[str, Callable[..., str]] = {
         "plain": lambda k, t, x, y: f"{t:.1f},{x:.5f},{y:.5f},{t:.3f}",

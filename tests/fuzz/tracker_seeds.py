@@ -26,8 +26,8 @@ from tracker_files import (
     write,
 )
 
-PIXELS = ("--metres-per-pixel", "0.001")
-FRAMES = ("--frame-rate", "10", *PIXELS)
+PIXELS = ("--scale", "0.001")
+FRAMES = ("--fps", "10", *PIXELS)
 POSE = ("--keypoint", "nose", "--heading", "tail,nose")
 
 

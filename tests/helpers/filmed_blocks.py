@@ -19,7 +19,7 @@ import driftwalk as dw
 from driftwalk.track.source.live_camera import LiveCamera
 
 SMALL = {"width_px": 240, "height_px": 180, "px_per_m": 560.0}
-TANK = ("--tank-diameter", "30cm")
+TANK = ("--tank", "30cm")
 
 
 def film(folder: Path, trajectory: xr.Dataset | None = None, *, frames: int = 24) -> list[object]:

@@ -7,7 +7,7 @@ import numpy as np
 from rosbags import rosbag2, typesys
 from scipy.io import savemat
 
-SHIFTS = ("--metres-per-pixel", "1mm", "--frame-interval", "10ms")
+SHIFTS = ("--scale", "1mm", "--frame-interval", "10ms")
 
 
 def recordings() -> dict[str, tuple[str, str, tuple[str, ...]]]:

@@ -119,7 +119,7 @@ def test_command_reads_a_simulated_path(
     path.to_netcdf(file, engine="h5netcdf")
     run = int(np.argmax(told["event_count"].values))
     tight = ["--join-distance", "0.1mm", "--join-angle", "0.1deg", "--min-duration", "0s"]
-    done = here("classify", file, "--run", str(run), *tight, "--json")
+    done = here("classify", file, "--replicate", str(run), *tight, "--json")
     assert done.code == 0, done.err
     events = json.loads(done.out)["events"]
     # Of a file with this one run, it is the run that nobody has to name.
@@ -130,7 +130,7 @@ def test_command_reads_a_simulated_path(
     assert [event["kind"] for event in events] == ["join"] * count
     times = told["event_time"].values[run, :count]
     assert [event["time_s"] for event in events] == pytest.approx(times, abs=INTERVAL)
-    assert "there is no run 99" in refusal(here("classify", file, "--run", "99"))
+    assert "there is no run 99" in refusal(here("classify", file, "--replicate", "99"))
     table = tmp_path / "table.csv"
     table.write_text("t_s,x_m,y_m,theta_rad\n0,0,0,0\n1,0,0,0\n", encoding="utf-8")
-    assert "--run is for a simulated path.nc" in refusal(here("classify", table, "--run", "0"))
+    assert "--replicate" in refusal(here("classify", table, "--replicate", "0"))

@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 from command_line import here, refusal
 
-PIXELS = ("--metres-per-pixel", "0.1mm")
+PIXELS = ("--scale", "0.1mm")
 SHIFTS = (*PIXELS, "--frame-interval", "10ms")
-UNITS = "does not name its units: give --metres-per-pixel and --frame-interval"
+UNITS = "does not name its units: give --scale and --frame-interval"
 NAMES = "u=velocity_n,v=velocity_s,x=grid_n,y=grid_z"
 
 # File, options, and what info says of it: parts of a refusal, or facts.
@@ -39,7 +39,7 @@ FILES: list[tuple[str, tuple[str, ...], Expected]] = [
         )
     ),
     ("formats-2/davis_B00001.txt", (), {"columns": 64, "rows": 64, "measured": 0.382324}),
-    ("formats-2/insight_pixels.vec", (), "positions are in pixels: give --metres-per-pixel"),
+    ("formats-2/insight_pixels.vec", (), "positions are in pixels: give --scale"),
     ("formats-2/insight_pixels.vec", PIXELS, {"columns": 41, "rows": 43, "measured": 0.870108}),
     (
         *("formats-2/piv_named_otherwise.nc", ()),
@@ -76,7 +76,7 @@ FILES: list[tuple[str, tuple[str, ...], Expected]] = [
         *("piv-pivpy/Run000002.T000.D000.P000.H001.L.vec", ()),
         {"columns": 63, "rows": 63, "measured": 0.909549},
     ),
-    ("piv-pivpy/test_pivlab.mat", (), "positions are in pixels: give --metres-per-pixel"),
+    ("piv-pivpy/test_pivlab.mat", (), "positions are in pixels: give --scale"),
     ("piv-pivpy/test_pivlab.mat", SHIFTS, {"columns": 10, "rows": 8, "measured": 0.9875}),
 ]
 NO_DATA = {"PROVENANCE.md", "LICENSE", "CREDIT.txt", "metadata.yaml"}

@@ -17,14 +17,14 @@ from driftwalk.record import describe, estimate_tracking_noise, fit_circle, load
 from driftwalk.schema import body_names, body_track
 
 SharedData = Callable[[str], Path]
-PX = ["--metres-per-pixel", "1mm"]
+PX = ["--scale", "1mm"]
 CASES: dict[str, tuple[str, str, list[str], int, int]] = {
     # name: folder, file, options, bodies, samples
     "tank30": ("tank30-ode-a", "recording.csv", [], 1, 18001),
     "rummynose": (
         "rummynose-single-epfl",
         "rummy_single_seven_trajectories.txt",
-        ["--frame-rate", "25", "--metres-per-pixel", "0.75mm", "--max-speed", "2"],
+        ["--fps", "25", "--scale", "0.75mm", "--max-speed", "2"],
         1,
         106087,
     ),
@@ -45,79 +45,79 @@ CASES: dict[str, tuple[str, str, list[str], int, int]] = {
     "tenebrio": (
         "tenebrio-ubitrail",
         "tenebrio_ubitrail.csv.gz",
-        ["--metres-per-pixel", "0.48mm"],
+        ["--scale", "0.48mm"],
         6,
         162136,
     ),
     "mouse": (
         "tracktor-mouse-termite",
         "mouse_video_tracked.csv",
-        [*PX, "--frame-rate", "30"],
+        [*PX, "--fps", "30"],
         1,
         10000,
     ),
     "mouse toxtrac": (
         "tracktor-mouse-termite",
         "mouse_video_toxtracked.txt",
-        [*PX, "--frame-rate", "30"],
+        [*PX, "--fps", "30"],
         1,
         9405,
     ),
     "mouse idtracker": (
         "tracktor-mouse-termite",
         "mouse_video_idtracked.txt",
-        [*PX, "--frame-rate", "30"],
+        [*PX, "--fps", "30"],
         1,
         9999,
     ),
     "termites": (
         "tracktor-mouse-termite",
         "termite_video_tracked.csv",
-        [*PX, "--frame-rate", "60"],
+        [*PX, "--fps", "60"],
         8,
         22392,
     ),
     "termites toxtrac": (
         "tracktor-mouse-termite",
         "termite_video_toxtracked.txt",
-        [*PX, "--frame-rate", "60"],
+        [*PX, "--fps", "60"],
         8,
         21560,
     ),
     "termites idtracker": (
         "tracktor-mouse-termite",
         "termite_video_idtracked.txt",
-        [*PX, "--frame-rate", "60"],
+        [*PX, "--fps", "60"],
         8,
         22326,
     ),
     "flume": (
         "tracktor-mouse-termite",
         "flume_video_tracked.csv",
-        [*PX, "--frame-rate", "30"],
+        [*PX, "--fps", "30"],
         1,
         4616,
     ),
     "hexbug": (
         "hexbug-gatech",
         "training_video1-centroid_data",
-        [*PX, "--frame-rate", "30"],
+        [*PX, "--fps", "30"],
         1,
         24352,
     ),
     "supersmarticle": (
         "supersmarticle-sr19",
         ".",
-        ["--x", "x.csv", "--y", "y.csv", "--theta", "theta.csv", "--frame-rate", "120"],
+        ["--x", "x.csv", "--y", "y.csv", "--theta", "theta.csv", "--fps", "120"],
         5,
         72005,
     ),
     "trajr": ("trajr-walks", "3537.csv", PX, 1, 1469),
-    "trajr DLTdv": ("trajr-walks", "096xypts.csv", [*PX, "--frame-rate", "50"], 1, 2030),
+    "trajr DLTdv": ("trajr-walks", "096xypts.csv", [*PX, "--fps", "50"], 1, 2030),
     "swistrack": (
         "format-swistrack",
         "ParticleSimulation_Particles.txt",
-        ["--frame-rate", "25"],
+        ["--fps", "25"],
         10,
         10320,
     ),
@@ -138,7 +138,7 @@ def test_info_and_convert(
     assert described["counts"]["samples"] == samples
     assert main(["info", recording, *options]) == 0
     out = tmp_path / "out.nc"
-    assert main(["convert", recording, str(out), *options]) == 0
+    assert main(["read", recording, "-o", str(out), *options]) == 0
     capsys.readouterr()
     converted = load(out)
     table = load(save_trajectory(converted, tmp_path / "out.csv"))

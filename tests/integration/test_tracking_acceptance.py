@@ -25,7 +25,7 @@ from driftwalk.schema import build_trajectory
 pytest.importorskip("cv2")
 
 STUDY = Path(__file__).resolve().parents[2] / "studies" / "tracking"
-TANK = ("--tank-diameter", "30cm")
+TANK = ("--tank", "30cm")
 NAN = float("nan")
 FRAMES = 4000
 FIRST_FRAMES = f"""\
@@ -194,7 +194,7 @@ def test_the_mouse_beside_its_published_track(
     """
     folder = shared_data("tracktor-mouse-termite")
     out = tmp_path / "recording.nc"
-    words = ("--markers", "blob", "--px-per-m", "500", "--bodies", "1", "-o", out)
+    words = ("--markers", "blob", "--scale", "500px/m", "--bodies", "1", "-o", out)
     done = apart("track", folder / "mouse_video.mp4", *words, before=FIRST_FRAMES)
     assert done.code == 0, done.err
     rows = (folder / "mouse_video_tracked.csv").read_text(encoding="utf-8").splitlines()

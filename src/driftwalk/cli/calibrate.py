@@ -20,7 +20,7 @@ from driftwalk.core.study_keys import CALIBRATION_KEYS
 @with_recording_options
 @with_study_options(
     CALIBRATION_KEYS,
-    *("tank_diameter", "side", "mass", "depth", "force_interval"),
+    *("side", "mass", "depth", "force_interval"),
     *("wall_friction", "wall_restitution", "time_step", "step_interval"),
     *("position_noise", "orientation_noise", "replicates", "bootstrap", "seed"),
     "flow_repeat",
@@ -70,7 +70,7 @@ def calibrate(
     )
     about: About = "block" if model is None else "tank"
     jumps = jump_warnings(read.trajectories[0], read.body)
-    begun = opening_note(read.study, given, about=about, warnings=jumps)
+    begun = opening_note(read.study, given, how=how, about=about, warnings=jumps)
     with Workers(cluster, cluster_options).reported("calibrate") as told:
         found = run_calibration(work, out, overwrite=overwrite, begun=begun, **told)
     many = found.attrs["kind"] == "model_calibration"

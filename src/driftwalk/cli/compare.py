@@ -72,9 +72,14 @@ def compare(
         ),
     ] = "strict",
     permutations: Annotated[
-        int, typer.Option("--permutations", min=0, help="Permutations of the test; 0 for no test.")
+        int,
+        typer.Option(
+            "--permutations", min=0, metavar="N", help="Permutations of the test; 0 for no test."
+        ),
     ] = 999,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the permutations.")] = 1,
+    seed: Annotated[
+        int, typer.Option("--seed", min=0, metavar="N", help="Seed of the permutations.")
+    ] = 1,
     out: Annotated[
         Path | None,
         typer.Option(

@@ -21,7 +21,7 @@ from driftwalk.core.study_keys import CALIBRATION_KEYS
 @with_recording_options
 @with_study_options(
     CALIBRATION_KEYS,
-    *("tank_diameter", "side", "mass", "depth", "force_interval"),
+    *("side", "mass", "depth", "force_interval"),
     *("wall_friction", "wall_restitution", "time_step", "step_interval"),
     *("position_noise", "orientation_noise", "bootstrap", "seed"),
     "flow_repeat",
@@ -78,7 +78,7 @@ def compare_models(
     )
     about: About = "block" if "block" in chosen else "tank"
     jumps = jump_warnings(read.trajectories[0], read.body)
-    begun = opening_note(read.study, given, about=about, warnings=jumps)
+    begun = opening_note(read.study, given, how=how, about=about, warnings=jumps)
     with Workers(cluster, cluster_options).reported("compare models") as told:
         said: dict[str, Any] = {} if json else {"finished": Ranking(told["progress"])}
         found = run_model_comparison(work, out, overwrite=overwrite, begun=begun, **said, **told)

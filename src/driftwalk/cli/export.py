@@ -51,16 +51,18 @@ def export(
         typer.Option(
             "--seed",
             min=0,
+            metavar="N",
             help="Seed of the stochastic force (default: that of the study).",
             show_default=False,
         ),
     ] = None,
-    world: Annotated[
+    replicate: Annotated[
         int | None,
         typer.Option(
-            "--world",
+            "--replicate",
             min=0,
-            help="The one simulated world to take, counted from 0 (default: all; of a film the "
+            metavar="N",
+            help="Replicate of a simulation to take, counted from 0 (default: all; of a film the "
             "first).",
             show_default=False,
         ),
@@ -94,7 +96,7 @@ def export(
             target.require()
     said: list[str] = []
     with ProgressReporter("frames") as progress:
-        source = Source(run, flow, seed, world, speed, said.append, progress)
+        source = Source(run, flow, seed, replicate, speed, said.append, progress)
         files = export_run(source, target, out)
     notes = [to_options(sentence) for sentence in said]
     outcome = target.verify(out) if verify and target.verify is not None else None

@@ -29,7 +29,7 @@ RecordingFiles = Annotated[
 @with_recording_options
 @with_study_options(
     FIT_KEYS,
-    *("tank_diameter", "side", "mass", "depth", "force_interval"),
+    *("side", "mass", "depth", "force_interval"),
     *("angle", "spline_spacing", "confidence", "switching_times", "flow_labels", "precision"),
     *("law", "pressure_gradient", "added_mass", "force_memory", "flow_strength", "camera"),
     *("added_mass_std", "mass_std", "side_std"),
@@ -77,7 +77,7 @@ def fit(
         read.trajectories, read.study, how.body, inputs, not no_check, compare_laws, wall
     )
     effort = fit_work(sum(one.sizes["time"] for one in read.trajectories))
-    opening = opening_note(read.study, given, about="block")
+    opening = opening_note(read.study, given, how=how, about="block")
 
     def begun() -> None:
         opening()

@@ -31,7 +31,7 @@ NOISE: Final = FLOW_KEYS["position_noise"]
 @with_recording_options
 @with_study_options(
     FLOW_KEYS,
-    *("tank_diameter", "side", "mass", "depth"),
+    *("side", "mass", "depth"),
     *("cells", "cell_size", "window", "inertia", "flow_drag_coefficient", "min_count"),
     "position_noise",
 )
@@ -62,7 +62,7 @@ def flow(
     that the body never visited are filled in and flagged. Mass and side come from the study; the
     default is the 11.6-g, 3-cm block of the paper. With --tracers the steps of many tracks are
     averaged, without those that join two particles. A field that was measured otherwise is brought
-    to metres, with its masked nodes filled; --arena circle:D@X,Y says where its tank is.
+    to metres, with its masked nodes filled; --tank D@X,Y says where its tank is.
     """
     from driftwalk.cli.inputs.flow_file import read_flow_file
     from driftwalk.conditions import (
@@ -70,18 +70,17 @@ def flow(
         load_with_study,
         require_motion,
         study_for,
+        study_of_block,
         unstated_warning,
     )
     from driftwalk.flow import save_flow
 
     existing = "replace" if overwrite else "error"
-    diameter = given.overrides.get(FLOW_KEYS["tank_diameter"])
     measured = read_flow_file(
         recording,
         how,
         frame_interval=frame_interval,
         variables=flow_variables,
-        tank_diameter=diameter,
     )
     if measured is not None:
         if tracers:
@@ -95,13 +94,14 @@ def flow(
     resolved = given.study()
     if given.file is None:
         # Without a study nobody has said how large the tank is: the default one is no answer.
-        trajectory = how.load(recording, tank_diameter=diameter, side=resolved.block.side_m)
-        if how.arena == "fit" and not is_stated(resolved, "block.side_m"):
+        trajectory = how.load(recording, side=resolved.block.side_m)
+        if how.tank == "fit" and not is_stated(resolved, "block.side_m"):
             # The circle was widened by the default side, which the recording does not say.
             del trajectory.attrs["block_side_m"]
     else:
         with explained():
             trajectory = load_with_study(recording, resolved, how.arguments())
+    resolved = study_of_block(resolved, trajectory)
     if tracers:
         field = _from_tracers(trajectory, resolved, noise=given.overrides.get(NOISE))
     else:
@@ -118,7 +118,7 @@ def flow(
     warning = unstated_warning(study_for([trajectory], resolved), about="block")
     print_warnings([] if warning is None else [warning])
     run = sibling(out.with_suffix(""), "run")
-    words = [*how.words(), *given.words("tank_diameter", "side", "mass", "depth")]
+    words = [*how.words(), *given.words("side", "mass", "depth")]
     print_next("calibrate", recording, *words, "--flow", out, "-o", run)
 
 

@@ -15,63 +15,64 @@ from collections.abc import Callable, Sequence
 from typing import Annotated, Any, Final, NamedTuple
 
 import typer
-from typer.core import TyperGroup
 from typer.main import get_command as to_click_command
 
 from driftwalk.cli.terminal.errors import PastTyper, exit_code_of
+from driftwalk.cli.terminal.help import HelpCommand, HelpGroup
 from driftwalk.core.extras import hide_dask
 
 
 class Command(NamedTuple):
-    """One command: where it is, and its line in the list of commands."""
+    """One command: its heading and line in the list of commands, and where it is."""
 
+    heading: str
+    help: str
     module: str
     attribute: str
-    help: str
 
 
+_GET, _FIT, _PREDICT = "Get a recording", "Fit", "Predict"
+_COMPARE, _SHARE, _SET_UP = "Compare", "Share", "Set up"
 COMMANDS: Final[dict[str, Command]] = {
-    "study": Command("study", "study_app", "Write and check study files."),
-    "camera": Command("recordings.camera", "camera_app", "Calibrate the camera: lens and plane."),
-    "markers": Command("recordings.markers", "markers_app", "Learn what the markers look like."),
-    "track": Command("recordings.track", "track", "Track blocks in a video or before a camera."),
-    "watch": Command("recordings.watch", "watch", "Watch blocks assemble, live."),
-    "info": Command(
-        "recordings.info", "info", "Say what a recording holds and how driftwalk reads it."
+    "demo": Command(_GET, "Try driftwalk on a recording that it brings along.", "demo", "demo"),
+    "read": Command(_GET, "Read a tracker's file into a recording.", "recordings.read", "read"),
+    "info": Command(_GET, "Show what a file holds.", "recordings.info", "info"),
+    "track": Command(_GET, "Track blocks in a video.", "recordings.track", "track"),
+    "watch": Command(_GET, "Watch blocks assemble, live.", "recordings.watch", "watch"),
+    "fit": Command(_FIT, "Fit flow, drag, force and noise by likelihood.", "fit", "fit"),
+    "calibrate": Command(_FIT, "Fit any motion model by simulation.", "calibrate", "calibrate"),
+    "flow": Command(_FIT, "Extract the flow field alone.", "flow", "flow"),
+    "simulate": Command(
+        _PREDICT, "Simulate the motion of one body.", "prediction.simulate", "simulate"
     ),
-    "convert": Command("recordings.convert", "convert", "Turn a recording into a trajectory file."),
-    "flow": Command("flow", "flow", "Take the flow field from a recording."),
-    "models": Command("models", "models", "List the models of bodies that move by themselves."),
-    "simulate": Command("prediction.simulate", "simulate", "Simulate the motion of the block."),
-    "compare": Command("compare", "compare", "Measure how far apart two motions are."),
-    "compare-models": Command(
-        "compare_models", "compare_models", "Say which motion models explain a recording."
-    ),
-    "calibrate": Command(
-        "calibrate", "calibrate", "Find the drag coefficient and the stochastic force."
-    ),
-    "fit": Command("fit", "fit", "Fit flow, drag, stochastic force and tracking noise together."),
     "assemble": Command(
-        "prediction.assemble", "assemble", "Simulate self-assembly of many blocks."
+        _PREDICT, "Simulate the self-assembly of many blocks.", "prediction.assemble", "assemble"
     ),
     "sensitivity": Command(
-        "prediction.sensitivity",
-        "sensitivity",
-        "Measure how much self-assembly depends on the model.",
+        _PREDICT, "Vary the model and see what assembles.", "prediction.sensitivity", "sensitivity"
     ),
+    "play": Command(
+        _PREDICT, "Change parameters while a simulation runs.", "prediction.play", "play"
+    ),
+    "compare": Command(_COMPARE, "Measure the distance of two motions.", "compare", "compare"),
+    "compare-models": Command(
+        _COMPARE, "Rank motion models on a recording.", "compare_models", "compare_models"
+    ),
+    "models": Command(_COMPARE, "List the motion models.", "models", "models"),
     "classify": Command(
-        "recordings.classify", "classify", "Say what the blocks of a recording assembled into."
+        _COMPARE, "Count what the blocks assembled into.", "recordings.classify", "classify"
     ),
-    "export": Command("export", "export", "Take a calibrated model to another simulator."),
-    "report": Command("sharing.report", "report", "Write a report of a run: one HTML file."),
-    "cite": Command("sharing.cite", "cite", "Say what to cite for a run."),
-    "view": Command("view", "view", "Explore a run in the browser, or watch a tracker."),
-    "play": Command("prediction.play", "play", "Turn the knobs of the model while the tank moves."),
-    "demo": Command("demo", "demo", "Fit a bundled recording, and calibrate on the fitted flow."),
+    "view": Command(_SHARE, "Explore a run in the browser.", "view", "view"),
+    "report": Command(_SHARE, "Write a run as one HTML file.", "sharing.report", "report"),
+    "export": Command(_SHARE, "Write a run for another program.", "export", "export"),
+    "cite": Command(_SHARE, "Print what to cite for a run.", "sharing.cite", "cite"),
+    "study": Command(_SET_UP, "Write study files and plan experiments.", "study", "study_app"),
+    "camera": Command(_SET_UP, "Calibrate the camera.", "recordings.camera", "camera_app"),
+    "markers": Command(_SET_UP, "Describe the markers.", "recordings.markers", "markers_app"),
 }
 
 
-class LazyGroup(TyperGroup):
+class LazyGroup(HelpGroup):
     """A group whose commands are stand-ins from `COMMANDS`, imported when they are run."""
 
     def __init__(self, **attributes: Any) -> None:
@@ -110,9 +111,11 @@ def _stand_in() -> None:
 
 def _one_command_app(name: str, function: Callable[..., Any]) -> Any:
     app = typer.Typer(add_completion=False)
-    short = COMMANDS[name].help
+    heading, short = COMMANDS[name][:2]
     text = short if function is _stand_in else paragraphs(function.__doc__ or short)
-    app.command(name, help=text, short_help=short)(function)
+    app.command(name, cls=HelpCommand, help=text, short_help=short, rich_help_panel=heading)(
+        function
+    )
     return to_click_command(app)
 
 

@@ -10,11 +10,12 @@ import typer
 from driftwalk.cli.main import paragraphs
 from driftwalk.cli.options.shared import Json
 from driftwalk.cli.study_recover import recover
+from driftwalk.cli.terminal.help import HelpCommand, HelpGroup
 from driftwalk.cli.terminal.output import print_json, print_next, print_note, require_place
 
 ALL_PARAMETERS = "\n# All parameters, with their units and meanings: driftwalk study new --full\n"
 
-study_app = typer.Typer(name="study", add_completion=False, help="Write and check study files.")
+study_app = typer.Typer(name="study", add_completion=False, cls=HelpGroup)
 
 
 @study_app.callback(invoke_without_command=True)
@@ -24,7 +25,7 @@ def study(ctx: typer.Context) -> None:
         typer.echo(ctx.get_help())
 
 
-@study_app.command()
+@study_app.command(cls=HelpCommand)
 def new(
     path: Annotated[
         Path | None,
@@ -51,7 +52,7 @@ def new(
     print_next("fit", "RECORDING", "--study", path, "-o", "fit")
 
 
-@study_app.command()
+@study_app.command(cls=HelpCommand)
 def check(
     path: Annotated[Path, typer.Argument(metavar="FILE", help="Study file.")], json: Json = False
 ) -> None:
@@ -67,4 +68,4 @@ def check(
         print_next("fit", "RECORDING", "--study", path, "-o", "fit")
 
 
-study_app.command("recover", help=paragraphs(recover.__doc__ or ""))(recover)
+study_app.command("recover", cls=HelpCommand, help=paragraphs(recover.__doc__ or ""))(recover)

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple
 
 import typer
 
+from driftwalk.cli.inputs.assembly_source import RUN_HELP
+from driftwalk.cli.inputs.found_source import FoundSource, open_run
 from driftwalk.cli.options.cluster import ClusterAt, ClusterOptions, Workers
 from driftwalk.cli.options.model import (
-    GIVE_VALUES,
     KnownModel,
     KnownParameters,
     ModelName,
-    ParametersFrom,
     ParameterValues,
     partly_known_model,
 )
@@ -54,24 +54,15 @@ Noise = Literal["estimated", "known"]
     RECOVER_KEYS,
     *("flow", "recordings", "duration", "precision", "seed"),
     *("tank_diameter", "position_noise", "step_interval", "bootstrap"),
-    file="none",
 )
 def recover(
     out: RunFolder,
     given: StudyOptions,
-    truth: Annotated[
-        Path | None,
-        typer.Option(
-            "--truth",
-            metavar="FILE",
-            help="Study file with the true values and \\[recover], or the run directory of a fit "
-            "or a calibration; with --model its tank, camera and \\[recover].",
-            show_default=False,
-        ),
+    run: Annotated[
+        Path | None, typer.Argument(metavar="RUN", help=RUN_HELP, show_default=False)
     ] = None,
     model: ModelName = None,
     parameters: ParameterValues = None,
-    parameters_from: ParametersFrom = None,
     known: KnownParameters = None,
     like: Annotated[
         Path | None,
@@ -95,6 +86,7 @@ def recover(
         typer.Option(
             "--threads",
             min=1,
+            metavar="N",
             help="Recordings to fit at the same time; threads of a calibration with --model "
             "(default: one per core).",
             show_default=False,
@@ -108,46 +100,45 @@ def recover(
     """Simulate recordings of known truth, fit them, and report how well the fit recovers the truth.
 
     Use it to design an experiment: what would recordings of this length, with this camera, in this
-    flow reveal? With --model: recordings of that motion model, each calibrated with all parameters
-    open but the --known ones. The directory holds the result, figures and manifest.json. After a
-    kill, the same command continues.
+    flow reveal? The truth is what a RUN has found, or a study file (--study) with the true values
+    and its section [recover]. With --model, or with a RUN of another model than the block:
+    recordings of that motion model, each calibrated with all parameters open but the --known ones.
+    The directory holds the result, figures and manifest.json. After a kill, the same command
+    continues.
     """
-    from driftwalk.runs import read_found
-
-    given = replace(given, file=truth)
     workers = Workers(cluster, cluster_options)
-    if model is not None:
+    source = None if run is None else open_run(run, given, model)
+    if model is not None or (source is not None and not source.is_block):
         _refuse(given, OF_THE_BLOCK, "about the block, which --model replaces; leave it out")
         of_model = [name for name in known or () if name != NOISE]
-        chosen = partly_known_model(model, parameters, parameters_from, of_model)
-        found = (
-            None if parameters_from is None else read_found(parameters_from, give=GIVE_VALUES).file
-        )
-        inputs = {"truth": truth, "parameters": found, "like": like}
+        chosen = partly_known_model(model, parameters, run, of_model)
+        found = None if source is None else source.found.file
+        inputs = {"truth": given.file, "parameters": found, "like": like}
         noise: Noise = "known" if NOISE in (known or ()) else "estimated"
-        set_up = _SetUp(given, sample_rate, like, body, _files(inputs), threads, noise)
+        set_up = _SetUp(given, source, sample_rate, like, body, _files(inputs), threads, noise)
         _of_model(chosen, set_up, out, workers, overwrite=overwrite, json=json)
         return
-    _refuse(given, OF_A_MODEL, "belongs to a --model; for the block it stands in --truth FILE")
+    _refuse(given, OF_A_MODEL, "belongs to a --model; for the block it stands in --study FILE")
     beside = {
-        "--parameter": parameters, "--parameters-from": parameters_from, "--known": known,
+        "--parameter": parameters, "--known": known,
         "--like": like, "--body": body, "--sample-rate": sample_rate,
     }  # fmt: skip
     for name, value in beside.items():
         if value:
-            raise ConfigurationError(f"{name} belongs to a --model; the block has --truth FILE")
-    if truth is None:
+            raise ConfigurationError(f"{name} belongs to a --model; the block has --study FILE")
+    if source is None and given.file is None:
         raise ConfigurationError(
-            "the truth is missing: give a study file of the block (--truth FILE), or a motion "
-            "model with its values (--model NAME --parameter NAME=VALUE)"
+            "the truth is missing: give a finished run, a study file of the block (--study FILE), "
+            "or a motion model with its values (--model NAME --parameter NAME=VALUE)"
         )
-    _of_block(truth, given, out, threads, workers, overwrite=overwrite, json=json)
+    _of_block(source, given, out, threads, workers, overwrite=overwrite, json=json)
 
 
 class _SetUp(NamedTuple):
     """How the recordings of a motion model are made."""
 
     given: StudyOptions
+    source: FoundSource | None
     sample_rate: float | None
     like: Path | None
     body: str | None
@@ -165,7 +156,7 @@ class _SetUp(NamedTuple):
                 raise ConfigurationError(f"--sample-rate {self.sample_rate:g}: give a rate above 0")
             clock = {"recover.sample_interval_s": 1.0 / self.sample_rate}
             given = given.and_also(clock, keys={"sample_rate": "recover.sample_interval_s"})
-        study = given.study()
+        study = given.study() if self.source is None else replace(self.source, given=given).study()
         return study if recording is None else study_for([recording], study, body=self.body)
 
 
@@ -225,7 +216,7 @@ def _of_model(
 
 
 def _of_block(
-    truth: Path,
+    source: FoundSource | None,
     given: StudyOptions,
     out: Path,
     threads: int | None,
@@ -238,10 +229,11 @@ def _of_block(
     from driftwalk.runs import RecoveryWork, run_recovery
 
     named = given.overrides.get(RECOVER_KEYS["flow"])
-    if truth.is_dir():
-        chosen, field, inputs = _of_run(truth, given, named)
+    if source is not None:
+        chosen, field, inputs = _of_run(source, named)
     else:
-        chosen = given.study()
+        chosen, truth = given.study(), given.file
+        assert truth is not None
         _require_stated(truth)
         field, flow_file = _flow(chosen, truth, None if named is None else Path(named))
         inputs = _files({"truth": truth, "flow": flow_file})
@@ -255,20 +247,19 @@ def _of_block(
 
 
 def _of_run(
-    folder: Path, given: StudyOptions, named: str | None
+    source: FoundSource, named: str | None
 ) -> tuple[Study, xr.Dataset | None, dict[str, Path]]:
     """Return the truth that a run has found: its study with its camera and options; flow, files."""
     from driftwalk.cli.inputs.assembly_source import load_flow_for
     from driftwalk.conditions import study_as_seen
-    from driftwalk.runs import read_found
     from driftwalk.schema import body_track
 
-    found = read_found(folder)
-    own = found.block_study(why="a recovery study of another model names it (--model)")
+    found = source.found
+    own = found.block_study()
     recording = found.recording()
     if recording is not None:
         own = study_as_seen(own, recording, body_track(recording, found.body))
-    study = given.over(own, base=f"the study of {folder}")
+    study = source.given.over(own, base=f"the study of {source.folder}")
     if named is None:
         return study, found.flow(own), found.inputs
     if named == RANDOM:

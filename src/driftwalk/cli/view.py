@@ -37,19 +37,13 @@ LAST_PORT = 65535
 
 
 def view(
-    run: Annotated[
-        Path | None,
-        typer.Argument(metavar="[RUN]", help="Run directory, finished or not.", show_default=False),
-    ] = None,
-    live: Annotated[
-        str | None,
-        typer.Option(
-            "--live",
-            metavar="ADDRESS:PORT",
-            help="Stream of a tracker or of the playground to watch.",
-            show_default=False,
+    source: Annotated[
+        str,
+        typer.Argument(
+            metavar="RUN|ADDRESS:PORT",
+            help="Run directory, finished or not; or the address of a stream.",
         ),
-    ] = None,
+    ],
     port: Port = 8765,
     host: Host = "127.0.0.1",
     open: Open = None,
@@ -60,15 +54,14 @@ def view(
     """
     from driftwalk.viewer import LiveSource, RunSource, require_server
 
-    if (run is None) == (live is None):
-        raise InputError("name a run directory, or a stream to watch (--live ADDRESS:PORT)")
+    address = None if Path(source).exists() else address_of(source)
     require_server()
-    source: Source = (
-        RunSource(run or "", tell=lambda text: print_warnings([text]))
-        if live is None
-        else LiveSource(*address_of(live))
+    shown: Source = (
+        RunSource(source, tell=lambda text: print_warnings([text]))
+        if address is None
+        else LiveSource(*address)
     )
-    show(source, host=host, port=port, open=open)
+    show(shown, host=host, port=port, open=open)
 
 
 def show(source: Source, *, host: str, port: int, open: bool | None) -> None:
@@ -101,13 +94,15 @@ def open_browser(address: str, opener: Callable[[str], bool] | None = None) -> N
     threading.Thread(target=target, args=(address,), daemon=True).start()
 
 
-def address_of(text: str) -> tuple[str, int]:
-    """Return host and port of a stream; loopback when only the port is given.
+def address_of(text: str) -> tuple[str, int] | None:
+    """Return host and port of a stream, None of a text that ends in no port.
+
+    The host is loopback when only the port is given.
 
     Raises
     ------
     InputError
-        When it is not an address.
+        When the port is not one.
 
     Examples
     --------
@@ -115,6 +110,8 @@ def address_of(text: str) -> tuple[str, int]:
     (('192.168.1.5', 5000), ('127.0.0.1', 5000), ('::1', 5000))
     """
     name, _, port = text.rpartition(":")
-    if not (port.isascii() and port.isdigit() and 0 < int(port) <= LAST_PORT):
-        raise InputError(f"--live {text}: expected an address and a port, such as 127.0.0.1:5000")
+    if not (port.isascii() and port.isdigit()):
+        return None
+    if not 0 < int(port) <= LAST_PORT:
+        raise InputError(f"{text}: expected an address and a port, such as 127.0.0.1:5000")
     return name.strip("[]") or "127.0.0.1", int(port)

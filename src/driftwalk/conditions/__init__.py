@@ -24,9 +24,11 @@ from driftwalk.conditions.refuse import (
 )
 from driftwalk.conditions.study import (
     About,
+    block_attributes,
     estimated_study,
     is_stated,
     study_for,
+    study_of_block,
     unstated_warning,
 )
 from driftwalk.conditions.tank import require_inside, study_in_arena
@@ -36,6 +38,7 @@ __all__ = [
     "Conditions",
     "Neighbours",
     "ReadRecordings",
+    "block_attributes",
     "estimated_study",
     "is_stated",
     "jump_warnings",
@@ -56,6 +59,7 @@ __all__ = [
     "study_as_seen",
     "study_for",
     "study_in_arena",
+    "study_of_block",
     "typical_speed",
     "unstated_warning",
 ]

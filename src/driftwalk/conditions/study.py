@@ -30,6 +30,8 @@ LAW_KEYS: Final = {
 _BLOCK_ATTRIBUTES: Final = {
     "side_m": ("block_side_m", "m", "side", "`block` when the recording is loaded"),
     "mass_kg": ("block_mass_kg", "kg", "mass", "`block.mass_kg`"),
+    "depth_m": ("block_depth_m", "m", "depth", "`block.depth`"),
+    "depth": ("block_depth", "", "depth", "`block.depth`"),
 }
 """Keys of [block] that a recording may state, with its attribute."""
 
@@ -81,19 +83,85 @@ def study_for(
     chosen = apply_overrides(study if study is not None else Study(), overrides or {})
     # A fact that is stated already, by the study or by an earlier recording, has to be the same.
     tank = is_stated(chosen, "tank.diameter_m")
-    block = set(chosen.block.model_fields_set)
+    block: set[str] = set(chosen.block.model_fields_set)
     fitted = False
     for recording in recordings:
         # A circle that is fitted to the positions states no tank: another recording has another.
         if not (fitted and _is_fitted(recording)):
             chosen = _with_tank(chosen, recording, is_stated=tank)
         fitted = fitted or _is_fitted(recording)
-        chosen = _with_block(chosen, recording, stated=block)
+        chosen = study_of_block(chosen, recording, stated=block)
         tank = tank or "arena" in recording.attrs
         block |= {key for key, (name, *_) in _BLOCK_ATTRIBUTES.items() if name in recording.attrs}
     for recording in recordings if tank or needs_tank else ():
         require_inside(chosen, recording, body)
     return chosen
+
+
+def study_of_block(
+    study: Study, recording: xr.Dataset, *, stated: Collection[str] | None = None
+) -> Study:
+    """Return the study with the block of a recording; refuse one that is not the stated block.
+
+    Parameters
+    ----------
+    study : Study
+        The study.
+    recording : xarray.Dataset
+        A `trajectory`.
+    stated : collection of str, optional
+        The keys of [block] that are stated; by default those that the study states.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> study_of_block(dw.Study(), dw.tank30_recording()).block.mass_kg
+    0.0116
+    """
+    from driftwalk.model import apply_overrides
+
+    known = set(study.block.model_fields_set if stated is None else stated)
+    for key, (name, unit, word, way) in _BLOCK_ATTRIBUTES.items():
+        if name not in recording.attrs:
+            continue
+        own, ours = recording.attrs[name], getattr(study.block, key)
+        if unit:
+            own = float(own)
+        # Up to rounding, two numbers are the same statement.
+        is_same = own == ours or (unit and ours is not None and abs(own - ours) <= 1e-9 * ours)
+        same_fact = {"depth", "depth_m"} if word == "depth" else {key}
+        if known.isdisjoint(same_fact):
+            study = apply_overrides(study, {f"block.{key}": ours if is_same else own})
+        elif not is_same:
+            raise InputError(
+                f"{_name_of(recording)}the recording is of a block of {word} {own} {unit}, and the "
+                f"study says {ours} {unit}: state the {word} once, {way}"
+            )
+    return study
+
+
+def block_attributes(study: Study, stated: Collection[str]) -> dict[str, Any]:
+    """Return the attributes by which a recording states its block.
+
+    Parameters
+    ----------
+    study : Study
+        Its [block].
+    stated : collection of str
+        The keys that are stated, as ``"section.key"``.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> study = dw.apply_overrides(dw.Study(), {"block.mass_kg": "24g"})
+    >>> block_attributes(study, {"block.mass_kg"})
+    {'block_mass_kg': 0.024}
+    """
+    return {
+        name: getattr(study.block, key)
+        for key, (name, *_) in _BLOCK_ATTRIBUTES.items()
+        if f"block.{key}" in stated
+    }
 
 
 def estimated_study(
@@ -275,26 +343,6 @@ def _with_tank(study: Study, recording: xr.Dataset, *, is_stated: bool) -> Study
             f"a {study.tank.describe()}: state the tank once, `tank` when the recording is loaded"
         )
     return own
-
-
-def _with_block(study: Study, recording: xr.Dataset, *, stated: Collection[str]) -> Study:
-    """Return the study with the block of a recording; refuse one that is not the stated block."""
-    from driftwalk.model import apply_overrides
-
-    for key, (name, unit, word, way) in _BLOCK_ATTRIBUTES.items():
-        if name not in recording.attrs:
-            continue
-        own, ours = float(recording.attrs[name]), getattr(study.block, key)
-        # Up to rounding, two numbers are the same statement.
-        is_same = abs(own - ours) <= 1e-9 * ours
-        if key in stated and not is_same:
-            raise InputError(
-                f"{_name_of(recording)}the recording is of a block of {own:g} {unit}, and the "
-                f"study says {ours:g} {unit}: state the {word} once, {way}"
-            )
-        if key not in stated:
-            study = apply_overrides(study, {f"block.{key}": ours if is_same else own})
-    return study
 
 
 def _is_fitted(recording: xr.Dataset) -> bool:

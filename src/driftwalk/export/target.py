@@ -21,8 +21,8 @@ class Source:
         The flow field, where `path` has none: that of a study file.
     seed : int or None
         Seed of the stochastic force over the run's own.
-    world : int or None
-        The one simulated world to take, a replicate or a run of blocks, where there are several.
+    replicate : int or None
+        The one simulated replicate to take, or run of blocks, where there are several.
     speed : float or None
         How much faster than real time a film is.
     tell : callable
@@ -34,7 +34,7 @@ class Source:
     path: Path
     flow: Path | None = None
     seed: int | None = None
-    world: int | None = None
+    replicate: int | None = None
     speed: float | None = None
     tell: Callable[[str], None] = tell_nobody
     progress: Callable[[int, int], None] = tell_nobody
@@ -78,7 +78,7 @@ class Target:
     require : callable or None
         ``require()`` raises `InputError` where `verify` cannot run on this machine.
     options : tuple of str
-        What it has a use for of a source's ``flow``, ``seed``, ``world`` and ``speed``.
+        What it has a use for of a source's ``flow``, ``seed``, ``replicate`` and ``speed``.
     """
 
     name: str

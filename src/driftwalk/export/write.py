@@ -69,7 +69,7 @@ def require_used(source: Source, target: Target) -> None:
     InputError
         Names it.
     """
-    for name in ("flow", "seed", "world", "speed"):
+    for name in ("flow", "seed", "replicate", "speed"):
         if getattr(source, name) is not None and name not in target.options:
             raise InputError(f"an export to {target.name} has no use for `{name}`: leave it out")
 

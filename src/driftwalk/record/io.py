@@ -22,6 +22,7 @@ from driftwalk.record.cleaning.clock import check_clock
 from driftwalk.record.cleaning.extent import refuse_many_bodies, refuse_sparse
 from driftwalk.record.cleaning.jumps import arena_diagonal, impossible_steps, impossible_warning
 from driftwalk.record.cleaning.warn import angle_warnings, plausibility_warnings
+from driftwalk.record.convert_units import convert_units
 from driftwalk.record.noise import noise_reach
 from driftwalk.record.origin import origin_of
 from driftwalk.record.pose.keypoints import two_names

@@ -139,6 +139,11 @@ class FoundRun:
         lacks = lack.get(self.kind, "no uncertainty of its values, as a fit or a calibration has")
         return f"the {self.words} has {lacks}: only the parameters that it found are simulated"
 
+    @property
+    def has_study(self) -> bool:
+        """Whether the dataset or the run directory holds the study of the run."""
+        return "study" in self.found.attrs or self.folder is not None
+
     def study(self) -> Study:
         """Return the study of the run, as it was before the estimates.
 

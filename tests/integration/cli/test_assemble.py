@@ -53,7 +53,7 @@ def calibrated(undrawn: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
     study.write_text(GRID, encoding="utf-8")
     done = here(
         *("calibrate", RECORDING, "--to", "60s", "--study", study, "--out", place / "run"),
-        *("--tank-diameter", "30cm", "--threads", "1"),
+        *("--tank", "30cm", "--threads", "1"),
     )
     assert done.code == 0, done.err
     return place / "run"
@@ -147,10 +147,10 @@ def test_from_a_flow_field(tmp_path: Path) -> None:
     """The form of the issue's second example, and that the result does not depend on threads."""
     given = ["--flow", FLOW, "--drag-coefficient", "0.45", "--force-std", "0.55mN"]
     found = []
-    for threads, size in (("1", "--tank-diameter"), ("2", "--study")):
+    for threads, size in (("1", "--tank"), ("2", "--study")):
         study = tmp_path / "study.toml"
         study.write_text('[tank]\ndiameter_m = "30cm"\n', encoding="utf-8")
-        tank = [size, "0.30" if size == "--tank-diameter" else study]
+        tank = [size, "0.30" if size == "--tank" else study]
         folder = tmp_path / f"run{threads}"
         words = [*given, *tank, *SIZE, "--threads", threads, "-o", folder]
         done = here("assemble", *words)
@@ -266,7 +266,7 @@ def test_a_calibration_without_bootstrap_gives_one_distribution(
         (["--runs", "0"], "'--runs'"),
         (["--duration", "0"], "--duration"),
         (["--duration", "5mm"], "--duration"),
-        (["--tank-diameter", "50cm"], "the flow field does not cover the tank"),
+        (["--tank", "50cm"], "the flow field does not cover the tank"),
         (["--latching", "conector"], "did you mean 'connector'?"),
         (["--chirality", "left"], "--chirality over"),
         (["--hidden-face-drag", "half"], "--hidden-face-drag over"),

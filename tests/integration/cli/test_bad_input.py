@@ -55,9 +55,9 @@ STILL = {
 
 COMMANDS: dict[str, Callable[[Path, Path], list[object]]] = {
     "info": lambda bad, folder: ["info", bad],
-    "convert": lambda bad, folder: ["convert", bad, folder / "out.nc", "--overwrite"],
+    "read": lambda bad, folder: ["read", bad, "-o", folder / "out.nc", "--overwrite"],
     "flow": lambda bad, folder: [
-        *("flow", bad, "--out", folder / "out.nc", "--tank-diameter", "30cm", "--overwrite")
+        *("flow", bad, "--out", folder / "out.nc", "--tank", "30cm", "--overwrite")
     ],
     "calibrate": lambda bad, folder: ["calibrate", bad, "--out", folder / "run", "--overwrite"],
     "calibrate with a flow": lambda bad, folder: [
@@ -174,7 +174,7 @@ def test_bad_study(study: str, command: str, folder: Path) -> None:
         (["--mass", "3cm"], "--mass"),
         (["--side", "40cm"], "--side over the default study: the block does not fit"),
         (["--side", "4"], "the block does not fit into the tank"),
-        (["--tank-diameter", "2cm"], "--tank-diameter"),
+        (["--tank", "2cm"], "does not fit into the tank"),
         (["--depth", "deep"], "(or immersed, archimedes)"),
         (["--time-step", "7ms"], "--time-step"),
         (["--force-interval", "0"], "--force-interval"),
@@ -184,8 +184,8 @@ def test_bad_study(study: str, command: str, folder: Path) -> None:
         (["--to", "1s"], "at least 30 are needed"),
         (["--body", "z"], "--body 'z'"),
         (["--columns", "x=nope"], "--columns x=nope"),
-        (["--arena", "oval:3"], "--arena"),
-        (["--arena", "circle:5cm"], "positions lie outside the tank"),
+        (["--tank", "oval:3"], "--tank"),
+        (["--tank", "circle:5cm"], "positions lie outside the tank"),
         (["--bootstrap=-1"], "--bootstrap"),
         (["--threads", "0"], "--threads"),
         (["--replicates", "0"], "--replicates"),
@@ -205,15 +205,15 @@ def test_bad_option_of_calibrate(options: list[str], says: str, folder: Path) ->
         (["flow", "--cell-size", "0"], "--cell-size"),
         (["flow", "--min-count=-1"], "--min-count"),
         (["compare", RECORDING, "--step-interval", "2h"], "(--step-interval)"),
-        (["convert", "--metres-per-pixel", "0"], "--metres-per-pixel"),
+        (["read", "--scale", "0"], "--scale"),
         (["info", "--length-unit", "furlong"], "--length-unit"),
     ],
 )
 def test_bad_option_of_other_commands(words: list[object], says: str, folder: Path) -> None:
     command, *rest = words
     place: list[object] = {
-        "flow": ["--tank-diameter", "30cm", "--out", folder / "new.nc"],
-        "convert": [folder / "new.nc"],
+        "flow": ["--tank", "30cm", "--out", folder / "new.nc"],
+        "read": ["-o", folder / "new.nc"],
     }.get(str(command), [])
     before = contents(folder)
     assert says in refusal(here(command, RECORDING, *place, *rest))
@@ -231,8 +231,8 @@ def test_a_refused_recording_leaves_its_run_directory_free(folder: Path) -> None
 def writers(place: Path) -> dict[str, list[object]]:
     good = place.parent / "good.csv"
     return {
-        "convert": ["convert", RECORDING, place],
-        "flow": ["flow", RECORDING, "--to", "60s", "--tank-diameter", "30cm", "--out", place],
+        "read": ["read", RECORDING, "-o", place],
+        "flow": ["flow", RECORDING, "--to", "60s", "--tank", "30cm", "--out", place],
         "simulate": ["simulate", "--flow", FLOW, "--duration", "1s", "--out", place],
         "compare": ["compare", good, good, "--permutations", "0", "--out", place],
         "study": ["study", "new", place],
@@ -325,11 +325,11 @@ def unwritable(tmp_path: Path) -> Iterator[Path]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("command", ["convert", "calibrate", "study"])
+@pytest.mark.parametrize("command", ["read", "calibrate", "study"])
 def test_a_folder_that_cannot_be_written(command: str, unwritable: Path) -> None:
     good = unwritable / "good.csv"
     words = {
-        "convert": ["convert", good, unwritable / "out.nc"],
+        "read": ["read", good, "-o", unwritable / "out.nc"],
         "calibrate": ["calibrate", good, "--flow", FLOW, "--out", unwritable / "run"],
         "study": ["study", "new", unwritable / "new.toml"],
     }[command]

@@ -96,7 +96,7 @@ def test_its_values_can_be_simulated(run: tuple[Path, dict]) -> None:
     folder, said = run
     out = folder / "again.nc"
     done = here(
-        "simulate", "--model", "active", "--parameters-from", folder / "run",
+        "simulate", folder / "run", "--model", "active",
         "--like", folder / "recording.nc", "-o", out,
     )  # fmt: skip
     assert done.code == 0, done.err

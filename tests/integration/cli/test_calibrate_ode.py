@@ -138,7 +138,7 @@ class TestContract(MotionModelContract):
 @pytest.mark.slow
 def test_without_a_flow_it_says_so(tmp_path: Path) -> None:
     study = written(tmp_path, step="4ms")
-    words = ("calibrate", RECORDING, "--to", "20s", "--tank-diameter", "30cm", "--study", study)
+    words = ("calibrate", RECORDING, "--to", "20s", "--tank", "30cm", "--study", study)
     done = here(*words, "--model", address(study), "-o", tmp_path / "run")
     assert "the block needs the water's velocity: give --flow" in done.err.splitlines()[-1]
     assert done.code == 2
@@ -154,7 +154,7 @@ def test_both_engines_calibrate_a_recording_alike(
     """
     leave_out_figures(monkeypatch)
     study = written(tmp_path, step="4ms")
-    given = ("--study", study, "--flow", FLOW, "--tank-diameter", "30cm", "--to", "4min")
+    given = ("--study", study, "--flow", FLOW, "--tank", "30cm", "--to", "4min")
     said = {}
     for name, words in (("ours", ()), ("theirs", ("--model", address(study)))):
         done = here("calibrate", RECORDING, *given, *words, "--json", "-o", tmp_path / name)

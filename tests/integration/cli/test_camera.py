@@ -159,7 +159,7 @@ def test_board_to_metres_and_poses(boards: Path, tmp_path: Path) -> None:
     blocks = moving_blocks(20)
     video = dw.write_video(tmp_path / "video.mkv", blocks, TILTED)
     markers = dw.track.save_markers(tmp_path / "m.toml", marker_of(TILTED))
-    for words in ((), ("--tank-diameter", "30cm")):
+    for words in ((), ("--tank", "30cm")):
         out = tmp_path / f"r{len(words)}.nc"
         done = here("track", video, "--markers", markers, "--camera", toml, *words, "-o", out)
         assert done.code == 0, done.err
@@ -191,14 +191,14 @@ def test_the_rim_gives_the_centre_where_the_board_lay_aside(boards: Path, tmp_pa
     video = dw.write_video(tmp_path / "video.mkv", blocks, TILTED)
     markers = dw.track.save_markers(tmp_path / "m.toml", marker_of(TILTED))
     track = ("track", video, "--markers", markers, "--camera", toml)
-    done = here(*track, "--tank-diameter", "30cm", "-o", tmp_path / "centred.nc")
+    done = here(*track, "--tank", "30cm", "-o", tmp_path / "centred.nc")
     assert done.code == 0, done.err
     assert here(*track, "-o", tmp_path / "aside.nc").code == 0
     centred, moved = dw.load(tmp_path / "centred.nc"), dw.load(tmp_path / "aside.nc")
     assert moved["x"].values - blocks["x"].values == pytest.approx(0.02, abs=0.2e-3)
     for name in ("x", "y"):
         assert centred[name].values == pytest.approx(blocks[name].values, abs=0.3e-3)
-    done = here(*track, "--tank-diameter", "25cm", "-o", tmp_path / "wrong.nc")
+    done = here(*track, "--tank", "25cm", "-o", tmp_path / "wrong.nc")
     width = re.search(r"the rim is ([\d.]+) cm wide, not 25 cm", done.err)
     assert width is not None, done.err
     assert float(width[1]) == pytest.approx(30.0, abs=0.1)

@@ -18,7 +18,7 @@ from driftwalk.runs import read_found
 from driftwalk.schema.stores.netcdf import open_netcdf
 
 SHORT = (
-    *(RECORDING, "--to", "30s", "--tank-diameter", "30cm", "--models", "inertial,active"),
+    *(RECORDING, "--to", "30s", "--tank", "30cm", "--models", "inertial,active"),
     *("--bootstrap", "0"),
 )
 
@@ -88,7 +88,7 @@ def test_models_are_ranked_as_they_finish(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def test_mistakes_are_one_line(tmp_path: Path) -> None:
-    words = ("compare-models", RECORDING, "--to", "60s", "--tank-diameter", "30cm")
+    words = ("compare-models", RECORDING, "--to", "60s", "--tank", "30cm")
     out = tmp_path / "run"
     assert "run_tumbel" in refusal(here(*words, "--models", "run_tumbel", "-o", out))
     assert "twice" in refusal(here(*words, "--models", "active,active", "-o", out))
@@ -126,7 +126,7 @@ def test_what_is_known_is_not_searched(tmp_path: Path, monkeypatch: pytest.Monke
     known = read_found(folder).known("active")
     assert known == {"speed": 0.02, "clearance": 0.01}
     simulated = here(
-        *("simulate", "--model", "active", "--parameters-from", folder, "--duration", "2s"),
+        *("simulate", folder, "--model", "active", "--duration", "2s"),
         *("-o", tmp_path / "simulated.nc"),
     )
     assert simulated.code == 0, simulated.err
@@ -187,6 +187,6 @@ def test_a_body_at_the_wall_is_compared(
 ) -> None:
     compare_after_little(monkeypatch)
     leave_out_figures(monkeypatch)
-    words = ("--tank-diameter", "30cm", "--models", "active", "--bootstrap", "0")
+    words = ("--tank", "30cm", "--models", "active", "--bootstrap", "0")
     done = here("compare-models", at_the_wall, *words, "-o", tmp_path / "run", "--json")
     assert done.code == 0, done.err

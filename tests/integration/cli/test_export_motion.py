@@ -109,7 +109,7 @@ def test_the_tank_is_said_where_it_is_lost_and_kept_where_it_is_not(tmp_path: Pa
     save_trajectory(recording, tmp_path / "a.nc")
     for to in ("csv", "trackpy"):
         done = here("export", tmp_path / "a.nc", "--to", to, "-o", tmp_path / to)
-        assert "--arena circle:0.3@0,0" in done.err
+        assert "--tank 0.3@0,0" in done.err
         page = (tmp_path / to / "README.md").read_text()
         (call,) = re.findall(r"`driftwalk\.load\((.*)\)`", page)
         name, tank = re.fullmatch(r'"(.*)", tank="(.*)"', call).groups()
@@ -155,7 +155,7 @@ def test_every_replicate_of_a_simulation_goes_out(tmp_path: Path) -> None:
             back = load(tmp_path / "out" / f"replicate_{number}.csv")
             np.testing.assert_array_equal(back["x"].values, stored["x"].values[number])
     one = tmp_path / "one"
-    assert here("export", tmp_path / "s.nc", "--world", "2", "--to", "csv", "-o", one).code == 0
+    assert here("export", tmp_path / "s.nc", "--replicate", "2", "--to", "csv", "-o", one).code == 0
     assert [file.name for file in one.glob("*.csv")] == ["replicate_2.csv"]
 
 
@@ -210,8 +210,8 @@ def test_fonts_of_a_pdf_are_truetype(run: Path, tmp_path: Path) -> None:
         (("{run}", "--to", "csv", "--seed", "1"), "csv has no use for --seed"),
         (("{run}", "--to", "gif", "--speed", "0"), "above zero: got 0"),
         (("{run}", "--to", "gif"), "at most 1200 s are written"),
-        (("{run}", "--to", "csv", "--world", "1"), "a recording of one world"),
-        (("{blocks}", "--to", "csv", "--world", "7"), "no run 7"),
+        (("{run}", "--to", "csv", "--replicate", "1"), "a recording of one world"),
+        (("{blocks}", "--to", "csv", "--replicate", "7"), "no run 7"),
         (("{blocks}", "--to", "pdf"), "is not the directory of a finished run"),
         (("nowhere.nc", "--to", "csv"), "does not exist"),
         (("{flow}", "--to", "movement"), "flow"),

@@ -52,7 +52,7 @@ def test_defaults_that_decide_a_number_are_said_and_warned_of(fitted: tuple[Path
     assert f"{opening}force redrawn every 16 ms (--force-interval)\n" in fitted[1].err
     warnings = [text for text in answer(fitted[1])["warnings"] if " not stated: " in text]
     assert len(warnings) == 1
-    assert warnings[0].endswith("state --mass, --side and --tank-diameter")
+    assert warnings[0].endswith("state --mass, --side and --tank")
 
 
 def test_the_run_directory_is_whole(fitted: tuple[Path, Done]) -> None:
@@ -114,7 +114,7 @@ def test_people_read_the_answer(tmp_path: Path) -> None:
     [
         (("--to", "5s"), "has 51 positions"),
         (("--to", "0.1s"), "at least 3 are needed"),
-        (("--tank-diameter", "12cm"), "outside the tank"),
+        (("--tank", "12cm"), "outside the tank"),
         (("--angle", "sideways"), "--angle"),
         (("--confidence", "2"), "confidence"),
         (("--spline-spacing", "-1cm"), "--spline-spacing"),

@@ -25,15 +25,13 @@ def shifts(tmp_path: Path) -> Path:
     return path
 
 
-SCALE = ("--metres-per-pixel", "1mm", "--frame-interval", "10ms")
+SCALE = ("--scale", "1mm", "--frame-interval", "10ms")
 
 
 def test_a_field_in_pixels_is_described_and_made_one_in_metres(
     shifts: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert "name its units: give --metres-per-pixel and --frame-interval" in refusal(
-        here("info", shifts)
-    )
+    assert "name its units: give --scale and --frame-interval" in refusal(here("info", shifts))
     code, out, err = here("info", shifts, *SCALE, "--json")
     assert code == 0
     described: dict[str, Any] = json.loads(out)
@@ -41,7 +39,7 @@ def test_a_field_in_pixels_is_described_and_made_one_in_metres(
     assert described["speed_max_m_s"] == pytest.approx(2.0 * np.hypot(0.152, 0.152), rel=1e-9)
     assert "y counts downwards" in described["warnings"][0]
     made = tmp_path / "flow.nc"
-    where = ("--arena", "circle:0.3@0.168,-0.168")
+    where = ("--tank", "circle:0.3@0.168,-0.168")
     code, out, err = here("flow", shifts, "--out", made, *SCALE, *where)
     assert code == 0
     assert "wrote" in err
@@ -83,9 +81,8 @@ def test_netcdf_whose_variables_nobody_knows(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--arena", "fit"), "--arena fit is for recordings"),
-        (("--arena", "circle:0.3", "--tank-diameter", "0.3"), "not both"),
-        (("--arena", "circle:wide"), "wide"),
+        (("--tank", "fit"), "--tank fit is for recordings"),
+        (("--tank", "circle:wide"), "wide"),
     ],
 )
 def test_where_the_tank_is(
@@ -106,7 +103,7 @@ def test_a_recording_has_no_time_between_images(tmp_path: Path) -> None:
 
 
 def test_a_field_is_no_recording(shifts: Path, tmp_path: Path) -> None:
-    said = refusal(here("convert", shifts, tmp_path / "out.nc"))
+    said = refusal(here("read", shifts, "-o", tmp_path / "out.nc"))
     assert f"{shifts} holds a flow field, and no positions: it is for --flow" in said
     binary = tmp_path / "B00001.vc7"
     binary.write_bytes(b"\0\1")

@@ -11,7 +11,7 @@ from command_line import RECORDING, here, leave_out_figures, refusal
 
 import driftwalk as dw
 
-BODY = ("--tank-diameter", "30cm", "--drag-coefficient", "0.4", "--force-std", "0.6mN")
+BODY = ("--tank", "30cm", "--drag-coefficient", "0.4", "--force-std", "0.6mN")
 
 
 @pytest.fixture(scope="module")
@@ -31,12 +31,12 @@ def _no_figures(monkeypatch: pytest.MonkeyPatch) -> None:
 def commands(series: Path, folder: Path) -> dict[str, tuple[object, ...]]:
     flow = ("--flow", series)
     runs = (*flow, "--blocks", 2, "--runs", 8, "--duration", "15s", "--threads", 1, *BODY)
-    recording = (RECORDING, *flow, "--tank-diameter", "30cm", "--to", "60")
+    recording = (RECORDING, *flow, "--tank", "30cm", "--to", "60")
     return {
         "simulate": ("simulate", *flow, "--duration", "60s", *BODY, "-o", folder / "block.nc"),
         "assemble": ("assemble", *runs, "--film", "none", "-o", folder / "two"),
         "sensitivity": ("sensitivity", *runs, "-o", folder / "map"),
-        "play": ("play", *flow, "--tank-diameter", "30cm"),
+        "play": ("play", *flow, "--tank", "30cm"),
         "calibrate": ("calibrate", *recording, "-o", folder / "run"),
         "compare-models": ("compare-models", *recording, "-o", folder / "models"),
     }

@@ -14,7 +14,7 @@ from drifting_tracers import seeded_tank, vortex
 from driftwalk.flow import load_flow
 from driftwalk.schema import FLAGS
 
-SCALE = ("--metres-per-pixel", "10um", "--frame-rate", "10")
+SCALE = ("--scale", "10um", "--fps", "10")
 
 
 def test_from_a_table_of_tracks_to_a_flow_that_is_simulated_in(tmp_path: Path) -> None:
@@ -23,7 +23,7 @@ def test_from_a_table_of_tracks_to_a_flow_that_is_simulated_in(tmp_path: Path) -
     table = recording.to_dataframe().reset_index()
     tracks, made = tmp_path / "tracks.csv", tmp_path / "flow.nc"
     table[["time", "body", "x", "y"]].to_csv(tracks, index=False)
-    tank = ("--tank-diameter", "30cm")
+    tank = ("--tank", "30cm")
     said = refusal(here("flow", tracks, "-o", made, *tank))
     assert "has 250 bodies: --tracers makes one flow of them" in said
     code, _, err = here("flow", tracks, "-o", made, "--tracers", *tank, "--cells", "10")
@@ -65,7 +65,7 @@ def test_the_files_of_particle_trackers(
     shared_data: Callable[[str], Path], tmp_path: Path, name: str, tracks: int, steps: int
 ) -> None:
     path, made = shared_data("formats-2") / name, tmp_path / "flow.nc"
-    assert "--metres-per-pixel" in refusal(here("flow", path, "-o", made, "--tracers"))
+    assert "--scale" in refusal(here("flow", path, "-o", made, "--tracers"))
     size = "1mm" if tracks > 2 else "80um"
     code, out, _ = here(
         "flow", path, "-o", made, "--tracers", *SCALE, "--cell-size", size, "--json"

@@ -13,7 +13,7 @@ from few_simulations import compare_after_little
 from driftwalk.record import load
 from driftwalk.schema import body_track
 
-TANK = ("--tank-diameter", "30cm")
+TANK = ("--tank", "30cm")
 
 
 @pytest.fixture(scope="module")

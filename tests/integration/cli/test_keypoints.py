@@ -14,7 +14,7 @@ import driftwalk as dw
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.model import parse_study
 
-FRAMES = ("--frame-rate", "10", "--metres-per-pixel", "1cm")
+FRAMES = ("--fps", "10", "--scale", "1cm")
 
 
 def test_info_and_convert_of_a_pose_file(tmp_path: Path) -> None:
@@ -28,7 +28,7 @@ def test_info_and_convert_of_a_pose_file(tmp_path: Path) -> None:
     answer = json.loads(done.out)
     assert answer["format"] == "sleap"
     assert any("below 0.5 are missing: 1 of 24" in text for text in answer["warnings"])
-    assert here("convert", path, tmp_path / "out.nc", *FRAMES, *pose).code == 0
+    assert here("read", path, "-o", tmp_path / "out.nc", *FRAMES, *pose).code == 0
     kept = dw.load(tmp_path / "out.nc")
     assert int(np.isnan(kept["theta"].sel(body="a")).sum()) == 1
     assert "--min-confidence changes it" in here("info", path, *FRAMES, *pose[:4]).err

@@ -244,7 +244,7 @@ def test_a_disk_that_is_full(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("command", ["convert", "flow", "simulate", "compare", "study"])
+@pytest.mark.parametrize("command", ["read", "flow", "simulate", "compare", "study"])
 def test_a_full_disk_keeps_the_file_that_was_there(command: str, small_disk: Path) -> None:
     out = small_disk / "out.nc"
     out.write_bytes(b"precious")
@@ -253,8 +253,8 @@ def test_a_full_disk_keeps_the_file_that_was_there(command: str, small_disk: Pat
     line = said(
         apart(
             *{
-                "convert": ["convert", RECORDING, out],
-                "flow": ["flow", RECORDING, "--tank-diameter", "30cm", "--out", out],
+                "read": ["read", RECORDING, "-o", out],
+                "flow": ["flow", RECORDING, "--tank", "30cm", "--out", out],
                 "simulate": ["simulate", "--flow", FLOW, "--duration", "60s", "--out", out],
                 "compare": ["compare", RECORDING, RECORDING, "--permutations", 0, "--out", out],
                 "study": ["study", "new", out],

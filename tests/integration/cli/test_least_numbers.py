@@ -51,7 +51,7 @@ def test_positions_that_are_as_good_as_zero(command: str, tmp_path: Path) -> Non
     steps = np.random.default_rng(2).normal(size=(600, 2))
     rows = np.column_stack([0.1 * np.arange(600), 1e-313 * np.cumsum(steps, axis=0)])
     np.savetxt(tmp_path / "tiny.csv", rows, delimiter=",", header="t,x,y", comments="")
-    out = () if command == "info" else ("-o", tmp_path / "run", "--tank-diameter", "30cm")
+    out = () if command == "info" else ("-o", tmp_path / "run", "--tank", "30cm")
     line = refusal(here(command, tmp_path / "tiny.csv", *out))
     assert "e-312 from the origin" in line.replace("e-311", "e-312")
     assert "--length-unit" in line

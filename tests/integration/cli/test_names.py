@@ -31,7 +31,7 @@ def recording(tmp_path: Path) -> Path:
 
 def test_a_name_that_is_not_utf8_is_spelled_in_a_recording(recording: Path) -> None:
     out = recording.with_name("out.nc")
-    assert here("convert", recording, out).code == 0
+    assert here("read", recording, "-o", out).code == 0
     assert load(out).attrs["source"] == "out.nc"
     assert load(recording).attrs["source"] == "K\\xe4fer.csv"
 

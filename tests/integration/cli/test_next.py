@@ -14,7 +14,7 @@ from typer.main import get_command
 
 from driftwalk.cli.main import app
 
-FIT = ("--tank-diameter", "30cm", "--spline-spacing", "4cm", "--no-check", "--angle", "none")
+FIT = ("--tank", "30cm", "--spline-spacing", "4cm", "--no-check", "--angle", "none")
 FEW = ("--runs", "4", "--duration", "5s", "--film", "none", "--threads", "1")
 
 pytestmark = pytest.mark.usefixtures("undrawn")
@@ -25,7 +25,7 @@ def tracks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return a recording in the present folder, which has a space in its name."""
     monkeypatch.chdir(tmp_path)
     path = Path("my tracks.nc")
-    assert here("convert", RECORDING, "--to", "60s", *FIT[:2], path).code == 0
+    assert here("read", RECORDING, "--to", "60s", *FIT[:2], "-o", path).code == 0
     return path
 
 
@@ -43,12 +43,12 @@ def next_of(done: Done) -> list[str]:
     ("words", "expected"),
     [
         (("info", "my tracks.nc"), ["fit", "my tracks.nc"]),
-        (("convert", "my tracks.nc", "b.nc"), ["fit", "b.nc", "-o", "b-fit"]),
+        (("read", "my tracks.nc", "-o", "b.nc"), ["fit", "b.nc", "-o", "b-fit"]),
         (
             ("flow", "my tracks.nc", "-o", "f.nc"),
             ["calibrate", "my tracks.nc", "--flow", "f.nc", "-o", "f-run"],
         ),
-        (("flow", FLOW, "--tank-diameter", "30cm", "-o", "f.nc"), ["simulate", "--flow", "f.nc"]),
+        (("flow", FLOW, "--tank", "30cm", "-o", "f.nc"), ["simulate", "--flow", "f.nc"]),
         (
             ("simulate", "--flow", FLOW, "--duration", "2s", "-o", "s.nc"),
             ["report", "s.nc", "-o", "report.html"],
@@ -71,9 +71,9 @@ def test_the_last_line_is_the_next_command(
 def test_what_was_said_of_tank_and_body_is_said_again(tmp_path: Path) -> None:
     study, out = tmp_path / "my.toml", tmp_path / "f.nc"
     study.write_text('[block]\ndepth = "archimedes"\n', encoding="utf-8")
-    said = ("--study", study, "--tank-diameter", "31cm", "--side", "2.9cm", "--mass", "12g")
+    said = ("--study", study, "--tank", "31cm", "--side", "2.9cm", "--mass", "12g")
     words = next_of(here("flow", RECORDING, "--to", "60", *said, "--cells", "30", "-o", out))
-    said_again = ["--study", str(study), "--tank-diameter", "0.31", "--side", "0.029"]
+    said_again = ["--tank", "31cm", "--study", str(study), "--side", "0.029"]
     assert words[:-2] == [
         *("calibrate", str(RECORDING), "--to", "60", *said_again, "--mass", "0.012"),
         *("--flow", str(out)),
@@ -95,7 +95,7 @@ def test_a_name_that_is_taken_is_not_proposed(tracks: Path) -> None:
 
 
 def test_the_side_that_a_fitted_tank_took_is_asked_for(tmp_path: Path) -> None:
-    done = here("flow", RECORDING, "--to", "300", "--arena", "fit", "-o", tmp_path / "f.nc")
+    done = here("flow", RECORDING, "--to", "300", "--tank", "fit", "-o", tmp_path / "f.nc")
     assert "the mass and side were not stated" in done.err
 
 

@@ -14,7 +14,7 @@ from few_simulations import compare_after_little, simulate_little
 from driftwalk.cli.terminal.progress import ProgressReporter
 
 Shares = Callable[..., list[float]]
-TANK = ("--tank-diameter", "30cm")
+TANK = ("--tank", "30cm")
 BLOCKS = ("--blocks", "2", "--runs", "4", "--duration", "2s")
 
 

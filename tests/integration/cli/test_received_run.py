@@ -26,7 +26,7 @@ pytestmark = [
 ]
 LONGEST_S = 60
 LITTLE = ("--blocks", "2", "--duration", "1s", "--threads", "1")
-FLOW_ALONE = ("--flow", FLOW, "--tank-diameter", "30cm")
+FLOW_ALONE = ("--flow", FLOW, "--tank", "30cm")
 
 
 @pytest.fixture(scope="module")
@@ -119,13 +119,13 @@ READING: dict[str, tuple[tuple[str, ...], Callable[[Path, Path], Words]]] = {
     "simulate": (
         ("manifest.json", "calibration.nc"),
         lambda run, out: (
-            *("simulate", "--model", "active", "--parameters-from", run),
+            *("simulate", run, "--model", "active"),
             *("--duration", "1s", "-o", out / "made.nc"),
         ),
     ),
     "play": (
         ("manifest.json", "calibration.nc"),
-        lambda run, out: ("play", "--model", "active", "--parameters-from", run, "--no-open"),
+        lambda run, out: ("play", run, "--model", "active", "--no-open"),
     ),
     "view": (("manifest.json",), lambda run, out: ("view", run, "--no-open")),
 }  # fmt: skip

@@ -45,7 +45,7 @@ def truth(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def words(truth: Path, folder: Path, *more: object) -> list[object]:
-    return ["study", "recover", "--truth", truth, "-o", folder, *more]
+    return ["study", "recover", "--study", truth, "-o", folder, *more]
 
 
 @pytest.fixture(scope="module")

@@ -89,7 +89,7 @@ def grid(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def on_a_grid(grid: Path, folder: Path, *more: object) -> list[object]:
     """Return a command that leaves one parameter open, which a map is made of."""
-    model = ("study", "recover", "--model", "active", *TRUTH, *KNOWN, "--truth", grid)
+    model = ("study", "recover", "--model", "active", *TRUTH, *KNOWN, "--study", grid)
     return [*model, "--threads", "1", "-o", folder, *more]
 
 
@@ -153,10 +153,10 @@ def test_recordings_are_like_one(grid: Path, tmp_path: Path) -> None:
     search = tmp_path / "search.toml"
     search.write_text(GRID.partition("[observation]")[0], encoding="utf-8")
     done = here(
-        *("study", "recover", "--model", "active", "--parameters-from", tmp_path / "found.nc"),
+        *("study", "recover", tmp_path / "found.nc", "--model", "active"),
         *("--parameter", "speed=0.02", *KNOWN, "--like", tmp_path / "seen.nc"),
         *(
-            "--truth",
+            "--study",
             search,
             "--known",
             "position_noise",
@@ -201,7 +201,7 @@ MODEL = ("--model", "active", *TRUTH)
         ((*MODEL, "--like", "nowhere.csv"), "nowhere.csv: there is no such file"),
         ((*MODEL, "--flow", "random"), 'the flow "random" is for the block'),
         ((*MODEL, "--flow", "nowhere.nc"), "nowhere.nc: there is no such file"),
-        (("--model", "active", "--parameters-from", "nowhere"), "nowhere does not exist"),
+        (("nowhere", "--model", "active"), "nowhere does not exist"),
         ((*MODEL[:-1], "turn_rate=99"), "turn_rate is 99 rad/s, and is searched from -10 to 10"),
     ],
 )

@@ -20,7 +20,7 @@ from page_reading import page_in, part_of, values
 
 from driftwalk.page import decode_array, report_html
 
-TANK = ("--tank-diameter", "30cm")
+TANK = ("--tank", "30cm")
 DOCS = Path(__file__).parents[3] / "docs"
 TRUTH = """\
 [forces]
@@ -193,7 +193,7 @@ def test_a_sensitivity_analysis(run: Path, tmp_path: Path) -> None:
 def test_a_recovery_study(tmp_path: Path) -> None:
     (tmp_path / "truth.toml").write_text(TRUTH, encoding="utf-8")
     made = here(
-        *("study", "recover", "--truth", tmp_path / "truth.toml", "--threads", "1"),
+        *("study", "recover", "--study", tmp_path / "truth.toml", "--threads", "1"),
         *("--out", tmp_path / "recover"),
     )
     assert made.code == 0, made.err
@@ -233,7 +233,7 @@ def test_a_simulation(tmp_path: Path) -> None:
     assert part["arena"]["diameter_m"] == 0.3
     assert any("simulated" in text for text in part_of(page, "warnings")["items"])
     line = refusal(here("report", simulation, "-o", tmp_path / "r.html", *TANK))
-    assert "--tank-diameter: for a recording" in line
+    assert "--tank: for a recording" in line
 
 
 def test_what_is_no_run_is_refused(tmp_path: Path) -> None:
@@ -247,7 +247,7 @@ def test_what_is_no_run_is_refused(tmp_path: Path) -> None:
 
 def test_options_of_reading_are_for_recordings(run: Path, tmp_path: Path) -> None:
     line = refusal(here("report", run, "-o", tmp_path / "r.html", "--from", "5s", *TANK))
-    assert "--from, --tank-diameter: for a recording" in line
+    assert "--from, --tank: for a recording" in line
 
 
 def test_another_file_is_not_replaced_unless_asked(run: Path, tmp_path: Path) -> None:

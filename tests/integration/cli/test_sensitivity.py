@@ -49,7 +49,7 @@ def calibrated(undrawn: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
     study.write_text(GRID.replace("bootstrap = 10", "bootstrap = 0"), encoding="utf-8")
     done = here(
         *("calibrate", RECORDING, "--to", "60s", "--study", study, "--out", place / "run"),
-        *("--tank-diameter", "30cm", "--threads", "1"),
+        *("--tank", "30cm", "--threads", "1"),
     )
     assert done.code == 0, done.err
     return place / "run"
@@ -162,7 +162,7 @@ def test_flows_of_a_study_lie_beside_it(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("no_figures")
 def test_other_axes_and_the_answer_for_people(tmp_path: Path) -> None:
-    words = ["--vary", "blocks=2:3:1", "--vary", "tank_diameter=25cm,30cm", "--sobol", "8"]
+    words = ["--vary", "blocks=2:3:1", "--vary", "tank=25cm,30cm", "--sobol", "8"]
     done = here("sensitivity", "--flow", FLOW, *SIZE, *words, "-o", tmp_path / "run")
     assert done.code == 0, done.err
     lines = done.out.splitlines()
@@ -199,7 +199,7 @@ def test_figures_of_three_axes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (["--vary", "drag=1"], "expected NAME=VALUES with a name out of tank-diameter, blocks"),
+        (["--vary", "drag=1"], "expected NAME=VALUES with a name out of tank, blocks"),
         (["--vary", "blocks"], "expected NAME=VALUES"),
         (["--vary", "blocks="], "a value is missing after 'blocks='"),
         (["--vary", "blocks=2,,3"], "a value is missing"),
@@ -214,7 +214,7 @@ def test_figures_of_three_axes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         (["--vary", "drag-coefficient=0:1:1e-9"], "more than 1000000 values"),
         (["--vary", "latching=glue"], '"collision" or "connector" or "none"'),
         (["--vary", "flow=nowhere.nc"], "nowhere.nc: there is no such file"),
-        (["--vary", "tank-diameter=30cm,50cm"], "at tank_diameter = 0.5: the flow field does not"),
+        (["--vary", "tank=30cm,50cm"], "at tank_diameter = 0.5: the flow field does not"),
         (["--vary", "blocks=2,200"], "at blocks = 200: 200 blocks of 0.03 m do not fit"),
         (["--blocks", "70"], "of 70 blocks found a place in the tank"),
         (["--runs", "0"], "'--runs'"),

@@ -65,7 +65,7 @@ def simulated(out: Path, *words: object) -> tuple[Done, xr.Dataset]:
 def test_a_member_of_the_family_in_a_tank_of_its_own(tmp_path: Path) -> None:
     words = ("--model", "active", *parameters(ACTIVE), "--parameter", "clearance=0.01")
     times = ("--duration", "60s", "--sample-rate", "20", "--replicates", "3", "--seed", "4")
-    done, run = simulated(tmp_path / "a.nc", *words, *times, "--tank-diameter", "20cm", "--json")
+    done, run = simulated(tmp_path / "a.nc", *words, *times, "--tank", "20cm", "--json")
     said = json.loads(done.out)
     assert (said["replicates"], said["samples"], said["duration_s"]) == (3, 1201, 60.0)
     assert said["model"] == "active"
@@ -76,7 +76,7 @@ def test_a_member_of_the_family_in_a_tank_of_its_own(tmp_path: Path) -> None:
     away = np.hypot(run["x"], run["y"]).values[:, 1:, 0] < 0.08
     step = np.hypot(*(np.diff(run[name].values[:, :, 0], axis=1) for name in "xy"))
     assert np.median(step[away]) == pytest.approx(0.0025, rel=0.02)
-    again = simulated(tmp_path / "b.nc", *words, *times, "--tank-diameter", "20cm")[1]
+    again = simulated(tmp_path / "b.nc", *words, *times, "--tank", "20cm")[1]
     np.testing.assert_array_equal(again["x"], run["x"])
     study = dw.apply_overrides(dw.Study(), {"tank.diameter_m": 0.2, "simulation.duration_s": 60.0})
     twin = dw.simulate(
@@ -109,7 +109,7 @@ def test_like_a_recording_and_read_again_as_its_commands_do(tmp_path: Path) -> N
     assert (body["samples"], body["gaps"]) == (18001, 0)
     assert body["x_max_m"] == pytest.approx(float(one["x"].max()), abs=1e-9)
     assert json.loads(info.out)["arena"]["diameter_m"] == 0.3
-    done = here("convert", tmp_path / "a.nc", tmp_path / "one.csv", "--replicate", "1")
+    done = here("read", tmp_path / "a.nc", "-o", tmp_path / "one.csv", "--replicate", "1")
     assert done.code == 0, done.err
     table = np.genfromtxt(tmp_path / "one.csv", delimiter=",", names=True)
     np.testing.assert_allclose(table["x_m"], one["x"].values[:, 0], atol=1e-7)
@@ -181,17 +181,17 @@ def test_values_of_a_calibration(
     assert speed == pytest.approx(ACTIVE["speed"], rel=0.05)
     words = ("--model", "active", "--like", tmp_path / "moved.nc", "--json")
     # The directory knows what the calibration was given; its dataset alone does not.
-    again = json.loads(simulated(tmp_path / "b.nc", *words, "--parameters-from", run)[0].out)
+    again = json.loads(simulated(tmp_path / "b.nc", run, *words)[0].out)
     stated = {"rotational_diffusion_rad2_s": 0.5, "turn_rate_rad_s": 0.0, "clearance_m": 0.015}
     assert again["parameters"] == {"speed_m_s": pytest.approx(speed), **stated}
-    over = (*words, "--parameters-from", run, "--parameter", "speed=0.2")
+    over = (run, *words, "--parameter", "speed=0.2")
     other = json.loads(simulated(tmp_path / "c.nc", *over)[0].out)
     assert other["parameters"]["speed_m_s"] == 0.2
     alone = tmp_path / "alone.nc"
     alone.write_bytes((run / "calibration.nc").read_bytes())
-    words = ("simulate", "--model", "active", "-o", tmp_path / "d.nc", "--parameters-from")
+    words = ("simulate", "--model", "active", "-o", tmp_path / "d.nc")
     assert "no value for rotational_diffusion" in refusal(here(*words, alone))
-    words = ("simulate", "--model", "run_tumble", "-o", tmp_path / "d.nc", "--parameters-from", run)
+    words = ("simulate", "--model", "run_tumble", "-o", tmp_path / "d.nc", run)
     assert "about active, and not about the model run_tumble" in refusal(here(*words))
 
 
@@ -202,8 +202,7 @@ def test_values_of_a_calibration(
         (("--model", "active"), "give one for each (--parameter)"),
         (("--model", "activ"), "activ"),
         (("--model", "mine.py:nothing"), "mine.py has no 'nothing'"),
-        (("--parameter", "speed=0.1"), "belong to a --model"),
-        (("--parameters-from", "run"), "belong to a --model"),
+        (("--parameter", "speed=0.1"), "belongs to a --model"),
         (("--model", "active", "--parameter", "speed"), "expected NAME=VALUE"),
         (("--model", "active", "--parameter", "speed=1,2"), "speed=1,2 is a range"),
         (("--model", "active", "--parameter", "speed=1", "--parameter", "speed=2"), "twice"),
@@ -215,9 +214,9 @@ def test_values_of_a_calibration(
         (("--model", "active", *parameters(ACTIVE), "--flow", FLOW), "does not feel the water"),
         (("--model", "active", *parameters(ACTIVE), "--side", "3cm"), "--side: about the block"),
         (("--model", "active", *parameters(ACTIVE), "--backend", "reference"), "for the block"),
-        (("--model", "active", "--parameters-from", "nowhere"), "nowhere does not exist"),
-        (("--model", "active", "--parameters-from", "."), "is not a run directory"),
-        (("--model", "active", "--parameters-from", "mine.py"), "not a NetCDF file"),
+        (("--model", "active", "nowhere"), "nowhere does not exist"),
+        (("--model", "active", "."), "is not a run directory"),
+        (("--model", "active", "mine.py"), "not a NetCDF file"),
         (("--model", "mine.py:fails", "--parameter", "speed=0.1"), "ValueError: no such speed"),
         (("--model", "mine.py:nowhere", "--parameter", "speed=0.1"), "such as at speed=0.1"),
         (("--model", f"command:{sys.executable} {PROGRAM} die", "--parameter", "speed=0.02",
@@ -248,7 +247,7 @@ def test_a_source_that_has_changed_since_is_said(
     estimate = xr.DataArray([2e-5], {"parameter": ["diffusivity"]}, "parameter")
     found = xr.Dataset({"estimate": estimate}, attrs={"kind": "calibration", **model.facts({})})
     found.to_netcdf("found.nc", engine="h5netcdf")
-    words = ("--model", "mine.py:diffuse", "--parameters-from", "found.nc", "--duration", "5s")
+    words = ("--model", "mine.py:diffuse", "found.nc", "--duration", "5s")
     assert "has changed since" not in simulated(tmp_path / "a.nc", *words)[0].err
     Path("mine.py").write_text(f"# another one\n{FILE}", encoding="utf-8")
     done, run = simulated(tmp_path / "b.nc", *words)

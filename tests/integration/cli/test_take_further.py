@@ -23,7 +23,7 @@ from driftwalk.runs import read_found
 from driftwalk.schema import build_dataset
 from driftwalk.schema.answers.fit_facts import fit_facts, fitted_value
 
-TANK = ("--tank-diameter", "30cm")
+TANK = ("--tank", "30cm")
 BODY = ("--side", "28mm", "--mass", "10g", "--depth", "9mm")
 COARSE = ("--spline-spacing", "4cm", "--no-check", "--angle", "none", "--force-interval", "16ms")
 SIZE = ("--runs", "50", "--duration", "10s", "--threads", "1")
@@ -213,7 +213,7 @@ def test_its_flow_serves_other_commands(fitted: Path, tmp_path: Path) -> None:
 
 def test_a_fit_is_the_truth_of_a_recovery_study(fitted: Path, tmp_path: Path) -> None:
     done = here(
-        *("study", "recover", "--truth", fitted, "--recordings", "2", "--duration", "30s"),
+        *("study", "recover", fitted, "--recordings", "2", "--duration", "30s"),
         *("--threads", "1", "--json", "-o", tmp_path / "recover"),
     )
     assert done.code == 0, done.err
@@ -278,7 +278,7 @@ def test_a_model_of_the_users_is_named_again(tmp_path: Path) -> None:
             ("sensitivity", folder, "-o", tmp_path / "out"),
             ("simulate", folder, "-o", tmp_path / "out.nc"),
             ("play", folder, "--no-open"),
-            ("study", "recover", "--truth", folder, "-o", tmp_path / "out"),
+            ("study", "recover", folder, "-o", tmp_path / "out"),
             ("export", folder, "--to", "mujoco", "-o", tmp_path / "out"),
         ):
             line = refusal(here(*words))
@@ -292,8 +292,6 @@ def test_what_the_run_says_is_not_said_twice(fitted: Path, tmp_path: Path) -> No
     out = ("-o", tmp_path / "sim.nc")
     for options in (("--force-std", "1mN"), ("--study", "x.toml")):
         assert "not with a finished run" in refusal(here("simulate", fitted, *options, *out))
-    line = refusal(here("simulate", fitted, "--parameters-from", fitted, *out))
-    assert "both give the values" in line
     line = refusal(here("simulate", fitted, "--model", "active", *out))
     assert "is about the block, and not about active" in line
     assert "give the directory of a finished fit" in refusal(here("simulate", RECORDING, *out))

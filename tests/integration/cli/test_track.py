@@ -28,7 +28,7 @@ cv2 = pytest.importorskip("cv2")
 
 FRAMES = 40
 DOCS = Path(__file__).resolve().parents[3] / "docs" / "reference"
-TANK = ("--tank-diameter", "30cm")
+TANK = ("--tank", "30cm")
 
 
 @pytest.fixture(scope="module")
@@ -114,7 +114,7 @@ def test_one_dark_object_among_brighter_ones(tmp_path: Path) -> None:
         image += random.normal(0, 2, image.shape)
         cv2.imwrite(str(tmp_path / f"{frame:03d}.png"), np.clip(image, 0, 255).astype(np.uint8))
     out = tmp_path / "r.nc"
-    words = ("--px-per-m", "500", "--image-rate", "10Hz", "--bodies", "1")
+    words = ("--scale", "500px/m", "--fps", "10Hz", "--bodies", "1")
     done = here("track", tmp_path, "--markers", "blob", *words, "-o", out)
     assert done.code == 0, done.err
     assert "objects that are dark are followed" in done.err
@@ -291,7 +291,7 @@ TwoColourDetector.detect = detect
 @pytest.mark.slow
 def test_mistakes_are_said_in_one_line(folder: Path, tmp_path: Path) -> None:
     video, markers, out = folder / "video.mkv", folder / "m.toml", tmp_path / "r.nc"
-    assert "no scale: state --tank-diameter" in refusal(
+    assert "no scale: state --tank" in refusal(
         here("track", video, "--markers", markers, "-o", out)
     )
     assert "-o recording.nc" in refusal(here("track", video, "--markers", markers, *TANK))

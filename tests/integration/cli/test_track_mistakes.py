@@ -52,7 +52,7 @@ def test_images_of_different_sizes(words: list[object], tmp_path: Path) -> None:
     images = images_of(Path(str(words[0])))
     images[12] = images[12][:-10]
     folder = image_folder(tmp_path / "images", images)
-    done = here("track", folder, *words[1:], "-o", tmp_path / "r.nc", "--image-rate", "10Hz")
+    done = here("track", folder, *words[1:], "-o", tmp_path / "r.nc", "--fps", "10Hz")
     assert "frame 12 is 240 x 170 pixels, the frames before are 240 x 180" in refusal(done)
 
 
@@ -61,8 +61,8 @@ def test_a_folder_that_does_not_say_when(words: list[object], tmp_path: Path) ->
     (folder / "notes.txt").write_text("not an image")
     assert dw.track.frame_count(folder) == 3
     track = ("track", folder, *words[1:], "-o", tmp_path / "r.nc")
-    assert "(--image-rate)" in refusal(here(*track))
-    assert "--image-rate must be above zero" in refusal(here(*track, "--image-rate", "0"))
+    assert "(--fps)" in refusal(here(*track))
+    assert "--fps must be above zero" in refusal(here(*track, "--fps", "0"))
 
 
 def test_a_colour_that_never_appears(words: list[object], tmp_path: Path) -> None:
@@ -90,10 +90,10 @@ def test_a_scale_at_which_the_markers_do_not_fit_the_block(
     assert good.code == 0, good.err
     assert "warning" not in good.err
     # A tank twice as wide as it is: discs 28 mm apart, on a block of 30 mm.
-    wrong = here(*teach, "--tank-diameter", "60cm")
+    wrong = here(*teach, "--tank", "60cm")
     assert wrong.code == 0, wrong.err
     assert "and the block's side is 30 mm" in wrong.err
-    assert "check --tank-diameter" in wrong.err
+    assert "check --tank" in wrong.err
 
 
 def test_a_picture_that_does_not_fit_on_the_disk_leaves_no_markers_either(
@@ -112,7 +112,7 @@ def test_a_video_without_colours_teaches_nothing_and_says_what_to_do(tmp_path: P
     for number in range(3):
         image = np.full((60, 80, 3), 90 + number, np.uint8)
         assert cv2.imwrite(str(folder / f"{number}.png"), image)
-    teach = ("markers", "teach", folder, "--image-rate", "10Hz", "--px-per-m", 200)
+    teach = ("markers", "teach", folder, "--fps", "10Hz", "--scale", "200px/m")
     said = refusal(here(*teach, "-o", tmp_path / "m.toml"))
     assert "seen: all is grey; take a video in brighter, even light" in said
 
@@ -123,8 +123,8 @@ def test_a_video_without_colours_teaches_nothing_and_says_what_to_do(tmp_path: P
         (("--bodies", "0"), "--bodies is the number of objects"),
         (("--max-speed", "0"), "--max-speed must be above zero"),
         (("--lost-after=-1s",), "--lost-after must be above zero"),
-        (("--px-per-m", "nan"), "--px-per-m must be above zero"),
-        (("--tank-diameter", "30"), "pixels wide at this scale: check --tank-diameter"),
+        (("--scale", "nan"), "--scale must be above zero"),
+        (("--tank", "30"), "pixels wide at this scale: check --tank"),
         (("--live", "5000", "--live-nmea", "5000"), "take two ports, got 5000 for both"),
         (("--live", "70000"), "a port is a number from 0 to 65535"),
         (("--markers", "aruco:4X4_50"), "nothing was tracked in 24 frames"),
@@ -200,7 +200,7 @@ def test_a_tag_too_many_does_not_end_the_run(tmp_path: Path) -> None:
     dark = [np.clip(image.astype(int) - 2 * step, 0, 255) for step in range(8)]
     folder = image_folder(tmp_path / "tags", dark)
     done = here(
-        "track", folder, "--markers", "aruco:4X4_50", "--px-per-m", "500", "--image-rate", "10",
+        "track", folder, "--markers", "aruco:4X4_50", "--scale", "500px/m", "--fps", "10",
         "--bodies", "2", "--side", "10cm", "-o", tmp_path / "r.nc",
     )  # fmt: skip
     assert done.code == 0, done.err

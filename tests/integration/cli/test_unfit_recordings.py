@@ -32,7 +32,7 @@ def test_a_body_that_only_the_tracker_moves(
     rows = np.column_stack([0.1 * np.arange(SAMPLES), noise + np.array([0.01, 0.02])])
     path = tmp_path / f"{place_m}.csv"
     np.savetxt(path, rows, delimiter=",", header="t,x,y", comments="")
-    options = ("--tank-diameter", "30cm", "-o", tmp_path / "run")
+    options = ("--tank", "30cm", "-o", tmp_path / "run")
     done = here(COMMANDS[command][0], path, *COMMANDS[command][1:], *options)
     line = refusal(done)
     assert line.count(path.name) == 1

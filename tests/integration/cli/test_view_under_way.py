@@ -21,12 +21,12 @@ from driftwalk.page.run_page import TITLES
 from driftwalk.page.stored_run import MAIN_FILES
 from driftwalk.viewer.watch.run import RunSource
 
-TANK = ("--tank-diameter", "30cm")
+TANK = ("--tank", "30cm")
 SHORT = (RECORDING, "--to", "30s", *TANK)
 ACTIVE = (
     *("--model", "active", "--parameter", "speed=0.03", "--parameter", "turn_rate=0.3"),
     *("--parameter", "rotational_diffusion=0.5", "--known", "turn_rate"),
-    *("--known", "rotational_diffusion", "--truth", "known.toml"),
+    *("--known", "rotational_diffusion", "--study", "known.toml"),
 )
 VARIED = ("--vary", "drag-coefficient=0.2,0.6", "--vary", "force-std=0.2mN,1mN")
 LITTLE = ("--blocks", "3", "--duration", "20s")
@@ -42,7 +42,7 @@ RUNS: dict[str, tuple[tuple[object, ...], str]] = {
         "A comparison of motion models under way",
     ),
     "fit": (("fit", *SHORT, "--spline-spacing", "4cm", "--no-check"), "A fit under way"),
-    "recovery": (("study", "recover", "--truth", "truth.toml"), "A recovery study under way"),
+    "recovery": (("study", "recover", "--study", "truth.toml"), "A recovery study under way"),
     "model_recovery": (
         ("study", "recover", *ACTIVE),
         "A recovery study under way",

@@ -26,7 +26,7 @@ from filmed_blocks import film  # noqa: E402
 
 Words = list[object]
 SharedData = Callable[[str], Path]
-TANK = ("--tank-diameter", "30cm")
+TANK = ("--tank", "30cm")
 
 
 def whole_commands() -> set[str]:
@@ -136,7 +136,7 @@ FOREIGN: dict[str, Callable[[Path], None]] = {
 BAD: dict[str, Callable[[Path, Path], list[Words]]] = {
     "study new": lambda bad, out: [["study", "new", bad]],
     "study check": lambda bad, out: [["study", "check", bad]],
-    "study recover": lambda bad, out: [["study", "recover", "--truth", bad, "-o", out]],
+    "study recover": lambda bad, out: [["study", "recover", "--study", bad, "-o", out]],
     "camera calibrate": lambda bad, out: [
         ["camera", "calibrate", bad, "--squares", "8x6", "--square", "3cm", "-o", out]
     ],
@@ -151,13 +151,13 @@ BAD: dict[str, Callable[[Path, Path], list[Words]]] = {
         ["watch", bad, "--markers", "blob", *TANK, "--bodies", "1", "--side", "3cm"]
     ],
     "info": lambda bad, out: [["info", bad]],
-    "convert": lambda bad, out: [["convert", bad, out / "out.nc"]],
+    "read": lambda bad, out: [["read", bad, "-o", out / "out.nc"]],
     "flow": lambda bad, out: [["flow", bad, *TANK, "-o", out / "out.nc"]],
     "models": lambda bad, out: [["models", bad]],
     "simulate": lambda bad, out: [
         ["simulate", "--flow", bad, "--duration", "1s", "-o", out / "out.nc"],
         ["simulate", "--flow", FLOW, "--like", bad, "-o", out / "out.nc"],
-        ["simulate", "--model", "active", "--parameters-from", bad, "-o", out / "out.nc"],
+        ["simulate", bad, "--model", "active", "-o", out / "out.nc"],
     ],
     "compare": lambda bad, out: [
         ["compare", bad, out / "good.csv"],
@@ -276,7 +276,7 @@ QUICK: dict[str, Callable[[Path, Path, Path], Words]] = {
         *("watch", place / "video.mkv", "--markers", place / "m.toml", *TANK, "--bodies", "2"),
     ],
     "info": lambda place, run, out: ["info", place / "two.csv"],
-    "convert": lambda place, run, out: ["convert", place / "two.csv", out / "out.nc"],
+    "read": lambda place, run, out: ["read", place / "two.csv", "-o", out / "out.nc"],
     "flow": lambda place, run, out: ["flow", RECORDING, *SHORT, *TANK, "-o", out / "flow.nc"],
     "models": lambda place, run, out: ["models", "run-rest+wall"],
     "simulate": lambda place, run, out: [
@@ -290,7 +290,7 @@ QUICK: dict[str, Callable[[Path, Path, Path], Words]] = {
 }
 LONG: dict[str, Callable[[Path, Path, Path], Words]] = {
     "study recover": lambda place, run, out: [
-        *("study", "recover", "--truth", place / "truth.toml", *ONE, "-o", out / "run")
+        *("study", "recover", "--study", place / "truth.toml", *ONE, "-o", out / "run")
     ],
     "compare-models": lambda place, run, out: [
         *("compare-models", RECORDING, *SHORT, *TANK, "--models", "inertial", *ONE),

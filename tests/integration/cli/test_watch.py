@@ -131,7 +131,7 @@ def test_many_hidden_blocks_are_said_to_leave_it_unknown(tmp_path: Path) -> None
             row, column = 20 + 75 * (number // 4), 20 + 75 * (number % 4)
             image[row : row + 40, column : column + 40] = tags.generateImageMarker(number, 40)
         cv2.imwrite(str(folder / f"{frame:03d}.png"), image)
-    options = ("--px-per-m", "800", "--image-rate", "10", "--bodies", "9", "--side", "5cm")
+    options = ("--scale", "800px/m", "--fps", "10", "--bodies", "9", "--side", "5cm")
     done = here("watch", folder, "--markers", "aruco:4X4_50", *options, "-o", tmp_path / "r.nc")
     assert done.code == 0, done.err
     said = [line for line in done.out.splitlines() if "  class  " in line]

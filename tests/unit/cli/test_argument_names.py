@@ -36,7 +36,7 @@ from driftwalk.model import Study
         ('add `columns={"body": "particle"}`', "add --columns body=particle"),
         ('add `columns={"theta": "Winkel [°]"}`', "add --columns 'theta=Winkel [°]'"),
         ('such as `columns={"t": "1", "x": "2"}`', "such as --columns t=1,x=2"),
-        ('`tank="fit"` found a tank', "--arena fit found a tank"),
+        ('`tank="fit"` found a tank', "--tank fit found a tank"),
         ("use fewer blocks (`assembly.blocks`)", "use fewer blocks (--blocks)"),
         ("calibrate with `calibration.bootstrap=200`", "calibrate with --bootstrap 200"),
         ("give `side` or `area`", "give --side or area"),
@@ -67,13 +67,13 @@ def test_a_caller_in_python_can_type_what_the_message_names(text: str) -> None:
 
 
 def test_errors_notes_and_json_are_translated(capsys: pytest.CaptureFixture[str]) -> None:
-    assert one_line(InputError("give `frame_rate`")) == "give --frame-rate"
+    assert one_line(InputError("give `frame_rate`")) == "give --fps"
     print_note("warning: give `frame_rate`")
-    assert capsys.readouterr().err == "driftwalk: warning: give --frame-rate\n"
+    assert capsys.readouterr().err == "driftwalk: warning: give --fps\n"
     print_json({"bodies": ["`body`"], "inner": [{"warnings": ["give `frame_rate`"]}]})
     assert json.loads(capsys.readouterr().out) == {
         "bodies": ["`body`"],
-        "inner": [{"warnings": ["give --frame-rate"]}],
+        "inner": [{"warnings": ["give --fps"]}],
     }
 
 

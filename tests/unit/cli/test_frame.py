@@ -25,7 +25,7 @@ from driftwalk.cli.options.study import StudyOptions, option_name, with_study_op
 from driftwalk.cli.terminal.output import print_json, print_table, to_json
 from driftwalk.cli.terminal.progress import ProgressReporter, duration_text
 from driftwalk.core.errors import ConfigurationError, FormatError, InputError
-from driftwalk.core.study_keys import CALIBRATION_KEYS, STUDY_KEYS, study_overrides
+from driftwalk.core.study_keys import CALIBRATION_KEYS, STUDY_KEYS, option_of, study_overrides
 from driftwalk.core.text.json_text import json_value
 from driftwalk.model import Study, load_study
 
@@ -40,7 +40,7 @@ def add_command(monkeypatch: pytest.MonkeyPatch) -> AddCommand:
         module = ModuleType("driftwalk.cli.probe")
         module.probe = function  # type: ignore[attr-defined]
         monkeypatch.setitem(sys.modules, "driftwalk.cli.probe", module)
-        monkeypatch.setitem(cli_main.COMMANDS, "probe", Command("probe", "probe", "Probe."))
+        monkeypatch.setitem(cli_main.COMMANDS, "probe", Command("Fit", "Probe.", "probe", "probe"))
 
     return add
 
@@ -196,7 +196,7 @@ def test_options_reach_the_study(
     assert seen[-1].simulation.seed == 5
     assert seen[-1].forces.force_std_N == 0.00055
     assert seen[-1].wetted_depth_m == 0.02
-    assert main(["probe", "--tank-diameter", "50cm", "--depth", "archimedes", "--seed", "9"]) == 0
+    assert main(["probe", "--tank", "50cm", "--depth", "archimedes", "--seed", "9"]) == 0
     assert seen[-1].tank.diameter_m == 0.5
     assert seen[-1].block.depth == "archimedes"
     assert seen[-1].simulation.seed == 9
@@ -213,7 +213,7 @@ def test_options_reach_the_study(
         (["--force-std", "12px"], "--force-std"),
         (["--force-std", "5s"], "'s' measures something else"),
         (["--force-std", "-1mN"], "--force-std over the default study: [forces] force_std_N: must"),
-        (["--tank-diameter", "1cm"], "--tank-diameter over the default study: the block does not"),
+        (["--tank", "1cm"], "--tank over the default study: the block does not"),
         (["--seed", "x"], "--seed"),
     ],
 )
@@ -233,7 +233,7 @@ def test_every_option_sets_a_parameter_that_exists() -> None:
     for name, key in (*STUDY_KEYS.items(), *CALIBRATION_KEYS.items()):
         section, _, field = key.partition(".")
         assert field in type(getattr(Study(), section)).model_fields, key
-        assert option_name(key) == f"--{name.replace('_', '-')}"
+        assert option_name(key) == option_of(name)
     assert option_name("block.depth_m") == "--depth"
     assert study_overrides(keys=CALIBRATION_KEYS, seed=3) == {"calibration.seed": 3}
 

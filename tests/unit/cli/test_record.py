@@ -1,4 +1,4 @@
-"""`driftwalk info` and `driftwalk convert`."""
+"""`driftwalk info` and `driftwalk read`."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def recording(tmp_path: Path) -> Path:
 
 
 def test_info_as_json(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    options = ["--metres-per-pixel", "1mm", "--from", "1s", "--to", "8s", "--tank-diameter", "30cm"]
+    options = ["--scale", "1mm", "--from", "1s", "--to", "8s", "--tank", "30cm"]
     assert main(["info", str(recording), *options, "--json"]) == 0
     described = json.loads(capsys.readouterr().out)
     assert described["arena"]["diameter_m"] == 0.3
@@ -35,7 +35,7 @@ def test_info_as_json(recording: Path, capsys: pytest.CaptureFixture[str]) -> No
 
 
 def test_info_as_a_table(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["info", str(recording), "--metres-per-pixel", "1mm", "--arena", "fit"]) == 0
+    assert main(["info", str(recording), "--scale", "1mm", "--tank", "fit"]) == 0
     captured = capsys.readouterr()
     lines = {line[:32].strip(): line for line in captured.out.splitlines()}
     assert lines["samples left"].split()[-1] == "100"
@@ -55,13 +55,13 @@ def test_convert_to_both_formats(
     recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out.nc"
-    convert = ["convert", str(recording), str(out), "--metres-per-pixel", "0.001"]
+    convert = ["read", str(recording), "-o", str(out), "--scale", "0.001"]
     assert main([*convert, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["samples"] == 100
     assert main(convert) == 2
     assert "exists already" in capsys.readouterr().err
     assert main([*convert, "--overwrite"]) == 0
-    assert main(["convert", str(out), str(tmp_path / "out.csv")]) == 0
+    assert main(["read", str(out), "-o", str(tmp_path / "out.csv")]) == 0
     first, second = load(out), load(tmp_path / "out.csv")
     for name in ("time", "x", "y", "theta"):
         np.testing.assert_array_equal(first[name].values, second[name].values)
@@ -70,12 +70,11 @@ def test_convert_to_both_formats(
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ([], "--metres-per-pixel"),
-        (["--metres-per-pixel", "1mm", "--frame-rate", "25"], "--frame-rate"),
-        (["--metres-per-pixel", "1mm", "--arena", "fit", "--tank-diameter", "1"], "not both"),
-        (["--metres-per-pixel", "1mm", "--columns", "x"], "--columns takes"),
-        (["--metres-per-pixel", "1mm", "--format", "nothing"], "unknown --format"),
-        (["--metres-per-pixel", "1mm", "--y-axis", "left"], "--y-axis"),
+        ([], "--scale"),
+        (["--scale", "1mm", "--fps", "25"], "--fps"),
+        (["--scale", "1mm", "--columns", "x"], "--columns takes"),
+        (["--scale", "1mm", "--format", "nothing"], "unknown --format"),
+        (["--scale", "1mm", "--y-axis", "left"], "--y-axis"),
     ],
 )
 def test_a_mistake_is_one_line_and_code_2(
@@ -101,7 +100,7 @@ def test_columns_delimiter_and_sort_on_the_command_line(
 def test_matrices_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for name in ("x", "y", "theta"):
         (tmp_path / f"{name}.csv").write_text("0.1,0.2\n0.3,0.4\n")
-    options = ["--x", "x.csv", "--y", "y.csv", "--theta", "theta.csv", "--frame-rate", "120"]
+    options = ["--x", "x.csv", "--y", "y.csv", "--theta", "theta.csv", "--fps", "120"]
     assert main(["info", str(tmp_path), *options, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["format"] == "matrices"
 

@@ -18,7 +18,7 @@ from driftwalk.cli.options.shared import Json
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.core import study_keys
 from driftwalk.core.errors import ConfigurationError
-from driftwalk.core.study_keys import FIT_KEYS, RECOVER_KEYS, STUDY_KEYS
+from driftwalk.core.study_keys import FIT_KEYS, RECOVER_KEYS, STUDY_KEYS, option_of
 from driftwalk.model import Study, declared
 from driftwalk.model.section import SMALLEST
 
@@ -42,7 +42,7 @@ def probe() -> Any:
         module = ModuleType("driftwalk.cli.probe")
         module.probe = command  # type: ignore[attr-defined]
         patch.setitem(sys.modules, "driftwalk.cli.probe", module)
-        patch.setitem(cli_main.COMMANDS, "probe", Command("probe", "probe", "Probe."))
+        patch.setitem(cli_main.COMMANDS, "probe", Command("Fit", "Probe.", "probe", "probe"))
         assert main(["probe", *words]) == (0 if seen else 2)
         return seen[0] if seen else StudyOptions(None, {}, keys)
 
@@ -62,7 +62,7 @@ def test_what_is_typed_reaches_the_key(
 ) -> None:
     keys = TABLES[table]
     typed, expected = data.draw(values_of(keys[name]))
-    given = probe(keys, f"--{name.replace('_', '-')}", typed, *with_it(keys, name))
+    given = probe(keys, option_of(name), typed, *with_it(keys, name))
     section, _, key = keys[name].partition(".")
     if key == "depth" and not isinstance(expected, str):
         key = "depth_m"
@@ -75,7 +75,7 @@ def with_it(keys: Mapping[str, str], name: str) -> list[str]:
     if name == "flow_labels" and keys is FIT_KEYS:
         return ["--switching-times", "1,2"]
     if name == "side":
-        return ["--tank-diameter", "900"]
+        return ["--tank", "900"]
     return ["--force-interval", "10"] if name == "time_step" else []
 
 
@@ -140,9 +140,9 @@ def test_the_study_file_is_read_and_named(
     assert given.states_tank
     assert (given.study().tank.diameter_m, given.study().block.mass_kg) == (0.4, 0.012)
     assert not probe(STUDY_KEYS, "--mass", "12g").states_tank
-    assert probe(STUDY_KEYS, "--tank-diameter", "50cm").states_tank
-    probe(STUDY_KEYS, "--study", str(path), "--tank-diameter", "1cm")
-    assert f"--tank-diameter over {path}: " in capsys.readouterr().err
+    assert probe(STUDY_KEYS, "--tank", "50cm").states_tank
+    probe(STUDY_KEYS, "--study", str(path), "--tank", "1cm")
+    assert f"--tank over {path}: " in capsys.readouterr().err
 
 
 def test_an_option_may_be_repeated_for_a_list(probe: Run) -> None:

@@ -39,12 +39,12 @@ def test_study_stands_in_for_options_that_are_not_given(asked: dict[str, Any]) -
             "frame_rate_Hz": 25,
         }
     )
-    load_with_study(Path("a.csv"), study, RecordingOptions(body="b", frame_rate=50.0).arguments())
+    load_with_study(Path("a.csv"), study, RecordingOptions(body="b", fps=50.0).arguments())
     assert (asked["path"], asked["body"], asked["frame_rate"]) == (Path("a.csv"), "b", 50.0)
     assert (asked["format"], asked["start"], asked["sort"]) == ("table", 1.0, "sort")
     assert asked["columns"] == {"x": "2", "y": "py:mm"}
     assert (asked["x"], asked["tank"], asked["block"]) == ("x.csv", "circle:0.3", None)
-    load_with_study(Path("a.csv"), study, RecordingOptions(arena="fit").arguments())
+    load_with_study(Path("a.csv"), study, RecordingOptions(tank="fit").arguments())
     assert (asked["tank"], asked["block"]) == ("fit", 0.03)
 
 

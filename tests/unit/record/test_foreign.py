@@ -64,7 +64,7 @@ FILES = {
     "confusing": "[confusing\n",
     "table": "t,x,y\n0,1,2\n1,1,3\n",
 }
-OPTIONS = ("--frame-rate", "10", "--metres-per-pixel", "0.01")
+OPTIONS = ("--fps", "10", "--scale", "0.01")
 
 
 def package(folder: Path) -> Path:

@@ -25,7 +25,7 @@ def jerky_path() -> np.ndarray:
 @pytest.mark.parametrize("px_per_m", [20.0, 500.0, 1500.0, 50_000.0])
 def test_what_is_kept_does_not_depend_on_the_scale(px_per_m: float) -> None:
     """A body that starts and turns at once, alone in the picture, loses no sample at any scale."""
-    options = TrackingOptions(source="video", markers="blob", px_per_m=px_per_m, bodies=1)
+    options = TrackingOptions(source="video", markers="blob", scale=1 / px_per_m, bodies=1)
     camera = dw.track.Camera.from_scale(640, 480, px_per_m=px_per_m)
     tracker = tracker_for(options, camera, None)
     spread = np.diag([0.1, 0.1, np.nan]) / px_per_m**2

@@ -24,7 +24,9 @@ FOUND_BY_A_RUN: Final = (
 )
 SEARCHED: Final = FOUND_BY_A_RUN[:2]
 """Parameters that a run finds: a study file may hold any value for them."""
-RUN_HELP: Final = "Run directory of a finished fit, calibration or comparison of models."
+RUN_HELP: Final = (
+    "Run directory of a finished fit, calibration or comparison of models, or its dataset."
+)
 CONNECTOR: Final = ("assembly.connector_distance_m", "assembly.connector_axis_rad")
 """Parameters of the latching rule "connector" alone."""
 RUN_NAMES: Final = (

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from driftwalk.cli.options.recording import RecordingOptions, parse_pairs
+from driftwalk.cli.options.recording import RecordingOptions, parse_pairs, tank_text
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -21,7 +21,6 @@ def read_flow_file(
     *,
     frame_interval: float | None,
     variables: str | None,
-    tank_diameter: float | None,
 ) -> xr.Dataset | None:
     """Load a flow field in the frame of its tank; None of a recording.
 
@@ -30,19 +29,16 @@ def read_flow_file(
     path : Path
         Any file. It is a recording where an option says how to read one.
     how : RecordingOptions
-        Its scale, unit, direction of y and arena.
+        Its scale, unit, direction of y and tank.
     frame_interval : float or None
         Time between the two images of a pair [s].
     variables : str or None
         ``u=NAME,v=NAME`` of a NetCDF file.
-    tank_diameter : float or None
-        Diameter of a round tank [m], as ``--arena circle:D``.
 
     Raises
     ------
     InputError
-        When the field cannot be read, the centre of the tank is not stated, ``--arena`` and
-        ``--tank-diameter`` are both given, or ``--frame-interval`` for a recording.
+        When the field cannot be read, or ``--frame-interval`` is given for a recording.
     """
     from driftwalk.flow import flow_format
 
@@ -54,7 +50,7 @@ def read_flow_file(
                 f"{path}: --frame-interval is for a flow field, and this is read as a recording"
             )
         return None
-    return _load(path, how, frame_interval, variables, tank_diameter)
+    return _load(path, how, frame_interval, variables)
 
 
 def _load(
@@ -62,20 +58,17 @@ def _load(
     how: RecordingOptions,
     frame_interval: float | None,
     variables: str | None,
-    tank_diameter: float | None,
 ) -> xr.Dataset:
     from driftwalk.flow import load_flow
 
     values: dict[str, Any] = {
-        "metres_per_pixel": how.metres_per_pixel,
+        "metres_per_pixel": how.scale,
         "frame_interval": frame_interval,
         "length_unit": how.length_unit,
         "y_axis": how.y_axis,
         "variables": None if variables is None else parse_pairs([variables], "--flow-variables"),
     }
-    if how.arena is not None and tank_diameter is not None:
-        raise InputError("give --arena or --tank-diameter, not both")
-    tank = how.arena if tank_diameter is None else f"circle:{tank_diameter!r}"
+    tank = None if how.tank is None else tank_text(how.tank)
     return load_flow(path, **values, **({} if tank is None else _placed(tank)))
 
 
@@ -88,7 +81,7 @@ def _placed(tank: str) -> dict[str, Any]:
     if not stated and kind != "fit":
         tank = f"{tank}@0,0"
     elif kind == "fit":
-        raise InputError("--arena fit is for recordings: state the tank, as in circle:D@X,Y")
+        raise InputError("--tank fit is for recordings: state the tank, as in 40cm@X,Y")
     # Its centre is stated, so that no positions have to say where it is.
     nowhere = np.empty(0)
     placed = place_arena(tank, nowhere, nowhere)

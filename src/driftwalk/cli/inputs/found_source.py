@@ -45,7 +45,12 @@ class FoundSource:
 
     def study(self) -> Study:
         """Return the study of the run, with the options over it."""
-        own = self.found.block_study() if self.is_block else self.found.study()
+        if self.is_block:
+            own = self.found.block_study()
+        elif self.given.file is not None or not self.found.has_study:
+            return self.given.study()
+        else:
+            own = self.found.study()
         return self.given.over(own, base=f"the study of {self.folder}")
 
     def block(self, flow: Path | None) -> tuple[Study, xr.Dataset]:
@@ -62,22 +67,20 @@ class FoundSource:
         return self.found.flow(study) if model.needs_flow else None
 
 
-def open_run(
-    folder: Path, given: StudyOptions, model: str | None, parameters_from: Path | None
-) -> FoundSource:
+def open_run(folder: Path, given: StudyOptions, model: str | None) -> FoundSource:
     """Return a run that the user has named as the model.
 
     Raises
     ------
     InputError
-        When it cannot be used, or another option says the model too.
+        When it cannot be used, or an option contradicts it.
     """
     from driftwalk.runs import read_found
 
-    if parameters_from is not None:
-        raise InputError(f"{folder} and --parameters-from both give the values: leave one out")
-    refuse_found(folder, given.overrides, also=[] if given.file is None else ["--study"])
     source = FoundSource(folder, read_found(folder), given)
+    # The values of another model hold in any study; those of the block belong to its own.
+    own = source.is_block and given.file is not None
+    refuse_found(folder, given.overrides, also=["--study"] if own else [])
     if model is not None and source.found.kind in ("fit", "calibration") and source.is_block:
         raise InputError(f"{folder} is about the block, and not about {model}: leave out --model")
     return source

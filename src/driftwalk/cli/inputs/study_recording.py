@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 from driftwalk.cli.inputs.assembly_source import load_flow_for
 from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.recording import RecordingOptions
-from driftwalk.cli.options.study import StudyOptions, option_name
+from driftwalk.cli.options.study import TANK, StudyOptions, option_name
 from driftwalk.cli.terminal.output import print_note
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def read_for_run(
     """
     from driftwalk.conditions import read_recordings
 
-    said = given.states_tank or how.arena is not None
+    said = given.states_tank or how.tank is not None
     with explained():
         return read_recordings(
             paths,
@@ -122,8 +122,8 @@ def words_to_fit(trajectory: xr.Dataset, described: Mapping[str, Any] | None = N
     Returns
     -------
     list of str
-        A body where there are several. Where nothing states the tank, ``--arena fit`` if the
-        positions show it; otherwise, if the default one does not hold them, ``--tank-diameter
+        A body where there are several. Where nothing states the tank, ``--tank fit`` if the
+        positions show it; otherwise, if the default one does not hold them, ``--tank
         DIAMETER``, which only the user can fill in.
     """
     from driftwalk.conditions import require_inside
@@ -139,11 +139,11 @@ def words_to_fit(trajectory: xr.Dataset, described: Mapping[str, Any] | None = N
     found = described if described is not None else describe(trajectory)
     circle = found["bodies"][names[0]]["circle_of_centers"]
     if circle and circle["sectors_visited_share"] >= FIT_TANK:
-        return [*words, "--arena", "fit"]
+        return [*words, "--tank", "fit"]
     try:
         require_inside(Study(), trajectory, names[0])
     except InputError:
-        return [*words, "--tank-diameter", "DIAMETER"]
+        return [*words, "--tank", "DIAMETER"]
     return words
 
 
@@ -152,6 +152,7 @@ def opening_note(
     given: StudyOptions,
     *,
     about: About,
+    how: RecordingOptions | None = None,
     otherwise: str = "recording",
     warnings: Sequence[str] = (),
 ) -> Callable[[], None]:
@@ -165,6 +166,8 @@ def opening_note(
         The options and the study file.
     about : {"tank", "block", "simulation"}
         As in `driftwalk.conditions.unstated_warning`.
+    how : RecordingOptions, optional
+        How the recording is read.
     otherwise : str
         Who stated what neither an option nor the study file does.
     warnings : sequence of str
@@ -178,7 +181,9 @@ def opening_note(
     def stated(key: str, text: str) -> str:
         same = ("block.depth", "block.depth_m") if key == "block.depth_m" else (key,)
         option = next((one for one in same if one in given.overrides), None)
-        if option is not None:
+        if key == TANK and how is not None and how.tank is not None:
+            source = "--tank"
+        elif option is not None:
             source = option_name(option, keys=given.keys)
         elif is_stated(file, key):
             source = str(given.file)

@@ -18,7 +18,7 @@ ClusterAt = Annotated[
         "--cluster",
         metavar="local:N|tcp://HOST:PORT|slurm:N",
         help="Workers that compute: N processes here, a Dask scheduler, or N jobs of slurm (pbs, "
-        "sge, lsf, oar, moab, htcondor). Needs driftwalk\\[cluster].",
+        "sge, lsf, oar, moab, htcondor). Needs driftwalk[cluster].",
         show_default=False,
     ),
 ]

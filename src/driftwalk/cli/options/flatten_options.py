@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable, Mapping
+from dataclasses import MISSING, fields
 from typing import Any, NamedTuple, get_type_hints
 
 Command = Callable[..., Any]
@@ -66,3 +67,22 @@ def spread(
     command.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
     command.__annotations__ = {item.name: item.annotation for item in parameters}
     return command
+
+
+def with_options(kind: Any, *names: str) -> Callable[[Command], Command]:
+    """Spread a command's parameter of a dataclass into an option per field, or per named field.
+
+    A field is annotated with its option, whose default is that of the field.
+    """
+    hints = get_type_hints(kind, include_extras=True)
+    required = inspect.Parameter.empty
+    defaults = {
+        one.name: required if one.default is MISSING else one.default for one in fields(kind)
+    }
+    parts = {
+        name: Part(hints[name], default)
+        for name, default in defaults.items()
+        if not names or name in names
+    }
+    absent = {name: None for name in defaults.keys() - parts.keys() if defaults[name] is required}
+    return lambda function: spread(function, kind, parts, lambda given: kind(**absent, **given))

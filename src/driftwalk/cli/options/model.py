@@ -66,18 +66,6 @@ PlayedParameters = Annotated[
         show_default=False,
     ),
 ]
-ParametersFrom = Annotated[
-    Path | None,
-    typer.Option(
-        "--parameters-from",
-        metavar="RUN",
-        help="Run directory of calibrate or compare-models, or its dataset, with the values of "
-        "--model; --parameter goes over it.",
-        show_default=False,
-    ),
-]
-
-
 KnownParameters = Annotated[
     list[str] | None,
     typer.Option(
@@ -174,7 +162,7 @@ def playable_model(
 
 
 def partly_known_model(
-    name: str, choices: Sequence[str] | None, place: Path | None, known: Sequence[str] | None
+    name: str | None, choices: Sequence[str] | None, place: Path | None, known: Sequence[str] | None
 ) -> KnownModel:
     """Return a motion model that knows some of its parameters, with the values of the others.
 
@@ -201,7 +189,7 @@ def partly_known_model(
     options: dict[str, Any] = {"clearance": clearance} if clearance else {}
     options |= {one: values[one] for one in known}
     left = {one: value for one, value in values.items() if one not in known}
-    return KnownModel(motion_model(name, **options), left, found.warnings)
+    return KnownModel(motion_model(name or found.model.name, **options), left, found.warnings)
 
 
 def chosen_model(name: str | None, choices: Sequence[str] | None) -> MotionModel | None:

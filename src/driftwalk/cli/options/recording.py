@@ -10,160 +10,164 @@ A command has one parameter of type `RecordingOptions` and the decorator spreads
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
-from driftwalk.cli.options.flatten_options import Command, Part, spread
-from driftwalk.cli.options.shared import quantity_parser
+from driftwalk.cli.options.flatten_options import with_options
+from driftwalk.cli.options.shared import option, scale_option
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
 
 PANEL = "How to read the recording"
+_ARGUMENTS = {"fps": "frame_rate", "scale": "metres_per_pixel"}
+"""Fields that have another name in `driftwalk.load`."""
+_option = partial(option, panel=PANEL)
 RecordingFile = Annotated[
     Path, typer.Argument(metavar="RECORDING", help="Recording, in any readable format.")
 ]
 
 
-def _option(name: str, help: str, *, metavar: str = "", unit: str = "") -> Any:
-    return typer.Option(
-        name,
-        help=help,
-        metavar=metavar or (f"<{unit}>" if unit else None),
-        parser=quantity_parser(unit) if unit else None,
-        rich_help_panel=PANEL,
-        show_default=False,
-    )
-
-
 @dataclass(frozen=True)
 class RecordingOptions:
-    """How to read a recording; the fields are the options, with the words of `driftwalk.load`."""
+    """How to read a recording; the fields are the options."""
 
     format: Annotated[
-        str | None, _option("--format", "Format of the file (default: recognised by content).")
+        str | None,
+        _option("--format", help="Format of the file (default: recognised by content)."),
     ] = None
-    body: Annotated[str | None, _option("--body", "Body to keep, or all.", metavar="NAME|all")] = (
-        None
-    )
-    start: Annotated[float | None, _option("--from", "First time to keep.", unit="s")] = None
-    stop: Annotated[float | None, _option("--to", "Last time to keep.", unit="s")] = None
-    arena: Annotated[
+    body: Annotated[
+        str | None, _option("--body", help="Body to keep, or all.", metavar="NAME|all")
+    ] = None
+    start: Annotated[float | None, _option("--from", help="First time to keep.", unit="s")] = None
+    stop: Annotated[float | None, _option("--to", help="Last time to keep.", unit="s")] = None
+    tank: Annotated[
         str | None,
         _option(
-            "--arena",
-            "Arena; @X,Y after a size gives its centre in metres.",
-            metavar="circle:D|rect:WxH|polygon:FILE|fit",
+            "--tank",
+            help="Tank: the diameter (40cm), two sides (60cmx40cm), or fit; @X,Y after a size "
+            "gives its centre in metres.",
+            metavar="D|WxH|polygon:FILE|fit",
         ),
     ] = None
-    frame_rate: Annotated[
+    fps: Annotated[
         float | None,
-        _option("--frame-rate", "Frames per second, for files that count frames.", unit="Hz"),
+        _option("--fps", help="Frames per second, if the file counts frames.", unit="Hz"),
     ] = None
-    metres_per_pixel: Annotated[
-        float | None, _option("--metres-per-pixel", "Scale of positions in pixels.", unit="m")
-    ] = None
+    scale: Annotated[float | None, scale_option(PANEL)] = None
     length_unit: Annotated[
         str | None,
         _option(
-            "--length-unit", "Unit of positions, if the file names none.", metavar="m|cm|mm|um|px"
+            "--length-unit",
+            help="Unit of positions, if the file names none.",
+            metavar="m|cm|mm|um|px",
         ),
     ] = None
     y_axis: Annotated[
         str | None,
-        _option("--y-axis", "Direction of y and of angles in the file.", metavar="up|down"),
+        _option("--y-axis", help="Direction of y and of angles in the file.", metavar="up|down"),
     ] = None
     max_speed: Annotated[
         float | None,
         _option(
             "--max-speed",
-            "Fastest plausible speed; the fewest samples without which it is kept become gaps.",
+            help="Fastest plausible speed; the fewest samples without which it is kept become "
+            "gaps.",
             unit="m/s",
         ),
     ] = None
     sort: Annotated[
-        bool, _option("--sort", "Sort times that go backwards (default: refuse them).")
+        bool, _option("--sort", help="Sort times that go backwards (default: refuse them).")
     ] = False
     columns: Annotated[
         list[str] | None,
         _option(
             "--columns",
-            "Columns of a plain table by name or number from 1, with an optional "
-            ":unit. Repeatable.",
+            help="Columns of a plain table by name or number from 1, with an optional :unit. "
+            "Repeatable.",
             metavar="t=NAME,x=NAME,y=NAME",
         ),
     ] = None
     delimiter: Annotated[
         str | None,
-        _option("--delimiter", "Character between fields, or tab or space (default: recognised)."),
+        _option(
+            "--delimiter",
+            help="Character between fields, or tab or space (default: recognised).",
+            metavar="CHARACTER",
+        ),
     ] = None
     up: Annotated[
         str | None,
         _option(
             "--up",
-            "Axis of a file in space that points up (default: as its format has it).",
+            help="Axis of a file in space that points up (default: as its format has it).",
             metavar="x|y|z|-x|-y|-z",
         ),
     ] = None
     topic: Annotated[
         str | None,
-        _option("--topic", "Topic of a ROS bag, or several with commas.", metavar="NAME[,NAME]"),
+        _option(
+            "--topic", help="Topic of a ROS bag, or several with commas.", metavar="NAME[,NAME]"
+        ),
     ] = None
     header_line: Annotated[
         int | None,
-        typer.Option(
+        _option(
             "--header-line",
-            min=1,
             help="Line of a plain table, from 1, that names its columns.",
-            rich_help_panel=PANEL,
-            show_default=False,
+            metavar="N",
+            min=1,
         ),
     ] = None
     sheet: Annotated[
         str | None,
         _option(
             "--sheet",
-            "Sheet of a workbook, by name or number from 1, or variable of a MATLAB file.",
+            help="Sheet of a workbook, by name or number from 1, or variable of a MATLAB file.",
             metavar="NAME",
         ),
     ] = None
     x: Annotated[
-        Path | None, _option("--x", "Matrix of x: a row per frame, a column per body.")
+        Path | None,
+        _option("--x", help="Matrix of x: a row per frame, a column per body.", metavar="FILE"),
     ] = None
-    y: Annotated[Path | None, _option("--y", "Matrix of y.", metavar="FILE")] = None
-    theta: Annotated[Path | None, _option("--theta", "Matrix of angles.", metavar="FILE")] = None
+    y: Annotated[Path | None, _option("--y", help="Matrix of y.", metavar="FILE")] = None
+    theta: Annotated[Path | None, _option("--theta", help="Matrix of angles.", metavar="FILE")] = (
+        None
+    )
     keypoint: Annotated[
-        str | None, _option("--keypoint", "Keypoint of a pose file that is the body.")
+        str | None,
+        _option("--keypoint", help="Keypoint of a pose file that is the body.", metavar="NAME"),
     ] = None
     heading: Annotated[
         str | None,
         _option(
             "--heading",
-            "Two keypoints, or bodies that are markers of one: the angle from one to the other.",
+            help="Two keypoints, or bodies that are markers of one: the angle from one to the "
+            "other.",
             metavar="FROM,TO",
         ),
     ] = None
     min_confidence: Annotated[
         float | None,
-        typer.Option(
+        _option(
             "--min-confidence",
-            min=0.0,
             help="Keypoints seen with less confidence are missing (default: that of the format).",
-            rich_help_panel=PANEL,
-            show_default=False,
+            metavar="SHARE",
+            min=0.0,
         ),
     ] = None
     replicate: Annotated[
         int | None,
-        typer.Option(
+        _option(
             "--replicate",
-            min=0,
             help="Replicate of a simulation, counted from 0 (default: the first).",
-            rich_help_panel=PANEL,
-            show_default=False,
+            metavar="N",
+            min=0,
         ),
     ] = None
 
@@ -178,9 +182,9 @@ class RecordingOptions:
             given["columns"] = parse_columns(self.columns)
         if self.heading:
             given["heading"] = self.heading.split(",")
-        if self.arena:
-            given["tank"] = given.pop("arena")
-        return given
+        if self.tank:
+            given["tank"] = tank_text(self.tank)
+        return {_ARGUMENTS.get(name, name): value for name, value in given.items()}
 
     def words(self) -> list[str]:
         """Return the options that are given, as a user types them."""
@@ -198,39 +202,37 @@ class RecordingOptions:
                     words += [name, text]
         return words
 
-    def load(
-        self, path: Path, *, tank_diameter: float | None = None, side: float | None = None
-    ) -> xr.Dataset:
-        """Load the recording.
-
-        Parameters
-        ----------
-        path : Path
-            The recording.
-        tank_diameter : float, optional
-            Diameter of a round tank [m], as ``--arena circle:D``.
-        side : float, optional
-            Side of the block [m], for ``--arena fit``.
+    def load(self, path: Path, *, side: float | None = None) -> xr.Dataset:
+        """Load the recording; a block's side [m] is for a tank that is fitted.
 
         Raises
         ------
         InputError
             As `driftwalk.load`, and it says what a file is that is no recording; when no row holds
-            a position; when ``--arena`` and ``--tank-diameter`` are both given.
+            a position.
         """
         from driftwalk.cli.inputs.other_files import explained
         from driftwalk.conditions import require_positions
         from driftwalk.record import load
 
         values = self.arguments()
-        if tank_diameter is not None:
-            if self.arena is not None:
-                raise InputError("give --arena or --tank-diameter, not both")
-            values["tank"] = f"circle:{tank_diameter!r}"
         with explained():
             recording = load(path, block=side if values.get("tank") == "fit" else None, **values)
         require_positions(recording, where=path)
         return recording
+
+
+def tank_text(text: str) -> str:
+    """Return a tank as `driftwalk.load` takes it; a bare size is that of a circle or a rectangle.
+
+    Examples
+    --------
+    >>> tank_text("40cm"), tank_text("60cmx40cm@0,0"), tank_text("fit")
+    ('circle:40cm', 'rect:60cmx40cm@0,0', 'fit')
+    """
+    if text == "fit" or ":" in text:
+        return text
+    return f"rect:{text}" if "x" in text.partition("@")[0] else f"circle:{text}"
 
 
 def parse_columns(texts: list[str]) -> dict[str, str]:
@@ -262,10 +264,5 @@ def parse_pairs(texts: list[str], option: str) -> dict[str, str]:
     return pairs
 
 
-def with_recording_options(function: Command) -> Command:
-    """Spread a command's parameter of type `RecordingOptions` into one option per field."""
-    hints = get_type_hints(RecordingOptions, include_extras=True)
-    parts = {
-        field.name: Part(hints[field.name], field.default) for field in fields(RecordingOptions)
-    }
-    return spread(function, RecordingOptions, parts, lambda given: RecordingOptions(**given))
+with_recording_options = with_options(RecordingOptions)
+"""Spreads a command's parameter of type `RecordingOptions` into one option per field."""

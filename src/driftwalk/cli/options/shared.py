@@ -43,13 +43,43 @@ def quantity_parser(unit: str, *words: str) -> Callable[[str], Any]:
     return parse
 
 
+def option(
+    *names: str, help: str, panel: str = PANEL, metavar: str = "", unit: str = "", **more: Any
+) -> Any:
+    """Return the declaration of an option; with a unit, of one that takes a quantity."""
+    return typer.Option(
+        *names,
+        help=help,
+        metavar=metavar or (f"<{unit}>" if unit else None),
+        parser=quantity_parser(unit) if unit else None,
+        rich_help_panel=panel,
+        show_default=False,
+        **more,
+    )
+
+
 def quantity_option(name: str, unit: str, help: str, *, panel: str = PANEL) -> Any:
     """Return the declaration of an option that takes a quantity."""
+    return option(name, help=help, panel=panel, unit=unit)
+
+
+def parse_scale(text: Any) -> Any:
+    """Return the metres that a pixel spans, from ``0.5mm`` or ``2000px/m``."""
+    if isinstance(text, str) and text.endswith("px/m"):
+        pixels = quantity_parser("1")(text.removesuffix("px/m"))
+        if not pixels > 0.0:
+            raise typer.BadParameter(f"a scale is above zero, got {text}")
+        return 1.0 / pixels
+    return quantity_parser("m")(text)
+
+
+def scale_option(panel: str) -> Any:
+    """Return the declaration of the option for the scale of an image."""
     return typer.Option(
-        name,
-        parser=quantity_parser(unit),
-        metavar=f"<{unit}>",
-        help=help,
+        "--scale",
+        help="Size of a pixel, such as 0.5mm or 2000px/m.",
+        metavar="<m>",
+        parser=parse_scale,
         rich_help_panel=panel,
         show_default=False,
     )
@@ -115,7 +145,11 @@ RunFolder = Annotated[
 Threads = Annotated[
     int | None,
     typer.Option(
-        "--threads", min=1, help="Worker threads (default: all cores).", show_default=False
+        "--threads",
+        min=1,
+        metavar="N",
+        help="Worker threads (default: all cores).",
+        show_default=False,
     ),
 ]
 Overwrite = Annotated[

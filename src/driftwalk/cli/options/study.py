@@ -3,7 +3,7 @@
 A command says once which keys its options set, by their names in `driftwalk.core.study_keys`; unit,
 words, bounds and meaning of an option are those that the study declares of the key::
 
-    @with_study_options(FIT_KEYS, "tank_diameter", "side")
+    @with_study_options(FIT_KEYS, "side", "mass")
     def fit(given: StudyOptions, json: Json = False) -> None:
         chosen = given.study()
 
@@ -23,7 +23,7 @@ from driftwalk.cli.options.flatten_options import Command, Part, spread
 from driftwalk.cli.options.shared import PANEL, StudyFile, quantity_parser
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.core.errors import ConfigurationError
-from driftwalk.core.study_keys import CALIBRATION_KEYS, STUDY_KEYS, study_overrides
+from driftwalk.core.study_keys import CALIBRATION_KEYS, STUDY_KEYS, option_of, study_overrides
 from driftwalk.model import Declaration, declared
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ class StudyOptions:
         Examples
         --------
         >>> StudyOptions(None, {"tank.diameter_m": 0.3}, STUDY_KEYS).words("tank_diameter", "side")
-        ['--tank-diameter', '0.3']
+        ['--tank', '0.3']
         """
         words = [] if self.file is None else ["--study", str(self.file)]
         for key in (self.keys[name] for name in names):
@@ -161,7 +161,7 @@ def study_option(name: str, keys: Mapping[str, str] = STUDY_KEYS) -> Any:
     quantity = None if key.is_list else key.quantity
     is_whole = quantity is not None and quantity.whole
     return typer.Option(
-        f"--{name.replace('_', '-')}",
+        option_of(name),
         metavar=_metavar(key),
         help=to_options(key.meaning),
         # The largest value is the study's to check: it says nothing to a reader of the help.
@@ -177,7 +177,7 @@ def option_name(key: str, *, keys: Mapping[str, str] = STUDY_KEYS) -> str:
     key = "block.depth" if key == "block.depth_m" else key
     known = (*keys.items(), *STUDY_KEYS.items(), *CALIBRATION_KEYS.items())
     names = [name for name, one in known if one == key]
-    return f"--{names[0].replace('_', '-')}" if names else key
+    return option_of(names[0]) if names else key
 
 
 def _part(name: str, keys: Mapping[str, str]) -> Part:
@@ -191,15 +191,15 @@ def _part(name: str, keys: Mapping[str, str]) -> Part:
 
 
 def _metavar(key: Declaration) -> str | None:
-    """Return the placeholder of the value in the help; typer has its own for a whole number."""
+    """Return the placeholder of the value in the help."""
     if key.placeholder:
         return key.placeholder
     if key.quantity is None:
         return "|".join(key.words) or None
-    unit = key.quantity.unit if key.quantity.unit != "1" else "number"
+    unit = key.quantity.unit if key.quantity.unit != "1" else "NUMBER"
     if key.is_list:
         return f"<{unit},{unit},...>"
-    return None if key.quantity.whole else f"<{'|'.join((*key.words, unit))}>"
+    return "N" if key.quantity.whole else f"<{'|'.join((*key.words, unit))}>"
 
 
 def _items(value: Any) -> Any:
@@ -209,5 +209,4 @@ def _items(value: Any) -> Any:
     return [item.strip() for text in value for item in text.split(",")]
 
 
-TankDiameter = Annotated[float | None, study_option("tank_diameter")]
 Side = Annotated[float | None, study_option("side")]

@@ -35,7 +35,7 @@ class Axis(NamedTuple):
 
 
 AXES: Final[dict[str, Axis]] = {
-    "tank-diameter": Axis("sensitivity.tank_diameter_m", "m"),
+    "tank": Axis("sensitivity.tank_diameter_m", "m"),
     "blocks": Axis("sensitivity.blocks", "1", whole=True),
     "flow": Axis("sensitivity.flow", ""),
     "latching": Axis("sensitivity.latching", ""),

@@ -14,7 +14,6 @@ from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.model import (
     KnownModel,
     ModelName,
-    ParametersFrom,
     PlayedParameters,
     playable_model,
 )
@@ -45,7 +44,6 @@ def play(
     flow: FlowFile = None,
     model: ModelName = None,
     parameters: PlayedParameters = None,
-    parameters_from: ParametersFrom = None,
     recording: Annotated[
         Path | None,
         typer.Option(
@@ -82,16 +80,16 @@ def play(
     from driftwalk.viewer import PlaySource, hello_line, require_server
 
     require_server()
-    found = None if run is None else open_run(run, given, model, parameters_from)
+    found = None if run is None else open_run(run, given, model)
     if model is not None or (found is not None and not found.is_block):
         if live is not None:
             raise InputError("--live publishes a tank of blocks: leave it out with another model")
-        known = playable_model(model, parameters, run or parameters_from)
+        known = playable_model(model, parameters, run)
         shown = _of_model(known, given, found, flow, recording, body)
         show(shown, host=host, port=port, open=open)
         return
-    if parameters or parameters_from is not None:
-        raise InputError("--parameter and --parameters-from belong to a --model")
+    if parameters:
+        raise InputError("--parameter belongs to a --model")
     bundled = not given.states_tank and flow is None and found is None
     if found is not None:
         chosen, field = found.block(flow)

@@ -14,7 +14,6 @@ from driftwalk.cli.inputs.study_recording import opening_note
 from driftwalk.cli.options.model import (
     KnownModel,
     ModelName,
-    ParametersFrom,
     ParameterValues,
     known_model,
 )
@@ -66,7 +65,6 @@ def simulate(
     ] = None,
     model: ModelName = None,
     parameters: ParameterValues = None,
-    parameters_from: ParametersFrom = None,
     like: Annotated[
         Path | None,
         typer.Option(
@@ -96,9 +94,10 @@ def simulate(
 ) -> None:
     """Simulate the motion of the block, or of another motion model.
 
-    With a RUN: its model, with the values, the study and the flow field of the run. With --model: a
-    body that moves by itself, or a model of one's own; every parameter gets a value. It starts
-    where the recording of --like does, otherwise anywhere in the tank, at rest.
+    With a RUN: its model, with the values, the study and the flow field of the run; --parameter
+    replaces a value. With --model alone: a body that moves by itself, or a model of your own; every
+    parameter needs a --parameter. The motion starts where the recording of --like does, otherwise
+    anywhere in the tank, at rest.
     """
     from driftwalk.core.files.atomic import write_atomic
     from driftwalk.motion import feels_others
@@ -112,14 +111,14 @@ def simulate(
     others = feels_others(model)
     kept = None if others else body
     recording = None if like is None else RecordingOptions(body=kept).load(like)
-    source = None if run is None else open_run(run, given, model, parameters_from)
+    source = None if run is None else open_run(run, given, model)
     if model is not None or (source is not None and not source.is_block):
         if backend != "cpu":
             raise InputError("--backend is for the block: leave it out with another model")
-        known = known_model(model, parameters, run or parameters_from)
+        known = known_model(model, parameters, run)
         result = _of_model(known, given, source, flow, recording, body)
-    elif parameters or parameters_from is not None:
-        raise InputError("--parameter and --parameters-from belong to a --model")
+    elif parameters:
+        raise InputError("--parameter belongs to a --model")
     else:
         result = _of_block(given, source, flow, recording, body, backend=backend)
     write_atomic(out, netcdf_bytes(result))

@@ -10,6 +10,7 @@ import typer
 
 from driftwalk.cli.main import paragraphs
 from driftwalk.cli.options.shared import Json, quantity_option
+from driftwalk.cli.terminal.help import HelpCommand, HelpGroup
 from driftwalk.cli.terminal.output import print_json, print_next, print_note, print_table
 from driftwalk.core.errors import FormatError, InputError
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 # Corners are found to a tenth of a pixel; farther off, the board or the lens is another one.
 _POOR_PX: Final = 1.0
-camera_app = typer.Typer(add_completion=False, help="Calibrate the camera.")
+camera_app = typer.Typer(add_completion=False, cls=HelpGroup)
 
 
 def calibrate(
@@ -116,7 +117,9 @@ def _read(path: Path) -> Any:
     return read_image(path)
 
 
-camera_app.command("calibrate", help=paragraphs(calibrate.__doc__ or ""))(calibrate)
+camera_app.command("calibrate", cls=HelpCommand, help=paragraphs(calibrate.__doc__ or ""))(
+    calibrate
+)
 
 
 @camera_app.callback()

@@ -80,15 +80,6 @@ def classify(
         float | None,
         _tolerance("--hold", "s", "Time for which an unseen block keeps its joins (default: 1s)."),
     ] = None,
-    run: Annotated[
-        int | None,
-        typer.Option(
-            "--run",
-            min=0,
-            help="Run of a simulated path.nc (default: its first).",
-            show_default=False,
-        ),
-    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -103,15 +94,15 @@ def classify(
     """Say what the blocks of a recording assembled into, and when.
 
     Blocks are joined if two faces stay close to each other and face each other. The outcome class
-    is the multiset of the shapes that they form. The side of the blocks is that of the study, by
-    default 3 cm.
+    is the multiset of the shapes that they form. The side of the blocks comes from the recording or
+    the study; the default is 3 cm.
     """
     from driftwalk.assembly import classify as classify_recording
     from driftwalk.core.files.atomic import require_target
 
     if out is not None:
         require_target(out, existing="replace" if overwrite else "error", endings=(".nc",))
-    recording, block_side, is_default = _load(poses, how, given, run)
+    recording, block_side, is_default = _load(poses, how, given)
     tolerances = {
         "join_distance": join_distance,
         "join_angle": join_angle,
@@ -169,9 +160,7 @@ def summarise(found: xr.Dataset) -> dict[str, Any]:
     }
 
 
-def _load(
-    path: Path, how: RecordingOptions, given: StudyOptions, run: int | None
-) -> tuple[xr.Dataset, float, bool]:
+def _load(path: Path, how: RecordingOptions, given: StudyOptions) -> tuple[xr.Dataset, float, bool]:
     """Return the recording or simulated run, the side of its blocks [m], and if it is a default."""
     from driftwalk.assembly import path_recording
     from driftwalk.conditions import load_with_study
@@ -179,15 +168,17 @@ def _load(
 
     simulated = _simulated_path(path)
     if simulated is not None:
-        chosen = int(simulated["run"][0]) if run is None else run
+        chosen = int(simulated["run"][0]) if how.replicate is None else how.replicate
         return path_recording(simulated, run=chosen), float(simulated.attrs["block_side_m"]), False
-    if run is not None:
-        raise InputError(f"{path}: --run is for a simulated path.nc of driftwalk assemble")
     if given.file is None:
         # Without a study nobody has said how large the tank is: the blocks need not fit into it.
         stated = given.overrides.get(STUDY_KEYS["side"])
         own = Block().side_m if stated is None else stated
-        return how.load(path, side=own), own, stated is None
+        recording = how.load(path, side=own)
+        # A circle that is fitted was widened by the default side, which the recording does not say.
+        if stated is None and how.tank != "fit" and "block_side_m" in recording.attrs:
+            return recording, float(recording.attrs["block_side_m"]), False
+        return recording, own, stated is None
     resolved = given.study()
     with explained():
         return load_with_study(path, resolved, how.arguments()), resolved.block.side_m, False

@@ -6,7 +6,7 @@ from typing import Any
 
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import FlowVariables, FrameInterval, Json
-from driftwalk.cli.options.study import Side, TankDiameter
+from driftwalk.cli.options.study import Side
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import print_json, print_next, print_note, print_table
 
@@ -80,7 +80,6 @@ _COUNTS = {
 def info(
     recording: RecordingFile,
     how: RecordingOptions,
-    tank_diameter: TankDiameter = None,
     side: Side = None,
     frame_interval: FrameInterval = None,
     flow_variables: FlowVariables = None,
@@ -100,12 +99,11 @@ def info(
         how,
         frame_interval=frame_interval,
         variables=flow_variables,
-        tank_diameter=tank_diameter,
     )
     if field is not None:
         _print_field(describe_field(field), json=json)
         return
-    trajectory = how.load(recording, tank_diameter=tank_diameter, side=side)
+    trajectory = how.load(recording, side=side)
     described = describe(trajectory)
     if json:
         print_json(described)
@@ -120,9 +118,8 @@ def info(
     _print_counts(described["counts"])
     for warning in described["warnings"]:
         print_note(f"warning: {warning}")
-    tank = [] if tank_diameter is None else ["--tank-diameter", f"{tank_diameter:.12g}"]
     block = [] if side is None else ["--side", f"{side:.12g}"]
-    words = [*how.words(), *tank, *block, *words_to_fit(trajectory, described)]
+    words = [*how.words(), *block, *words_to_fit(trajectory, described)]
     # A body that never moves cannot be fitted.
     if any(body["speed_max_m_s"] for body in described["bodies"].values()):
         print_next("fit", recording, *words, "-o", f"{recording.stem}-fit")
@@ -177,7 +174,7 @@ def _print_file(described: dict[str, Any]) -> None:
 def _arena_text(described: dict[str, Any]) -> str:
     arena = described["arena"]
     if arena is None:
-        return "not stated (--arena)"
+        return "not stated (--tank)"
     sizes = {
         "circle": lambda: f"circle, diameter {arena['diameter_m'] * 100:.4g} cm",
         "rectangle": lambda: (

@@ -8,8 +8,9 @@ from typing import Annotated, Any
 import typer
 
 from driftwalk.cli.main import paragraphs
-from driftwalk.cli.options import tracking as given
+from driftwalk.cli.options.flatten_options import with_options
 from driftwalk.cli.options.tracking import TrackingOptions
+from driftwalk.cli.terminal.help import HelpCommand, HelpGroup
 from driftwalk.cli.terminal.output import print_next, print_note, print_table
 from driftwalk.core.errors import DriftwalkError, InputError
 
@@ -17,17 +18,13 @@ _REMEDY = (
     "take a video in brighter, even light, with stronger colours on the discs, or a part of it in "
     "which several blocks are seen whole"
 )
-markers_app = typer.Typer(add_completion=False, help="Describe the markers on the blocks.")
+markers_app = typer.Typer(add_completion=False, cls=HelpGroup)
 
 
+@with_options(TrackingOptions, "source", "camera", "tank", "scale", "fps", "side")
 def teach(
-    source: given.SourceName,
+    options: TrackingOptions,
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.toml", help="File to write.")],
-    camera: given.CameraFile = None,
-    tank_diameter: given.Diameter = None,
-    px_per_m: given.PxPerM = None,
-    image_rate: given.ImageRate = None,
-    side: given.TaughtSide = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace files that exist.")
     ] = False,
@@ -44,15 +41,12 @@ def teach(
     require_target(out, existing=existing, endings=(".toml",))
     picture = out.with_suffix(".png")
     require_free(picture, existing=existing)
-    images = sample_images(source, 9, rate=image_rate)
-    options = TrackingOptions(
-        source, "", camera=camera, tank_diameter=tank_diameter, px_per_m=px_per_m
-    )
+    images = sample_images(options.source, 9, rate=options.fps)
     found = find_camera(options, images)
     try:
-        proposal = propose_markers(images, found, block_side=side)
+        proposal = propose_markers(images, found, block_side=options.side)
     except InputError as error:
-        raise InputError(f"{source}: {error}; {_REMEDY}") from None
+        raise InputError(f"{options.source}: {error}; {_REMEDY}") from None
     save_markers(out, proposal.marker)
     try:
         save_picture(picture, proposal.picture)
@@ -69,20 +63,20 @@ def teach(
     ]
     print_table(rows)
     print_note(f"wrote {out} and {picture}")
-    reach = marker.spacing_m + marker.size_m
+    reach, side = marker.spacing_m + marker.size_m, options.side
     if side is not None and reach > side:
         print_note(
             f"warning: the two discs reach over {1e3 * reach:.3g} mm, and the block's side is "
             f"{1e3 * side:.3g} mm: unless they lie along its diagonal the scale is wrong; check "
-            "--tank-diameter, --px-per-m or --camera"
+            "--tank, --scale or --camera"
         )
-    stated = (("camera", camera), ("tank-diameter", tank_diameter), ("px-per-m", px_per_m))
-    scale = [f"--{name}={value}" for name, value in stated if value is not None]
+    stated = {"camera": options.camera, "tank": options.tank, "scale": options.scale}
+    scale = [f"--{name}={value}" for name, value in stated.items() if value is not None]
     recording = out.with_suffix(".nc")
-    print_next("track", Path(source), "--markers", out, *scale, "-o", recording)
+    print_next("track", Path(options.source), "--markers", out, *scale, "-o", recording)
 
 
-markers_app.command("teach", help=paragraphs(teach.__doc__ or ""))(teach)
+markers_app.command("teach", cls=HelpCommand, help=paragraphs(teach.__doc__ or ""))(teach)
 
 
 @markers_app.callback()

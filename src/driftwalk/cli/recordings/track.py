@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from driftwalk.cli.options import tracking as given
+from driftwalk.cli.options.flatten_options import with_options
 from driftwalk.cli.options.shared import Json
 from driftwalk.cli.options.tracking import TrackingOptions
 from driftwalk.cli.terminal.output import print_json, print_next, print_note, print_table, sibling
@@ -16,9 +16,9 @@ from driftwalk.core.errors import InputError
 _SHOWN = {"duplicates": "doubled"}
 
 
+@with_options(TrackingOptions)
 def track(
-    source: given.SourceName,
-    markers: given.Markers,
+    options: TrackingOptions,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -29,21 +29,6 @@ def track(
             show_default=False,
         ),
     ] = None,
-    camera: given.CameraFile = None,
-    tank_diameter: given.Diameter = None,
-    px_per_m: given.PxPerM = None,
-    polarity: given.Polarity = None,
-    least_area_px: given.LeastArea = None,
-    most_area_px: given.MostArea = None,
-    image_rate: given.ImageRate = None,
-    bodies: given.Bodies = None,
-    max_speed: given.MaxSpeed = None,
-    lost_after: given.LostAfter = None,
-    side: given.BlockSide = None,
-    live: given.Live = None,
-    live_nmea: given.LiveNmea = None,
-    live_host: given.LiveHost = "127.0.0.1",
-    overlay: given.Overlay = None,
     explain: Annotated[
         int | None,
         typer.Option(
@@ -70,33 +55,14 @@ def track(
     from driftwalk.core.files.atomic import require_free, require_target
 
     existing = "replace" if overwrite else "error"
-    options = TrackingOptions(
-        source=source,
-        markers=markers,
-        camera=camera,
-        tank_diameter=tank_diameter,
-        px_per_m=px_per_m,
-        polarity=polarity,
-        least_area_px=least_area_px,
-        most_area_px=most_area_px,
-        image_rate=image_rate,
-        bodies=bodies,
-        max_speed=max_speed,
-        lost_after=lost_after,
-        side=side,
-        live=live,
-        live_nmea=live_nmea,
-        live_host=live_host,
-        overlay=overlay,
-    )
     if explain is not None:
         _explain(options, explain, out, existing)
         return
     if out is None:
         raise InputError("name the recording to write: -o recording.nc")
     require_target(out, existing=existing, endings=(".nc",))
-    if overlay is not None:
-        require_free(overlay, existing=existing)
+    if options.overlay is not None:
+        require_free(options.overlay, existing=existing)
     run = TrackingRun(options, build_parts(options), out)
     run.run()
     found = summary(run)
@@ -105,7 +71,7 @@ def track(
         return
     print_note(f"wrote {out}")
     _print(found)
-    if bodies == 1:
+    if options.bodies == 1:
         print_next("fit", out, "-o", sibling(out.with_suffix(""), "fit"))
     else:
         print_next("classify", out)
@@ -141,7 +107,7 @@ def _explain(options: TrackingOptions, number: int, out: Path | None, existing: 
         picture = (Path() if out is None else out.parent) / f"{stem}-frame-{number}.png"
     require_target(picture, existing=existing, endings=(".png",))
     parts = build_parts(options)
-    opened = open_source(options.source, rate=options.image_rate, keep_stale=True)
+    opened = open_source(options.source, rate=options.fps, keep_stale=True)
     last = -1
     try:
         for frame in opened:

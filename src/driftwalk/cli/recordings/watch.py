@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from driftwalk.cli.options import tracking as given
+from driftwalk.cli.options.flatten_options import with_options
 from driftwalk.cli.options.tracking import TrackingOptions
 from driftwalk.cli.terminal.output import print_note
 from driftwalk.core.errors import InputError
@@ -19,21 +19,13 @@ if TYPE_CHECKING:
 _MOST_CLASSES = 6
 
 
+@with_options(
+    TrackingOptions,
+    *("source", "markers", "bodies", "side", "camera", "tank", "scale", "fps"),
+    *("max_speed", "lost_after", "live", "live_nmea", "live_host", "overlay"),
+)
 def watch(
-    source: given.SourceName,
-    markers: given.Markers,
-    bodies: given.Bodies = None,
-    side: given.BlockSide = None,
-    camera: given.CameraFile = None,
-    tank_diameter: given.Diameter = None,
-    px_per_m: given.PxPerM = None,
-    image_rate: given.ImageRate = None,
-    max_speed: given.MaxSpeed = None,
-    lost_after: given.LostAfter = None,
-    live: given.Live = None,
-    live_nmea: given.LiveNmea = None,
-    live_host: given.LiveHost = "127.0.0.1",
-    overlay: given.Overlay = None,
+    options: TrackingOptions,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -56,24 +48,8 @@ def watch(
     existing = "replace" if overwrite else "error"
     if out is not None:
         require_target(out, existing=existing, endings=(".nc",))
-    if overlay is not None:
-        require_free(overlay, existing=existing)
-    options = TrackingOptions(
-        source=source,
-        markers=markers,
-        camera=camera,
-        tank_diameter=tank_diameter,
-        px_per_m=px_per_m,
-        image_rate=image_rate,
-        bodies=bodies,
-        max_speed=max_speed,
-        lost_after=lost_after,
-        side=side,
-        live=live,
-        live_nmea=live_nmea,
-        live_host=live_host,
-        overlay=overlay,
-    )
+    if options.overlay is not None:
+        require_free(options.overlay, existing=existing)
     parts = build_parts(options)
     if parts.observer is None:
         raise InputError(

@@ -11,7 +11,6 @@ import typer
 
 from driftwalk.cli.inputs.motion import load_simulation
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
-from driftwalk.cli.options.study import TankDiameter
 from driftwalk.cli.terminal.answer import print_warnings
 from driftwalk.cli.terminal.output import print_note, require_place
 from driftwalk.core.errors import InputError
@@ -30,7 +29,6 @@ def report(
     out: Annotated[
         Path, typer.Option("--out", "-o", metavar="FILE", help="HTML file to write.")
     ] = Path("report.html"),
-    tank_diameter: TankDiameter = None,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace a file that exists.")
     ] = False,
@@ -48,7 +46,7 @@ def report(
 
     existing: Literal["error", "replace"] = "replace" if overwrite else "error"
     require_place(out, existing=existing)
-    pages = [_page(run, how, tank_diameter) for run in runs]
+    pages = [_page(run, how) for run in runs]
     page = pages[0]
     if len(pages) > 1:
         name_apart(pages)
@@ -61,28 +59,27 @@ def report(
     print(f"next: open {out} in a browser", file=sys.stderr)
 
 
-def _page(path: Path, how: RecordingOptions, tank_diameter: float | None) -> dict[str, Any]:
+def _page(path: Path, how: RecordingOptions) -> dict[str, Any]:
     """Return the page data of a run directory, or of a recording."""
     from driftwalk.page import recording_page, report_page
     from driftwalk.record import describe
 
     if not path.is_file():
         if path.is_dir():
-            _refuse_reading_options(f"{path} is a directory, read as a run", how, tank_diameter)
+            _refuse_reading_options(f"{path} is a directory, read as a run", how)
         return report_page(path, tell=lambda text: print_warnings([text]))
     trajectory = load_simulation(path, replicate=how.replicate or 0)
     if trajectory is None:
-        trajectory = how.load(path, tank_diameter=tank_diameter)
+        trajectory = how.load(path)
     else:
         others = replace(how, replicate=None)
-        _refuse_reading_options(f"{path} is a simulation", others, tank_diameter)
+        _refuse_reading_options(f"{path} is a simulation", others)
     return recording_page(trajectory, describe(trajectory))
 
 
-def _refuse_reading_options(what: str, how: RecordingOptions, tank_diameter: float | None) -> None:
+def _refuse_reading_options(what: str, how: RecordingOptions) -> None:
     """Refuse options that have no meaning for a run directory or a simulation."""
     given = [field.name for field in fields(how) if getattr(how, field.name) not in (None, False)]
-    given += [] if tank_diameter is None else ["tank_diameter"]
     words = {"start": "from", "stop": "to"}
     if given:
         names = ", ".join(f"--{words.get(name, name).replace('_', '-')}" for name in given)

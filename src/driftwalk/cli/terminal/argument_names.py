@@ -12,13 +12,13 @@ import shlex
 from collections.abc import Mapping
 from typing import Any, Final
 
-from driftwalk.core.study_keys import TABLES
+from driftwalk.core.study_keys import TABLES, option_of
 
 # The tables have most keys in common, each by the same name in all of them.
 OPTIONS: Final[dict[str, str | None]] = {
     "angle": "--angle",
     "area": None,
-    "arena": "--arena",
+    "arena": "--tank",
     "backend": "--backend",
     "block": "--side",
     "block_length": None,
@@ -28,12 +28,12 @@ OPTIONS: Final[dict[str, str | None]] = {
     "cells": "--cells",
     "clearance": None,
     "columns": "--columns",
-    "diameter": "--tank-diameter",
+    "diameter": "--tank",
     "flow": "--flow",
     "folder": None,
     "format": "--format",
     "frame_interval": "--frame-interval",
-    "frame_rate": "--frame-rate",
+    "frame_rate": "--fps",
     "header_line": "--header-line",
     "heading": "--heading",
     "host": "--host",
@@ -43,16 +43,16 @@ OPTIONS: Final[dict[str, str | None]] = {
     "length_unit": "--length-unit",
     "mass": "--mass",
     "max_speed": "--max-speed",
-    "metres_per_pixel": "--metres-per-pixel",
+    "metres_per_pixel": "--scale",
     "min_confidence": "--min-confidence",
     "min_count": "--min-count",
     "noise": None,
-    "origin": "--arena",
+    "origin": "--tank",
     "outlier_threshold": None,
     "parameters": "--parameter",
     "port": "--port",
     "position_noise": "--position-noise",
-    "rate": "--image-rate",
+    "rate": "--fps",
     "replicate": "--replicate",
     "seconds": None,
     "seed": "--seed",
@@ -64,7 +64,7 @@ OPTIONS: Final[dict[str, str | None]] = {
     "step_interval": "--step-interval",
     "stop": "--to",
     "study": "--study",
-    "tank": "--arena",
+    "tank": "--tank",
     "theta": "--theta",
     "timeout": None,
     "topic": "--topic",
@@ -74,12 +74,12 @@ OPTIONS: Final[dict[str, str | None]] = {
     "x": "--x",
     "y": "--y",
     "y_axis": "--y-axis",
-    **{key: f"--{name.replace('_', '-')}" for table in TABLES for name, key in table.items()},
+    **{key: option_of(name) for table in TABLES for name, key in table.items()},
 }
 """From an argument, or a key of the study, to its option; None where there is no option."""
 
 WHOLE: Final[dict[str, str]] = {
-    'arena={"shape": "circle", "diameter_m": 0.3}': "--tank-diameter",
+    'arena={"shape": "circle", "diameter_m": 0.3}': "--tank",
     'existing="replace"': "--overwrite",
     "overwrite=True": "--overwrite",
     'sort="sort"': "--sort",
@@ -121,7 +121,7 @@ def in_options(values: Any) -> Any:
     Examples
     --------
     >>> in_options({"body": "`x`", "warnings": ["give `frame_rate`"]})
-    {'body': '`x`', 'warnings': ['give --frame-rate']}
+    {'body': '`x`', 'warnings': ['give --fps']}
     """
     if isinstance(values, Mapping):
         return {
@@ -149,7 +149,11 @@ def _option(match: re.Match[str]) -> str:
     if value is None:
         return option
     try:
-        return f"{option} {shlex.quote(_words(json.loads(value)))}"
+        words = _words(json.loads(value))
+        if name == "tank":
+            # The command line takes a bare size.
+            words = words.removeprefix("circle:").removeprefix("rect:")
+        return f"{option} {shlex.quote(words)}"
     except json.JSONDecodeError:
         return match[0]
 

@@ -19,6 +19,15 @@ from driftwalk.core.errors import DriftwalkError
 EXIT_USER_ERROR = 2
 EXIT_INTERRUPTED = 130
 EXIT_BROKEN_PIPE = 141
+# What other programs call an option or a command, and what it is here.
+_SYNONYMS = {
+    **dict.fromkeys(("--arena", "--tank-diameter", "--diameter"), "--tank"),
+    **dict.fromkeys(("--frame-rate", "--image-rate"), "--fps"),
+    **dict.fromkeys(("--metres-per-pixel", "--px-per-m", "--pixel-size"), "--scale"),
+    **dict.fromkeys(("--parameters-from", "--from-run", "--truth"), "RUN or --study"),
+    **dict.fromkeys(("--world", "--run"), "--replicate"),
+    "convert": "driftwalk read",
+}
 _LONGEST = 1500
 """Characters of a message; it may quote what a file holds."""
 
@@ -93,7 +102,12 @@ def _usage_message(error: BaseException) -> str:
     context = getattr(error, "ctx", None)
     if context is None:
         return message
-    return f"{message.rstrip('.')} (see '{context.command_path} --help')"
+    message = message.rstrip(".")
+    option = getattr(error, "option_name", None)
+    wanted = _SYNONYMS.get(option or message.partition("'")[2].rstrip("'"))
+    if wanted is not None:
+        message = f"{message}; did you mean {wanted}?"
+    return f"{message} (see '{context.command_path} --help{'' if option is None else '-all'}')"
 
 
 def _operating_system_message(error: OSError) -> str:

@@ -116,8 +116,8 @@ def command_text(name: str, *words: str | Path) -> str:
 
     Examples
     --------
-    >>> command_text("fit", Path("my tracks.csv"), "--frame-rate", "30")
-    "driftwalk fit 'my tracks.csv' --frame-rate 30"
+    >>> command_text("fit", Path("my tracks.csv"), "--fps", "30")
+    "driftwalk fit 'my tracks.csv' --fps 30"
     >>> command_text("report", Path("-run"))
     'driftwalk report ./-run'
     """

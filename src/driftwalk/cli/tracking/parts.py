@@ -51,11 +51,11 @@ def build_parts(options: TrackingOptions) -> TrackingParts:
 
     _check(options)
     number = _FOR_BACKGROUND if options.markers == "blob" else _FOR_RIM
-    images = sample_images(options.source, number, rate=options.image_rate)
+    images = sample_images(options.source, number, rate=options.fps)
     camera = find_camera(options, images)
     camera.check_size(images[0].shape[1], images[0].shape[0])
     detector, side = _detector(options, camera, images)
-    diameter = options.tank_diameter or camera.tank_diameter_m
+    diameter = options.tank or camera.tank_diameter_m
     tracker = tracker_for(options, camera, diameter)
     side = options.side if options.side is not None else side
     return TrackingParts(camera, detector, tracker, _observer(options, side), diameter, side)
@@ -65,7 +65,7 @@ def _check(options: TrackingOptions) -> None:
     """Check what is said about the motion before a long run begins."""
     if options.bodies is not None and options.bodies < 1:
         raise InputError(f"--bodies is the number of objects, 1 or more; got {options.bodies}")
-    for name in ("max_speed", "lost_after", "side", "tank_diameter", "px_per_m", "image_rate"):
+    for name in ("max_speed", "lost_after", "side", "tank", "scale", "fps"):
         value = getattr(options, name)
         if value is not None and not (math.isfinite(value) and value > 0):
             raise InputError(f"--{name.replace('_', '-')} must be above zero, got {value:g}")
@@ -87,18 +87,17 @@ def find_camera(options: TrackingOptions, images: Sequence[Any]) -> Camera:
     lens = known.lens if known is not None else None
     if options.px_per_m is not None:
         if known is not None and known.homography_px_to_m is not None:
-            raise ConfigurationError(f"--px-per-m: {options.camera} has a scale already")
+            raise ConfigurationError(f"--scale: {options.camera} has a scale already")
         rows, columns = images[0].shape[:2]
         return Camera.from_scale(columns, rows, px_per_m=options.px_per_m, lens=lens)
     still = median_background(list(images)) if len(images) > 2 else images[0]
     if known is not None and known.homography_px_to_m is not None:
         known.check_size(still.shape[1], still.shape[0])
-        return known if options.tank_diameter is None else _centred(known, still, options)
-    if options.tank_diameter is not None:
-        return camera_from_rim(still, diameter=options.tank_diameter, lens=lens)
+        return known if options.tank is None else _centred(known, still, options)
+    if options.tank is not None:
+        return camera_from_rim(still, diameter=options.tank, lens=lens)
     raise InputError(
-        "no scale: state --tank-diameter (the rim must be seen), or --camera with a plane, or "
-        "--px-per-m"
+        "no scale: state --tank (the rim must be seen), or --camera with a plane, or --scale"
     )
 
 
@@ -106,14 +105,14 @@ def _centred(camera: Camera, still: Any, options: TrackingOptions) -> Camera:
     """Return a camera with a scale of its own, its origin moved to the middle of the tank."""
     from driftwalk.track import centre_on_rim
 
-    stated = options.tank_diameter
+    stated = options.tank
     assert stated is not None
     try:
         centred, found = centre_on_rim(camera, still)
     except InputError as error:
         raise InputError(
             f"{options.camera} has a scale, and the tank's centre is not found: {error}; or leave "
-            "--tank-diameter out: then the origin is that of the camera file"
+            "--tank out: then the origin is that of the camera file"
         ) from error
     if abs(found / stated - 1) > _RIM_OFF:
         print_note(
@@ -138,8 +137,8 @@ def _detector(
 
     blob = {
         "polarity": options.polarity,
-        "least_area_px": options.least_area_px,
-        "most_area_px": options.most_area_px,
+        "least_area_px": options.min_area_px,
+        "most_area_px": options.max_area_px,
     }
     given: dict[str, Any] = {key: value for key, value in blob.items() if value is not None}
     if options.markers == "blob":
@@ -170,7 +169,7 @@ def _check_size(marker: TwoColourMarker, camera: Camera, options: TrackingOption
     if width < _LEAST_DISC_PX or width > camera.width_px:
         raise InputError(
             f"{options.markers}: a disc of {1e3 * marker.size_m:.3g} mm would be {width:.3g} "
-            "pixels wide at this scale: check --tank-diameter, --px-per-m or the camera file "
+            "pixels wide at this scale: check --tank, --scale or the camera file "
             "(a length without a unit is in metres)"
         )
 
@@ -185,7 +184,7 @@ def _check_colours(
     if missing is not None and options.is_camera:
         print_note(f"warning: {options.markers}: {missing} up to now (driftwalk markers teach)")
     elif missing is not None:
-        more = sample_images(options.source, _FOR_COLOURS, rate=options.image_rate)
+        more = sample_images(options.source, _FOR_COLOURS, rate=options.fps)
         missing = missing_colours(marker, more)
         if missing is not None:
             raise InputError(f"{options.markers}: {missing} (driftwalk markers teach)")

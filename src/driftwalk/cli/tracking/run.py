@@ -84,7 +84,7 @@ class TrackingRun:
         from driftwalk.track import frame_count, open_source
 
         total = frame_count(self.options.source) or 0
-        source = open_source(self.options.source, rate=self.options.image_rate)
+        source = open_source(self.options.source, rate=self.options.fps)
         name = source.name if self.options.is_camera else Path(source.name).name
         self.source_name = text_of_name(name)
         with contextlib.ExitStack() as open_things:

@@ -30,7 +30,7 @@ def _write_motions(format: str, source: Source, folder: Path) -> list[Path]:
     files: list[Path] = []
     pages: list[Exported] = []
     missing: dict[str, None] = {}
-    for motion in find_motions(source.path, world=source.world):
+    for motion in find_motions(source.path, world=source.replicate):
         file, *further = write(motion, folder)
         sentences = lost(format, motion)
         pages.append(Exported(file, sentences, read_again(format, motion, file)))
@@ -46,7 +46,7 @@ def _write_motions(format: str, source: Source, folder: Path) -> list[Path]:
 def _write_films(ending: str, source: Source, folder: Path) -> list[Path]:
     from driftwalk.plot import write_animation
 
-    motions = find_motions(source.path, world=source.world)
+    motions = find_motions(source.path, world=source.replicate)
     if len(motions) > 1:
         source.tell(
             f"the film shows {motions[0].name}, the first of {len(motions)}: name a world to see it"
@@ -63,11 +63,11 @@ def _write_films(ending: str, source: Source, folder: Path) -> list[Path]:
 
 DATA_TARGETS: Final = (
     *(
-        Target(name, gives, partial(_write_motions, name), options=("world",))
+        Target(name, gives, partial(_write_motions, name), options=("replicate",))
         for name, (_, gives) in WRITERS.items()
     ),
     *(
-        Target(name, gives, partial(_write_films, name), options=("world", "speed"))
+        Target(name, gives, partial(_write_films, name), options=("replicate", "speed"))
         for name, gives in FILMS.items()
     ),
 )

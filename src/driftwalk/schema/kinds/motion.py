@@ -19,6 +19,7 @@ WORLD_STATUS: Final = {"non_finite": 1, "escaped": 2, "no_motion": 4}
 """Bits of a simulated world's status; 0 is sound."""
 
 _FILE: Final = "read from a file"
+_STATED: Final = "it was stated"
 _TRACKED: Final = "tracked videos"
 
 TRAJECTORY: Final = Kind(
@@ -61,6 +62,10 @@ TRAJECTORY: Final = Kind(
         Attribute("arena", "object", ARENA.meaning, "the tank is known"),
         Attribute("arena_found", "object", "how the tank was found", "the tank is known"),
         Attribute("origin_shift_m", "list", "offset that was subtracted from the positions", _FILE),
+        Attribute("block_side_m", "number", "side of the block", _STATED),
+        Attribute("block_mass_kg", "number", "mass of the block", _STATED),
+        Attribute("block_depth_m", "number", "wetted depth of a side face", _STATED),
+        Attribute("block_depth", "text", "immersed or archimedes, instead of a length", _STATED),
         Attribute("bodies_apart", "yes or no", "whether each has a tank of its own", "it has"),
         Attribute("counts", "object", "counts of what cleaning did", _FILE),
         Attribute("simulated", "yes or no", "whether a model made the motion", "simulated"),

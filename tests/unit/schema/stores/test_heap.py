@@ -73,7 +73,7 @@ def test_damaged_texts_are_refused_unread(
     begin = time.process_time()
     if not userblock:
         assert kind_of(path) is None
-        said = refusal(here("info", path, "--metres-per-pixel", "0.001"))
+        said = refusal(here("info", path, "--scale", "0.001"))
         assert DAMAGES[damage] in said
     assert time.process_time() - begin < 1.0
 
@@ -82,7 +82,7 @@ def test_whole_texts_are_read(tmp_path: Path) -> None:
     path = tmp_path / "trajectories.h5"
     labelled(path)
     assert kind_of(path) == "a kind of its own"
-    assert here("info", path, "--metres-per-pixel", "0.001").code == 0
+    assert here("info", path, "--scale", "0.001").code == 0
 
 
 def test_a_remnant_that_nothing_refers_to_is_no_damage(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""`driftwalk convert`: any readable recording to driftwalk's NetCDF or plain CSV."""
+"""`driftwalk read`: a tracker's file as a recording that states scale, axes, tank and block."""
 
 from __future__ import annotations
 
@@ -10,31 +10,44 @@ import typer
 
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import Json
-from driftwalk.cli.options.study import Side, TankDiameter
+from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_json, print_next, print_note, sibling
+from driftwalk.core.study_keys import STUDY_KEYS
 
 
 @with_recording_options
-def convert(
+@with_study_options(STUDY_KEYS, "side", "mass", "depth", file="none")
+def read(
     recording: RecordingFile,
-    out: Annotated[Path, typer.Argument(metavar="OUT", help="File to write; ends in .nc or .csv.")],
+    out: Annotated[
+        Path,
+        typer.Option("--out", "-o", metavar="FILE", help="File to write; ends in .nc or .csv."),
+    ],
     how: RecordingOptions,
-    tank_diameter: TankDiameter = None,
-    side: Side = None,
+    given: StudyOptions,
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace a file that exists.")
     ] = False,
     json: Json = False,
 ) -> None:
-    """Turn a recording into driftwalk's NetCDF (.nc) or plain CSV (.csv).
+    """Read a tracker's file into a recording (.nc), once for all other commands.
 
-    Positions are in metres with y up, times in seconds, angles in radians. NetCDF also keeps the
-    arena and all other information; CSV has the columns t_s, x_m, y_m, theta_rad and body.
+    The recording has positions in metres with y up, times in seconds and angles in radians. It
+    keeps the tank and the block that you state here, so the other commands need no options for
+    them. With a name that ends in .csv: a plain table with the columns t_s, x_m, y_m, theta_rad and
+    body, without tank and block.
     """
     from driftwalk.cli.inputs.study_recording import words_to_fit
+    from driftwalk.conditions import block_attributes
     from driftwalk.record import save_trajectory
 
-    trajectory = how.load(recording, tank_diameter=tank_diameter, side=side)
+    stated = block_attributes(given.study(), given.overrides)
+    trajectory = how.load(recording, side=stated.get("block_side_m"))
+    if stated.keys() & {"block_depth", "block_depth_m"}:
+        # A depth is a word or a length: the one that is stated replaces the other.
+        for name in ("block_depth", "block_depth_m"):
+            trajectory.attrs.pop(name, None)
+    trajectory.attrs.update(stated)
     save_trajectory(trajectory, out, existing="replace" if overwrite else "error")
     counts = json_module.loads(trajectory.attrs["counts"])
     warnings = counts.pop("warnings")
@@ -59,4 +72,6 @@ def convert(
         f"format {trajectory.attrs['format']}; y {trajectory.attrs['y_axis']}"
     )
     words = words_to_fit(trajectory)
+    if out.suffix.lower() == ".csv":
+        words = [*words, *given.words("side", "mass", "depth")]
     print_next("fit", out, *words, "-o", sibling(out.with_suffix(""), "fit"))
