@@ -19,6 +19,7 @@ def pages() -> dict[str, str]:
     return {path.relative_to(FOLDER).as_posix(): text for path, text in all_pages().items()}
 
 
+@pytest.mark.slow
 def test_the_pages_say_what_the_docstrings_say(pages: dict[str, str]) -> None:
     stored = [FOLDER / "python.md", *(FOLDER / "python").glob("*.md")]
     found = {

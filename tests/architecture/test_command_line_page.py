@@ -40,6 +40,7 @@ def options_of(command: Any) -> set[str]:
     }
 
 
+@pytest.mark.fast_cases(8)
 @pytest.mark.parametrize("name", [name for name, _ in commands()])
 def test_command_is_on_the_page(name: str) -> None:
     page, options = sections(), options_of(dict(commands())[name])
@@ -51,6 +52,7 @@ def test_page_has_no_other_commands() -> None:
     assert sections().keys() - {READING} == {name for name, _ in commands()}
 
 
+@pytest.mark.fast_cases(9)
 @pytest.mark.parametrize("name", [name for name, _ in commands()])
 def test_no_help_is_taken_for_a_style(name: str) -> None:
     """Rich drops an unescaped ``[recover]`` from the text that it prints."""

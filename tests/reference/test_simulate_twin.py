@@ -21,6 +21,7 @@ from driftwalk import _core
 from driftwalk.core.seeds import world_keys
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("law", BEYOND_PAPER)
 def test_twin_and_double_agree_beyond_the_paper_s_law(law: str) -> None:
     numbers = {**numbers_of(BEYOND_PAPER[law]), "steps_per_interval": 2}

@@ -82,6 +82,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.fast_cases(22)
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize("name", [*BAD, "nowhere.csv"])
 def test_bad_recording(name: str, command: str, folder: Path) -> None:
@@ -152,6 +153,7 @@ WITH_STUDY: dict[str, list[object]] = {
 }
 
 
+@pytest.mark.fast_cases(26)
 @pytest.mark.parametrize("command", WITH_STUDY)
 @pytest.mark.parametrize("study", STUDIES)
 def test_bad_study(study: str, command: str, folder: Path) -> None:
@@ -166,6 +168,7 @@ def test_bad_study(study: str, command: str, folder: Path) -> None:
     assert contents(folder) == before
 
 
+@pytest.mark.fast_cases(9)
 @pytest.mark.parametrize(
     ("options", "says"),
     [
@@ -290,6 +293,7 @@ def test_a_body_must_be_named(folder: Path) -> None:
 # What follows starts processes: that the exit code and the one line come from the program itself.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["info", "calibrate"])
 def test_the_process_itself(command: str, folder: Path) -> None:
     (folder / "junk.csv").write_bytes(BAD["junk.csv"])

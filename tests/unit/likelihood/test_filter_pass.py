@@ -141,6 +141,7 @@ def test_where_one_pass_restarted_the_noises_tell_nothing() -> None:
     assert _beside(other, base).tolist() == [True, False, False]
 
 
+@pytest.mark.slow
 def test_wrong_times_are_tried_on_all_samples_of_an_accurate_camera() -> None:
     """Positions known to 15 micrometres: what the usual step does then outweighs their noise.
 
@@ -180,6 +181,7 @@ def test_a_slow_cosine_of_the_flow_is_a_steady_change_times_the_cosine(
     assert np.abs((tried.score - opened.score)[at] / size).max() < 0.3
 
 
+@pytest.mark.slow
 def test_the_first_errors_of_a_stretch_are_small_and_are_not_counted() -> None:
     """After a start, a gap and a contact the filter allows for any velocity.
 

@@ -54,6 +54,7 @@ def test_movement_with_confidence_and_heading(tmp_path: Path, plural: str) -> No
     check_swimmer(sleap, ["a", "b"], lost=[])
 
 
+@pytest.mark.slow
 def test_a_movement_file_over_other_dimensions(tmp_path: Path) -> None:
     """Found by damaging files: xarray's error came through."""
     path = movement_file(tmp_path / "poses.nc")

@@ -101,6 +101,7 @@ def test_a_model_of_the_user_answers_under_its_own_names(form: str) -> None:
         assert facts[f"coarse_{one.key}"] in found[one.name].values
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("name", FILES)
 def test_version_1_is_read_as_a_current_one(name: str) -> None:
     old, found = as_stored(OLD / name), open_netcdf(OLD / name)
@@ -124,6 +125,7 @@ def test_version_2_had_as_many_replicates_of_every_setting(form: str) -> None:
         assert (found[f"{prefix}replicate_count"] == most).all()
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("name", FILES)
 def test_nothing_that_version_1_said_is_lost(name: str) -> None:
     old, facts = as_stored(OLD / name), facts_of(open_netcdf(OLD / name))
@@ -145,6 +147,7 @@ def test_the_verdict_of_version_1_is_that_of_its_numbers(
     assert bool(current_form(far_but_usual)["explained"])
 
 
+@pytest.mark.slow
 def test_a_calibration_from_the_beginning_of_version_1_is_read() -> None:
     """The verdict's numbers were not among the first attributes, nor were the halves."""
     old = as_stored(OLD / FILES[0])
@@ -156,6 +159,7 @@ def test_a_calibration_from_the_beginning_of_version_1_is_read() -> None:
     assert fitted_value(found, "force_std") == old.attrs["force_std_N"]
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("lost", ["drag_coefficient", "force_std_N_interval", "warnings", "study"])
 def test_version_1_without_its_answer_is_damaged(lost: str, tmp_path: Path) -> None:
     old = as_stored(OLD / FILES[0])
@@ -167,6 +171,7 @@ def test_version_1_without_its_answer_is_damaged(lost: str, tmp_path: Path) -> N
     assert caught.value.path == path
 
 
+@pytest.mark.slow
 def test_stages_and_pages_take_version_1_as_xarray_reads_it() -> None:
     old, found = as_stored(OLD / FILES[0]), open_netcdf(OLD / FILES[0])
     options = {"like": dw.tank30_recording().isel(time=slice(0, 600)), "flow": dw.tank30_flow()}

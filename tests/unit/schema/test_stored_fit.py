@@ -39,11 +39,13 @@ def stored(dataset: xr.Dataset, folder: Path) -> xr.Dataset:
     return open_netcdf(path)
 
 
+@pytest.mark.slow
 def test_what_is_stored_is_what_is_in_memory(fit: xr.Dataset, tmp_path: Path) -> None:
     xr.testing.assert_identical(stored(fit, tmp_path), fit)
     assert fit_facts(stored(fit, tmp_path)) == fit_facts(fit)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [0, 1, 2])
 def test_warnings_are_kept_however_many_there_are(
     fit: xr.Dataset, count: int, tmp_path: Path
@@ -56,6 +58,7 @@ def test_warnings_are_kept_however_many_there_are(
     check_dataset(found)
 
 
+@pytest.mark.slow
 def test_the_answer_has_units_and_verdicts(fit: xr.Dataset) -> None:
     assert dict(zip(fit["parameter"].values, fit["unit"].values, strict=True)) == {
         "drag_coefficient": "1",
@@ -98,6 +101,7 @@ def test_a_fit_of_version_1_is_read_as_a_current_one(name: str) -> None:
     np.testing.assert_array_equal(found["u"].values, old["u"].values)
 
 
+@pytest.mark.slow
 def test_nothing_that_version_1_said_is_lost() -> None:
     for name in FITS:
         old, facts = as_stored(OLD / name), fit_facts(open_netcdf(OLD / name))
@@ -109,6 +113,7 @@ def test_nothing_that_version_1_said_is_lost() -> None:
                 assert np.atleast_1d(facts[key]).tolist() == expected, key
 
 
+@pytest.mark.slow
 def test_stages_take_a_fit_of_version_1_as_xarray_reads_it() -> None:
     old, found = as_stored(OLD / FITS[0]), open_netcdf(OLD / FITS[0])
     xr.testing.assert_identical(dw.fitted_flow(old), dw.fitted_flow(found))
@@ -116,12 +121,14 @@ def test_stages_take_a_fit_of_version_1_as_xarray_reads_it() -> None:
     assert dw.fitted_flow(switched, interval=1).attrs["flow_label"] == "B"
 
 
+@pytest.mark.slow
 def test_a_current_fit_and_other_datasets_stay_as_they_are(fit: xr.Dataset) -> None:
     assert current_form(fit) is fit
     other = xr.Dataset(attrs={"kind": "fit of another program", "schema_version": 1})
     assert current_form(other) is other
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("lost", ["drag_coefficient_interval", "confidence", "warnings"])
 def test_a_fit_of_version_1_without_its_answer_is_damaged(lost: str, tmp_path: Path) -> None:
     old = as_stored(OLD / FITS[0])
@@ -133,6 +140,7 @@ def test_a_fit_of_version_1_without_its_answer_is_damaged(lost: str, tmp_path: P
     assert caught.value.path == path
 
 
+@pytest.mark.slow
 def test_a_fit_from_the_beginning_of_version_1_is_read() -> None:
     """The share of the tank that was visited was not among the first attributes."""
     old = as_stored(OLD / FITS[0])
@@ -143,6 +151,7 @@ def test_a_fit_from_the_beginning_of_version_1_is_read() -> None:
     xr.testing.assert_identical(dw.fitted_flow(found), dw.fitted_flow(open_netcdf(OLD / FITS[0])))
 
 
+@pytest.mark.slow
 def test_flat_facts_and_variables_are_each_other_s_inverse(fit: xr.Dataset) -> None:
     data, coords = fit_variables(fit_facts(fit))
     made = xr.Dataset(data, coords)
@@ -150,6 +159,7 @@ def test_flat_facts_and_variables_are_each_other_s_inverse(fit: xr.Dataset) -> N
         np.testing.assert_array_equal(made[name].values, fit[name].values)
 
 
+@pytest.mark.slow
 def test_a_check_of_version_1_is_read_as_a_current_one() -> None:
     path = OLD / "model_check_version_1.nc"
     old, found = as_stored(path), open_netcdf(path)
