@@ -129,6 +129,7 @@ def test_one_parameter_on_a_logarithmic_scale_is_found(diffusing):
     assert first == pytest.approx(DIFFUSIVITY, rel=0.25)
 
 
+@pytest.mark.slow
 def test_threads_and_company_of_settings_do_not_change_a_single_bit(diffusing):
     recording = synthetic_recording(DIFFUSE, diffusivity=DIFFUSIVITY)
     many = motion_model(diffuse, *DIFFUSE.parameters, settings="many")

@@ -138,7 +138,7 @@ def test_killed_twice_and_resumed(
     ]
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("threads", [0, 2])
 def test_interrupt_loses_nothing(
     tmp_path: Path, uninterrupted: dict[str, bytes], threads: int

@@ -82,7 +82,6 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-@pytest.mark.fast_cases(22)
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize("name", [*BAD, "nowhere.csv"])
 def test_bad_recording(name: str, command: str, folder: Path) -> None:
@@ -153,7 +152,6 @@ WITH_STUDY: dict[str, list[object]] = {
 }
 
 
-@pytest.mark.fast_cases(26)
 @pytest.mark.parametrize("command", WITH_STUDY)
 @pytest.mark.parametrize("study", STUDIES)
 def test_bad_study(study: str, command: str, folder: Path) -> None:
@@ -168,7 +166,6 @@ def test_bad_study(study: str, command: str, folder: Path) -> None:
     assert contents(folder) == before
 
 
-@pytest.mark.fast_cases(9)
 @pytest.mark.parametrize(
     ("options", "says"),
     [

@@ -173,7 +173,7 @@ def test_the_world_of_gazebo_is_xml_with_the_block_where_it_starts(
     assert len(world.findall(".//collision")) == 65
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("target", ["mujoco", "gazebo"])
 def test_a_tank_too_narrow_for_a_proof_is_said(target: str, study: Path, tmp_path: Path) -> None:
     """The block goes out all the same; its diagonal is 4.2 cm."""

@@ -174,7 +174,7 @@ def test_the_page_and_the_terminal_name_what_is_not_shown(
     assert len(told) == 1
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command", ["report", "cite", "export to csv", pytest.param("assemble", marks=pytest.mark.slow)]
 )
@@ -198,7 +198,7 @@ def test_a_whole_run_has_nothing_said_against_it(received: Path, tmp_path: Path)
         assert "manifest" not in done.err
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["/etc/hostname", "../home/secret", "../home/pipe", "a\n\x1b[2Jb"])
 def test_names_in_the_manifest_lead_nowhere(received: Path, tmp_path: Path, name: str) -> None:
     (tmp_path / "home" / "secret").write_text("mine")

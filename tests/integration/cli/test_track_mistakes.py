@@ -242,7 +242,7 @@ TwoColourDetector.detect = detect
     assert here("info", out).code == 0
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command",
     [

@@ -303,7 +303,7 @@ def test_mistakes(
     assert said in refusal(here(*words))
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "said"),
     [

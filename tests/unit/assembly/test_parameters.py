@@ -20,7 +20,7 @@ def scaled(drag_coefficient: np.ndarray, force_std: np.ndarray) -> np.ndarray:
     return (np.column_stack([drag_coefficient, force_std]) - CENTER) / WIDTH
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.false_alarm(2e-5)
 @pytest.mark.parametrize("confidence", [0.5, 0.9])
 def test_draws_have_the_weight_that_is_stated(

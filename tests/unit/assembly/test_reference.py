@@ -156,6 +156,7 @@ def test_forces_on_blocks_turn_and_push_the_assembly() -> None:
     np.testing.assert_allclose(body.motion, expected, rtol=1e-12, atol=1e-18)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(("hidden", "windward"), [("none", 1), ("full", 2)])
 def test_a_pair_along_the_flow_follows_the_closed_form(hidden: Any, windward: int) -> None:
     # 2m dw/dt = -k w^2 with k = 1/2 rho C_d a d for each face that meets the water; w = u - v.
@@ -272,6 +273,7 @@ def test_contact_points_lie_in_both_blocks() -> None:
     assert counts == {1, 2}
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("friction", [0.0, 0.4])
 def test_collisions_keep_momentum_and_never_gain_energy(friction: float) -> None:
     rng = np.random.default_rng(3)

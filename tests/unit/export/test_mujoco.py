@@ -33,6 +33,7 @@ def loaded(folder: Path) -> tuple[Any, Any]:
     return model, data
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("integrator", ["RK4", "Euler"])
 def test_each_force_acts_for_its_interval(integrator: str, tmp_path: Path) -> None:
     """Without drag the velocity is the sum of the impulses: a step in the wrong interval shows."""

@@ -96,7 +96,7 @@ FIGURES = {
 }
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FIGURES)
 def test_every_text_lies_inside_its_figure(name) -> None:
     with print_style():

@@ -98,6 +98,7 @@ def _texts(figure) -> list[str]:
     return [text.get_text() for text in figure.findobj(matplotlib.text.Text)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("simulated", "expected"), [("yes", 1), pytest.param("no", 0, marks=pytest.mark.slow)]
 )

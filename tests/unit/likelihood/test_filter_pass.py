@@ -40,6 +40,7 @@ def point(passes: Passes) -> Point:
     return replace(point, log_lever=math.log(3e-3), log_angle_noise=math.log(0.012))
 
 
+@pytest.mark.fast_cases(1)
 def test_the_score_is_the_slope_of_the_likelihood(passes: Passes, point: Point) -> None:
     """Central differences of the likelihood along single parameters and random directions.
 

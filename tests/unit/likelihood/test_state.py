@@ -177,6 +177,7 @@ def test_half_of_the_angles_make_it_the_default(track: xr.Dataset) -> None:
         assert use_angle([recording], [body_track(recording)], "auto") == used
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("angle", [0.0, 0.3])
 def test_a_column_that_is_only_filled_is_no_orientation(track: xr.Dataset, angle: float) -> None:
     short = track.isel(time=slice(0, 600)).copy(deep=True)

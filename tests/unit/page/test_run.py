@@ -291,7 +291,7 @@ def test_self_assembly_from_its_files(tmp_path: Path) -> None:
     assert kinds["replay"] == "empty"
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [HOSTILE.replace("/", "∕"), "..\\..", "%2e%2e", "a\nb", "'; --"])
 def test_a_hostile_name_is_only_text(
     tmp_path: Path, datasets: dict[str, xr.Dataset], name: str

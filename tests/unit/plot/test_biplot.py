@@ -75,7 +75,7 @@ def test_axes_state_their_share_of_the_variance_and_have_one_scale(parts) -> Non
     assert per_pixel[0] == pytest.approx(per_pixel[1], rel=0.01)
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(("blocks", "chirality"), [(4, "merged"), (4, "distinct"), (6, "merged")])
 def test_labels_lie_inside_and_not_on_each_other(blocks, chirality) -> None:
     data = sensitivity(blocks, chirality, points=(8, 7))

@@ -97,6 +97,7 @@ def test_choice_of_classes(largest, expected) -> None:
     assert classes_to_show(names, np.array(largest)) == expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("blocks", [4, 6])
 def test_realisations_are_mean_and_standard_deviation(blocks) -> None:
     repeated = realisations(blocks=blocks)

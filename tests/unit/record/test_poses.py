@@ -41,6 +41,7 @@ def check_swimmer(dataset: xr.Dataset, names: list[str], *, lost: list[int]) -> 
 POSE: dict[str, Any] = {"keypoint": "nose", "heading": ("tail", "nose")}
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("plural", ["", "s"])
 def test_movement_with_confidence_and_heading(tmp_path: Path, plural: str) -> None:
     path = movement_file(tmp_path / "poses.nc", plural=plural)

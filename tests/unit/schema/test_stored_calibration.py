@@ -125,7 +125,7 @@ def test_version_2_had_as_many_replicates_of_every_setting(form: str) -> None:
         assert (found[f"{prefix}replicate_count"] == most).all()
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FILES)
 def test_nothing_that_version_1_said_is_lost(name: str) -> None:
     old, facts = as_stored(OLD / name), facts_of(open_netcdf(OLD / name))
@@ -159,7 +159,7 @@ def test_a_calibration_from_the_beginning_of_version_1_is_read() -> None:
     assert fitted_value(found, "force_std") == old.attrs["force_std_N"]
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("lost", ["drag_coefficient", "force_std_N_interval", "warnings", "study"])
 def test_version_1_without_its_answer_is_damaged(lost: str, tmp_path: Path) -> None:
     old = as_stored(OLD / FILES[0])

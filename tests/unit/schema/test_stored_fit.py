@@ -128,7 +128,7 @@ def test_a_current_fit_and_other_datasets_stay_as_they_are(fit: xr.Dataset) -> N
     assert current_form(other) is other
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("lost", ["drag_coefficient_interval", "confidence", "warnings"])
 def test_a_fit_of_version_1_without_its_answer_is_damaged(lost: str, tmp_path: Path) -> None:
     old = as_stored(OLD / FITS[0])

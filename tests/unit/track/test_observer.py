@@ -56,7 +56,7 @@ def watched(recording: xr.Dataset, side: float) -> tuple[AssemblyObserver, list,
     return observer, seen, [event for one in seen for event in one.events]
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [0.0, 1.0, 4.0])
 def test_live_events_are_those_of_classify(
     simulated: tuple[xr.Dataset, xr.Dataset], scale: float

@@ -148,7 +148,7 @@ def follow(world: World, settings: TrackerSettings, seed: int, *, lost=None, fal
     return tracker.finish()
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 def test_four_blocks_with_clutter_and_gaps_never_swap(seed: int) -> None:
     world, lost = with_gaps(seed)
@@ -211,6 +211,7 @@ def test_marking_is_not_everything() -> None:
     assert unmarked_swaps(recording, world)[1] == 0
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("seed", range(2))
 def test_blocks_that_are_joined_are_not_marked_all_the_time(seed: int) -> None:
     """Four blocks side by side move as one, each missed in 5 % of the frames."""

@@ -120,7 +120,6 @@ PLACES: dict[str, Callable[[Path, Path], None]] = {
 }
 
 
-@pytest.mark.fast_cases(41)
 @pytest.mark.skipif(os.name == "nt", reason="links need a privilege there, and pipes have no names")
 @pytest.mark.parametrize("place", PLACES)
 @pytest.mark.parametrize("entry", ENTRIES)
