@@ -120,7 +120,7 @@ def _leave_cases_to_the_slow_set(items: list[pytest.Item]) -> None:
     """Mark as slow all but some cases, spread evenly, of the tests with `fast_cases(number)`."""
     cases: dict[str, list[pytest.Item]] = {}
     for item in items:
-        if item.get_closest_marker("fast_cases"):
+        if item.get_closest_marker("fast_cases") and not item.get_closest_marker("slow"):
             cases.setdefault(item.nodeid.partition("[")[0], []).append(item)
     for some in cases.values():
         mark = some[0].get_closest_marker("fast_cases")

@@ -23,7 +23,6 @@ from examples.running import Reader, compared, streaming
 TUTORIAL, FIT_PAGE = "docs/tutorials/first-calibration.md", "docs/how-to/fit.md"
 
 
-@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(
     "name",
     [pytest.param(name, marks=[pytest.mark.slow] * page.slow) for name, page in PAGES.items()],

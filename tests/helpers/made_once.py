@@ -20,16 +20,37 @@ def made_once(name: str, make: Callable[[], T]) -> T:
     shared = os.environ.get(SHARED)
     if shared is None:
         return make()
-    stored = Path(shared) / f"{name.replace('/', '-')}.pickle"
+    stored = Path(shared) / f"{name}.pickle"
     with FileLock(f"{stored}.lock"):
         if stored.exists():
-            return pickle.loads(stored.read_bytes())
-        made = make()
-        stored.write_bytes(pickle.dumps(made))
+            made: T = pickle.loads(stored.read_bytes())
+        else:
+            made = make()
+            stored.write_bytes(pickle.dumps(made))
     return made
 
 
-def shared_folder(name: str, other: Path) -> Path:
-    """Return the folder of a run that the workers of a session share, or the other one."""
+def shared_folder(name: str, otherwise: Path) -> Path:
+    """Return a folder that the workers of a session share; `otherwise` outside of a session."""
     shared = os.environ.get(SHARED)
-    return other if shared is None else Path(shared) / name
+    return otherwise if shared is None else Path(shared) / name
+
+
+def made_once_in(folders: list[Path], name: str, make: Callable[[], T]) -> T:
+    """Return what `make` returns, and copy into these new folders what it wrote into them."""
+
+    def made_with_files() -> tuple[T, list[dict[str, bytes]]]:
+        result = make()
+        return result, [_files(folder) for folder in folders]
+
+    result, files = made_once(name, made_with_files)
+    for folder, contents in zip(folders, files, strict=True):
+        for path, content in contents.items():
+            (folder / path).parent.mkdir(parents=True, exist_ok=True)
+            (folder / path).write_bytes(content)
+    return result
+
+
+def _files(folder: Path) -> dict[str, bytes]:
+    paths = (path for path in folder.rglob("*") if path.is_file())
+    return {str(path.relative_to(folder)): path.read_bytes() for path in paths}

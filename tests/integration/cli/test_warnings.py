@@ -324,7 +324,6 @@ def own_words(err: str) -> None:
         assert re.match(r"(driftwalk|next): |[a-z ]+: \d+ (of \d+ |%)|$", line), err
 
 
-@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("command", QUICK)
 def test_good_input(
     command: str, place: Path, finished: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
