@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import gc
 import os
+import shutil
+import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
+from made_once import SHARED
 
 # Tests run side by side, one a core: threads of the linear algebra would only wait for each other.
 # This is read when NumPy is loaded, and passed on to the commands that tests start.
@@ -42,6 +45,8 @@ MORE_EXAMPLES = 5
 _text = os.environ.get("DRIFTWALK_TEST_SEED", "")
 BASE_SEED = int(_text) if _text else None
 settings.load_profile("repeatable" if BASE_SEED is None else "fresh")
+
+_RESULTS = pytest.StashKey[str]()
 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 
@@ -77,6 +82,18 @@ def fresh_seed() -> Callable[[int], int]:
     return seed
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Give the session a folder of finished results, which its workers inherit."""
+    if SHARED not in os.environ:
+        os.environ[SHARED] = config.stash[_RESULTS] = tempfile.mkdtemp(prefix="driftwalk-tests-")
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    if _RESULTS in config.stash:
+        shutil.rmtree(config.stash[_RESULTS], ignore_errors=True)
+        os.environ.pop(SHARED, None)
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Iterator[None]:
     """Leave the tests and the libraries, which stay until the end, out of collecting garbage.
@@ -99,8 +116,26 @@ def _false_alarm(item: pytest.Item) -> float | None:
     return float(rate)
 
 
+def _leave_cases_to_the_slow_set(items: list[pytest.Item]) -> None:
+    """Mark as slow all but some cases, spread evenly, of the tests with `fast_cases(number)`."""
+    cases: dict[str, list[pytest.Item]] = {}
+    for item in items:
+        if item.get_closest_marker("fast_cases") and not item.get_closest_marker("slow"):
+            cases.setdefault(item.nodeid.partition("[")[0], []).append(item)
+    for some in cases.values():
+        mark = some[0].get_closest_marker("fast_cases")
+        assert mark is not None
+        (number,) = mark.args
+        kept = {index * len(some) // number for index in range(number)}
+        for index, item in enumerate(some):
+            if index not in kept:
+                item.add_marker(pytest.mark.slow)
+
+
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Hold tests with new seeds to their marker, and give Hypothesis more examples to try."""
+    _leave_cases_to_the_slow_set(items)
     enlarged = set()
     for item in items:
         rate = _false_alarm(item)

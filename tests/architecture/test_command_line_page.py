@@ -41,6 +41,7 @@ def options_of(command: Any) -> set[str]:
     }
 
 
+@pytest.mark.fast_cases(8)
 @pytest.mark.parametrize("name", [name for name, _ in commands()])
 def test_command_is_on_the_page(name: str) -> None:
     page, options = sections(), options_of(dict(commands())[name])
@@ -52,6 +53,7 @@ def test_page_has_no_other_commands() -> None:
     assert sections().keys() - {READING} == {name for name, _ in commands()}
 
 
+@pytest.mark.fast_cases(9)
 @pytest.mark.parametrize("name", [name for name, _ in commands()])
 def test_help_shows_the_main_options_and_help_all_shows_every_one(
     name: str, capsys: pytest.CaptureFixture[str]

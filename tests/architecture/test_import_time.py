@@ -42,6 +42,7 @@ def test_nothing_heavy_is_loaded(code: str, absent: set[str]) -> None:
     assert not loaded & absent
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["info", "report"])
 def test_short_commands_load_what_they_need(command: str, tmp_path: Path) -> None:
     """Dask, for instance, is loaded by xarray where it is installed, and with it scipy."""
@@ -67,10 +68,12 @@ def small_run(folder: Path) -> Path:
     return out
 
 
+@pytest.mark.slow
 def test_the_list_of_modules_would_show_a_heavy_one() -> None:
     assert "xarray" in loaded_by(f"{IMPORT}; import xarray")
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(("code", "limit_s"), [(IMPORT, 0.3), (HELP, 0.5)], ids=["import", "help"])
 def test_time_to_answer(code: str, limit_s: float) -> None:
     """Processor time above an empty interpreter, the best of five: other work only adds."""

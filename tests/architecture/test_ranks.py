@@ -152,6 +152,7 @@ def test_every_folder_has_a_rank() -> None:
     assert folders <= MAY_IMPORT.keys(), folders - MAY_IMPORT.keys()
 
 
+@pytest.mark.slow
 def test_walk_finds_imports() -> None:
     """The walk itself can fail: a known import inside a function, and one for types only."""
     found = [entry for entry in all_imports() if entry.file == SOURCE / "schema" / "check.py"]

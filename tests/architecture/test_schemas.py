@@ -45,11 +45,13 @@ def said_kinds(tree: ast.Module) -> Iterator[str]:
                     yield str(value.value)
 
 
+@pytest.mark.slow
 def test_what_the_package_makes_has_a_schema_and_no_schema_lies_idle() -> None:
     made = {kind for _, tree in modules() for kind in said_kinds(tree)}
     assert made == set(KINDS)
 
 
+@pytest.mark.slow
 def test_versions_stand_in_the_schemas_alone() -> None:
     """A version that a builder names itself would not rise with its schema."""
     others = [

@@ -21,6 +21,7 @@ import xarray as xr
 from command_line import FLOW, GRID, RECORDING, here
 from drifting_tracers import seeded_tank
 from finished_run import write_finished_run
+from made_once import made_once_in
 from self_propelled import moving
 
 import driftwalk as dw
@@ -61,7 +62,7 @@ class Page:
     needs: tuple[str, ...] = ()
     """Packages without which the examples are skipped."""
     slow: bool = False
-    """Whether the page takes about two seconds or more."""
+    """Whether the page takes more than 0.3 s of processor time."""
 
 
 def _files(*provisions: Callable[[Path], Names]) -> Callable[[Path], Names]:
@@ -285,10 +286,15 @@ def _assembled(folder: Path) -> Names:
 
 def _fitted(folder: Path) -> Names:
     """Provide ``fit/``: a run directory of a fit of a minute, and ``four/`` of what it builds."""
+    fit, four = folder / "fit", folder / "four"
     words = ("--to", "60s", "--tank", "30cm", "--spline-spacing", "4cm", "--no-check")
-    assert here("fit", RECORDING, *words, "-o", folder / "fit").code == 0
     few = ("--runs", "20", "--duration", "20s", "--film", "none")
-    assert here("assemble", folder / "fit", *few, "-o", folder / "four").code == 0
+
+    def make() -> None:
+        assert here("fit", RECORDING, *words, "-o", fit).code == 0
+        assert here("assemble", fit, *few, "-o", four).code == 0
+
+    made_once_in([fit, four], "fit and assembly of the pages", make)
     return {}
 
 
@@ -531,12 +537,15 @@ PAGES: dict[str, Page] = {
         provide=_files(_recording(), _tracks),
         numbers=Numbers.SAME,
         holds=("u.shape == (2,)", "water.attrs['tracks_used'] == 1500"),
+        slow=True,
     ),
     "docs/how-to/install.md": Page(
         not_run={"pip install *": INSTALLS, "driftwalk demo --quick": DEMO, "docker *": DOCKER},
     ),
     "docs/how-to/load-a-recording.md": Page(
-        provide=_files(_recording(60.0), _pixels, _poses), numbers=Numbers.SAME
+        provide=_files(_recording(60.0), _pixels, _poses),
+        numbers=Numbers.SAME,
+        slow=True,
     ),
     "docs/how-to/report.md": Page(
         provide=_files(_recording(60.0), _calibrated, _simulated, _fitted), slow=True
@@ -593,6 +602,7 @@ PAGES: dict[str, Page] = {
         provide=_calibrated_twice,
         holds=("table.shape == (2, 2)", "'drag_coefficient' in table"),
         not_run={"pip install *": INSTALLS, "driftwalk *": "needs workers; has a test"},
+        slow=True,
     ),
     "docs/how-to/take-the-model-to-your-simulator.md": Page(
         provide=_calibrated,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import io
 import re
 import shutil
@@ -14,7 +15,8 @@ from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
-from command_line import here
+from command_line import Done, here
+from made_once import made_once_in
 from page_server import served
 
 import driftwalk as dw
@@ -75,13 +77,22 @@ class Reader:
                         raise AssertionError(f"{where}: only driftwalk is run; see provisions.py")
 
     def _driftwalk(self, where: str, command: Command, numbers: Numbers) -> None:
-        done = here(*command.words[1:])
+        done = self._run(command.words[1:])
         refused = any(line.startswith("driftwalk: error: ") for line in command.shown)
         assert done.code == (2 if refused else 0), f"{where}\n{done.err}"
         if command.into:
             Path(command.into).write_text(done.out, encoding="utf-8")
         self._last = done.out + done.err, numbers
         self._compare(where, command.shown)
+
+    def _run(self, words: list[str]) -> Done:
+        """Run a command; a fit that stands on another page too is made once."""
+        if words[0] != "fit" or Path(words[words.index("-o") + 1]).exists():
+            return here(*words)
+        folder = Path(words[words.index("-o") + 1])
+        given = [Path(word).read_bytes() for word in words if Path(word).is_file()]
+        key = hashlib.sha256(repr((words, given, self.page.draws)).encode()).hexdigest()
+        return made_once_in([folder], f"fit {key}", lambda: here(*words))
 
     def _compare(self, where: str, shown: list[str]) -> None:
         """Compare the lines that a page shows with what the last command printed."""

@@ -24,14 +24,12 @@ FRAMES = ("--fps", "10", "--scale", "0.001")
 DEEP, DIGITS = "[" * 5000, "9" * 5000
 
 
-@pytest.mark.parametrize("count", [20, pytest.param(60, marks=pytest.mark.slow)])
-def test_a_short_round_finds_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, count: int
-) -> None:
+@pytest.mark.slow
+def test_a_short_round_finds_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(str(Path(__file__).parent))
     from fuzz_run import fuzz
 
-    found, ends = fuzz(tmp_path, seed=1, cases=range(count), runs=False)
+    found, ends = fuzz(tmp_path, seed=1, cases=range(60), runs=False)
     assert not found, "\n".join(found)
     # Both happen: damage that is read all the same, and damage that is refused.
     assert ends["0"] > 2
@@ -108,6 +106,7 @@ def test_a_recording_that_packs_as_well_as_any_is_read(tmp_path: Path) -> None:
     assert open_netcdf(file).sizes["time"] == count
 
 
+@pytest.mark.fast_cases(3)
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -151,6 +150,7 @@ def test_a_column_of_bodies_that_counts_rows_is_refused(
     assert "20000 bodies" in refusal(here("info", file, *options))
 
 
+@pytest.mark.slow
 def test_bodies_without_a_time_in_common_are_refused_before_the_table(tmp_path: Path) -> None:
     file = tmp_path / "a.csv"
     lines = [f"{k},0.1,0.2,{k // 10}\n" for k in range(40_000)]

@@ -122,6 +122,7 @@ def test_a_line_that_is_quoted_stays_on_one_line(tmp_path: Path) -> None:
     assert len(str(caught.value).splitlines()) == 1
 
 
+@pytest.mark.slow
 def test_a_table_of_many_tracks_is_no_flow_field_at_once(tmp_path: Path) -> None:
     path = tmp_path / "tracking.txt"
     rows = [f"39\t{k}\t1\t39.0\t92.9\t1\n" for k in range(40_000)]

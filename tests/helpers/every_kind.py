@@ -10,6 +10,7 @@ import xarray as xr
 from drifting_tracers import seeded_tank
 from few_simulations import simulate_little
 from fit_worlds import coarse_study, recording
+from made_once import made_once
 from recovery_worlds import small_study
 from self_propelled import moving
 from small_sensitivity import FLOW, small
@@ -169,5 +170,5 @@ FORMS: dict[str, Callable[[], xr.Dataset]] = {
 
 @cache
 def every_kind(form: str) -> xr.Dataset:
-    """Return the dataset of a form, made once."""
-    return FORMS[form]()
+    """Return the dataset of a form, made once in a session."""
+    return made_once(f"kind {form}", FORMS[form])

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import xarray as xr
 from command_line import FLOW, RECORDING
+from made_once import made_once
 
 import driftwalk as dw
 from driftwalk.core.files.rundir import RunDirectory
@@ -26,12 +27,23 @@ SEARCH = {
 }
 
 
-@cache
-def _calibrated() -> dict[str, xr.Dataset]:
-    """Return what the calibration took and found, made once in a process."""
+def _calibrate() -> dict[str, xr.Dataset]:
+    """Return what the calibration took and found."""
     recording, flow = dw.tank30_recording(), dw.tank30_flow()
     found = dw.calibrate(recording, dw.apply_overrides(Study(), SEARCH), flow=flow, threads=1)
     return {"calibration.nc": found, "recording.nc": recording, "flow.nc": flow}
+
+
+@cache
+def _calibrated() -> dict[str, bytes]:
+    """Return the files of the calibration, made once in a session."""
+    return made_once(
+        "finished run",
+        lambda: {
+            name: bytes(dataset.to_netcdf(engine="h5netcdf"))
+            for name, dataset in _calibrate().items()
+        },
+    )
 
 
 def write_finished_run(folder: Path) -> Path:
@@ -50,8 +62,8 @@ def write_finished_run(folder: Path) -> Path:
             seeds={"calibration": study.calibration.seed},
             inputs={"recording": RECORDING, "flow": FLOW},
         )
-        for name, dataset in _calibrated().items():
-            run.write(name, bytes(dataset.to_netcdf(engine="h5netcdf")))
+        for name, content in _calibrated().items():
+            run.write(name, content)
         run.write("figures/map.png", b"no picture")
         run.finish(about)
     return folder

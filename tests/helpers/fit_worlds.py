@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
+from made_once import made_once
 
 import driftwalk as dw
 from driftwalk.model import Study, apply_overrides
@@ -58,11 +59,12 @@ def recording(seconds: float, realisation: Literal["first", "second"] = "first")
 
 @cache
 def _fitted(seconds: float) -> xr.Dataset:
-    return dw.fit_motion(recording(seconds), coarse_study())
+    name = f"fit of {seconds:g} s"
+    return made_once(name, lambda: dw.fit_motion(recording(seconds), coarse_study()))
 
 
 def fitted(seconds: float) -> xr.Dataset:
-    """Return the fit of the first part of the bundled recording, made once in a process."""
+    """Return the fit of the first part of the bundled recording, made once in a session."""
     return _fitted(seconds).copy(deep=True)
 
 

@@ -65,6 +65,7 @@ def found():
     return dw.calibrate(synthetic_recording(400.0), study, flow=dw.tank30_flow(), threads=2)
 
 
+@pytest.mark.slow
 def test_the_truth_of_a_synthetic_recording_is_found(found):
     """Over 12 recordings C_d was 0.450 +- 0.006 and D 1.01 +- 0.09 floors: some 5 sd each.
 
@@ -82,6 +83,7 @@ def test_the_truth_of_a_synthetic_recording_is_found(found):
     assert all("force_std reaches the end of the search" in text for text in said)
 
 
+@pytest.mark.slow
 @pytest.mark.false_alarm(2e-3)
 def test_the_truth_explains_a_recording_best(fresh_seed):
     """The lowest distance of a map is at the truth, in twenty minutes and steps of 1 s.
@@ -96,6 +98,7 @@ def test_the_truth_explains_a_recording_best(fresh_seed):
     assert found["force_std_N"] == pytest.approx(TRUTH["force_std_N"])
 
 
+@pytest.mark.slow
 def test_sigma_f_comes_with_its_interval_and_the_intensity(found):
     facts = calibration_facts(found)
     assert facts["force_noise_intensity_N2_s"] == pytest.approx(
@@ -107,11 +110,13 @@ def test_sigma_f_comes_with_its_interval_and_the_intensity(found):
     assert low < facts["drag_coefficient"] < high
 
 
+@pytest.mark.slow
 def test_the_camera_noise_was_estimated(found):
     assert found["position_noise"].item() == pytest.approx(3e-4, rel=0.15)
     assert found["orientation_noise"].item() == pytest.approx(0.01, rel=0.2)
 
 
+@pytest.mark.slow
 def test_the_dataset_holds_what_is_kept_of_every_setting(found):
     assert found["ks_distance"].dims == ("drag_coefficient", "force_std")
     assert np.isfinite(found["ks_distance"]).all()
@@ -125,6 +130,7 @@ def test_the_dataset_holds_what_is_kept_of_every_setting(found):
     assert found.sizes["bootstrap"] == 30
 
 
+@pytest.mark.slow
 def test_place_and_quadrant_are_where_the_world_and_the_recording_differ(found):
     """The shares of steps in the stated quadrant differ by the distance.
 
@@ -226,6 +232,7 @@ def test_a_coarse_map_alone_is_possible():
     assert calibration_facts(found)["drag_coefficient"] in found["drag_coefficient"].values
 
 
+@pytest.mark.slow
 def test_without_a_given_flow_it_is_extracted_from_the_recording():
     study = apply_overrides(dw.Study(), {**SMALL, "calibration.refine": "none"})
     recording = dw.tank30_recording().isel(time=slice(0, 3000))
@@ -236,6 +243,7 @@ def test_without_a_given_flow_it_is_extracted_from_the_recording():
     assert own.attrs["simulated_recording"] == "yes"
 
 
+@pytest.mark.slow
 def test_a_block_that_its_own_flow_does_not_explain_is_told_what_to_do():
     study = apply_overrides(dw.Study(), {**SMALL, "calibration.bootstrap": 10})
     recording = dw.tank30_recording().isel(time=slice(0, 1000))
@@ -244,6 +252,7 @@ def test_a_block_that_its_own_flow_does_not_explain_is_told_what_to_do():
     assert any("driftwalk fit" in text for text in own["warning"].values)
 
 
+@pytest.mark.slow
 def test_an_interval_that_the_search_cuts_off_is_warned_of():
     """A minute leaves sigma_F open from 0.2 to 0.8 mN; the truth, 0.6 mN, is within."""
     study = apply_overrides(

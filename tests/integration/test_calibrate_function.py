@@ -112,6 +112,7 @@ def test_everything_stands_under_the_names_of_the_parameters(tumbling):
     assert border[1].min() < tumbling["estimate"].sel(parameter="tumble_rate") < border[1].max()
 
 
+@pytest.mark.slow
 def test_one_parameter_on_a_logarithmic_scale_is_found(diffusing):
     found = diffusing["estimate"].sel(parameter="diffusivity").item()
     allowed = ALLOWED / np.sqrt(DURATION * RATE_HZ) + np.log(10.0) * 0.1 / 5 / 4
@@ -128,6 +129,7 @@ def test_one_parameter_on_a_logarithmic_scale_is_found(diffusing):
     assert first == pytest.approx(DIFFUSIVITY, rel=0.25)
 
 
+@pytest.mark.slow
 def test_threads_and_company_of_settings_do_not_change_a_single_bit(diffusing):
     recording = synthetic_recording(DIFFUSE, diffusivity=DIFFUSIVITY)
     many = motion_model(diffuse, *DIFFUSE.parameters, settings="many")

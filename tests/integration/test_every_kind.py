@@ -11,12 +11,24 @@ from driftwalk.schema.check import check_dataset, unknown_names
 from driftwalk.schema.kinds import KINDS
 from driftwalk.schema.stores.netcdf import open_netcdf
 
+# What needs a search, a fit or many runs of blocks.
+COSTLY = (
+    *("model_calibration", "calibration", "calibration of one parameter"),
+    *("calibration of two parameters", "model_comparison", "model_check", "recovery"),
+    *("model_recovery", "fit", "fit of several flows", "fit with the angle in the state"),
+    *("flow_field of a fit", "assembly", "assembly_sizes", "classification with blocks hidden"),
+)
+
+
+def costly(form: str) -> list[pytest.MarkDecorator]:
+    return [pytest.mark.slow] if form in COSTLY else []
+
 
 def test_every_kind_is_made() -> None:
     assert {form.split()[0] for form in FORMS} == set(KINDS)
 
 
-@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("form", [pytest.param(form, marks=costly(form)) for form in FORMS])
 def test_it_is_what_its_schema_says(form: str, tmp_path) -> None:
     made = every_kind(form)
     assert made.attrs["kind"] == form.split()[0]
@@ -29,6 +41,7 @@ def test_it_is_what_its_schema_says(form: str, tmp_path) -> None:
     xr.testing.assert_equal(stored, made)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "form",
     [

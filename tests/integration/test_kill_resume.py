@@ -109,6 +109,7 @@ def uninterrupted(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
     return results(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("threads", [0, 3])
 def test_killed_twice_and_resumed(
     tmp_path: Path, uninterrupted: dict[str, bytes], threads: int
@@ -137,6 +138,7 @@ def test_killed_twice_and_resumed(
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("threads", [0, 2])
 def test_interrupt_loses_nothing(
     tmp_path: Path, uninterrupted: dict[str, bytes], threads: int
@@ -152,6 +154,7 @@ def test_interrupt_loses_nothing(
     assert results(path) == uninterrupted
 
 
+@pytest.mark.slow
 def test_second_process_is_refused_and_the_first_unharmed(
     tmp_path: Path, uninterrupted: dict[str, bytes]
 ) -> None:
@@ -170,6 +173,7 @@ def test_second_process_is_refused_and_the_first_unharmed(
     assert results(path) == uninterrupted
 
 
+@pytest.mark.slow
 def test_processes_that_start_at_once(tmp_path: Path, uninterrupted: dict[str, bytes]) -> None:
     path = tmp_path / "run"
     ends = [end(process) for process in [start(path, pause_s=0.005) for _ in range(3)]]
@@ -178,6 +182,7 @@ def test_processes_that_start_at_once(tmp_path: Path, uninterrupted: dict[str, b
     assert results(path) == uninterrupted
 
 
+@pytest.mark.slow
 def test_disk_that_fills_in_the_middle(tmp_path: Path, uninterrupted: dict[str, bytes]) -> None:
     """A limit on file sizes cuts the write of the joined result, larger than any shard."""
     path = tmp_path / "run"
@@ -203,6 +208,7 @@ def test_disk_that_fills_in_the_middle(tmp_path: Path, uninterrupted: dict[str, 
     assert results(path) == uninterrupted
 
 
+@pytest.mark.slow
 def test_damaged_shards_are_computed_again(tmp_path: Path, uninterrupted: dict[str, bytes]) -> None:
     path = tmp_path / "run"
     assert end(start(path, program=PROGRAM + after_units(signal.SIGKILL, 6) + MAIN))[0] < 0
@@ -318,6 +324,7 @@ def test_results_are_the_numbers(uninterrupted: dict[str, bytes]) -> None:
     assert uninterrupted["trajectory.bin"] == (draws * scale[:, None]).tobytes()
 
 
+@pytest.mark.slow
 def test_manifest_of_a_resumed_run(tmp_path: Path) -> None:
     path = tmp_path / "run"
     assert end(start(path, program=PROGRAM + after_units(signal.SIGKILL, 2) + MAIN))[0] < 0

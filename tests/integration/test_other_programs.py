@@ -84,6 +84,7 @@ TRACKERS = ("movement_", "sleap_", "trackmate_", "trackpy_", "traja_")
 """Beginnings of the names of tracking programs' files, which have tests of their own."""
 
 
+@pytest.mark.fast_cases(6)
 @pytest.mark.parametrize(("name", "options", "expected"), FILES)
 def test_a_real_file(
     shared_data: Callable[[str], Path], name: str, options: tuple[str, ...], expected: Expected

@@ -158,6 +158,7 @@ def test_tracking_noise_of_the_bundled_recordings(name: str) -> None:
     assert abs(found.position_noise_m - 3e-4) < 4.0 * found.position_noise_standard_error_m
 
 
+@pytest.mark.slow
 def test_no_tracking_noise_is_seen_where_there_is_none() -> None:
     path = files("driftwalk.datasets") / "tank30_ode_a" / "without_tracking_noise.csv"
     found = estimate_tracking_noise(body_track(load(str(path))))
@@ -198,6 +199,7 @@ def test_the_same_mouse_through_three_trackers(shared_data: SharedData) -> None:
     assert float(np.nanmedian(away)) < 0.005  # pixels of 1 mm: five pixels
 
 
+@pytest.mark.slow
 def test_what_the_files_do_not_hold_is_asked_for(shared_data: SharedData) -> None:
     fish = shared_data("rummynose-single-epfl") / "rummy_single_seven_trajectories.txt"
     with pytest.raises(InputError, match="`frame_rate`"):

@@ -30,6 +30,7 @@ def test_zero_on_itself(a: np.ndarray, ties: str) -> None:
     assert ks_distance(a, a, method="peacock") == 0.0
 
 
+@pytest.mark.slow
 @modest
 @given(a=points, b=points, ties=ties)
 def test_symmetric_and_within_bounds(a: np.ndarray, b: np.ndarray, ties: str) -> None:
@@ -39,6 +40,7 @@ def test_symmetric_and_within_bounds(a: np.ndarray, b: np.ndarray, ties: str) ->
     assert (there.difference_a, there.difference_b) == (back.difference_b, back.difference_a)
 
 
+@pytest.mark.slow
 @modest
 @given(a=points, b=points, seed=st.integers(0, 99))
 def test_order_does_not_matter(a: np.ndarray, b: np.ndarray, seed: int) -> None:
@@ -96,6 +98,7 @@ INCREASING = {
 }
 
 
+@pytest.mark.slow
 @modest
 @given(a=points, b=points, ties=ties, maps=st.tuples(*[st.sampled_from(sorted(INCREASING))] * 2))
 def test_strictly_monotone_maps_do_not_matter(
@@ -111,6 +114,7 @@ def test_strictly_monotone_maps_do_not_matter(
     assert ks_distance(mapped(a), mapped(b), ties=ties) == ks_distance(a, b, ties=ties)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 @modest
 @given(a=points, b=points)
 def test_ranks_are_all_that_matters(a: np.ndarray, b: np.ndarray) -> None:
@@ -122,6 +126,7 @@ def test_ranks_are_all_that_matters(a: np.ndarray, b: np.ndarray) -> None:
     assert ks_distance(ranks[: len(a)], ranks[len(a) :]) == ks_distance(a, b)
 
 
+@pytest.mark.slow
 @modest
 @given(a=points, b=points, ties=ties)
 def test_mirroring_and_swapping_axes_do_not_matter(a: np.ndarray, b: np.ndarray, ties: str) -> None:
@@ -132,12 +137,14 @@ def test_mirroring_and_swapping_axes_do_not_matter(a: np.ndarray, b: np.ndarray,
         assert result.difference_b == expected.difference_b
 
 
+@pytest.mark.slow
 @modest
 @given(a=points, b=points)
 def test_the_two_zeros_are_one_number(a: np.ndarray, b: np.ndarray) -> None:
     assert ks_distance(np.where(a == 0, -0.0, a), np.where(b == 0, 0.0, b)) == ks_distance(a, b)
 
 
+@pytest.mark.slow
 @modest
 @given(a=points, b=points)
 def test_the_conventions_are_ordered(a: np.ndarray, b: np.ndarray) -> None:
@@ -149,6 +156,7 @@ def test_the_conventions_are_ordered(a: np.ndarray, b: np.ndarray) -> None:
     assert strict.difference_b <= limits.difference_b <= cuts.difference_b
 
 
+@pytest.mark.slow
 @modest
 @given(a=points, b=points, copies=st.integers(2, 4))
 def test_copies_of_a_sample_do_not_matter(a: np.ndarray, b: np.ndarray, copies: int) -> None:

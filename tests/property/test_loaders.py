@@ -99,6 +99,7 @@ def load_or_refuse(path: Path, name: str | None) -> None:
             json.loads(dataset.attrs["counts"])
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @given(
     head=st.sampled_from(HEADERS),
@@ -117,6 +118,7 @@ def test_arbitrary_bytes_are_read_or_refused(head: bytes, body: bytes, name: str
         load_or_refuse(path, name)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=40)
 @given(body=ROWS, head=st.sampled_from([head for head in HEADERS if b"," in head or b"\t" in head]))
 def test_what_looks_like_a_table_is_read_or_refused(body: bytes, head: bytes) -> None:
@@ -133,6 +135,7 @@ def _fields_of(line: bytes, separator: bytes | None) -> int:
     return len(line.split()) if separator is None else outside.count(separator) + 1
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=100)
 @given(ROWS, st.sampled_from([",", "\t", ";", " "]))
 def test_fields_are_counted_as_by_splitting(text: bytes, delimiter: str) -> None:
@@ -162,6 +165,7 @@ def test_quoted_fields_are_counted_as_they_were_written(
     assert counted == [len(row) for row in rows]
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=8)
 @given(data=st.data(), bodies=st.integers(1, 3), count=st.integers(1, 12))
 def test_round_trip_through_both_formats_is_exact(

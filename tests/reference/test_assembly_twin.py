@@ -103,6 +103,7 @@ def drain(model: dw.Study, *, inflow: float, spin: float) -> xr.Dataset:
     return flow
 
 
+@pytest.mark.slow
 def test_free_blocks_agree_before_they_meet() -> None:
     model = study(0.4)
     flow = swirl(model, angular_velocity=4.0)
@@ -114,6 +115,7 @@ def test_free_blocks_agree_before_they_meet() -> None:
     assert np.abs(run["pose"][:, :2] - start[:, :2]).max() > 0.05
 
 
+@pytest.mark.slow
 def test_one_block_runs_to_its_last_step() -> None:
     model = study(0.12)
     flow = swirl(model, angular_velocity=3.0)
@@ -123,6 +125,7 @@ def test_one_block_runs_to_its_last_step() -> None:
 
 
 # Seeds of starts from which connectors come face to face.
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize(("blocks", "seed"), [(2, 202), (3, 123), (4, 104), (5, 125)])
 @pytest.mark.parametrize(("hidden", "force"), [("none", 2e-3), ("full", 0.0)])
 @pytest.mark.parametrize("latching", ["none", "collision", "connector"])
@@ -140,6 +143,7 @@ def test_events_and_poses_agree(
     assert (run["event_count"] > 0) == (latching != "none"), "nothing latched"
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("hidden", ["none", "full"])
 @pytest.mark.parametrize("law", BEYOND_PAPER)
 def test_events_and_poses_agree_beyond_the_paper_s_law(law: str, hidden: str) -> None:
@@ -161,6 +165,7 @@ TANKS: tuple[dict[str, Any], ...] = (
 )
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("seed", [0, 2, 3, 4, 7, 13, 17])
 def test_heaps_agree(seed: int) -> None:
     """Blocks on top of each other, some through the wall: every rule of settling in a few steps."""

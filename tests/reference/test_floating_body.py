@@ -215,6 +215,7 @@ def test_the_force_remembers_as_said_from_the_start_on() -> None:
         np.testing.assert_allclose(along, kept**lag, atol=0.055)
 
 
+@pytest.mark.slow
 def test_a_force_that_remembers_has_the_intensity_it_had() -> None:
     """The sum of n forces has the variance sum of kept^|i-j| (1 - kept)/(1 + kept), n for large n.
 

@@ -74,6 +74,7 @@ def test_a_weightless_tracer_goes_the_way_of_the_water(
     assert np.abs(y).max() < 1e-9
 
 
+@pytest.mark.fast_cases(4)
 @pytest.mark.parametrize("precision", ["single", "double"])
 @pytest.mark.parametrize("start", [0.0, 4.4])
 @pytest.mark.parametrize("repeat", ["loop", "mirror", "hold"])

@@ -78,6 +78,7 @@ def strips_of(theta: float) -> list[tuple[Floats, Floats]]:
     return out
 
 
+@pytest.mark.slow
 def test_mean_over_the_covariance_is_the_integral():
     """Each strip integrated over its closing speed; the slip given it is linear in it."""
     theta, omega = 0.4, 1.3
@@ -101,6 +102,7 @@ def test_mean_over_the_covariance_is_the_integral():
     assert np.abs(mean_drag(LINEAR, STATE)["acceleration"] / total - 1).max() > 0.05
 
 
+@pytest.mark.slow
 @pytest.mark.false_alarm(2e-4)
 def test_mean_over_the_covariance_is_the_mean_of_draws(fresh_seed):
     """4 standard errors on each of two components: a false alarm in 8000."""

@@ -58,6 +58,7 @@ def test_larger_samples_equal_the_definition() -> None:
 
 
 # A comparison or a radix sort, blocks of 128 points, numbers that crowd on an even scale.
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize(("n", "m"), [(127, 128), (128, 129), (255, 1), (384, 257)])
 @pytest.mark.parametrize("shape", ["even", "over all sizes", "one far point", "tied"])
 def test_sizes_around_a_threshold_equal_the_definition(n: int, m: int, shape: str) -> None:

@@ -75,6 +75,7 @@ def test_from_rest_the_speed_settles_as_the_drag_says() -> None:
     assert np.abs(seen.y[0]).max() < 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.false_alarm(2e-4)
 def test_the_heading_diffuses(fresh_seed) -> None:
     """<cos> = exp(-V/2) with V = 2 D (t - 1.5 s): the turning settles within s, from rest.
@@ -119,6 +120,7 @@ def test_along_the_wall_it_slides_without_friction() -> None:
     assert speed == pytest.approx(SPEED * np.sin(heading), rel=0.02)
 
 
+@pytest.mark.slow
 def test_another_tank_is_refused_in_its_words() -> None:
     tank = Tank.from_arena({"shape": "rectangle", "width_m": 0.3, "height_m": 0.3})
     with pytest.raises(InputError, match="it reported: this robot knows round tanks only"):

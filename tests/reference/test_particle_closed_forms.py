@@ -79,6 +79,7 @@ def runs_and_rests(count: int, **changes: float) -> ParticleTable:
     return of("run_rest", count, **(given | changes))
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.false_alarm(FALSE_ALARM)
 @pytest.mark.parametrize(("run_cv", "rest_cv"), [(0.3, 0.3), (1.0, 1.0), (2.0, 2.0), (0.3, 2.0)])
 def test_the_share_of_time_at_rest(run_cv: float, rest_cv: float, fresh_seed: Seed) -> None:
@@ -90,6 +91,7 @@ def test_the_share_of_time_at_rest(run_cv: float, rest_cv: float, fresh_seed: Se
     assert errors_off(running, 1.0 / 1.5) < SIGMAS
 
 
+@pytest.mark.slow
 @pytest.mark.false_alarm(4 * FALSE_ALARM)
 def test_bouts_last_as_long_as_asked_for(fresh_seed: Seed) -> None:
     # Of every world the same number of bouts: those of a fixed window would be the short ones.

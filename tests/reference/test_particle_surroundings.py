@@ -135,6 +135,7 @@ def near_wall(part: str, seed: int) -> Floats:
     return np.asarray(psi[np.abs(here) > 0.15 - reach])
 
 
+@pytest.mark.slow
 @pytest.mark.false_alarm(2 * FALSE_ALARM)
 def test_turning_away_and_following_show_near_the_wall(fresh_seed: Seed) -> None:
     # Turned away a particle heads outwards less, and one that follows heads along the wall more.

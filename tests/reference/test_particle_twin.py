@@ -209,6 +209,7 @@ def agree(case: Case, seed: int = 5) -> Path:
     return path
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("name", SWITCHING)
 def test_a_switching_particle_moves_as_its_twin(name: str) -> None:
     path = agree(SWITCHING[name])
@@ -242,6 +243,7 @@ def test_a_particle_stays_in_a_sharp_corner(angle: float, reflects: bool) -> Non
     assert x.max() > 0.09, "no particle came to the tip"
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("reflects", [False, True])
 @pytest.mark.parametrize("tank", [CIRCLE, SQUARE], ids=["circle", "square"])
 @pytest.mark.parametrize("name", WALLS)
@@ -267,6 +269,7 @@ def test_a_corner_holds_a_particle_as_in_the_twin() -> None:
     np.testing.assert_allclose(np.stack([x, y])[..., -1], 0.14, atol=1e-12)
 
 
+@pytest.mark.fast_cases(3)
 @pytest.mark.parametrize("reflects", [False, True])
 @pytest.mark.parametrize("tank", [CIRCLE, SQUARE, WEDGE], ids=["circle", "square", "wedge"])
 @pytest.mark.parametrize("carried", [False, True])
@@ -280,6 +283,7 @@ def test_an_inertial_particle_moves_as_its_twin(tank: Tank, reflects: bool, carr
     agree(Case((), shared, tank, reflects, carried))
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("name", ["active", "run and rest", "diffusion"])
 def test_the_water_carries_a_particle_as_its_twin(name: str) -> None:
     case = SWITCHING[name]

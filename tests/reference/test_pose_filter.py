@@ -53,6 +53,7 @@ def difficult_poses() -> dict[str, Any]:
     return track
 
 
+@pytest.mark.slow
 def test_filter_is_the_dense_one():
     track = difficult_poses()
     got = run_pose(track, sensitivities=True)

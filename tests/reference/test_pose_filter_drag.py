@@ -82,6 +82,7 @@ def test_known_pose_and_angle_as_an_input_are_the_same():
     np.testing.assert_allclose(got["by_coefficients"][:2], given["by_coefficients"], rtol=1e-12)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("coefficients", [LINEAR, WAVY], ids=["linear", "wavy"])
 def test_mean_over_the_covariance_is_the_integral(coefficients):
     """Each strip integrated over its closing speed; the slip given it is linear in it."""

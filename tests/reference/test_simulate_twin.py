@@ -21,6 +21,7 @@ from driftwalk import _core
 from driftwalk.core.seeds import world_keys
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("law", BEYOND_PAPER)
 def test_twin_and_double_agree_beyond_the_paper_s_law(law: str) -> None:
     numbers = {**numbers_of(BEYOND_PAPER[law]), "steps_per_interval": 2}
@@ -46,6 +47,7 @@ def test_twin_and_double_agree_beyond_the_paper_s_law(law: str) -> None:
     assert np.abs(x - paper[0])[:, -1].min() > 1e-5, "a world moved as the paper says"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("friction", [pytest.param(0.0, marks=pytest.mark.slow), 0.4])
 def test_twin_and_double_agree_over_ten_seconds(friction: float) -> None:
     keys = world_keys(5, trial=0, replicate=np.arange(8))

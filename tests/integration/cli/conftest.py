@@ -7,13 +7,14 @@ from pathlib import Path
 
 import pytest
 from command_line import FIT, Done, here, leave_out_figures
+from made_once import made_once, shared_folder
 
 
 @pytest.fixture(scope="session")
 def fitted(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Done]:
     """Return the run directory of a fit with its check and all figures, and what it printed."""
-    folder = tmp_path_factory.mktemp("fit") / "run"
-    return folder, here(*FIT, "-o", folder, "--json")
+    folder = shared_folder("fit", tmp_path_factory.mktemp("fit")) / "run"
+    return folder, made_once("fit", lambda: here(*FIT, "-o", folder, "--json"))
 
 
 @pytest.fixture(scope="module")

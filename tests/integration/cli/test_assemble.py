@@ -72,6 +72,7 @@ def dataset(path: Path) -> xr.Dataset:
         return stored.load()
 
 
+@pytest.mark.slow
 def test_json_holds_both_distributions(whole: tuple[Path, Done]) -> None:
     done = whole[1]
     assert done.code == 0, done.err
@@ -93,6 +94,7 @@ def test_json_holds_both_distributions(whole: tuple[Path, Done]) -> None:
     assert (found["blocks"], found["duration_s"], found["seed"]) == (4, 30.0, 1)
 
 
+@pytest.mark.slow
 def test_the_parameters_are_the_calibrations(whole: tuple[Path, Done], calibrated: Path) -> None:
     found, known = json.loads(whole[1].out), dataset(calibrated / "calibration.nc")
     for name in ("drag_coefficient", "force_std_N", "force_interval_s"):
@@ -109,6 +111,7 @@ def test_the_parameters_are_the_calibrations(whole: tuple[Path, Done], calibrate
     assert (fixed["x"].values != drawn["x"].values).all()
 
 
+@pytest.mark.slow
 def test_the_run_directory_is_complete(whole: tuple[Path, Done], calibrated: Path) -> None:
     folder = whole[0]
     names = {path for path in contents(folder) if not path.startswith("figures/")}
@@ -134,6 +137,7 @@ def test_the_run_directory_is_complete(whole: tuple[Path, Done], calibrated: Pat
         assert listed[name] == hashlib.sha256((folder / name).read_bytes()).hexdigest()
 
 
+@pytest.mark.slow
 def test_the_path_is_that_of_the_first_runs(whole: tuple[Path, Done]) -> None:
     fixed, path = (dataset(whole[0] / name) for name in ("assembly.nc", "path.nc"))
     assert path["run"].values.tolist() == [0, 1, 2, 3]
@@ -179,6 +183,7 @@ def test_the_answer_for_people_stands_side_by_side(calibrated: Path, tmp_path: P
     assert "drawn for each run: drag_coefficient, force_std, flow" in lines
 
 
+@pytest.mark.slow
 def test_of_many_blocks_sizes_are_printed_and_stored(calibrated: Path, tmp_path: Path) -> None:
     """Nearly every run is a class of its own, with a name that is longer than a line."""
     many = ["--blocks", "16", "--runs", "12", "--duration", "20s", "--threads", "1"]
@@ -257,6 +262,7 @@ def test_a_calibration_without_bootstrap_gives_one_distribution(
     assert not (tmp_path / "run" / "distribution_drawn.nc").exists()
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize(
     ("options", "says"),
     [
@@ -328,6 +334,7 @@ def test_what_does_not_go_together(calibrated: Path, tmp_path: Path) -> None:
     assert "no such file" in refusal(missing)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_figures")
 def test_a_finished_run_is_kept_until_overwrite(calibrated: Path, tmp_path: Path) -> None:
     words = ["assemble", calibrated, *SIZE, "-o", tmp_path / "run"]
@@ -380,5 +387,6 @@ def test_killed_interrupted_and_continued(
     assert not (folder / ".shards").exists()
 
 
+@pytest.mark.slow
 def test_its_figures_are_drawn_again_alike(whole: tuple[Path, Done], tmp_path: Path) -> None:
     assert_drawn_alike(whole[0], tmp_path / "out")

@@ -290,6 +290,7 @@ def test_a_body_must_be_named(folder: Path) -> None:
 # What follows starts processes: that the exit code and the one line come from the program itself.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["info", "calibrate"])
 def test_the_process_itself(command: str, folder: Path) -> None:
     (folder / "junk.csv").write_bytes(BAD["junk.csv"])

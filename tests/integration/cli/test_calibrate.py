@@ -67,6 +67,7 @@ def words(study: Path, folder: Path, until: str = "120s") -> list[object]:
     ]
 
 
+@pytest.mark.slow
 def test_json_holds_the_answer_with_its_intervals(finished: tuple[Path, Done]) -> None:
     done = finished[1]
     assert done.code == 0, done.err
@@ -95,6 +96,7 @@ def test_json_holds_the_answer_with_its_intervals(finished: tuple[Path, Done]) -
     assert isinstance(found["warnings"], list)
 
 
+@pytest.mark.slow
 def test_the_run_directory_is_complete(finished: tuple[Path, Done]) -> None:
     folder = finished[0]
     figures = {f"figures/{name}.{kind}" for name in FIGURES for kind in ("png", "svg")}
@@ -107,6 +109,7 @@ def test_the_run_directory_is_complete(finished: tuple[Path, Done]) -> None:
         assert ET.parse(folder / "figures" / f"{name}.svg").getroot().tag.endswith("svg")
 
 
+@pytest.mark.slow
 def test_the_manifest_says_how_the_run_came_about(finished: tuple[Path, Done], study: Path) -> None:
     folder = finished[0]
     manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
@@ -126,6 +129,7 @@ def test_the_manifest_says_how_the_run_came_about(finished: tuple[Path, Done], s
     assert any("machine" in key or "platform" in key for key in manifest)
 
 
+@pytest.mark.slow
 def test_the_calibration_has_units_and_no_missing_cell(finished: tuple[Path, Done]) -> None:
     found = calibration(finished[0])
     units = {"drag_coefficient": "1", "force_std": "N", "ks_distance": "1", "excerpt_x": "m"}
@@ -139,6 +143,7 @@ def test_the_calibration_has_units_and_no_missing_cell(finished: tuple[Path, Don
     assert calibration_facts(found)["force_std_N"] == json.loads(finished[1].out)["force_std_N"]
 
 
+@pytest.mark.slow
 def test_a_finished_run_is_kept_as_it_is(finished: tuple[Path, Done], study: Path) -> None:
     folder = finished[0]
     before = contents(folder)
@@ -169,6 +174,7 @@ def test_overwrite_moves_the_finished_run_aside(study: Path, tmp_path: Path) -> 
     assert contents(folder) == before
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_figures")
 def test_no_force_is_printed_without_its_interval(study: Path, tmp_path: Path) -> None:
     done = here(*words(study, tmp_path / "run"), "--flow", FLOW)
@@ -181,6 +187,7 @@ def test_no_force_is_printed_without_its_interval(study: Path, tmp_path: Path) -
     assert "simulated by another engine" not in done.out
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_figures")
 @pytest.mark.parametrize("how", [["--bootstrap", "0"], ["--study", "coarse"]])
 def test_a_force_without_bootstrap_says_that_it_has_no_interval(

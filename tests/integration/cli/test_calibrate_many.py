@@ -36,6 +36,7 @@ def words(folder: Path) -> tuple[object, ...]:
     return ("calibrate", folder / "recording.nc", *model, *noise, "-o", folder / "run")
 
 
+@pytest.mark.slow
 def test_the_truth_is_found(run: tuple[Path, dict]) -> None:
     """Three intervals of 90 %, widened by half: all hold the truth of 97 of 100 recordings."""
     _, said = run
@@ -48,6 +49,7 @@ def test_the_truth_is_found(run: tuple[Path, dict]) -> None:
     assert said["parameters"]["speed_m_s"]["determined"]
 
 
+@pytest.mark.slow
 def test_the_folder_holds_everything(run: tuple[Path, dict]) -> None:
     folder, said = run
     stored = open_netcdf(folder / "run" / "model_calibration.nc")
@@ -60,6 +62,7 @@ def test_the_folder_holds_everything(run: tuple[Path, dict]) -> None:
     assert "--overwrite" in refusal(here(*words(folder)))
 
 
+@pytest.mark.slow
 def test_the_posterior_is_a_table(run: tuple[Path, dict]) -> None:
     folder, said = run
     head, *rows = (folder / "run" / "posterior.csv").read_text().splitlines()
@@ -70,6 +73,7 @@ def test_the_posterior_is_a_table(run: tuple[Path, dict]) -> None:
     assert [low, high] == pytest.approx(said["parameters"]["speed_m_s"]["interval"], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_posterior_of_a_map_is_refused(run: tuple[Path, dict], tmp_path: Path) -> None:
     folder, _ = run
     words = ("calibrate", folder / "recording.nc", "--posterior", "-o", tmp_path / "run")
@@ -78,6 +82,7 @@ def test_a_posterior_of_a_map_is_refused(run: tuple[Path, dict], tmp_path: Path)
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.slow
 def test_people_read_which_parameters_are_determined(
     run: tuple[Path, dict], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -92,6 +97,7 @@ def test_people_read_which_parameters_are_determined(
     assert [row.split()[-1] for row in rows[:3]] == ["m/s)", "rad2/s)", "rad/s)"]
 
 
+@pytest.mark.slow
 def test_its_values_can_be_simulated(run: tuple[Path, dict]) -> None:
     folder, said = run
     out = folder / "again.nc"
@@ -104,5 +110,6 @@ def test_its_values_can_be_simulated(run: tuple[Path, dict]) -> None:
     assert stored["speed_m_s"] == said["parameters"]["speed_m_s"]["value"]
 
 
+@pytest.mark.slow
 def test_its_figures_are_drawn_again_alike(run: tuple[Path, dict], tmp_path: Path) -> None:
     assert_drawn_alike(run[0] / "run", tmp_path / "out")

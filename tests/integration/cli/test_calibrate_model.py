@@ -39,6 +39,7 @@ def words(place: Path, out: Path) -> tuple[object, ...]:
     return ("calibrate", place / "recording.nc", "--study", place / "grid.toml", "-o", out)
 
 
+@pytest.mark.slow
 def test_the_speed_of_an_active_body_is_found(
     place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -99,6 +100,7 @@ def test_mistakes_are_one_line(
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "said"),
     [

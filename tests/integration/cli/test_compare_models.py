@@ -33,6 +33,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
     return folder, json.loads(done.out)
 
 
+@pytest.mark.slow
 def test_json_holds_the_ranking(run: tuple[Path, dict]) -> None:
     _, said = run
     names = [one["model"] for one in said["models"]]
@@ -48,6 +49,7 @@ def test_json_holds_the_ranking(run: tuple[Path, dict]) -> None:
     assert walk["estimate"] == {}
 
 
+@pytest.mark.slow
 def test_the_folder_holds_everything(run: tuple[Path, dict]) -> None:
     folder, said = run
     stored = open_netcdf(folder / "comparison.nc")
@@ -58,6 +60,7 @@ def test_the_folder_holds_everything(run: tuple[Path, dict]) -> None:
     assert manifest["inputs"]["recording"]["sha256"]
 
 
+@pytest.mark.slow
 def test_people_read_the_answer(run: tuple[Path, dict], capsys: pytest.CaptureFixture[str]) -> None:
     folder, said = run
     print_answer(open_netcdf(folder / "comparison.nc"), folder)
@@ -96,6 +99,7 @@ def test_mistakes_are_one_line(tmp_path: Path) -> None:
     assert not out.exists()
 
 
+@pytest.mark.slow
 def test_a_finished_run_is_kept(run: tuple[Path, dict]) -> None:
     folder, _ = run
     assert "--overwrite" in refusal(here("compare-models", *SHORT, "-o", folder))
@@ -105,10 +109,12 @@ def test_the_usual_models_begin_with_the_block() -> None:
     assert DEFAULT_MODELS[0] == "block"
 
 
+@pytest.mark.slow
 def test_its_figures_are_drawn_again_alike(run: tuple[Path, dict], tmp_path: Path) -> None:
     assert_drawn_alike(run[0], tmp_path / "out")
 
 
+@pytest.mark.slow
 def test_what_is_known_is_not_searched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     compare_after_little(monkeypatch)
     leave_out_figures(monkeypatch)
@@ -140,6 +146,7 @@ def test_a_parameter_that_no_model_has_is_named(tmp_path: Path) -> None:
     assert "expected NAME=VALUE" in refusal(here(*words, "speed"))
 
 
+@pytest.mark.slow
 def test_the_notebook_takes_what_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
     compare_after_little(monkeypatch)
     recording = dw.load(RECORDING, stop=30.0, tank="circle:30cm")

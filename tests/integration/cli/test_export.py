@@ -40,6 +40,7 @@ def one_path(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("driftwalk.export.simulators.reference.KEPT", 1)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("one_path")
 def test_a_calibration_runs_in_mujoco(calibrated: Path, tmp_path: Path) -> None:
     """The promise: within 0.1 mm over 10 s, without the stochastic force and with it."""
@@ -65,6 +66,7 @@ def test_a_calibration_runs_in_mujoco(calibrated: Path, tmp_path: Path) -> None:
     assert dw.load_study(out / "study.toml").forces.force_std_N == numbers["force_std_N"]
 
 
+@pytest.mark.slow
 def test_the_proof_can_fail(study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A drag that is wrong by a fifth is another run after a second."""
     pytest.importorskip("mujoco", reason="mujoco-core is not installed: make .venv/.test-tools")
@@ -114,6 +116,7 @@ def test_every_path_of_an_export_to_mujoco(study: Path, tmp_path: Path) -> None:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("target", ["webots", "gazebo"])
 def test_the_force_of_a_plugin_is_driftwalk_s(study: Path, target: str, tmp_path: Path) -> None:
     """Number by number, by the compiled code; and the proof fails where the drag is another."""
@@ -137,6 +140,7 @@ def test_the_force_of_a_plugin_is_driftwalk_s(study: Path, target: str, tmp_path
     assert not outcome.passed
 
 
+@pytest.mark.slow
 def test_a_fit_goes_out_with_its_law_and_its_flow(
     fitted: tuple[Path, Done], tmp_path: Path
 ) -> None:
@@ -153,6 +157,7 @@ def test_a_fit_goes_out_with_its_law_and_its_flow(
     assert np.array_equal(written["u"], own["u"])
 
 
+@pytest.mark.slow
 def test_the_world_of_gazebo_is_xml_with_the_block_where_it_starts(
     study: Path, tmp_path: Path
 ) -> None:
@@ -168,6 +173,7 @@ def test_the_world_of_gazebo_is_xml_with_the_block_where_it_starts(
     assert len(world.findall(".//collision")) == 65
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("target", ["mujoco", "gazebo"])
 def test_a_tank_too_narrow_for_a_proof_is_said(target: str, study: Path, tmp_path: Path) -> None:
     """The block goes out all the same; its diagonal is 4.2 cm."""
@@ -242,6 +248,7 @@ class TestRefusals:
         assert ("is not a run directory" if there else "does not exist") in line
         assert "driftwalk calibrate" in line
 
+    @pytest.mark.slow
     def test_another_motion_model(self, calibrated: Path, tmp_path: Path) -> None:
         """A finished run whose calibration is about a body that moves by itself."""
         run = tmp_path / "run"

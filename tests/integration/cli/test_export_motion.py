@@ -49,6 +49,7 @@ def assert_same(back: xr.Dataset, recording: xr.Dataset, names: Mapping[str, str
                 np.testing.assert_array_equal(found, other)
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize(
     ("file", "options"),
     [
@@ -104,6 +105,7 @@ def test_a_bag_holds_the_poses_to_the_nanosecond(tmp_path: Path) -> None:
         np.testing.assert_allclose(found.theta, expected.theta, rtol=0, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_the_tank_is_said_where_it_is_lost_and_kept_where_it_is_not(tmp_path: Path) -> None:
     recording = dw.tank30_recording().isel(time=slice(50))
     save_trajectory(recording, tmp_path / "a.nc")
@@ -146,6 +148,7 @@ def test_movement_itself_reads_its_file(tmp_path: Path) -> None:
     np.testing.assert_array_equal(x, recording["x"].values[:, 0])
 
 
+@pytest.mark.slow
 def test_every_replicate_of_a_simulation_goes_out(tmp_path: Path) -> None:
     words = ("--flow", FLOW, "--duration", "2s", "--replicates", "3", "-o", tmp_path / "s.nc")
     assert here("simulate", *words).code == 0
@@ -159,6 +162,7 @@ def test_every_replicate_of_a_simulation_goes_out(tmp_path: Path) -> None:
     assert [file.name for file in one.glob("*.csv")] == ["replicate_2.csv"]
 
 
+@pytest.mark.slow
 def test_blocks_that_assemble_go_out_by_run(blocks: Path, tmp_path: Path) -> None:
     assert here("export", blocks, "--to", "trackpy", "-o", tmp_path / "out").code == 0
     with xr.open_dataset(blocks, engine="h5netcdf", decode_times=False) as stored:
@@ -169,6 +173,7 @@ def test_blocks_that_assemble_go_out_by_run(blocks: Path, tmp_path: Path) -> Non
                 np.testing.assert_array_equal(back[name].values, expected)
 
 
+@pytest.mark.slow
 def test_a_film_shows_the_first_of_several_runs_and_says_so(blocks: Path, tmp_path: Path) -> None:
     done = here("export", blocks, "--to", "gif", "--speed", "5", "-o", tmp_path / "out")
     assert done.code == 0, done.err
@@ -176,6 +181,7 @@ def test_a_film_shows_the_first_of_several_runs_and_says_so(blocks: Path, tmp_pa
     assert (tmp_path / "out" / "run_0.gif").stat().st_size > 1000
 
 
+@pytest.mark.slow
 def test_figures_come_with_the_numbers_that_they_draw(run: Path, tmp_path: Path) -> None:
     done = here("export", run, "--to", "svg", "-o", tmp_path / "out")
     assert done.code == 0, done.err
@@ -196,6 +202,7 @@ def test_figures_come_with_the_numbers_that_they_draw(run: Path, tmp_path: Path)
     assert {round(1.0 - value, 12) for value in expected} <= shown
 
 
+@pytest.mark.slow
 def test_fonts_of_a_pdf_are_truetype(run: Path, tmp_path: Path) -> None:
     assert here("export", run, "--to", "pdf", "-o", tmp_path / "out").code == 0
     for drawing in (tmp_path / "out").glob("*.pdf"):

@@ -31,6 +31,7 @@ def answer(done: Done) -> dict[str, Any]:
     return found
 
 
+@pytest.mark.slow
 def test_json_holds_what_is_promised(fitted: tuple[Path, Done]) -> None:
     found = answer(fitted[1])
     assert set(REQUIRED) <= found.keys()
@@ -47,6 +48,7 @@ def test_json_holds_what_is_promised(fitted: tuple[Path, Done]) -> None:
     assert found["tracking_noise_m"] == pytest.approx(truth["tracking_noise_m"], rel=0.05)
 
 
+@pytest.mark.slow
 def test_defaults_that_decide_a_number_are_said_and_warned_of(fitted: tuple[Path, Done]) -> None:
     opening = "block of side 3 cm (default); mass 11.6 g (default); wetted depth 3 cm (default); "
     assert f"{opening}force redrawn every 16 ms (--force-interval)\n" in fitted[1].err
@@ -55,6 +57,7 @@ def test_defaults_that_decide_a_number_are_said_and_warned_of(fitted: tuple[Path
     assert warnings[0].endswith("state --mass, --side and --tank")
 
 
+@pytest.mark.slow
 def test_the_run_directory_is_whole(fitted: tuple[Path, Done]) -> None:
     folder = fitted[0]
     for name in ("fit.nc", "flow.nc", "recording.nc", "manifest.json"):
@@ -69,6 +72,7 @@ def test_the_run_directory_is_whole(fitted: tuple[Path, Done]) -> None:
         assert dw.fitted_flow(stored)["u"].values == pytest.approx(flow["u"].values)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_figures")
 def test_simulate_and_assemble_take_its_flow(fitted: tuple[Path, Done], tmp_path: Path) -> None:
     flow = fitted[0] / "flow.nc"
@@ -79,6 +83,7 @@ def test_simulate_and_assemble_take_its_flow(fitted: tuple[Path, Done], tmp_path
     assert done.code == 0, done.err
 
 
+@pytest.mark.slow
 def test_a_finished_run_is_not_done_again(fitted: tuple[Path, Done]) -> None:
     done = here(*FIT, "-o", fitted[0])
     assert done.code == 2
@@ -97,6 +102,7 @@ def test_several_recordings(fitted: tuple[Path, Done], tmp_path: Path) -> None:
     assert widths[0] < 0.9 * widths[1]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_figures")
 def test_people_read_the_answer(tmp_path: Path) -> None:
     done = here(*FIT, "--to", "100", "-o", tmp_path / "run", "--angle", "none", "--wall")
@@ -109,6 +115,7 @@ def test_people_read_the_answer(tmp_path: Path) -> None:
     assert wall.endswith("(--columns), and fit with --angle state")
 
 
+@pytest.mark.fast_cases(4)
 @pytest.mark.parametrize(
     ("options", "words"),
     [

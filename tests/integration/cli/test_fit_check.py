@@ -19,6 +19,7 @@ STUDIES = Path(__file__).resolve().parents[3] / "studies" / "real"
 FIGURES = ("check_innovations", "check_map", "check_time", "check_steps")
 
 
+@pytest.mark.slow
 def test_json_says_whether_the_model_explains_it(fitted: tuple[Path, Done]) -> None:
     assert fitted[1].code == 0, fitted[1].err
     found = json.loads(fitted[1].out)
@@ -28,6 +29,7 @@ def test_json_says_whether_the_model_explains_it(fitted: tuple[Path, Done]) -> N
     assert 0.0 < found["ks_distance"] < 4.0 * found["ks_noise_floor"] < 1.0
 
 
+@pytest.mark.slow
 def test_the_check_is_written_with_its_figures(fitted: tuple[Path, Done]) -> None:
     folder = fitted[0]
     for name in FIGURES:
@@ -123,5 +125,6 @@ def test_a_robot_that_drives_itself_is_not_explained(
     assert found["ks_distance"] > 3.0 * found["ks_noise_floor"]
 
 
+@pytest.mark.slow
 def test_its_figures_are_drawn_again_alike(fitted: tuple[Path, Done], tmp_path: Path) -> None:
     assert_drawn_alike(fitted[0], tmp_path / "out")

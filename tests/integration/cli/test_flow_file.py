@@ -28,6 +28,7 @@ def shifts(tmp_path: Path) -> Path:
 SCALE = ("--scale", "1mm", "--frame-interval", "10ms")
 
 
+@pytest.mark.slow
 def test_a_field_in_pixels_is_described_and_made_one_in_metres(
     shifts: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -64,6 +65,7 @@ def test_simulate_says_what_to_do_about_pixels(shifts: Path, tmp_path: Path) -> 
     assert "driftwalk flow FILE -o flow.nc takes them" in said
 
 
+@pytest.mark.slow
 def test_netcdf_whose_variables_nobody_knows(tmp_path: Path) -> None:
     path = tmp_path / "field.nc"
     xr.Dataset(

@@ -52,6 +52,7 @@ def test_a_flow_that_ends_is_refused(name: str, series: Path, tmp_path: Path) ->
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("repeat", ["loop", "mirror", "hold"])
 def test_how_it_goes_on_is_said(repeat: str, series: Path, tmp_path: Path) -> None:
     words = (*commands(series, tmp_path)["assemble"], "--flow-repeat", repeat)

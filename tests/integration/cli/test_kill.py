@@ -51,7 +51,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def words(study: Path, folder: Path) -> list[object]:
     return [
-        *("calibrate", RECORDING, "--to", "60s", "--flow", FLOW, "--study", study),
+        *("calibrate", RECORDING, "--to", "20s", "--flow", FLOW, "--study", study),
         *("--out", folder, "--threads", "1"),
     ]
 
@@ -127,6 +127,7 @@ sys.addaudithook(hook)
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("no_figures")
 def test_killed_between_any_two_changes(
     study: Path, uninterrupted: xr.Dataset, tmp_path: Path
 ) -> None:
@@ -141,7 +142,7 @@ def test_killed_between_any_two_changes(
         assert code == -signal.SIGKILL
         kills += 1
         if not (folder / "manifest.json").exists():
-            done = apart(*words(study, folder), before=PLAIN)
+            done = here(*words(study, folder))
             assert done.code == 0, done.err
         assert_same_bits(calibration(folder), uninterrupted)
     assert kills > 3
@@ -226,6 +227,7 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("no_figures")
 @pytest.mark.parametrize("free", [40_000, 600_000, 1_300_000, 2_000_000])
 def test_a_disk_that_is_full(
     free: int, study: Path, uninterrupted: xr.Dataset, small_disk: Path
@@ -238,7 +240,7 @@ def test_a_disk_that_is_full(
     assert str(folder) in line
     ballast.unlink()
     assert not list(folder.rglob("*partial*"))
-    done = apart(*words(study, folder), before=PLAIN)
+    done = here(*words(study, folder))
     assert done.code == 0, done.err
     assert_same_bits(calibration(folder), uninterrupted)
 

@@ -88,6 +88,7 @@ def test_no_memory_for_a_simulation_names_its_size(monkeypatch: pytest.MonkeyPat
     assert one_line(MemoryError("std::bad_alloc")) == "there is not enough memory for this"
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_figures")
 def test_a_connector_without_effect_is_said(tmp_path: Path) -> None:
     options = ("--duration", "1s", "--connector-distance", "1cm", "--connector-axis", "0.1")

@@ -39,6 +39,7 @@ def next_of(done: Done) -> list[str]:
     return words
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
@@ -80,6 +81,7 @@ def test_what_was_said_of_tank_and_body_is_said_again(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_a_name_that_is_taken_is_not_proposed(tracks: Path) -> None:
     simulate = ("simulate", "--flow", FLOW, "--duration", "2s", "--overwrite", "-o", "s.nc")
     proposed = []
@@ -99,6 +101,7 @@ def test_the_side_that_a_fitted_tank_took_is_asked_for(tmp_path: Path) -> None:
     assert "the mass and side were not stated" in done.err
 
 
+@pytest.mark.slow
 def test_the_lines_lead_from_a_recording_to_a_page(tracks: Path) -> None:
     words = next_of(here("info", tracks))
     words = next_of(here(*words, *FIT))

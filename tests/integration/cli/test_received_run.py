@@ -131,6 +131,7 @@ READING: dict[str, tuple[tuple[str, ...], Callable[[Path, Path], Words]]] = {
 }  # fmt: skip
 
 
+@pytest.mark.fast_cases(6)
 @pytest.mark.parametrize("attack", LEADING_OUT)
 @pytest.mark.parametrize(
     ("command", "name"), [(one, name) for one, (names, _) in READING.items() for name in names]
@@ -173,6 +174,7 @@ def test_the_page_and_the_terminal_name_what_is_not_shown(
     assert len(told) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command", ["report", "cite", "export to csv", pytest.param("assemble", marks=pytest.mark.slow)]
 )
@@ -188,6 +190,7 @@ def test_a_file_that_the_run_did_not_write_is_named(
     assert f"{name} is not the file that the run wrote" in done.err
 
 
+@pytest.mark.slow
 def test_a_whole_run_has_nothing_said_against_it(received: Path, tmp_path: Path) -> None:
     for command in ("report", "cite", "export to csv"):
         done = here(*READING[command][1](received, tmp_path))
@@ -195,6 +198,7 @@ def test_a_whole_run_has_nothing_said_against_it(received: Path, tmp_path: Path)
         assert "manifest" not in done.err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["/etc/hostname", "../home/secret", "../home/pipe", "a\n\x1b[2Jb"])
 def test_names_in_the_manifest_lead_nowhere(received: Path, tmp_path: Path, name: str) -> None:
     (tmp_path / "home" / "secret").write_text("mine")
@@ -208,6 +212,7 @@ def test_names_in_the_manifest_lead_nowhere(received: Path, tmp_path: Path, name
     assert "\x1b" not in done.err
 
 
+@pytest.mark.slow
 def test_a_file_that_was_put_there_is_named(received: Path, tmp_path: Path) -> None:
     shutil.copy(received / "recording.nc", received / "recording-2.nc")
     done = here("report", received, "-o", tmp_path / "page.html")
@@ -237,6 +242,7 @@ def test_a_journal_replaces_no_file_of_the_user(
     assert (tmp_path / "home" / "authorized_keys").read_text() == "mine"
 
 
+@pytest.mark.fast_cases(15)
 @pytest.mark.parametrize("attack", LEADING_OUT)
 @pytest.mark.parametrize("name", [*ALL, ".lock", ".run.json", ".moving", ".shards"])
 def test_nothing_is_written_where_something_leads_out(
@@ -343,6 +349,7 @@ CALLS = [
 ]
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(
     ("state", "command"),
     [pytest.param(*one, marks=pytest.mark.slow if one[1] in LONG else ()) for one in CALLS],
@@ -371,6 +378,7 @@ def test_the_trap_is_one(received: Path, tmp_path: Path, monkeypatch: pytest.Mon
     assert marker.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("file", ["/etc/hostname", "../home/pipe"])
 def test_flow_files_that_the_study_of_a_run_names_are_not_read(
     received: Path, tmp_path: Path, file: str, monkeypatch: pytest.MonkeyPatch

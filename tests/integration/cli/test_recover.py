@@ -213,5 +213,6 @@ def test_python_gives_the_same(truth: Path, finished: tuple[Path, Done]) -> None
         )  # threads of BLAS
 
 
+@pytest.mark.slow
 def test_its_figures_are_drawn_again_alike(finished: tuple[Path, Done], tmp_path: Path) -> None:
     assert_drawn_alike(finished[0], tmp_path / "out")

@@ -41,6 +41,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]
     return folder, json.loads(done.out)
 
 
+@pytest.mark.slow
 def test_the_answer_is_the_summary_of_the_recordings(run: tuple[Path, dict[str, Any]]) -> None:
     folder, said = run
     found = open_netcdf(folder / "model_recovery.nc")
@@ -53,6 +54,7 @@ def test_the_answer_is_the_summary_of_the_recordings(run: tuple[Path, dict[str, 
     assert said["parameters"]["speed_m_s"]["determined"] == 2
 
 
+@pytest.mark.slow
 def test_the_folder_holds_everything(run: tuple[Path, dict[str, Any]]) -> None:
     folder, _ = run
     for name in ("errors.png", "errors.svg"):
@@ -110,12 +112,14 @@ def test_known_parameters_leave_a_map(one_open: tuple[Path, dict[str, Any]]) -> 
     assert said["parameters"]["speed_m_s"]["intervals"] == 3
 
 
+@pytest.mark.slow
 def test_python_gives_the_same(one_open: tuple[Path, dict[str, Any]], grid: Path) -> None:
     model = dw.motion_model("active", turn_rate=0.3, rotational_diffusion=0.5)
     found = dw.recover_model(model, {"speed": 0.03}, dw.load_study(grid), threads=2)
     xr.testing.assert_equal(found, open_netcdf(one_open[0] / "model_recovery.nc"))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 def test_killed_after_two_recordings_it_goes_on(
     one_open: tuple[Path, dict[str, Any]], grid: Path, tmp_path: Path
@@ -139,6 +143,7 @@ def test_killed_after_two_recordings_it_goes_on(
     xr.testing.assert_allclose(open_netcdf(folder / "model_recovery.nc"), stored, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_recordings_are_like_one(grid: Path, tmp_path: Path) -> None:
     """Its times and gaps; the truth is that of a made-up calibration, with one value over it."""
     found = xr.Dataset(
@@ -211,6 +216,7 @@ def test_mistakes_are_one_line(options: tuple[str, ...], message: str, tmp_path:
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.slow
 def test_its_figures_are_drawn_again_alike(
     run: tuple[Path, dict[str, Any]], tmp_path: Path
 ) -> None:

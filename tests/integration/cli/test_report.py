@@ -102,6 +102,7 @@ def test_a_calibration(run: Path, tmp_path: Path) -> None:
     assert part_of(page, "manifest")["inputs"][0]["name"] == "recording.csv"
 
 
+@pytest.mark.slow
 def test_a_report_is_made_quickly_and_always_the_same(run: Path, tmp_path: Path) -> None:
     # Processor time: what else the machine does is not counted.
     begin = time.process_time()
@@ -111,6 +112,7 @@ def test_a_report_is_made_quickly_and_always_the_same(run: Path, tmp_path: Path)
     assert (tmp_path / "a.html").read_bytes() == (tmp_path / "b.html").read_bytes()
 
 
+@pytest.mark.slow
 def test_the_example_of_the_docs_reads_it(
     run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -150,6 +152,7 @@ def assembled(run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_self_assembly(assembled: Path, tmp_path: Path) -> None:
     page = report_of(assembled, tmp_path / "report.html")
     kinds = kinds_of(page)
@@ -218,6 +221,7 @@ def test_a_trajectory_file(run: Path, tmp_path: Path) -> None:
     assert part_of(page, "recording-1")["kind"] == "trajectory"
 
 
+@pytest.mark.slow
 def test_a_simulation(tmp_path: Path) -> None:
     """The first replicate, and the page says that nobody measured it."""
     simulation = tmp_path / "sim.nc"
@@ -250,6 +254,7 @@ def test_options_of_reading_are_for_recordings(run: Path, tmp_path: Path) -> Non
     assert "--from, --tank: for a recording" in line
 
 
+@pytest.mark.slow
 def test_another_file_is_not_replaced_unless_asked(run: Path, tmp_path: Path) -> None:
     out = tmp_path / "report.html"
     out.write_text("mine", encoding="utf-8")
@@ -258,6 +263,7 @@ def test_another_file_is_not_replaced_unless_asked(run: Path, tmp_path: Path) ->
     assert report_of(run, out, "--overwrite")["title"] == "Calibration"
 
 
+@pytest.mark.slow
 def test_another_ending_is_refused(run: Path, tmp_path: Path) -> None:
     assert "ends in .html" in refusal(here("report", run, "-o", tmp_path / "report.pdf"))
 
@@ -278,6 +284,7 @@ def test_an_unfinished_run_is_told_on_stderr_and_in_the_page(run: Path, tmp_path
     assert part_of(page, "summary")["kind"] == "empty"
 
 
+@pytest.mark.slow
 def test_a_run_in_which_settings_failed_shows_why(run: Path, tmp_path: Path) -> None:
     folder = tmp_path / "run"
     shutil.copytree(run, folder)
@@ -290,6 +297,7 @@ def test_a_run_in_which_settings_failed_shows_why(run: Path, tmp_path: Path) -> 
     assert np.isnan(values(part["value"])[1, 1])
 
 
+@pytest.mark.slow
 def test_a_hostile_run_adds_nothing_to_the_document(run: Path, tmp_path: Path) -> None:
     text = "</script><script>alert(1)</script>"
     folder = tmp_path / text.replace("/", "∕") / "'\"><b>"

@@ -67,6 +67,7 @@ def dataset(path: Path) -> xr.Dataset:
         return stored.load()
 
 
+@pytest.mark.slow
 def test_json_says_what_the_files_hold(whole: tuple[Path, Done], calibrated: Path) -> None:
     folder, done = whole
     assert done.code == 0, done.err
@@ -101,6 +102,7 @@ def test_json_says_what_the_files_hold(whole: tuple[Path, Done], calibrated: Pat
     assert said["sobol"] is None
 
 
+@pytest.mark.slow
 def test_the_run_directory_is_complete(whole: tuple[Path, Done], calibrated: Path) -> None:
     folder = whole[0]
     assert {path for path in contents(folder) if not path.startswith("figures/")} == NAMES
@@ -160,6 +162,7 @@ def test_flows_of_a_study_lie_beside_it(tmp_path: Path) -> None:
     assert {"flow", "study", "flow one.csv", "flow two.csv"} == set(manifest["inputs"])
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_figures")
 def test_other_axes_and_the_answer_for_people(tmp_path: Path) -> None:
     words = ["--vary", "blocks=2:3:1", "--vary", "tank=25cm,30cm", "--sobol", "8"]
@@ -180,6 +183,7 @@ def test_other_axes_and_the_answer_for_people(tmp_path: Path) -> None:
     assert indices.sizes["setting"] == 8 * 5
 
 
+@pytest.mark.slow
 def test_figures_of_three_axes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     drawn: dict[str, Any] = {}
 
@@ -196,6 +200,7 @@ def test_figures_of_three_axes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert drawn["latching_collision"]["l1_distance"].dims == ("drag_coefficient", "force_std")
 
 
+@pytest.mark.fast_cases(12)
 @pytest.mark.parametrize(
     ("options", "says"),
     [
@@ -242,6 +247,7 @@ def test_sources_that_cannot_be_used(calibrated: Path, tmp_path: Path) -> None:
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_figures")
 def test_a_finished_run_is_kept_until_overwrite(tmp_path: Path) -> None:
     words = ["sensitivity", "--flow", FLOW, *SIZE, "--vary", "blocks=2,3", "-o", tmp_path / "run"]
@@ -252,6 +258,7 @@ def test_a_finished_run_is_kept_until_overwrite(tmp_path: Path) -> None:
     assert here(*words, "--overwrite", "--seed", "2").code == 0
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_figures")
 def test_an_unfinished_run_whose_units_keep_less_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -308,5 +315,6 @@ def test_killed_interrupted_and_continued(
     assert not (folder / ".shards").exists()
 
 
+@pytest.mark.slow
 def test_its_figures_are_drawn_again_alike(whole: tuple[Path, Done], tmp_path: Path) -> None:
     assert_drawn_alike(whole[0], tmp_path / "out")

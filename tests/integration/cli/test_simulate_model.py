@@ -62,6 +62,7 @@ def simulated(out: Path, *words: object) -> tuple[Done, xr.Dataset]:
     return done, check_dataset(open_netcdf(out))
 
 
+@pytest.mark.slow
 def test_a_member_of_the_family_in_a_tank_of_its_own(tmp_path: Path) -> None:
     words = ("--model", "active", *parameters(ACTIVE), "--parameter", "clearance=0.01")
     times = ("--duration", "60s", "--sample-rate", "20", "--replicates", "3", "--seed", "4")
@@ -89,6 +90,7 @@ def test_a_member_of_the_family_in_a_tank_of_its_own(tmp_path: Path) -> None:
     np.testing.assert_array_equal(twin["x"], run["x"])
 
 
+@pytest.mark.slow
 def test_like_a_recording_and_read_again_as_its_commands_do(tmp_path: Path) -> None:
     words = ("--model", "active", *parameters(ACTIVE), "--like", RECORDING, "--replicates", "2")
     _, run = simulated(tmp_path / "a.nc", *words)
@@ -142,6 +144,7 @@ def test_a_file_and_a_program(place: Path, tmp_path: Path) -> None:
     assert run.attrs["model"] == "tumble_program"
 
 
+@pytest.mark.slow
 def test_the_water_carries_it(tmp_path: Path) -> None:
     """A swimmer that hardly swims follows the water, by SciPy's integrator and interpolation."""
     slow = parameters({**ACTIVE, "speed": 1e-6})
@@ -160,6 +163,7 @@ def test_the_water_carries_it(tmp_path: Path) -> None:
         np.testing.assert_allclose(run[name].values[0, :, 0], expected, atol=5e-4)
 
 
+@pytest.mark.slow
 def test_values_of_a_calibration(
     place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -238,6 +242,7 @@ def test_mistakes_are_one_line(
     assert not out.exists()
 
 
+@pytest.mark.slow
 def test_a_source_that_has_changed_since_is_said(
     place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -64,6 +64,7 @@ def test_an_arena_that_is_given_goes_over_the_tank_of_the_study(tmp_path: Path) 
     assert (read.study.tank.diameter_m, read.study.tank.wall_friction) == (0.45, 0.2)
 
 
+@pytest.mark.slow
 def test_two_files_that_hold_two_tanks_are_refused(tmp_path: Path) -> None:
     paths = [stored(tmp_path, circle(size), named=f"{size}") for size in (0.4, 0.5)]
     with pytest.raises(dw.InputError, match=r"circle of diameter 0.5 m, and the study says .* 0.4"):
@@ -71,6 +72,7 @@ def test_two_files_that_hold_two_tanks_are_refused(tmp_path: Path) -> None:
     assert read_recordings(paths, dw.Study()).study.tank.diameter_m == 0.3
 
 
+@pytest.mark.slow
 def test_circles_that_are_fitted_to_two_recordings_are_no_contradiction(tmp_path: Path) -> None:
     recording = dw.tank30_recording()
     paths = [

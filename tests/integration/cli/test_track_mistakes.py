@@ -48,6 +48,7 @@ def test_what_is_no_video_or_holds_no_frame(words: list[object], tmp_path: Path)
     assert not out.exists()
 
 
+@pytest.mark.slow
 def test_images_of_different_sizes(words: list[object], tmp_path: Path) -> None:
     images = images_of(Path(str(words[0])))
     images[12] = images[12][:-10]
@@ -65,6 +66,7 @@ def test_a_folder_that_does_not_say_when(words: list[object], tmp_path: Path) ->
     assert "--fps must be above zero" in refusal(here(*track, "--fps", "0"))
 
 
+@pytest.mark.slow
 def test_a_colour_that_never_appears(words: list[object], tmp_path: Path) -> None:
     other = Path(str(words[2])).read_text(encoding="utf-8").splitlines()
     first = other.index("[colour_1]")
@@ -81,6 +83,7 @@ def test_a_colour_that_never_appears(words: list[object], tmp_path: Path) -> Non
     assert "green (a*" in said
 
 
+@pytest.mark.slow
 def test_a_scale_at_which_the_markers_do_not_fit_the_block(
     words: list[object], tmp_path: Path
 ) -> None:
@@ -96,6 +99,7 @@ def test_a_scale_at_which_the_markers_do_not_fit_the_block(
     assert "check --tank" in wrong.err
 
 
+@pytest.mark.slow
 def test_a_picture_that_does_not_fit_on_the_disk_leaves_no_markers_either(
     words: list[object], tmp_path: Path
 ) -> None:
@@ -117,6 +121,7 @@ def test_a_video_without_colours_teaches_nothing_and_says_what_to_do(tmp_path: P
     assert "seen: all is grey; take a video in brighter, even light" in said
 
 
+@pytest.mark.fast_cases(5)
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -144,6 +149,7 @@ def test_options_that_cannot_be(
     assert not out.exists()
 
 
+@pytest.mark.slow
 def test_a_second_run_does_not_replace_the_first(words: list[object], tmp_path: Path) -> None:
     out, overlay = tmp_path / "r.nc", tmp_path / "o.avi"
     track = ("track", *words, "-o", out, "--overlay", overlay)
@@ -236,6 +242,7 @@ TwoColourDetector.detect = detect
     assert here("info", out).code == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command",
     [

@@ -130,6 +130,7 @@ def test_nonsense_on_the_socket_is_survived(server: PageServer) -> None:
         received(channel, "page")
 
 
+@pytest.mark.slow
 def test_bad_utf_8_ends_only_its_sender_and_is_not_told(finished: Path) -> None:
     with served("view", finished) as started:
         with started.socket() as other, started.socket() as channel:
@@ -156,6 +157,7 @@ def send_slowly(raw: socket.socket) -> None:
         time.sleep(0.1)
 
 
+@pytest.mark.slow
 def test_half_a_request_is_not_waited_for(finished: Path) -> None:
     """Nothing, half of a head, a byte now and then: all are closed; who has asked stays."""
     with served("view", finished, before=QUICK) as started, started.socket() as channel:
@@ -261,6 +263,7 @@ def test_away_from_loopback_a_token_is_asked_for(finished: Path) -> None:
         assert token.removeprefix("token=") not in words
 
 
+@pytest.mark.slow
 def test_a_port_in_use(finished: Path) -> None:
     with closing(socket.create_server(("127.0.0.1", 0))) as taken:
         port = taken.getsockname()[1]
@@ -299,6 +302,7 @@ def test_mistakes(
     assert said in refusal(here(*words))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -432,6 +436,7 @@ def test_play_does_without_a_bundled_flow(tmp_path: Path) -> None:
     assert words.count("\n") == 2
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="a directory cannot have this name elsewhere")
 def test_the_folder_s_name_is_only_text(server: PageServer, finished: Path) -> None:
     assert finished.name == HOSTILE

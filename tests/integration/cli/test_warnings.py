@@ -199,6 +199,7 @@ def test_every_command_is_here() -> None:
     assert set(QUICK) | set(LONG) | ELSEWHERE == whole_commands()
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("command", BAD)
 def test_a_foreign_file(command: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     rows = [f"{k / 10},{np.cos(k / 9):.4f},{np.sin(k / 9):.4f},0.1" for k in range(200)]
@@ -210,6 +211,7 @@ def test_a_foreign_file(command: str, tmp_path: Path, capfd: pytest.CaptureFixtu
             refusal(strict(capfd, *words))
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("command", ["info", "simulate", "classify"])
 def test_real_files_of_other_programs(
     command: str, shared_data: SharedData, tmp_path: Path, capfd: pytest.CaptureFixture[str]

@@ -56,6 +56,7 @@ def two_blocks(distance: Any, **others: Any) -> xr.Dataset:
     return build_trajectory(np.arange(len(x)) / RATE, x, pose["y"], pose["theta"])
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("chirality", ["merged", "distinct"])
 @pytest.mark.parametrize("blocks", [1, 2, 4])
 def test_noisy_runs(blocks: int, chirality: Chirality) -> None:
@@ -190,6 +191,7 @@ def fits(one: np.ndarray, other: np.ndarray, distance: float, angle: float) -> b
     return False
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=100)
 @given(
     st.floats(0.8, 1.3),
@@ -432,6 +434,7 @@ def test_the_closest_that_two_came() -> None:
     assert found.attrs["closest_m"] == pytest.approx(0.02)
 
 
+@pytest.mark.slow
 def test_a_file_keeps_the_result(tmp_path: Any) -> None:
     for recording in (two_blocks(np.full(10, SIDE)), two_blocks([0.08])):
         found = classify(recording, side=SIDE)

@@ -102,6 +102,7 @@ def test_every_variable_has_the_dimensions_of_the_contract() -> None:
     assert {"block_side_m", "time_step_s", "force_interval_s"} <= facts.keys()
 
 
+@pytest.mark.slow
 def test_a_dataset_survives_its_file(tmp_path: Any) -> None:
     found = build_assembly(plan(), arrays(), attrs={"drawn": "no"})
     found.to_netcdf(tmp_path / "assembly.nc", engine="h5netcdf")

@@ -90,6 +90,7 @@ def test_the_level_of_a_class_is_shared_out_and_that_of_complete_is_not() -> Non
 RARE = [0.5, 0.3, 0.1979, 0.001, 0.0005, 0.0003, 0.0002, 0.0001, 0.0, 0.0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("proportions", [[0.1] * 10, RARE])
 def test_all_intervals_hold_at_once_as_often_as_stated(proportions: list[float]) -> None:
     """600 samples of 1000 runs at 90 %; a true coverage of 90 % fails with probability 1e-5.

@@ -28,6 +28,7 @@ def random_runs(blocks: int, count: int, seed: int, *, stop: float = 0.3) -> lis
     return [random_run(blocks, rng, stop=stop) for _ in range(count)]
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("chirality", ["merged", "distinct"])
 @pytest.mark.parametrize("blocks", [1, 2, 3, 4])
 def test_small_worlds(blocks: int, chirality: Chirality) -> None:
@@ -74,6 +75,7 @@ def test_larger_worlds(blocks: int) -> None:
     assert blocks <= 8 or len(listed) == len(seen)
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(st.integers(2, 6), st.integers(0, 2**32))
 def test_lattice_of_the_end_may_be_any(blocks: int, seed: int) -> None:
@@ -89,6 +91,7 @@ def test_lattice_of_the_end_may_be_any(blocks: int, seed: int) -> None:
     assert (other.event_class == made.event_class).all()
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(st.integers(2, 6), st.integers(0, 2**32))
 def test_classes_do_not_depend_on_the_numbers_of_the_blocks(blocks: int, seed: int) -> None:

@@ -98,6 +98,7 @@ def test_a_large_table_is_drawn_in_parts(monkeypatch: pytest.MonkeyPatch) -> Non
 WEIGHTS = arrays(np.float64, 6, elements=st.floats(0, 10)).filter(lambda w: w.sum() > 0.1)
 
 
+@pytest.mark.slow
 @given(WEIGHTS, WEIGHTS, WEIGHTS)
 def test_it_is_a_distance_from_0_to_2(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> None:
     a, b, c = a / a.sum(), b / b.sum(), c / c.sum()

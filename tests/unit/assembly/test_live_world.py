@@ -216,6 +216,7 @@ def test_without_drag_forces_before_and_after_a_change_add_up() -> None:
     np.testing.assert_allclose(early + late, whole, rtol=0, atol=1e-13)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("hidden_face_drag", "law"), [("none", "paper"), ("full", "paper"), ("none", "all")]
 )

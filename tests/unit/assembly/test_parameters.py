@@ -20,6 +20,7 @@ def scaled(drag_coefficient: np.ndarray, force_std: np.ndarray) -> np.ndarray:
     return (np.column_stack([drag_coefficient, force_std]) - CENTER) / WIDTH
 
 
+@pytest.mark.slow
 @pytest.mark.false_alarm(2e-5)
 @pytest.mark.parametrize("confidence", [0.5, 0.9])
 def test_draws_have_the_weight_that_is_stated(
@@ -39,6 +40,7 @@ def test_draws_have_the_weight_that_is_stated(
     assert kstest(turn, lambda t: (t + np.pi) / (2.0 * np.pi)).pvalue > 1e-5
 
 
+@pytest.mark.slow
 def test_draws_lie_in_the_region_and_fill_it() -> None:
     point = scaled(*draw_parameters(quadratic(), runs=3000, seed=1))
     assert (np.hypot(*point.T) <= 1.0 + 1e-9).all()

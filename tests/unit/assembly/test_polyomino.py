@@ -92,6 +92,7 @@ def test_a_chiral_shape_of_five_has_a_code_for_each_hand() -> None:
     assert polyomino_name(f, chirality="distinct") == "x../xxx/.x."
 
 
+@pytest.mark.slow
 @given(shapes(), CHIRALITY, st.integers(0, 3), st.booleans())
 def test_name_does_not_depend_on_place_turn_mirror_and_order(
     cells: list[tuple[int, int]], chirality: Chirality, turn: int, mirror: bool
@@ -125,6 +126,7 @@ def test_names_that_differ_are_of_forms_that_differ(size: int, chirality: Chiral
     )
 
 
+@pytest.mark.slow
 @given(shapes(30))
 def test_a_code_shows_the_cells(cells: list[tuple[int, int]]) -> None:
     name = polyomino_name(cells)

@@ -146,6 +146,7 @@ def test_a_simulation_depends_on_drag_and_force_over_the_mass() -> None:
     np.testing.assert_allclose(one["x"], two["x"], rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.false_alarm(2e-4)
 def test_errors_of_a_fitted_flow_go_together_over_its_knots(
     fresh_seed: Callable[[int], int],

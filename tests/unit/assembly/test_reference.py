@@ -93,6 +93,7 @@ def random_overlap(rng: np.random.Generator) -> tuple[Assembly, Assembly]:
 # --- one block ------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("friction", [0.0, 0.4])
 def test_one_block_is_the_one_block_twin(friction: float) -> None:
     model = study(0.16, tank={"wall_friction": friction})
@@ -155,6 +156,7 @@ def test_forces_on_blocks_turn_and_push_the_assembly() -> None:
     np.testing.assert_allclose(body.motion, expected, rtol=1e-12, atol=1e-18)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize(("hidden", "windward"), [("none", 1), ("full", 2)])
 def test_a_pair_along_the_flow_follows_the_closed_form(hidden: Any, windward: int) -> None:
     # 2m dw/dt = -k w^2 with k = 1/2 rho C_d a d for each face that meets the water; w = u - v.
@@ -252,6 +254,7 @@ def test_overlap_is_the_depth_of_the_minkowski_difference() -> None:
     assert signs == {-1.0, 1.0}
 
 
+@pytest.mark.slow
 def test_contact_points_lie_in_both_blocks() -> None:
     rng = np.random.default_rng(2)
     counts = set()
@@ -270,6 +273,7 @@ def test_contact_points_lie_in_both_blocks() -> None:
     assert counts == {1, 2}
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("friction", [0.0, 0.4])
 def test_collisions_keep_momentum_and_never_gain_energy(friction: float) -> None:
     rng = np.random.default_rng(3)
@@ -285,6 +289,7 @@ def test_collisions_keep_momentum_and_never_gain_energy(friction: float) -> None
     assert changed > 15, "too few of the pairs were closing"
 
 
+@pytest.mark.slow
 def test_after_a_collision_no_contact_point_closes() -> None:
     rng = np.random.default_rng(4)
     for _ in range(100):
@@ -341,6 +346,7 @@ def test_friction_is_a_share_of_the_push_and_no_more_than_stops_the_sliding() ->
     assert abs((y1 + spin1 * HALF) - (y2 - spin2 * HALF)) < 0.05 * 0.005
 
 
+@pytest.mark.slow
 def test_crowded_blocks_stay_apart_and_inside() -> None:
     # Block against block and wall, with sideways rubbing, for two seconds of hard shaking.
     model = study(0.12)
@@ -423,6 +429,7 @@ def random_meeting(rng: np.random.Generator) -> World:
     return World(rules(latching="collision"), [first, second])
 
 
+@pytest.mark.slow
 def test_merging_keeps_momentum_and_angular_momentum_about_the_joint_centre() -> None:
     rng = np.random.default_rng(6)
     for _ in range(100):
@@ -440,6 +447,7 @@ def test_merging_keeps_momentum_and_angular_momentum_about_the_joint_centre() ->
         assert own_after == pytest.approx(own_before, abs=1e-15)
 
 
+@pytest.mark.slow
 def test_merged_blocks_are_on_one_lattice_with_the_joined_faces_together() -> None:
     rng = np.random.default_rng(7)
     for _ in range(100):
@@ -591,6 +599,7 @@ def test_no_merge_into_a_third_block() -> None:
 # --- worlds ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_sampling_does_not_change_the_events_and_a_complete_world_ends_early() -> None:
     model = study(0.14)
     arguments: dict[str, Any] = {

@@ -132,6 +132,7 @@ def test_no_random_number_is_used_twice(found: xr.Dataset, reference: xr.Dataset
     assert not set(trials) & {0, 1, *range(2 << 32, (2 << 32) + REALISATIONS)}
 
 
+@pytest.mark.slow
 def test_bits_depend_on_nothing_else(
     study: dw.Study, found: xr.Dataset, reference: xr.Dataset, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -177,6 +178,7 @@ def test_continues_after_a_kill(
     xr.testing.assert_identical(again, found)
 
 
+@pytest.mark.slow
 def test_axes_of_another_kind() -> None:
     """Blocks, tank and latching: classes united, trials counted on, worlds told apart."""
     study = small(tank={"diameter_m": 0.2})
@@ -305,6 +307,7 @@ def test_axes_that_cannot_be(study: dw.Study, axes: dict[str, Any], says: str) -
         assert says in str(caught.value)
 
 
+@pytest.mark.slow
 def test_blocks_that_find_no_place_are_the_users_to_mend() -> None:
     """Enough room by area, not in fact: said before the map, and by the map too."""
     study = small(assembly={"blocks": 14})

@@ -107,6 +107,7 @@ def test_they_end_with_the_outcomes_and_begin_with_single_blocks(found: xr.Datas
         np.testing.assert_array_equal(last, found["count"].sel({"class": name}))
 
 
+@pytest.mark.slow
 def test_the_reference_is_all_its_realisations(
     study: dw.Study, reference: xr.Dataset, found: xr.Dataset
 ) -> None:
@@ -131,6 +132,7 @@ def test_other_numbers_of_blocks_and_rules(study: dw.Study, reference: xr.Datase
                 assert +kept(one, at) == classes_by_loop(alone, float(found["time"][at]))
 
 
+@pytest.mark.slow
 def test_many_blocks_have_their_classes_too() -> None:
     """Beyond 8 blocks nobody lists the classes, and a call of the core names its own."""
     wide = dw.apply_overrides(small(blocks=9), {"tank.diameter_m": 0.3})
@@ -234,6 +236,7 @@ def test_of_many_classes_the_largest_are_kept_and_the_rest_summed() -> None:
         np.testing.assert_array_equal(rows[:, -1], rest)
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(
     st.dictionaries(

@@ -170,6 +170,7 @@ def test_a_single_run_has_no_interval(runs: list[Run]) -> None:
     assert np.isnan(found["number_high"]).all()
 
 
+@pytest.mark.slow
 def test_intervals_hold_as_often_as_they_say() -> None:
     """Blocks pair or not by a coin: the mean of the shares is known here."""
     rng = np.random.default_rng(2)

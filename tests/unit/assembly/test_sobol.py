@@ -142,6 +142,7 @@ def test_noise_is_taken_out_again(fresh_seed: Callable[[int], int]) -> None:
     np.testing.assert_allclose(found["total_order_corrected"], total, atol=0.18)
 
 
+@pytest.mark.slow
 @pytest.mark.false_alarm(1e-4)
 def test_pure_noise_shows_what_is_stated(fresh_seed: Callable[[int], int]) -> None:
     """200 outputs of noise in two inputs; scatter of first order sqrt(2/256) = 0.088, total 1.

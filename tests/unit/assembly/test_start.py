@@ -95,6 +95,7 @@ def edges_cross(first: np.ndarray, second: np.ndarray) -> bool:
     )
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=300)
 @given(
     x=st.floats(-0.05, 0.05),

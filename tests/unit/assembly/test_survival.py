@@ -121,6 +121,7 @@ def test_a_median_whose_upper_limit_is_not_reached() -> None:
     assert np.isnan(found.median_high)
 
 
+@pytest.mark.slow
 def test_intervals_hold_as_often_as_stated() -> None:
     """400 data sets of 150 exponential times, half of them censored; curve and median, at 90 %.
 

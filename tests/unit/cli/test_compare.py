@@ -78,6 +78,7 @@ def test_recording_and_simulation(
     assert other["ks_distance"] == bodies["ks_distance"] != 0.0
 
 
+@pytest.mark.slow
 def test_comparison_is_written(
     tmp_path: Path, synthetic: dict[str, Path], capsys: pytest.CaptureFixture[str]
 ) -> None:

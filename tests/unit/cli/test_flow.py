@@ -43,6 +43,7 @@ def test_writes_a_field_and_says_so(
     assert (field.flag == FLAGS["measured"]).sum() > 100
 
 
+@pytest.mark.slow
 def test_options_reach_the_field(
     recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -67,6 +68,7 @@ def test_options_reach_the_field(
     assert (told["rows"], told["columns"]) == (32, 32)
 
 
+@pytest.mark.slow
 def test_a_study_gives_the_tank_and_the_block(recording: Path, tmp_path: Path) -> None:
     study = tmp_path / "study.toml"
     study.write_text('[block]\nmass_kg = "15g"\n[tank]\ndiameter_m = 0.4\n[flow]\ncells = 20\n')

@@ -134,6 +134,7 @@ def test_broken_pipe_is_silent(add_command: AddCommand, capsys: pytest.CaptureFi
     assert capsys.readouterr().err == ""
 
 
+@pytest.mark.slow
 def test_reader_that_goes_away_is_silent() -> None:
     code = "from driftwalk.cli.main import run; run()"
     read_end, write_end = os.pipe()
@@ -146,6 +147,7 @@ def test_reader_that_goes_away_is_silent() -> None:
     assert done.returncode == 141
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
 def test_full_disk_is_one_line() -> None:
     code = "from driftwalk.cli.main import run; run()"
@@ -333,6 +335,7 @@ def test_duration_text(seconds: float, text: str) -> None:
     assert duration_text(seconds) == text
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="closes streams as a POSIX shell does")
 def test_closed_streams_are_no_error() -> None:
     code = "from driftwalk.cli.main import run; run()"
@@ -343,6 +346,7 @@ def test_closed_streams_are_no_error() -> None:
     assert (done.returncode, done.stdout) == (2, b"")
 
 
+@pytest.mark.slow
 def test_a_backend_that_does_not_exist_is_no_concern_of_figures() -> None:
     code = (
         "import sys; from driftwalk.cli import main; main.main = lambda: __import__('matplotlib')\n"

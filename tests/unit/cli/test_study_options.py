@@ -54,6 +54,7 @@ NAMES = {key: (table, name) for table, keys in TABLES.items() for name, key in k
 """One name of each key; the tables have most keys in common."""
 
 
+@pytest.mark.fast_cases(9)
 @pytest.mark.parametrize(("table", "name"), NAMES.values(), ids=NAMES)
 @settings(max_examples=3)
 @examples(data=st.data())

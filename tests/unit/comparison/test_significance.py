@@ -91,6 +91,7 @@ def test_the_seed_decides() -> None:
     assert permuted(1) != permuted(2)
 
 
+@pytest.mark.slow
 @pytest.mark.false_alarm(1e-5)
 def test_a_true_null_is_rejected_about_as_often_as_stated(fresh_seed: Callable[[int], int]) -> None:
     """AR(1) of autocorrelation time 19, 120 pairs at the 5 % level.

@@ -190,6 +190,7 @@ class TestPlan:
         with pytest.raises(InputError, match=message):
             plan_steps(time, **options)
 
+    @pytest.mark.slow
     @settings(deadline=None, max_examples=60)
     @given(data=st.data())
     def test_every_pair_is_made_of_three_positions_an_interval_apart(

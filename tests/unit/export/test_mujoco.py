@@ -33,6 +33,7 @@ def loaded(folder: Path) -> tuple[Any, Any]:
     return model, data
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("integrator", ["RK4", "Euler"])
 def test_each_force_acts_for_its_interval(integrator: str, tmp_path: Path) -> None:
     """Without drag the velocity is the sum of the impulses: a step in the wrong interval shows."""
@@ -68,6 +69,7 @@ def test_the_water_acts_on_its_own_data_alone(tmp_path: Path) -> None:
     assert np.abs(other.qfrc_passive).max() == 0
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("restitution", [0.2, 0.5, 0.8, 1.0])
 def test_a_frontal_impact_gives_back_what_the_study_says(
     restitution: float, tmp_path: Path
@@ -83,6 +85,7 @@ def test_a_frontal_impact_gives_back_what_the_study_says(
     assert abs(data.qvel[2]) < 1e-2
 
 
+@pytest.mark.slow
 def test_the_block_stays_in_a_tank_of_straight_walls(tmp_path: Path) -> None:
     """A polygon: each edge is a wall with its outside behind it."""
     corners = ((-0.1, -0.08), (0.12, -0.1), (0.1, 0.09), (-0.09, 0.1))
@@ -115,6 +118,7 @@ def test_the_contact_is_a_damped_spring(restitution: float) -> None:
     assert -speed == pytest.approx(max(restitution, math.exp(-2)), abs=2e-3)
 
 
+@pytest.mark.slow
 def test_mass_and_inertia_hold_what_moves_along(tmp_path: Path) -> None:
     share = {"added_mass_share": 0.4}
     folder = export_of(tmp_path, "mujoco", **{"forces.added_mass_share": 0.4})

@@ -43,6 +43,7 @@ def test_every_figure_of_an_experiment_is_written(tmp_path) -> None:
     assert sorted(folder.iterdir()) == sorted(written)
 
 
+@pytest.mark.slow
 def test_only_what_is_given_is_drawn(tmp_path) -> None:
     written = write_assembly_figures(tmp_path, distribution=distribution(), formats=["png"])
     assert [path.name for path in written] == ["outcomes.png"]
@@ -95,6 +96,7 @@ FIGURES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FIGURES)
 def test_every_text_lies_inside_its_figure(name) -> None:
     with print_style():

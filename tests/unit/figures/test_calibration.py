@@ -83,6 +83,7 @@ def test_style_is_restored_even_after_an_error() -> None:
     assert dict(matplotlib.rcParams) == before
 
 
+@pytest.mark.slow
 def test_importing_is_light_and_drawing_needs_no_pyplot() -> None:
     code = (
         "import sys, driftwalk.plot as plot\n"
@@ -97,6 +98,7 @@ def _texts(figure) -> list[str]:
     return [text.get_text() for text in figure.findobj(matplotlib.text.Text)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("simulated", "expected"), [("yes", 1), pytest.param("no", 0, marks=pytest.mark.slow)]
 )
@@ -176,6 +178,7 @@ def test_an_unknown_format_is_refused_before_anything_is_written(datasets, tmp_p
     assert not (tmp_path / "x").exists()
 
 
+@pytest.mark.slow
 def test_without_bootstrap_the_profiles_are_drawn_alone(datasets, tmp_path, monkeypatch) -> None:
     calibration, flow, trajectory = datasets
     names = [name for name in calibration if name.startswith(("bootstrap_", "region_"))]

@@ -102,6 +102,7 @@ def test_what_is_placed_in_the_axes_and_not_in_the_data_is_left_out(tmp_path) ->
     assert {row["label"] for row in rows} == {"seen"}
 
 
+@pytest.mark.slow
 def test_figures_without_the_table_say_nothing_of_one(tmp_path) -> None:
     def make():
         figure = new_figure(width_mm=90.0, height_mm=60.0)

@@ -18,6 +18,7 @@ def found() -> xr.Dataset:
     return every_kind("model_calibration")
 
 
+@pytest.mark.slow
 def test_every_pair_has_a_panel_and_its_draws(found: xr.Dataset) -> None:
     figure = pairs_figure(found)
     shown = [ax for ax in figure.axes if ax.get_visible()]
@@ -29,6 +30,7 @@ def test_every_pair_has_a_panel_and_its_draws(found: xr.Dataset) -> None:
     assert estimate.get_xdata() == [float(found["estimate"][0])]
 
 
+@pytest.mark.slow
 def test_labels_have_units_and_stay_on_the_page(found: xr.Dataset) -> None:
     figure = pairs_figure(found)
     figure.draw_without_rendering()
@@ -39,6 +41,7 @@ def test_labels_have_units_and_stay_on_the_page(found: xr.Dataset) -> None:
         assert 0.0 <= box.x0 < box.x1 <= figure.bbox.width
 
 
+@pytest.mark.slow
 def test_a_profile_is_least_at_its_middle_and_has_the_interval(found: xr.Dataset) -> None:
     panels = [ax for ax in profiles_figure(found).axes if ax.get_visible()]
     assert len(panels) == found.sizes["parameter"]
@@ -48,12 +51,14 @@ def test_a_profile_is_least_at_its_middle_and_has_the_interval(found: xr.Dataset
         assert [line.get_xdata()[0] for line in ax.lines[2:4]] == interval.tolist()
 
 
+@pytest.mark.slow
 def test_the_quality_shows_the_distances(found: xr.Dataset) -> None:
     aspects, checks = quality_figure(found).axes
     assert aspects.lines[0].get_xdata().tolist() == found["held_out_distance"].values.tolist()
     assert checks.get_xlabel() == "model / recording"
 
 
+@pytest.mark.slow
 def test_without_draws_there_are_no_pairs(found: xr.Dataset, tmp_path: Path) -> None:
     rest = found.drop_vars(["draws", "profile_value", "profile_misfit"])
     written = write_model_calibration_figures(tmp_path, calibration=rest, formats=("png",))

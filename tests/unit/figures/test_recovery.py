@@ -86,12 +86,14 @@ def test_error_by_length_with_its_law(recovery: xr.Dataset) -> None:
     assert np.concatenate([line.get_ydata() for line in crosses]) == pytest.approx([10.0] * 4)
 
 
+@pytest.mark.slow
 def test_files(recovery: xr.Dataset, tmp_path: Path) -> None:
     files = write_recovery_figures(tmp_path, recovery=recovery, formats=("png",))
     assert [path.name for path in files] == ["recovery.png", "error_by_length.png"]
     assert min(path.stat().st_size for path in files) > 5000
 
 
+@pytest.mark.slow
 def test_a_study_without_a_single_fit_is_drawn(recovery: xr.Dataset, tmp_path: Path) -> None:
     nothing = recovery.copy(deep=True)
     for name in nothing.data_vars:
@@ -109,6 +111,7 @@ def test_refusals(recovery: xr.Dataset) -> None:
             plot(xr.Dataset())
 
 
+@pytest.mark.slow
 def test_a_page_of_far_too_many_durations_is_one_sentence(recovery: xr.Dataset) -> None:
     """Found by damaging files: an axis of 100,000 took the page over half a minute."""
     long = recovery.isel(duration=np.zeros(100_000, dtype=int))

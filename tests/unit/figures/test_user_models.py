@@ -82,6 +82,7 @@ def test_one_parameter_has_a_curve_and_a_histogram_on_its_scale():
     assert ax.get_xscale() == "log"
 
 
+@pytest.mark.slow
 def test_panels_name_what_differs_and_what_stays():
     calibration = two_parameters()
     assert shared_setting_text(calibration, parameter="speed") == "rate of tumbles = 0.0005 1/s"

@@ -99,6 +99,7 @@ def flow_of(samples: list[Array]) -> Array:
     return np.asarray(mean[:2] + inertia_correction(mean[2:], mass=0.0116, area=9e-4))
 
 
+@pytest.mark.slow
 def test_means_counts_and_errors_against_plain_loops() -> None:
     track = wandering_track()
     flow = extract_flow(track, **BLOCK)

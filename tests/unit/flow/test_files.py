@@ -232,6 +232,7 @@ def test_foreign_units_are_refused_by_name(
         load_flow(tmp_path / "field.nc")
 
 
+@pytest.mark.slow
 def test_netcdf_that_is_no_flow_field_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "field.nc"
     foreign_dataset().drop_vars("v").to_netcdf(path, engine="h5netcdf")

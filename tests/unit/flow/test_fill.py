@@ -63,6 +63,7 @@ def minimise_energy(grid: Grid, velocity: Array, known: Array, radius: float) ->
     return np.where(free[..., None], solution.reshape(*grid.shape, 2), velocity)
 
 
+@pytest.mark.slow
 def test_filled_cells_minimise_the_stated_energy() -> None:
     grid = make_grid(outline_of(CIRCLE), cells=7)
     x, y = grid.nodes()

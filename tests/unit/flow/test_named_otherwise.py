@@ -115,6 +115,7 @@ def test_the_names_of_opendrift(tmp_path: Path) -> None:
     check(load_flow(path))
 
 
+@pytest.mark.slow
 def test_variables_by_name_with_a_mask_and_turned_dimensions(tmp_path: Path) -> None:
     mask = np.zeros((4, 3))
     mask[2, 1] = 1

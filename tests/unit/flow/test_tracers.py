@@ -149,6 +149,7 @@ def test_a_shear_is_no_false_link_and_a_track_of_its_own_speed_none_either() -> 
     assert flow.attrs["samples_rejected"] == 0
 
 
+@pytest.mark.slow
 def test_without_a_tank_the_field_is_the_box_of_the_tracks(tmp_path: Path) -> None:
     recording = seeded_tank(6, tracers=200, samples=6).recording
     bounded = flow_from_tracers(recording, cells=12)
@@ -166,6 +167,7 @@ def test_without_a_tank_the_field_is_the_box_of_the_tracks(tmp_path: Path) -> No
     xr.testing.assert_identical(load_flow(path).drop_attrs(), stream.drop_attrs())
 
 
+@pytest.mark.slow
 @settings(max_examples=10, deadline=None)
 @given(seed=st.integers(0, 2**31), shift=st.floats(-1.0, 1.0))
 def test_neither_the_order_of_the_bodies_nor_the_place_matters(seed: int, shift: float) -> None:

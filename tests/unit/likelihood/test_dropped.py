@@ -44,6 +44,7 @@ def dropped_at_random(track: Track, share: float, seed: int) -> Filmed:
     return without(track, dropped)
 
 
+@pytest.mark.slow
 @pytest.mark.false_alarm(1e-4)
 @pytest.mark.parametrize("angle", ["with", "without"])
 def test_dropped_frames_are_found_where_they_are(
@@ -71,6 +72,7 @@ def test_dropped_frames_are_found_where_they_are(
     assert np.abs(np.diff(later)).mean() < 0.1 * (true > 0).mean() / RATE_HZ
 
 
+@pytest.mark.slow
 def test_one_frame_in_five_may_be_missing() -> None:
     """More windows lack a frame than do not: two in one do not pass for something else."""
     track, frame = dropped_at_random(drift(4), 0.2, 4)
@@ -80,6 +82,7 @@ def test_one_frame_in_five_may_be_missing() -> None:
     assert (true[found.after] > 0).mean() > 0.9
 
 
+@pytest.mark.slow
 def test_two_and_three_frames_in_a_row_are_counted() -> None:
     dropped = np.zeros(drift(3).time.size, dtype=bool)
     singles, twos, threes = np.arange(40, 1500, 40), np.arange(1550, 2200, 60), (2300, 2500, 2700)
@@ -131,6 +134,7 @@ def test_bounces_are_no_dropped_frames(
     assert find_dropped_frames(track._replace(x=x, y=y), track.time).frames == 0
 
 
+@pytest.mark.slow
 @settings(max_examples=5)
 @given(st.floats(1e-3, 0.05), st.integers(1, 3), st.integers(0, 100))
 def test_wrong_samples_and_jumps_are_no_dropped_frames(size: float, run: int, seed: int) -> None:
@@ -146,6 +150,7 @@ def test_wrong_samples_and_jumps_are_no_dropped_frames(size: float, run: int, se
     assert find_dropped_frames(track._replace(x=x, y=y), track.time).frames == 0
 
 
+@pytest.mark.slow
 def test_a_body_that_moves_in_leaps_lacks_no_frames() -> None:
     """One step in twenty is one half to three and a half times as long: the control finds those."""
     track = drift(7)
@@ -156,11 +161,13 @@ def test_a_body_that_moves_in_leaps_lacks_no_frames() -> None:
     assert find_dropped_frames(track._replace(x=x, y=y), track.time).frames == 0
 
 
+@pytest.mark.slow
 def test_a_recording_of_the_model_lacks_none() -> None:
     track = body_track(dw.tank30_recording())
     assert find_dropped_frames(track, track.time).evidence == pytest.approx(0.0, abs=0.5)
 
 
+@pytest.mark.slow
 def test_stamps_of_a_clock_are_believed() -> None:
     """Right stamps, whose gaps say where frames are missing, and stamps that are not regular."""
     whole = drift(8, seconds=120.0)
@@ -173,6 +180,7 @@ def test_stamps_of_a_clock_are_believed() -> None:
     assert find_dropped_frames(track._replace(time=rounded), rounded).frames > 40
 
 
+@pytest.mark.slow
 def test_short_tracks_and_bodies_at_rest_are_left_alone() -> None:
     track = drift(9)
     short = Track(*(axis[:60] for axis in track[:4]))

@@ -40,6 +40,7 @@ def point(passes: Passes) -> Point:
     return replace(point, log_lever=math.log(3e-3), log_angle_noise=math.log(0.012))
 
 
+@pytest.mark.fast_cases(1)
 def test_the_score_is_the_slope_of_the_likelihood(passes: Passes, point: Point) -> None:
     """Central differences of the likelihood along single parameters and random directions.
 
@@ -141,6 +142,7 @@ def test_where_one_pass_restarted_the_noises_tell_nothing() -> None:
     assert _beside(other, base).tolist() == [True, False, False]
 
 
+@pytest.mark.slow
 def test_wrong_times_are_tried_on_all_samples_of_an_accurate_camera() -> None:
     """Positions known to 15 micrometres: what the usual step does then outweighs their noise.
 
@@ -180,6 +182,7 @@ def test_a_slow_cosine_of_the_flow_is_a_steady_change_times_the_cosine(
     assert np.abs((tried.score - opened.score)[at] / size).max() < 0.3
 
 
+@pytest.mark.slow
 def test_the_first_errors_of_a_stretch_are_small_and_are_not_counted() -> None:
     """After a start, a gap and a contact the filter allows for any velocity.
 

@@ -47,6 +47,7 @@ def test_a_jump_to_another_place_is_none(along: float, across: float) -> None:
     assert not mistakes_in(track).any()
 
 
+@pytest.mark.slow
 @given(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.floats(0.0, 1.0))
 def test_a_bounce_between_two_samples_is_none(vx: float, vy: float, share: float) -> None:
     """The velocity changes at once, by up to 3 m/s, anywhere between two samples."""
@@ -125,6 +126,7 @@ def test_one_sample_in_twenty_may_be_wrong(size_m: float) -> None:
     assert fit_facts(clean)["mistakes"] == 0
 
 
+@pytest.mark.slow
 def test_samples_beyond_the_greatest_speed_are_counted(tmp_path: Path) -> None:
     """Wrong by 50 mm they go when the recording is read, by 5 mm at 10 Hz when it is fitted."""
     film = with_mistakes(recording(SECONDS), 0.05, 0.05, 5)

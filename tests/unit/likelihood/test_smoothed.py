@@ -56,6 +56,7 @@ def test_smoothing_is_recognised(way: str, fresh_seed: Callable[[int], int]) -> 
     assert found.evidence > 5.0 * ENOUGH
 
 
+@pytest.mark.slow
 @settings(max_examples=20)
 @given(st.integers(0, 10_000), st.floats(0.0, 2e-3), st.floats(0.0, 1e-3))
 def test_raw_positions_are_not_smoothed(seed: int, noise_m: float, rounded_m: float) -> None:

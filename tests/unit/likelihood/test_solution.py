@@ -49,6 +49,7 @@ def test_a_last_part_shorter_than_the_lags_is_checked(left_over: int) -> None:
     assert check.attrs["samples"] == BLOCK + left_over
 
 
+@pytest.mark.slow
 def test_too_few_used_intervals_are_no_check() -> None:
     track = recording(20.0)
     fit = dw.fit_motion(track, coarse_study())
@@ -60,6 +61,7 @@ def test_too_few_used_intervals_are_no_check() -> None:
         dw.check_model(fit, broken)
 
 
+@pytest.mark.slow
 def test_few_used_intervals_are_a_warning() -> None:
     generator = np.random.default_rng(1)
     # A body that rests, but for a jump of some millimetres in every eighth interval.
@@ -118,6 +120,7 @@ def test_motion_that_is_all_noise_is_no_solution() -> None:
         require_noise_below_motion(0.174, [track])
 
 
+@pytest.mark.slow
 def test_an_interval_without_an_end_is_infinite() -> None:
     track = recording(60.0)
     fit = dw.fit_motion(track, coarse_study())

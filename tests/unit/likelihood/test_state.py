@@ -76,6 +76,7 @@ def deviations(fit: xr.Dataset) -> np.ndarray:
     return np.log(np.array([fit_facts(fit)[name] for name in names]) / truth) / sd
 
 
+@pytest.mark.slow
 def test_the_truth_is_within_the_errors(fit: xr.Dataset) -> None:
     """4 sd for each of four: once in 4000 runs, if the errors are right."""
     assert fit.attrs["angle"] == "state"
@@ -90,12 +91,14 @@ def test_the_truth_is_within_the_errors(fit: xr.Dataset) -> None:
         assert low < fit_facts(fit)[name] < high
 
 
+@pytest.mark.slow
 def test_a_force_on_the_centre_has_no_lever(fit: xr.Dataset) -> None:
     """What is found, from its prior, is below a hundredth of the block's side."""
     assert fit_facts(fit)["force_lever_m"] < 3e-4
     assert np.sqrt(fit["covariance"].values[3, 3]) > 0.3
 
 
+@pytest.mark.slow
 def test_turning_and_motion_agree_on_the_drag(fit: xr.Dataset) -> None:
     assert 0.0 <= fit_facts(fit)["angle_disagreement_std"] < 3.0
     low, high = fit_facts(fit)["drag_coefficient_angle_given_interval"]
@@ -107,6 +110,7 @@ def test_turning_and_motion_agree_on_the_drag(fit: xr.Dataset) -> None:
     assert fit_facts(fit)["warnings"] == []
 
 
+@pytest.mark.slow
 def test_the_errors_of_prediction_are_white(fit: xr.Dataset) -> None:
     """18,000 numbers: 4 sd of the mean square are 4 %, and the fit takes less than 1 %."""
     assert fit_facts(fit)["chi_squared_per_dof"] == pytest.approx(1.0, abs=0.05)
@@ -173,6 +177,7 @@ def test_half_of_the_angles_make_it_the_default(track: xr.Dataset) -> None:
         assert use_angle([recording], [body_track(recording)], "auto") == used
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("angle", [0.0, 0.3])
 def test_a_column_that_is_only_filled_is_no_orientation(track: xr.Dataset, angle: float) -> None:
     short = track.isel(time=slice(0, 600)).copy(deep=True)

@@ -60,6 +60,7 @@ def test_both_flows_and_the_parameters_are_recovered(fit: xr.Dataset) -> None:
         assert swapped["flow_error"] > 0.3
 
 
+@pytest.mark.slow
 def test_it_holds_every_flow_and_the_times(fit: xr.Dataset) -> None:
     assert fit["u"].dims == ("flow", "y", "x")
     assert fit["coefficient"].dims == ("flow", "component", "knot_y", "knot_x")
@@ -72,6 +73,7 @@ def test_it_holds_every_flow_and_the_times(fit: xr.Dataset) -> None:
     assert fit_facts(fit)["samples"] == two_flows().sizes["time"]
 
 
+@pytest.mark.slow
 def test_the_flow_field_jumps_at_the_switch(fit: xr.Dataset) -> None:
     """Its times count from the first sample, as those of a simulation do."""
     whole = dw.fitted_flow(fit)
@@ -86,6 +88,7 @@ def test_the_flow_field_jumps_at_the_switch(fit: xr.Dataset) -> None:
             )
 
 
+@pytest.mark.slow
 def test_a_simulation_in_it_is_one_in_each_flow(fit: xr.Dataset) -> None:
     """Up to the switch it is the simulation in the first flow, number by number."""
     clock = SWITCH_S + np.arange(-2.0, 2.0, 0.1)
@@ -100,6 +103,7 @@ def test_a_simulation_in_it_is_one_in_each_flow(fit: xr.Dataset) -> None:
     assert np.abs(runs[0][~before] - runs[1][~before]).max() > 1e-3
 
 
+@pytest.mark.slow
 def test_a_stored_fit_gives_the_same_flow(fit: xr.Dataset, tmp_path: Path) -> None:
     """netCDF turns a list of one time into a number."""
     fit.to_netcdf(tmp_path / "fit.nc", engine="h5netcdf")
@@ -107,6 +111,7 @@ def test_a_stored_fit_gives_the_same_flow(fit: xr.Dataset, tmp_path: Path) -> No
         xr.testing.assert_equal(dw.fitted_flow(stored), dw.fitted_flow(fit))
 
 
+@pytest.mark.slow
 def test_which_flow_must_be_said(fit: xr.Dataset) -> None:
     truth = {"drag_coefficient": DRAG, "force_std": FORCE_N, "tracking_noise": NOISE_M}
     with pytest.raises(InputError, match="the fit has 2 flows: name the interval"):
@@ -149,6 +154,7 @@ def test_every_flow_adds_to_its_own_block() -> None:
     assert (np.diag(whole.information)[shared] > 0.0).all()
 
 
+@pytest.mark.slow
 def test_the_prior_of_several_flows_is_that_of_each() -> None:
     passes, point = prepared(**SWITCHED)
     prior, weights = Prior(passes), Weights(2.0, 3.0)
@@ -410,6 +416,7 @@ def test_a_region_never_visited_is_filled_and_warned_of() -> None:
     assert any(f"over {share:.0%} of the tank only" in one for one in warnings)
 
 
+@pytest.mark.slow
 def test_two_recordings_are_cut_by_their_own_clocks() -> None:
     track = two_flows()
     later = track.assign_coords(time=track["time"] + 20.0)

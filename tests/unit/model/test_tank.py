@@ -116,6 +116,7 @@ def test_corners_of_a_turned_block() -> None:
         assert corner == pytest.approx(wanted, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_the_grid_of_the_paper_has_41_by_41_settings() -> None:
     assert len(Calibration().drag_coefficients) == len(Calibration().force_stds_N) == 41
     assert Calibration().force_stds_N[11] == 0.00055

@@ -93,6 +93,7 @@ def test_it_is_stored_as_a_dataset_and_remembers_its_file(tmp_path: Path) -> Non
     assert as_result(read).encoding["source"] == read.encoding["source"]
 
 
+@pytest.mark.slow
 @given(st.floats(1e-12, 1e12), st.floats(0.1, 0.99), st.floats(1.01, 10.0))
 def test_numbers_survive_to_four_digits(value: float, low: float, high: float) -> None:
     found = answer()

@@ -32,6 +32,7 @@ def test_doubles_come_back_bit_for_bit(array: np.ndarray) -> None:
     np.testing.assert_array_equal(values(encoded), array)
 
 
+@pytest.mark.slow
 @given(arrays(np.float32, SHAPES, elements=st.floats(width=32, allow_infinity=False)))
 def test_floats_come_back_bit_for_bit(array: np.ndarray) -> None:
     encoded = through_json(encode_array(array, dtype="f4"))
@@ -39,6 +40,7 @@ def test_floats_come_back_bit_for_bit(array: np.ndarray) -> None:
     np.testing.assert_array_equal(values(encoded), array.astype(np.float64))
 
 
+@pytest.mark.slow
 @given(arrays(np.float64, SHAPES, elements=FLOATS), RESOLUTIONS, st.booleans())
 def test_rounded_numbers_are_half_a_step_off_at_most(
     array: np.ndarray, resolution: float, delta: bool

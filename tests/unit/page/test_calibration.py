@@ -44,6 +44,7 @@ def sections(calibration: xr.Dataset) -> list[dict[str, Any]]:
     return calibration_sections(calibration, recording=bundled_recording(rows=1000))
 
 
+@pytest.mark.slow
 def test_the_map_is_that_of_the_dataset(
     calibration: xr.Dataset, sections: list[dict[str, Any]]
 ) -> None:
@@ -225,6 +226,7 @@ def test_the_bootstrap_and_the_closed_region(
     assert part["marks"] == [{"label": "estimate", "x": 0.39, "y": 0.61e-3}]
 
 
+@pytest.mark.slow
 def test_halves_are_shown_where_they_are(calibration: xr.Dataset) -> None:
     assert part_of(calibration_sections(calibration), "validation")["kind"] == "empty"
     halves = {

@@ -41,6 +41,7 @@ def page(**content: Any) -> dict[str, Any]:
     return {"title": "Run", "subtitle": None, "sections": [], **content}
 
 
+@pytest.mark.slow
 @given(st.dictionaries(TEXT, JSON, max_size=4))
 def test_any_data_come_back_from_the_document(data: dict[str, Any]) -> None:
     text = report_html(page(data=data))

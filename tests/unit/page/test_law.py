@@ -85,6 +85,7 @@ def test_what_was_tested_is_a_table() -> None:
     ]
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize(
     ("name", "sigmas", "reason"),
     [

@@ -23,6 +23,7 @@ def sections(comparison: xr.Dataset) -> dict[str, dict[str, Any]]:
     return {part["id"]: part for part in model_sections(comparison)}
 
 
+@pytest.mark.slow
 def test_the_page_has_a_title_and_every_section(comparison: xr.Dataset) -> None:
     page = dataset_page(comparison)
     assert page["title"] == "Comparison of motion models"

@@ -79,12 +79,14 @@ def test_a_finished_run(tmp_path: Path, datasets: dict[str, xr.Dataset]) -> None
     assert part_of(page, "warnings")["items"] == []
 
 
+@pytest.mark.slow
 def test_the_same_run_gives_the_same_bytes(tmp_path: Path, datasets: dict[str, xr.Dataset]) -> None:
     folder = make_run(tmp_path / "run", datasets)
     first = report_html(report_page(folder))
     assert report_html(report_page(folder / ".." / "run")) == first
 
 
+@pytest.mark.slow
 def test_the_manifest_is_whole(tmp_path: Path, datasets: dict[str, xr.Dataset]) -> None:
     part = part_of(report_page(make_run(tmp_path / "run", datasets)), "manifest")
     stored = json.loads((tmp_path / "run" / "manifest.json").read_text(encoding="utf-8"))
@@ -162,6 +164,7 @@ def test_a_run_with_nothing_in_it_says_so(
     assert kinds <= {"summary", "empty", "manifest", "warnings"}
 
 
+@pytest.mark.slow
 def test_a_run_of_another_version_names_both(
     tmp_path: Path, datasets: dict[str, xr.Dataset]
 ) -> None:
@@ -174,6 +177,7 @@ def test_a_run_of_another_version_names_both(
     assert "version 0.0.7;" in part_of(page, "manifest")["cite"]
 
 
+@pytest.mark.slow
 def test_a_manifest_of_another_version_is_refused(
     tmp_path: Path, datasets: dict[str, xr.Dataset]
 ) -> None:
@@ -183,6 +187,7 @@ def test_a_manifest_of_another_version_is_refused(
         report_page(folder)
 
 
+@pytest.mark.slow
 def test_a_damaged_file_costs_its_sections_and_is_named(
     tmp_path: Path, datasets: dict[str, xr.Dataset]
 ) -> None:
@@ -194,6 +199,7 @@ def test_a_damaged_file_costs_its_sections_and_is_named(
     assert part_of(page, "map")["kind"] == "map"
 
 
+@pytest.mark.slow
 def test_a_finished_run_of_which_nothing_can_be_read_is_refused(
     tmp_path: Path, datasets: dict[str, xr.Dataset]
 ) -> None:
@@ -216,6 +222,7 @@ def test_what_is_no_run_is_refused(tmp_path: Path) -> None:
         report_page(tmp_path)
 
 
+@pytest.mark.slow
 def test_the_runs_inside_a_directory_are_named(
     tmp_path: Path, datasets: dict[str, xr.Dataset]
 ) -> None:
@@ -231,6 +238,7 @@ def test_a_damaged_record_is_refused(tmp_path: Path) -> None:
         report_page(tmp_path)
 
 
+@pytest.mark.slow
 def test_several_recordings_of_a_fit(tmp_path: Path) -> None:
     recording = bundled_recording(rows=50)
     files = {"fit.nc": made_up_fit(), "recording.nc": recording, "recording-2.nc": recording}
@@ -238,6 +246,7 @@ def test_several_recordings_of_a_fit(tmp_path: Path) -> None:
     assert part_of(page, "recording-1-of-2")["kind"] == "trajectory"
 
 
+@pytest.mark.slow
 def test_pages_of_runs_that_belong_together_are_joined(
     tmp_path: Path, datasets: dict[str, xr.Dataset]
 ) -> None:
@@ -282,6 +291,7 @@ def test_self_assembly_from_its_files(tmp_path: Path) -> None:
     assert kinds["replay"] == "empty"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [HOSTILE.replace("/", "∕"), "..\\..", "%2e%2e", "a\nb", "'; --"])
 def test_a_hostile_name_is_only_text(
     tmp_path: Path, datasets: dict[str, xr.Dataset], name: str

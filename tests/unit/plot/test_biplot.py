@@ -63,6 +63,7 @@ def test_arrows_are_loadings_times_the_factor_stated(parts) -> None:
         assert arrow.get_position() == (0.0, 0.0)
 
 
+@pytest.mark.slow
 def test_axes_state_their_share_of_the_variance_and_have_one_scale(parts) -> None:
     ax = plot_biplot(parts)
     share = 100.0 * parts["explained_variance_ratio"].values
@@ -74,6 +75,7 @@ def test_axes_state_their_share_of_the_variance_and_have_one_scale(parts) -> Non
     assert per_pixel[0] == pytest.approx(per_pixel[1], rel=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("blocks", "chirality"), [(4, "merged"), (4, "distinct"), (6, "merged")])
 def test_labels_lie_inside_and_not_on_each_other(blocks, chirality) -> None:
     data = sensitivity(blocks, chirality, points=(8, 7))
@@ -92,6 +94,7 @@ def test_labels_lie_inside_and_not_on_each_other(blocks, chirality) -> None:
         assert not any(box.overlaps(other) for other in boxes[:index])
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=30)
 @given(st.lists(st.tuples(st.floats(30.0, 270.0), st.floats(30.0, 270.0)), min_size=1, max_size=10))
 def test_labels_never_overlap_where_there_is_room(tips) -> None:
@@ -105,6 +108,7 @@ def test_labels_never_overlap_where_there_is_room(tips) -> None:
             assert (np.abs(places[i] - places[j]) >= boxes[i] - 1e-3).any()
 
 
+@pytest.mark.slow
 def test_a_setting_left_out_and_a_class_that_never_varies_are_no_trouble(parts, study) -> None:
     holed = parts.copy(deep=True)
     holed["score"][2, 3] = np.nan

@@ -53,6 +53,7 @@ def pixels(frame: Image.Image, color: str) -> np.ndarray:
     )
 
 
+@pytest.mark.slow
 def test_gif_has_its_frames_and_shows_the_blocks_where_they_are(path, tmp_path) -> None:
     file = write_animation(path, tmp_path / "run.gif", seconds=2.0)
     with Image.open(file) as film:
@@ -73,6 +74,7 @@ def test_gif_has_its_frames_and_shows_the_blocks_where_they_are(path, tmp_path) 
             assert 0.8 * area < len(seen) < 1.02 * area
 
 
+@pytest.mark.slow
 def test_a_recording_is_shown_in_real_time_and_a_body_that_is_away_is_not_shown(tmp_path) -> None:
     seen = frames_of(write_animation(two_bodies(), tmp_path / "a.gif", speed=1.0))
     assert len(seen) == 51
@@ -100,6 +102,7 @@ def test_a_block_lies_in_the_picture_as_it_does_in_the_tank(tmp_path) -> None:
         assert np.ptp(rows) == pytest.approx(per_cm * width, abs=6.0)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("unknown", ["theta", "side"])
 def test_without_a_side_or_an_orientation_a_body_is_a_disc(unknown, tmp_path) -> None:
     recording = two_bodies(block_side_m=None if unknown == "side" else 0.03)
@@ -112,6 +115,7 @@ def test_without_a_side_or_an_orientation_a_body_is_a_disc(unknown, tmp_path) ->
     assert np.pi * radius**2 * 0.75 < len(places) < np.pi * (radius + 1.0) ** 2
 
 
+@pytest.mark.slow
 def test_a_tank_that_nobody_knows_is_framed_by_the_motion(tmp_path) -> None:
     first = frames_of(write_animation(two_bodies(arena=None), tmp_path / "a.gif", speed=4.0))[0]
     left, right = (pixels(first, PALETTE[body])[:, 1].mean() for body in (0, 1))
@@ -119,6 +123,7 @@ def test_a_tank_that_nobody_knows_is_framed_by_the_motion(tmp_path) -> None:
     assert right - left == pytest.approx(10.0 * 0.9 * 400 / 16.8, abs=12.0)
 
 
+@pytest.mark.slow
 def test_frames_are_told_as_they_are_written(tmp_path: Path) -> None:
     told: list[tuple[int, ...]] = []
     write_animation(
@@ -158,6 +163,7 @@ def test_a_film_is_whole_or_not_there(path, tmp_path, monkeypatch) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_opencv_writes_an_mp4_where_there_is_no_ffmpeg(tmp_path, monkeypatch) -> None:
     cv2 = pytest.importorskip("cv2", reason="OpenCV is not installed: pip install driftwalk[track]")
     monkeypatch.setattr(film_file.shutil, "which", lambda _name: None)

@@ -157,6 +157,7 @@ def test_panels_along_one_axis_are_lines() -> None:
     np.testing.assert_allclose(ax.lines[0].get_ydata(), data["proportion"].sel({"class": "T"}))
 
 
+@pytest.mark.slow
 def test_panels_of_many_classes_leave_out_the_rare_ones() -> None:
     data = sensitivity(6, points=(4, 4))
     panels = plot_class_panels(data)

@@ -69,6 +69,7 @@ def test_second_distribution_is_matched_by_name() -> None:
     assert texts[1].startswith("full: 4 blocks, 1000 runs")
 
 
+@pytest.mark.slow
 def test_of_68_classes_the_common_ones_are_shown_and_the_rest_is_summed() -> None:
     data = distribution(6)
     ax = plot_outcomes(data)
@@ -96,6 +97,7 @@ def test_choice_of_classes(largest, expected) -> None:
     assert classes_to_show(names, np.array(largest)) == expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("blocks", [4, 6])
 def test_realisations_are_mean_and_standard_deviation(blocks) -> None:
     repeated = realisations(blocks=blocks)
@@ -143,6 +145,7 @@ def test_what_cannot_be_drawn_is_refused() -> None:
         plot_outcomes(data, realisations=data)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("style", ["own", "print"])
 @pytest.mark.parametrize("pair", [False, True])
 def test_sketches_stay_apart_in_any_style(style, pair) -> None:

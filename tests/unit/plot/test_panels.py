@@ -33,6 +33,7 @@ def test_settings_are_the_nearest_of_the_grid(calibration) -> None:
     assert [s.values["drag_coefficient"] for s in settings] == pytest.approx([0.4] * 3)
 
 
+@pytest.mark.slow
 def test_panels_hold_the_stored_densities_on_one_scale(calibration) -> None:
     row = plot_density_panels(calibration)
     stored = [

@@ -70,6 +70,7 @@ def test_labels_name_both_words_for_the_angle_and_the_units() -> None:
     assert ax.figure.axes[-1].get_ylabel() == "density of steps (% mm⁻¹ °⁻¹)"
 
 
+@pytest.mark.slow
 def test_marginals_can_be_left_out() -> None:
     assert plot_steps([0.001, 0.002], [0.0, 0.1], marginals="none").child_axes == []
 
@@ -79,6 +80,7 @@ def test_steps_without_a_number_are_left_out() -> None:
     assert np.ma.count(_mesh(ax).get_array()) == 2
 
 
+@pytest.mark.slow
 def test_equal_steps_are_drawn() -> None:
     plot_steps([0.001, 0.001], [0.0, 0.0]).figure.draw_without_rendering()
 

@@ -118,6 +118,7 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[str, st
     }
 
 
+@pytest.mark.slow
 def test_a_file_of_the_package_is_read(answers: dict[str, tuple[str, str, Path]]) -> None:
     assert answers["good"][0] == "0"
 

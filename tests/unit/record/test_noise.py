@@ -56,6 +56,7 @@ def test_noise_for_several_ratios_of_unrest_to_noise(
     assert np.isnan(found.orientation_noise_rad)
 
 
+@pytest.mark.slow
 @pytest.mark.false_alarm(1e-4)
 def test_the_standard_error_covers(fresh_seed: Callable[[int], int]) -> None:
     """Forty recordings: the deviations in standard errors have a root mean square near one."""
@@ -83,6 +84,7 @@ def test_no_noise_is_none(fresh_seed: Callable[[int], int]) -> None:
     assert found.acceleration_intensity_m2_s3 == pytest.approx(4.5e-5, rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.false_alarm(1e-3)
 def test_an_uneven_clock_needs_no_special_case(fresh_seed: Callable[[int], int]) -> None:
     random = np.random.default_rng(fresh_seed(7))

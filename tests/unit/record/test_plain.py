@@ -219,6 +219,7 @@ def test_missing_file_and_unknown_format(tmp_path: Path) -> None:
         load(write(tmp_path, "t,x,y\n0,1,2\n"), format="swisstrack")
 
 
+@pytest.mark.slow
 def test_a_bad_row_far_into_a_large_file_is_located(tmp_path: Path) -> None:
     rows = [f"{index},{index % 7},{index % 5}" for index in range(600_000)]
     rows[555_555] = "555555,1,?"

@@ -32,6 +32,7 @@ def read(content: bytes) -> Any:
     return unpickle(content, where="it", path=HERE)
 
 
+@pytest.mark.slow
 @settings(max_examples=60)
 @given(PLAIN, st.integers(3, 5))
 def test_plain_data_is_read_as_by_pickle(data: Any, protocol: int) -> None:
@@ -103,6 +104,7 @@ def test_instructions_that_plain_data_does_not_need(content: bytes, message: str
         read(content)
 
 
+@pytest.mark.slow
 @settings(max_examples=200)
 @given(st.data())
 def test_a_damaged_pickle_is_read_or_refused(data: st.DataObject) -> None:

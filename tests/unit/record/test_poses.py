@@ -41,6 +41,7 @@ def check_swimmer(dataset: xr.Dataset, names: list[str], *, lost: list[int]) -> 
 POSE: dict[str, Any] = {"keypoint": "nose", "heading": ("tail", "nose")}
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("plural", ["", "s"])
 def test_movement_with_confidence_and_heading(tmp_path: Path, plural: str) -> None:
     path = movement_file(tmp_path / "poses.nc", plural=plural)
@@ -54,6 +55,7 @@ def test_movement_with_confidence_and_heading(tmp_path: Path, plural: str) -> No
     check_swimmer(sleap, ["a", "b"], lost=[])
 
 
+@pytest.mark.slow
 def test_a_movement_file_over_other_dimensions(tmp_path: Path) -> None:
     """Found by damaging files: xarray's error came through."""
     path = movement_file(tmp_path / "poses.nc")

@@ -77,6 +77,7 @@ def of(shared_data: SharedData, file: str) -> Path:
     return shared_data(folder) / name
 
 
+@pytest.mark.fast_cases(7)
 @pytest.mark.parametrize("sample", READ, ids=lambda sample: sample.file)
 def test_a_sample_is_read(shared_data: SharedData, sample: Sample) -> None:
     path = of(shared_data, sample.file)
@@ -92,6 +93,7 @@ FOLDERS = ["formats-2", "format-idtrackerai", "format-swistrack", "tracktor-mous
            "trajr-walks", "piv-pivpy", "capillary-spinners", "rummynose-single-epfl"]  # fmt: skip
 
 
+@pytest.mark.fast_cases(4)
 @pytest.mark.parametrize("folder", FOLDERS)
 def test_every_file_is_read_or_refused_in_one_line(shared_data: SharedData, folder: str) -> None:
     files = [path for path in sorted(shared_data(folder).rglob("*")) if path.is_file()]

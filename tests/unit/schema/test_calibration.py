@@ -58,6 +58,7 @@ def test_damage_is_named(damage, message):
         check_contents(damage(stored(two_parameters())), PLACE)
 
 
+@pytest.mark.slow
 def test_self_assembly_takes_no_calibration_of_another_model(tmp_path):
     folder = tmp_path / "run"
     folder.mkdir()

@@ -85,6 +85,7 @@ def test_a_wrong_markers_file_is_said(tmp_path: Path, line: str, message: str) -
         dw.track.load_markers(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", [pytest.param("moderate", marks=pytest.mark.slow), "heavy"])
 def test_the_rim_gives_scale_and_centre(level: str) -> None:
     drawn = dw.video_settings(level, centre_px=(312.3, 244.8), px_per_m=1480.0)

@@ -73,6 +73,7 @@ def every_assignment(cost: np.ndarray) -> list[tuple[float, tuple[int, ...]]]:
     return sorted(found)
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(
     st.integers(1, 4),

@@ -69,6 +69,7 @@ def test_hello_comes_first_however_late_a_client_connects(connect) -> None:
             assert json.loads(reader.readline())["frame"] == 3
 
 
+@pytest.mark.slow
 def test_slow_client_loses_frames_and_the_tracker_does_not_wait(connect) -> None:
     """One client never reads 400 messages of 100 kB; another one reads them all the while."""
     payload = "x" * 100_000
@@ -110,6 +111,7 @@ def test_the_last_lines_wait_for_a_client_that_is_busy(connect) -> None:
     assert found == [0, 1, 2]
 
 
+@pytest.mark.slow
 def test_clients_that_never_read_are_left_together(
     connect, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -56,6 +56,7 @@ def watched(recording: xr.Dataset, side: float) -> tuple[AssemblyObserver, list,
     return observer, seen, [event for one in seen for event in one.events]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale", [0.0, 1.0, 4.0])
 def test_live_events_are_those_of_classify(
     simulated: tuple[xr.Dataset, xr.Dataset], scale: float
@@ -87,6 +88,7 @@ def test_live_events_are_those_of_classify(
     assert number >= RUNS
 
 
+@pytest.mark.slow
 def test_hidden_blocks_leave_the_true_class_possible(
     simulated: tuple[xr.Dataset, xr.Dataset],
 ) -> None:

@@ -148,6 +148,7 @@ def follow(world: World, settings: TrackerSettings, seed: int, *, lost=None, fal
     return tracker.finish()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 def test_four_blocks_with_clutter_and_gaps_never_swap(seed: int) -> None:
     world, lost = with_gaps(seed)
@@ -185,6 +186,7 @@ def test_worlds_that_no_setting_was_chosen_on(fresh_seed: Callable[[int], int]) 
     assert nothing < 7
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_bodies_that_cross_unseen_are_marked(seed: int) -> None:
     """Points without angle that cross and are hidden while they do: swaps, none of them unmarked.
@@ -200,6 +202,7 @@ def test_bodies_that_cross_unseen_are_marked(seed: int) -> None:
     assert unmarked == 0
 
 
+@pytest.mark.slow
 def test_marking_is_not_everything() -> None:
     """The test above could pass by marking all: crossings are marked, the rest is not."""
     world = wander(3, bodies=5, frames=900, apart=0.0, speed=0.08)
@@ -208,6 +211,7 @@ def test_marking_is_not_everything() -> None:
     assert unmarked_swaps(recording, world)[1] == 0
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("seed", range(2))
 def test_blocks_that_are_joined_are_not_marked_all_the_time(seed: int) -> None:
     """Four blocks side by side move as one, each missed in 5 % of the frames."""

@@ -131,6 +131,7 @@ def test_clear_forgets() -> None:
     assert window.message()["steps"] == 0
 
 
+@pytest.mark.slow
 def test_the_window_keeps_the_newest() -> None:
     window = MotionWindow(None, seed=1)
     for at in range(25_000):
@@ -254,6 +255,7 @@ def test_messages_and_actions() -> None:
     json.dumps(heard, allow_nan=False)
 
 
+@pytest.mark.slow
 def test_a_flood_of_wishes_is_one_wish(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whoever presses a button ten thousand times must not stop the tank for the others."""
     done: list[str] = []
@@ -382,6 +384,7 @@ def test_latching_off_parts_what_is_joined_and_says_so() -> None:
     assert source.tank.outcome == "+".join(12 * ["1"])
 
 
+@pytest.mark.slow
 def test_whoever_comes_gets_a_picture_of_one_moment() -> None:
     """A greeting is asked for while another thread moves the tank: as many x as angles."""
     source = PlaySource(Study(), STILL, blocks=2)
@@ -406,6 +409,7 @@ def test_whoever_comes_gets_a_picture_of_one_moment() -> None:
     asyncio.run(run())
 
 
+@pytest.mark.slow
 def test_real_time_is_kept() -> None:
     async def run() -> list[float]:
         source = PlaySource(Study(), STILL, blocks=2)

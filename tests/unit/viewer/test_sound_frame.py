@@ -142,6 +142,7 @@ JSON = st.recursive(
 KEYS = ("frame", "time_s", "bodies", "joined", "events", "outcome", "possible", "hidden")
 
 
+@pytest.mark.slow
 @given(
     st.fixed_dictionaries({}, optional=dict.fromkeys(KEYS, JSON)),
     st.lists(JSON | st.fixed_dictionaries({}, optional=dict.fromkeys(BODY, JSON)), max_size=4),

@@ -102,6 +102,7 @@ def test_two_places_compare_by_their_likelihood(fresh_seed: Callable[[int], int]
     assert model.emulator(4096).log_variance == pytest.approx(wanted, abs=0.4)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.false_alarm(1e-4)
 @pytest.mark.parametrize("related", [False, True])
 def test_the_misfit_at_the_truth_is_that_of_the_known_noise(
@@ -127,6 +128,7 @@ def test_the_misfit_at_the_truth_is_that_of_the_known_noise(
     assert misfits.var() == pytest.approx(variance, rel=0.15)
 
 
+@pytest.mark.slow
 @pytest.mark.false_alarm(2e-4)
 def test_a_solution_is_as_near_the_truth_as_it_says(fresh_seed: Callable[[int], int]):
     """300 recordings of a model at settings inside the box.

@@ -79,6 +79,7 @@ def deviations() -> np.ndarray:
     return np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled)))
 
 
+@pytest.mark.slow
 def test_a_recording_of_the_model_is_matched_by_its_summaries_alone():
     """The search is not asked for; intervals are those of the model, and so are the misfits.
 
@@ -100,6 +101,7 @@ def test_a_recording_of_the_model_is_matched_by_its_summaries_alone():
     assert found.misfit < MATCHES * SPREAD.size
 
 
+@pytest.mark.slow
 def test_what_the_model_cannot_give_widens_the_draws():
     """One summary is ten deviations off: draws are spread as the misfit is above its usual one."""
     starts = Starts((0.4, 0.6), (0.41, 0.6), (0.9, 0.9))
@@ -114,6 +116,7 @@ def test_what_the_model_cannot_give_widens_the_draws():
     np.testing.assert_allclose(found.point, np.median(found.draws, axis=0), atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_small_misfit_leaves_parameters_determined():
     """One summary is three deviations off, 9 of misfit beside the usual 3.4 of 4 degrees."""
     found = matched(Toy(bent, 2, off=3.0), Starts((0.4, 0.6)), worlds=200)
@@ -121,6 +124,7 @@ def test_a_small_misfit_leaves_parameters_determined():
     assert not found.unlike
 
 
+@pytest.mark.slow
 def test_another_start_is_no_use_for_another_model():
     starts = Starts((0.4, 0.6))
     found = matched(Toy(bent, 3, off=300.0), starts)
@@ -130,6 +134,7 @@ def test_another_start_is_no_use_for_another_model():
     assert ((found.draws >= 0.0) & (found.draws <= 1.0)).all()
 
 
+@pytest.mark.slow
 def test_a_regression_with_large_errors_is_a_start_all_the_same():
     """Three waves: the errors of a regression over the whole ranges are a quarter of them."""
     starts = Starts((0.9, 0.1))
@@ -139,6 +144,7 @@ def test_a_regression_with_large_errors_is_a_start_all_the_same():
     np.testing.assert_allclose(found.point, TRUTH, atol=0.01)
 
 
+@pytest.mark.slow
 def test_where_summaries_find_no_neighbourhood_the_search_does():
     """Five waves look the same at more settings: only a start near the truth ends at it."""
     starts = Starts((0.9, 0.1), (0.91, 0.11), (0.42, 0.58))
@@ -148,6 +154,7 @@ def test_where_summaries_find_no_neighbourhood_the_search_does():
     np.testing.assert_allclose(found.point, TRUTH, atol=0.01)
 
 
+@pytest.mark.slow
 def test_draws_are_put_in_order():
     """Two parameters that change places: the larger one comes first here."""
 
@@ -164,6 +171,7 @@ def test_draws_are_put_in_order():
     np.testing.assert_allclose(found.point, TRUTH[::-1], atol=4 * found.draws.std(axis=0).max())
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_answer():
     first, again = (matched(Toy(bent, 6), Starts(), worlds=10) for _ in range(2))
     for one, other in zip(first, again, strict=True):

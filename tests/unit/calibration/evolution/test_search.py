@@ -35,6 +35,7 @@ def banana(setting):
     return float((1.0 - x) ** 2 + 100.0 * (y - x**2) ** 2)
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("parameters", [1, 2, 5, 9])
 def test_the_lowest_point_of_a_bowl_is_found(parameters):
     found = search_minimum(noisy(bowl, 0.0), parameters)
@@ -47,12 +48,14 @@ def test_a_narrow_valley_is_followed():
     np.testing.assert_allclose(3.0 * found.best - 1.0, 1.0, atol=0.05)
 
 
+@pytest.mark.slow
 def test_noise_moves_the_answer_by_little():
     """A bowl with noise of a tenth: a point 0.15 off the lowest one is 0.02 higher."""
     found = search_minimum(noisy(bowl, 0.1), 4, seed=2)
     assert bowl(found.best) < 0.05
 
 
+@pytest.mark.slow
 def test_the_best_of_two_valleys_wins():
     def two(setting):
         return min(bowl(setting), 0.02 + float(((setting - 0.9) ** 2).sum()))
@@ -62,6 +65,7 @@ def test_the_best_of_two_valleys_wins():
     assert found.ends.shape == (Budget().starts + 1,)
 
 
+@pytest.mark.slow
 def test_a_minimum_at_the_end_of_a_range_is_reached():
     found = search_minimum(noisy(lambda setting: float(setting.sum()), 0.0), 3)
     assert found.best.max() < 0.02

@@ -65,6 +65,7 @@ def calibrated(maps):
     return refine(maps, locate(maps, first_window(coarse, FLOOR), LIMITS), LIMITS, STEPS, 8)
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("lowest", [(0.7531, 0.283e-3), (0.775, 0.5e-3), (1.2022, 0.931e-3)])
 @pytest.mark.parametrize("scale", [(0.002, 3e-5), (0.005, 8e-5), (0.03, 4e-6), (0.02, 1e-4)])
 def test_a_valley_is_resolved_however_narrow_it_is(lowest, scale):
@@ -88,6 +89,7 @@ def test_a_valley_across_both_axes_is_resolved():
         assert abs(value - lowest) < scale / 2
 
 
+@pytest.mark.slow
 def test_a_wide_valley_costs_no_more_settings_than_a_narrow_one():
     maps = Painted((0.8, 1e-3), (0.4, 4e-4))
     found = calibrated(maps)
@@ -95,18 +97,21 @@ def test_a_wide_valley_costs_no_more_settings_than_a_narrow_one():
     assert found.landscape.optimum.point == pytest.approx((0.8, 1e-3), rel=0.15)
 
 
+@pytest.mark.slow
 def test_the_steps_of_the_study_are_kept_where_there_is_room():
     found = calibrated(Painted((0.8, 1e-3), (0.05, 8e-5)))
     for axis, step in zip(found.map.axes, STEPS, strict=True):
         assert np.diff(axis).max() < 1.6 * step
 
 
+@pytest.mark.slow
 def test_an_optimum_outside_the_first_window_is_followed():
     maps = Painted((0.9, 1.2e-3), (0.02, 1e-4))
     found = locate(maps, ((0.75, 0.85), (0.8e-3, 1.0e-3)), LIMITS)
     assert found.landscape.optimum.point == pytest.approx((0.9, 1.2e-3), rel=0.03)
 
 
+@pytest.mark.slow
 def test_a_window_ends_with_the_search():
     found = calibrated(Painted((0.0, 2e-3), (0.05, 1e-4)))
     assert found.landscape.optimum.point == pytest.approx((0.0, 2e-3), abs=0.02)
@@ -133,6 +138,7 @@ def test_a_setting_that_beats_the_optimum_by_more_than_chance_is_found():
     assert beating_cell(found, landscape_of(found, widths)) == (3, 4)
 
 
+@pytest.mark.slow
 def test_chance_alone_beats_the_optimum_in_next_to_no_map():
     """At a rate of 1 in 1000, 2 of 60 maps or more are seen with a chance of 0.2 %."""
     maps = Painted((0.75, 3e-4), (0.05, 1e-4))

@@ -107,6 +107,7 @@ def test_the_nearest_point_of_a_lattice():
     assert nearest_point(lattice, (0.6, 9.0)) == (2, 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("parameters", [1, 3])
 def test_a_quadratic_in_any_number_of_parameters_is_reproduced(parameters):
     axes = [np.linspace(-1.0, 1.0, 5 + index) for index in range(parameters)]

@@ -89,6 +89,7 @@ def test_the_concentration_of_angles_is_found(concentration: float) -> None:
     assert _concentration(resultant)[0] == pytest.approx(concentration, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_truth_is_found_from_steps_alone() -> None:
     """6,000 steps: standard errors of some 2 %; the bound is about five of them."""
     found = fit_hidden_walk([drawn(3000, 4), drawn(3000, 5)], states=2)

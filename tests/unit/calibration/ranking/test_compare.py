@@ -48,6 +48,7 @@ def found() -> xr.Dataset:
     )
 
 
+@pytest.mark.slow
 def test_the_true_model_is_the_closest(found: xr.Dataset) -> None:
     names = found["model"].values.tolist()
     assert set(names) == {"inertial", "run_tumble", "resampled steps", "hidden Markov walk"}
@@ -55,11 +56,13 @@ def test_the_true_model_is_the_closest(found: xr.Dataset) -> None:
     assert str(found["finding"].values[0]).startswith("run_tumble explains the recording")
 
 
+@pytest.mark.slow
 def test_it_is_what_its_schema_says(found: xr.Dataset) -> None:
     check_dataset(found)
     assert found.attrs["simulated_recording"] == "yes"
 
 
+@pytest.mark.slow
 def test_models_come_from_the_closest_to_the_farthest(found: xr.Dataset) -> None:
     assert (np.diff(found["score"].values) >= 0.0).all()
     assert found["behind"].values[0] == found["behind_std"].values[0] == 0.0
@@ -68,6 +71,7 @@ def test_models_come_from_the_closest_to_the_farthest(found: xr.Dataset) -> None
     assert floors.values == pytest.approx(found["score"].values, rel=0.15)
 
 
+@pytest.mark.slow
 def test_walks_of_recorded_steps_are_near_in_steps_and_never_explained(found: xr.Dataset) -> None:
     walks = found.isel(model=found["baseline"].values.astype(bool))
     assert not walks["explained"].values.any()
@@ -77,6 +81,7 @@ def test_walks_of_recorded_steps_are_near_in_steps_and_never_explained(found: xr
     assert (apart.sel(aspect="wall") > 2.0 * best.sel(aspect="wall")).all()
 
 
+@pytest.mark.slow
 def test_each_model_has_values_of_its_own_parameters_alone(found: xr.Dataset) -> None:
     for name in ("inertial", "run_tumble"):
         values = found["estimate"].sel(model=name).dropna("parameter")
@@ -84,6 +89,7 @@ def test_each_model_has_values_of_its_own_parameters_alone(found: xr.Dataset) ->
         assert sorted(values["parameter"].values.tolist()) == sorted(wanted)
 
 
+@pytest.mark.slow
 def test_threads_do_not_change_the_answer(recorded: xr.Dataset) -> None:
     one, two = (
         compare_models(recorded, ["inertial"], study=DISTANCES, budget=SMALL, threads=threads)
@@ -106,6 +112,7 @@ class Counted(MemoryStore):
         super().write(*unit)
 
 
+@pytest.mark.slow
 def test_a_comparison_that_was_ended_goes_on_with_the_model_that_it_was_at(
     recorded: xr.Dataset,
 ) -> None:
@@ -149,6 +156,7 @@ def test_a_comparison_that_was_ended_goes_on_with_the_model_that_it_was_at(
     )
 
 
+@pytest.mark.slow
 def test_models_searched_at_the_same_time_that_were_ended_go_on(recorded: xr.Dataset) -> None:
     kept = Counted()
     models = ["run_tumble", "active", "inertial"]
@@ -177,6 +185,7 @@ def test_models_searched_at_the_same_time_that_were_ended_go_on(recorded: xr.Dat
     )
 
 
+@pytest.mark.slow
 def test_a_users_own_model_is_asked_by_one_thread_alone(recorded: xr.Dataset) -> None:
     seen: set[str] = set()
 
@@ -223,6 +232,7 @@ def with_summaries(recorded: xr.Dataset, **options: Any) -> xr.Dataset:
     return compare_models(recorded, models, study=study, budget=SMALL, **options)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("asked")
 def test_summaries_are_matched_and_kept(recorded: xr.Dataset) -> None:
     kept: dict[str, Counted] = {}
@@ -269,6 +279,7 @@ def test_mistakes_are_said(recorded: xr.Dataset) -> None:
         check_models(recorded.isel(time=slice(0, 2)), ["active"])
 
 
+@pytest.mark.slow
 def test_a_block_without_a_flow_is_left_out_with_its_reason(recorded: xr.Dataset) -> None:
     study = dw.apply_overrides(dw.Study(), {"flow.min_count": 5000, "calibration.bootstrap": 0})
     found = compare_models(recorded, ["block", "inertial"], study=study, budget=SMALL)
@@ -276,6 +287,7 @@ def test_a_block_without_a_flow_is_left_out_with_its_reason(recorded: xr.Dataset
     assert any("the block is left out" in str(text) for text in found["warning"].values)
 
 
+@pytest.mark.slow
 def test_a_model_that_feels_others_is_left_out_where_there_are_none(recorded: xr.Dataset) -> None:
     found = compare_models(
         recorded, ["active+neighbours", "inertial"], study=DISTANCES, budget=SMALL

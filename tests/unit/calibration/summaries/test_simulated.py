@@ -88,6 +88,7 @@ def test_the_same_setting_twice_has_new_random_numbers(worlds, motion):
     assert not np.array_equal(objective(setting), objective(setting))
 
 
+@pytest.mark.slow
 def test_the_recording_is_like_its_own_model(worlds, motion):
     """Each summary lies within 5 standard deviations of 100 simulations of the truth."""
     truth = np.array(
@@ -106,6 +107,7 @@ def test_the_recording_is_like_its_own_model(worlds, motion):
     assert apart.max() > 10.0
 
 
+@pytest.mark.slow
 def test_cameras_differ_where_their_noise_is_estimated(worlds, motion):
     """Sixteen settings in a row have one camera, and all that may be have their turn."""
     assert motion.noises == (2e-4,)

@@ -165,6 +165,7 @@ def sines(plan: SummaryPlan) -> np.ndarray:
     return found
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(
     seed=st.integers(0, 10_000),
@@ -184,6 +185,7 @@ def test_the_centre_has_no_direction(seed: int, angle: float, mirrored: bool, ga
     assert np.abs(before[sines(plan)]).max() > 1e-3
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(seed=st.integers(0, 10_000), factor=st.floats(1e-4, 1e4))
 def test_lengths_have_no_unit(seed: int, factor: float) -> None:

@@ -49,6 +49,7 @@ def test_stated_laws(stated: dict[str, Any], force: str, drag: str, kind: str) -
     assert facts["drag_law"] == kind
 
 
+@pytest.mark.slow
 def test_a_fit_keeps_it() -> None:
     fit = fitted(120.0)
     assert {fit.attrs["force_law_stated"], fit.attrs["drag_law_stated"]} == {"yes"}

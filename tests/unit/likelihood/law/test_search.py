@@ -69,6 +69,7 @@ def test_the_interval_of_the_quadratic_part_knows_its_share() -> None:
     assert _log_drag_std(closed, covariance[:3, :3]) == pytest.approx(0.2)
 
 
+@pytest.mark.slow
 def test_a_stated_power_of_the_drag_is_that_of_the_fit() -> None:
     stated = apply_overrides(study_with(keys=FIT_KEYS, camera="exact"), {"forces.drag_power": 1.7})
     fit = dw.fit_motion(recording(60.0), stated)
@@ -118,6 +119,7 @@ def test_a_marker_that_is_off_and_turned_is_found() -> None:
     assert "marker_x" not in exact["parameter"].values
 
 
+@pytest.mark.slow
 def test_the_model_itself_opens_nothing() -> None:
     fit = dw.fit_motion(recording(SECONDS), study_with())
     assert fit.attrs["force_law"] == "paper"
@@ -126,6 +128,7 @@ def test_the_model_itself_opens_nothing() -> None:
     assert {"linear_share", "force_memory", "marker_x"} <= set(fit["departure"].values)
 
 
+@pytest.mark.slow
 def test_stated_uncertainty_widens_the_intervals() -> None:
     track = recording(120.0)
     exact = dw.fit_motion(track, study_with(keys=FIT_KEYS, law="paper"))
@@ -174,6 +177,7 @@ def test_a_fit_that_compared_nothing_has_no_figure(tmp_path: Path) -> None:
         write_laws_figure(tmp_path, fit=xr.Dataset())
 
 
+@pytest.mark.slow
 def test_a_mirrored_orientation_is_said() -> None:
     track = recording(120.0)
     assert not [text for text in warned(track) if "against the water" in text]
@@ -186,6 +190,7 @@ def warned(track: xr.Dataset) -> list[str]:
     return [str(text) for text in fit["warning"].values]
 
 
+@pytest.mark.slow
 def test_what_is_stated_goes_with_the_fit() -> None:
     """The simulations of a fit follow a stated memory; linear drag has C_d's uncertainty."""
     track = recording(60.0)

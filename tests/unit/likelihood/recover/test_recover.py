@@ -134,6 +134,7 @@ def test_the_dataset_is_whole(found: xr.Dataset) -> None:
     assert found.attrs["flow"] == "flow_true.csv"
 
 
+@pytest.mark.slow
 def test_the_numbers_do_not_depend_on_the_other_lengths(
     found: xr.Dataset, flow: xr.Dataset
 ) -> None:

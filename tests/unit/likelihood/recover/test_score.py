@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
-from fit_worlds import DRAG, FORCE_N, NOISE_M, coarse_study, recording
+from fit_worlds import DRAG, FORCE_N, NOISE_M, fitted, recording
 
 import driftwalk as dw
 from driftwalk.core.errors import InputError
@@ -23,8 +23,8 @@ def track() -> xr.Dataset:
 
 
 @pytest.fixture(scope="module")
-def fit(track: xr.Dataset) -> xr.Dataset:
-    return dw.fit_motion(track, coarse_study())
+def fit() -> xr.Dataset:
+    return fitted(300.0)
 
 
 def scored(fit: xr.Dataset, **changes: object) -> dict[str, object]:
@@ -37,6 +37,7 @@ def scored(fit: xr.Dataset, **changes: object) -> dict[str, object]:
     return dw.score_fit(fit, **{**truth, **changes})
 
 
+@pytest.mark.slow
 def test_the_parameters_are_held_beside_the_truth(fit: xr.Dataset) -> None:
     """The standard deviations by the fit's own covariance of (ln C_d, ln q, ln r)."""
     score = scored(fit)
@@ -52,6 +53,7 @@ def test_the_parameters_are_held_beside_the_truth(fit: xr.Dataset) -> None:
         assert [score[f"{name}_low"], score[f"{name}_high"]] == fit_facts(fit)[f"{name}_interval"]
 
 
+@pytest.mark.fast_cases(6)
 @pytest.mark.parametrize("name", ["drag_coefficient", "force_std", "tracking_noise"])
 @pytest.mark.parametrize(
     ("sds", "covered"), [(1.6, True), (1.7, False), (-1.6, True), (-1.7, False)]
@@ -67,6 +69,7 @@ def test_a_90_percent_interval_reaches_1_645_standard_deviations(
     assert score[f"{key}_z"] == pytest.approx(-sds)
 
 
+@pytest.mark.slow
 def test_the_flow_error_by_brute_force(fit: xr.Dataset, track: xr.Dataset) -> None:
     """Cell by cell, sample by sample, point by point of the block."""
     score = scored(fit, recordings=track)
@@ -126,6 +129,7 @@ def test_a_flow_that_is_a_tenth_too_strong_is_off_by_a_tenth(
     assert exact["flow_z_rms"] == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_a_block_averages_a_parabola_by_its_second_moment() -> None:
     """Mean of y^2 over a square of side a is y0^2 + a^2/12 at any angle; midpoints: (1 - 1/36)."""
     flow = dw.flow_from_function(lambda x, y: (y**2, 0.0 * x), cells=2000)

@@ -32,7 +32,7 @@ from driftwalk.simulation import Start
 from driftwalk.simulation.backend import STATUS, Camera
 from driftwalk.testing import MotionModelContract, assert_same
 
-SCRIPT = Path(__file__).resolve().parents[2] / "helpers" / "tumble_program.py"
+SCRIPT = Path(__file__).resolve().parents[3] / "helpers" / "tumble_program.py"
 # Without site-packages an interpreter starts in a fiftieth of a second.
 PYTHON = f"{shlex.quote(sys.executable)} -I -S"
 LIKE = Conditions(
@@ -257,6 +257,7 @@ def test_much_on_standard_error_blocks_nothing():
     assert_same(simulate("errors"), simulate(), "standard error matters")
 
 
+@pytest.mark.slow
 def test_answers_of_some_megabytes_are_read():
     """A request and an answer that no pipe holds, read whole."""
     like = replace(LIKE, sample_time=np.arange(4000) / 10.0, threads=2)

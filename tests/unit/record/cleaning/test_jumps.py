@@ -30,6 +30,7 @@ def cost(kept: tuple[int, ...], track: RawBody, max_speed: float) -> float:
     return total
 
 
+@pytest.mark.slow
 @given(
     st.lists(st.tuples(st.floats(0.05, 0.5), COORDINATE, COORDINATE), min_size=2, max_size=9),
     st.floats(0.5, 10.0),

@@ -41,6 +41,7 @@ def check(path: Path, **options: Any) -> None:
     np.testing.assert_array_equal(track.y, [2.0, 2.25])
 
 
+@pytest.mark.slow
 def test_the_sheet_that_fits_or_is_named(tmp_path: Path) -> None:
     check(book(tmp_path, data=ROWS))
     check(book(tmp_path, notes=[["who", "when"], ["me", 2024]], empty=[], data=ROWS))
@@ -122,6 +123,7 @@ def damaged(folder: Path) -> dict[str, bytes]:
     }
 
 
+@pytest.mark.slow
 def test_damaged_files_are_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "damaged.xlsx"
     for case, content in damaged(tmp_path).items():
@@ -140,6 +142,7 @@ def test_a_word_is_said_with_its_row_and_sheet(tmp_path: Path) -> None:
         load(path)
 
 
+@pytest.mark.slow
 def test_without_the_extra_one_line_says_what_to_install(tmp_path: Path) -> None:
     path = book(tmp_path, A=ROWS)
     program = "import sys; sys.modules['openpyxl'] = None\nfrom driftwalk.cli.main import main\n"

@@ -27,6 +27,7 @@ def judged() -> Judged:
     return judge_fit(fit_motion(track, coarse_study()), [track])
 
 
+@pytest.mark.slow
 def test_the_fit_says_what_its_check_says(judged: Judged) -> None:
     fit, check = judged
     assert check is not None
@@ -37,6 +38,7 @@ def test_the_fit_says_what_its_check_says(judged: Judged) -> None:
     xr.testing.assert_identical(fit["p_value"], check["p_value"])
 
 
+@pytest.mark.slow
 def test_residuals_come_back_as_they_were(judged: Judged) -> None:
     fit, check = judged
     assert check is not None
@@ -50,17 +52,20 @@ def test_residuals_come_back_as_they_were(judged: Judged) -> None:
     assert found.attrs["arena"] == check.attrs["arena"]
 
 
+@pytest.mark.slow
 def test_nothing_of_the_fit_is_lost(judged: Judged) -> None:
     plain = fit_motion(recording(SECONDS), coarse_study())
     xr.testing.assert_identical(judged.fit[list(plain.variables)], plain)
 
 
+@pytest.mark.slow
 def test_what_is_stored_is_what_is_in_memory(judged: Judged, tmp_path: Path) -> None:
     path = tmp_path / "fit.nc"
     path.write_bytes(netcdf_bytes(judged.fit))
     xr.testing.assert_identical(open_netcdf(path), judged.fit)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("show", ["mean", "noise"])
 def test_the_map_of_the_fit_is_that_of_the_check(judged: Judged, show: str) -> None:
     fit, check = judged
@@ -72,6 +77,7 @@ def test_the_map_of_the_fit_is_that_of_the_check(judged: Judged, show: str) -> N
     np.testing.assert_array_equal(*drawn)
 
 
+@pytest.mark.slow
 def test_the_flow_of_a_fit_is_drawn_as_its_flow_field(judged: Judged) -> None:
     drawn = [dw.plot.flow(one) for one in (judged.fit, dw.fitted_flow(judged.fit))]
     colours = [ax.collections[0].get_array() for ax in drawn]
@@ -80,6 +86,7 @@ def test_the_flow_of_a_fit_is_drawn_as_its_flow_field(judged: Judged) -> None:
         dw.plot.flow(judged.fit.expand_dims(flow=["a", "b"]))
 
 
+@pytest.mark.slow
 def test_a_fit_that_could_not_be_checked_says_why() -> None:
     track = recording(SECONDS)
     fit = fit_motion(track, coarse_study())
@@ -93,6 +100,7 @@ def test_a_fit_that_could_not_be_checked_says_why() -> None:
     assert why in str(error.value)
 
 
+@pytest.mark.slow
 def test_residuals_of_something_else_are_refused(judged: Judged) -> None:
     with pytest.raises(InputError, match="kind 'trajectory'"):
         residuals_of(recording(SECONDS))
@@ -100,6 +108,7 @@ def test_residuals_of_something_else_are_refused(judged: Judged) -> None:
         residuals_of(fit_motion(recording(SECONDS), coarse_study()))
 
 
+@pytest.mark.slow
 def test_the_page_of_a_fit_in_memory_has_the_verdict(judged: Judged) -> None:
     fit, check = judged
     assert check is not None
