@@ -9,57 +9,35 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
-from driftwalk.likelihood.filter_pass import Passes
-from driftwalk.likelihood.newton import FROM_NEAR, Mode, Prior, find_mode
+from driftwalk.likelihood.filter.filter_pass import Passes
+from driftwalk.likelihood.interval_inflation import parameter_covariance, parameter_facts
+from driftwalk.likelihood.newton import FROM_NEAR, Mode, ModeSearch, require_mode
+from driftwalk.likelihood.prior import Prior
 from driftwalk.likelihood.reml import Restricted, restricted_drag
-from driftwalk.likelihood.result import parameter_covariance, parameter_facts
 from driftwalk.likelihood.solution import BREAKDOWN
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
 
-CLOSE: Final = 2.0
-"""In standard deviations: a shorter step of the search leaves a fifth of one at most."""
-NOTABLE_DISAGREEMENT: Final = 3.0
-"""Combined standard deviations beyond which the two estimates of C_d do not agree."""
-
 
 def angle_given_facts(
     passes: Passes, mode: Mode, restricted: Restricted, study: Study
 ) -> dict[str, Any]:
-    """Fit once more with the angle as an input, and compare.
+    """Fit once more with the angle as an input (`passes`), and compare.
 
-    Parameters
-    ----------
-    passes : Passes
-        The filter with the angle as an input.
-    mode, restricted : Mode, Restricted
-        Result with the angle in the state; the search begins there.
-    study : Study
-        The section [fit].
-
-    Returns
-    -------
-    dict
-        ``drag_coefficient_angle_given`` with its interval, and ``angle_disagreement_std``: the
-        difference of the two ln C_d in combined standard deviations, NaN where the second fit has
-        no solution.
+    Returns ``drag_coefficient_angle_given`` with its interval, and ``angle_disagreement_std``: the
+    difference of the two ln C_d in combined standard deviations, NaN where the second fit has no
+    solution.
     """
     found = restricted.point
     known = {**found.fixed, **found.opened}
     start = replace(found, log_lever=None, log_angle_noise=None, opened={}, fixed=known)
     prior = Prior(passes)
     try:
-        other = find_mode(
-            passes,
-            start,
-            mode.weights,
-            prior,
-            iterations=study.fit.iterations,
-            held=FROM_NEAR,
-        )
+        search = ModeSearch(passes, prior, study.fit.iterations)
+        other = require_mode(search.find(start, mode.weights, held=FROM_NEAR))
         again = restricted_drag(passes, other, prior, intensity=False)
         covariance = parameter_covariance(other, again)
         own = parameter_covariance(mode, restricted)

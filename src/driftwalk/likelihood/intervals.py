@@ -16,9 +16,6 @@ if TYPE_CHECKING:
 
     from driftwalk.model import Study
 
-HALF_SWITCH_S = 1e-6
-"""A flow field is linear between its frames: those before and after a switch are so far from it."""
-
 
 @dataclass(frozen=True)
 class Intervals:
@@ -176,8 +173,9 @@ def switched_frames(
     ([2.999999, 3.000001], [[0.0], [1.0]])
     """
     time, flow = [], []
+    half = 1e-6  # [s], for a field is linear between its frames
     for index, switch in enumerate(intervals.times):
-        time += [switch - first - HALF_SWITCH_S, switch - first + HALF_SWITCH_S]
+        time += [switch - first - half, switch - first + half]
         flow += [intervals.flows[index], intervals.flows[index + 1]]
     return np.array(time), {
         name: np.stack([values[one] for one in flow]) for name, values in fields.items()

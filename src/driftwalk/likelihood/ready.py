@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
 import numpy as np
 
@@ -13,10 +13,10 @@ from driftwalk.core.text.argument_text import argument_text
 from driftwalk.core.text.json_text import parse_json
 from driftwalk.flow.arena import Outline, outline_of, read_arena
 from driftwalk.likelihood.angle import no_angle, smooth_angle
-from driftwalk.likelihood.filter_pass import LONGEST_GAP_S, Body, Series
+from driftwalk.likelihood.filter.series import FILTER, Body, Series
 from driftwalk.likelihood.intervals import Intervals, cut_track, intervals_of
 from driftwalk.likelihood.refuse import (
-    FEWEST_SAMPLES,
+    LIMIT,
     require_length,
     require_memory,
     require_own_arena,
@@ -40,11 +40,9 @@ if TYPE_CHECKING:
 
     from driftwalk.model import Study
 
-ORIENTED_SHARE = 0.5
-"""Share of samples with an orientation from which on "auto" uses it."""
-
-LINEAR_TIME_S = 1.0
-"""Linear and quadratic drag are compared at the speed of one side of the block in this time."""
+ORIENTED_SHARE: Final = 0.5
+"""Share of the samples with an orientation from which on the fit uses orientations by default, and
+the search for dropped frames does. Chosen by hand: the majority."""
 
 AngleUse = Literal["auto", "state", "given", "none"]
 
@@ -59,7 +57,7 @@ def as_list(recordings: xr.Dataset | Sequence[xr.Dataset]) -> list[xr.Dataset]:
     return many
 
 
-class Ready(NamedTuple):
+class PreparedRecordings(NamedTuple):
     """Recordings, ready for the filter."""
 
     tracks: list[Track]
@@ -84,6 +82,11 @@ class Ready(NamedTuple):
     """Where they are, in words; empty where there are none."""
 
     @property
+    def duration(self) -> float:
+        """Length of all recordings together [s]."""
+        return sum(float(one.time[-1] - one.time[0]) for one in self.series)
+
+    @property
     def samples(self) -> int:
         """Number of all samples, with those that are left out."""
         return sum(one.time.size for one in self.series) + self.mistakes
@@ -91,7 +94,7 @@ class Ready(NamedTuple):
 
 def prepare(
     many: Sequence[xr.Dataset], study: Study, angle: AngleUse | None, body: str | None
-) -> Ready:
+) -> PreparedRecordings:
     """Return recordings ready for the filter; refuse what cannot be fitted."""
     require_memory(sum(one.sizes["time"] for one in many))
     intervals = intervals_of(study)
@@ -110,7 +113,7 @@ def prepare(
         raws.append(track)
         dropped.append(find_dropped_frames(track, recording["time"].values))
         track = with_gaps(track, dropped[-1])
-        cut = cut_track(track, intervals, fewest=FEWEST_SAMPLES, where=where)
+        cut = cut_track(track, intervals, fewest=LIMIT.fewest_samples, where=where)
         for number, part in enumerate(cut):
             if len(cut) > 1:
                 require_travel(part, study, where=f"{where}{intervals.describe(number)}")
@@ -136,7 +139,7 @@ def prepare(
         for raw, recording in zip(raws, many, strict=True):
             require_raw(raw, where=_name_of(recording))
     share = near_wall / count
-    return Ready(
+    return PreparedRecordings(
         tracks,
         parts,
         places,
@@ -235,7 +238,7 @@ def series_of(
         smooth = no_angle(time.size)
         corners = None
         if used_angle != "none":
-            smooth = smooth_angle(time, track.theta, longest_gap=LONGEST_GAP_S)
+            smooth = smooth_angle(time, track.theta, longest_gap=FILTER.longest_gap_s)
             corners = np.where(np.isfinite(track.theta), track.theta, smooth.theta)
         wall = wall_intervals(
             time,
@@ -244,7 +247,7 @@ def series_of(
             corners,
             outline=outline,
             side=study.block.side_m,
-            longest_gap=LONGEST_GAP_S,
+            longest_gap=FILTER.longest_gap_s,
         )
         found.append(
             Series(
@@ -270,7 +273,7 @@ def _require_usable(series: Sequence[Series], study: Study, *, where: str = "") 
         intervals=sum(one.time.size - 1 for one in series),
         near_wall=sum(one.near_wall for one in series),
         tank=study.tank.describe(),
-        longest_gap=LONGEST_GAP_S,
+        longest_gap=FILTER.longest_gap_s,
         where=where,
     )
 
@@ -278,7 +281,7 @@ def _require_usable(series: Sequence[Series], study: Study, *, where: str = "") 
 def usable_intervals(series: Sequence[Series]) -> int:
     """Return the number of intervals that are not left out and not longer than a gap."""
     return sum(
-        int(np.count_nonzero((one.excluded[1:] == 0) & (np.diff(one.time) <= LONGEST_GAP_S)))
+        int(np.count_nonzero((one.excluded[1:] == 0) & (np.diff(one.time) <= FILTER.longest_gap_s)))
         for one in series
     )
 
@@ -300,7 +303,8 @@ def body_of(study: Study, used_angle: str) -> Body:
         depth=study.wetted_depth_m,
         strips=study.block.strips_per_face,
         water_density=study.water.density_kg_m3,
-        linear_speed=study.block.side_m / LINEAR_TIME_S,
+        # Linear and quadratic drag are compared at a speed of one side of the block a second.
+        linear_speed=study.block.side_m,
         drag_speed=study.forces.drag_speed_m_s,
         orientation=used_angle,
     )

@@ -18,8 +18,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from driftwalk.likelihood.filter_pass import Passes, Point
-from driftwalk.likelihood.newton import Mode, Prior, known_numbers_variance
+from driftwalk.likelihood.filter.filter_pass import Passes
+from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.newton import Mode, known_numbers_variance
+from driftwalk.likelihood.prior import Prior
 from driftwalk.likelihood.solution import cholesky
 from driftwalk.likelihood.spline import Floats
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from driftwalk.core.errors import InputError
-from driftwalk.likelihood.refuse import MOST_WALL_SHARE
+from driftwalk.likelihood.refuse import LIMIT
 
 if TYPE_CHECKING:
     from driftwalk.likelihood.spline import Floats
@@ -47,7 +47,7 @@ def solved(wall_share: float = 0.0) -> Iterator[None]:
 
 def _reason(wall_share: float) -> str:
     """Return why a search may break down, and what to do."""
-    if wall_share > MOST_WALL_SHARE:
+    if wall_share > LIMIT.most_wall_share:
         return (
             f"{wall_share:.0%} of the intervals are at the wall and were left out, and the motion "
             "in the others does not follow the model; record where the body stays away from the "

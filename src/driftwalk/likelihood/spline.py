@@ -19,12 +19,7 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
-REACH = 0.1
-"""The knots go beyond the tank's bounding box by this many block sides: a corner of a tracked block
-may seem to be outside."""
 DEGREE = 3
-_GAUSS_POINTS = 4
-"""Exact for products of two cubics."""
 
 
 @dataclass(frozen=True)
@@ -99,9 +94,11 @@ def lay_spline(outline: Outline, *, side: float, spacing: float) -> Spline:
     >>> lay_spline(Circle(0.15), side=0.03, spacing=0.02).columns
     19
     """
+    # Knots go beyond the tank by a tenth of a side: a corner of a tracked block may seem to be
+    # outside.
     x_min, y_min, x_max, y_max = outline.bounds
     cells_x, cells_y = (
-        math.ceil((high - low + 2.0 * REACH * side) / spacing - 1e-9)
+        math.ceil((high - low + 2.0 * 0.1 * side) / spacing - 1e-9)
         for low, high in ((x_min, x_max), (y_min, y_max))
     )
     return Spline(
@@ -164,7 +161,7 @@ def penalties(spline: Spline) -> tuple[Floats, Floats]:
 
 def _gram(count: int, spacing: float, order: int) -> Floats:
     """Return the integrals of products of two basis functions' derivatives along an axis."""
-    nodes, weights = np.polynomial.legendre.leggauss(_GAUSS_POINTS)
+    nodes, weights = np.polynomial.legendre.leggauss(4)  # exact for products of two cubics
     values = _derivative(0.5 * (nodes + 1.0), order) / spacing**order
     cell = values.T @ (values * (0.5 * spacing * weights)[:, None])
     gram = np.zeros((count, count))

@@ -11,27 +11,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.conditions.study import fitted_law
-from driftwalk.core.errors import InputError
-from driftwalk.likelihood.filter_pass import Passes, Place, Point, Series, Sums
-from driftwalk.likelihood.law.facts import effective_logs, stored_numbers
-from driftwalk.likelihood.newton import Prior, Weights
-from driftwalk.likelihood.ready import body_of, prepare
-from driftwalk.likelihood.result import require_fit
+from driftwalk.likelihood.estimate import Estimate
+from driftwalk.likelihood.filter.filter_pass import Place, Sums
+from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.filter.series import Series
+from driftwalk.likelihood.prior import Prior
 from driftwalk.likelihood.spline import DEGREE, Floats, Spline, basis
-from driftwalk.schema import Track
-from driftwalk.schema.answers.fit_facts import fitted_value
 
 if TYPE_CHECKING:
-    import xarray as xr
-
-    from driftwalk.model import Study
+    pass
 
 Integers = npt.NDArray[np.int64]
 Flags = npt.NDArray[np.bool_]
@@ -44,53 +38,6 @@ DRAWS = 16
 """Draws of the parameters from which that correction is computed."""
 WHOLE: tuple[Place, ...] = ((slice(None), slice(None)),)
 """All columns, where they are."""
-
-
-@dataclass(frozen=True, eq=False)
-class Estimate:
-    """A fit, ready to run its filter at what it found."""
-
-    study: Study
-    passes: Passes
-    point: Point
-    weights: Weights
-    tracks: Sequence[Track]
-    """Sources of the series of the passes: the recordings, cut at the switching times."""
-
-
-def estimate_of(fit: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str | None) -> Estimate:
-    """Return what a fit found, with the recordings it was fitted to."""
-    from driftwalk.model import apply_overrides, parse_study
-
-    fit = require_fit(fit)
-    study = parse_study(fit.attrs["study"])
-    study = apply_overrides(study, fitted_law(fit))
-    ready = prepare(recordings, study, fit.attrs["angle"], body)
-    if ready.samples != int(fit["samples"]):
-        raise InputError(
-            f"the recordings have {ready.samples} positions, the fit was made of "
-            f"{int(fit['samples'])}: check it with the recordings that it was fitted to"
-        )
-    coefficients = np.asarray(fit["coefficient"].values, dtype=np.float64)
-    x, y = fit["spline_origin"].values
-    spline = Spline(float(x), float(y), float(fit["spline_spacing"]), *coefficients.shape[:-3:-1])
-    numbers = stored_numbers(fit)
-    point = Point(
-        coefficients,
-        *effective_logs(fit, study),
-        math.log(fitted_value(fit, "tracking_noise")),
-        opened=numbers.opened,
-        fixed=numbers.fixed,
-    )
-    if ready.angle == "state":
-        point = replace(
-            point,
-            log_lever=math.log(fitted_value(fit, "force_lever")),
-            log_angle_noise=math.log(fitted_value(fit, "orientation_noise")),
-        )
-    weights = Weights(float(fit["roughness_weight"]), float(fit["size_weight"]))
-    passes = Passes(ready.series, body_of(study, ready.angle), spline, len(ready.intervals.labels))
-    return Estimate(study, passes, point, weights, ready.parts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -294,7 +241,7 @@ def _parts(estimate: Estimate, errors: Sequence[Errors]) -> Iterator[_Part]:
         flow = one.series.flow
         places = estimate.passes.columns_of(flow, 1)
         point = estimate.point.in_flow(flow)
-        running = estimate.passes._filter(one.series, point, sensitivities=True)
+        running = estimate.passes.kernel(one.series, point, sensitivities=True)
         for start in range(0, one.used.size, SAMPLES_AT_ONCE):
             found = running.run(SAMPLES_AT_ONCE)
             white = np.asarray(found["whitened"]).ravel()

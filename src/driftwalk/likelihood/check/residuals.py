@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from driftwalk.flow.arena import outline_of
-from driftwalk.likelihood.check.errors import Errors, Estimate, Leverage, collect
+from driftwalk.likelihood.check.errors import Errors, Leverage, collect
 from driftwalk.likelihood.check.place import (
     Layout,
     Local,
@@ -20,6 +20,7 @@ from driftwalk.likelihood.check.place import (
     trend_of,
 )
 from driftwalk.likelihood.check.white import LAGS, White, white_of
+from driftwalk.likelihood.estimate import Estimate
 
 
 @dataclass(frozen=True, eq=False)

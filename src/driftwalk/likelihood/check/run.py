@@ -9,7 +9,7 @@ import numpy as np
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.processors import one_blas_thread
-from driftwalk.likelihood.check.errors import Errors, errors_of, estimate_of
+from driftwalk.likelihood.check.errors import Errors, errors_of
 from driftwalk.likelihood.check.motion import compare_motion
 from driftwalk.likelihood.check.residuals import residuals_of
 from driftwalk.likelihood.check.result import (
@@ -25,8 +25,9 @@ from driftwalk.likelihood.check.worlds import (
     replicates_at_estimate,
     replicates_drawn,
 )
+from driftwalk.likelihood.estimate import estimate_of
+from driftwalk.likelihood.fitted_flow import require_fit
 from driftwalk.likelihood.ready import as_list
-from driftwalk.likelihood.result import require_fit
 from driftwalk.schema.answers.fit_facts import texts
 from driftwalk.schema.check import build_dataset
 

@@ -17,10 +17,10 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.processors import map_in_threads
 from driftwalk.core.seeds import world_keys
 from driftwalk.core.streams import CheckStream
-from driftwalk.likelihood.check.errors import Estimate
-from driftwalk.likelihood.filter_pass import Series
+from driftwalk.likelihood.estimate import Estimate
+from driftwalk.likelihood.filter.series import Series
+from driftwalk.likelihood.fitted_flow import fitted_flow
 from driftwalk.likelihood.intervals import fitted_intervals
-from driftwalk.likelihood.result import fitted_flow
 from driftwalk.likelihood.spline import Floats
 from driftwalk.schema import Track
 from driftwalk.schema.answers.fit_facts import fitted_value

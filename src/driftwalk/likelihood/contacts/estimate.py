@@ -9,14 +9,14 @@ import numpy as np
 
 from driftwalk.conditions import estimated_study
 from driftwalk.core.run_stages import tell_nobody
-from driftwalk.likelihood.check.errors import Estimate, estimate_of
 from driftwalk.likelihood.contacts.lattice import tried_walls
 from driftwalk.likelihood.contacts.parabola import answer, says_nothing
 from driftwalk.likelihood.contacts.particles import Part, Trial
 from driftwalk.likelihood.contacts.passages import Passages, passages_of, thinned
+from driftwalk.likelihood.estimate import Estimate, estimate_of
+from driftwalk.likelihood.fitted_flow import fitted_flow
 from driftwalk.likelihood.intervals import fitted_intervals
 from driftwalk.likelihood.newton import Tell
-from driftwalk.likelihood.result import fitted_flow
 from driftwalk.likelihood.solution import BREAKDOWN
 from driftwalk.schema.answers.answer import undetermined
 from driftwalk.schema.answers.law_words import WALL_KEYS

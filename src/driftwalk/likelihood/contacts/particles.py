@@ -19,7 +19,7 @@ from driftwalk.core.processors import default_threads
 from driftwalk.core.seeds import world_keys
 from driftwalk.likelihood.contacts.known import known_covariance
 from driftwalk.likelihood.contacts.passages import Passages
-from driftwalk.likelihood.filter_pass import Point
+from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.spline import Floats
 from driftwalk.schema.trajectory import wrap_angle
 from driftwalk.simulation.backend import Camera, native_model, world_table

@@ -6,8 +6,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.likelihood.check.errors import Estimate
-from driftwalk.likelihood.filter_pass import Series, corrected
+from driftwalk.likelihood.estimate import Estimate
+from driftwalk.likelihood.filter.series import Series, corrected
 from driftwalk.likelihood.spline import Floats
 
 BEFORE: Final = 3

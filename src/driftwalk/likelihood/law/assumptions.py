@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from driftwalk.likelihood.law.departures import DRAG_SHAPES, DRAGS, STRENGTHS
+from driftwalk.likelihood.filter.departures import DRAG_SHAPES, DRAGS, STRENGTHS
 
 if TYPE_CHECKING:
     from driftwalk.model import Study

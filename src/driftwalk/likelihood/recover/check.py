@@ -9,7 +9,7 @@ import numpy as np
 
 from driftwalk.core.errors import InputError
 from driftwalk.flow.arena import outline_of
-from driftwalk.likelihood.refuse import FEWEST_SAMPLES
+from driftwalk.likelihood.refuse import LIMIT
 from driftwalk.model.recover import RANDOM
 from driftwalk.schema import FLAGS, check_flow_field
 
@@ -87,11 +87,11 @@ def _require_length(study: Study) -> None:
     # Five standard deviations: chance shall not stop a study half-way.
     kept = 1.0 - settings.missing_share
     expected = samples * kept - 5.0 * math.sqrt(samples * kept * settings.missing_share)
-    if expected < FEWEST_SAMPLES:
+    if expected < LIMIT.fewest_samples:
         raise InputError(
             f"[recover] durations_s: {shortest:g} s at a sample every "
             f"{settings.sample_interval_s:g} s, {settings.missing_share:.0%} of them missing, are "
-            f"about {samples * kept:.0f} positions; the fit needs {FEWEST_SAMPLES} at "
+            f"about {samples * kept:.0f} positions; the fit needs {LIMIT.fewest_samples} at "
             "least, and some minutes to be of use"
         )
 

@@ -23,7 +23,7 @@ from driftwalk.likelihood.recover.one import (
 )
 from driftwalk.likelihood.recover.score import SCORED
 from driftwalk.likelihood.recover.summary import COVERAGE_CONFIDENCE, NEEDED_CONFIDENCE, add_summary
-from driftwalk.likelihood.refuse import MOST_WALL_SHARE
+from driftwalk.likelihood.refuse import LIMIT
 from driftwalk.model.recover import RANDOM
 from driftwalk.schema.check import described
 from driftwalk.schema.kinds import KINDS
@@ -162,7 +162,7 @@ def _dataset(
     data["status"] = (dims, tables["status"])
     data["message"] = (dims, tables["message"].astype(object))
     fitted = tables["status"] == STATUS["fitted"]
-    used = fitted & (np.where(fitted, tables["wall_share"], 1.0) <= MOST_WALL_SHARE)
+    used = fitted & (np.where(fitted, tables["wall_share"], 1.0) <= LIMIT.most_wall_share)
     data["used"] = (dims, used.astype(np.int8))
     coords = {
         "duration": ("duration", np.array(study.recover.durations_s)),
@@ -191,7 +191,7 @@ def _attrs(study: Study, flow: xr.Dataset | None) -> dict[str, Any]:
         "confidence": study.fit.confidence,
         "coverage_confidence": COVERAGE_CONFIDENCE,
         "needed_confidence": NEEDED_CONFIDENCE,
-        "most_wall_share": MOST_WALL_SHARE,
+        "most_wall_share": LIMIT.most_wall_share,
         "drag_coefficient_precision": np.nan if asked is None else asked,
         "study": study.to_toml(),
     }

@@ -12,8 +12,8 @@ import numpy.typing as npt
 from driftwalk.core.errors import InputError
 from driftwalk.flow import bilinear
 from driftwalk.flow.arena import outline_of
+from driftwalk.likelihood.fitted_flow import fitted_flow, require_fit
 from driftwalk.likelihood.intervals import fitted_intervals
-from driftwalk.likelihood.result import fitted_flow, require_fit
 from driftwalk.likelihood.wall import MARGIN
 from driftwalk.schema import FLAGS, body_track
 from driftwalk.schema.answers.fit_facts import fit_facts

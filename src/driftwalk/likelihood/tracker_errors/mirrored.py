@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from driftwalk.likelihood.spline import Floats, Spline, basis_matrix
 
 if TYPE_CHECKING:
-    from driftwalk.likelihood.filter_pass import Series
-
-MIRRORED: Final = -0.35
-"""Correlation of the spin of the block with the vorticity of the water below which it is said."""
+    from driftwalk.likelihood.filter.series import Series
 
 
 def spin_correlation(coefficients: Floats, spline: Spline, series: Sequence[Series]) -> float:

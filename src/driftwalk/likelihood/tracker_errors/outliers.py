@@ -16,7 +16,7 @@ from typing import Final
 
 import numpy as np
 
-from driftwalk.likelihood.filter_pass import Flags
+from driftwalk.likelihood.filter.series import Flags
 from driftwalk.likelihood.spline import Floats
 from driftwalk.schema import Track
 

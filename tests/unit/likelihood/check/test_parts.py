@@ -25,7 +25,7 @@ from driftwalk.likelihood.check.scan import scan_of
 from driftwalk.likelihood.check.verdict import motion_criterion
 from driftwalk.likelihood.check.white import white_of
 from driftwalk.likelihood.check.worlds import Replicates
-from driftwalk.likelihood.filter_pass import Series
+from driftwalk.likelihood.filter.series import Series
 from driftwalk.likelihood.spline import Spline
 
 ROWS, PARAMETERS, COMPONENTS = 400, 12, 2
