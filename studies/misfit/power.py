@@ -23,7 +23,7 @@ from run import FIRST_SEED, SETS, current, file_of
 import driftwalk as dw
 from driftwalk.core.files.atomic import write_atomic
 from driftwalk.core.provenance import manifest, write_manifest
-from driftwalk.likelihood.check.verdict import LEVEL
+from driftwalk.likelihood.check.verdict import VERDICT
 from driftwalk.likelihood.law.forward_selection import (
     MEMORY_SIGMAS,
     OPENED_SIGMAS,
@@ -168,7 +168,7 @@ def is_named(case: str, line: dict[str, Any]) -> bool:
 
 def is_rejected(line: dict[str, Any]) -> bool:
     """Return whether the check fails, at the level that it has now."""
-    return bool(line.get("least_p_value", 1.0) < LEVEL)
+    return bool(line.get("least_p_value", 1.0) < VERDICT.level)
 
 
 def right_table(lines: Lines) -> str:

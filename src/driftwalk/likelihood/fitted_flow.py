@@ -16,13 +16,7 @@ if TYPE_CHECKING:
 
 
 def require_fit(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a fit, one of an earlier schema version in its current form.
-
-    Raises
-    ------
-    InputError
-        When it is no fit.
-    """
+    """Return a fit, one of an earlier schema version in its current form."""
     kind = dataset.attrs.get("kind")
     if kind != "fit":
         raise InputError(f"not a fit: its kind is {kind!r}; fit_motion makes one")

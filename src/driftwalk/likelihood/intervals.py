@@ -101,24 +101,7 @@ def _letter(index: int) -> str:
 
 
 def cut_track(track: Track, intervals: Intervals, *, fewest: int, where: str) -> list[Track]:
-    """Cut a track at the switching times, one part for each interval.
-
-    Parameters
-    ----------
-    track : Track
-        The recorded body.
-    intervals : Intervals
-        Where to cut.
-    fewest : int
-        Positions that every part needs.
-    where : str
-        The recording, to begin a message with.
-
-    Raises
-    ------
-    InputError
-        When a switching time is outside the recording, or an interval too short.
-    """
+    """Cut a track at the switching times, one part for each interval."""
     if not intervals.times:
         return [track]
     first, last = float(track.time[0]), float(track.time[-1])
@@ -147,23 +130,6 @@ def switched_frames(
     intervals: Intervals, fields: Mapping[str, Sequence[np.ndarray]], *, first: float
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Return frames of a flow that jumps at the switches, where frames are joined by lines.
-
-    Parameters
-    ----------
-    intervals : Intervals
-        When the flow changes.
-    fields : mapping
-        By name the field of each flow.
-    first : float
-        First sample of the recording on its own clock [s].
-
-    Returns
-    -------
-    time : ndarray
-        Times of the frames [s] from the first sample on: one just before and one just after each
-        switch.
-    frames : dict
-        By name the fields at these times.
 
     Examples
     --------

@@ -17,9 +17,10 @@ class LengthPolicy(NamedTuple):
     the flow. A rule of thumb."""
     without_angle: float = 0.1
     """Standard error of ln C_d in that time without orientations: half an hour has 6 % on the
-    bundled recording (docs/explanation/likelihood.md);"""
+    bundled recording (docs/explanation/likelihood.md)."""
     with_angle: float = 0.05
-    """and with them. Cautious: half an hour has 1 % on the bundled recording."""
+    """Standard error of ln C_d in that time with orientations. Cautious: half an hour has 1 % on
+    the bundled recording."""
 
 
 LENGTH: Final = LengthPolicy()
@@ -27,15 +28,6 @@ LENGTH: Final = LengthPolicy()
 
 def needed_duration(duration: float, std: float, precision: float) -> float:
     """Return how long a recording like this one has to be for a precision [s].
-
-    Parameters
-    ----------
-    duration : float
-        Length of the recording [s].
-    std : float
-        Standard deviation of ln C_d that it gives; it falls with the root of the length.
-    precision : float
-        The one that is wanted.
 
     Examples
     --------

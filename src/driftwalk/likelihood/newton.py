@@ -72,9 +72,9 @@ class WorkPolicy(NamedTuple):
     from_afar: float = 9.0
     """Passes of a search from afar."""
     of_pieces: float = 7.0
-    """Passes of a search on pieces of a long recording,"""
+    """Passes of a search on pieces of a long recording."""
     from_pieces: float = 4.0
-    """and of the search on all of it that follows."""
+    """Passes of the search on all of a long recording that follows."""
     score_tests: float = 2.5
     """Passes that take as long as the score tests of closed numbers."""
     restricted: float = 2.0
@@ -257,15 +257,6 @@ def limited(step: Floats, drag: int, opened: Sequence[str] = ()) -> Floats:
     in the variance it finds a wrong one in one step, from whatever side. Lever and noise of the
     angle are another matter: they may be known from their priors alone, which are those of
     logarithms.
-
-    Parameters
-    ----------
-    step : ndarray
-        In (coefficients, ln C_d, noises, numbers).
-    drag : int
-        Where ln C_d stands in it.
-    opened : sequence of str
-        The numbers, at its end.
     """
     shorter = step * min(1.0, SEARCH.most_log_drag_step / max(abs(float(step[drag])), 1e-300))
     for index, power in ((1, 1.0), (2, 2.0)):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.text.argument_text import argument_text
 from driftwalk.core.text.json_text import parse_json
 from driftwalk.flow.arena import Outline, outline_of, read_arena
-from driftwalk.likelihood.angle import no_angle, smooth_angle
+from driftwalk.likelihood.angle import ORIENTED_SHARE, no_angle, smooth_angle
 from driftwalk.likelihood.filter.series import FILTER, Body, Series
 from driftwalk.likelihood.intervals import Intervals, cut_track, intervals_of
 from driftwalk.likelihood.refuse import (
@@ -39,10 +39,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
-
-ORIENTED_SHARE: Final = 0.5
-"""Share of the samples with an orientation from which on the fit uses orientations by default, and
-the search for dropped frames does. Chosen by hand: the majority."""
 
 AngleUse = Literal["auto", "state", "given", "none"]
 

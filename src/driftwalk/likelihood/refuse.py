@@ -105,13 +105,7 @@ def fit_work(samples: int) -> Work:
 
 
 def require_memory(samples: int) -> None:
-    """Refuse more samples than this machine has memory for.
-
-    Raises
-    ------
-    InputError
-        With the memory and the time that they would take.
-    """
+    """Refuse more samples than this machine has memory for."""
     work, there = fit_work(samples), machine_memory()
     if there is not None and work.memory > there:
         raise InputError(
@@ -120,13 +114,7 @@ def require_memory(samples: int) -> None:
 
 
 def require_length(track: Track, study: Study, *, where: str) -> None:
-    """Refuse a recording with too few positions.
-
-    Raises
-    ------
-    InputError
-        With how long to record for the precision that the study asks for.
-    """
+    """Refuse a recording with too few positions."""
     if track.time.size < LIMIT.fewest_samples:
         raise InputError(
             f"{where}the recording has {track.time.size} positions of this body; the fit needs "
@@ -136,22 +124,7 @@ def require_length(track: Track, study: Study, *, where: str) -> None:
 
 
 def require_own_arena(study: Study, *, intervals: int, near_wall: int, where: str) -> None:
-    """Refuse a tank that was fitted to the positions and then excludes nearly all of them.
-
-    Parameters
-    ----------
-    study : Study
-        The block and the tank, a fitted circle.
-    intervals, near_wall : int
-        Intervals between samples: all, and those at the wall.
-    where : str
-        Beginning of the message.
-
-    Raises
-    ------
-    InputError
-        With the sizes of both, and what to state instead.
-    """
+    """Refuse a tank that was fitted to the positions and then excludes nearly all of them."""
     if near_wall <= LIMIT.most_at_own_wall * intervals:
         return
     reason = (
@@ -171,24 +144,7 @@ def require_own_arena(study: Study, *, intervals: int, near_wall: int, where: st
 def require_usable(
     usable: int, *, intervals: int, near_wall: int, tank: str, longest_gap: float, where: str
 ) -> None:
-    """Refuse when too few intervals are left after those at the wall and in gaps.
-
-    Parameters
-    ----------
-    usable, intervals, near_wall : int
-        Intervals between samples that can be used, all of them, and those at the wall.
-    tank : str
-        The tank in words.
-    longest_gap : float
-        Longest interval that is predicted over [s].
-    where : str
-        The subject, to begin the message with.
-
-    Raises
-    ------
-    InputError
-        With what was left out, and why.
-    """
+    """Refuse when too few intervals are left after those at the wall and in gaps."""
     if usable >= LIMIT.fewest_samples:
         return
     advice = (
@@ -207,20 +163,7 @@ def require_usable(
 
 
 def require_size(flows: int, coefficients: int) -> None:
-    """Refuse more flows than can be fitted together in sensible memory and time.
-
-    Parameters
-    ----------
-    flows : int
-        Number of flows.
-    coefficients : int
-        Coefficients of one flow.
-
-    Raises
-    ------
-    InputError
-        With the memory and the time that they would take.
-    """
+    """Refuse more flows than can be fitted together in sensible memory and time."""
     total = flows * coefficients
     if flows == 1 or total <= LIMIT.most_coefficients:
         return

@@ -55,15 +55,7 @@ class Spline:
         return np.asarray(along_y @ coefficients @ along_x.T)
 
     def standard_errors(self, covariance: Floats, x: Floats, y: Floats) -> Floats:
-        """Return the standard errors [m/s] at the nodes of a grid, shape (2, y.size, x.size).
-
-        Parameters
-        ----------
-        covariance : ndarray, shape (2 size, 2 size)
-            Of the coefficients, u first.
-        x, y : ndarray
-            Nodes [m].
-        """
+        """Return the standard errors [m/s] at the nodes of a grid, shape (2, y.size, x.size)."""
         along_x, along_y = self.design(x, y)
         errors = np.empty((2, y.size, x.size))
         for component in range(2):
@@ -78,15 +70,6 @@ class Spline:
 
 def lay_spline(outline: Outline, *, side: float, spacing: float) -> Spline:
     """Lay knots over a tank, centred on its bounding box.
-
-    Parameters
-    ----------
-    outline : Outline
-        The tank.
-    side : float
-        Side of the block [m].
-    spacing : float
-        Distance between knots [m].
 
     Examples
     --------
@@ -137,13 +120,10 @@ def basis_matrix(position: Floats, count: int) -> Floats:
 
 
 def penalties(spline: Spline) -> tuple[Floats, Floats]:
-    """Return the matrices of the two penalties on one velocity component.
+    """Return the matrices R, S of the two penalties on one velocity component f.
 
-    Returns
-    -------
-    roughness, size : ndarray, shape (spline.size, spline.size)
-        ``c' roughness c`` is the integral of ``f_xx^2 + 2 f_xy^2 + f_yy^2`` over the knots' box,
-        ``c' size c`` that of ``f^2``.
+    ``c' R c`` is the integral of ``f_xx^2 + 2 f_xy^2 + f_yy^2`` over the knots' box, ``c' S c`` the
+    integral of ``f^2``.
 
     Examples
     --------

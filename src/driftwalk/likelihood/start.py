@@ -29,19 +29,7 @@ def first_point(
     angle: str,
     in_flows: Sequence[Track] = (),
 ) -> Point:
-    """Return the first values: C_d = 0.5, the flow of Eq. 4, the noise of `driftwalk info`.
-
-    Parameters
-    ----------
-    tracks : sequence of Track
-        The recordings.
-    study, spline
-        Block and tank, and the knots of the flow.
-    angle : {"state", "given", "none"}
-        How orientations are used.
-    in_flows : sequence of Track
-        With several flows: a track in each of them.
-    """
+    """Return the first values: C_d = 0.5, the flow of Eq. 4, the noise of `driftwalk info`."""
     cameras = [recorded_camera(track, study, position_quantum=0.0) for track in tracks]
     steps = np.concatenate([np.hypot(np.diff(track.x), np.diff(track.y)) for track in tracks])
     # A noise of a thousandth of the step between samples at least.

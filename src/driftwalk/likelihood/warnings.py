@@ -27,9 +27,10 @@ class WarningPolicy(NamedTuple):
     """Share of the tank's nodes below which a fitted flow is mostly made of its prior. Chosen by
     hand."""
     autocorrelation: float = 0.05
-    """Autocorrelation of the innovations that matters, however certain it is. Chosen by hand,"""
+    """Least autocorrelation of the innovations that is reported. Chosen by hand."""
     autocorrelation_stds: float = 4.0
-    """and how many standard deviations it has to be from zero: chance exceeds it once in 16,000."""
+    """Standard deviations that the autocorrelation has to be from zero: chance exceeds them once in
+    16,000."""
     disagreement_stds: float = 3.0
     """Combined standard deviations between the two estimates of C_d, with the angle in the state
     and as an input, beyond which they do not agree: chance exceeds it once in 370."""
@@ -42,17 +43,7 @@ WARNING: Final = WarningPolicy()
 
 
 def precision_facts(std: float, duration: float, study: Study) -> dict[str, float]:
-    """Return what stands in the fit on the precision of C_d.
-
-    Parameters
-    ----------
-    std : float
-        Standard deviation of ln C_d.
-    duration : float
-        Length of the recordings together [s].
-    study : Study
-        Its [fit] drag_coefficient_precision.
-    """
+    """Return what stands in the fit on the precision of C_d."""
     wanted = study.fit.drag_coefficient_precision
     facts = {"drag_coefficient_relative_std": std}
     if wanted is not None:
@@ -69,21 +60,7 @@ def warnings_of(
     *,
     side_m: float,
 ) -> list[str]:
-    """Return the warnings.
-
-    Parameters
-    ----------
-    facts : mapping
-        The attributes of the fit.
-    whiteness : Whiteness
-        The check of the innovations.
-    visited : sequence of float
-        Share of the tank that the block has been over, in each flow.
-    intervals : Intervals
-        Names of the flows.
-    side_m : float
-        Side of the block [m].
-    """
+    """Return the warnings."""
     return [
         *_on_the_data(facts, visited, intervals),
         *_on_the_search(facts),

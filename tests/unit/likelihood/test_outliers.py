@@ -13,7 +13,7 @@ from hypothesis import given, strategies as st
 
 import driftwalk as dw
 from driftwalk.likelihood.ready import prepare
-from driftwalk.likelihood.tracker_errors.outliers import FEWEST, mistakes_in, without_mistakes
+from driftwalk.likelihood.tracker_errors.outliers import OUTLIER, mistakes_in, without_mistakes
 from driftwalk.schema import Track, body_track
 from driftwalk.schema.answers.fit_facts import fit_facts
 
@@ -87,7 +87,7 @@ def test_gaps_and_short_tracks_are_left_alone() -> None:
     track.x[AT] += 0.05
     sparse = Track(*(axis[kept] for axis in track[:4]))
     assert not mistakes_in(sparse).any()
-    short = Track(*(axis[: FEWEST - 1] for axis in track[:4]))
+    short = Track(*(axis[: OUTLIER.fewest - 1] for axis in track[:4]))
     assert not mistakes_in(short).any()
     still = Track(track.time, np.zeros(SAMPLES), np.zeros(SAMPLES), track.theta)
     assert not mistakes_in(still).any()

@@ -14,7 +14,7 @@ from scipy.signal import lfilter, savgol_filter
 
 import driftwalk as dw
 from driftwalk.core.errors import InputError
-from driftwalk.likelihood.tracker_errors.smoothed import ENOUGH, find_smoothing
+from driftwalk.likelihood.tracker_errors.smoothed import SMOOTHING, find_smoothing
 from driftwalk.schema import Track, body_track, build_trajectory
 
 Floats = npt.NDArray[np.float64]
@@ -53,7 +53,7 @@ def test_smoothing_is_recognised(way: str, fresh_seed: Callable[[int], int]) -> 
     found = find_smoothing(filtered(drift(fresh_seed(1)), WAYS[way]))
     assert found is not None
     assert found.way == way
-    assert found.evidence > 5.0 * ENOUGH
+    assert found.evidence > 5.0 * SMOOTHING.evidence
 
 
 @settings(max_examples=20)

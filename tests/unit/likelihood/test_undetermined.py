@@ -114,7 +114,7 @@ def test_a_check_or_a_wall_that_breaks_down_leaves_the_fit(error: Any, monkeypat
     found = judge_fit(fit, [track])
     assert found.check is None
     assert str(error) in found.fit.attrs["check_left_out"]
-    monkeypatch.setattr(wall, "LEAST_CONTACTS", 0)
+    monkeypatch.setattr(wall, "CONTACT", wall.CONTACT._replace(fewest=0))
     monkeypatch.setattr(wall, "tried_walls", breaks)
     assert str(error) in estimate_wall(fit, [track]).attrs["wall_left_out"]
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -30,12 +30,10 @@ if TYPE_CHECKING:
 Integers = npt.NDArray[np.int64]
 Flags = npt.NDArray[np.bool_]
 
-SAMPLES_AT_ONCE = 2048
+SAMPLES_AT_ONCE: Final = 2048
 """Rows of derivatives that are held at a time: some 20 MB."""
-MOST_KEPT_PARTS = 4
-"""Parts of the recording whose derivatives are kept for the correction of the autocorrelation."""
-DRAWS = 16
-"""Draws of the parameters from which that correction is computed."""
+
+
 WHOLE: tuple[Place, ...] = ((slice(None), slice(None)),)
 """All columns, where they are."""
 
@@ -195,7 +193,8 @@ def collect(
 
     size = estimate.point.coefficients.size + 1
     count = sum(math.ceil(one.used.size / SAMPLES_AT_ONCE) for one in errors)
-    chosen = set(np.linspace(0, count - 1, MOST_KEPT_PARTS).astype(int).tolist())
+    # Derivatives of four parts are kept, for the correction of the autocorrelation.
+    chosen = set(np.linspace(0, count - 1, 4).astype(int).tolist())
     kept = []
     for contrast in contrasts:
         contrast.begin(size)
@@ -249,20 +248,7 @@ def _parts(estimate: Estimate, errors: Sequence[Errors]) -> Iterator[_Part]:
 
 
 def used_pairs(used: Flags, lags: int) -> Iterator[tuple[int, Flags]]:
-    """Yield the lags that the samples reach, each with where a sample and the one so far on count.
-
-    Parameters
-    ----------
-    used : ndarray of bool, shape (n,)
-        Samples that count; there may be fewer of them than lags.
-    lags : int
-        Longest lag.
-
-    Yields
-    ------
-    tuple of int and ndarray of bool, shape (n - lag,)
-        The lag, and by the earlier sample whether both count.
-    """
+    """Yield each lag, and by the earlier sample whether both samples of a pair count."""
     for lag in range(min(lags, used.size - 1) + 1):
         yield lag, used[lag:] & used[: used.size - lag]
 
@@ -270,17 +256,18 @@ def used_pairs(used: Flags, lags: int) -> Iterator[tuple[int, Flags]]:
 def _autocovariance(
     spread: Floats, errors: Sequence[Errors], kept: Sequence[_Part], lags: int
 ) -> Floats:
-    """Return the mean of J C J' by component and lag, from draws of the parameters."""
+    """Return the mean of J C J' by component and lag, from samples of the posterior."""
     components = errors[0].components
     generator = np.random.default_rng(0)
-    draws = spread @ generator.normal(size=(len(spread), DRAWS))
+    count = 16  # samples of the posterior
+    samples = spread @ generator.normal(size=(len(spread), count))
     total, pairs = np.zeros((components, lags + 1)), np.zeros(lags + 1)
     for part in kept:
-        own = np.concatenate([draws[columns] for _, columns in part.places])
-        moved = (part.jacobian @ own).reshape(-1, components, DRAWS)
+        own = np.concatenate([samples[columns] for _, columns in part.places])
+        moved = (part.jacobian @ own).reshape(-1, components, count)
         used = errors[part.series].used[part.start : part.start + len(moved)]
         for lag, both in used_pairs(used, lags):
             products = moved[lag:][both] * moved[: used.size - lag][both]
-            total[:, lag] += products.sum(axis=(0, 2)) / DRAWS
+            total[:, lag] += products.sum(axis=(0, 2)) / count
             pairs[lag] += both.sum()
     return np.asarray(total / np.maximum(pairs, 1.0))

@@ -43,15 +43,7 @@ class Residuals:
 
 
 def residuals_of(estimate: Estimate, errors: Sequence[Errors]) -> Residuals:
-    """Return the statistics of the errors of prediction.
-
-    Parameters
-    ----------
-    estimate : Estimate
-        The fit.
-    errors : sequence of Errors
-        Its errors of prediction, by recording.
-    """
+    """Return the statistics of the errors of prediction."""
     study = estimate.study
     bounds = outline_of(study.tank.to_arena()).bounds
     layout = lay_out(errors, bounds, side=study.block.side_m)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.processors import one_blas_thread
 from driftwalk.likelihood.check.errors import Errors, errors_of
-from driftwalk.likelihood.check.motion import compare_motion
+from driftwalk.likelihood.check.motion import FEWEST_REPLICATES, compare_motion
 from driftwalk.likelihood.check.residuals import residuals_of
 from driftwalk.likelihood.check.result import (
     criterion_variables,
@@ -19,11 +19,11 @@ from driftwalk.likelihood.check.result import (
     white_variables,
 )
 from driftwalk.likelihood.check.scan import scan_of
-from driftwalk.likelihood.check.verdict import LEVEL, criteria_of, findings_of
+from driftwalk.likelihood.check.verdict import VERDICT, criteria_of, findings_of
 from driftwalk.likelihood.check.worlds import (
-    ready_problems,
+    posterior_replicates,
+    problems_of,
     replicates_at_estimate,
-    replicates_drawn,
 )
 from driftwalk.likelihood.estimate import estimate_of
 from driftwalk.likelihood.fitted_flow import require_fit
@@ -33,12 +33,6 @@ from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
-
-FEWEST_REPLICATES: Final = 4
-FEWEST_USED: Final = 300
-"""Intervals. With fewer the fitted flow takes so much out of the errors that recordings of the
-model itself fail the test of their autocorrelation: 3 of 5 did with 200 samples, none of 5 with
-300."""
 
 
 @one_blas_thread()
@@ -117,7 +111,7 @@ def check_model(
         "cell_size_m": found.layout.size,
         "replicates": replicates,
         "seed": seed,
-        "level": LEVEL,
+        "level": VERDICT.level,
         "arena": fit.attrs["arena"],
         "source": fit.attrs["source"],
         "simulated_recording": fit.attrs["simulated_recording"],
@@ -125,8 +119,8 @@ def check_model(
     data, coords = white_variables(found)
     parts = [place_variables(found)]
     try:
-        problems = ready_problems(fit, estimate, many)
-        drawn = replicates_drawn(
+        problems = problems_of(fit, estimate, many)
+        drawn = posterior_replicates(
             fit, estimate, problems, found.leverage.spread, count=replicates, seed=seed
         )
         motion = compare_motion(
@@ -166,9 +160,9 @@ def check_model(
 def _require_used(errors: Sequence[Errors]) -> None:
     """Refuse a check of so few errors that the tests of them mean nothing."""
     used = sum(int(one.used.sum()) for one in errors)
-    if used < FEWEST_USED:
+    if used < VERDICT.fewest_used:
         intervals = sum(one.used.size - 1 for one in errors)
         raise InputError(
             f"the model cannot be checked: the fit used {used} of {intervals} intervals between "
-            f"samples, and the check needs {FEWEST_USED} at least"
+            f"samples, and the check needs {VERDICT.fewest_used} at least"
         )

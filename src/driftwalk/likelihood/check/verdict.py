@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -16,18 +16,31 @@ from driftwalk.likelihood.check.scan import Scan
 from driftwalk.likelihood.check.white import White
 from driftwalk.likelihood.spline import Floats
 
-LEVEL = 0.0005
-"""A recording of the model itself fails one criterion this often; ten of them, that is one
-recording in 200. One in 50 is allowed: tails of distributions are known only about, so the level
-has a margin. At 0.001 eleven of 380 failed (docs/explanation/likelihood.md)."""
-MOST_OUTLIERS = 1e-3
-"""Share of samples. One in 5e8 is expected, but a tracker may slip now and then."""
-MISSED_MISTAKES = 0.25
-"""Mistakes of a tracker that show in the errors of prediction alone, over those that their
-neighbours show: 9 to 14 % where positions were 5 mm off."""
-DRAG_CHANGE_OF_THE_FIT = 0.05
-"""Change of C_d with speed that the fit itself brings about: in ten minutes of the model itself C_d
-seems 4 % lower at the lowest speeds and 5 % higher at the highest, in half an hour 2 % each."""
+
+class VerdictPolicy(NamedTuple):
+    """When the model does not explain a recording."""
+
+    level: float = 0.0005
+    """A recording of the model itself fails one criterion this often; ten of them, so one recording
+    in 200. Measured: 3 of 380 failed, and 11 of them at 0.001 (studies/misfit, set right). Tails of
+    distributions are known only about, so the level has a margin."""
+    most_outliers: float = 1e-3
+    """Share of samples beyond 6 standard deviations. One in 5e8 is expected, but a tracker may slip
+    now and then. Chosen by hand."""
+    missed_outliers: float = 0.25
+    """Mistakes of a tracker that show in the innovations alone, over those that their neighbours
+    show: 9 to 14 % where positions were 5 mm off."""
+    drag_change: float = 0.05
+    """Change of C_d with speed that the fit itself brings about. Measured: in ten minutes of the
+    model itself C_d seems 4 % lower at the lowest speeds and 5 % higher at the highest, in half an
+    hour 2 % each."""
+    fewest_used: int = 300
+    """Intervals that a check needs. With fewer the fitted flow takes so much out of the innovations
+    that recordings of the model itself fail the test of their autocorrelation: 3 of 5 did with 200
+    samples, none of 5 with 300."""
+
+
+VERDICT: Final = VerdictPolicy()
 
 
 class Criterion(NamedTuple):
@@ -42,7 +55,7 @@ class Criterion(NamedTuple):
     @property
     def failed(self) -> bool:
         """Whether this criterion says that the model does not explain the recording."""
-        return self.p_value < LEVEL
+        return self.p_value < VERDICT.level
 
 
 def components_of(count: int) -> tuple[str, ...]:
@@ -140,11 +153,11 @@ def outlier_criterion(outliers: int, samples: int, mistakes: int) -> Criterion:
 
     `mistakes` of the tracker were left out before, as far from both of their neighbours.
     """
-    expected = round(MISSED_MISTAKES * mistakes)
+    expected = round(VERDICT.missed_outliers * mistakes)
     share = outliers / max(samples, 1)
     return Criterion(
         "outliers",
-        0.0 if share > MOST_OUTLIERS and outliers > expected else 1.0,
+        0.0 if share > VERDICT.most_outliers and outliers > expected else 1.0,
         f"{outliers} of {samples} samples ({share:.2%}) are further than 6 sd from where they were "
         f"predicted and were left out, expected {expected or 'none'}: jumps of the tracker, "
         "contacts, or bursts",
@@ -228,7 +241,7 @@ def drag_criterion(trend: Trend, edges: Floats) -> Criterion:
 
     if trend.dof == 0:
         return Criterion("drag law", math.nan, "")
-    std = np.hypot(trend.std, DRAG_CHANGE_OF_THE_FIT)
+    std = np.hypot(trend.std, VERDICT.drag_change)
     off = np.abs(trend.change) / std
     worst = int(off.argmax())
     return Criterion(

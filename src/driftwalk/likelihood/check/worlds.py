@@ -31,10 +31,6 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 Keys = npt.NDArray[np.uint64]
-FLOWS = 8
-"""Flow fields that are drawn; a world on its own takes as long as eight together."""
-MOST_LOG_STD = math.log(10.0)
-"""Standard deviation of the logarithm of a parameter, beyond which draws of it mean nothing."""
 
 Path = tuple[Floats, Floats, Floats]
 
@@ -52,16 +48,10 @@ class Replicates(NamedTuple):
     """How many were left out."""
 
 
-def ready_problems(
+def problems_of(
     fit: xr.Dataset, estimate: Estimate, recordings: Sequence[xr.Dataset]
 ) -> list[Problem]:
-    """Return the series ready for comparison, each in its fitted flow, with one step interval.
-
-    Raises
-    ------
-    InputError
-        When a recording forms too few steps.
-    """
+    """Return the series ready for comparison, each in its fitted flow, with one step interval."""
     from driftwalk.model import apply_overrides
 
     study, tracks, series = estimate.study, estimate.tracks, estimate.passes.series
@@ -113,7 +103,7 @@ def replicates_at_estimate(
     return _joined(parts, np.zeros(count, dtype=np.int64))
 
 
-def replicates_drawn(
+def posterior_replicates(
     fit: xr.Dataset,
     estimate: Estimate,
     problems: Sequence[Problem],
@@ -122,22 +112,11 @@ def replicates_drawn(
     count: int,
     seed: int,
 ) -> Replicates:
-    """Simulate the recordings with flow and parameters drawn from what the fit leaves open.
-
-    Parameters
-    ----------
-    fit, estimate : xarray.Dataset, Estimate
-        The fit.
-    problems : sequence of Problem
-        The recordings, cut at the switching times.
-    spread : ndarray
-        Root of the covariance of the flow's coefficients and ln C_d.
-    count, seed : int
-        How many, and the seed.
-    """
-    flows = min(FLOWS, count)
+    """Simulate the recordings with flow and parameters drawn from what the fit leaves open."""
+    # Eight flow fields: a world on its own takes as long as eight together.
+    flows = min(8, count)
     flow_of = np.arange(count) % flows
-    coefficients, factors = _draws(fit, estimate, spread, flows, seed)
+    coefficients, factors = _posterior_samples(fit, estimate, spread, flows, seed)
     drag = fitted_value(fit, "drag_coefficient") * factors[:, 0]
     force = fitted_value(fit, "force_std") * factors[:, 1]
     parts: list[list[_World]] = []
@@ -165,7 +144,7 @@ def replicates_drawn(
     return _joined(parts, flow_of)
 
 
-def _draws(
+def _posterior_samples(
     fit: xr.Dataset, estimate: Estimate, spread: Floats, count: int, seed: int
 ) -> tuple[Floats, Floats]:
     """Return drawn coefficients of the flow, and factors of C_d, force_std and tracking noise.
@@ -177,7 +156,8 @@ def _draws(
     size = estimate.point.coefficients.size
     found = fit["covariance"].values[:3, :3]
     widest = float(np.sqrt(np.diag(found).max()))
-    if not widest < MOST_LOG_STD:
+    # Samples of a parameter that is known to a factor of ten only mean nothing.
+    if not widest < math.log(10.0):
         raise InputError(
             "the fit leaves C_d, the force or the tracking noise uncertain by more "
             "than a factor of ten"

@@ -18,9 +18,8 @@ class DifferencePolicy(NamedTuple):
     """When two passes give a derivative."""
 
     step: float = 1e-4
-    """Change of the logarithm of a noise. Chosen by hand: truncation and rounding both stay below
-    a hundred-thousandth of a derivative."""
-    most_change: float = 100 * 1e-4
+    """Change of the logarithm of a noise. Chosen by hand."""
+    most_change: float = 1e-2
     """Largest relative change of a variance between the passes. It is a hundred steps: a larger one
     means that one pass restarted where the other did not."""
     most_change_far: float = 1.0

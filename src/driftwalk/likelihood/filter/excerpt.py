@@ -18,12 +18,12 @@ class ExcerptPolicy(NamedTuple):
     """Laws are compared on this many samples from the beginning of the recordings. Chosen by hand:
     five minutes at 10 Hz tell the two laws apart (docs/explanation/likelihood.md)."""
     near_samples: int = 3600
-    """A search comes near its end on this many samples. Chosen by hand for the time of half an hour
-    at 10 Hz,"""
+    """A search comes near its end on this many samples. Chosen by hand."""
     piece_samples: int = 300
-    """in pieces of this many from all over the recordings. Chosen by hand,"""
+    """The samples come in pieces of this many from all over the recordings. Chosen by hand."""
     worth_factor: float = 2.5
-    """where the recordings have more than this many times as many: below, nothing is saved."""
+    """A search goes by way of pieces where the recordings have this many times as many samples.
+    Chosen by hand: below, nothing is saved."""
 
 
 EXCERPT: Final = ExcerptPolicy()

@@ -19,14 +19,14 @@ class FilterPolicy(NamedTuple):
     """How the filter goes over a track."""
 
     largest_step_s: float = 0.05
-    """Longest step of the filter's integrator [s]. Chosen by hand: the block turns and speeds up
-    little in it."""
+    """Longest step of the filter's integrator [s]. Chosen by hand."""
     longest_gap_s: float = 1.0
     """Longest gap that is predicted over [s]; the filter restarts after a longer one. Chosen by
-    hand: after a second the prediction is about as wide as the flow's structures."""
+    hand."""
     settling_samples: int = 3
-    """Samples after the first one of a stretch until the filter knows the velocity. A velocity
-    takes two positions, their noise a third."""
+    """Samples after the first one of a stretch until the filter knows the velocity. Its innovations
+    are a hundredth to four fifths of what it expects there; when they counted, six of 42 recordings
+    of the model itself were rejected."""
 
 
 FILTER: Final = FilterPolicy()

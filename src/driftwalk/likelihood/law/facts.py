@@ -89,17 +89,7 @@ def inertia_facts(inertia: Inertia, facts: dict[str, Any], normal: float) -> dic
 
 
 def number_facts(point: Point, reach: Floats, study: Study) -> dict[str, Any]:
-    """Return the opened numbers with their intervals, and the stated ones, units in the keys.
-
-    Parameters
-    ----------
-    point : Point
-        The estimate.
-    reach : ndarray
-        Half the width of the intervals, of ln C_d, the noises and the opened numbers.
-    study : Study
-        The block.
-    """
+    """Return the opened numbers with their intervals, and the stated ones, units in the keys."""
     first = 1 + len(point.noises)
     widths = dict(zip(point.opened, reach[first:].tolist(), strict=True))
     facts: dict[str, Any] = {}

@@ -35,9 +35,10 @@ class LawPolicy(NamedTuple):
 
     doubted_chi_squared: float = 30.0
     """The paper's law is in doubt when the numbers of a floating body are this far from its own,
-    in chi squared of two degrees of freedom: chance exceeds it once in 3 million;"""
+    in chi squared of two degrees of freedom: chance exceeds it once in 3 million."""
     doubted_linear_sigmas: float = 3.0
-    """and when its drag seems to have a linear part, by this many standard deviations. Under the
+    """It is also in doubt when its drag seems to have a linear part by this many standard
+    deviations. Under the
     paper's law eight floating bodies had one of 3 to 18 (docs/explanation/likelihood.md)."""
     decisive_evidence: float = 100.0
     """Difference of the log evidences that nothing missing has feigned. Pulses of the flow feigned

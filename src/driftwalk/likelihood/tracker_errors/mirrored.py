@@ -18,20 +18,6 @@ def spin_correlation(coefficients: Floats, spline: Spline, series: Sequence[Seri
 
     A block in water turns with it, at about half the vorticity. With the orientation counted the
     wrong way round the correlation is negative.
-
-    Parameters
-    ----------
-    coefficients : ndarray, shape (2, rows, columns)
-        A first flow of the water [m/s], from the positions alone.
-    spline : Spline
-        Its knots.
-    series : sequence of Series
-        The recordings, with the spin of the block [rad/s].
-
-    Returns
-    -------
-    float
-        In [-1, 1]; 0 where neither changes.
     """
     spins, vorticities = [], []
     for one in series:
