@@ -182,11 +182,7 @@ def fit_motion(
 
 
 def _parameter_facts(
-    passes: Passes,
-    law: LawResult,
-    restricted: Restricted,
-    ready: PreparedRecordings,
-    study: Study,
+    passes: Passes, law: LawResult, restricted: Restricted, ready: PreparedRecordings, study: Study
 ) -> dict[str, Any]:
     """Return the parameters with their intervals, and the precision of C_d."""
     mode = law.mode

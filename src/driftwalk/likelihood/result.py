@@ -132,10 +132,7 @@ def build_fit(
     names = np.array([*PARAMETERS[:noises], *mode.point.opened], dtype=object)
     data: dict[str, Any] = {
         **(flows[0] if intervals.steady else _stacked(flows)),
-        "covariance": (
-            ("log_parameter", "other_log_parameter"),
-            uncertainty,
-        ),
+        "covariance": (("log_parameter", "other_log_parameter"), uncertainty),
         "profile_deviance": ("profile", [one.deviance - least for one in profiles]),
         "profile_half_log_determinant": (
             "profile",
@@ -158,10 +155,7 @@ def build_fit(
     }
     if not intervals.steady:
         coords["flow"] = ("flow", np.array(intervals.labels, dtype=object))
-        data["interval_flow"] = (
-            "flow_interval",
-            np.array(intervals.flows, dtype=np.int32),
-        )
+        data["interval_flow"] = ("flow_interval", np.array(intervals.flows, dtype=np.int32))
         facts["switching_times_s"] = list(intervals.times)
         facts["recording_start_s"] = first
     numbers, names_of = fit_variables(facts)

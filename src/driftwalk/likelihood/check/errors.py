@@ -228,9 +228,7 @@ def collect(
     full = prior.add(sums, estimate.point, estimate.weights).information
     spread = solve_triangular(np.linalg.cholesky(full), np.eye(len(full)), lower=True).T
     return Leverage(
-        spread,
-        float(((data @ spread) * spread).sum()),
-        _autocovariance(spread, errors, kept, lags),
+        spread, float(((data @ spread) * spread).sum()), _autocovariance(spread, errors, kept, lags)
     )
 
 

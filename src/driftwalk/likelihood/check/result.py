@@ -29,10 +29,7 @@ def white_variables(found: Residuals) -> Parts:
     }
     names = np.array(components_of(len(white.chi_squared)), dtype=object)
     lags = np.arange(1, white.autocorrelation.shape[1] + 1)
-    return data, {
-        "component": ("component", names),
-        "lag": ("lag", lags),
-    }
+    return data, {"component": ("component", names), "lag": ("lag", lags)}
 
 
 def place_variables(found: Residuals) -> Parts:
@@ -61,10 +58,7 @@ def place_variables(found: Residuals) -> Parts:
             sums / np.maximum(count.sum(axis=1), 1.0)[:, None],
         ),
         "part_count": ("part", count.sum(axis=1)),
-        "part_chi_squared": (
-            "part",
-            np.nansum(table, axis=1),
-        ),
+        "part_chi_squared": ("part", np.nansum(table, axis=1)),
         "part_dof": ("part", place.mean.shape[1] * known.sum(axis=1)),
         "part_noise_ratio": ("part", found.noise_by_part.ratio),
         "part_noise_ratio_std": ("part", found.noise_by_part.std),

@@ -84,8 +84,7 @@ def _problem(
     # The rounding of the file is part of the noise that the fit finds, and is simulated apart.
     plain = float(np.sqrt(max(noise**2 - quantum**2 / 12.0, 0.0)))
     seen = apply_overrides(
-        study,
-        {"observation.position_noise_m": plain, "observation.orientation_noise_rad": 0.0},
+        study, {"observation.position_noise_m": plain, "observation.orientation_noise_rad": 0.0}
     )
     camera = recorded_camera(track, seen, position_quantum=quantum)
     return prepare_problem(track, seen, flow, camera=camera)
@@ -185,10 +184,7 @@ def _simulated(
     problem: Problem, keys: Keys, drag: float, force: float, begin: float = 0.0
 ) -> list[_World]:
     like = problem.like
-    values = {
-        "drag_coefficient": np.full(keys.size, drag),
-        "force_std": np.full(keys.size, force),
-    }
+    values = {"drag_coefficient": np.full(keys.size, drag), "force_std": np.full(keys.size, force)}
     x, y, _, status = problem.model.simulate(values, like, keys)
     worlds = []
     for k in range(keys.size):

@@ -16,9 +16,9 @@ class LatticePolicy(NamedTuple):
     """The lattices of walls, in restitution and hold: mu / (1 + mu) for the friction mu."""
 
     restitutions: tuple[float, ...] = (0.0, 0.5, 1.0)
-    """Of the coarse lattice. Chosen by hand, as what follows."""
+    """Restitutions of the coarse lattice. Chosen by hand, as what follows."""
     holds: tuple[float, ...] = (0.0, 0.1, 0.25, 0.45, 0.65)
-    """Of the coarse lattice: from a friction of about 1 on every contact sticks, and more of it
+    """Holds of the coarse lattice. From a friction of about 1 on every contact sticks, and more of it
     changes nothing."""
     most_hold: float = 0.8
     """Largest hold that is tried."""

@@ -19,11 +19,7 @@ from driftwalk.likelihood.filter.departures import DRAG_SHAPES, DRAGS, NUMBERS
 from driftwalk.likelihood.filter.excerpt import beginning
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.law.assumptions import FLOATING, Assumptions
-from driftwalk.likelihood.law.forward_selection import (
-    ForwardSelection,
-    LawResult,
-    is_retained,
-)
+from driftwalk.likelihood.law.forward_selection import ForwardSelection, LawResult, is_retained
 from driftwalk.likelihood.law.score_tests import ScoreTests, score_tests
 from driftwalk.likelihood.newton import FROM_ANOTHER, FROM_NEAR, Mode, ModeSearch, require_mode
 from driftwalk.likelihood.prior import Prior, Weights
@@ -71,11 +67,7 @@ def evidence_of(mode: Mode, prior: Prior) -> float:
 class LawSearch:
     """Searches over laws for the recordings of one fit."""
 
-    def __init__(
-        self,
-        search: ModeSearch,
-        assumptions: Assumptions,
-    ) -> None:
+    def __init__(self, search: ModeSearch, assumptions: Assumptions) -> None:
         self.assumptions, self.search = assumptions, search
         self.selection = ForwardSelection(search, assumptions)
 
@@ -228,10 +220,7 @@ class LawSearch:
             return found
         prior = self.search.prior
         paper, floating = (rival, mode) if found.floating else (mode, rival)
-        evidence = {
-            "paper": evidence_of(paper, prior),
-            "floating": evidence_of(floating, prior),
-        }
+        evidence = {"paper": evidence_of(paper, prior), "floating": evidence_of(floating, prior)}
         other = LawResult(rival, rival, not found.floating, evidence, ahead, None)
         return self.selection.select(other)
 
