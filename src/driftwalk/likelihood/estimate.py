@@ -1,4 +1,4 @@
-"""A stored fit, ready to run its filter at the estimate."""
+"""The estimate of a stored fit, ready to run its filter."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from driftwalk.conditions import jump_warnings, unstated_warning
 from driftwalk.core.processors import one_blas_thread
 from driftwalk.core.run_stages import Course, share_of_search, tell_nobody
 from driftwalk.flow.arena import outline_of
-from driftwalk.likelihood.angle_consistency import angle_given_facts
+from driftwalk.likelihood.angle_consistency import angle_given_facts, spin_correlation
 from driftwalk.likelihood.filter.excerpt import pieces
 from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.filter.parameters import Point
@@ -42,7 +42,6 @@ from driftwalk.likelihood.reml import Restricted, restricted_drag
 from driftwalk.likelihood.result import Whiteness, build_fit, visited_shares, whiteness_of
 from driftwalk.likelihood.solution import BREAKDOWN, require_noise_below_motion, solved
 from driftwalk.likelihood.start import first_point, first_weights
-from driftwalk.likelihood.tracker_errors.mirrored import spin_correlation
 from driftwalk.likelihood.warnings import precision_facts, warnings_of
 from driftwalk.schema.answers.fit_facts import texts
 from driftwalk.schema.check import described
@@ -190,7 +189,7 @@ def _parameter_facts(
     covariance = with_mended_frames(parameter_covariance(mode, restricted), mended)
     stated = open_where_undetermined(covariance, mode, restricted)
     slopes = side_slopes(passes, law, restricted, study)
-    std = math.inf if mode.lost else math.sqrt(covariance[0, 0])
+    std = math.inf if mode.diverged else math.sqrt(covariance[0, 0])
     return {
         **parameter_facts(restricted.point, stated, study, by_side=slopes),
         "maximum_likelihood_drag_coefficient": stated_drag(mode.point, study),
@@ -224,7 +223,7 @@ def _search_facts(law: LawResult, restricted: Restricted) -> dict[str, Any]:
         "samples_used": mode.used,
         "iterations": mode.iterations,
         "converged": "yes" if mode.converged else "no",
-        "search_left": mode.left if mode.lost else 0.0,
+        "search_left": mode.left if mode.diverged else 0.0,
         "roughness_weight": mode.weights.roughness,
         "size_weight": mode.weights.size,
     }

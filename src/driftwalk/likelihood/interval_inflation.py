@@ -91,7 +91,7 @@ def open_where_undetermined(covariance: Floats, mode: Mode, restricted: Restrict
 
     The estimate of C_d is its weak prior's where the data say less of it than that prior.
     """
-    if mode.lost:
+    if mode.diverged:
         return np.asarray(np.diag(np.full(len(covariance), math.inf)))
     found = covariance.copy()
     # Where data and prior tell as much, the posterior has 1 / sqrt(2) of the prior's deviation.

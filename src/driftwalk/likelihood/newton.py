@@ -104,7 +104,7 @@ class Mode:
     step, in standard deviations: how far the maximum seems to be."""
 
     @property
-    def lost(self) -> bool:
+    def diverged(self) -> bool:
         """Whether the search was given up so far from a maximum that its numbers mean nothing."""
         return not self.converged and not self.left <= SEARCH.most_left
 

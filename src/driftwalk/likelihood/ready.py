@@ -1,4 +1,4 @@
-"""Recordings made ready for the filter of the likelihood fit, or refused."""
+"""Preparation of the recordings for the filter."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from driftwalk.likelihood.tracker_errors.dropped import (
     places_of,
     with_gaps,
 )
-from driftwalk.likelihood.tracker_errors.outliers import without_mistakes
+from driftwalk.likelihood.tracker_errors.outliers import without_outliers
 from driftwalk.likelihood.tracker_errors.smoothed import require_raw
 from driftwalk.likelihood.wall import wall_intervals
 from driftwalk.schema import Track, body_track
@@ -102,7 +102,7 @@ def prepare(
     for index, recording in enumerate(many):
         seen, where = body_track(recording, body), _name_of(recording)
         name = str(recording.attrs.get("source", ""))
-        track = without_mistakes(seen)
+        track = without_outliers(seen)
         mistakes += seen.time.size - track.time.size
         require_length(track, study, where=where)
         require_travel(track, study, where=name)

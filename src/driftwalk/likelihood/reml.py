@@ -108,20 +108,20 @@ def restricted_drag(
     slopes = mode.covariance[:, drag] / mode.covariance[drag, drag]
     found = [profile_at(passes, mode, prior, start.log_drag, start.coefficients.ravel())]
 
-    def look(log_drag: float) -> None:
+    def add_profile(log_drag: float) -> None:
         near = min(found, key=lambda one: abs(one.log_drag - log_drag))
         guess = near.coefficients + slopes[:drag] * (log_drag - near.log_drag)
         found.append(profile_at(passes, mode, prior, log_drag, guess))
 
-    look(start.log_drag - REML.span * sd)
+    add_profile(start.log_drag - REML.span * sd)
     # Two points give the slope of the determinant and with it a first guess of the minimum.
     guess, _ = _minimum(found)
     guess = float(
         np.clip(guess, start.log_drag - 2 * REML.span * sd, start.log_drag + REML.span * sd)
     )
     if abs(guess - start.log_drag) > REML.near * sd:
-        look(guess)
-        look(guess - REML.span * sd)
+        add_profile(guess)
+        add_profile(guess - REML.span * sd)
     found.sort(key=lambda one: one.log_drag)
     log_drag, std = _minimum(found)
     if not sd / REML.most_std_ratio <= std <= sd * REML.most_std_ratio:

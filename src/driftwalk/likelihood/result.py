@@ -126,7 +126,7 @@ def build_fit(
     least = min(one.deviance for one in profiles)
     flat = profiles[0].half_log_determinant
     uncertainty = parameter_covariance(mode, restricted)
-    if mode.lost:
+    if mode.diverged:
         uncertainty = open_where_undetermined(uncertainty, mode, restricted)
     noises = 1 + len(mode.point.noises)
     names = np.array([*PARAMETERS[:noises], *mode.point.opened], dtype=object)
@@ -234,8 +234,8 @@ def footprint_count(
     offsets = np.arange(-reach, reach + 1)
     total = np.zeros(grid.size)
     for one in series:
-        kept = (one.excluded == 0) & np.isfinite(one.x) & np.isfinite(one.theta)
-        x, y, theta = one.x[kept], one.y[kept], one.theta[kept]
+        retained = (one.excluded == 0) & np.isfinite(one.x) & np.isfinite(one.theta)
+        x, y, theta = one.x[retained], one.y[retained], one.theta[retained]
         column = np.round((x - grid.x[0]) / grid.cell_size).astype(np.intp)
         row = np.round((y - grid.y[0]) / grid.cell_size).astype(np.intp)
         cosine, sine = np.cos(theta), np.sin(theta)

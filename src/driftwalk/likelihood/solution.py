@@ -1,4 +1,4 @@
-"""Fits that have no solution: found where they break down, and said in one sentence."""
+"""Breakdown of a search: fits that have no solution, as one error for people."""
 
 from __future__ import annotations
 

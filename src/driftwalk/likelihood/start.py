@@ -1,4 +1,4 @@
-"""Where the search of the likelihood fit begins."""
+"""Starting values of the search."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which intervals of a track may hold a contact with the wall: they are left out of the fit.
+"""Intervals of a track that may hold a contact with the wall: the fit leaves them out.
 
 The rule looks at the past only. To leave out an interval because of where the body is at its end
 would select among the forces that brought it there, and bias what is estimated.

@@ -34,8 +34,8 @@ class Filmed(NamedTuple):
 def without(track: Track, dropped: npt.NDArray[np.bool_]) -> Filmed:
     """Return a track that lacks frames, with stamps at a constant rate."""
     frame = np.flatnonzero(~dropped)
-    kept = Track(*(axis[frame] for axis in track[:4]))
-    return Filmed(kept._replace(time=track.time[: frame.size]), frame)
+    retained = Track(*(axis[frame] for axis in track[:4]))
+    return Filmed(retained._replace(time=track.time[: frame.size]), frame)
 
 
 def dropped_at_random(track: Track, share: float, seed: int) -> Filmed:

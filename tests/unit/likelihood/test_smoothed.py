@@ -94,8 +94,8 @@ def test_another_periodic_error_has_no_name() -> None:
 
 def test_gaps_are_passed_over_and_short_tracks_left_alone() -> None:
     smooth = filtered(drift(6), averaged([1, 1, 1]))
-    kept = np.arange(3000) % 250 != 0
-    found = find_smoothing(Track(*(axis[kept] for axis in smooth[:4])))
+    retained = np.arange(3000) % 250 != 0
+    found = find_smoothing(Track(*(axis[retained] for axis in smooth[:4])))
     assert found is not None
     assert found.way == "averages over 3 frames"
     short = Track(*(axis[:100] for axis in smooth[:4]))

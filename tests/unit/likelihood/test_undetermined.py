@@ -18,7 +18,7 @@ from driftwalk.cli.terminal.fit_answer import summary
 from driftwalk.conditions import estimated_study
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood import angle_consistency, compare_laws, estimate_wall, judge_fit
-from driftwalk.likelihood.check import judged
+from driftwalk.likelihood.check import run
 from driftwalk.likelihood.contacts import estimate as wall
 from driftwalk.likelihood.newton import Mode, ModeSearch, require_mode
 from driftwalk.page.sections.fit import fit_summary
@@ -110,12 +110,12 @@ def test_a_check_or_a_wall_that_breaks_down_leaves_the_fit(error: Any, monkeypat
         raise error
 
     track, fit = recording(60.0), fitted(60.0)
-    monkeypatch.setattr(judged, "check_model", breaks)
+    monkeypatch.setattr(run, "check_model", breaks)
     found = judge_fit(fit, [track])
     assert found.check is None
     assert str(error) in found.fit.attrs["check_left_out"]
     monkeypatch.setattr(wall, "CONTACT", wall.CONTACT._replace(fewest=0))
-    monkeypatch.setattr(wall, "tried_walls", breaks)
+    monkeypatch.setattr(wall, "search_walls", breaks)
     assert str(error) in estimate_wall(fit, [track]).attrs["wall_left_out"]
 
 

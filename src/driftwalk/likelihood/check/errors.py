@@ -1,4 +1,4 @@
-"""The errors of prediction at the estimate of a fit, and what fitting has taken out of them.
+"""Innovations at the estimate of a fit, and what fitting has taken out of them.
 
 With J the whitened derivatives of the predictions and Lambda the precision of the prior, the
 whitened innovations at the estimate have the covariance ``I - J C J'``, ``C = (J'J + Lambda)^-1``,
@@ -39,7 +39,7 @@ WHOLE: tuple[Place, ...] = ((slice(None), slice(None)),)
 
 
 @dataclass(frozen=True, eq=False)
-class Errors:
+class Innovations:
     """The errors of prediction of one series, whitened, and where they were made."""
 
     series: Series
@@ -58,7 +58,7 @@ class Errors:
         return int(self.white.shape[1])
 
 
-def errors_of(estimate: Estimate) -> list[Errors]:
+def innovations_of(estimate: Estimate) -> list[Innovations]:
     """Run the filter over every series at the estimate."""
     found = []
     whitened = estimate.passes.innovations(estimate.point)
@@ -71,7 +71,7 @@ def errors_of(estimate: Estimate) -> list[Errors]:
         outlier = np.isfinite(white).all(axis=1) & ~used & (series.excluded == 0)
         counted = used & series.settled
         white = np.where(counted[:, None], white, 0.0)
-        found.append(Errors(series, white, counted, outlier, speed))
+        found.append(Innovations(series, white, counted, outlier, speed))
     return found
 
 
@@ -141,13 +141,13 @@ class Contrast:
         """Add the rows of one part; `places` says where its columns stand among all parameters."""
         from scipy.sparse import csr_matrix
 
-        kept = np.flatnonzero(group >= 0)
-        if not kept.size:
+        retained = np.flatnonzero(group >= 0)
+        if not retained.size:
             return
-        present, local = np.unique(group[kept], return_inverse=True)
-        matrix = csr_matrix((weight[kept], (local, kept)), shape=(present.size, group.size))
+        present, local = np.unique(group[retained], return_inverse=True)
+        matrix = csr_matrix((weight[retained], (local, retained)), shape=(present.size, group.size))
         self.score[present] += np.asarray(matrix @ white)
-        self.power[present] += np.bincount(local, weight[kept] ** 2)
+        self.power[present] += np.bincount(local, weight[retained] ** 2)
         slope = np.asarray(matrix @ jacobian)
         for own, columns in places:
             self.slope[present, columns] += slope[:, own]
@@ -185,7 +185,7 @@ class _Part(NamedTuple):
 
 
 def collect(
-    estimate: Estimate, errors: Sequence[Errors], contrasts: Sequence[Contrast], *, lags: int
+    estimate: Estimate, errors: Sequence[Innovations], contrasts: Sequence[Contrast], *, lags: int
 ) -> Leverage:
     """Fill the contrasts in one pass with derivatives, and return what fitting absorbed."""
     from scipy.linalg import solve_triangular
@@ -195,7 +195,7 @@ def collect(
     count = sum(math.ceil(one.used.size / SAMPLES_AT_ONCE) for one in errors)
     # Derivatives of four parts are kept, for the correction of the autocorrelation.
     chosen = set(np.linspace(0, count - 1, 4).astype(int).tolist())
-    kept = []
+    retained = []
     for contrast in contrasts:
         contrast.begin(size)
     lower: dict[int, Any] = {}
@@ -215,7 +215,7 @@ def collect(
             group = contrast.groups[part.series][part.start : part.start + SAMPLES_AT_ONCE]
             contrast.add(group.ravel(), weights[contrast.by], part.white, jacobian, part.places)
         if number in chosen:
-            kept.append(part)
+            retained.append(part)
     data = np.zeros((size, size))
     for flow, part_of in lower.items():
         whole = np.tril(part_of) + np.tril(part_of, -1).T
@@ -228,11 +228,13 @@ def collect(
     full = prior.add(sums, estimate.point, estimate.weights).information
     spread = solve_triangular(np.linalg.cholesky(full), np.eye(len(full)), lower=True).T
     return Leverage(
-        spread, float(((data @ spread) * spread).sum()), _autocovariance(spread, errors, kept, lags)
+        spread,
+        float(((data @ spread) * spread).sum()),
+        _autocovariance(spread, errors, retained, lags),
     )
 
 
-def _parts(estimate: Estimate, errors: Sequence[Errors]) -> Iterator[_Part]:
+def _parts(estimate: Estimate, errors: Sequence[Innovations]) -> Iterator[_Part]:
     """Run the filter with derivatives over every series, some samples at a time."""
     for index, one in enumerate(errors):
         flow = one.series.flow
@@ -252,7 +254,7 @@ def used_pairs(used: Flags, lags: int) -> Iterator[tuple[int, Flags]]:
 
 
 def _autocovariance(
-    spread: Floats, errors: Sequence[Errors], kept: Sequence[_Part], lags: int
+    spread: Floats, errors: Sequence[Innovations], retained: Sequence[_Part], lags: int
 ) -> Floats:
     """Return the mean of J C J' by component and lag, from samples of the posterior."""
     components = errors[0].components
@@ -260,7 +262,7 @@ def _autocovariance(
     count = 16  # samples of the posterior
     samples = spread @ generator.normal(size=(len(spread), count))
     total, pairs = np.zeros((components, lags + 1)), np.zeros(lags + 1)
-    for part in kept:
+    for part in retained:
         own = np.concatenate([samples[columns] for _, columns in part.places])
         moved = (part.jacobian @ own).reshape(-1, components, count)
         used = errors[part.series].used[part.start : part.start + len(moved)]

@@ -1,4 +1,4 @@
-"""Does the fitted model move like the recording? The recording's steps against simulated ones.
+"""Posterior predictive check of the motion: steps of the recording and of replicates.
 
 Steps are formed by the same function for all. Replicates at the estimate give the distance and its
 noise floor. Replicates with flow and parameters drawn from what the fit leaves open give the
@@ -36,7 +36,7 @@ class Density(NamedTuple):
     high: Floats
 
 
-class Motion(NamedTuple):
+class MotionComparison(NamedTuple):
     """The recording against simulated ones."""
 
     distance: Floats
@@ -77,7 +77,7 @@ class Motion(NamedTuple):
 
 def compare_motion(
     real: Floats, at_estimate: Replicates, drawn: Replicates, *, threads: int
-) -> Motion:
+) -> MotionComparison:
     """Compare a recording's steps with simulated ones."""
     for replicates in (at_estimate, drawn):
         alone = replicates is drawn and np.unique(drawn.flow).size < 2
@@ -96,7 +96,7 @@ def compare_motion(
         )
         for k, part in ((0, 0.9995), (1, 1.0))
     ]
-    return Motion(
+    return MotionComparison(
         _distances([real], at_estimate.steps, threads)[0],
         floor.ravel(),
         _distances([real], drawn.steps, threads)[0],

@@ -1,4 +1,4 @@
-"""Where and when the errors of prediction are not what the model says.
+"""Tests of the innovations by place, time and speed.
 
 All statistics here are sums of whitened innovations over groups (a cell of the tank, a part of the
 recording, a range of speeds) with their exact variance after fitting, see
@@ -14,7 +14,10 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.likelihood.check.errors import Contrast, Errors, Integers
+from driftwalk.flow.arena import outline_of
+from driftwalk.likelihood.check.errors import Contrast, Innovations, Integers, Leverage, collect
+from driftwalk.likelihood.check.white import LAGS, WhitenessTests, whiteness_tests
+from driftwalk.likelihood.estimate import Estimate
 from driftwalk.likelihood.spline import Floats
 
 Flags = npt.NDArray[np.bool_]
@@ -91,7 +94,7 @@ class Layout:
 
 
 def lay_out(
-    errors: Sequence[Errors], bounds: tuple[float, float, float, float], *, side: float
+    errors: Sequence[Innovations], bounds: tuple[float, float, float, float], *, side: float
 ) -> Layout:
     """Lay cells over the tank, and cut the recordings and the speeds into parts."""
     x_min, y_min, x_max, y_max = bounds
@@ -140,7 +143,7 @@ class Groups(NamedTuple):
     speed: Integers
 
 
-def groups_of(layout: Layout, errors: Sequence[Errors]) -> list[Groups]:
+def groups_of(layout: Layout, errors: Sequence[Innovations]) -> list[Groups]:
     """Return the groups of the samples of every series."""
     found = []
     for index, one in enumerate(errors):
@@ -195,7 +198,7 @@ def contrasts_of(layout: Layout, groups: Sequence[Groups], components: int) -> C
     )
 
 
-class Local(NamedTuple):
+class LocalMeans(NamedTuple):
     """Sums over cells, with their distance from zero; the first axis is that of the groups."""
 
     samples: Floats
@@ -206,7 +209,7 @@ class Local(NamedTuple):
     too few samples."""
 
 
-def local_scores(score: Floats, count: Floats, slope: Floats, covariance: Floats) -> Local:
+def local_scores(score: Floats, count: Floats, slope: Floats, covariance: Floats) -> LocalMeans:
     """Return the sums of groups with their chi squared of D degrees of freedom."""
     chi_squared = np.full(count.size, np.nan)
     enough = np.flatnonzero(count >= GROUP.fewest_in_cell)
@@ -217,7 +220,7 @@ def local_scores(score: Floats, count: Floats, slope: Floats, covariance: Floats
         value, vector = np.linalg.eigh(left)
         along = np.einsum("gde,gd->ge", vector, score[enough]) / np.sqrt(count[enough])[:, None]
         chi_squared[enough] = (along**2 / np.maximum(value, GROUP.least_freedom)).sum(axis=1)
-    return Local(count, score / np.maximum(count, 1.0)[:, None], chi_squared)
+    return LocalMeans(count, score / np.maximum(count, 1.0)[:, None], chi_squared)
 
 
 class Trend(NamedTuple):
@@ -267,7 +270,7 @@ class Spread(NamedTuple):
     """Standard deviation of the ratio if it is one."""
 
 
-def spread_of(errors: Sequence[Errors], groups: Sequence[Integers], size: int) -> Spread:
+def spread_of(errors: Sequence[Innovations], groups: Sequence[Integers], size: int) -> Spread:
     """Return the mean square of the errors in each group: the noise should be the same in all."""
     group = np.concatenate(list(groups))
     square = np.concatenate([(one.white**2).mean(axis=1) for one in errors])[group >= 0]
@@ -282,3 +285,51 @@ def spread_of(errors: Sequence[Errors], groups: Sequence[Integers], size: int) -
     share = 1.0 - count[enough] / max(square.size, 1)
     std[enough] = float(square.std()) / mean * np.sqrt(share / count[enough])
     return Spread(ratio, std)
+
+
+@dataclass(frozen=True, eq=False)
+class Residuals:
+    """The statistics of the errors of prediction."""
+
+    layout: Layout
+    leverage: Leverage
+    white: WhitenessTests
+    place: LocalMeans
+    """By cell."""
+    part: LocalMeans
+    """By part of the recording and cell, in that order."""
+    strength: Trend
+    """Of the flow, by part of the recording."""
+    drag: Trend
+    """Of C_d, by the speed of the water past the block."""
+    noise_by_part: Spread
+    noise_by_place: Spread
+
+
+def residuals_of(estimate: Estimate, errors: Sequence[Innovations]) -> Residuals:
+    """Return the statistics of the errors of prediction."""
+    study = estimate.study
+    bounds = outline_of(study.tank.to_arena()).bounds
+    layout = lay_out(errors, bounds, side=study.block.side_m)
+    groups = groups_of(layout, errors)
+    components = errors[0].components
+    sums = contrasts_of(layout, groups, components)
+    leverage = collect(estimate, errors, sums, lags=LAGS)
+    covariance = leverage.covariance
+    shape = (layout.parts, layout.cells, components)
+    score, power = sums.place.score.reshape(shape), sums.place.power.reshape(shape)[:, :, 0]
+    slope = sums.place.slope.reshape(*shape, -1)
+    by_part = (layout.parts * layout.cells, components)
+    return Residuals(
+        layout=layout,
+        leverage=leverage,
+        white=whiteness_tests(errors, leverage),
+        place=local_scores(score.sum(axis=0), power.sum(axis=0), slope.sum(axis=0), covariance),
+        part=local_scores(
+            score.reshape(by_part), power.ravel(), slope.reshape(*by_part, -1), covariance
+        ),
+        strength=trend_of(sums.strength, covariance),
+        drag=trend_of(sums.drag, covariance),
+        noise_by_part=spread_of(errors, [one.part for one in groups], layout.parts),
+        noise_by_place=spread_of(errors, [one.cell for one in groups], layout.cells),
+    )

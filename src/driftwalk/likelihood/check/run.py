@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from driftwalk.core.errors import InputError
+from driftwalk.core.errors import InputError, reason_of
 from driftwalk.core.processors import one_blas_thread
-from driftwalk.likelihood.check.errors import Errors, errors_of
+from driftwalk.likelihood.check.errors import Innovations, innovations_of
 from driftwalk.likelihood.check.motion import FEWEST_REPLICATES, compare_motion
-from driftwalk.likelihood.check.residuals import residuals_of
+from driftwalk.likelihood.check.place import residuals_of
 from driftwalk.likelihood.check.result import (
     criterion_variables,
     motion_variables,
@@ -28,7 +28,9 @@ from driftwalk.likelihood.check.worlds import (
 from driftwalk.likelihood.estimate import estimate_of
 from driftwalk.likelihood.fitted_flow import require_fit
 from driftwalk.likelihood.ready import as_list
+from driftwalk.likelihood.solution import BREAKDOWN
 from driftwalk.schema.answers.fit_facts import texts
+from driftwalk.schema.answers.verdict import with_verdict
 from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:
@@ -92,7 +94,7 @@ def check_model(
         raise InputError(f"replicates must be at least {FEWEST_REPLICATES}, got {replicates}")
     fit, many = require_fit(fit), as_list(recordings)
     estimate = estimate_of(fit, many, body=body)
-    errors = errors_of(estimate)
+    errors = innovations_of(estimate)
     _require_used(errors)
     try:
         found = residuals_of(estimate, errors)
@@ -157,7 +159,7 @@ def check_model(
     return build_dataset("model_check", data, coords, attrs)
 
 
-def _require_used(errors: Sequence[Errors]) -> None:
+def _require_used(errors: Sequence[Innovations]) -> None:
     """Refuse a check of so few errors that the tests of them mean nothing."""
     used = sum(int(one.used.sum()) for one in errors)
     if used < VERDICT.fewest_used:
@@ -166,3 +168,51 @@ def _require_used(errors: Sequence[Errors]) -> None:
             f"the model cannot be checked: the fit used {used} of {intervals} intervals between "
             f"samples, and the check needs {VERDICT.fewest_used} at least"
         )
+
+
+class Judged(NamedTuple):
+    """A fit that was checked."""
+
+    fit: xr.Dataset
+    """A `fit`, with the verdict in it; where no check could be made, its attribute
+    ``check_left_out`` says why."""
+    check: xr.Dataset | None
+    """The `model_check`; None where it could not be made."""
+
+
+def judge_fit(
+    fit: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str | None = None
+) -> Judged:
+    """Check a fit and keep the verdict in it.
+
+    Parameters
+    ----------
+    fit : xarray.Dataset
+        Result of `fit_motion`.
+    recordings : sequence of xarray.Dataset
+        The fitted recordings, in the same order.
+    body : str, optional
+        The body, where a recording has several.
+
+    Returns
+    -------
+    Judged
+        The `fit` with the verdict, and the `model_check`. A fit that cannot be checked is no
+        error: its attribute ``check_left_out`` says why.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> recording = dw.tank30_recording()
+    >>> found = judge_fit(dw.fit_motion(recording), [recording])  # doctest: +SKIP
+    >>> bool(found.fit["explained"])  # doctest: +SKIP
+    True
+    """
+    try:
+        check = check_model(fit, recordings, body=body)
+    except InputError as error:
+        return Judged(fit.assign_attrs(check_left_out=str(error)), None)
+    except BREAKDOWN as error:
+        why = f"the model cannot be checked: the check broke down ({reason_of(error)})"
+        return Judged(fit.assign_attrs(check_left_out=why), None)
+    return Judged(with_verdict(fit, check), check)

@@ -1,4 +1,4 @@
-"""Did the flow change during the recording? Velocities in the same cell at different times.
+"""Scan for a change of the flow: velocities in the same cell at different times.
 
 The errors of prediction see a change of the flow badly: a wrong flow makes the fit lower C_d until
 one sample tells little of the next. So the body's own velocity is looked at. For every stretch of
@@ -129,9 +129,9 @@ def _sums(path: Path, series: int, layout: Layout) -> Floats:
     parts = np.flatnonzero(layout.series == series)
     part = np.searchsorted(layout.start[parts][1:], time[:-1], side="right")
     cell = cell_of(layout, 0.5 * (x[:-1] + x[1:]), 0.5 * (y[:-1] + y[1:]))
-    kept = step <= SCAN.longest_intervals * np.median(step)
-    group = (part * layout.cells + cell)[kept]
+    retained = step <= SCAN.longest_intervals * np.median(step)
+    group = (part * layout.cells + cell)[retained]
     size = parts.size * layout.cells
-    weights = (None, (np.diff(x) / step)[kept], (np.diff(y) / step)[kept])
+    weights = (None, (np.diff(x) / step)[retained], (np.diff(y) / step)[retained])
     found = [np.bincount(group, one, minlength=size) for one in weights]
     return np.asarray(np.stack(found).reshape(3, parts.size, -1).transpose(1, 0, 2), np.float64)

@@ -8,12 +8,11 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.likelihood.check.errors import Errors
-from driftwalk.likelihood.check.motion import Motion
-from driftwalk.likelihood.check.place import Layout, Local, Spread, Trend
-from driftwalk.likelihood.check.residuals import Residuals
+from driftwalk.likelihood.check.errors import Innovations
+from driftwalk.likelihood.check.motion import MotionComparison
+from driftwalk.likelihood.check.place import Layout, LocalMeans, Residuals, Spread, Trend
 from driftwalk.likelihood.check.scan import Scan
-from driftwalk.likelihood.check.white import White
+from driftwalk.likelihood.check.white import WhitenessTests
 from driftwalk.likelihood.spline import Floats
 
 
@@ -64,16 +63,16 @@ def components_of(count: int) -> tuple[str, ...]:
 
 
 def criteria_of(
-    errors: Sequence[Errors],
+    errors: Sequence[Innovations],
     found: Residuals,
-    motion: Motion | None,
+    motion: MotionComparison | None,
     scan: Scan | None,
     *,
     angle: str,
     mistakes: int,
 ) -> list[Criterion]:
     """Ask everything of a fit with this use of the angle, and so many mistakes left out."""
-    where = Where(found.layout)
+    where = Places(found.layout)
     names = components_of(errors[0].components)
     return [
         autocorrelation_criterion(found.white, names),
@@ -100,7 +99,7 @@ def findings_of(criteria: Sequence[Criterion]) -> list[str]:
     return [one.sentence for one in sorted(failed, key=lambda one: one.p_value)]
 
 
-class Where(NamedTuple):
+class Places(NamedTuple):
     """All that is needed to name places and times."""
 
     layout: Layout
@@ -119,7 +118,7 @@ class Where(NamedTuple):
         return found
 
 
-def autocorrelation_criterion(white: White, components: tuple[str, ...]) -> Criterion:
+def autocorrelation_criterion(white: WhitenessTests, components: tuple[str, ...]) -> Criterion:
     """Ask whether the errors of prediction are independent."""
     component, lag = white.largest
     value, expected = (part[component, lag - 1] for part in (white.autocorrelation, white.expected))
@@ -135,7 +134,7 @@ def autocorrelation_criterion(white: White, components: tuple[str, ...]) -> Crit
     )
 
 
-def tail_criterion(white: White, components: tuple[str, ...]) -> Criterion:
+def tail_criterion(white: WhitenessTests, components: tuple[str, ...]) -> Criterion:
     """Ask whether the errors of prediction are normal."""
     worst = int(np.abs(white.excess_kurtosis).argmax())
     return Criterion(
@@ -164,7 +163,7 @@ def outlier_criterion(outliers: int, samples: int, mistakes: int) -> Criterion:
     )
 
 
-def place_criterion(local: Local, where: Where) -> Criterion:
+def place_criterion(local: LocalMeans, where: Places) -> Criterion:
     """Ask whether the mean error of prediction is zero in every cell."""
     from scipy.stats import chi2
 
@@ -192,7 +191,7 @@ def distance_limit(cells: int, dof: int) -> float:
     return math.sqrt(float(chi2.isf(0.05 / cells, dof)))
 
 
-def time_and_place_criterion(local: Local, where: Where) -> Criterion:
+def time_and_place_criterion(local: LocalMeans, where: Places) -> Criterion:
     """Ask whether the flow is the same in every part of the recording: means by cell and part."""
     from scipy.stats import chi2
 
@@ -218,7 +217,7 @@ def time_and_place_criterion(local: Local, where: Where) -> Criterion:
     )
 
 
-def strength_criterion(trend: Trend, where: Where) -> Criterion:
+def strength_criterion(trend: Trend, where: Places) -> Criterion:
     """Ask whether the flow is as strong in every part of the recording."""
     if trend.dof == 0:
         return Criterion("flow strength", math.nan, "")
@@ -253,7 +252,7 @@ def drag_criterion(trend: Trend, edges: Floats) -> Criterion:
     )
 
 
-def noise_criterion(spread: Spread, where: Where, *, by: str) -> Criterion:
+def noise_criterion(spread: Spread, where: Places, *, by: str) -> Criterion:
     """Ask whether the noise is the same in every cell (by "place") or part (by "time")."""
     from scipy.stats import gamma
 
@@ -276,7 +275,7 @@ def noise_criterion(spread: Spread, where: Where, *, by: str) -> Criterion:
     )
 
 
-def motion_criterion(motion: Motion | None, *, angle: str) -> Criterion:
+def motion_criterion(motion: MotionComparison | None, *, angle: str) -> Criterion:
     """Ask whether simulated recordings have the recording's steps."""
     if motion is None:
         return Criterion("steps", math.nan, "")
@@ -296,7 +295,7 @@ def motion_criterion(motion: Motion | None, *, angle: str) -> Criterion:
     )
 
 
-def change_criterion(scan: Scan | None, where: Where) -> Criterion:
+def change_criterion(scan: Scan | None, where: Places) -> Criterion:
     """Ask whether the body moves alike in the same cells at all times."""
     if scan is None:
         return Criterion("change", math.nan, "")

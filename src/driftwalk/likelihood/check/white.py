@@ -1,4 +1,4 @@
-"""Are the errors of prediction white and normal? Autocorrelation, portmanteau statistic, tails."""
+"""Whiteness and normality of the innovations: autocorrelation, Ljung-Box statistic, kurtosis."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.likelihood.check.errors import Errors, Leverage, used_pairs
+from driftwalk.likelihood.check.errors import Innovations, Leverage, used_pairs
 from driftwalk.likelihood.spline import Floats
 
 LAGS: Final = 20
 """Lags of the portmanteau statistic: two seconds at 10 Hz. Chosen by hand."""
 
 
-class White(NamedTuple):
+class WhitenessTests(NamedTuple):
     """How white and how normal the errors are; arrays by component, or by component and lag."""
 
     autocorrelation: Floats
@@ -41,7 +41,9 @@ class White(NamedTuple):
     """Component and lag (from 1) that are furthest from what is expected."""
 
 
-def white_of(errors: Sequence[Errors], leverage: Leverage, *, lags: int = LAGS) -> White:
+def whiteness_tests(
+    errors: Sequence[Innovations], leverage: Leverage, *, lags: int = LAGS
+) -> WhitenessTests:
     """Return the statistics of whiteness of all recordings together.
 
     Ljung and Box's statistic takes the residuals of a fit for errors. Here each autocorrelation is
@@ -74,7 +76,7 @@ def white_of(errors: Sequence[Errors], leverage: Leverage, *, lags: int = LAGS) 
     values = np.concatenate([one.white[one.used] for one in errors])
     unit = values / np.sqrt(variance[:, 0])
     component, lag = divmod(int(np.abs(off).argmax()), lags)
-    return White(
+    return WhitenessTests(
         found,
         expected,
         np.array(std),

@@ -1,4 +1,4 @@
-"""Recordings simulated from a fit: at the estimate, or with what the fit leaves open redrawn."""
+"""Posterior predictive replicates of the recordings, and replicates at the estimate."""
 
 from __future__ import annotations
 
@@ -199,10 +199,10 @@ def _joined(parts: Sequence[Sequence[_World]], flow_of: npt.NDArray[np.int64]) -
     """Put the recordings of each replicate together."""
     whole = list(zip(*parts, strict=True))
     sound = np.array([all(world.sound for world in one) for one in whole])
-    kept = [whole[k] for k in np.flatnonzero(sound)]
+    retained = [whole[k] for k in np.flatnonzero(sound)]
     return Replicates(
-        [np.concatenate([world.steps for world in one]) for one in kept],
-        [[world.path for world in one] for one in kept],
+        [np.concatenate([world.steps for world in one]) for one in retained],
+        [[world.path for world in one] for one in retained],
         flow_of[sound],
         int(np.count_nonzero(~sound)),
     )

@@ -9,8 +9,8 @@ import numpy as np
 
 from driftwalk.conditions import estimated_study
 from driftwalk.core.run_stages import tell_nobody
-from driftwalk.likelihood.contacts.lattice import tried_walls
-from driftwalk.likelihood.contacts.parabola import answer, says_nothing
+from driftwalk.likelihood.contacts.lattice import search_walls
+from driftwalk.likelihood.contacts.parabola import answer, is_undetermined
 from driftwalk.likelihood.contacts.particles import Part, WallLikelihood
 from driftwalk.likelihood.contacts.passages import Passages, passages_of, thinned
 from driftwalk.likelihood.estimate import Estimate, estimate_of
@@ -100,7 +100,7 @@ def estimate_wall(
         data = _answer(fit, estimate, found, seed=seed, tell=tell or tell_nobody)
     except BREAKDOWN as error:
         return fit.assign_attrs(wall_left_out=f"the estimate of the wall failed: {error}")
-    if says_nothing(data):
+    if is_undetermined(data):
         return fit.assign_attrs(wall_left_out=_all_alike(count))
     return described(fit.assign(data))
 
@@ -121,7 +121,7 @@ def _answer(
         if len(passages.x)
     ]
     likelihood = WallLikelihood(estimated_study(fit), estimate.point, parts, seed)
-    walls = tried_walls(likelihood.log_likelihood, tell)
+    walls = search_walls(likelihood.log_likelihood, tell)
     return answer(walls, float(fit["confidence"]))
 
 

@@ -1,4 +1,4 @@
-"""Walls that are tried: a coarse lattice, then finer ones around the best wall."""
+"""Grid search for the wall: a coarse lattice, then finer ones around the best wall."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ class LatticePolicy(NamedTuple):
     restitutions: tuple[float, ...] = (0.0, 0.5, 1.0)
     """Restitutions of the coarse lattice. Chosen by hand, as what follows."""
     holds: tuple[float, ...] = (0.0, 0.1, 0.25, 0.45, 0.65)
-    """Holds of the coarse lattice. From a friction of about 1 on every contact sticks, and more of it
-    changes nothing."""
+    """Holds of the coarse lattice. From a friction of about 1 on every contact sticks, and more of
+    it changes nothing."""
     most_hold: float = 0.8
     """Largest hold that is tried."""
     finer: tuple[tuple[float, float], ...] = ((0.25, 0.12), (0.15, 0.05))
@@ -39,7 +39,7 @@ class Wall(NamedTuple):
     log_likelihood: float
 
 
-def tried_walls(log_likelihood: Callable[[float, float], float], tell: Tell) -> list[Wall]:
+def search_walls(log_likelihood: Callable[[float, float], float], tell: Tell) -> list[Wall]:
     """Try the walls of a coarse lattice, then of finer ones around the best of them."""
     count = len(LATTICE.restitutions) * len(LATTICE.holds) + LATTICE.fine**2 * len(LATTICE.finer)
     walls: dict[tuple[float, float], Wall] = {}

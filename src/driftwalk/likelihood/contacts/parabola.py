@@ -1,4 +1,4 @@
-"""Estimates of restitution and friction, from a parabola through the likely walls."""
+"""Quadratic fit to the log likelihood of the walls: restitution and friction with intervals."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def answer(walls: Sequence[Wall], confidence: float) -> dict[str, Any]:
     }
 
 
-def says_nothing(found: Mapping[str, Any]) -> bool:
+def is_undetermined(found: Mapping[str, Any]) -> bool:
     """Return whether the intervals of an answer hold every wall."""
     restitution, friction = (
         found[f"wall_{name}_interval"][1].tolist() for name in ("restitution", "friction")

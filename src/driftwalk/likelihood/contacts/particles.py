@@ -1,4 +1,4 @@
-"""Likelihood of a wall: particles follow the block through its passages along the wall.
+"""Particle filter of the passages along the wall: the likelihood of a wall.
 
 They get the fitted flow, drag and force, and the impacts of a wall of given restitution and
 friction. The likelihood (Gordon, Salmond and Smith 1993) is the product of the mean densities of

@@ -81,5 +81,5 @@ def passages_of(estimate: Estimate, series: Series) -> Passages:
 def thinned(passages: Passages, share: float) -> Passages:
     """Return a share of the passages, evenly taken; one at least."""
     count = len(passages.x)
-    kept = np.unique(np.linspace(0, count - 1, max(round(share * count), 1)).astype(np.intp))
-    return Passages(*(part[kept] for part in passages))
+    retained = np.unique(np.linspace(0, count - 1, max(round(share * count), 1)).astype(np.intp))
+    return Passages(*(part[retained] for part in passages))

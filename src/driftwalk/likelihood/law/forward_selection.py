@@ -1,4 +1,4 @@
-"""Numbers of departures from the model that a recording asks to be opened.
+"""Forward selection of the numbers of departures, with backward elimination.
 
 Score tests at the mode of a law (`driftwalk.likelihood.law.score_tests`) select them. A number is
 closed again where opening it does not improve the fit.
@@ -122,10 +122,10 @@ class ForwardSelection:
             untried = not set(PULSES) & {*mode.point.opened, *rejected}
             if tests is not None and self.assumptions.pulses and untried:
                 pulses = find_pulses(self.search.passes, mode)
-            asked = self._candidates(tests, pulses)
-            if not asked:
+            candidates = self._candidates(tests, pulses)
+            if not candidates:
                 break
-            mode, idle = self._open_together_or_singly(mode, asked, tests)
+            mode, idle = self._open_together_or_singly(mode, candidates, tests)
             rejected |= idle
         else:
             names = self._closed_names(mode, rejected)
@@ -146,7 +146,7 @@ class ForwardSelection:
         return [name for name in names if not (shaped and name in DRAG_SHAPES)]
 
     def _open_together_or_singly(
-        self, mode: Mode, asked: Mapping[str, float], tests: ScoreTests | None
+        self, mode: Mode, candidates: Mapping[str, float], tests: ScoreTests | None
     ) -> tuple[Mode, set[str]]:
         """Return the mode with numbers opened, or where nothing comes of all together, with some.
 
@@ -154,55 +154,57 @@ class ForwardSelection:
         that were not opened alone are not counted as closed: without the mistake they are tested
         again.
         """
-        found, idle = self._open(mode, asked)
-        parts = [] if tests is None else _parts(asked, tests)
+        found, idle = self._open(mode, candidates)
+        parts = [] if tests is None else _parts(candidates, tests)
         if found is not mode or len(parts) < 2:
             return found, idle
         for names in parts:
-            alone, of_alone = self._open(mode, {name: asked[name] for name in names})
+            alone, of_alone = self._open(mode, {name: candidates[name] for name in names})
             if alone is not mode:
                 return alone, of_alone
         return found, idle
 
     def _candidates(self, tests: ScoreTests | None, pulses: Pulses | None) -> dict[str, float]:
         """Return the numbers to open, with the values to begin with."""
-        asked: dict[str, float] = {}
+        candidates: dict[str, float] = {}
         if tests is None:
-            return asked
+            return candidates
         for name, sigmas in tests.sigmas.items():
             estimate, _ = tests.of(name)
-            if name not in (*STRENGTHS, *FLOATING) and self._is_asked(name, sigmas, estimate):
-                asked[name] = _within(name, NUMBERS[name].model + estimate)
-        rivals = sorted(set(DRAG_SHAPES) & set(asked), key=lambda name: abs(tests.sigmas[name]))
+            if name not in (*STRENGTHS, *FLOATING) and self._is_candidate(name, sigmas, estimate):
+                candidates[name] = _within(name, NUMBERS[name].model + estimate)
+        rivals = sorted(
+            set(DRAG_SHAPES) & set(candidates), key=lambda name: abs(tests.sigmas[name])
+        )
         for name in rivals[:-1]:
-            del asked[name]
+            del candidates[name]
         strengths = [name for name in STRENGTHS if name in tests.names]
         if strengths:
             joint = tests.chi_squared(dict.fromkeys(strengths, 0.0))
             estimates = {name: tests.of(name)[0] for name in strengths}
             largest = max(map(abs, estimates.values()))
             if joint > SELECTION.strength_chi_squared and largest > SELECTION.strength:
-                asked.update({name: _within(name, value) for name, value in estimates.items()})
+                candidates.update({name: _within(name, value) for name, value in estimates.items()})
         if pulses is not None and pulses.significant and pulses.amplitude > SELECTION.pulse:
-            asked.update(zip(PULSES, (pulses.cosine, pulses.sine), strict=True))
-            asked["pulse_frequency"] = pulses.frequency
-        return asked
+            candidates.update(zip(PULSES, (pulses.cosine, pulses.sine), strict=True))
+            candidates["pulse_frequency"] = pulses.frequency
+        return candidates
 
-    def _is_asked(self, name: str, sigmas: float, estimate: float) -> bool:
+    def _is_candidate(self, name: str, sigmas: float, estimate: float) -> bool:
         if name in ("force_memory", "time_variance", "linear_share") and estimate < 0.0:
             return False
         least = MEMORY_SIGMAS if name == "force_memory" else OPENED_SIGMAS
         return abs(sigmas) > least and abs(estimate) > self.least.get(name, 0.0)
 
-    def _open(self, mode: Mode, asked: Mapping[str, float]) -> tuple[Mode, set[str]]:
+    def _open(self, mode: Mode, candidates: Mapping[str, float]) -> tuple[Mode, set[str]]:
         """Return the mode with numbers opened, and those that were closed again."""
-        asked = dict(asked)
+        candidates = dict(candidates)
         fixed = dict(mode.point.fixed)
-        frequency = asked.pop("pulse_frequency", None)
+        frequency = candidates.pop("pulse_frequency", None)
         if frequency is not None:
             fixed["pulse_frequency"] = frequency
         before = mode
-        point = replace(mode.point, opened={**mode.point.opened, **asked}, fixed=fixed)
+        point = replace(mode.point, opened={**mode.point.opened, **candidates}, fixed=fixed)
         found = self._near(point, mode.weights)
         if found is not None and frequency is not None:
             # A frequency has a derivative only once there are pulses.
@@ -211,10 +213,10 @@ class ForwardSelection:
             point = replace(found.point, opened=opened, fixed=fixed)
             found = self._near(point, found.weights)
         if found is None:
-            return before, set(asked)
+            return before, set(candidates)
         mode = found
-        idle = self._idle(mode, set(asked))
-        if idle >= set(asked):
+        idle = self._idle(mode, set(candidates))
+        if idle >= set(candidates):
             return before, idle
         return self._without(mode, idle) or before, idle
 
@@ -239,8 +241,8 @@ class ForwardSelection:
             return mode
         # Without pulses their frequency is the frequency of nothing.
         gone = {*idle, "pulse_frequency"} if set(PULSES) <= idle else idle
-        kept = {name: value for name, value in mode.point.opened.items() if name not in gone}
-        return self._near(replace(mode.point, opened=kept), mode.weights)
+        retained = {name: value for name, value in mode.point.opened.items() if name not in gone}
+        return self._near(replace(mode.point, opened=retained), mode.weights)
 
     def _near(self, point: Point, weights: Weights) -> Mode | None:
         """Return the mode near a point; nothing where the search does not soon come to its end.
@@ -251,17 +253,17 @@ class ForwardSelection:
         return mode if mode is not None and mode.converged else None
 
 
-def _parts(asked: Mapping[str, float], tests: ScoreTests) -> list[tuple[str, ...]]:
+def _parts(candidates: Mapping[str, float], tests: ScoreTests) -> list[tuple[str, ...]]:
     """Return the numbers that are opened together, what the recording asks for most first."""
     gains: dict[tuple[str, ...], float] = {}
-    strengths = tuple(name for name in STRENGTHS if name in asked)
+    strengths = tuple(name for name in STRENGTHS if name in candidates)
     if strengths:
         gains[strengths] = tests.chi_squared(dict.fromkeys(strengths, 0.0)) - len(strengths)
-    pulses = tuple(name for name in asked if name.startswith("pulse_"))
+    pulses = tuple(name for name in candidates if name.startswith("pulse_"))
     if pulses:
         # Those have no score test, and may be what another departure leaves in the spectrum.
         gains[pulses] = 0.0
-    for name in set(asked) - {*strengths, *pulses}:
+    for name in set(candidates) - {*strengths, *pulses}:
         gains[(name,)] = tests.sigmas[name] ** 2 - 1.0
     return sorted(gains, key=lambda names: (-gains[names], names))
 

@@ -1,4 +1,4 @@
-"""Which numbers of departures a recording asks to be opened: score tests at the end of a search.
+"""Rao's score tests of closed numbers at a mode, and the spectrum of the flow's strength.
 
 At the mode the derivatives of the likelihood by all fitted parameters are zero. Those by a closed
 number are not, if the number is not what the model says. With the information of all parameters the

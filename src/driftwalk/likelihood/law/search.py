@@ -1,4 +1,4 @@
-"""The force law and the departures from the model that a recording supports.
+"""Model selection: the force law and the departures that a recording supports.
 
 The search of the likelihood is made for the paper's law, and for that of a floating body where
 score tests under the first cast doubt on it. At the better one, such tests say which further

@@ -112,8 +112,8 @@ def recover_one(truth: Truth, *, recording: int, duration: float, angle: str) ->
         "converged": bool(fit["converged"]),
         "fit_time": took,
     }
-    kept = {key: float(value) for key, value in {**score, **facts}.items() if key in nothing}
-    return {**kept, "status": STATUS["fitted"], "message": ""}
+    retained = {key: float(value) for key, value in {**score, **facts}.items() if key in nothing}
+    return {**retained, "status": STATUS["fitted"], "message": ""}
 
 
 def simulated_recordings(

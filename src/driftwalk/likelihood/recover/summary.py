@@ -129,10 +129,10 @@ def add_summary(recovery: xr.Dataset, *, precision: float | None) -> xr.Dataset:
     flow = {name: np.full(shape[1:], np.nan) for name in ("median_flow_error", "flow_error_90")}
     used = recovery["used"].values == 1
     for place in np.ndindex(*shape):
-        name, kept = PARAMETERS[place[0]], used[place[1:]]
+        name, retained = PARAMETERS[place[0]], used[place[1:]]
         found = summarise(
             *(
-                recovery[f"{name}_{part}"].values[place[1:]][kept]
+                recovery[f"{name}_{part}"].values[place[1:]][retained]
                 for part in ("error", "z", "covered")
             )
         )

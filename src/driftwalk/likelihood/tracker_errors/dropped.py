@@ -1,4 +1,4 @@
-"""Frames that a recording lacks although its stamps say a constant rate, found from its track.
+"""Dropped frames, found by expectation and maximisation over the lengths of intervals.
 
 Where a block moves, its step across a missing frame is twice as long as its neighbours', in x, y
 and orientation together. Every interval is compared with what its neighbours predict, once for each
@@ -22,8 +22,8 @@ from driftwalk.likelihood.tracker_errors.interval_windows import (
     AT_MIDDLE,
     CLASSES,
     CLEAN,
-    DECOY,
-    DECOYS,
+    CONTROL,
+    CONTROL_LENGTHS,
     DROPS,
     HERE,
     KIND,
@@ -269,7 +269,7 @@ def _weights(rates: Floats) -> Floats:
 def _are_dropped_frames(rates: Floats, most: float) -> bool:
     """Whether the intervals are whole ones rather than any, and mostly lack one frame."""
     single, more = rates[DROPS[0]], rates[list(DROPS[1:])].sum()
-    return bool(len(DECOYS) * rates[DECOY] <= most * (single + more) and more <= single)
+    return bool(len(CONTROL_LENGTHS) * rates[CONTROL] <= most * (single + more) and more <= single)
 
 
 def _posterior(likelihood: Floats, rates: Floats) -> Floats:

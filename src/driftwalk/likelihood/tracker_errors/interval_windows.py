@@ -26,11 +26,11 @@ MIDDLE: Final = 3
 """Which of the window's intervals is the one in question."""
 MOST_MISSING: Final = 3
 """Missing frames in one interval that are looked for."""
-DECOYS: Final = (0.5, 1.5, 2.5)
+CONTROL_LENGTHS: Final = (0.5, 1.5, 2.5)
 """Lengths that no dropped frame makes. Quick movements of an animal, or a clock that is not
 regular, make them as often as double ones."""
 DROPS: Final = tuple(range(1, MOST_MISSING + 1))
-DECOY, WRONG, BOUNCE, JUMP = range(MOST_MISSING + 1, MOST_MISSING + 5)
+CONTROL, WRONG, BOUNCE, JUMP = range(MOST_MISSING + 1, MOST_MISSING + 5)
 CLEAN: Final = 0
 CLASSES: Final = JUMP + 1
 
@@ -76,7 +76,9 @@ def patterns_of(lengths: Floats, stamped: float) -> list[Pattern]:
         Pattern(kind, MIDDLE, longer(MIDDLE, missing), None)
         for missing, kind in enumerate(DROPS[1:], start=2)
     ]
-    found += [Pattern(DECOY, MIDDLE, longer(MIDDLE, length - 1.0), None) for length in DECOYS]
+    found += [
+        Pattern(CONTROL, MIDDLE, longer(MIDDLE, length - 1.0), None) for length in CONTROL_LENGTHS
+    ]
     number = np.arange(WIDTH)
     time = np.concatenate([[0.0], np.cumsum(plain)])
     found += [Pattern(WRONG, at, plain, (number == at).astype(np.float64)) for at in range(WIDTH)]

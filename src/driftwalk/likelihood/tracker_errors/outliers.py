@@ -1,4 +1,4 @@
-"""Samples that are mistakes of the tracker: isolated positions far from both of their neighbours.
+"""Outliers of the tracker: isolated positions far from both of their neighbours.
 
 The filter leaves out a sample that is far from its prediction. But the search of the fit begins
 with so much unrest that nothing is far; if some in a hundred samples are wrong by many times the
@@ -40,7 +40,7 @@ class OutlierPolicy(NamedTuple):
 OUTLIER: Final = OutlierPolicy()
 
 
-def mistakes_in(track: Track) -> Flags:
+def outliers_in(track: Track) -> Flags:
     """Return which samples of a track are mistakes of the tracker, shape (n,).
 
     Examples
@@ -49,7 +49,7 @@ def mistakes_in(track: Track) -> Flags:
     >>> noise = np.random.default_rng(1).normal(0.0, 3e-4, (2, 1000))
     >>> noise[0, 300] += 5e-3
     >>> x = 0.1 * np.sin(0.5 * time) + noise[0]
-    >>> mistakes_in(Track(time, x, noise[1], 0 * time)).nonzero()[0].tolist()
+    >>> outliers_in(Track(time, x, noise[1], 0 * time)).nonzero()[0].tolist()
     [300]
     """
     found = np.zeros(track.time.size, dtype=bool)
@@ -94,10 +94,10 @@ def _off_the_line(track: Track) -> Floats:
     return off
 
 
-def without_mistakes(track: Track) -> Track:
+def without_outliers(track: Track) -> Track:
     """Return a track without the samples that are mistakes of the tracker: they become gaps."""
-    wrong = mistakes_in(track)
+    wrong = outliers_in(track)
     if not wrong.any():
         return track
-    kept = ~wrong
-    return Track(track.time[kept], track.x[kept], track.y[kept], track.theta[kept])
+    retained = ~wrong
+    return Track(track.time[retained], track.x[retained], track.y[retained], track.theta[retained])

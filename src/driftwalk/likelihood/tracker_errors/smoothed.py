@@ -1,4 +1,4 @@
-"""Positions that are not what the camera saw: a tracker has smoothed them.
+"""Smoothed positions, recognised by Whittle's likelihood of their spectrum.
 
 A moving average, or a parabola through some frames (Savitzky and Golay), takes certain frequencies
 out of a track altogether, of the motion and of the tracking noise alike; averages over three frames
