@@ -44,15 +44,16 @@ def policies() -> Iterator[Policy]:
         for node in ast.parse(text).body:
             if isinstance(node, ast.ClassDef) and node.name.endswith("Policy"):
                 purpose = " ".join((ast.get_docstring(node) or "").split())
-                yield Policy(path.relative_to(ROOT), node.name, purpose, list(_fields(node)))
+                yield Policy(path.relative_to(ROOT), node.name, purpose, list(_fields(node, text)))
 
 
-def _fields(policy: ast.ClassDef) -> Iterator[Threshold]:
+def _fields(policy: ast.ClassDef, text: str) -> Iterator[Threshold]:
     for field, after in zip(policy.body, [*policy.body[1:], None], strict=True):
         if isinstance(field, ast.AnnAssign) and field.value is not None:
             documented = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
             reason = " ".join(str(after.value.value).split()) if documented else ""  # type: ignore[union-attr]
-            yield Threshold(ast.unparse(field.target), ast.unparse(field.value), reason)
+            value = " ".join((ast.get_source_segment(text, field.value) or "").split())
+            yield Threshold(ast.unparse(field.target), value, reason)
 
 
 def thresholds_page(page: str) -> str:

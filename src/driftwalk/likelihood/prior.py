@@ -25,8 +25,7 @@ class PriorPolicy(NamedTuple):
     """Centres and widths of the weak priors."""
 
     drag: float = 0.5
-    """Centre of the prior of C_d, and where the search begins. Chosen by hand: between a sphere and
-    a cube."""
+    """Centre of the prior of C_d, and where the search begins. Chosen by hand."""
     log_drag_std: float = 0.7
     """Standard deviation of ln C_d: within a factor of two. Chosen by hand."""
     lever: float = 0.01

@@ -92,6 +92,7 @@ def prepare(
     many: Sequence[xr.Dataset], study: Study, angle: AngleUse | None, body: str | None
 ) -> PreparedRecordings:
     """Return recordings ready for the filter; refuse what cannot be fitted."""
+    # The cheap refusals come first: memory and size need no track to be read.
     require_memory(sum(one.sizes["time"] for one in many))
     intervals = intervals_of(study)
     outline = outline_of(study.tank.to_arena())
@@ -106,6 +107,7 @@ def prepare(
         mistakes += seen.time.size - track.time.size
         require_length(track, study, where=where)
         require_travel(track, study, where=name)
+        # Smoothing is looked for in the track as recorded: gaps would cut its spectrum.
         raws.append(track)
         dropped.append(find_dropped_frames(track, recording["time"].values))
         track = with_gaps(track, dropped[-1])
@@ -116,15 +118,18 @@ def prepare(
         tracks.append(track)
         parts += cut
         places += [(flow, index) for flow in intervals.flows]
+    # One use of the angle for all recordings, as they share the noise of the angle.
     used_angle = use_angle(many, tracks, study.fit.angle if angle is None else angle)
     series = series_of(parts, study, outline, used_angle, places)
     count, near_wall = (
         sum(one.time.size - 1 for one in series),
         sum(one.near_wall for one in series),
     )
+    # A tank that was fitted to the positions touches them: say so before the wall share does.
     if _is_fitted_arena(many[0], study):
         require_own_arena(study, intervals=count, near_wall=near_wall, where=_name_of(many[0]))
     _require_usable(series, study)
+    # Each flow has coefficients of its own, so each needs enough intervals.
     for flow in range(0 if intervals.steady else len(intervals.labels)):
         _require_usable(
             [one for one in series if one.flow == flow],
@@ -228,6 +233,8 @@ def series_of(
         ends[number if places is None else places[number][1]] = float(track.time[-1])
     for number, track in enumerate(tracks):
         flow, recording = (0, number) if places is None else places[number]
+        # All parts of a recording count time from its first sample: the cosines of the flow's
+        # strength run over the whole of it.
         if not found or found[-1].recording != recording:
             first = float(track.time[0])
         time = track.time - first
@@ -235,6 +242,7 @@ def series_of(
         corners = None
         if used_angle != "none":
             smooth = smooth_angle(time, track.theta, longest_gap=FILTER.longest_gap_s)
+            # A corner is where the recorded angle puts it; the smooth one only fills its holes.
             corners = np.where(np.isfinite(track.theta), track.theta, smooth.theta)
         wall = wall_intervals(
             time,

@@ -123,9 +123,12 @@ def build_fit(
         for flow in range(len(intervals.labels))
     ]
     profiles = restricted.profiles
+    # Only differences of a profile mean anything: it begins at zero.
     least = min(one.deviance for one in profiles)
     flat = profiles[0].half_log_determinant
     uncertainty = parameter_covariance(mode, restricted)
+    # The stored covariance stays finite where C_d is known from its prior alone, as the check draws
+    # from it; a search that was given up has none.
     if mode.diverged:
         uncertainty = open_where_undetermined(uncertainty, mode, restricted)
     noises = 1 + len(mode.point.noises)

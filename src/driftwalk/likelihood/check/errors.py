@@ -198,6 +198,7 @@ def collect(
     retained = []
     for contrast in contrasts:
         contrast.begin(size)
+    # J'J by flow, its lower half alone: a series has derivatives by the coefficients of its flow.
     lower: dict[int, Any] = {}
     for number, part in enumerate(_parts(estimate, errors)):
         jacobian = part.jacobian
@@ -223,6 +224,7 @@ def collect(
         for own, row in places:
             for own_column, column in places:
                 data[row, column] += whole[own, own_column]
+    # C = (J'J + Lambda)^-1, held as a root so that samples and traces take one product.
     prior = Prior(estimate.passes)
     sums = Sums(0.0, np.zeros(len(data)), data, 0)
     full = prior.add(sums, estimate.point, estimate.weights).information

@@ -209,6 +209,8 @@ class Passes:
         if point.log_lever is not None and point.log_angle_noise is not None:
             pose["force_lever"] = math.exp(point.log_lever)
             pose["angle_noise"] = math.exp(point.log_angle_noise)
+        # Offsets of marker and angle move the data and not the model: the core knows the centre of
+        # mass and the angle of the faces only.
         x, y, theta = corrected(series, point)
         share = point.number("linear_share")
         return _core.InnovationsFilter(
@@ -238,6 +240,7 @@ class Passes:
             sensitivities=sensitivities,
             strength=strength_of(series, point),
             quadratic=1.0 - share,
+            # Linear drag acts on all four faces, windward or not: a quarter on each.
             linear=0.25 * share * body.linear_speed,
             water_acceleration=point.number("water_acceleration"),
             water_spin=point.number("water_spin"),

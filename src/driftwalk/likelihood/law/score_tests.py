@@ -25,8 +25,8 @@ class PulsePolicy(NamedTuple):
     """When a line in the spectrum of errors times derivatives is a pulse of the flow."""
 
     oversampled: int = 4
-    """Frequencies of the spectrum for each period that the recording holds. Chosen by hand: a line
-    between two of them loses 3 % of its height."""
+    """Frequencies of the spectrum for each period that the recording holds. A line between two of
+    them loses 5 % of its height at most."""
     least_periods: float = 6.0
     """Periods that a recording holds at least. A slower change is one of the six cosines of the
     flow's strength."""

@@ -132,6 +132,7 @@ def find_dropped_frames(track: Track, clock: Floats) -> DroppedFrames:
         axes = _axes(track, _time_of(lengths, interval))
         likelihood = log_likelihoods(axes, starts, lengths, stamped, dt=interval)
         rates, value = _rates(likelihood)
+        # The evidence is that of the first round: later ones have fitted the lengths to the track.
         if number == 0:
             evidence = value - _rates(likelihood, without=DROPS)[1]
             if evidence < DROPPED.evidence or not _are_dropped_frames(
@@ -143,6 +144,7 @@ def find_dropped_frames(track: Track, clock: Floats) -> DroppedFrames:
         found = some > 0.5
         before = lengths
         lengths = stamped.copy()
+        # Neighbours of a dropped frame see its true length in the next round.
         lengths[starts[found] + MIDDLE] += 1.0 + share[found].argmax(axis=1)
         if np.array_equal(lengths, before):
             break

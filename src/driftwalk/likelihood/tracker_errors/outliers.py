@@ -29,7 +29,7 @@ class OutlierPolicy(NamedTuple):
     mistake: of a normal law one in 65 million."""
     opposite: float = 0.25
     """Least part of its own distance by which both neighbours lie off to the other side. A mistake
-    alone has 0.5; half of it leaves room for the motion. Chosen by hand."""
+    alone has 0.5. Chosen by hand."""
     longest_gap: float = 1.5
     """Usual intervals between neighbours up to which they are neighbours. Chosen by hand: a missing
     frame makes it 2."""
