@@ -9,7 +9,7 @@ from worlds import RADIUS_M, Floats, World
 
 import driftwalk as dw
 from driftwalk.flow.arena import outline_of
-from driftwalk.likelihood.filter_pass import LONGEST_GAP_S
+from driftwalk.likelihood.filter.series import FILTER
 from driftwalk.likelihood.wall import wall_intervals
 from driftwalk.model import Tank
 from driftwalk.schema import build_trajectory
@@ -63,7 +63,7 @@ def wall_share(poses: Poses) -> float:
         *poses,
         outline=outline_of(dw.Study().tank.to_arena()),
         side=dw.Study().block.side_m,
-        longest_gap=LONGEST_GAP_S,
+        longest_gap=FILTER.longest_gap_s,
     )
     return float(near[1:].mean())
 

@@ -23,12 +23,12 @@ from run import FIRST_SEED, SETS, current, file_of
 import driftwalk as dw
 from driftwalk.core.files.atomic import write_atomic
 from driftwalk.core.provenance import manifest, write_manifest
-from driftwalk.likelihood.check.verdict import LEVEL
+from driftwalk.likelihood.check.verdict import VERDICT
 from driftwalk.likelihood.law.forward_selection import (
     MEMORY_SIGMAS,
     OPENED_SIGMAS,
-    OPENED_STRENGTH,
-    worth,
+    SELECTION,
+    least_effects,
 )
 
 Lines = Sequence[dict[str, Any]]
@@ -60,7 +60,10 @@ SHOWN: Final = {
     "marker_x": ("marker off", 1e3, "mm"),
 }
 """Words, factor and unit of the numbers of a fit."""
-SIGMAS: Final = {"force_memory": MEMORY_SIGMAS, "strength_1": math.sqrt(OPENED_STRENGTH)}
+SIGMAS: Final = {
+    "force_memory": MEMORY_SIGMAS,
+    "strength_1": math.sqrt(SELECTION.strength_chi_squared),
+}
 """Standard deviations that open a number, where they are others than `OPENED_SIGMAS`."""
 
 
@@ -127,7 +130,7 @@ def limits_table(lines: Lines) -> str:
     The score test has to find it so many standard deviations from the model, and it has to be large
     enough to be worth a number.
     """
-    least = worth(dw.Study().block.side_m)
+    least = least_effects(dw.Study().block.side_m)
     lengths = sorted({one["minutes"] for one in lines if "departure_std" in one})
     rows = [["number", *(f"{minutes:g} min" for minutes in lengths), "but at least"]]
     rows.append(["---"] * len(rows[0]))
@@ -165,7 +168,7 @@ def is_named(case: str, line: dict[str, Any]) -> bool:
 
 def is_rejected(line: dict[str, Any]) -> bool:
     """Return whether the check fails, at the level that it has now."""
-    return bool(line.get("least_p_value", 1.0) < LEVEL)
+    return bool(line.get("least_p_value", 1.0) < VERDICT.level)
 
 
 def right_table(lines: Lines) -> str:

@@ -1,15 +1,13 @@
 """The likelihood fit: flow, drag, stochastic force and tracking noise of one recording."""
 
-from driftwalk.likelihood.check.judged import Judged, judge_fit
-from driftwalk.likelihood.check.run import check_model
+from driftwalk.likelihood.check.run import Judged, check_model, judge_fit
 from driftwalk.likelihood.contacts.estimate import estimate_wall
 from driftwalk.likelihood.fit import check_fit, fit_motion
+from driftwalk.likelihood.fitted_flow import fitted_flow
 from driftwalk.likelihood.law.held_out import compare_laws
-from driftwalk.likelihood.recover.check import check_recovery
-from driftwalk.likelihood.recover.run import recovery_study
+from driftwalk.likelihood.recover.run import check_recovery, recovery_study
 from driftwalk.likelihood.recover.score import score_fit
 from driftwalk.likelihood.refuse import fit_work
-from driftwalk.likelihood.result import fitted_flow
 
 __all__ = [
     "Judged",

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 Floats = npt.NDArray[np.float64]
 
-WINDOW = 5
+ORIENTED_SHARE: Final = 0.5
+"""Share of the samples with an orientation from which on the fit uses orientations by default, and
+the search for dropped frames does. Chosen by hand: the majority."""
+WINDOW: Final = 5
 """Samples of a parabola: the five nearest in time, so that gaps and uneven clocks are no case."""
 
 
@@ -31,20 +34,6 @@ def no_angle(count: int) -> Angle:
 
 def smooth_angle(time: Floats, theta: Floats, *, longest_gap: float) -> Angle:
     """Fit a parabola to the five orientations nearest in time to each sample.
-
-    Parameters
-    ----------
-    time : ndarray, shape (n,)
-        Time stamps [s], strictly increasing.
-    theta : ndarray, shape (n,)
-        Orientations [rad], wrapped or not; NaN where missing.
-    longest_gap : float
-        A window does not reach further than this [s]. Where it would, nothing is known.
-
-    Returns
-    -------
-    Angle
-        At samples without an orientation, the linear interpolation of its neighbours'.
 
     Examples
     --------

@@ -1,65 +1,49 @@
-"""Whether the turning of the block and its motion tell of the same drag.
+"""Whether the turning of the block and its motion agree: on the drag, and on the vorticity.
 
 With the angle in the state most of what is learned of C_d comes from how the block turns: its
 torque goes with differences of the flow over the block. With the angle as an input the motion alone
-tells. If the drag law is right the two agree.
+tells. If the drag law is right the two agree. A block also turns with the water around it, unless
+its orientation is counted clockwise.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
-from driftwalk.likelihood.filter_pass import Passes
-from driftwalk.likelihood.newton import FROM_NEAR, Mode, Prior, find_mode
+import numpy as np
+
+from driftwalk.likelihood.filter.filter_pass import Passes
+from driftwalk.likelihood.filter.series import Series
+from driftwalk.likelihood.interval_inflation import parameter_covariance, parameter_facts
+from driftwalk.likelihood.newton import FROM_NEAR, Mode, ModeSearch, require_mode
+from driftwalk.likelihood.prior import Prior
 from driftwalk.likelihood.reml import Restricted, restricted_drag
-from driftwalk.likelihood.result import parameter_covariance, parameter_facts
 from driftwalk.likelihood.solution import BREAKDOWN
+from driftwalk.likelihood.spline import Floats, Spline, basis_matrix
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
-
-CLOSE: Final = 2.0
-"""In standard deviations: a shorter step of the search leaves a fifth of one at most."""
-NOTABLE_DISAGREEMENT: Final = 3.0
-"""Combined standard deviations beyond which the two estimates of C_d do not agree."""
 
 
 def angle_given_facts(
     passes: Passes, mode: Mode, restricted: Restricted, study: Study
 ) -> dict[str, Any]:
-    """Fit once more with the angle as an input, and compare.
+    """Fit once more with the angle as an input (`passes`), and compare.
 
-    Parameters
-    ----------
-    passes : Passes
-        The filter with the angle as an input.
-    mode, restricted : Mode, Restricted
-        Result with the angle in the state; the search begins there.
-    study : Study
-        The section [fit].
-
-    Returns
-    -------
-    dict
-        ``drag_coefficient_angle_given`` with its interval, and ``angle_disagreement_std``: the
-        difference of the two ln C_d in combined standard deviations, NaN where the second fit has
-        no solution.
+    Returns ``drag_coefficient_angle_given`` with its interval, and ``angle_disagreement_std``: the
+    difference of the two ln C_d in combined standard deviations, NaN where the second fit has no
+    solution.
     """
     found = restricted.point
     known = {**found.fixed, **found.opened}
     start = replace(found, log_lever=None, log_angle_noise=None, opened={}, fixed=known)
     prior = Prior(passes)
     try:
-        other = find_mode(
-            passes,
-            start,
-            mode.weights,
-            prior,
-            iterations=study.fit.iterations,
-            held=FROM_NEAR,
-        )
+        search = ModeSearch(passes, prior, study.fit.iterations)
+        other = require_mode(search.find(start, mode.weights, held=FROM_NEAR))
         again = restricted_drag(passes, other, prior, intensity=False)
         covariance = parameter_covariance(other, again)
         own = parameter_covariance(mode, restricted)
@@ -68,10 +52,40 @@ def angle_given_facts(
         disagreement = apart / math.sqrt(covariance[0, 0] + own[0, 0])
     except BREAKDOWN:
         return {"angle_disagreement_std": math.nan}
-    if other.lost or not math.isfinite(disagreement):
+    if other.diverged or not math.isfinite(disagreement):
         return {"angle_disagreement_std": math.nan}
     return {
         "drag_coefficient_angle_given": facts["drag_coefficient"],
         "drag_coefficient_angle_given_interval": facts["drag_coefficient_interval"],
         "angle_disagreement_std": disagreement,
     }
+
+
+def spin_correlation(coefficients: Floats, spline: Spline, series: Sequence[Series]) -> float:
+    """Return the correlation of the block's spin with the vorticity of the water around it.
+
+    A block in water turns with it, at about half the vorticity. With the orientation counted the
+    wrong way round the correlation is negative.
+    """
+    spins, vorticities = [], []
+    for one in series:
+        seen = np.isfinite(one.x) & np.isfinite(one.y) & (one.excluded == 0)
+        spins.append(one.omega[seen])
+        vorticities.append(_vorticity(coefficients, spline, one.x[seen], one.y[seen]))
+    spin, vorticity = np.concatenate(spins), np.concatenate(vorticities)
+    size = float(np.sqrt((spin**2).mean() * (vorticity**2).mean()))
+    return float((spin * vorticity).mean()) / size if size > 0.0 else 0.0
+
+
+def _vorticity(coefficients: Floats, spline: Spline, x: Floats, y: Floats) -> Floats:
+    """Return dv/dx - du/dy at places, from differences over a tenth of a cell."""
+    step = 0.05 * spline.spacing
+
+    def at(component: int, dx: float, dy: float) -> Floats:
+        along_x = basis_matrix((x + dx - spline.origin_x) / spline.spacing, spline.columns)
+        along_y = basis_matrix((y + dy - spline.origin_y) / spline.spacing, spline.rows)
+        return np.asarray(np.einsum("ni,ji,nj->n", along_x, coefficients[component], along_y))
+
+    return (at(1, step, 0.0) - at(1, -step, 0.0) - at(0, 0.0, step) + at(0, 0.0, -step)) / (
+        2.0 * step
+    )

@@ -3,27 +3,33 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from driftwalk.conditions import jump_warnings, unstated_warning
 from driftwalk.core.processors import one_blas_thread
 from driftwalk.core.run_stages import Course, share_of_search, tell_nobody
 from driftwalk.flow.arena import outline_of
-from driftwalk.likelihood.angle_consistency import angle_given_facts
-from driftwalk.likelihood.excerpt import pieces
-from driftwalk.likelihood.filter_pass import Passes, Point
-from driftwalk.likelihood.interval_inflation import with_mended_frames
-from driftwalk.likelihood.law.assumptions import Assumptions, assumptions_of
+from driftwalk.likelihood.angle_consistency import angle_given_facts, spin_correlation
+from driftwalk.likelihood.filter.excerpt import pieces
+from driftwalk.likelihood.filter.filter_pass import Passes
+from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.interval_inflation import (
+    open_where_undetermined,
+    parameter_covariance,
+    parameter_facts,
+    with_mended_frames,
+)
+from driftwalk.likelihood.law.assumptions import assumptions_of
 from driftwalk.likelihood.law.facts import law_facts, side_slopes, stated_drag
-from driftwalk.likelihood.law.found import LawFound
-from driftwalk.likelihood.law.modes import TRIAL_PASSES
+from driftwalk.likelihood.law.forward_selection import LawResult
 from driftwalk.likelihood.law.search import LawSearch
-from driftwalk.likelihood.newton import Passed, Prior, Tell, work_of_pass
+from driftwalk.likelihood.newton import WORK, ModeSearch, Passed, Tell, work_of_pass
+from driftwalk.likelihood.prior import Prior
 from driftwalk.likelihood.ready import (
     AngleUse,
-    Ready,
+    PreparedRecordings,
     as_list,
     body_of,
     is_simulated,
@@ -33,19 +39,10 @@ from driftwalk.likelihood.ready import (
     usable_intervals,
 )
 from driftwalk.likelihood.reml import Restricted, restricted_drag
-from driftwalk.likelihood.result import (
-    build_fit,
-    open_where_undetermined,
-    parameter_covariance,
-    parameter_facts,
-    visited_shares,
-    whiteness_of,
-)
+from driftwalk.likelihood.result import Whiteness, build_fit, visited_shares, whiteness_of
 from driftwalk.likelihood.solution import BREAKDOWN, require_noise_below_motion, solved
 from driftwalk.likelihood.start import first_point, first_weights
-from driftwalk.likelihood.tracker_errors.mirrored import spin_correlation
 from driftwalk.likelihood.warnings import precision_facts, warnings_of
-from driftwalk.schema import Track
 from driftwalk.schema.answers.fit_facts import texts
 from driftwalk.schema.check import described
 
@@ -53,21 +50,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
-
-SEARCH: Final = "likelihood"
-RESTRICTED: Final = "drag"
-ANGLE_GIVEN: Final = "angle as given"
-PASSES_FROM_AFAR: Final = 9.0
-"""Passes of the filter that a search usually takes, on the bundled recording and parts of it: from
-afar,"""
-PASSES_OF_PIECES: Final = 7.0
-"""of pieces of a long recording first,"""
-PASSES_FROM_PIECES: Final = 4.0
-"""and then of all of it."""
-PASSES_RESTRICTED: Final = 2.0
-"""Passes of a search that take as long as the restricted likelihood,"""
-PASSES_ANGLE_GIVEN: Final = 3.0
-"""and as the fit with the angle as given."""
 
 
 @one_blas_thread()
@@ -128,93 +110,144 @@ def fit_motion(
     chosen = study if study is not None else Study()
     many = as_list(recordings)
     ready = prepare(many, chosen, angle, body)
-    series, used_angle, intervals = ready.series, ready.angle, ready.intervals
-    outline = outline_of(chosen.tank.to_arena())
-    spline = spline_of(chosen, outline)
-    flows = len(intervals.labels)
-    passes = Passes(series, body_of(chosen, used_angle), spline, flows)
+    spline = spline_of(chosen, outline_of(chosen.tank.to_arena()))
+    flows = len(ready.intervals.labels)
+    passes = Passes(ready.series, body_of(chosen, ready.angle), spline, flows)
     start = _start(passes, ready, chosen)
-    assumptions = assumptions_of(chosen, used_angle, recordings=len(ready.tracks), flows=flows)
-    course = Course(tell or tell_nobody, _usual_parts(passes, used_angle))
-    law, restricted = _search(passes, start, ready, assumptions, chosen, course)
-    mode = law.mode
+    assumptions = assumptions_of(chosen, ready.angle, recordings=len(ready.tracks), flows=flows)
+    course = Course(tell or tell_nobody, _usual_parts(passes, ready.angle))
+    prior = Prior(passes)
+    weights = first_weights(ready.tracks, spline)
+    # The stages follow one another here, and not each in a function: the search is four calls above
+    # the kernel as it is.
+    with solved(ready.wall_share):
+        passed = _work_listener(course, _usual_search(passes))
+        search = ModeSearch(passes, prior, chosen.fit.iterations, passed)
+        law = LawSearch(search, assumptions).find(start, weights)
+        course.begin("drag")
+        try:
+            restricted = restricted_drag(passes, law.mode, prior)
+        except BREAKDOWN:
+            # What was opened may have no restricted likelihood; the law without it has one.
+            law = replace(law, mode=law.base)
+            restricted = restricted_drag(passes, law.mode, prior)
+        noise = math.exp(restricted.point.log_noise)
+    require_noise_below_motion(noise, ready.tracks, ready.wall_share)
     with solved(ready.wall_share):
         innovations = passes.innovations(restricted.point)
     whiteness = whiteness_of(
         [
             (white, used & one.settled)
-            for (white, used), one in zip(innovations, series, strict=True)
+            for (white, used), one in zip(innovations, ready.series, strict=True)
         ]
     )
-    facts_given: dict[str, Any] = {}
-    if used_angle == "state":
-        course.begin(ANGLE_GIVEN)
+    consistency: dict[str, Any] = {}
+    if ready.angle == "state":
+        course.begin("angle as given")
+        outline = outline_of(chosen.tank.to_arena())
         given = series_of(ready.parts, chosen, outline, "given", ready.places)
-        facts_given = angle_given_facts(
-            Passes(given, body_of(chosen, "given"), spline, flows), mode, restricted, chosen
-        )
-    duration = sum(float(one.time[-1] - one.time[0]) for one in series)
-    mended = ready.dropped_frames / max(ready.samples, 1)
+        passes_given = Passes(given, body_of(chosen, "given"), spline, flows)
+        consistency = angle_given_facts(passes_given, law.mode, restricted, chosen)
     with solved(ready.wall_share):
-        covariance = with_mended_frames(parameter_covariance(mode, restricted), mended)
-        stated = open_where_undetermined(covariance, mode, restricted)
-        slopes = side_slopes(passes, law, restricted, chosen)
-        parameters = parameter_facts(restricted.point, stated, chosen, by_side=slopes)
-    facts: dict[str, Any] = {
-        **parameters,
-        "maximum_likelihood_drag_coefficient": stated_drag(mode.point, chosen),
-        **precision_facts(math.inf if mode.lost else math.sqrt(covariance[0, 0]), duration, chosen),
+        facts = _parameter_facts(passes, law, restricted, ready, chosen)
+    facts = {
+        **facts,
         **law_facts(law, assumptions),
         **_turning(start, passes),
-        "wetted_depth_m": chosen.wetted_depth_m,
-        "wall_share": ready.wall_share,
-        "angle": used_angle,
-        **facts_given,
-        "restricted": "yes" if restricted.has_minimum else "no",
-        "samples": ready.samples,
-        "mistakes": ready.mistakes,
-        "jumps_removed": ready.jumps_removed,
-        "dropped_frames": ready.dropped_frames,
-        "dropped_places": ready.dropped_places,
-        "samples_used": mode.used,
-        "intervals_usable": usable_intervals(series),
-        "duration_s": duration,
-        "recordings": len(ready.tracks),
+        **consistency,
         **whiteness._asdict(),
-        "iterations": mode.iterations,
-        "converged": "yes" if mode.converged else "no",
-        "search_left": mode.left if mode.lost else 0.0,
-        "roughness_weight": mode.weights.roughness,
-        "size_weight": mode.weights.size,
-        "source": ", ".join(str(one.attrs.get("source", "")) for one in many),
-        "simulated_recording": "yes" if any(is_simulated(one) for one in many) else "no",
+        **_recording_facts(many, ready),
+        **_search_facts(law, restricted),
+        "wetted_depth_m": chosen.wetted_depth_m,
     }
     fit = build_fit(
         spline,
-        mode,
+        law,
         restricted,
-        series,
+        ready.series,
         study=chosen,
-        oriented=used_angle != "none",
-        intervals=intervals,
+        oriented=ready.angle != "none",
+        intervals=ready.intervals,
         first=float(ready.tracks[0].time[0]),
-        law=law,
         facts=facts,
     )
     shares = visited_shares(fit)
-    unstated = unstated_warning(chosen, about="block")
-    warnings = [] if unstated is None else [unstated]
-    warnings += [
-        sentence
-        for recording, track in zip(many, ready.tracks, strict=True)
-        for sentence in jump_warnings(recording, body, track=track)
-    ]
-    warnings += warnings_of(facts, whiteness, shares, intervals, side_m=chosen.block.side_m)
+    warnings = _warnings(many, ready, facts, whiteness, shares, chosen, body)
     return described(
         fit.assign(visited_share=((), min(shares))).assign_coords(
             warning=("warning", texts(warnings))
         )
     )
+
+
+def _parameter_facts(
+    passes: Passes, law: LawResult, restricted: Restricted, ready: PreparedRecordings, study: Study
+) -> dict[str, Any]:
+    """Return the parameters with their intervals, and the precision of C_d."""
+    mode = law.mode
+    mended = ready.dropped_frames / max(ready.samples, 1)
+    covariance = with_mended_frames(parameter_covariance(mode, restricted), mended)
+    stated = open_where_undetermined(covariance, mode, restricted)
+    slopes = side_slopes(passes, law, restricted, study)
+    std = math.inf if mode.diverged else math.sqrt(covariance[0, 0])
+    return {
+        **parameter_facts(restricted.point, stated, study, by_side=slopes),
+        "maximum_likelihood_drag_coefficient": stated_drag(mode.point, study),
+        **precision_facts(std, ready.duration, study),
+    }
+
+
+def _recording_facts(many: Sequence[xr.Dataset], ready: PreparedRecordings) -> dict[str, Any]:
+    """Return what stands in a fit of its recordings."""
+    return {
+        "wall_share": ready.wall_share,
+        "angle": ready.angle,
+        "samples": ready.samples,
+        "mistakes": ready.mistakes,
+        "jumps_removed": ready.jumps_removed,
+        "dropped_frames": ready.dropped_frames,
+        "dropped_places": ready.dropped_places,
+        "intervals_usable": usable_intervals(ready.series),
+        "duration_s": ready.duration,
+        "recordings": len(ready.tracks),
+        "source": ", ".join(str(one.attrs.get("source", "")) for one in many),
+        "simulated_recording": "yes" if any(is_simulated(one) for one in many) else "no",
+    }
+
+
+def _search_facts(law: LawResult, restricted: Restricted) -> dict[str, Any]:
+    """Return what stands in a fit of its search."""
+    mode = law.mode
+    return {
+        "restricted": "yes" if restricted.has_minimum else "no",
+        "samples_used": mode.used,
+        "iterations": mode.iterations,
+        "converged": "yes" if mode.converged else "no",
+        "search_left": mode.left if mode.diverged else 0.0,
+        "roughness_weight": mode.weights.roughness,
+        "size_weight": mode.weights.size,
+    }
+
+
+def _warnings(
+    many: Sequence[xr.Dataset],
+    ready: PreparedRecordings,
+    facts: Mapping[str, Any],
+    whiteness: Whiteness,
+    shares: Sequence[float],
+    study: Study,
+    body: str | None,
+) -> list[str]:
+    """Return the warnings of a fit, in sentences."""
+    unstated = unstated_warning(study, about="block")
+    jumps = [
+        sentence
+        for recording, track in zip(many, ready.tracks, strict=True)
+        for sentence in jump_warnings(recording, body, track=track)
+    ]
+    side = study.block.side_m
+    own = warnings_of(facts, whiteness, shares, ready.intervals, side_m=side)
+    return [*([] if unstated is None else [unstated]), *jumps, *own]
 
 
 def _turning(start: Point, passes: Passes) -> dict[str, float]:
@@ -259,76 +292,45 @@ def _usual_search(passes: Passes) -> float:
     few = pieces(passes)
     whole = work_of_pass(passes)
     if few is None:
-        return (PASSES_FROM_AFAR + TRIAL_PASSES) * whole
-    near = PASSES_OF_PIECES * work_of_pass(replace(passes, series=few))
-    return near + (PASSES_FROM_PIECES + TRIAL_PASSES) * whole
+        return (WORK.from_afar + WORK.score_tests) * whole
+    near = WORK.of_pieces * work_of_pass(replace(passes, series=few))
+    return near + (WORK.from_pieces + WORK.score_tests) * whole
 
 
 def _usual_parts(passes: Passes, angle: str) -> dict[str, float]:
     """Return the work of each stage of a fit, in samples."""
     whole = work_of_pass(passes)
     return {
-        SEARCH: _usual_search(passes),
-        RESTRICTED: PASSES_RESTRICTED * whole,
-        **({ANGLE_GIVEN: PASSES_ANGLE_GIVEN * whole} if angle == "state" else {}),
+        "likelihood": _usual_search(passes),
+        "drag": WORK.restricted * whole,
+        **({"angle as given": WORK.angle_given * whole} if angle == "state" else {}),
     }
 
 
-def _counted(course: Course, usual: float) -> Passed:
-    """Return what hears of the work of the search, of which nobody knows how much there will be."""
-    said, done = course.stage(SEARCH), 0.0
+def _work_listener(course: Course, usual: float) -> Passed:
+    """Return a listener to the work of the search, whose length is unknown beforehand."""
+    said, done = course.stage("likelihood"), 0.0
 
     def passed(work: float) -> None:
         nonlocal done
         done += work
         said(share_of_search(done / usual), 1)
 
-    course.begin(SEARCH)
+    course.begin("likelihood")
     return passed
 
 
-def _longest_in(ready: Ready, flow: int) -> Track:
-    """Return the longest part that is in a flow."""
-    return max(
-        (part for part, (one, _) in zip(ready.parts, ready.places, strict=True) if one == flow),
-        key=lambda part: part.time.size,
-    )
+def _start(passes: Passes, ready: PreparedRecordings, study: Study) -> Point:
+    """Return the point from which the search begins."""
 
+    def longest(flow: int) -> Any:
+        in_flow = zip(ready.parts, ready.places, strict=True)
+        return max((part for part, (one, _) in in_flow if one == flow), key=lambda p: p.time.size)
 
-def _start(passes: Passes, ready: Ready, study: Study) -> Point:
-    """Return where the search begins."""
     return first_point(
         ready.tracks,
         study,
         passes.spline,
         angle=passes.body.orientation,
-        in_flows=[_longest_in(ready, flow) for flow in range(passes.flows)],
+        in_flows=[longest(flow) for flow in range(passes.flows)],
     )
-
-
-def _search(
-    passes: Passes,
-    start: Point,
-    ready: Ready,
-    assumptions: Assumptions,
-    study: Study,
-    course: Course,
-) -> tuple[LawFound, Restricted]:
-    """Return the law with the maximum of its likelihood, and that of the restricted one."""
-    prior = Prior(passes)
-    weights = first_weights(ready.tracks, passes.spline)
-    with solved(ready.wall_share):
-        passed = _counted(course, _usual_search(passes))
-        law = LawSearch(passes, prior, assumptions, study.fit.iterations, passed).find(
-            start, weights
-        )
-        course.begin(RESTRICTED)
-        try:
-            restricted = restricted_drag(passes, law.mode, prior)
-        except BREAKDOWN:
-            # What was opened may have no restricted likelihood; the law without it has one.
-            law = replace(law, mode=law.base)
-            restricted = restricted_drag(passes, law.mode, prior)
-        noise = math.exp(restricted.point.log_noise)
-    require_noise_below_motion(noise, ready.tracks, ready.wall_share)
-    return law, restricted

@@ -16,9 +16,6 @@ if TYPE_CHECKING:
 
     from driftwalk.model import Study
 
-HALF_SWITCH_S = 1e-6
-"""A flow field is linear between its frames: those before and after a switch are so far from it."""
-
 
 @dataclass(frozen=True)
 class Intervals:
@@ -104,24 +101,7 @@ def _letter(index: int) -> str:
 
 
 def cut_track(track: Track, intervals: Intervals, *, fewest: int, where: str) -> list[Track]:
-    """Cut a track at the switching times, one part for each interval.
-
-    Parameters
-    ----------
-    track : Track
-        The recorded body.
-    intervals : Intervals
-        Where to cut.
-    fewest : int
-        Positions that every part needs.
-    where : str
-        The recording, to begin a message with.
-
-    Raises
-    ------
-    InputError
-        When a switching time is outside the recording, or an interval too short.
-    """
+    """Cut a track at the switching times, one part for each interval."""
     if not intervals.times:
         return [track]
     first, last = float(track.time[0]), float(track.time[-1])
@@ -151,23 +131,6 @@ def switched_frames(
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Return frames of a flow that jumps at the switches, where frames are joined by lines.
 
-    Parameters
-    ----------
-    intervals : Intervals
-        When the flow changes.
-    fields : mapping
-        By name the field of each flow.
-    first : float
-        First sample of the recording on its own clock [s].
-
-    Returns
-    -------
-    time : ndarray
-        Times of the frames [s] from the first sample on: one just before and one just after each
-        switch.
-    frames : dict
-        By name the fields at these times.
-
     Examples
     --------
     >>> steps = Intervals((5.0,), (0, 1), ("A", "B"))
@@ -176,8 +139,9 @@ def switched_frames(
     ([2.999999, 3.000001], [[0.0], [1.0]])
     """
     time, flow = [], []
+    half = 1e-6  # [s], for a field is linear between its frames
     for index, switch in enumerate(intervals.times):
-        time += [switch - first - HALF_SWITCH_S, switch - first + HALF_SWITCH_S]
+        time += [switch - first - half, switch - first + half]
         flow += [intervals.flows[index], intervals.flows[index + 1]]
     return np.array(time), {
         name: np.stack([values[one] for one in flow]) for name, values in fields.items()

@@ -3,27 +3,31 @@
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
-USUAL_PRECISION: Final = 0.1
-"""Standard error of ln C_d above which a fit warns where nobody has said what is wanted."""
-USUAL_S: Final = 1200.0
-"""In some 20 minutes, 10 to 30 by the flow, C_d comes out to the two below."""
-PRECISION_WITHOUT_ANGLE: Final = 0.1
-PRECISION_WITH_ANGLE: Final = 0.05
+
+class LengthPolicy(NamedTuple):
+    """The precision of C_d that a recording of usual length gives."""
+
+    usual_precision: float = 0.1
+    """Standard error of ln C_d above which a fit warns, where the user states no precision. Chosen
+    by hand."""
+    usual_s: float = 1200.0
+    """Length [s] in which C_d comes out to the two precisions that follow: 20 minutes, 10 to 30 by
+    the flow. A rule of thumb."""
+    without_angle: float = 0.1
+    """Standard error of ln C_d in that time without orientations. Cautious: half an hour has 6 % on
+    the bundled recording (docs/explanation/likelihood.md)."""
+    with_angle: float = 0.05
+    """Standard error of ln C_d in that time with orientations. Cautious: half an hour has 1 % on
+    the bundled recording."""
+
+
+LENGTH: Final = LengthPolicy()
 
 
 def needed_duration(duration: float, std: float, precision: float) -> float:
     """Return how long a recording like this one has to be for a precision [s].
-
-    Parameters
-    ----------
-    duration : float
-        Length of the recording [s].
-    std : float
-        Standard deviation of ln C_d that it gives; it falls with the root of the length.
-    precision : float
-        The one that is wanted.
 
     Examples
     --------
@@ -54,8 +58,8 @@ def length_advice(precision: float | None) -> str:
             "As a rule 10 to 30 min give C_d to 10 % without orientations, to about 5 % with them"
         )
     with_angle, without = (
-        in_words(needed_duration(USUAL_S, usual, precision))
-        for usual in (PRECISION_WITH_ANGLE, PRECISION_WITHOUT_ANGLE)
+        in_words(needed_duration(LENGTH.usual_s, usual, precision))
+        for usual in (LENGTH.with_angle, LENGTH.without_angle)
     )
     return (
         f"For C_d to {100 * precision:.3g} % record some {with_angle} with orientations, "

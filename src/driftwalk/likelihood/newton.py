@@ -1,30 +1,27 @@
-"""The maximum of the penalised likelihood, by Gauss-Newton, and the smoothness of the flow.
-
-Prior of the flow's coefficients: ``exp(-(lam_r c' R c + lam_s c' S c) / 2)`` per component, R and S
-the roughness and the size of `driftwalk.likelihood.spline.penalties`; with several flows the
-weights are the same for all. The two weights follow from the data: each step sets a weight to the
-degrees of freedom that the data have taken from its prior, over ``c' R c`` or ``c' S c`` (MacKay's
-fixed point of the evidence).
-"""
+"""The maximum of the penalised likelihood, by Gauss-Newton with a step that is kept in bounds."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, replace
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from driftwalk.core.run_stages import tell_nobody
-from driftwalk.likelihood.filter_pass import Passes, Point, Sums
-from driftwalk.likelihood.law.departures import NUMBERS
-from driftwalk.likelihood.solution import cholesky
-from driftwalk.likelihood.spline import Floats, penalties
+from driftwalk.likelihood.filter.departures import NUMBERS
+from driftwalk.likelihood.filter.excerpt import pieces
+from driftwalk.likelihood.filter.filter_pass import Passes, Sums
+from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.filter.series import Series
+from driftwalk.likelihood.prior import LEVER, MOST_FACTOR, Prior, Weights
+from driftwalk.likelihood.solution import BREAKDOWN, cholesky
+from driftwalk.likelihood.spline import Floats
 
-PRIOR_DRAG = 0.5
-"""Centre of the weak prior of C_d, and where the search begins."""
-PRIOR_LOG_DRAG_STD = 0.7
+Tell = Callable[[int, int, str], None]
+Passed = Callable[[float], None]
+"""Hears of work as it is done, see `work_of_pass`."""
 Held = Sequence[Sequence[int]]
 """Parameters, counted from C_d on, that the first steps leave as they are."""
 FROM_AFAR: Final[Held] = ((0, 2, 3, 4), (0,))
@@ -33,103 +30,60 @@ FROM_ANOTHER: Final[Held] = ((1, 2, 3, 4), (1, 2, 3, 4))
 """Where the search begins at the mode of other samples, the flow has to follow the new ones before
 a step of the noises means anything."""
 FROM_NEAR: Final[Held] = ()
-PRIOR_LEVER = 0.01
-"""Centre of the weak prior of the force's lever, in sides of the block, and its first value."""
-NOTABLE_LEVER = 0.005
-"""Lever of the force, in sides of the block, above which the turning is not that of the model: on
-recordings of the model it comes out at 0.001 to 0.004, with angles 5 degrees off at 0.015."""
-PRIOR_LOG_LEVER_STD = 1.0
-PRIOR_ANGLE_NOISE = 0.01
-"""Centre of the prior of the angle's noise [rad], so weak that it counts only where the turning is
-so restless that nothing is known of the noise."""
-PRIOR_LOG_ANGLE_NOISE_STD = 2.3
-LEVER, ANGLE_NOISE = 3, 4
-"""Places of the lever and of the angle's noise, counted from C_d on."""
-MOST_LOG_STEP = 1.0
-"""Of the lever and of the angle's noise."""
-MOST_LOG_DRAG_STEP = 0.5
-MOST_FACTOR = 10.0
-"""By which q, r^2 or the weight of a penalty may change in a step."""
-CLOSE = 0.25
-"""Converged when the steps of C_d and the noises, and in the mean those of the coefficients, are
-below this part of their standard deviations: what is left is a tenth of such a step."""
-CLOSE_ENOUGH = 0.5
-"""The same where a search of many more samples begins: what is saved here costs more there."""
-MOST_LEFT: Final = 2.0
-"""Standard deviations: an interval around a place further from the maximum does not hold it. A body
-that is driven on a circle without any force was given up 5 to 80 away."""
-CLOSE_NATS: Final = 1.0
-"""Converged when a whole step would also raise the log likelihood by less than this. Hundreds of
-coefficients may each move by a small part of their standard deviations and gain 100 nats together:
-on the plateau at the edge of a narrow jet a search ended 170 nats above its minimum."""
 
 
-@dataclass(frozen=True)
-class Weights:
-    """Weights of the two penalties."""
+class SearchPolicy(NamedTuple):
+    """How far a step goes, and when the search ends."""
 
-    roughness: float
-    size: float
+    most_log_drag_step: float = 0.5
+    """Largest step of ln C_d. Chosen by hand."""
+    most_log_step: float = 1.0
+    """Largest step of the logarithm of the lever or of the angle's noise. Chosen by hand."""
+    close: float = 0.25
+    """The search has converged when the steps of C_d and the noises, and in the mean those of the
+    coefficients, are below this part of their standard deviations. A tenth of such a step is left
+    then (docs/explanation/likelihood.md)."""
+    close_enough: float = 0.5
+    """The same where a search of many more samples begins: what is saved here costs more there.
+    Chosen by hand."""
+    close_nats: float = 1.0
+    """And when a whole step would raise the log likelihood by less than this [nat]. Hundreds of
+    coefficients may each move by little and gain 100 nats together: on the plateau at the edge of a
+    narrow jet a search ended 170 nats above its minimum."""
+    most_left: float = 2.0
+    """Standard deviations from the maximum beyond which an interval does not hold it. A body that
+    is driven on a circle without any force was given up 5 to 80 away."""
+    trial_iterations: int = 12
+    """Most steps of a search that only tries whether a law or a number has a mode: as many as the
+    longest usual search (docs/explanation/likelihood.md)."""
 
 
-class Prior:
-    """The prior of all parameters as a quadratic form."""
+SEARCH: Final = SearchPolicy()
 
-    def __init__(self, passes: Passes) -> None:
-        self.roughness, self.size = penalties(passes.spline)
-        self.log_lever = math.log(PRIOR_LEVER * passes.body.side)
 
-    def matrix(self, weights: Weights) -> Floats:
-        """Return the precision of one component's coefficients."""
-        return weights.roughness * self.roughness + weights.size * self.size
+class WorkPolicy(NamedTuple):
+    """Usual work of each stage in passes of the filter, for the progress of a fit.
 
-    def add(self, sums: Sums, point: Point, weights: Weights) -> Sums:
-        """Return the sums with the prior of the coefficients, of C_d and of the lever in them."""
-        precision = self.matrix(weights)
-        count = len(precision)
-        coefficients = point.coefficients.reshape(-1, count)
-        score, information = sums.score.copy(), sums.information.copy()
-        pull = coefficients @ precision
-        for component in range(len(coefficients)):
-            part = slice(component * count, (component + 1) * count)
-            information[part, part] += precision
-            score[part] -= pull[component]
-        deviance = sums.deviance + 0.5 * float((pull * coefficients).sum())
-        drag = coefficients.size
-        single = [(drag, point.log_drag - math.log(PRIOR_DRAG), PRIOR_LOG_DRAG_STD)]
-        if point.log_lever is not None:
-            single.append((drag + LEVER, point.log_lever - self.log_lever, PRIOR_LOG_LEVER_STD))
-        if point.log_angle_noise is not None:
-            off = point.log_angle_noise - math.log(PRIOR_ANGLE_NOISE)
-            single.append((drag + ANGLE_NOISE, off, PRIOR_LOG_ANGLE_NOISE_STD))
-        first = drag + 1 + len(point.noises)
-        for index, (name, value) in enumerate(point.opened.items(), first):
-            single.append((index, value - NUMBERS[name].model, NUMBERS[name].prior_std))
-        for index, off, std in single:
-            deviance += 0.5 * (off / std) ** 2
-            # Without derivatives by the noises there is no row of the lever.
-            if index < score.size:
-                information[index, index] += 1.0 / std**2
-                score[index] -= off / std**2
-        return Sums(deviance, score, information, sums.used)
+    Measured on the bundled recording and parts of it.
+    """
 
-    def updated(self, weights: Weights, point: Point, covariance: Floats) -> Weights:
-        """Return the weights after one step of the evidence's fixed point."""
-        inverse = np.linalg.inv(self.matrix(weights))
-        count = len(inverse)
-        coefficients = point.coefficients.reshape(-1, count)
-        parts = [
-            covariance[k * count : (k + 1) * count, k * count : (k + 1) * count]
-            for k in range(len(coefficients))
-        ]
-        new = []
-        for old, form in ((weights.roughness, self.roughness), (weights.size, self.size)):
-            prior = len(parts) * float((form * inverse).sum())
-            posterior = sum(float((form * part).sum()) for part in parts)
-            value = float(np.einsum("ka,ab,kb->", coefficients, form, coefficients))
-            wanted = old * (prior - posterior) / max(value, 1e-300)
-            new.append(float(np.clip(wanted, old / MOST_FACTOR, old * MOST_FACTOR)))
-        return Weights(*new)
+    overhead_samples: float = 2000.0
+    """Time of a pass besides its samples, in samples: measured on the first 100 and 300 s too."""
+    from_afar: float = 9.0
+    """Passes of a search from afar."""
+    of_pieces: float = 7.0
+    """Passes of a search on pieces of a long recording."""
+    from_pieces: float = 4.0
+    """Passes of the search on all of a long recording that follows."""
+    score_tests: float = 2.5
+    """Passes that take as long as the score tests of closed numbers."""
+    restricted: float = 2.0
+    """Passes that take as long as the restricted likelihood."""
+    angle_given: float = 3.0
+    """Passes that take as long as the second fit, with the angle as an input."""
+
+
+WORK: Final = WorkPolicy()
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,9 +104,9 @@ class Mode:
     step, in standard deviations: how far the maximum seems to be."""
 
     @property
-    def lost(self) -> bool:
+    def diverged(self) -> bool:
         """Whether the search was given up so far from a maximum that its numbers mean nothing."""
-        return not self.converged and not self.left <= MOST_LEFT
+        return not self.converged and not self.left <= SEARCH.most_left
 
     def value_of(self, name: str) -> tuple[float, float]:
         """Return a noise or an opened number, and its standard deviation by theory."""
@@ -172,86 +126,99 @@ def known_numbers_variance(mode: Mode) -> float:
     return float(own - across @ np.linalg.solve(mode.covariance[first:, first:], across))
 
 
-Tell = Callable[[int, int, str], None]
-Passed = Callable[[float], None]
-"""Hears of work as it is done, see `work_of_pass`."""
-BESIDE_SAMPLES: Final = 2000
-"""A pass takes as much time besides its samples as that of so many (the bundled recording, and the
-first 100 and 300 s of it)."""
-
-
 def work_of_pass(passes: Passes) -> float:
     """Return the work of one pass of the filter with derivatives, in samples."""
-    return float(sum(one.time.size for one in passes.series) + BESIDE_SAMPLES)
+    return sum(one.time.size for one in passes.series) + WORK.overhead_samples
 
 
-def find_mode(
-    passes: Passes,
-    start: Point,
-    weights: Weights,
-    prior: Prior,
-    *,
-    iterations: int,
-    passed: Passed = tell_nobody,
-    held: Held = FROM_AFAR,
-    close: float = CLOSE,
-    close_nats: float = CLOSE_NATS,
-) -> Mode:
-    """Search the maximum of the penalised likelihood.
+@dataclass(frozen=True, eq=False)
+class ModeSearch:
+    """Searches the mode of the penalised likelihood for the recordings of one fit."""
 
-    Parameters
-    ----------
-    passes : Passes
-        The filter.
-    start : Point
-        Where to begin.
-    weights : Weights
-        Of the penalties, at the beginning.
-    prior : Prior
-        Their forms.
-    iterations : int
-        Most steps.
-    passed : callable
-        Called after every pass of the filter with its work.
-    held : sequence of sequence of int
-        Parameters that the first steps leave as they are: `FROM_AFAR`, `FROM_ANOTHER` or
-        `FROM_NEAR`.
-    close : float
-        The search ends when its steps are below this part of the standard deviations,
-    close_nats : float
-        and when a whole step would gain less than this [nat].
-    """
-    point, used, converged = start, 0, False
-    covariance = np.zeros((0, 0))
-    deviance = ahead = math.inf
-    last = np.zeros(start.coefficients.size + 1 + len(start.extras))
-    for index in range(iterations):
-        drag = point.coefficients.size
-        left = [drag + k for k in (held[index] if index < len(held) else ())]
-        left = [one for one in left if one <= drag + len(point.noises)]
-        others = range(drag + 1, drag + 1 + len(point.extras))
-        moving = "without" if set(others) <= set(left) else "with"
-        sums = _of_all(prior.add(passes.sums(point, noise=moving), point, weights), last.size)
-        passed(work_of_pass(passes))
-        used, deviance = sums.used, sums.deviance
-        covariance = inverse(sums.information)
-        whole = newton_step(sums, covariance, held=left)
-        step = limited(whole, drag, list(point.opened))
-        step = last = damped(step, last, sums.information)
-        point = point.moved(step)
-        weights = prior.updated(weights, point, covariance)
-        stds = np.sqrt(np.diag(covariance))
-        moves, ways = np.abs(step) / stds, np.abs(whole) / stds
-        # A lever that is known from its prior alone may go to and fro without moving anything else.
-        if point.log_lever is not None:
-            moves[drag + LEVER] = ways[drag + LEVER] = 0.0
-        ahead = float(ways[drag:].max())
-        near = max(float(moves[drag:].max()), float(np.sqrt((moves[:drag] ** 2).mean())))
-        gain = 0.5 * float(sums.score @ covariance @ sums.score)
-        if len(left) == 0 and near < close and gain < close_nats:
-            converged = True
-            break
-    return Mode(point, weights, covariance, used, index + 1, converged, deviance, ahead)
+    passes: Passes
+    prior: Prior
+    iterations: int
+    """Most steps of a search."""
+    passed: Passed = tell_nobody
+    """Called after every pass of the filter with its work."""
+    close: float = SEARCH.close
+    """A search ends when its steps are below this part of the standard deviations,"""
+    close_nats: float = SEARCH.close_nats
+    """and when a whole step would gain less than this [nat]."""
+
+    def of(self, series: Sequence[Series]) -> ModeSearch:
+        """Return the search for other series."""
+        return replace(self, passes=replace(self.passes, series=series))
+
+    def shortened(self) -> ModeSearch:
+        """Return the search with fewer steps, to see whether it comes to an end."""
+        few = min(self.iterations, SEARCH.trial_iterations)
+        return replace(self, iterations=few, close_nats=math.inf)
+
+    def coarse(self) -> ModeSearch:
+        """Return a search that ends a little earlier, where another one follows."""
+        return replace(self, close=SEARCH.close_enough, close_nats=math.inf)
+
+    def find(self, start: Point, weights: Weights, *, held: Held = FROM_AFAR) -> Mode | None:
+        """Return the mode; None where the search breaks down, as under a wrong law it may."""
+        point, used, converged = start, 0, False
+        covariance = np.zeros((0, 0))
+        deviance = ahead = math.inf
+        last = np.zeros(start.coefficients.size + 1 + len(start.extras))
+        try:
+            with np.errstate(all="ignore"):
+                for index in range(self.iterations):
+                    drag = point.coefficients.size
+                    left = [drag + k for k in (held[index] if index < len(held) else ())]
+                    left = [one for one in left if one <= drag + len(point.noises)]
+                    # Derivatives by the noises take a pass each: none where all of them are held.
+                    others = range(drag + 1, drag + 1 + len(point.extras))
+                    moving = "without" if set(others) <= set(left) else "with"
+                    sums = self.passes.sums(point, noise=moving)
+                    sums = _of_all(self.prior.add(sums, point, weights), last.size)
+                    self.passed(work_of_pass(self.passes))
+                    used, deviance = sums.used, sums.deviance
+                    covariance = inverse(sums.information)
+                    whole = newton_step(sums, covariance, held=left)
+                    step = limited(whole, drag, list(point.opened))
+                    step = last = damped(step, last, sums.information)
+                    point = point.moved(step)
+                    # The smoothness follows the data: one step of the evidence's fixed point.
+                    weights = self.prior.updated(weights, point, covariance)
+                    stds = np.sqrt(np.diag(covariance))
+                    moves, ways = np.abs(step) / stds, np.abs(whole) / stds
+                    # A lever that is known from its prior alone may go to and fro without moving
+                    # anything else.
+                    if point.log_lever is not None:
+                        moves[drag + LEVER] = ways[drag + LEVER] = 0.0
+                    ahead = float(ways[drag:].max())
+                    of_flow = float(np.sqrt((moves[:drag] ** 2).mean()))
+                    near = max(float(moves[drag:].max()), of_flow)
+                    gain = 0.5 * float(sums.score @ covariance @ sums.score)
+                    if len(left) == 0 and near < self.close and gain < self.close_nats:
+                        converged = True
+                        break
+        except BREAKDOWN:
+            return None
+        return Mode(point, weights, covariance, used, index + 1, converged, deviance, ahead)
+
+    def find_from_afar(self, start: Point, weights: Weights) -> Mode | None:
+        """Return the mode, of long recordings by way of the mode of pieces of them."""
+        few = pieces(self.passes)
+        if few is not None:
+            near = self.of(few).coarse().find(start, weights)
+            if near is not None and near.converged:
+                mode = self.find(near.point, near.weights, held=FROM_ANOTHER)
+                if mode is not None and mode.converged:
+                    return mode
+        return self.find(start, weights)
+
+
+def require_mode(mode: Mode | None) -> Mode:
+    """Return a mode; raise `LinAlgError` where the search broke down."""
+    if mode is None:
+        raise np.linalg.LinAlgError("the search broke down")
+    return mode
 
 
 def _of_all(sums: Sums, count: int) -> Sums:
@@ -290,23 +257,14 @@ def limited(step: Floats, drag: int, opened: Sequence[str] = ()) -> Floats:
     in the variance it finds a wrong one in one step, from whatever side. Lever and noise of the
     angle are another matter: they may be known from their priors alone, which are those of
     logarithms.
-
-    Parameters
-    ----------
-    step : ndarray
-        In (coefficients, ln C_d, noises, numbers).
-    drag : int
-        Where ln C_d stands in it.
-    opened : sequence of str
-        The numbers, at its end.
     """
-    shorter = step * min(1.0, MOST_LOG_DRAG_STEP / max(abs(float(step[drag])), 1e-300))
+    shorter = step * min(1.0, SEARCH.most_log_drag_step / max(abs(float(step[drag])), 1e-300))
     for index, power in ((1, 1.0), (2, 2.0)):
         factor = np.clip(1.0 + power * step[drag + index], 1.0 / MOST_FACTOR, MOST_FACTOR)
         shorter[drag + index] = math.log(factor) / power
     numbers = step.size - len(opened)
     levers = slice(drag + LEVER, numbers)
-    shorter[levers] = np.clip(step[levers], -MOST_LOG_STEP, MOST_LOG_STEP)
+    shorter[levers] = np.clip(step[levers], -SEARCH.most_log_step, SEARCH.most_log_step)
     for index, name in enumerate(opened, numbers):
         most = NUMBERS[name].most
         shorter[index] = min(max(float(step[index]), -most), most)

@@ -1,4 +1,4 @@
-"""Recordings made ready for the filter of the likelihood fit, or refused."""
+"""Preparation of the recordings for the filter."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.text.argument_text import argument_text
 from driftwalk.core.text.json_text import parse_json
 from driftwalk.flow.arena import Outline, outline_of, read_arena
-from driftwalk.likelihood.angle import no_angle, smooth_angle
-from driftwalk.likelihood.filter_pass import LONGEST_GAP_S, Body, Series
+from driftwalk.likelihood.angle import ORIENTED_SHARE, no_angle, smooth_angle
+from driftwalk.likelihood.filter.series import FILTER, Body, Series
 from driftwalk.likelihood.intervals import Intervals, cut_track, intervals_of
 from driftwalk.likelihood.refuse import (
-    FEWEST_SAMPLES,
+    LIMIT,
     require_length,
     require_memory,
     require_own_arena,
@@ -30,7 +30,7 @@ from driftwalk.likelihood.tracker_errors.dropped import (
     places_of,
     with_gaps,
 )
-from driftwalk.likelihood.tracker_errors.outliers import without_mistakes
+from driftwalk.likelihood.tracker_errors.outliers import without_outliers
 from driftwalk.likelihood.tracker_errors.smoothed import require_raw
 from driftwalk.likelihood.wall import wall_intervals
 from driftwalk.schema import Track, body_track
@@ -39,12 +39,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
-
-ORIENTED_SHARE = 0.5
-"""Share of samples with an orientation from which on "auto" uses it."""
-
-LINEAR_TIME_S = 1.0
-"""Linear and quadratic drag are compared at the speed of one side of the block in this time."""
 
 AngleUse = Literal["auto", "state", "given", "none"]
 
@@ -59,7 +53,7 @@ def as_list(recordings: xr.Dataset | Sequence[xr.Dataset]) -> list[xr.Dataset]:
     return many
 
 
-class Ready(NamedTuple):
+class PreparedRecordings(NamedTuple):
     """Recordings, ready for the filter."""
 
     tracks: list[Track]
@@ -84,6 +78,11 @@ class Ready(NamedTuple):
     """Where they are, in words; empty where there are none."""
 
     @property
+    def duration(self) -> float:
+        """Length of all recordings together [s]."""
+        return sum(float(one.time[-1] - one.time[0]) for one in self.series)
+
+    @property
     def samples(self) -> int:
         """Number of all samples, with those that are left out."""
         return sum(one.time.size for one in self.series) + self.mistakes
@@ -91,8 +90,9 @@ class Ready(NamedTuple):
 
 def prepare(
     many: Sequence[xr.Dataset], study: Study, angle: AngleUse | None, body: str | None
-) -> Ready:
+) -> PreparedRecordings:
     """Return recordings ready for the filter; refuse what cannot be fitted."""
+    # The cheap refusals come first: memory and size need no track to be read.
     require_memory(sum(one.sizes["time"] for one in many))
     intervals = intervals_of(study)
     outline = outline_of(study.tank.to_arena())
@@ -103,29 +103,33 @@ def prepare(
     for index, recording in enumerate(many):
         seen, where = body_track(recording, body), _name_of(recording)
         name = str(recording.attrs.get("source", ""))
-        track = without_mistakes(seen)
+        track = without_outliers(seen)
         mistakes += seen.time.size - track.time.size
         require_length(track, study, where=where)
         require_travel(track, study, where=name)
+        # Smoothing is looked for in the track as recorded: gaps would cut its spectrum.
         raws.append(track)
         dropped.append(find_dropped_frames(track, recording["time"].values))
         track = with_gaps(track, dropped[-1])
-        cut = cut_track(track, intervals, fewest=FEWEST_SAMPLES, where=where)
+        cut = cut_track(track, intervals, fewest=LIMIT.fewest_samples, where=where)
         for number, part in enumerate(cut):
             if len(cut) > 1:
                 require_travel(part, study, where=f"{where}{intervals.describe(number)}")
         tracks.append(track)
         parts += cut
         places += [(flow, index) for flow in intervals.flows]
+    # One use of the angle for all recordings, as they share the noise of the angle.
     used_angle = use_angle(many, tracks, study.fit.angle if angle is None else angle)
     series = series_of(parts, study, outline, used_angle, places)
     count, near_wall = (
         sum(one.time.size - 1 for one in series),
         sum(one.near_wall for one in series),
     )
+    # A tank that was fitted to the positions touches them: say so before the wall share does.
     if _is_fitted_arena(many[0], study):
         require_own_arena(study, intervals=count, near_wall=near_wall, where=_name_of(many[0]))
     _require_usable(series, study)
+    # Each flow has coefficients of its own, so each needs enough intervals.
     for flow in range(0 if intervals.steady else len(intervals.labels)):
         _require_usable(
             [one for one in series if one.flow == flow],
@@ -136,7 +140,7 @@ def prepare(
         for raw, recording in zip(raws, many, strict=True):
             require_raw(raw, where=_name_of(recording))
     share = near_wall / count
-    return Ready(
+    return PreparedRecordings(
         tracks,
         parts,
         places,
@@ -229,13 +233,16 @@ def series_of(
         ends[number if places is None else places[number][1]] = float(track.time[-1])
     for number, track in enumerate(tracks):
         flow, recording = (0, number) if places is None else places[number]
+        # All parts of a recording count time from its first sample: the cosines of the flow's
+        # strength run over the whole of it.
         if not found or found[-1].recording != recording:
             first = float(track.time[0])
         time = track.time - first
         smooth = no_angle(time.size)
         corners = None
         if used_angle != "none":
-            smooth = smooth_angle(time, track.theta, longest_gap=LONGEST_GAP_S)
+            smooth = smooth_angle(time, track.theta, longest_gap=FILTER.longest_gap_s)
+            # A corner is where the recorded angle puts it; the smooth one only fills its holes.
             corners = np.where(np.isfinite(track.theta), track.theta, smooth.theta)
         wall = wall_intervals(
             time,
@@ -244,7 +251,7 @@ def series_of(
             corners,
             outline=outline,
             side=study.block.side_m,
-            longest_gap=LONGEST_GAP_S,
+            longest_gap=FILTER.longest_gap_s,
         )
         found.append(
             Series(
@@ -270,7 +277,7 @@ def _require_usable(series: Sequence[Series], study: Study, *, where: str = "") 
         intervals=sum(one.time.size - 1 for one in series),
         near_wall=sum(one.near_wall for one in series),
         tank=study.tank.describe(),
-        longest_gap=LONGEST_GAP_S,
+        longest_gap=FILTER.longest_gap_s,
         where=where,
     )
 
@@ -278,7 +285,7 @@ def _require_usable(series: Sequence[Series], study: Study, *, where: str = "") 
 def usable_intervals(series: Sequence[Series]) -> int:
     """Return the number of intervals that are not left out and not longer than a gap."""
     return sum(
-        int(np.count_nonzero((one.excluded[1:] == 0) & (np.diff(one.time) <= LONGEST_GAP_S)))
+        int(np.count_nonzero((one.excluded[1:] == 0) & (np.diff(one.time) <= FILTER.longest_gap_s)))
         for one in series
     )
 
@@ -300,7 +307,8 @@ def body_of(study: Study, used_angle: str) -> Body:
         depth=study.wetted_depth_m,
         strips=study.block.strips_per_face,
         water_density=study.water.density_kg_m3,
-        linear_speed=study.block.side_m / LINEAR_TIME_S,
+        # Linear and quadratic drag are compared at a speed of one side of the block a second.
+        linear_speed=study.block.side_m,
         drag_speed=study.forces.drag_speed_m_s,
         orientation=used_angle,
     )

@@ -14,24 +14,34 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
     from driftwalk.schema import Track
 
-FEWEST_SAMPLES: Final = 100
-"""Positions, or intervals between them, that a flow needs at least."""
-MOST_WALL_SHARE: Final = 0.3
-"""Share of intervals at the wall above which C_d means little."""
-MOST_AT_OWN_WALL: Final = 0.9
-"""Share of the intervals at the wall of a tank that was fitted to the positions themselves."""
-MOST_COEFFICIENTS: Final = 4400
-"""Limit for all flows together: about six flows in the paper's tank."""
 
-SAMPLE_BYTES: Final = 5200.0
-"""Memory of a fit for each sample: 0.27 GB at 18,000 samples, 0.49 GB at 60,000, with the angle in
-the state; a million took 4 GB."""
-SAMPLE_S: Final = 1.2e-3
-"""Time of one processor for each sample, with the check: 0.8 ms for the fit at 18,000 and at 60,000
-samples in the paper's tank, and half as much for the check."""
-NOTABLE_BYTES: Final = 2e9
-NOTABLE_S: Final = 600.0
-"""A fit that takes more is announced."""
+class LimitPolicy(NamedTuple):
+    """Which recordings a fit refuses, and what it announces."""
+
+    fewest_samples: int = 100
+    """Positions, or intervals between them, that a flow needs at least. Chosen by hand."""
+    most_wall_share: float = 0.3
+    """Share of intervals at the wall above which C_d means little (docs/explanation/likelihood.md).
+    The accuracy is measured below it."""
+    most_at_own_wall: float = 0.9
+    """Share of the intervals at the wall of a tank that was fitted to the positions themselves.
+    Chosen by hand."""
+    most_coefficients: int = 4400
+    """Coefficients of all flows together: about six flows in the paper's tank. Chosen by hand, from
+    the memory and the time that `require_size` states."""
+    sample_bytes: float = 5200.0
+    """Memory of a fit for each sample. Measured: 0.27 GB at 18,000 samples, 0.49 GB at 60,000, with
+    the angle in the state; a million took 4 GB."""
+    sample_s: float = 1.2e-3
+    """Time of one processor for each sample, with the check. Measured: 0.8 ms for the fit at 18,000
+    and at 60,000 samples in the paper's tank, and half as much for the check."""
+    notable_bytes: float = 2e9
+    """A fit that takes more memory is announced. Chosen by hand."""
+    notable_s: float = 600.0
+    """A fit that takes longer is announced [s]. Chosen by hand."""
+
+
+LIMIT: Final = LimitPolicy()
 
 
 class Work(NamedTuple):
@@ -45,7 +55,7 @@ class Work(NamedTuple):
     @property
     def notable(self) -> bool:
         """Whether it is so much that it should be said before."""
-        return self.memory > NOTABLE_BYTES or self.seconds > NOTABLE_S
+        return self.memory > LIMIT.notable_bytes or self.seconds > LIMIT.notable_s
 
     def describe(self) -> str:
         """Return "a fit of 1000000 samples takes about 5.2 GB of memory and 20 min".
@@ -62,7 +72,11 @@ class Work(NamedTuple):
 
     def advice(self) -> str:
         """Return how to take fewer samples."""
-        every = max(math.ceil(self.memory / NOTABLE_BYTES), math.ceil(self.seconds / NOTABLE_S), 2)
+        every = max(
+            math.ceil(self.memory / LIMIT.notable_bytes),
+            math.ceil(self.seconds / LIMIT.notable_s),
+            2,
+        )
         return (
             "fit a part of the time (`start`, `stop` of `load`), or fewer samples a second, such "
             f"as one row in {every} of the file"
@@ -87,17 +101,11 @@ def fit_work(samples: int) -> Work:
     >>> round(fit_work(100_000).seconds)
     120
     """
-    return Work(samples, SAMPLE_BYTES * samples, SAMPLE_S * samples)
+    return Work(samples, LIMIT.sample_bytes * samples, LIMIT.sample_s * samples)
 
 
 def require_memory(samples: int) -> None:
-    """Refuse more samples than this machine has memory for.
-
-    Raises
-    ------
-    InputError
-        With the memory and the time that they would take.
-    """
+    """Refuse more samples than this machine has memory for."""
     work, there = fit_work(samples), machine_memory()
     if there is not None and work.memory > there:
         raise InputError(
@@ -106,38 +114,18 @@ def require_memory(samples: int) -> None:
 
 
 def require_length(track: Track, study: Study, *, where: str) -> None:
-    """Refuse a recording with too few positions.
-
-    Raises
-    ------
-    InputError
-        With how long to record for the precision that the study asks for.
-    """
-    if track.time.size < FEWEST_SAMPLES:
+    """Refuse a recording with too few positions."""
+    if track.time.size < LIMIT.fewest_samples:
         raise InputError(
             f"{where}the recording has {track.time.size} positions of this body; the fit needs "
-            f"{FEWEST_SAMPLES} at least. {length_advice(study.fit.drag_coefficient_precision)}"
+            f"{LIMIT.fewest_samples} at least. "
+            f"{length_advice(study.fit.drag_coefficient_precision)}"
         )
 
 
 def require_own_arena(study: Study, *, intervals: int, near_wall: int, where: str) -> None:
-    """Refuse a tank that was fitted to the positions and then excludes nearly all of them.
-
-    Parameters
-    ----------
-    study : Study
-        The block and the tank, a fitted circle.
-    intervals, near_wall : int
-        Intervals between samples: all, and those at the wall.
-    where : str
-        Beginning of the message.
-
-    Raises
-    ------
-    InputError
-        With the sizes of both, and what to state instead.
-    """
-    if near_wall <= MOST_AT_OWN_WALL * intervals:
+    """Refuse a tank that was fitted to the positions and then excludes nearly all of them."""
+    if near_wall <= LIMIT.most_at_own_wall * intervals:
         return
     reason = (
         "the body stays in a region too small to find the tank from. State the tank with "
@@ -156,25 +144,8 @@ def require_own_arena(study: Study, *, intervals: int, near_wall: int, where: st
 def require_usable(
     usable: int, *, intervals: int, near_wall: int, tank: str, longest_gap: float, where: str
 ) -> None:
-    """Refuse when too few intervals are left after those at the wall and in gaps.
-
-    Parameters
-    ----------
-    usable, intervals, near_wall : int
-        Intervals between samples that can be used, all of them, and those at the wall.
-    tank : str
-        The tank in words.
-    longest_gap : float
-        Longest interval that is predicted over [s].
-    where : str
-        The subject, to begin the message with.
-
-    Raises
-    ------
-    InputError
-        With what was left out, and why.
-    """
-    if usable >= FEWEST_SAMPLES:
+    """Refuse when too few intervals are left after those at the wall and in gaps."""
+    if usable >= LIMIT.fewest_samples:
         return
     advice = (
         "check size and place of the tank, and record where the block stays away from the wall"
@@ -184,38 +155,26 @@ def require_usable(
     left_out = (
         f"all {intervals} intervals are at the wall of the tank (a {tank})"
         if near_wall == intervals
-        else f"only {usable} of {intervals} intervals can be used, at least {FEWEST_SAMPLES} are "
-        f"needed: {near_wall} are at the wall of the tank (a {tank}), the others are longer than "
-        f"{longest_gap:g} s or have no orientation near"
+        else f"only {usable} of {intervals} intervals can be used, at least "
+        f"{LIMIT.fewest_samples} are needed: {near_wall} are at the wall of the tank (a {tank}), "
+        f"the others are longer than {longest_gap:g} s or have no orientation near"
     )
     raise InputError(f"{where}{left_out}; {advice}")
 
 
 def require_size(flows: int, coefficients: int) -> None:
-    """Refuse more flows than can be fitted together in sensible memory and time.
-
-    Parameters
-    ----------
-    flows : int
-        Number of flows.
-    coefficients : int
-        Coefficients of one flow.
-
-    Raises
-    ------
-    InputError
-        With the memory and the time that they would take.
-    """
+    """Refuse more flows than can be fitted together in sensible memory and time."""
     total = flows * coefficients
-    if flows == 1 or total <= MOST_COEFFICIENTS:
+    if flows == 1 or total <= LIMIT.most_coefficients:
         return
     # Half a dozen matrices of doubles; inverse and factors take some 3 n^3 operations in each of
     # about twenty steps.
     memory = 6 * 8 * total**2 / 1e9
+    fitting = LIMIT.most_coefficients // coefficients
     minutes = 20 * 3 * float(total) ** 3 / 3e10 / 60
     raise InputError(
         f"{flows} flows of {coefficients} coefficients are too many to fit together: they would "
-        f"take about {memory:.1f} GB and {minutes:.0f} min, {MOST_COEFFICIENTS // coefficients} "
+        f"take about {memory:.1f} GB and {minutes:.0f} min, {fitting} "
         "can be fitted; set knots further apart (`fit.spline_spacing_m`), give flows that come "
         "back the same name (`fit.flow_labels`), or fit parts of the recording (`start`, `stop` "
         "of `load`)"

@@ -14,28 +14,38 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.likelihood.filter_pass import Passes, Point
-from driftwalk.likelihood.newton import Mode, Prior, known_numbers_variance
+from driftwalk.likelihood.filter.filter_pass import Passes
+from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.newton import Mode, known_numbers_variance
+from driftwalk.likelihood.prior import Prior
 from driftwalk.likelihood.solution import cholesky
 from driftwalk.likelihood.spline import Floats
 
-SPAN = 2.0
-"""The profile is looked at this many standard deviations around the first guess of its minimum."""
-NEAR = 1.0
-"""A first guess within so many standard deviations of the likelihood's maximum is the minimum."""
-LATTICE = 2001
-INTENSITY_STEP = 0.05
-"""Change of ln q for the slope of the determinant."""
-MOST_STD_RATIO = 4.0
-"""A criterion that is so much flatter or sharper than the likelihood has no minimum worth the name:
-the motion does not follow the model, or tells nothing of C_d."""
-MOST_NOISE_MOVE = 1.0
-"""Nor has one along whose ridge ln(tracking noise) moves by more: nothing holds the noise there. In
-recordings of the model it moves by some hundredths."""
+
+class RemlPolicy(NamedTuple):
+    """Where the restricted criterion is computed, and when it has a minimum."""
+
+    span: float = 2.0
+    """Standard deviations around the first guess of the minimum at which the profile is computed.
+    Chosen by hand."""
+    near: float = 1.0
+    """A first guess within this many standard deviations of the likelihood's maximum is the
+    minimum. Chosen by hand."""
+    intensity_step: float = 0.05
+    """Change of ln q for the slope of the determinant. Chosen by hand."""
+    most_std_ratio: float = 4.0
+    """A criterion that is this many times flatter or sharper than the likelihood has no minimum:
+    the motion does not follow the model, or tells nothing of C_d. Chosen by hand."""
+    most_noise_move: float = 1.0
+    """Largest move of ln(tracking noise) along the ridge of a criterion that has a minimum: beyond
+    it nothing holds the noise. In recordings of the model it moves by some hundredths."""
+
+
+REML: Final = RemlPolicy()
 
 
 class Profile(NamedTuple):
@@ -90,24 +100,7 @@ def profile_at(
 def restricted_drag(
     passes: Passes, mode: Mode, prior: Prior, *, intensity: bool = True
 ) -> Restricted:
-    """Minimise the restricted criterion over ln C_d.
-
-    Parameters
-    ----------
-    passes : Passes
-        The filter.
-    mode : Mode
-        The maximum of the likelihood; noises and smoothness stay as they are there.
-    prior : Prior
-        The penalties.
-    intensity : bool
-        Whether q, too, is made that of the restricted criterion.
-
-    Returns
-    -------
-    Restricted
-        With the coefficients that belong to the C_d found.
-    """
+    """Minimise the restricted criterion over ln C_d."""
     start = mode.point
     drag = start.coefficients.size
     # The profile is that of a C_d beside numbers that are known.
@@ -115,27 +108,29 @@ def restricted_drag(
     slopes = mode.covariance[:, drag] / mode.covariance[drag, drag]
     found = [profile_at(passes, mode, prior, start.log_drag, start.coefficients.ravel())]
 
-    def look(log_drag: float) -> None:
+    def add_profile(log_drag: float) -> None:
         near = min(found, key=lambda one: abs(one.log_drag - log_drag))
         guess = near.coefficients + slopes[:drag] * (log_drag - near.log_drag)
         found.append(profile_at(passes, mode, prior, log_drag, guess))
 
-    look(start.log_drag - SPAN * sd)
+    add_profile(start.log_drag - REML.span * sd)
     # Two points give the slope of the determinant and with it a first guess of the minimum.
     guess, _ = _minimum(found)
-    guess = float(np.clip(guess, start.log_drag - 2 * SPAN * sd, start.log_drag + SPAN * sd))
-    if abs(guess - start.log_drag) > NEAR * sd:
-        look(guess)
-        look(guess - SPAN * sd)
+    guess = float(
+        np.clip(guess, start.log_drag - 2 * REML.span * sd, start.log_drag + REML.span * sd)
+    )
+    if abs(guess - start.log_drag) > REML.near * sd:
+        add_profile(guess)
+        add_profile(guess - REML.span * sd)
     found.sort(key=lambda one: one.log_drag)
     log_drag, std = _minimum(found)
-    if not sd / MOST_STD_RATIO <= std <= sd * MOST_STD_RATIO:
+    if not sd / REML.most_std_ratio <= std <= sd * REML.most_std_ratio:
         return Restricted(start, sd, found, has_minimum=False)
     nearest = min(found, key=lambda one: abs(one.log_drag - log_drag))
     coefficients = _coefficients_at(found, nearest, log_drag)
     # The noises that belong to this C_d follow along the ridge of the likelihood.
     point = start.moved(slopes * (log_drag - start.log_drag))
-    if abs(point.log_noise - start.log_noise) > MOST_NOISE_MOVE:
+    if abs(point.log_noise - start.log_noise) > REML.most_noise_move:
         return Restricted(start, sd, found, has_minimum=False)
     point = replace(
         point, log_drag=log_drag, coefficients=coefficients.reshape(start.coefficients.shape)
@@ -157,11 +152,11 @@ def _with_restricted_intensity(
     order = np.argsort(at)
     values = np.array([one.half_log_determinant for one in found])
     here = float(np.interp(point.log_drag, at[order], values[order]))
-    more = replace(point, log_intensity=point.log_intensity + INTENSITY_STEP)
+    more = replace(point, log_intensity=point.log_intensity + REML.intensity_step)
     there = profile_at(
         passes, replace(mode, point=more), prior, point.log_drag, point.coefficients.ravel()
     )
-    slope = (there.half_log_determinant - here) / INTENSITY_STEP
+    slope = (there.half_log_determinant - here) / REML.intensity_step
     drag = point.coefficients.size
     with_drag = mode.covariance[drag + 1 :, drag]
     # Of the noises with ln q, at this C_d.
@@ -191,7 +186,7 @@ def _minimum(found: list[Profile]) -> tuple[float, float]:
     determinants = [one.half_log_determinant - found[0].half_log_determinant for one in found]
     slope = polynomial.fit(at, slopes, degree).convert()
     slope = slope + polynomial.fit(at, determinants, degree).convert().deriv()
-    lattice = np.linspace(at.min() - 0.5, at.max() + 0.5, LATTICE)
+    lattice = np.linspace(at.min() - 0.5, at.max() + 0.5, 2001)
     values = slope(lattice)
     upward = np.flatnonzero((values[:-1] < 0.0) & (values[1:] >= 0.0))
     if not upward.size:

@@ -18,25 +18,17 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.errors import InputError
 from driftwalk.flow.arena import Outline, outline_of
 from driftwalk.flow.grid import Grid, make_grid
-from driftwalk.likelihood.filter_pass import Point, Series
-from driftwalk.likelihood.interval_inflation import widened
-from driftwalk.likelihood.intervals import Intervals, fitted_intervals, switched_frames
-from driftwalk.likelihood.law.facts import (
-    inertia_facts,
-    inertia_of,
-    number_facts,
-    number_variables,
-)
-from driftwalk.likelihood.law.found import LawFound
-from driftwalk.likelihood.newton import PRIOR_LOG_DRAG_STD, Mode, known_numbers_variance
+from driftwalk.likelihood.filter.series import Series
+from driftwalk.likelihood.interval_inflation import open_where_undetermined, parameter_covariance
+from driftwalk.likelihood.intervals import Intervals
+from driftwalk.likelihood.law.facts import number_variables
+from driftwalk.likelihood.law.forward_selection import LawResult
 from driftwalk.likelihood.reml import Restricted
 from driftwalk.likelihood.spline import Floats, Spline
-from driftwalk.schema import FLAGS, build_flow_field
+from driftwalk.schema import FLAGS
 from driftwalk.schema.answers.fit_facts import fit_variables
-from driftwalk.schema.check import refuse_other_version
 from driftwalk.schema.kinds import KINDS
 
 if TYPE_CHECKING:
@@ -44,14 +36,6 @@ if TYPE_CHECKING:
 
     from driftwalk.model import Study
 
-LEAST_QUADRATIC = 1e-6
-"""Share of the quadratic drag below which nothing is known of its C_d."""
-MOST_LOG_WIDTH: Final = 300.0
-"""Beyond this an interval has no upper end: exp would not fit a double for long."""
-PRIOR_ALONE: Final = math.sqrt(0.5)
-"""Share of the prior's standard deviation of ln C_d above which the data tell less than it does."""
-LEAST_COUNT: Final = 3
-"""Samples with the block over a node that make the node a measured one."""
 PARAMETERS: Final = (
     "ln_drag_coefficient",
     "ln_noise_intensity",
@@ -104,102 +88,9 @@ def whiteness_of(innovations: list[tuple[Floats, npt.NDArray[np.bool_]]]) -> Whi
     return Whiteness(variance, products / count / max(variance, 1e-300), 1.0 / math.sqrt(count))
 
 
-def parameter_covariance(mode: Mode, restricted: Restricted) -> Floats:
-    """Return the covariance of ln C_d, the noises and opened numbers.
-
-    C_d's variance comes from its own criterion, in which the numbers are known; it is made larger
-    by the share that they add to it. The rest is that of theory, with the factors that were
-    measured.
-    """
-    drag = mode.point.coefficients.size
-    covariance = mode.covariance[drag:, drag:].copy()
-    scale = np.ones(len(covariance))
-    scale[0] = restricted.log_drag_std / math.sqrt(known_numbers_variance(mode))
-    return widened(covariance * np.outer(scale, scale), mode.point)
-
-
-def open_where_undetermined(covariance: Floats, mode: Mode, restricted: Restricted) -> Floats:
-    """Return the covariance, infinite for parameters of which the recording tells nothing.
-
-    Parameters
-    ----------
-    covariance : ndarray
-        As of `parameter_covariance`.
-    mode, restricted : Mode, Restricted
-        Where the search has come to, and C_d: where the data say less of it than its weak prior,
-        the estimate is the prior's.
-    """
-    if mode.lost:
-        return np.asarray(np.diag(np.full(len(covariance), math.inf)))
-    found = covariance.copy()
-    if restricted.log_drag_std > PRIOR_ALONE * PRIOR_LOG_DRAG_STD:
-        found[0, 0] = math.inf
-    return found
-
-
-def parameter_facts(
-    point: Point, covariance: Floats, study: Study, *, by_side: tuple[float, float] = (0.0, 0.0)
-) -> dict[str, Any]:
-    """Return the parameters with their intervals, units in the keys.
-
-    `by_side` holds the derivatives of ln C_d and ln σ_F by the logarithm of the block's side.
-    """
-    from scipy.special import ndtri
-
-    confidence = study.fit.confidence
-    interval = study.forces.force_interval_s
-    mass = study.block.mass_kg
-    intensity = mass**2 * math.exp(point.log_intensity)
-    normal = float(ndtri(0.5 + 0.5 * confidence))
-    reach = normal * np.sqrt(np.diag(covariance))
-    reach_of_drag = normal * _log_drag_std(point, covariance)
-    heavier = inertia_of(study, floating=point.number("water_acceleration") != 0.0)
-    side = normal * study.fit.side_std_m / study.block.side_m
-    of_drag, of_force = (
-        math.hypot(one, normal * heavier.log_std, side * slope)
-        for one, slope in zip((reach_of_drag, 0.5 * reach[1]), by_side, strict=True)
-    )
-    total = heavier.share**2 * intensity
-    drag = (1.0 - point.number("linear_share")) * math.exp(point.log_drag)
-    values = {
-        "drag_coefficient": (heavier.share * drag, of_drag),
-        "force_std_N": (math.sqrt(total / interval), of_force),
-        "force_noise_intensity_N2_s": (total, 2.0 * of_force),
-        "tracking_noise_m": (math.exp(point.log_noise), reach[2]),
-    }
-    if point.log_lever is not None and point.log_angle_noise is not None:
-        values["force_lever_m"] = (math.exp(point.log_lever), reach[3])
-        values["orientation_noise_rad"] = (math.exp(point.log_angle_noise), reach[4])
-    if heavier.share != 1.0 or heavier.log_std > 0.0:
-        values["effective_drag_coefficient"] = (drag, reach_of_drag)
-        values["effective_force_std_N"] = (math.sqrt(intensity / interval), 0.5 * reach[1])
-    facts: dict[str, Any] = {"force_interval_s": interval, "confidence": confidence}
-    for name, (value, width) in values.items():
-        facts[name] = value
-        facts[f"{name}_interval"] = [value * math.exp(-width), _upper(value, width)]
-    return {**facts, **inertia_facts(heavier, facts, normal), **number_facts(point, reach, study)}
-
-
-def _log_drag_std(point: Point, covariance: Floats) -> float:
-    """Return the standard deviation of ln C_d of the quadratic part of the drag."""
-    if math.isinf(covariance[0, 0]):
-        return math.inf
-    slopes = np.zeros(len(covariance))
-    slopes[0] = 1.0
-    if "linear_share" in point.opened:
-        at = 1 + list(point.extras).index("linear_share")
-        slopes[at] = -1.0 / max(1.0 - point.opened["linear_share"], LEAST_QUADRATIC)
-    return math.sqrt(float(slopes @ covariance @ slopes))
-
-
-def _upper(value: float, log_width: float) -> float:
-    """Return the upper end of an interval; infinity where the data leave it open."""
-    return value * math.exp(log_width) if log_width < MOST_LOG_WIDTH else math.inf
-
-
 def build_fit(
     spline: Spline,
-    mode: Mode,
+    law: LawResult,
     restricted: Restricted,
     series: list[Series],
     *,
@@ -207,7 +98,6 @@ def build_fit(
     oriented: bool,
     intervals: Intervals,
     first: float,
-    law: LawFound,
     facts: dict[str, Any],
 ) -> xr.Dataset:
     """Assemble the dataset of a fit, without warnings and the share of the tank that was visited.
@@ -216,6 +106,7 @@ def build_fit(
     """
     import xarray as xr
 
+    mode = law.mode
     outline = outline_of(study.tank.to_arena())
     grid = make_grid(outline, cells=study.flow.cells, cell_size=study.flow.cell_size_m)
     flows = [
@@ -232,19 +123,19 @@ def build_fit(
         for flow in range(len(intervals.labels))
     ]
     profiles = restricted.profiles
+    # Only differences of a profile mean anything: it begins at zero.
     least = min(one.deviance for one in profiles)
     flat = profiles[0].half_log_determinant
     uncertainty = parameter_covariance(mode, restricted)
-    if mode.lost:
+    # The stored covariance stays finite where C_d is known from its prior alone, as the check draws
+    # from it; a search that was given up has none.
+    if mode.diverged:
         uncertainty = open_where_undetermined(uncertainty, mode, restricted)
     noises = 1 + len(mode.point.noises)
     names = np.array([*PARAMETERS[:noises], *mode.point.opened], dtype=object)
     data: dict[str, Any] = {
         **(flows[0] if intervals.steady else _stacked(flows)),
-        "covariance": (
-            ("log_parameter", "other_log_parameter"),
-            uncertainty,
-        ),
+        "covariance": (("log_parameter", "other_log_parameter"), uncertainty),
         "profile_deviance": ("profile", [one.deviance - least for one in profiles]),
         "profile_half_log_determinant": (
             "profile",
@@ -267,10 +158,7 @@ def build_fit(
     }
     if not intervals.steady:
         coords["flow"] = ("flow", np.array(intervals.labels, dtype=object))
-        data["interval_flow"] = (
-            "flow_interval",
-            np.array(intervals.flows, dtype=np.int32),
-        )
+        data["interval_flow"] = ("flow_interval", np.array(intervals.flows, dtype=np.int32))
         facts["switching_times_s"] = list(intervals.times)
         facts["recording_start_s"] = first
     numbers, names_of = fit_variables(facts)
@@ -336,87 +224,6 @@ def visited_shares(fit: xr.Dataset) -> list[float]:
     ]
 
 
-def require_fit(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a fit.
-
-    Raises
-    ------
-    InputError
-        When it is no fit, or one of another schema version.
-    """
-    kind = dataset.attrs.get("kind")
-    if kind != "fit":
-        raise InputError(f"not a fit: its kind is {kind!r}; fit_motion makes one")
-    return refuse_other_version(dataset)
-
-
-def fitted_flow(fit: xr.Dataset, *, interval: int | None = None) -> xr.Dataset:
-    """Return the flow of a fit as a flow field, for everything that takes one.
-
-    Parameters
-    ----------
-    fit : xarray.Dataset
-        Result of `fit_motion`.
-    interval : int, optional
-        With switching times: the interval, counted from 0, whose steady flow is wanted. Without
-        it the flow that changes is returned: its frames are a microsecond before and after each
-        switch, as fields are linear in time between frames; times count from the first sample of
-        the first recording, as those of a simulation do.
-
-    Returns
-    -------
-    xarray.Dataset
-        A `flow_field`. Nodes that the block has been over are *measured*, the others of the tank
-        *filled*: there the spline is continued smoothly. Standard errors stand at measured nodes
-        (those of all nodes are in the fit); they are correlated over about the distance of knots.
-
-    Raises
-    ------
-    InputError
-        When the dataset is no fit, or has no such interval.
-
-    Examples
-    --------
-    >>> import driftwalk as dw
-    >>> flow = dw.fitted_flow(dw.fit_motion(dw.tank30_recording()))  # doctest: +SKIP
-    """
-    fit = require_fit(fit)
-    intervals = fitted_intervals(fit)
-    if interval is not None and not 0 <= interval < len(intervals.flows):
-        raise InputError(
-            f"no interval {interval}: the fit has {len(intervals.flows)}, counted from 0"
-        )
-    attrs: dict[str, Any] = {
-        "method": "bicubic spline, fitted with drag and noise by the innovations' likelihood",
-        "cell_size_m": float(fit["cell_size"]),
-        **{key: fit.attrs[key] for key in ("arena", "source")},
-    }
-    if intervals.steady:
-        return build_flow_field(
-            fit["x"].values, fit["y"].values, attrs=attrs, **_field_variables(fit)
-        )
-    fields = [_field_variables(fit.isel(flow=index)) for index in range(fit.sizes["flow"])]
-    if interval is not None:
-        flow = intervals.flows[interval]
-        attrs["flow_label"] = intervals.labels[flow]
-        attrs["intervals"] = ", ".join(intervals.describe(one) for one in intervals.of_flow(flow))
-        return build_flow_field(fit["x"].values, fit["y"].values, attrs=attrs, **fields[flow])
-    attrs["repeat"] = "hold"  # before the first switch and after the last the flow is steady
-    by_name = {name: [one[name] for one in fields] for name in fields[0]}
-    time, frames = switched_frames(intervals, by_name, first=float(fit["recording_start"]))
-    return build_flow_field(fit["x"].values, fit["y"].values, time=time, attrs=attrs, **frames)
-
-
-def _field_variables(fit: xr.Dataset) -> dict[str, Any]:
-    """Return the variables of a flow field: standard errors at measured nodes only."""
-    measured = fit["flag"].values == FLAGS["measured"]
-    errors = {
-        name: np.where(measured, fit[name].values, np.nan)
-        for name in ("u_standard_error", "v_standard_error")
-    }
-    return {**{name: fit[name].values for name in ("u", "v", "flag", "count")}, **errors}
-
-
 def footprint_count(
     grid: Grid, series: list[Series], *, side: float, oriented: bool
 ) -> npt.NDArray[np.float64]:
@@ -430,8 +237,8 @@ def footprint_count(
     offsets = np.arange(-reach, reach + 1)
     total = np.zeros(grid.size)
     for one in series:
-        kept = (one.excluded == 0) & np.isfinite(one.x) & np.isfinite(one.theta)
-        x, y, theta = one.x[kept], one.y[kept], one.theta[kept]
+        retained = (one.excluded == 0) & np.isfinite(one.x) & np.isfinite(one.theta)
+        x, y, theta = one.x[retained], one.y[retained], one.theta[retained]
         column = np.round((x - grid.x[0]) / grid.cell_size).astype(np.intp)
         row = np.round((y - grid.y[0]) / grid.cell_size).astype(np.intp)
         cosine, sine = np.cos(theta), np.sin(theta)
@@ -454,5 +261,5 @@ def _flags(grid: Grid, outline: Outline, count: Floats) -> npt.NDArray[np.int8]:
     x, y = (part.ravel() for part in grid.nodes())
     flag = np.full(grid.shape, FLAGS["filled"], dtype=np.int8)
     flag[(outline.depth(x, y) < 0.0).reshape(grid.shape)] = FLAGS["outside"]
-    flag[count >= LEAST_COUNT] = FLAGS["measured"]
+    flag[count >= 3] = FLAGS["measured"]
     return flag

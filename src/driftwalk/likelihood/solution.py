@@ -1,4 +1,4 @@
-"""Fits that have no solution: found where they break down, and said in one sentence."""
+"""Breakdown of a search: fits that have no solution, as one error for people."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from driftwalk.core.errors import InputError
-from driftwalk.likelihood.refuse import MOST_WALL_SHARE
+from driftwalk.likelihood.refuse import LIMIT
 
 if TYPE_CHECKING:
     from driftwalk.likelihood.spline import Floats
@@ -22,18 +22,7 @@ is no longer a number, the root of a negative variance, a value that the filter 
 
 @contextmanager
 def solved(wall_share: float = 0.0) -> Iterator[None]:
-    """Turn every way in which a search breaks down into one error for people.
-
-    Parameters
-    ----------
-    wall_share : float
-        Share of the intervals that were left out because the body is at the wall.
-
-    Raises
-    ------
-    InputError
-        When the search within it breaks down.
-    """
+    """Turn every way in which a search breaks down into one error for people."""
     try:
         with np.errstate(all="ignore"):
             yield
@@ -47,7 +36,7 @@ def solved(wall_share: float = 0.0) -> Iterator[None]:
 
 def _reason(wall_share: float) -> str:
     """Return why a search may break down, and what to do."""
-    if wall_share > MOST_WALL_SHARE:
+    if wall_share > LIMIT.most_wall_share:
         return (
             f"{wall_share:.0%} of the intervals are at the wall and were left out, and the motion "
             "in the others does not follow the model; record where the body stays away from the "
@@ -59,13 +48,7 @@ def _reason(wall_share: float) -> str:
 
 
 def cholesky(information: Floats) -> Any:
-    """Return scipy's Cholesky factor of an information matrix.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        When it is not positive definite, or holds a value that is not finite.
-    """
+    """Return scipy's Cholesky factor of an information matrix."""
     from scipy.linalg import cho_factor
 
     if not np.isfinite(information).all():
@@ -76,22 +59,7 @@ def cholesky(information: Floats) -> Any:
 def require_noise_below_motion(
     noise: float, tracks: Sequence[Track], wall_share: float = 0.0
 ) -> None:
-    """Refuse a solution that takes the whole motion for tracking noise.
-
-    Parameters
-    ----------
-    noise : float
-        Fitted tracking noise [m].
-    tracks : sequence of Track
-        The recordings.
-    wall_share : float
-        As of `solved`.
-
-    Raises
-    ------
-    InputError
-        When the positions scatter less than the noise alone would make them.
-    """
+    """Refuse a solution that takes the whole motion for tracking noise."""
     scatter = max(float(axis.std()) for track in tracks for axis in (track.x, track.y))
     if noise > scatter:
         raise InputError(

@@ -19,12 +19,7 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
-REACH = 0.1
-"""The knots go beyond the tank's bounding box by this many block sides: a corner of a tracked block
-may seem to be outside."""
 DEGREE = 3
-_GAUSS_POINTS = 4
-"""Exact for products of two cubics."""
 
 
 @dataclass(frozen=True)
@@ -60,15 +55,7 @@ class Spline:
         return np.asarray(along_y @ coefficients @ along_x.T)
 
     def standard_errors(self, covariance: Floats, x: Floats, y: Floats) -> Floats:
-        """Return the standard errors [m/s] at the nodes of a grid, shape (2, y.size, x.size).
-
-        Parameters
-        ----------
-        covariance : ndarray, shape (2 size, 2 size)
-            Of the coefficients, u first.
-        x, y : ndarray
-            Nodes [m].
-        """
+        """Return the standard errors [m/s] at the nodes of a grid, shape (2, y.size, x.size)."""
         along_x, along_y = self.design(x, y)
         errors = np.empty((2, y.size, x.size))
         for component in range(2):
@@ -84,24 +71,17 @@ class Spline:
 def lay_spline(outline: Outline, *, side: float, spacing: float) -> Spline:
     """Lay knots over a tank, centred on its bounding box.
 
-    Parameters
-    ----------
-    outline : Outline
-        The tank.
-    side : float
-        Side of the block [m].
-    spacing : float
-        Distance between knots [m].
-
     Examples
     --------
     >>> from driftwalk.flow.arena import Circle
     >>> lay_spline(Circle(0.15), side=0.03, spacing=0.02).columns
     19
     """
+    # Knots go beyond the tank by a tenth of a side: a corner of a tracked block may seem to be
+    # outside.
     x_min, y_min, x_max, y_max = outline.bounds
     cells_x, cells_y = (
-        math.ceil((high - low + 2.0 * REACH * side) / spacing - 1e-9)
+        math.ceil((high - low + 2.0 * 0.1 * side) / spacing - 1e-9)
         for low, high in ((x_min, x_max), (y_min, y_max))
     )
     return Spline(
@@ -140,13 +120,10 @@ def basis_matrix(position: Floats, count: int) -> Floats:
 
 
 def penalties(spline: Spline) -> tuple[Floats, Floats]:
-    """Return the matrices of the two penalties on one velocity component.
+    """Return the matrices R, S of the two penalties on one velocity component f.
 
-    Returns
-    -------
-    roughness, size : ndarray, shape (spline.size, spline.size)
-        ``c' roughness c`` is the integral of ``f_xx^2 + 2 f_xy^2 + f_yy^2`` over the knots' box,
-        ``c' size c`` that of ``f^2``.
+    ``c' R c`` is the integral of ``f_xx^2 + 2 f_xy^2 + f_yy^2`` over the knots' box, ``c' S c`` the
+    integral of ``f^2``.
 
     Examples
     --------
@@ -164,7 +141,7 @@ def penalties(spline: Spline) -> tuple[Floats, Floats]:
 
 def _gram(count: int, spacing: float, order: int) -> Floats:
     """Return the integrals of products of two basis functions' derivatives along an axis."""
-    nodes, weights = np.polynomial.legendre.leggauss(_GAUSS_POINTS)
+    nodes, weights = np.polynomial.legendre.leggauss(4)  # exact for products of two cubics
     values = _derivative(0.5 * (nodes + 1.0), order) / spacing**order
     cell = values.T @ (values * (0.5 * spacing * weights)[:, None])
     gram = np.zeros((count, count))

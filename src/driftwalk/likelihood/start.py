@@ -1,4 +1,4 @@
-"""Where the search of the likelihood fit begins."""
+"""Starting values of the search."""
 
 from __future__ import annotations
 
@@ -12,21 +12,13 @@ import numpy as np
 from driftwalk.conditions import recorded_camera, typical_speed
 from driftwalk.conditions.own_flow import flow_from_track
 from driftwalk.core.errors import InputError
-from driftwalk.likelihood.filter_pass import Point
-from driftwalk.likelihood.newton import PRIOR_DRAG, PRIOR_LEVER, Weights
+from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.prior import PRIOR, Weights
 from driftwalk.likelihood.spline import Floats, Spline, penalties
 from driftwalk.schema import FLAGS, Track
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
-
-SMOOTHING = 1e-3
-"""Weight of the roughness, against the data, in the spline through the first flow field."""
-UNREST = 0.1
-"""Share of U^3 / a (speed U, block side a) that the first q is: rather too large than too small, as
-a small one makes the filter lose the track."""
-SMALLEST_NOISE = 1e-3
-"""Least tracking noise at the start, of the step between samples."""
 
 
 def first_point(
@@ -37,30 +29,22 @@ def first_point(
     angle: str,
     in_flows: Sequence[Track] = (),
 ) -> Point:
-    """Return the first values: C_d = 0.5, the flow of Eq. 4, the noise of `driftwalk info`.
-
-    Parameters
-    ----------
-    tracks : sequence of Track
-        The recordings.
-    study, spline
-        Block and tank, and the knots of the flow.
-    angle : {"state", "given", "none"}
-        How orientations are used.
-    in_flows : sequence of Track
-        With several flows: a track in each of them.
-    """
+    """Return the first values: C_d = 0.5, the flow of Eq. 4, the noise of `driftwalk info`."""
     cameras = [recorded_camera(track, study, position_quantum=0.0) for track in tracks]
     steps = np.concatenate([np.hypot(np.diff(track.x), np.diff(track.y)) for track in tracks])
-    least = max(SMALLEST_NOISE * float(np.median(steps[steps > 0.0])), 1e-9)
+    # A noise of a thousandth of the step between samples at least.
+    least = max(1e-3 * float(np.median(steps[steps > 0.0])), 1e-9)
+    # The first q is a tenth of U^3 / a, speed U and side a: rather too large than too small, as a
+    # small one makes the filter lose the track.
+    unrest = 0.1 * typical_speed(tracks) ** 3 / study.block.side_m
     point = Point(
         coefficients=(
             np.stack([_flow_coefficients(one, study, spline) for one in in_flows])
             if len(in_flows) > 1
             else _flow_coefficients(tracks[0], study, spline)
         ),
-        log_drag=math.log(PRIOR_DRAG),
-        log_intensity=math.log(UNREST * typical_speed(tracks) ** 3 / study.block.side_m),
+        log_drag=math.log(PRIOR.drag),
+        log_intensity=math.log(unrest),
         log_noise=_log_noise([camera.position_noise for camera in cameras], least),
     )
     if angle != "state":
@@ -69,7 +53,7 @@ def first_point(
     least_angle = least / study.block.side_m
     return replace(
         point,
-        log_lever=math.log(PRIOR_LEVER * study.block.side_m),
+        log_lever=math.log(PRIOR.lever * study.block.side_m),
         log_angle_noise=_log_noise([camera.orientation_noise for camera in cameras], least_angle),
     )
 
@@ -101,7 +85,8 @@ def _flow_coefficients(track: Track, study: Study, spline: Spline) -> Floats:
     normal = normal.reshape(spline.size, spline.size)
     roughness, size = penalties(spline)
     share = float(np.trace(normal)) / float(np.trace(roughness))
-    normal += SMOOTHING * share * (roughness + 1e-3 * size / spline.spacing**4)
+    # Little smoothing: the roughness has a thousandth of the weight of the data.
+    normal += 1e-3 * share * (roughness + 1e-3 * size / spline.spacing**4)
     right = [(along_y.T @ (weight * field[name].values) @ along_x).ravel() for name in ("u", "v")]
     found = np.linalg.solve(normal, np.stack(right, axis=1)).T
     return np.ascontiguousarray(found.reshape(2, spline.rows, spline.columns))

@@ -1,4 +1,4 @@
-"""Which intervals of a track may hold a contact with the wall: they are left out of the fit.
+"""Intervals of a track that may hold a contact with the wall: the fit leaves them out.
 
 The rule looks at the past only. To leave out an interval because of where the body is at its end
 would select among the forces that brought it there, and bias what is estimated.
@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 
 MARGIN = 0.002
-"""A corner nearer to the wall than this [m] may touch it within a sampling interval."""
+"""A corner nearer to the wall than this [m] may touch it within a sampling interval. Chosen by
+hand."""
 
 
 def wall_intervals(
@@ -31,27 +32,11 @@ def wall_intervals(
     side: float,
     longest_gap: float,
 ) -> npt.NDArray[np.bool_]:
-    """Find the intervals in which the block may touch the wall.
+    """Return which intervals, by the sample at their end, may hold a contact with the wall, (n,).
 
-    Parameters
-    ----------
-    time, x, y : ndarray, shape (n,)
-        The track [s], [m].
-    theta : ndarray or None
-        Orientations [rad]; without them the circle around the block replaces its corners.
-    outline : Outline
-        The tank.
-    side : float
-        Side of the block [m].
-    longest_gap : float
-        A pose is not continued from one that is older than this [s].
-
-    Returns
-    -------
-    ndarray of bool, shape (n,)
-        True at sample k where the interval from k - 1 to k counts as one at the wall: a corner at
-        k - 1, or where the motion and the turning from k - 3 to k - 1 lead by k, comes within 2 mm
-        of the wall.
+    In the one from k - 1 to k a corner comes within 2 mm of the wall: at k - 1, or where the motion
+    and the turning from k - 3 to k - 1 lead by k. Without orientations the circle around the block
+    replaces its corners.
     """
     turned = None if theta is None else np.unwrap(theta)
     ahead_x, ahead_y = (_continued(time, axis, longest_gap) for axis in (x, y))

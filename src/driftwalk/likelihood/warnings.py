@@ -4,45 +4,51 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from driftwalk.likelihood.angle_consistency import NOTABLE_DISAGREEMENT
 from driftwalk.likelihood.intervals import Intervals
-from driftwalk.likelihood.length import USUAL_PRECISION, in_words, needed_duration
-from driftwalk.likelihood.newton import NOTABLE_LEVER
-from driftwalk.likelihood.refuse import MOST_WALL_SHARE
+from driftwalk.likelihood.law.search import LAW
+from driftwalk.likelihood.length import LENGTH, in_words, needed_duration
+from driftwalk.likelihood.refuse import LIMIT
 from driftwalk.likelihood.result import Whiteness
-from driftwalk.likelihood.tracker_errors.mirrored import MIRRORED
 from driftwalk.schema.answers.fit_facts import is_open
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
 
-LEAST_USED: Final = 0.9
-"""Share of the usable intervals below which what the filter takes is not the whole motion."""
-LEAST_VISITED: Final = 0.3
-"""Share of the tank's nodes below which a fitted flow is mostly made of its prior."""
-NOTABLE_AUTOCORRELATION: Final = 0.05
-NOTABLE_STDS: Final = 4.0
+
+class WarningPolicy(NamedTuple):
+    """When a fit warns."""
+
+    least_used: float = 0.9
+    """Share of the usable intervals below which what the filter takes is not the whole motion.
+    Chosen by hand."""
+    least_visited: float = 0.3
+    """Share of the tank's nodes below which a fitted flow is mostly made of its prior. Chosen by
+    hand."""
+    autocorrelation: float = 0.05
+    """Least autocorrelation of the innovations that is reported. Chosen by hand."""
+    autocorrelation_stds: float = 4.0
+    """Standard deviations that the autocorrelation has to be from zero: chance exceeds them once in
+    16,000."""
+    disagreement_stds: float = 3.0
+    """Combined standard deviations between the two estimates of C_d, with the angle in the state
+    and as an input, beyond which they do not agree: chance exceeds it once in 370."""
+    mirrored_correlation: float = -0.35
+    """Correlation of the block's spin with the vorticity of the water below which orientations are
+    taken for mirrored. Chosen by hand: a block turns with the water around it."""
+
+
+WARNING: Final = WarningPolicy()
 
 
 def precision_facts(std: float, duration: float, study: Study) -> dict[str, float]:
-    """Return what stands in the fit on the precision of C_d.
-
-    Parameters
-    ----------
-    std : float
-        Standard deviation of ln C_d.
-    duration : float
-        Length of the recordings together [s].
-    study : Study
-        Its [fit] drag_coefficient_precision.
-    """
+    """Return what stands in the fit on the precision of C_d."""
     wanted = study.fit.drag_coefficient_precision
     facts = {"drag_coefficient_relative_std": std}
     if wanted is not None:
         facts["drag_coefficient_precision"] = wanted
-    facts["needed_duration_s"] = needed_duration(duration, std, wanted or USUAL_PRECISION)
+    facts["needed_duration_s"] = needed_duration(duration, std, wanted or LENGTH.usual_precision)
     return facts
 
 
@@ -54,21 +60,7 @@ def warnings_of(
     *,
     side_m: float,
 ) -> list[str]:
-    """Return the warnings.
-
-    Parameters
-    ----------
-    facts : mapping
-        The attributes of the fit.
-    whiteness : Whiteness
-        The check of the innovations.
-    visited : sequence of float
-        Share of the tank that the block has been over, in each flow.
-    intervals : Intervals
-        Names of the flows.
-    side_m : float
-        Side of the block [m].
-    """
+    """Return the warnings."""
     return [
         *_on_the_data(facts, visited, intervals),
         *_on_the_search(facts),
@@ -81,7 +73,7 @@ def _on_the_data(
     facts: Mapping[str, Any], visited: Sequence[float], intervals: Intervals
 ) -> list[str]:
     found = []
-    if facts["wall_share"] > MOST_WALL_SHARE:
+    if facts["wall_share"] > LIMIT.most_wall_share:
         found.append(
             f"{facts['wall_share']:.0%} of the intervals are at the wall and were "
             "left out: do not trust C_d above 30 %; record where the block stays "
@@ -104,7 +96,7 @@ def _on_the_data(
             "as their neighbours; their time was put in. Record the time of every frame"
         )
     used, usable = facts["samples_used"], facts["intervals_usable"]
-    if used < LEAST_USED * usable:
+    if used < WARNING.least_used * usable:
         found.append(
             f"the fit used {used} of {usable} intervals only: at the end of the others the body "
             "was more than 6 standard deviations from where the model predicted it; "
@@ -112,17 +104,17 @@ def _on_the_data(
         )
     std = facts["drag_coefficient_relative_std"]
     wanted = facts.get("drag_coefficient_precision")
-    if std > (wanted or USUAL_PRECISION) and not facts.get("search_left", 0.0):
+    if std > (wanted or LENGTH.usual_precision) and not facts.get("search_left", 0.0):
         # Infinite where the criterion is flat.
         needed = facts["needed_duration_s"]
         length = f"about {in_words(needed)}" if math.isfinite(needed) else "another recording"
         found.append(
             f"C_d is known to {100 * std:.2g} % only (one standard deviation) from "
-            f"{in_words(facts['duration_s'])}: for {100 * (wanted or USUAL_PRECISION):.3g} % "
-            f"{length} like this would be needed"
+            f"{in_words(facts['duration_s'])}: for "
+            f"{100 * (wanted or LENGTH.usual_precision):.3g} % {length} like this would be needed"
         )
     for flow, share in enumerate(visited):
-        if share < LEAST_VISITED:
+        if share < WARNING.least_visited:
             name = "" if intervals.steady else f"in {intervals.describe_flow(flow)} "
             found.append(
                 f"{name}the block has been over {share:.0%} of the tank only: elsewhere the flow "
@@ -167,7 +159,9 @@ def _on_the_model(facts: Mapping[str, Any], whiteness: Whiteness) -> list[str]:
             "which made C_d 31 % too small to 6 % too large on recordings of known truth"
         )
     off = abs(whiteness.autocorrelation)
-    if off > max(NOTABLE_STDS * whiteness.autocorrelation_std, NOTABLE_AUTOCORRELATION):
+    if off > max(
+        WARNING.autocorrelation_stds * whiteness.autocorrelation_std, WARNING.autocorrelation
+    ):
         found.append(
             f"the errors of prediction are correlated ({whiteness.autocorrelation:+.2f} from one "
             "sample to the next): the motion contains something that the model "
@@ -179,7 +173,7 @@ def _on_the_model(facts: Mapping[str, Any], whiteness: Whiteness) -> list[str]:
 def _on_the_turning(facts: Mapping[str, Any], side_m: float) -> list[str]:
     found = []
     along = facts.get("spin_correlation", 0.0)
-    if along < MIRRORED:
+    if along < WARNING.mirrored_correlation:
         found.append(
             f"the block seems to turn against the water (correlation {along:.2f} of its spin with "
             "the vorticity of the flow): the recorded orientation is likely mirrored, counted "
@@ -191,7 +185,7 @@ def _on_the_turning(facts: Mapping[str, Any], side_m: float) -> list[str]:
             "the fit with the angle as an input has no solution and was left out: whether the "
             "turning of the block and its motion follow one drag law is not known"
         )
-    if apart > NOTABLE_DISAGREEMENT:
+    if apart > WARNING.disagreement_stds:
         found.append(
             f"with the angle as an input C_d is {facts['drag_coefficient_angle_given']:.3g}, "
             f"{apart:.1f} combined standard deviations away: the turning of the block "
@@ -199,7 +193,7 @@ def _on_the_turning(facts: Mapping[str, Any], side_m: float) -> list[str]:
             "narrow"
         )
     lever = facts.get("force_lever_m_interval", (0.0, 0.0))[0]
-    if lever > NOTABLE_LEVER * side_m:
+    if lever > LAW.notable_lever * side_m:
         found.append(
             f"the block turns as if the force acted {1e3 * facts['force_lever_m']:.2g} mm from its "
             "centre: the recorded angle is late, or not that of the block's faces, "

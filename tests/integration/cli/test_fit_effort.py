@@ -35,7 +35,7 @@ def test_the_memory_of_this_machine_is_asked_before_the_work() -> None:
     there = machine_memory()
     if there is None:
         pytest.skip("this system does not say how much memory it has")
-    samples = int(there / refuse.SAMPLE_BYTES) + 1000
+    samples = int(there / refuse.LIMIT.sample_bytes) + 1000
     short = build_trajectory(np.arange(3.0), np.zeros(3), np.zeros(3))
     many = np.broadcast_to(0.0, (samples, 1))
     poses = dict.fromkeys(("x", "y", "theta"), (("time", "body"), many))

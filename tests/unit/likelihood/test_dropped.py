@@ -15,7 +15,7 @@ from hypothesis import given, settings, strategies as st
 import driftwalk as dw
 from driftwalk.likelihood.interval_inflation import with_mended_frames
 from driftwalk.likelihood.tracker_errors.dropped import (
-    ENOUGH,
+    DROPPED,
     find_dropped_frames,
     places_of,
     with_gaps,
@@ -34,8 +34,8 @@ class Filmed(NamedTuple):
 def without(track: Track, dropped: npt.NDArray[np.bool_]) -> Filmed:
     """Return a track that lacks frames, with stamps at a constant rate."""
     frame = np.flatnonzero(~dropped)
-    kept = Track(*(axis[frame] for axis in track[:4]))
-    return Filmed(kept._replace(time=track.time[: frame.size]), frame)
+    retained = Track(*(axis[frame] for axis in track[:4]))
+    return Filmed(retained._replace(time=track.time[: frame.size]), frame)
 
 
 def dropped_at_random(track: Track, share: float, seed: int) -> Filmed:
@@ -61,7 +61,7 @@ def test_dropped_frames_are_found_where_they_are(
     track, frame = dropped_at_random(whole, 0.05, fresh_seed(2))
     true = np.diff(frame) - 1
     found = find_dropped_frames(track, track.time)
-    assert found.evidence > 3.0 * ENOUGH
+    assert found.evidence > 3.0 * DROPPED.evidence
     right = true[found.after] == found.missing
     assert right.mean() > 0.95
     assert found.missing[right].sum() > 0.9 * true.sum()

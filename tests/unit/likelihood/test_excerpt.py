@@ -9,10 +9,10 @@ import pytest
 from fit_worlds import coarse_study, driven
 
 from driftwalk.flow.arena import outline_of
-from driftwalk.likelihood.excerpt import NEAR_SAMPLES, PIECE_SAMPLES, WORTH_FACTOR, pieces
-from driftwalk.likelihood.filter_pass import Passes
+from driftwalk.likelihood import newton
+from driftwalk.likelihood.filter.excerpt import EXCERPT, pieces
+from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.fit import fit_motion
-from driftwalk.likelihood.law import modes
 from driftwalk.likelihood.ready import body_of, series_of
 from driftwalk.likelihood.spline import lay_spline
 from driftwalk.schema import body_track
@@ -27,16 +27,16 @@ def _passes(seconds: float) -> Passes:
 
 
 def test_pieces_come_from_all_over_a_long_recording() -> None:
-    few = pieces(_passes(0.11 * WORTH_FACTOR * NEAR_SAMPLES))
+    few = pieces(_passes(0.11 * EXCERPT.worth_factor * EXCERPT.near_samples))
     assert few is not None
-    assert {one.time.size for one in few} == {PIECE_SAMPLES}
-    assert len(few) == NEAR_SAMPLES // PIECE_SAMPLES
-    whole = _passes(0.11 * WORTH_FACTOR * NEAR_SAMPLES).series[0]
+    assert {one.time.size for one in few} == {EXCERPT.piece_samples}
+    assert len(few) == EXCERPT.near_samples // EXCERPT.piece_samples
+    whole = _passes(0.11 * EXCERPT.worth_factor * EXCERPT.near_samples).series[0]
     first = [one.time[0] for one in few]
     assert first[0] == whole.time[0]
     assert few[-1].time[-1] == whole.time[-1]
     assert np.ptp(np.diff(first)) < 0.2
-    assert np.min(np.diff(first)) > 0.1 * PIECE_SAMPLES
+    assert np.min(np.diff(first)) > 0.1 * EXCERPT.piece_samples
 
 
 def test_a_short_recording_is_searched_as_a_whole() -> None:
@@ -49,7 +49,7 @@ def test_of_many_short_recordings_little_would_be_left_out() -> None:
     long = _passes(600.0)
     few = pieces(replace(long, series=5 * long.series))
     assert few is not None
-    assert sum(one.time.size for one in few) == 5 * 2 * PIECE_SAMPLES
+    assert sum(one.time.size for one in few) == 5 * 2 * EXCERPT.piece_samples
 
 
 @pytest.mark.slow
@@ -62,7 +62,7 @@ def test_a_search_by_way_of_pieces_ends_where_one_of_the_whole_does(
     found = fit_motion(recording, study)
     # Two steps without the noises, two with them, and what the last nat takes.
     assert int(found["iterations"]) <= 6
-    monkeypatch.setattr(modes, "pieces", lambda passes: None)
+    monkeypatch.setattr(newton, "pieces", lambda passes: None)
     whole = fit_motion(recording, study)
     assert int(whole["iterations"]) > int(found["iterations"])
     width = np.ptp(whole["interval"].values, axis=1) / 3.29

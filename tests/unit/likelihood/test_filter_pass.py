@@ -10,10 +10,13 @@ import pytest
 from fit_worlds import coarse_study, driven, recording
 
 from driftwalk.flow.arena import outline_of
-from driftwalk.likelihood.check.errors import estimate_of
-from driftwalk.likelihood.filter_pass import Passes, Point, Sums, _beside
+from driftwalk.likelihood.estimate import estimate_of
+from driftwalk.likelihood.filter.difference_pairs import Pair
+from driftwalk.likelihood.filter.filter_pass import Passes, Sums
+from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.fit import fit_motion
-from driftwalk.likelihood.newton import Prior, Weights, inverse, limited, newton_step
+from driftwalk.likelihood.newton import inverse, limited, newton_step
+from driftwalk.likelihood.prior import Prior, Weights
 from driftwalk.likelihood.ready import body_of, series_of
 from driftwalk.likelihood.spline import lay_spline
 from driftwalk.schema import body_track
@@ -85,7 +88,7 @@ def test_the_products_are_those_of_the_derivatives(passes: Passes, point: Point)
     """
     series = passes.series[0]
     sums = replace(passes, series=[series]).sums(point, noise="without")
-    whole = passes._filter(series, point, sensitivities=True).run(series.time.size)
+    whole = passes.kernel(series, point, sensitivities=True).run(series.time.size)
     wanted = whole["jacobian"].T @ whole["jacobian"]
     score = whole["jacobian"].T @ whole["whitened"]
     assert sums.used == whole["used"].sum()
@@ -136,10 +139,17 @@ def test_a_wrong_variance_is_found_in_one_step() -> None:
 
 def test_where_one_pass_restarted_the_noises_tell_nothing() -> None:
     """A step of a ten-thousandth in a noise changes a variance by as much, not by a factor."""
-    base = {"covariance": np.array([[1.0, 0.2, 2.0], [1.0, 0.2, 2.0], [1.0, np.nan, np.nan]])}
-    other = {"covariance": np.array([[1.0001, 0.2, 2.0], [1.0, 0.2, 1e12], [1.0, 0.2, 2.0]])}
-    assert _beside(base, other).tolist() == [True, False, False]
-    assert _beside(other, base).tolist() == [True, False, False]
+    used = np.ones(3, dtype=np.uint8)
+    base = {
+        "used": used,
+        "covariance": np.array([[1.0, 0.2, 2.0], [1.0, 0.2, 2.0], [1.0, np.nan, np.nan]]),
+    }
+    other = {
+        "used": used,
+        "covariance": np.array([[1.0001, 0.2, 2.0], [1.0, 0.2, 1e12], [1.0, 0.2, 2.0]]),
+    }
+    for one, two in ((base, other), (other, base)):
+        assert Pair(one, two, 1.0).comparable.tolist() == [True, False, False]
 
 
 @pytest.mark.slow

@@ -12,7 +12,7 @@ from fit_worlds import DRAG, FORCE_N, NOISE_M, coarse_study, fitted, recording
 import driftwalk as dw
 from driftwalk.core.errors import InputError
 from driftwalk.flow.grid import Grid
-from driftwalk.likelihood.filter_pass import Series
+from driftwalk.likelihood.filter.series import Series
 from driftwalk.likelihood.result import footprint_count, whiteness_of
 from driftwalk.model import apply_overrides
 from driftwalk.schema import FLAGS, build_trajectory

@@ -13,7 +13,7 @@ from hypothesis import given, strategies as st
 
 import driftwalk as dw
 from driftwalk.likelihood.ready import prepare
-from driftwalk.likelihood.tracker_errors.outliers import FEWEST, mistakes_in, without_mistakes
+from driftwalk.likelihood.tracker_errors.outliers import OUTLIER, outliers_in, without_outliers
 from driftwalk.schema import Track, body_track
 from driftwalk.schema.answers.fit_facts import fit_facts
 
@@ -36,7 +36,7 @@ def test_a_sample_far_from_both_neighbours_is_a_mistake(size: float, direction: 
     track = smooth()
     track.x[AT] += size * np.cos(direction)
     track.y[AT] += size * np.sin(direction)
-    assert mistakes_in(track).nonzero()[0].tolist() == [AT]
+    assert outliers_in(track).nonzero()[0].tolist() == [AT]
 
 
 @given(st.floats(-0.2, 0.2), st.floats(-0.2, 0.2))
@@ -44,7 +44,7 @@ def test_a_jump_to_another_place_is_none(along: float, across: float) -> None:
     track = smooth()
     track.x[AT:] += along
     track.y[AT:] += across
-    assert not mistakes_in(track).any()
+    assert not outliers_in(track).any()
 
 
 @pytest.mark.slow
@@ -53,7 +53,7 @@ def test_a_bounce_between_two_samples_is_none(vx: float, vy: float, share: float
     """The velocity changes at once, by up to 3 m/s, anywhere between two samples."""
     track = smooth()
     since = np.maximum(track.time - (track.time[AT] + 0.1 * share), 0.0)
-    assert not mistakes_in(
+    assert not outliers_in(
         Track(track.time, track.x + vx * since, track.y + vy * since, track.theta)
     ).any()
 
@@ -64,34 +64,34 @@ def test_a_fast_turn_is_none(turn_rate: float, radius: float) -> None:
     track = smooth()
     angle = min(turn_rate, 20.0) * track.time
     fast = Track(track.time, radius * np.cos(angle), radius * np.sin(angle), track.theta)
-    assert not mistakes_in(fast).any()
+    assert not outliers_in(fast).any()
 
 
 @pytest.mark.false_alarm(1e-4)
 def test_noise_alone_is_none(fresh_seed: Callable[[int], int]) -> None:
     """Twenty tracks of 400: a sample is 6 sd off in x or y once in 4e8, less often in both."""
     for k in range(20):
-        assert not mistakes_in(smooth(fresh_seed(100 + k))).any()
+        assert not outliers_in(smooth(fresh_seed(100 + k))).any()
 
 
 @pytest.mark.parametrize("realisation", ["first", "second"])
 def test_a_recording_of_the_model_has_none(realisation: str) -> None:
     """Half an hour with contacts at the wall: what is fitted has not changed."""
     track = body_track(dw.tank30_recording(realisation))  # type: ignore[arg-type]
-    assert without_mistakes(track) is track
+    assert without_outliers(track) is track
 
 
 def test_gaps_and_short_tracks_are_left_alone() -> None:
     track = smooth()
-    kept = np.ones(SAMPLES, dtype=bool)
-    kept[AT + 1] = kept[AT - 1] = False
+    retained = np.ones(SAMPLES, dtype=bool)
+    retained[AT + 1] = retained[AT - 1] = False
     track.x[AT] += 0.05
-    sparse = Track(*(axis[kept] for axis in track[:4]))
-    assert not mistakes_in(sparse).any()
-    short = Track(*(axis[: FEWEST - 1] for axis in track[:4]))
-    assert not mistakes_in(short).any()
+    sparse = Track(*(axis[retained] for axis in track[:4]))
+    assert not outliers_in(sparse).any()
+    short = Track(*(axis[: OUTLIER.fewest - 1] for axis in track[:4]))
+    assert not outliers_in(short).any()
     still = Track(track.time, np.zeros(SAMPLES), np.zeros(SAMPLES), track.theta)
-    assert not mistakes_in(still).any()
+    assert not outliers_in(still).any()
 
 
 def with_mistakes(track: xr.Dataset, share: float, size_m: float, seed: int) -> xr.Dataset:

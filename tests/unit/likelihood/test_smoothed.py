@@ -14,7 +14,7 @@ from scipy.signal import lfilter, savgol_filter
 
 import driftwalk as dw
 from driftwalk.core.errors import InputError
-from driftwalk.likelihood.tracker_errors.smoothed import ENOUGH, find_smoothing
+from driftwalk.likelihood.tracker_errors.smoothed import SMOOTHING, find_smoothing
 from driftwalk.schema import Track, body_track, build_trajectory
 
 Floats = npt.NDArray[np.float64]
@@ -53,7 +53,7 @@ def test_smoothing_is_recognised(way: str, fresh_seed: Callable[[int], int]) -> 
     found = find_smoothing(filtered(drift(fresh_seed(1)), WAYS[way]))
     assert found is not None
     assert found.way == way
-    assert found.evidence > 5.0 * ENOUGH
+    assert found.evidence > 5.0 * SMOOTHING.evidence
 
 
 @pytest.mark.slow
@@ -95,8 +95,8 @@ def test_another_periodic_error_has_no_name() -> None:
 
 def test_gaps_are_passed_over_and_short_tracks_left_alone() -> None:
     smooth = filtered(drift(6), averaged([1, 1, 1]))
-    kept = np.arange(3000) % 250 != 0
-    found = find_smoothing(Track(*(axis[kept] for axis in smooth[:4])))
+    retained = np.arange(3000) % 250 != 0
+    found = find_smoothing(Track(*(axis[retained] for axis in smooth[:4])))
     assert found is not None
     assert found.way == "averages over 3 frames"
     short = Track(*(axis[:100] for axis in smooth[:4]))

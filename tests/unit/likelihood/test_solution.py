@@ -12,8 +12,8 @@ from fit_worlds import coarse_study, recording
 import driftwalk as dw
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood.check.errors import used_pairs
-from driftwalk.likelihood.filter_pass import Point
-from driftwalk.likelihood.result import parameter_facts
+from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.interval_inflation import parameter_facts
 from driftwalk.likelihood.solution import cholesky, require_noise_below_motion, solved
 from driftwalk.model import Study, apply_overrides
 from driftwalk.schema import Track, build_trajectory

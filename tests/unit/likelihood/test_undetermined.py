@@ -18,9 +18,9 @@ from driftwalk.cli.terminal.fit_answer import summary
 from driftwalk.conditions import estimated_study
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood import angle_consistency, compare_laws, estimate_wall, judge_fit
-from driftwalk.likelihood.check import judged
+from driftwalk.likelihood.check import run
 from driftwalk.likelihood.contacts import estimate as wall
-from driftwalk.likelihood.newton import Mode
+from driftwalk.likelihood.newton import Mode, ModeSearch, require_mode
 from driftwalk.page.sections.fit import fit_summary
 from driftwalk.schema import build_trajectory
 from driftwalk.schema.answers.answer import answer_lines
@@ -77,16 +77,16 @@ def test_a_motion_without_random_force_has_no_numbers(
 
 def test_the_fit_with_the_angle_given_may_break_down_alone(monkeypatch: Any) -> None:
     study, track = coarse_study(), recording(60.0)
-    found = angle_consistency.find_mode
 
-    def diverged(*given: Any, **options: Any) -> Mode:
-        mode = found(*given, **options)
-        # Beyond 709 the exponential of ln q is no longer a double.
-        return replace(mode, point=replace(mode.point, log_intensity=2000.0))
+    class Diverged(ModeSearch):
+        def find(self, *given: Any, **options: Any) -> Mode:
+            mode = require_mode(super().find(*given, **options))
+            # Beyond 709 the exponential of ln q is no longer a double.
+            return replace(mode, point=replace(mode.point, log_intensity=2000.0))
 
     alone = dw.fit_motion(track, study)
     with monkeypatch.context() as patch:
-        patch.setattr(angle_consistency, "find_mode", diverged)
+        patch.setattr(angle_consistency, "ModeSearch", Diverged)
         patch.setattr(
             angle_consistency, "restricted_drag", lambda _, mode, *rest, **more: _at(mode)
         )
@@ -110,12 +110,12 @@ def test_a_check_or_a_wall_that_breaks_down_leaves_the_fit(error: Any, monkeypat
         raise error
 
     track, fit = recording(60.0), fitted(60.0)
-    monkeypatch.setattr(judged, "check_model", breaks)
+    monkeypatch.setattr(run, "check_model", breaks)
     found = judge_fit(fit, [track])
     assert found.check is None
     assert str(error) in found.fit.attrs["check_left_out"]
-    monkeypatch.setattr(wall, "LEAST_CONTACTS", 0)
-    monkeypatch.setattr(wall, "tried_walls", breaks)
+    monkeypatch.setattr(wall, "CONTACT", wall.CONTACT._replace(fewest=0))
+    monkeypatch.setattr(wall, "search_walls", breaks)
     assert str(error) in estimate_wall(fit, [track]).attrs["wall_left_out"]
 
 

@@ -1,4 +1,4 @@
-"""The errors of prediction at the estimate of a fit, and what fitting has taken out of them.
+"""Innovations at the estimate of a fit, and what fitting has taken out of them.
 
 With J the whitened derivatives of the predictions and Lambda the precision of the prior, the
 whitened innovations at the estimate have the covariance ``I - J C J'``, ``C = (J'J + Lambda)^-1``,
@@ -11,90 +11,35 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.conditions.study import fitted_law
-from driftwalk.core.errors import InputError
-from driftwalk.likelihood.filter_pass import Passes, Place, Point, Series, Sums
-from driftwalk.likelihood.law.facts import effective_logs, stored_numbers
-from driftwalk.likelihood.newton import Prior, Weights
-from driftwalk.likelihood.ready import body_of, prepare
-from driftwalk.likelihood.result import require_fit
+from driftwalk.likelihood.estimate import Estimate
+from driftwalk.likelihood.filter.filter_pass import Place, Sums
+from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.filter.series import Series
+from driftwalk.likelihood.prior import Prior
 from driftwalk.likelihood.spline import DEGREE, Floats, Spline, basis
-from driftwalk.schema import Track
-from driftwalk.schema.answers.fit_facts import fitted_value
 
 if TYPE_CHECKING:
-    import xarray as xr
-
-    from driftwalk.model import Study
+    pass
 
 Integers = npt.NDArray[np.int64]
 Flags = npt.NDArray[np.bool_]
 
-SAMPLES_AT_ONCE = 2048
+SAMPLES_AT_ONCE: Final = 2048
 """Rows of derivatives that are held at a time: some 20 MB."""
-MOST_KEPT_PARTS = 4
-"""Parts of the recording whose derivatives are kept for the correction of the autocorrelation."""
-DRAWS = 16
-"""Draws of the parameters from which that correction is computed."""
+
+
 WHOLE: tuple[Place, ...] = ((slice(None), slice(None)),)
 """All columns, where they are."""
 
 
 @dataclass(frozen=True, eq=False)
-class Estimate:
-    """A fit, ready to run its filter at what it found."""
-
-    study: Study
-    passes: Passes
-    point: Point
-    weights: Weights
-    tracks: Sequence[Track]
-    """Sources of the series of the passes: the recordings, cut at the switching times."""
-
-
-def estimate_of(fit: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str | None) -> Estimate:
-    """Return what a fit found, with the recordings it was fitted to."""
-    from driftwalk.model import apply_overrides, parse_study
-
-    fit = require_fit(fit)
-    study = parse_study(fit.attrs["study"])
-    study = apply_overrides(study, fitted_law(fit))
-    ready = prepare(recordings, study, fit.attrs["angle"], body)
-    if ready.samples != int(fit["samples"]):
-        raise InputError(
-            f"the recordings have {ready.samples} positions, the fit was made of "
-            f"{int(fit['samples'])}: check it with the recordings that it was fitted to"
-        )
-    coefficients = np.asarray(fit["coefficient"].values, dtype=np.float64)
-    x, y = fit["spline_origin"].values
-    spline = Spline(float(x), float(y), float(fit["spline_spacing"]), *coefficients.shape[:-3:-1])
-    numbers = stored_numbers(fit)
-    point = Point(
-        coefficients,
-        *effective_logs(fit, study),
-        math.log(fitted_value(fit, "tracking_noise")),
-        opened=numbers.opened,
-        fixed=numbers.fixed,
-    )
-    if ready.angle == "state":
-        point = replace(
-            point,
-            log_lever=math.log(fitted_value(fit, "force_lever")),
-            log_angle_noise=math.log(fitted_value(fit, "orientation_noise")),
-        )
-    weights = Weights(float(fit["roughness_weight"]), float(fit["size_weight"]))
-    passes = Passes(ready.series, body_of(study, ready.angle), spline, len(ready.intervals.labels))
-    return Estimate(study, passes, point, weights, ready.parts)
-
-
-@dataclass(frozen=True, eq=False)
-class Errors:
+class Innovations:
     """The errors of prediction of one series, whitened, and where they were made."""
 
     series: Series
@@ -113,7 +58,7 @@ class Errors:
         return int(self.white.shape[1])
 
 
-def errors_of(estimate: Estimate) -> list[Errors]:
+def innovations_of(estimate: Estimate) -> list[Innovations]:
     """Run the filter over every series at the estimate."""
     found = []
     whitened = estimate.passes.innovations(estimate.point)
@@ -126,7 +71,7 @@ def errors_of(estimate: Estimate) -> list[Errors]:
         outlier = np.isfinite(white).all(axis=1) & ~used & (series.excluded == 0)
         counted = used & series.settled
         white = np.where(counted[:, None], white, 0.0)
-        found.append(Errors(series, white, counted, outlier, speed))
+        found.append(Innovations(series, white, counted, outlier, speed))
     return found
 
 
@@ -196,13 +141,13 @@ class Contrast:
         """Add the rows of one part; `places` says where its columns stand among all parameters."""
         from scipy.sparse import csr_matrix
 
-        kept = np.flatnonzero(group >= 0)
-        if not kept.size:
+        retained = np.flatnonzero(group >= 0)
+        if not retained.size:
             return
-        present, local = np.unique(group[kept], return_inverse=True)
-        matrix = csr_matrix((weight[kept], (local, kept)), shape=(present.size, group.size))
+        present, local = np.unique(group[retained], return_inverse=True)
+        matrix = csr_matrix((weight[retained], (local, retained)), shape=(present.size, group.size))
         self.score[present] += np.asarray(matrix @ white)
-        self.power[present] += np.bincount(local, weight[kept] ** 2)
+        self.power[present] += np.bincount(local, weight[retained] ** 2)
         slope = np.asarray(matrix @ jacobian)
         for own, columns in places:
             self.slope[present, columns] += slope[:, own]
@@ -240,7 +185,7 @@ class _Part(NamedTuple):
 
 
 def collect(
-    estimate: Estimate, errors: Sequence[Errors], contrasts: Sequence[Contrast], *, lags: int
+    estimate: Estimate, errors: Sequence[Innovations], contrasts: Sequence[Contrast], *, lags: int
 ) -> Leverage:
     """Fill the contrasts in one pass with derivatives, and return what fitting absorbed."""
     from scipy.linalg import solve_triangular
@@ -248,10 +193,12 @@ def collect(
 
     size = estimate.point.coefficients.size + 1
     count = sum(math.ceil(one.used.size / SAMPLES_AT_ONCE) for one in errors)
-    chosen = set(np.linspace(0, count - 1, MOST_KEPT_PARTS).astype(int).tolist())
-    kept = []
+    # Derivatives of four parts are kept, for the correction of the autocorrelation.
+    chosen = set(np.linspace(0, count - 1, 4).astype(int).tolist())
+    retained = []
     for contrast in contrasts:
         contrast.begin(size)
+    # J'J by flow, its lower half alone: a series has derivatives by the coefficients of its flow.
     lower: dict[int, Any] = {}
     for number, part in enumerate(_parts(estimate, errors)):
         jacobian = part.jacobian
@@ -269,7 +216,7 @@ def collect(
             group = contrast.groups[part.series][part.start : part.start + SAMPLES_AT_ONCE]
             contrast.add(group.ravel(), weights[contrast.by], part.white, jacobian, part.places)
         if number in chosen:
-            kept.append(part)
+            retained.append(part)
     data = np.zeros((size, size))
     for flow, part_of in lower.items():
         whole = np.tril(part_of) + np.tril(part_of, -1).T
@@ -277,6 +224,7 @@ def collect(
         for own, row in places:
             for own_column, column in places:
                 data[row, column] += whole[own, own_column]
+    # C = (J'J + Lambda)^-1, held as a root so that samples and traces take one product.
     prior = Prior(estimate.passes)
     sums = Sums(0.0, np.zeros(len(data)), data, 0)
     full = prior.add(sums, estimate.point, estimate.weights).information
@@ -284,17 +232,17 @@ def collect(
     return Leverage(
         spread,
         float(((data @ spread) * spread).sum()),
-        _autocovariance(spread, errors, kept, lags),
+        _autocovariance(spread, errors, retained, lags),
     )
 
 
-def _parts(estimate: Estimate, errors: Sequence[Errors]) -> Iterator[_Part]:
+def _parts(estimate: Estimate, errors: Sequence[Innovations]) -> Iterator[_Part]:
     """Run the filter with derivatives over every series, some samples at a time."""
     for index, one in enumerate(errors):
         flow = one.series.flow
         places = estimate.passes.columns_of(flow, 1)
         point = estimate.point.in_flow(flow)
-        running = estimate.passes._filter(one.series, point, sensitivities=True)
+        running = estimate.passes.kernel(one.series, point, sensitivities=True)
         for start in range(0, one.used.size, SAMPLES_AT_ONCE):
             found = running.run(SAMPLES_AT_ONCE)
             white = np.asarray(found["whitened"]).ravel()
@@ -302,38 +250,26 @@ def _parts(estimate: Estimate, errors: Sequence[Errors]) -> Iterator[_Part]:
 
 
 def used_pairs(used: Flags, lags: int) -> Iterator[tuple[int, Flags]]:
-    """Yield the lags that the samples reach, each with where a sample and the one so far on count.
-
-    Parameters
-    ----------
-    used : ndarray of bool, shape (n,)
-        Samples that count; there may be fewer of them than lags.
-    lags : int
-        Longest lag.
-
-    Yields
-    ------
-    tuple of int and ndarray of bool, shape (n - lag,)
-        The lag, and by the earlier sample whether both count.
-    """
+    """Yield each lag, and by the earlier sample whether both samples of a pair count."""
     for lag in range(min(lags, used.size - 1) + 1):
         yield lag, used[lag:] & used[: used.size - lag]
 
 
 def _autocovariance(
-    spread: Floats, errors: Sequence[Errors], kept: Sequence[_Part], lags: int
+    spread: Floats, errors: Sequence[Innovations], retained: Sequence[_Part], lags: int
 ) -> Floats:
-    """Return the mean of J C J' by component and lag, from draws of the parameters."""
+    """Return the mean of J C J' by component and lag, from samples of the posterior."""
     components = errors[0].components
     generator = np.random.default_rng(0)
-    draws = spread @ generator.normal(size=(len(spread), DRAWS))
+    count = 16  # samples of the posterior
+    samples = spread @ generator.normal(size=(len(spread), count))
     total, pairs = np.zeros((components, lags + 1)), np.zeros(lags + 1)
-    for part in kept:
-        own = np.concatenate([draws[columns] for _, columns in part.places])
-        moved = (part.jacobian @ own).reshape(-1, components, DRAWS)
+    for part in retained:
+        own = np.concatenate([samples[columns] for _, columns in part.places])
+        moved = (part.jacobian @ own).reshape(-1, components, count)
         used = errors[part.series].used[part.start : part.start + len(moved)]
         for lag, both in used_pairs(used, lags):
             products = moved[lag:][both] * moved[: used.size - lag][both]
-            total[:, lag] += products.sum(axis=(0, 2)) / DRAWS
+            total[:, lag] += products.sum(axis=(0, 2)) / count
             pairs[lag] += both.sum()
     return np.asarray(total / np.maximum(pairs, 1.0))

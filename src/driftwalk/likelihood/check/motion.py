@@ -1,4 +1,4 @@
-"""Does the fitted model move like the recording? The recording's steps against simulated ones.
+"""Posterior predictive check of the motion: steps of the recording and of replicates.
 
 Steps are formed by the same function for all. Replicates at the estimate give the distance and its
 noise floor. Replicates with flow and parameters drawn from what the fit leaves open give the
@@ -9,7 +9,7 @@ differs from the fitted values as the truth does.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -18,11 +18,10 @@ from driftwalk.core.errors import InputError
 from driftwalk.likelihood.check.worlds import Replicates
 from driftwalk.likelihood.spline import Floats
 
-BINS = 40
-BAND = 0.9
+BAND: Final = 0.9
 """Share of the replicates within the bands of the densities."""
-SHOWN_FRACTION = 0.9995
-FEWEST_REPLICATES = 4
+FEWEST_REPLICATES: Final = 4
+"""Sound replicates of either set: two on either side of the noise floor."""
 
 
 class Density(NamedTuple):
@@ -37,7 +36,7 @@ class Density(NamedTuple):
     high: Floats
 
 
-class Motion(NamedTuple):
+class MotionComparison(NamedTuple):
     """The recording against simulated ones."""
 
     distance: Floats
@@ -78,23 +77,8 @@ class Motion(NamedTuple):
 
 def compare_motion(
     real: Floats, at_estimate: Replicates, drawn: Replicates, *, threads: int
-) -> Motion:
-    """Compare a recording's steps with simulated ones.
-
-    Parameters
-    ----------
-    real : ndarray, shape (pairs, 2)
-        Step lengths [m] and turning angles [rad].
-    at_estimate, drawn : Replicates
-        Simulated recordings.
-    threads : int
-        Of the native core.
-
-    Raises
-    ------
-    InputError
-        When fewer than four replicates of either set are sound.
-    """
+) -> MotionComparison:
+    """Compare a recording's steps with simulated ones."""
     for replicates in (at_estimate, drawn):
         alone = replicates is drawn and np.unique(drawn.flow).size < 2
         if len(replicates.steps) < FEWEST_REPLICATES or alone:
@@ -110,16 +94,16 @@ def compare_motion(
         float(
             np.quantile(np.abs(np.concatenate([real[:, k], *(s[:, k] for s in drawn.steps)])), part)
         )
-        for k, part in ((0, SHOWN_FRACTION), (1, 1.0))
+        for k, part in ((0, 0.9995), (1, 1.0))
     ]
-    return Motion(
+    return MotionComparison(
         _distances([real], at_estimate.steps, threads)[0],
         floor.ravel(),
         _distances([real], drawn.steps, threads)[0],
         np.nanmean(among, axis=1),
         int(np.unique(drawn.flow).size),
-        _density(real, drawn, 0, np.linspace(0.0, limits[0] or 1.0, BINS + 1)),
-        _density(real, drawn, 1, np.linspace(-limits[1], limits[1], BINS + 1)),
+        _density(real, drawn, 0, np.linspace(0.0, limits[0] or 1.0, 41)),
+        _density(real, drawn, 1, np.linspace(-limits[1], limits[1], 41)),
     )
 
 

@@ -1,4 +1,4 @@
-"""Where and when the errors of prediction are not what the model says.
+"""Tests of the innovations by place, time and speed.
 
 All statistics here are sums of whitened innovations over groups (a cell of the tank, a part of the
 recording, a range of speeds) with their exact variance after fitting, see
@@ -9,30 +9,44 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.likelihood.check.errors import Contrast, Errors, Integers
+from driftwalk.flow.arena import outline_of
+from driftwalk.likelihood.check.errors import Contrast, Innovations, Integers, Leverage, collect
+from driftwalk.likelihood.check.white import LAGS, WhitenessTests, whiteness_tests
+from driftwalk.likelihood.estimate import Estimate
 from driftwalk.likelihood.spline import Floats
 
 Flags = npt.NDArray[np.bool_]
 
-CELLS_PER_SIDE = 1.5
-MOST_CELLS = 24
-"""Most cells across the tank."""
-TIME_BINS = 10
-FEWEST_IN_BIN = 300
-"""Samples of a part of the recording."""
-SPEED_BINS = 6
-FEWEST_IN_CELL = 10
-FEWEST_FOR_SPREAD = 50
-"""Samples that make the mean of their squares about normal."""
-LEAST_VISIBLE = 0.5
-"""Share of a group's change that must be left by the fit for its estimate to mean something."""
-LEAST_FREEDOM = 0.1
-"""A direction in which fitting has left less than this share of the variance says nothing."""
+
+class GroupPolicy(NamedTuple):
+    """Sizes of the groups of innovations, and what a group has to hold."""
+
+    cells_per_side: float = 1.5
+    """Cells along a side of the block. Chosen by hand, as what follows."""
+    most_cells: int = 24
+    """Most cells across the tank."""
+    time_bins: int = 10
+    """Most parts of the recordings."""
+    fewest_in_part: int = 300
+    """Samples of a part of the recordings."""
+    speed_bins: int = 6
+    """Ranges of the speed of the water past the block."""
+    fewest_in_cell: int = 10
+    """Samples of a cell for the mean of its innovations."""
+    fewest_for_spread: int = 50
+    """Samples that make the mean of their squares about normal."""
+    least_visible: float = 0.5
+    """Share of a group's change that must be left by the fit for its estimate to mean something."""
+    least_freedom: float = 0.1
+    """A direction in which fitting has left less than this share of the variance says nothing."""
+
+
+GROUP: Final = GroupPolicy()
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,19 +94,19 @@ class Layout:
 
 
 def lay_out(
-    errors: Sequence[Errors], bounds: tuple[float, float, float, float], *, side: float
+    errors: Sequence[Innovations], bounds: tuple[float, float, float, float], *, side: float
 ) -> Layout:
     """Lay cells over the tank, and cut the recordings and the speeds into parts."""
     x_min, y_min, x_max, y_max = bounds
     widest = max(x_max - x_min, y_max - y_min)
-    size = max(side / CELLS_PER_SIDE, widest / MOST_CELLS)
+    size = max(side / GROUP.cells_per_side, widest / GROUP.most_cells)
     axes = []
     for low, high in ((x_min, x_max), (y_min, y_max)):
         count = max(1, int(np.ceil((high - low) / size - 1e-9)))
         middle = size * (np.arange(count, dtype=np.float64) - 0.5 * (count - 1))
         axes.append(0.5 * (low + high) + middle)
     samples = sum(int(one.used.sum()) for one in errors)
-    parts = int(np.clip(samples // FEWEST_IN_BIN, 1, TIME_BINS))
+    parts = int(np.clip(samples // GROUP.fewest_in_part, 1, GROUP.time_bins))
     numbers, start, end = [], [], []
     duration = sum(float(one.series.time[-1] - one.series.time[0]) for one in errors)
     for index, one in enumerate(errors):
@@ -105,7 +119,9 @@ def lay_out(
     speeds = np.concatenate([one.speed[one.used] for one in errors])
     speeds = speeds[np.isfinite(speeds)]
     edges = (
-        np.quantile(speeds, np.linspace(0.0, 1.0, SPEED_BINS + 1)) if speeds.size else np.zeros(0)
+        np.quantile(speeds, np.linspace(0.0, 1.0, GROUP.speed_bins + 1))
+        if speeds.size
+        else np.zeros(0)
     )
     return Layout(
         axes[0],
@@ -127,7 +143,7 @@ class Groups(NamedTuple):
     speed: Integers
 
 
-def groups_of(layout: Layout, errors: Sequence[Errors]) -> list[Groups]:
+def groups_of(layout: Layout, errors: Sequence[Innovations]) -> list[Groups]:
     """Return the groups of the samples of every series."""
     found = []
     for index, one in enumerate(errors):
@@ -182,7 +198,7 @@ def contrasts_of(layout: Layout, groups: Sequence[Groups], components: int) -> C
     )
 
 
-class Local(NamedTuple):
+class LocalMeans(NamedTuple):
     """Sums over cells, with their distance from zero; the first axis is that of the groups."""
 
     samples: Floats
@@ -193,30 +209,18 @@ class Local(NamedTuple):
     too few samples."""
 
 
-def local_scores(score: Floats, count: Floats, slope: Floats, covariance: Floats) -> Local:
-    """Return the sums of groups with their chi squared of D degrees of freedom.
-
-    Parameters
-    ----------
-    score : ndarray, shape (groups, D)
-        Sums of whitened innovations.
-    count : ndarray, shape (groups,)
-        Samples.
-    slope : ndarray, shape (groups, D, parameters)
-        Derivatives of the sums.
-    covariance : ndarray, shape (parameters, parameters)
-        C.
-    """
+def local_scores(score: Floats, count: Floats, slope: Floats, covariance: Floats) -> LocalMeans:
+    """Return the sums of groups with their chi squared of D degrees of freedom."""
     chi_squared = np.full(count.size, np.nan)
-    enough = np.flatnonzero(count >= FEWEST_IN_CELL)
+    enough = np.flatnonzero(count >= GROUP.fewest_in_cell)
     if enough.size:
         rows = slope[enough]
         taken = np.einsum("gdp,gep->gde", (rows @ covariance), rows)
         left = np.eye(score.shape[1]) - taken / count[enough][:, None, None]
         value, vector = np.linalg.eigh(left)
         along = np.einsum("gde,gd->ge", vector, score[enough]) / np.sqrt(count[enough])[:, None]
-        chi_squared[enough] = (along**2 / np.maximum(value, LEAST_FREEDOM)).sum(axis=1)
-    return Local(count, score / np.maximum(count, 1.0)[:, None], chi_squared)
+        chi_squared[enough] = (along**2 / np.maximum(value, GROUP.least_freedom)).sum(axis=1)
+    return LocalMeans(count, score / np.maximum(count, 1.0)[:, None], chi_squared)
 
 
 class Trend(NamedTuple):
@@ -242,7 +246,7 @@ def trend_of(contrast: Contrast, covariance: Floats) -> Trend:
     variance = np.diag(contrast.power) - contrast.slope @ covariance @ contrast.slope.T
     value, vector = np.linalg.eigh(variance)
     typical = float(contrast.power.max(initial=0.0))
-    seen = value > LEAST_FREEDOM * typical
+    seen = value > GROUP.least_freedom * typical
     if not typical > 0.0 or not seen.any():
         nothing = np.full(contrast.size, np.nan)
         return Trend(nothing, nothing, 0.0, 0, np.zeros(contrast.size, dtype=bool))
@@ -253,7 +257,7 @@ def trend_of(contrast: Contrast, covariance: Floats) -> Trend:
         np.sqrt(np.diag(inverse)),
         float(contrast.score @ change),
         int(seen.sum()),
-        (vector[:, seen] ** 2).sum(axis=1) > LEAST_VISIBLE,
+        (vector[:, seen] ** 2).sum(axis=1) > GROUP.least_visible,
     )
 
 
@@ -266,24 +270,14 @@ class Spread(NamedTuple):
     """Standard deviation of the ratio if it is one."""
 
 
-def spread_of(errors: Sequence[Errors], groups: Sequence[Integers], size: int) -> Spread:
-    """Return whether the errors are larger in some groups: the noise is to be the same everywhere.
-
-    Parameters
-    ----------
-    errors : sequence of Errors
-        The errors of every recording.
-    groups : sequence of ndarray, shapes (n,)
-        The group of each sample, -1 for none.
-    size : int
-        Number of groups.
-    """
+def spread_of(errors: Sequence[Innovations], groups: Sequence[Integers], size: int) -> Spread:
+    """Return the mean square of the errors in each group: the noise should be the same in all."""
     group = np.concatenate(list(groups))
     square = np.concatenate([(one.white**2).mean(axis=1) for one in errors])[group >= 0]
     group = group[group >= 0]
     count = np.bincount(group, minlength=size).astype(np.float64)
     mean = max(float(square.mean()), 1e-300) if square.size else 1.0
-    enough = count >= FEWEST_FOR_SPREAD
+    enough = count >= GROUP.fewest_for_spread
     ratio, std = np.full(size, np.nan), np.full(size, np.nan)
     total = np.bincount(group, square, minlength=size)
     ratio[enough] = total[enough] / count[enough] / mean
@@ -291,3 +285,51 @@ def spread_of(errors: Sequence[Errors], groups: Sequence[Integers], size: int) -
     share = 1.0 - count[enough] / max(square.size, 1)
     std[enough] = float(square.std()) / mean * np.sqrt(share / count[enough])
     return Spread(ratio, std)
+
+
+@dataclass(frozen=True, eq=False)
+class Residuals:
+    """The statistics of the errors of prediction."""
+
+    layout: Layout
+    leverage: Leverage
+    white: WhitenessTests
+    place: LocalMeans
+    """By cell."""
+    part: LocalMeans
+    """By part of the recording and cell, in that order."""
+    strength: Trend
+    """Of the flow, by part of the recording."""
+    drag: Trend
+    """Of C_d, by the speed of the water past the block."""
+    noise_by_part: Spread
+    noise_by_place: Spread
+
+
+def residuals_of(estimate: Estimate, errors: Sequence[Innovations]) -> Residuals:
+    """Return the statistics of the errors of prediction."""
+    study = estimate.study
+    bounds = outline_of(study.tank.to_arena()).bounds
+    layout = lay_out(errors, bounds, side=study.block.side_m)
+    groups = groups_of(layout, errors)
+    components = errors[0].components
+    sums = contrasts_of(layout, groups, components)
+    leverage = collect(estimate, errors, sums, lags=LAGS)
+    covariance = leverage.covariance
+    shape = (layout.parts, layout.cells, components)
+    score, power = sums.place.score.reshape(shape), sums.place.power.reshape(shape)[:, :, 0]
+    slope = sums.place.slope.reshape(*shape, -1)
+    by_part = (layout.parts * layout.cells, components)
+    return Residuals(
+        layout=layout,
+        leverage=leverage,
+        white=whiteness_tests(errors, leverage),
+        place=local_scores(score.sum(axis=0), power.sum(axis=0), slope.sum(axis=0), covariance),
+        part=local_scores(
+            score.reshape(by_part), power.ravel(), slope.reshape(*by_part, -1), covariance
+        ),
+        strength=trend_of(sums.strength, covariance),
+        drag=trend_of(sums.drag, covariance),
+        noise_by_part=spread_of(errors, [one.part for one in groups], layout.parts),
+        noise_by_place=spread_of(errors, [one.cell for one in groups], layout.cells),
+    )

@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from driftwalk.likelihood.check.motion import BAND, Density, Motion
-from driftwalk.likelihood.check.place import Local
-from driftwalk.likelihood.check.residuals import Residuals
+from driftwalk.likelihood.check.motion import BAND, Density, MotionComparison
+from driftwalk.likelihood.check.place import LocalMeans, Residuals
 from driftwalk.likelihood.check.verdict import Criterion, components_of, distance_limit
 
 Parts = tuple[dict[str, Any], dict[str, Any]]
@@ -29,10 +28,7 @@ def white_variables(found: Residuals) -> Parts:
     }
     names = np.array(components_of(len(white.chi_squared)), dtype=object)
     lags = np.arange(1, white.autocorrelation.shape[1] + 1)
-    return data, {
-        "component": ("component", names),
-        "lag": ("lag", lags),
-    }
+    return data, {"component": ("component", names), "lag": ("lag", lags)}
 
 
 def place_variables(found: Residuals) -> Parts:
@@ -61,10 +57,7 @@ def place_variables(found: Residuals) -> Parts:
             sums / np.maximum(count.sum(axis=1), 1.0)[:, None],
         ),
         "part_count": ("part", count.sum(axis=1)),
-        "part_chi_squared": (
-            "part",
-            np.nansum(table, axis=1),
-        ),
+        "part_chi_squared": ("part", np.nansum(table, axis=1)),
         "part_dof": ("part", place.mean.shape[1] * known.sum(axis=1)),
         "part_noise_ratio": ("part", found.noise_by_part.ratio),
         "part_noise_ratio_std": ("part", found.noise_by_part.std),
@@ -86,13 +79,15 @@ def place_variables(found: Residuals) -> Parts:
     return data, coords
 
 
-def _limit(place: Local) -> float:
+def _limit(place: LocalMeans) -> float:
     """Return what the largest distance of all cells exceeds once in twenty."""
     cells = int(np.isfinite(place.chi_squared).sum())
     return distance_limit(max(cells, 1), place.mean.shape[1])
 
 
-def motion_variables(motion: Motion) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
+def motion_variables(
+    motion: MotionComparison,
+) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
     """Return distances and densities, their coordinates, and attributes."""
     data: dict[str, Any] = {
         "ks_to_estimate": ("replicate", motion.distance),

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from driftwalk.core.errors import InputError
+from driftwalk.core.errors import InputError, reason_of
 from driftwalk.core.processors import one_blas_thread
-from driftwalk.likelihood.check.errors import Errors, errors_of, estimate_of
-from driftwalk.likelihood.check.motion import compare_motion
-from driftwalk.likelihood.check.residuals import residuals_of
+from driftwalk.likelihood.check.errors import Innovations, innovations_of
+from driftwalk.likelihood.check.motion import FEWEST_REPLICATES, compare_motion
+from driftwalk.likelihood.check.place import residuals_of
 from driftwalk.likelihood.check.result import (
     criterion_variables,
     motion_variables,
@@ -19,25 +19,22 @@ from driftwalk.likelihood.check.result import (
     white_variables,
 )
 from driftwalk.likelihood.check.scan import scan_of
-from driftwalk.likelihood.check.verdict import LEVEL, criteria_of, findings_of
+from driftwalk.likelihood.check.verdict import VERDICT, criteria_of, findings_of
 from driftwalk.likelihood.check.worlds import (
-    ready_problems,
+    posterior_replicates,
+    problems_of,
     replicates_at_estimate,
-    replicates_drawn,
 )
+from driftwalk.likelihood.estimate import estimate_of
+from driftwalk.likelihood.fitted_flow import require_fit
 from driftwalk.likelihood.ready import as_list
-from driftwalk.likelihood.result import require_fit
+from driftwalk.likelihood.solution import BREAKDOWN
 from driftwalk.schema.answers.fit_facts import texts
+from driftwalk.schema.answers.verdict import with_verdict
 from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
-
-FEWEST_REPLICATES: Final = 4
-FEWEST_USED: Final = 300
-"""Intervals. With fewer the fitted flow takes so much out of the errors that recordings of the
-model itself fail the test of their autocorrelation: 3 of 5 did with 200 samples, none of 5 with
-300."""
 
 
 @one_blas_thread()
@@ -97,7 +94,7 @@ def check_model(
         raise InputError(f"replicates must be at least {FEWEST_REPLICATES}, got {replicates}")
     fit, many = require_fit(fit), as_list(recordings)
     estimate = estimate_of(fit, many, body=body)
-    errors = errors_of(estimate)
+    errors = innovations_of(estimate)
     _require_used(errors)
     try:
         found = residuals_of(estimate, errors)
@@ -116,7 +113,7 @@ def check_model(
         "cell_size_m": found.layout.size,
         "replicates": replicates,
         "seed": seed,
-        "level": LEVEL,
+        "level": VERDICT.level,
         "arena": fit.attrs["arena"],
         "source": fit.attrs["source"],
         "simulated_recording": fit.attrs["simulated_recording"],
@@ -124,8 +121,8 @@ def check_model(
     data, coords = white_variables(found)
     parts = [place_variables(found)]
     try:
-        problems = ready_problems(fit, estimate, many)
-        drawn = replicates_drawn(
+        problems = problems_of(fit, estimate, many)
+        drawn = posterior_replicates(
             fit, estimate, problems, found.leverage.spread, count=replicates, seed=seed
         )
         motion = compare_motion(
@@ -162,12 +159,60 @@ def check_model(
     return build_dataset("model_check", data, coords, attrs)
 
 
-def _require_used(errors: Sequence[Errors]) -> None:
+def _require_used(errors: Sequence[Innovations]) -> None:
     """Refuse a check of so few errors that the tests of them mean nothing."""
     used = sum(int(one.used.sum()) for one in errors)
-    if used < FEWEST_USED:
+    if used < VERDICT.fewest_used:
         intervals = sum(one.used.size - 1 for one in errors)
         raise InputError(
             f"the model cannot be checked: the fit used {used} of {intervals} intervals between "
-            f"samples, and the check needs {FEWEST_USED} at least"
+            f"samples, and the check needs {VERDICT.fewest_used} at least"
         )
+
+
+class Judged(NamedTuple):
+    """A fit that was checked."""
+
+    fit: xr.Dataset
+    """A `fit`, with the verdict in it; where no check could be made, its attribute
+    ``check_left_out`` says why."""
+    check: xr.Dataset | None
+    """The `model_check`; None where it could not be made."""
+
+
+def judge_fit(
+    fit: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str | None = None
+) -> Judged:
+    """Check a fit and keep the verdict in it.
+
+    Parameters
+    ----------
+    fit : xarray.Dataset
+        Result of `fit_motion`.
+    recordings : sequence of xarray.Dataset
+        The fitted recordings, in the same order.
+    body : str, optional
+        The body, where a recording has several.
+
+    Returns
+    -------
+    Judged
+        The `fit` with the verdict, and the `model_check`. A fit that cannot be checked is no
+        error: its attribute ``check_left_out`` says why.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> recording = dw.tank30_recording()
+    >>> found = judge_fit(dw.fit_motion(recording), [recording])  # doctest: +SKIP
+    >>> bool(found.fit["explained"])  # doctest: +SKIP
+    True
+    """
+    try:
+        check = check_model(fit, recordings, body=body)
+    except InputError as error:
+        return Judged(fit.assign_attrs(check_left_out=str(error)), None)
+    except BREAKDOWN as error:
+        why = f"the model cannot be checked: the check broke down ({reason_of(error)})"
+        return Judged(fit.assign_attrs(check_left_out=why), None)
+    return Judged(with_verdict(fit, check), check)

@@ -1,4 +1,4 @@
-"""Did the flow change during the recording? Velocities in the same cell at different times.
+"""Scan for a change of the flow: velocities in the same cell at different times.
 
 The errors of prediction see a change of the flow badly: a wrong flow makes the fit lower C_d until
 one sample tells little of the next. So the body's own velocity is looked at. For every stretch of
@@ -10,7 +10,7 @@ simulated recordings, whose flow is steady.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -18,13 +18,21 @@ from driftwalk.likelihood.check.place import Layout, cell_of
 from driftwalk.likelihood.check.worlds import Path
 from driftwalk.likelihood.spline import Floats
 
-FEWEST_IN_CELL = 5
-"""Velocities in a cell, on either side of the comparison."""
-LONGEST_INTERVALS = 1.5
-"""A velocity is taken between samples at most this many usual intervals apart."""
-LEAST_SPREAD = 0.02
-"""Least standard deviation of the logarithm of a difference among replicates; with a dozen
-replicates, a smaller one is chance."""
+
+class ScanPolicy(NamedTuple):
+    """Which velocities are compared, and how far replicates scatter at least."""
+
+    fewest_in_cell: int = 5
+    """Velocities in a cell, on either side of the comparison. Chosen by hand."""
+    longest_intervals: float = 1.5
+    """A velocity is taken between samples at most this many usual intervals apart. Chosen by
+    hand."""
+    least_spread: float = 0.02
+    """Least standard deviation of the logarithm of a difference among replicates: with a dozen
+    replicates, a smaller one is chance. Chosen by hand."""
+
+
+SCAN: Final = ScanPolicy()
 
 
 class Scan(NamedTuple):
@@ -45,17 +53,7 @@ class Scan(NamedTuple):
 def scan_of(
     real: Sequence[Path], simulated: Sequence[Sequence[Path]], layout: Layout
 ) -> Scan | None:
-    """Return the stretch that differs most from the rest; None where there is only one part.
-
-    Parameters
-    ----------
-    real : sequence of tuple
-        The recordings.
-    simulated : sequence of sequence of tuple
-        Replicates of the recordings.
-    layout : Layout
-        Cells, and parts of the recordings.
-    """
+    """Return the stretch that differs most from the rest; None where there is only one part."""
     from scipy.stats import gumbel_r
 
     stretches = _stretches(layout)
@@ -67,7 +65,7 @@ def scan_of(
         return None
     logs = np.log(table[:, known])
     mine, theirs = logs[0], logs[1:]
-    spread = max(float(np.sqrt(theirs.var(axis=0, ddof=1).mean())), LEAST_SPREAD)
+    spread = max(float(np.sqrt(theirs.var(axis=0, ddof=1).mean())), SCAN.least_spread)
     off = (mine - theirs.mean(axis=0)) / spread
     # Each replicate against the others, as the recording is against all.
     others = (theirs.sum(axis=0) - theirs) / (len(theirs) - 1)
@@ -115,7 +113,7 @@ def _differences(
     for k, (first, last) in enumerate(stretches):
         inside = running[last + 1] - running[first]
         rest = whole[int(flows[first])] - inside
-        both = (inside[0] >= FEWEST_IN_CELL) & (rest[0] >= FEWEST_IN_CELL)
+        both = (inside[0] >= SCAN.fewest_in_cell) & (rest[0] >= SCAN.fewest_in_cell)
         if both.any():
             inside, rest = inside[:, both], rest[:, both]
             apart = inside[1:] / inside[0] - rest[1:] / rest[0]
@@ -131,9 +129,9 @@ def _sums(path: Path, series: int, layout: Layout) -> Floats:
     parts = np.flatnonzero(layout.series == series)
     part = np.searchsorted(layout.start[parts][1:], time[:-1], side="right")
     cell = cell_of(layout, 0.5 * (x[:-1] + x[1:]), 0.5 * (y[:-1] + y[1:]))
-    kept = step <= LONGEST_INTERVALS * np.median(step)
-    group = (part * layout.cells + cell)[kept]
+    retained = step <= SCAN.longest_intervals * np.median(step)
+    group = (part * layout.cells + cell)[retained]
     size = parts.size * layout.cells
-    weights = (None, (np.diff(x) / step)[kept], (np.diff(y) / step)[kept])
+    weights = (None, (np.diff(x) / step)[retained], (np.diff(y) / step)[retained])
     found = [np.bincount(group, one, minlength=size) for one in weights]
     return np.asarray(np.stack(found).reshape(3, parts.size, -1).transpose(1, 0, 2), np.float64)

@@ -1,22 +1,21 @@
-"""Are the errors of prediction white and normal? Autocorrelation, portmanteau statistic, tails."""
+"""Whiteness and normality of the innovations: autocorrelation, Ljung-Box statistic, kurtosis."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.likelihood.check.errors import Errors, Leverage, used_pairs
+from driftwalk.likelihood.check.errors import Innovations, Leverage, used_pairs
 from driftwalk.likelihood.spline import Floats
 
-LAGS = 20
-TAIL = 3.0
-"""Errors beyond this many standard deviations are the tail: 0.27 % of normal ones."""
+LAGS: Final = 20
+"""Lags of the portmanteau statistic: two seconds at 10 Hz. Chosen by hand."""
 
 
-class White(NamedTuple):
+class WhitenessTests(NamedTuple):
     """How white and how normal the errors are; arrays by component, or by component and lag."""
 
     autocorrelation: Floats
@@ -42,7 +41,9 @@ class White(NamedTuple):
     """Component and lag (from 1) that are furthest from what is expected."""
 
 
-def white_of(errors: Sequence[Errors], leverage: Leverage, *, lags: int = LAGS) -> White:
+def whiteness_tests(
+    errors: Sequence[Innovations], leverage: Leverage, *, lags: int = LAGS
+) -> WhitenessTests:
     """Return the statistics of whiteness of all recordings together.
 
     Ljung and Box's statistic takes the residuals of a fit for errors. Here each autocorrelation is
@@ -75,7 +76,7 @@ def white_of(errors: Sequence[Errors], leverage: Leverage, *, lags: int = LAGS) 
     values = np.concatenate([one.white[one.used] for one in errors])
     unit = values / np.sqrt(variance[:, 0])
     component, lag = divmod(int(np.abs(off).argmax()), lags)
-    return White(
+    return WhitenessTests(
         found,
         expected,
         np.array(std),
@@ -87,6 +88,6 @@ def white_of(errors: Sequence[Errors], leverage: Leverage, *, lags: int = LAGS) 
         (unit**4).mean(axis=0) - 3.0,
         float(np.sqrt(24.0 / samples)),
         np.atleast_1d(kurtosistest(unit, axis=0).pvalue),
-        (np.abs(values) > TAIL).mean(axis=0),
+        (np.abs(values) > 3.0).mean(axis=0),
         (component, lag + 1),
     )

@@ -1,4 +1,4 @@
-"""Recordings simulated from a fit: at the estimate, or with what the fit leaves open redrawn."""
+"""Posterior predictive replicates of the recordings, and replicates at the estimate."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.processors import map_in_threads
 from driftwalk.core.seeds import world_keys
 from driftwalk.core.streams import CheckStream
-from driftwalk.likelihood.check.errors import Estimate
-from driftwalk.likelihood.filter_pass import Series
+from driftwalk.likelihood.estimate import Estimate
+from driftwalk.likelihood.filter.series import Series
+from driftwalk.likelihood.fitted_flow import fitted_flow
 from driftwalk.likelihood.intervals import fitted_intervals
-from driftwalk.likelihood.result import fitted_flow
 from driftwalk.likelihood.spline import Floats
 from driftwalk.schema import Track
 from driftwalk.schema.answers.fit_facts import fitted_value
@@ -31,10 +31,6 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 Keys = npt.NDArray[np.uint64]
-FLOWS = 8
-"""Flow fields that are drawn; a world on its own takes as long as eight together."""
-MOST_LOG_STD = math.log(10.0)
-"""Standard deviation of the logarithm of a parameter, beyond which draws of it mean nothing."""
 
 Path = tuple[Floats, Floats, Floats]
 
@@ -52,16 +48,10 @@ class Replicates(NamedTuple):
     """How many were left out."""
 
 
-def ready_problems(
+def problems_of(
     fit: xr.Dataset, estimate: Estimate, recordings: Sequence[xr.Dataset]
 ) -> list[Problem]:
-    """Return the series ready for comparison, each in its fitted flow, with one step interval.
-
-    Raises
-    ------
-    InputError
-        When a recording forms too few steps.
-    """
+    """Return the series ready for comparison, each in its fitted flow, with one step interval."""
     from driftwalk.model import apply_overrides
 
     study, tracks, series = estimate.study, estimate.tracks, estimate.passes.series
@@ -94,8 +84,7 @@ def _problem(
     # The rounding of the file is part of the noise that the fit finds, and is simulated apart.
     plain = float(np.sqrt(max(noise**2 - quantum**2 / 12.0, 0.0)))
     seen = apply_overrides(
-        study,
-        {"observation.position_noise_m": plain, "observation.orientation_noise_rad": 0.0},
+        study, {"observation.position_noise_m": plain, "observation.orientation_noise_rad": 0.0}
     )
     camera = recorded_camera(track, seen, position_quantum=quantum)
     return prepare_problem(track, seen, flow, camera=camera)
@@ -113,7 +102,7 @@ def replicates_at_estimate(
     return _joined(parts, np.zeros(count, dtype=np.int64))
 
 
-def replicates_drawn(
+def posterior_replicates(
     fit: xr.Dataset,
     estimate: Estimate,
     problems: Sequence[Problem],
@@ -122,22 +111,11 @@ def replicates_drawn(
     count: int,
     seed: int,
 ) -> Replicates:
-    """Simulate the recordings with flow and parameters drawn from what the fit leaves open.
-
-    Parameters
-    ----------
-    fit, estimate : xarray.Dataset, Estimate
-        The fit.
-    problems : sequence of Problem
-        The recordings, cut at the switching times.
-    spread : ndarray
-        Root of the covariance of the flow's coefficients and ln C_d.
-    count, seed : int
-        How many, and the seed.
-    """
-    flows = min(FLOWS, count)
+    """Simulate the recordings with flow and parameters drawn from what the fit leaves open."""
+    # Eight flow fields: a world on its own takes as long as eight together.
+    flows = min(8, count)
     flow_of = np.arange(count) % flows
-    coefficients, factors = _draws(fit, estimate, spread, flows, seed)
+    coefficients, factors = _posterior_samples(fit, estimate, spread, flows, seed)
     drag = fitted_value(fit, "drag_coefficient") * factors[:, 0]
     force = fitted_value(fit, "force_std") * factors[:, 1]
     parts: list[list[_World]] = []
@@ -165,7 +143,7 @@ def replicates_drawn(
     return _joined(parts, flow_of)
 
 
-def _draws(
+def _posterior_samples(
     fit: xr.Dataset, estimate: Estimate, spread: Floats, count: int, seed: int
 ) -> tuple[Floats, Floats]:
     """Return drawn coefficients of the flow, and factors of C_d, force_std and tracking noise.
@@ -177,7 +155,8 @@ def _draws(
     size = estimate.point.coefficients.size
     found = fit["covariance"].values[:3, :3]
     widest = float(np.sqrt(np.diag(found).max()))
-    if not widest < MOST_LOG_STD:
+    # Samples of a parameter that is known to a factor of ten only mean nothing.
+    if not widest < math.log(10.0):
         raise InputError(
             "the fit leaves C_d, the force or the tracking noise uncertain by more "
             "than a factor of ten"
@@ -205,10 +184,7 @@ def _simulated(
     problem: Problem, keys: Keys, drag: float, force: float, begin: float = 0.0
 ) -> list[_World]:
     like = problem.like
-    values = {
-        "drag_coefficient": np.full(keys.size, drag),
-        "force_std": np.full(keys.size, force),
-    }
+    values = {"drag_coefficient": np.full(keys.size, drag), "force_std": np.full(keys.size, force)}
     x, y, _, status = problem.model.simulate(values, like, keys)
     worlds = []
     for k in range(keys.size):
@@ -223,10 +199,10 @@ def _joined(parts: Sequence[Sequence[_World]], flow_of: npt.NDArray[np.int64]) -
     """Put the recordings of each replicate together."""
     whole = list(zip(*parts, strict=True))
     sound = np.array([all(world.sound for world in one) for one in whole])
-    kept = [whole[k] for k in np.flatnonzero(sound)]
+    retained = [whole[k] for k in np.flatnonzero(sound)]
     return Replicates(
-        [np.concatenate([world.steps for world in one]) for one in kept],
-        [[world.path for world in one] for one in kept],
+        [np.concatenate([world.steps for world in one]) for one in retained],
+        [[world.path for world in one] for one in retained],
         flow_of[sound],
         int(np.count_nonzero(~sound)),
     )

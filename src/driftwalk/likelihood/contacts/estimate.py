@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 from driftwalk.conditions import estimated_study
 from driftwalk.core.run_stages import tell_nobody
-from driftwalk.likelihood.check.errors import Estimate, estimate_of
-from driftwalk.likelihood.contacts.lattice import tried_walls
-from driftwalk.likelihood.contacts.parabola import answer, says_nothing
-from driftwalk.likelihood.contacts.particles import Part, Trial
+from driftwalk.likelihood.contacts.lattice import search_walls
+from driftwalk.likelihood.contacts.parabola import answer, is_undetermined
+from driftwalk.likelihood.contacts.particles import Part, WallLikelihood
 from driftwalk.likelihood.contacts.passages import Passages, passages_of, thinned
+from driftwalk.likelihood.estimate import Estimate, estimate_of
+from driftwalk.likelihood.fitted_flow import fitted_flow
 from driftwalk.likelihood.intervals import fitted_intervals
 from driftwalk.likelihood.newton import Tell
-from driftwalk.likelihood.result import fitted_flow
 from driftwalk.likelihood.solution import BREAKDOWN
 from driftwalk.schema.answers.answer import undetermined
 from driftwalk.schema.answers.law_words import WALL_KEYS
@@ -25,10 +25,17 @@ from driftwalk.schema.check import described
 if TYPE_CHECKING:
     import xarray as xr
 
-LEAST_CONTACTS: Final = 8
-"""Fewer passages along the wall say nothing of it."""
-MOST_CONTACTS: Final = 50
-"""More are thinned to so many, evenly."""
+
+class ContactPolicy(NamedTuple):
+    """How many contacts an estimate of the wall takes."""
+
+    fewest: int = 8
+    """Fewer passages along the wall say nothing of it. Chosen by hand."""
+    most: int = 50
+    """More are thinned to this many, evenly. Chosen by hand, for the time that they take."""
+
+
+CONTACT: Final = ContactPolicy()
 
 
 def estimate_wall(
@@ -87,13 +94,13 @@ def estimate_wall(
     found = [passages_of(estimate, one) for one in estimate.passes.series]
     count = sum(len(one.x) for one in found)
     fit = described(fit.assign(wall_contacts=((), np.int64(count))))
-    if count < LEAST_CONTACTS:
+    if count < CONTACT.fewest:
         return fit.assign_attrs(wall_left_out=_too_few(count))
     try:
         data = _answer(fit, estimate, found, seed=seed, tell=tell or tell_nobody)
     except BREAKDOWN as error:
         return fit.assign_attrs(wall_left_out=f"the estimate of the wall failed: {error}")
-    if says_nothing(data):
+    if is_undetermined(data):
         return fit.assign_attrs(wall_left_out=_all_alike(count))
     return described(fit.assign(data))
 
@@ -106,15 +113,15 @@ def _answer(
     intervals = fitted_intervals(fit)
     parts = [
         Part(
-            thinned(passages, min(1.0, MOST_CONTACTS / count)),
+            thinned(passages, min(1.0, CONTACT.most / count)),
             fitted_flow(fit, interval=intervals.of_flow(series.flow)[0]),
             float(np.median(np.diff(series.time))),
         )
         for series, passages in zip(estimate.passes.series, found, strict=True)
         if len(passages.x)
     ]
-    trial = Trial(estimated_study(fit), estimate.point, parts, seed)
-    walls = tried_walls(trial.log_likelihood, tell)
+    likelihood = WallLikelihood(estimated_study(fit), estimate.point, parts, seed)
+    walls = search_walls(likelihood.log_likelihood, tell)
     return answer(walls, float(fit["confidence"]))
 
 
@@ -142,7 +149,7 @@ def _no_orientation(angle: str) -> str:
 def _too_few(count: int) -> str:
     """Return why so few contacts say nothing of the wall."""
     return (
-        f"the estimate of the wall needs {LEAST_CONTACTS} contacts with it, and {count} can be "
+        f"the estimate of the wall needs {CONTACT.fewest} contacts with it, and {count} can be "
         "followed: record for longer, at an even rate, or where the flow drives the block to the "
         "wall"
     )

@@ -1,24 +1,33 @@
-"""Estimates of restitution and friction, from a parabola through the likely walls."""
+"""Quadratic fit to the log likelihood of the walls: restitution and friction with intervals."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.likelihood.contacts.lattice import MOST_HOLD, Wall
+from driftwalk.likelihood.contacts.lattice import LATTICE, Wall
 from driftwalk.likelihood.spline import Floats
 
-NEAR: Final = 80.0
-"""Walls whose log likelihood is so near the largest ones form the parabola, at least"""
-LEAST_WALLS: Final = 14
-"""so many."""
-HALF_WEIGHT: Final = 15.0
-"""A wall with a log likelihood so far below the largest one counts half."""
-LEAST_CURVATURE: Final = 0.5
-"""A direction along which the likelihood falls less is not determined."""
+
+class ParabolaPolicy(NamedTuple):
+    """Which of the walls form the parabola."""
+
+    near: float = 80.0
+    """Walls whose log likelihood is this near the largest ones form the parabola. Chosen by
+    hand."""
+    fewest_walls: int = 14
+    """Least number of walls that form the parabola: it has six numbers. Chosen by hand."""
+    half_weight: float = 15.0
+    """A wall with a log likelihood this far below the largest one counts half. Chosen by hand: far
+    from its top the likelihood is no parabola."""
+    least_curvature: float = 0.5
+    """A direction along which the likelihood falls less is not determined. Chosen by hand."""
+
+
+PARABOLA: Final = ParabolaPolicy()
 
 
 def answer(walls: Sequence[Wall], confidence: float) -> dict[str, Any]:
@@ -32,13 +41,12 @@ def answer(walls: Sequence[Wall], confidence: float) -> dict[str, Any]:
     table = np.array(walls)
     order = np.argsort(-table[:, 2])
     top = table[order[:3], 2].mean()
-    near = table[table[:, 2] > top - NEAR]
-    if len(near) < LEAST_WALLS:
-        near = table[order[:LEAST_WALLS]]
+    near = table[table[:, 2] > top - PARABOLA.near]
+    if len(near) < PARABOLA.fewest_walls:
+        near = table[order[: PARABOLA.fewest_walls]]
     e, hold, height = near.T
     terms = np.column_stack([np.ones_like(e), e, hold, e**2, e * hold, hold**2])
-    # Far from its top the likelihood is no parabola.
-    weight = 1.0 / (1.0 + np.maximum(top - height, 0.0) / HALF_WEIGHT)
+    weight = 1.0 / (1.0 + np.maximum(top - height, 0.0) / PARABOLA.half_weight)
     root = np.sqrt(weight)
     fitted, *_ = np.linalg.lstsq(terms * root[:, None], (height - top) * root, rcond=None)
     scatter = (height - top) - terms @ fitted
@@ -46,7 +54,7 @@ def answer(walls: Sequence[Wall], confidence: float) -> dict[str, Any]:
     curvature = -np.array([[2 * fitted[3], fitted[4]], [fitted[4], 2 * fitted[5]]])
     values, vectors = np.linalg.eigh(curvature)
     # A direction along which the likelihood does not fall is not determined.
-    inverse = vectors @ np.diag(1.0 / np.maximum(values, LEAST_CURVATURE)) @ vectors.T
+    inverse = vectors @ np.diag(1.0 / np.maximum(values, PARABOLA.least_curvature)) @ vectors.T
     best = inverse @ fitted[1:3]
     slopes = np.column_stack(
         [np.zeros(2), inverse, *(-inverse @ part @ best for part in _CURVATURES)]
@@ -64,7 +72,7 @@ def answer(walls: Sequence[Wall], confidence: float) -> dict[str, Any]:
     }
 
 
-def says_nothing(found: Mapping[str, Any]) -> bool:
+def is_undetermined(found: Mapping[str, Any]) -> bool:
     """Return whether the intervals of an answer hold every wall."""
     restitution, friction = (
         found[f"wall_{name}_interval"][1].tolist() for name in ("restitution", "friction")
@@ -81,6 +89,6 @@ _CURVATURES: Final = (
 
 
 def _friction(hold: Floats) -> Floats:
-    """Return the friction of a hold; from `MOST_HOLD` on it only sticks."""
+    """Return the friction of a hold; from the largest hold on it only sticks."""
     with np.errstate(divide="ignore"):
-        return np.where(hold < MOST_HOLD, hold / (1.0 - hold), np.inf)
+        return np.where(hold < LATTICE.most_hold, hold / (1.0 - hold), np.inf)

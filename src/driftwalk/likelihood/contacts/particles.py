@@ -1,4 +1,4 @@
-"""Likelihood of a wall: particles follow the block through its passages along the wall.
+"""Particle filter of the passages along the wall: the likelihood of a wall.
 
 They get the fitted flow, drag and force, and the impacts of a wall of given restitution and
 friction. The likelihood (Gordon, Salmond and Smith 1993) is the product of the mean densities of
@@ -17,9 +17,8 @@ import numpy.typing as npt
 from driftwalk import _core
 from driftwalk.core.processors import default_threads
 from driftwalk.core.seeds import world_keys
-from driftwalk.likelihood.contacts.known import known_covariance
 from driftwalk.likelihood.contacts.passages import Passages
-from driftwalk.likelihood.filter_pass import Point
+from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.spline import Floats
 from driftwalk.schema.trajectory import wrap_angle
 from driftwalk.simulation.backend import Camera, native_model, world_table
@@ -29,18 +28,30 @@ if TYPE_CHECKING:
 
     from driftwalk.model import Study
 
-PARTICLES: Final = 150
-MISTAKE: Final = 1e-3
-"""Chance that a sample is a mistake, anywhere in the tank: no particle need be near."""
-SPREAD: Final = 1.5
-"""Factor on the spread of the first states: what is too wide costs little, too narrow misleads."""
-ROUGH: Final = 0.3
-"""Noise that the particles get at each sample, as a share of the camera's, and of that a sample
-later for their rates: without it they soon are copies of a few (Gordon, Salmond and Smith 1993)."""
-WIDER: Final = 2.0
-"""Factor on the camera's noise."""
-DRAWS: Final = 2
-"""Draws of the force from sample to sample, at least."""
+
+class ParticlePolicy(NamedTuple):
+    """The particles that follow a passage along the wall."""
+
+    particles: int = 150
+    """Particles of a passage. Chosen by hand: the scatter that they leave is in the intervals."""
+    mistake: float = 1e-3
+    """Chance that a sample is a mistake, anywhere in the tank: no particle need be near. Chosen by
+    hand."""
+    spread: float = 1.5
+    """Factor on the spread of the first states. Chosen by hand: one that is too wide costs little,
+    one too narrow misleads."""
+    rough: float = 0.3
+    """Noise that the particles get at each sample, as a share of the camera's, and of that a sample
+    later for their rates: without it they soon are copies of a few (Gordon, Salmond and Smith
+    1993). Chosen by hand."""
+    wider: float = 2.0
+    """Factor on the camera's noise. Chosen by hand."""
+    force_draws: int = 2
+    """Draws of the force from sample to sample, at least: a force that is held for longer comes out
+    too weak."""
+
+
+PARTICLE: Final = ParticlePolicy()
 
 
 class Part(NamedTuple):
@@ -53,27 +64,15 @@ class Part(NamedTuple):
     """Between samples [s]."""
 
 
-class Trial:
-    """Likelihoods of walls for the passages of some series.
-
-    Parameters
-    ----------
-    study : Study
-        The fitted study; its wall does not matter.
-    point : Point
-        What was estimated, with the orientation in the state.
-    parts : sequence of Part
-        The passages, by series.
-    seed : int
-        Of the particles.
-    """
+class WallLikelihood:
+    """Likelihoods of walls for the passages of some series."""
 
     def __init__(self, study: Study, point: Point, parts: Sequence[Part], seed: int) -> None:
         assert point.log_angle_noise is not None
         assert point.log_lever is not None
         self.study, self.parts, self.seed = study, parts, seed
-        self.noise = WIDER * math.exp(point.log_noise)
-        self.angle_noise = WIDER * math.exp(point.log_angle_noise)
+        self.noise = PARTICLE.wider * math.exp(point.log_noise)
+        self.angle_noise = PARTICLE.wider * math.exp(point.log_angle_noise)
         intensity = math.exp(point.log_intensity)
         turning = 6.0 * math.exp(point.log_lever) / study.block.side_m**2
         self.intensity = np.array([intensity, intensity, intensity * turning**2])
@@ -87,7 +86,7 @@ class Trial:
         return float(sum(self._of(study, part, index) for index, part in enumerate(self.parts)))
 
     def _of(self, study: Study, part: Part, index: int) -> float:
-        study = _fast_enough(study, part.interval)
+        study = _with_short_force_interval(study, part.interval)
         passages, step = part.passages, study.time_step_s
         generator = np.random.default_rng([self.seed, index])
         state = self._first(passages, part.interval, generator)
@@ -101,26 +100,30 @@ class Trial:
             running = np.isfinite(passages.x[:, k])
             if not running.any():
                 break
-            pose, motion = _moved(model, study, state, keys, step)
+            pose, motion = _propagated(model, study, state, keys, step)
             logs = self._densities(passages, k, pose)
             top = logs.max(axis=1, keepdims=True)
             weight = np.exp(logs - top)
             total += float((np.log(weight.mean(axis=1)) + top[:, 0])[running].sum())
-            state = _drawn([*pose, *motion], weight, uniform)
+            state = _resampled([*pose, *motion], weight, uniform)
             for a, noise in enumerate((self.noise, self.noise, self.angle_noise)):
-                state[a] += ROUGH * noise * generator.normal(size=weight.shape)
-                state[a + 3] += ROUGH * noise / part.interval * generator.normal(size=weight.shape)
+                state[a] += PARTICLE.rough * noise * generator.normal(size=weight.shape)
+                state[a + 3] += (
+                    PARTICLE.rough * noise / part.interval * generator.normal(size=weight.shape)
+                )
         return total
 
     def _first(
         self, passages: Passages, interval: float, generator: np.random.Generator
     ) -> list[Floats]:
         """Return the first states of the particles, six of shape (passages, particles)."""
-        shape = (len(passages.x), PARTICLES)
+        shape = (len(passages.x), PARTICLE.particles)
         state = [np.empty(shape) for _ in range(6)]
         noises = (self.noise, self.noise, self.angle_noise)
         for a, (noise, intensity) in enumerate(zip(noises, self.intensity, strict=True)):
-            root = SPREAD * np.linalg.cholesky(known_covariance(noise, intensity, interval))
+            root = PARTICLE.spread * np.linalg.cholesky(
+                filtered_covariance(noise, intensity, interval)
+            )
             drawn = np.einsum("ab,bij->aij", root, generator.normal(size=(2, *shape)))
             state[a] = passages.state[:, a, None] + drawn[0]
             state[a + 3] = passages.state[:, a + 3, None] + drawn[1]
@@ -135,13 +138,13 @@ class Trial:
         size = (
             math.log(2.0 * math.pi) * 1.5 + 2.0 * math.log(self.noise) + math.log(self.angle_noise)
         )
-        anywhere = math.log(MISTAKE / (self.study.tank.extent_m[0] ** 2 * 2.0 * math.pi))
+        anywhere = math.log(PARTICLE.mistake / (self.study.tank.extent_m[0] ** 2 * 2.0 * math.pi))
         # Of a passage that has ended all particles are alike.
         squares = np.where(np.isfinite(squares), squares, 0.0)
         return np.logaddexp(-0.5 * squares - size, anywhere)
 
 
-def _fast_enough(study: Study, interval: float) -> Study:
+def _with_short_force_interval(study: Study, interval: float) -> Study:
     """Return a study whose force is redrawn twice or more between samples, as strong as before.
 
     The particles get a new force at each sample. One that would be held for longer than from sample
@@ -149,7 +152,7 @@ def _fast_enough(study: Study, interval: float) -> Study:
     """
     from driftwalk.model import apply_overrides
 
-    forces, held = study.forces, interval / DRAWS
+    forces, held = study.forces, interval / PARTICLE.force_draws
     if forces.force_interval_s <= held:
         return study
     return apply_overrides(
@@ -162,7 +165,7 @@ def _fast_enough(study: Study, interval: float) -> Study:
     )
 
 
-def _moved(
+def _propagated(
     model: Any, study: Study, state: Sequence[Floats], keys: npt.NDArray[np.uint64], step: float
 ) -> tuple[list[Floats], list[Floats]]:
     """Return poses and rates of the particles one interval later."""
@@ -185,7 +188,7 @@ def _moved(
     return pose, motion
 
 
-def _drawn(state: Sequence[Floats], weight: Floats, uniform: Floats) -> list[Floats]:
+def _resampled(state: Sequence[Floats], weight: Floats, uniform: Floats) -> list[Floats]:
     """Return the particles drawn by their weights, systematically."""
     passages, particles = weight.shape
     total = np.cumsum(weight, axis=1)
@@ -194,3 +197,23 @@ def _drawn(state: Sequence[Floats], weight: Floats, uniform: Floats) -> list[Flo
     chosen = np.searchsorted((total / total[:, -1:] + row).ravel(), (places + row).ravel())
     chosen = np.minimum(chosen, (row * particles + particles - 1).repeat(particles, 1).ravel())
     return [part.ravel()[chosen].reshape(weight.shape) for part in state]
+
+
+def filtered_covariance(noise: float, intensity: float, interval: float) -> Floats:
+    """Return the covariance of a coordinate and its rate after many samples, without drag.
+
+    `noise` is the camera's, `intensity` that of the white noise of the acceleration.
+    """
+    moved = np.array([[1.0, interval], [0.0, 1.0]])
+    added = intensity * np.array(
+        [[interval**3 / 3.0, interval**2 / 2.0], [interval**2 / 2.0, interval]]
+    )
+    known = np.diag([noise**2, (noise / interval) ** 2])
+    # Sample by sample, and not the steady state from scipy's `solve_discrete_are`: the less noise
+    # the turning has, the more samples the steady state takes, and where it has next to none the
+    # pencil has its eigenvalues at the unit circle and scipy finds no stabilising solution.
+    for _ in range(200):
+        known = moved @ known @ moved.T + added
+        gain = known[:, 0] / (known[0, 0] + noise**2)
+        known = known - np.outer(gain, known[0])
+    return known + np.diag([1e-18, 1e-12])

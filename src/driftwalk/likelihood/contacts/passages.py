@@ -6,18 +6,25 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.likelihood.check.errors import Estimate
-from driftwalk.likelihood.filter_pass import Series, corrected
+from driftwalk.likelihood.estimate import Estimate
+from driftwalk.likelihood.filter.series import Series, corrected
 from driftwalk.likelihood.spline import Floats
 
-BEFORE: Final = 3
-"""Samples that a passage begins before the wall,"""
-AFTER: Final = 4
-"""ends after it,"""
-LONGEST: Final = 25
-"""and has at most, from the wall on."""
-UNEVEN: Final = 0.2
-"""Largest relative difference of an interval from the usual one."""
+
+class PassagePolicy(NamedTuple):
+    """Samples of a passage along the wall."""
+
+    before: int = 3
+    """Samples that a passage begins before the wall. Chosen by hand, as what follows."""
+    after: int = 4
+    """Samples that it ends after the wall."""
+    longest: int = 25
+    """Most samples from the wall on."""
+    uneven: float = 0.2
+    """Largest relative difference of an interval from the usual one."""
+
+
+PASSAGE: Final = PassagePolicy()
 
 
 class Passages(NamedTuple):
@@ -37,7 +44,7 @@ def passages_of(estimate: Estimate, series: Series) -> Passages:
     x, y, theta = corrected(series, point)
     states = estimate.passes.states(series, point)
     usual = float(np.median(np.diff(series.time)))
-    even = np.concatenate([[False], np.abs(np.diff(series.time) - usual) < UNEVEN * usual])
+    even = np.concatenate([[False], np.abs(np.diff(series.time) - usual) < PASSAGE.uneven * usual])
     whole = np.isfinite(x) & np.isfinite(y) & np.isfinite(theta)
     rows = []
     at = 0
@@ -45,9 +52,12 @@ def passages_of(estimate: Estimate, series: Series) -> Passages:
     while places.size:
         first = int(places[0])
         last = first
-        while last + 1 < x.size and series.excluded[last + 1 : last + 1 + AFTER].any():
+        while last + 1 < x.size and series.excluded[last + 1 : last + 1 + PASSAGE.after].any():
             last += 1
-        begin, end = first - 1 - BEFORE, min(last + 1 + AFTER, first + LONGEST)
+        begin, end = (
+            first - 1 - PASSAGE.before,
+            min(last + 1 + PASSAGE.after, first + PASSAGE.longest),
+        )
         places = places[places > max(last, end)]
         inside = slice(begin + 1, end)
         if begin <= at or end >= x.size or series.excluded[begin - 1 : first].any():
@@ -55,7 +65,7 @@ def passages_of(estimate: Estimate, series: Series) -> Passages:
         if not (whole[begin:end].all() and even[inside].all() and np.isfinite(states[begin]).all()):
             continue
         at = end
-        pad = LONGEST + BEFORE + 1 - (end - begin - 1)
+        pad = PASSAGE.longest + PASSAGE.before + 1 - (end - begin - 1)
         rows.append(
             (
                 *(np.pad(part[inside], (0, pad), constant_values=np.nan) for part in (x, y, theta)),
@@ -63,7 +73,7 @@ def passages_of(estimate: Estimate, series: Series) -> Passages:
             )
         )
     if not rows:
-        empty = np.zeros((0, LONGEST + BEFORE + 1))
+        empty = np.zeros((0, PASSAGE.longest + PASSAGE.before + 1))
         return Passages(empty, empty, empty, np.zeros((0, 6)))
     return Passages(*(np.array(column) for column in zip(*rows, strict=True)))
 
@@ -71,5 +81,5 @@ def passages_of(estimate: Estimate, series: Series) -> Passages:
 def thinned(passages: Passages, share: float) -> Passages:
     """Return a share of the passages, evenly taken; one at least."""
     count = len(passages.x)
-    kept = np.unique(np.linspace(0, count - 1, max(round(share * count), 1)).astype(np.intp))
-    return Passages(*(part[kept] for part in passages))
+    retained = np.unique(np.linspace(0, count - 1, max(round(share * count), 1)).astype(np.intp))
+    return Passages(*(part[retained] for part in passages))

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from driftwalk.likelihood.law.departures import DRAG_SHAPES, DRAGS, STRENGTHS
+from driftwalk.likelihood.filter.departures import DRAG_SHAPES, DRAGS, STRENGTHS
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
@@ -39,15 +39,6 @@ def assumptions_of(study: Study, angle: str, *, recordings: int, flows: int) -> 
     """Return what a study leaves to the fit.
 
     Where [fit] says "auto", a key of [forces] states the law if it differs from its default.
-
-    Parameters
-    ----------
-    study : Study
-        Its section [fit].
-    angle : {"state", "given", "none"}
-        How orientations are used.
-    recordings, flows : int
-        Their numbers: a strength over time belongs to one recording in one flow.
     """
     fit = study.fit
     opened, fixed, tried = _drag_of(study)

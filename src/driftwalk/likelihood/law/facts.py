@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from driftwalk.core.errors import InputError
-from driftwalk.likelihood.filter_pass import Passes, Point
+from driftwalk.likelihood.filter.departures import DRAG_SHAPES, STRENGTHS
+from driftwalk.likelihood.filter.filter_pass import Passes
+from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.law.assumptions import USUAL_ADDED_MASS, added_mass_of, is_stated
-from driftwalk.likelihood.law.departures import DRAG_SHAPES, STRENGTHS
 from driftwalk.likelihood.solution import BREAKDOWN
 from driftwalk.schema.answers.fit_facts import fitted_value
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.likelihood.law.assumptions import Assumptions
-    from driftwalk.likelihood.law.found import LawFound
+    from driftwalk.likelihood.law.forward_selection import LawResult
     from driftwalk.likelihood.reml import Restricted
     from driftwalk.likelihood.spline import Floats
     from driftwalk.model import Study
@@ -33,8 +34,6 @@ PLAIN: Final = {
     "pulse_frequency": "pulse_frequency_Hz",
 }
 """Numbers that are stated as they are."""
-SIDE_STEP: Final = 0.01
-"""Relative change of the side for the derivatives by it."""
 
 
 class Inertia(NamedTuple):
@@ -90,28 +89,18 @@ def inertia_facts(inertia: Inertia, facts: dict[str, Any], normal: float) -> dic
 
 
 def number_facts(point: Point, reach: Floats, study: Study) -> dict[str, Any]:
-    """Return the opened numbers with their intervals, and the stated ones, units in the keys.
-
-    Parameters
-    ----------
-    point : Point
-        The estimate.
-    reach : ndarray
-        Half the width of the intervals, of ln C_d, the noises and the opened numbers.
-    study : Study
-        The block.
-    """
+    """Return the opened numbers with their intervals, and the stated ones, units in the keys."""
     first = 1 + len(point.noises)
     widths = dict(zip(point.opened, reach[first:].tolist(), strict=True))
     facts: dict[str, Any] = {}
 
-    def tell(key: str, value: float, width: float, scale: float = 1.0) -> None:
+    def state(key: str, value: float, width: float, scale: float = 1.0) -> None:
         facts[key] = scale * value
         facts[f"{key}_interval"] = [scale * (value - width), scale * (value + width)]
 
     for name, key in PLAIN.items():
         if name in widths or name in point.fixed:
-            tell(key, point.number(name), widths.get(name, 0.0))
+            state(key, point.number(name), widths.get(name, 0.0))
     if "time_variance" in widths:
         value, width = point.opened["time_variance"], widths["time_variance"]
         ends = [math.sqrt(max(one, 0.0)) for one in (value - width, value + width)]
@@ -121,31 +110,29 @@ def number_facts(point: Point, reach: Floats, study: Study) -> dict[str, Any]:
     if share:
         # It goes with C_d of the filter, too.
         width = math.hypot(widths.get("linear_share", 0.0), share * float(reach[0]))
-        tell("linear_drag_kg_s", share, width, _linear_drag(point, study))
+        state("linear_drag_kg_s", share, width, _linear_drag(point, study))
     if "strength_1" in widths:
         # From the beginning of the recording to its end the odd cosines change their signs.
         odd = STRENGTHS[::2]
         change = -2.0 * sum(point.opened[name] for name in odd)
-        tell("flow_strength_change", change, 2.0 * math.hypot(*(widths[name] for name in odd)))
+        state("flow_strength_change", change, 2.0 * math.hypot(*(widths[name] for name in odd)))
     if "pulse_sine" in widths:
         size = math.hypot(point.opened["pulse_cosine"], point.opened["pulse_sine"])
-        tell("pulse_amplitude", size, max(widths["pulse_cosine"], widths["pulse_sine"]))
+        state("pulse_amplitude", size, max(widths["pulse_cosine"], widths["pulse_sine"]))
     return facts
 
 
 def _linear_drag(point: Point, study: Study) -> float:
     """Return the linear drag of the whole block [kg/s] for a linear share of 1."""
-    from driftwalk.likelihood.ready import LINEAR_TIME_S
-
     block, floating = study.block, point.number("water_acceleration") != 0.0
     area = block.side_m * study.wetted_depth_m
     # K b of all strips: four faces, b a quarter of the speed.
-    speed = block.side_m / LINEAR_TIME_S
+    speed = block.side_m
     drag = 0.5 * study.water.density_kg_m3 * math.exp(point.log_drag) * area * speed
     return drag * inertia_of(study, floating=floating).share
 
 
-def law_facts(law: LawFound, assumptions: Assumptions) -> dict[str, Any]:
+def law_facts(law: LawResult, assumptions: Assumptions) -> dict[str, Any]:
     """Return the law, whether it was stated, and by how much the recording supports it."""
     searched = bool(set(DRAG_SHAPES) & set(assumptions.tried))
     facts: dict[str, Any] = {
@@ -168,7 +155,7 @@ def _drag_law(point: Point) -> str:
     return "linear" if point.number("linear_share") == 1.0 else "quadratic"
 
 
-def number_variables(point: Point, law: LawFound) -> tuple[dict[str, Any], dict[str, Any]]:
+def number_variables(point: Point, law: LawResult) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return variables and coordinates with the numbers of the law, and what was tested."""
     values = {**point.fixed, **point.opened}
     data: dict[str, Any] = {
@@ -181,10 +168,10 @@ def number_variables(point: Point, law: LawFound) -> tuple[dict[str, Any], dict[
         "number": ("number", np.array(list(values), dtype=np.str_)),
         "law": ("law", np.array(list(law.evidence), dtype=np.str_)),
     }
-    if law.trial is not None:
-        data["departure_estimate"] = ("departure", law.trial.estimate)
-        data["departure_std"] = ("departure", law.trial.std)
-        coords["departure"] = ("departure", np.array(law.trial.names, dtype=np.str_))
+    if law.tests is not None:
+        data["departure_estimate"] = ("departure", law.tests.estimate)
+        data["departure_std"] = ("departure", law.tests.std)
+        coords["departure"] = ("departure", np.array(law.tests.names, dtype=np.str_))
     return data, coords
 
 
@@ -225,7 +212,7 @@ def stored_numbers(fit: xr.Dataset) -> Numbers:
 
 
 def side_slopes(
-    passes: Passes, law: LawFound, restricted: Restricted, study: Study
+    passes: Passes, law: LawResult, restricted: Restricted, study: Study
 ) -> tuple[float, float]:
     """Return the derivatives of ln C_d and ln σ_F by the logarithm of the block's side.
 
@@ -234,11 +221,13 @@ def side_slopes(
     """
     if study.fit.side_std_m == 0.0:
         return 0.0, 0.0
-    from driftwalk.likelihood.newton import Prior, inverse
+    from driftwalk.likelihood.newton import inverse
+    from driftwalk.likelihood.prior import Prior
     from driftwalk.likelihood.ready import body_of
     from driftwalk.model import apply_overrides
 
-    larger = apply_overrides(study, {"block.side_m": (1.0 + SIDE_STEP) * study.block.side_m})
+    # A side larger by 1 %: the derivative is a difference of two steps of the search.
+    larger = apply_overrides(study, {"block.side_m": (1.0 + 0.01) * study.block.side_m})
     prior = Prior(passes)
     changed = replace(passes, body=body_of(larger, passes.body.orientation))
     steps = []
@@ -249,5 +238,5 @@ def side_slopes(
     except BREAKDOWN:
         return math.inf, math.inf
     drag = restricted.point.coefficients.size
-    slope = (steps[1] - steps[0])[drag : drag + 2] / math.log1p(SIDE_STEP)
+    slope = (steps[1] - steps[0])[drag : drag + 2] / math.log1p(0.01)
     return float(slope[0]), 0.5 * float(slope[1])

@@ -1,4 +1,4 @@
-"""Numbers of departures from the model that a recording asks to be opened.
+"""Forward selection of the numbers of departures, with backward elimination.
 
 Score tests at the mode of a law (`driftwalk.likelihood.law.score_tests`) select them. A number is
 closed again where opening it does not improve the fit.
@@ -8,84 +8,132 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Set
-from dataclasses import replace
-from typing import Final
+from dataclasses import dataclass, replace
+from typing import Final, NamedTuple
 
-from driftwalk.likelihood.filter_pass import Point
+from driftwalk.likelihood.filter.departures import DRAG_SHAPES, NUMBERS, PULSES, STRENGTHS
+from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.law.assumptions import FLOATING, Assumptions
-from driftwalk.likelihood.law.departures import DRAG_SHAPES, NUMBERS, PULSES, STRENGTHS
-from driftwalk.likelihood.law.found import LawFound
-from driftwalk.likelihood.law.modes import Modes, unless_broken
-from driftwalk.likelihood.law.score_tests import Trial, find_pulses
-from driftwalk.likelihood.newton import FROM_NEAR, Mode, Weights
+from driftwalk.likelihood.law.score_tests import Pulses, ScoreTests, find_pulses, score_tests
+from driftwalk.likelihood.newton import FROM_NEAR, Mode, ModeSearch
+from driftwalk.likelihood.prior import Weights
 from driftwalk.schema.answers.law_words import MEMORY_SIGMAS, OPENED_SIGMAS
 
-KEPT_SIGMAS: Final = 3.0
-"""An opened number stays open when the fit finds it so far from the model [standard deviations],
-with half of what is worth it as an error of the filter;"""
-KEPT_MEMORY_SIGMAS: Final = 3.4
-"""the memory of the force so far: a flow with more detail than the spline acts like a memory of 0.1
-s."""
-OPENED_STRENGTH: Final = 50.0
-"""Chi squared (6 degrees of freedom) of the strength of the flow from which on it is opened."""
-ROUNDS: Final = 3
 
+class SelectionPolicy(NamedTuple):
+    """When a number of a departure is opened, and when it stays open.
 
-def worth(side: float) -> dict[str, float]:
-    """Return from which size on a departure is worth a number, by name, for a block's side [m].
-
-    Below it the filter's own errors may be what is seen.
+    A number is asked for when its score test is beyond `OPENED_SIGMAS`, and the force's memory
+    beyond `MEMORY_SIGMAS`: see `driftwalk.schema.answers.law_words`.
     """
+
+    retained_sigmas: float = 3.0
+    """An opened number stays open when the fit finds it further from the model than this [standard
+    deviations], with half of its least effect as an error of the filter. Chosen by hand; none of
+    380 recordings of the model opened a number (studies/misfit, set right)."""
+    retained_memory_sigmas: float = 3.4
+    """The same for the memory of the force: a flow with more detail than the spline acts like a
+    memory of 0.1 s (docs/explanation/likelihood.md)."""
+    strength_chi_squared: float = 50.0
+    """Chi squared (6 degrees of freedom) of the flow's strength from which on its cosines are
+    opened: chance exceeds it once in 2e8."""
+    rounds: int = 3
+    """Rounds of score tests and openings. Chosen by hand."""
+    linear_share: float = 0.15
+    """Least effect of a linear part: a smaller one may be an error of the filter. Chosen by hand,
+    as the least effects that follow (studies/misfit/power.py shows what they let through)."""
+    drag_power: float = 0.15
+    """Least change of the drag's power."""
+    force_memory: float = 0.04
+    """Least memory of the force [s]."""
+    time_noise: float = 0.003
+    """Least jitter of the time stamps [s]."""
+    angle_offset_deg: float = 0.7
+    """Least offset of the angle [degrees]."""
+    marker: float = 0.012
+    """Least offset of the marker, in sides of the block."""
+    strength: float = 0.01
+    """Least amplitude of a cosine of the flow's strength."""
+    pulse: float = 0.02
+    """Least amplitude of a pulse."""
+
+
+SELECTION: Final = SelectionPolicy()
+
+
+@dataclass(frozen=True, eq=False)
+class LawResult:
+    """Result of a search over laws."""
+
+    mode: Mode
+    base: Mode
+    """The mode of the law alone, without departures."""
+    floating: bool
+    """Whether the water's own acceleration pushes the body."""
+    evidence: Mapping[str, float]
+    """Logarithm of the evidence for each law that was fitted, without its constant."""
+    settled_by: float
+    """Logarithm of the evidence for the law over the other; infinite where one law alone was
+    fitted."""
+    tests: ScoreTests | None
+    """The last score tests of closed numbers; None where they broke down."""
+
+
+def least_effects(side: float) -> dict[str, float]:
+    """Return the least effect of each number, for a block's side [m]: below it none is opened."""
     return {
-        "linear_share": 0.15,
-        "drag_power": 0.15,
-        "force_memory": 0.04,
-        "time_variance": 0.003**2,
-        "angle_offset": math.radians(0.7),
-        "marker_x": 0.012 * side,
-        "marker_y": 0.012 * side,
-        **dict.fromkeys(STRENGTHS, 0.01),
-        **dict.fromkeys(PULSES, 0.02),
+        "linear_share": SELECTION.linear_share,
+        "drag_power": SELECTION.drag_power,
+        "force_memory": SELECTION.force_memory,
+        "time_variance": SELECTION.time_noise**2,
+        "angle_offset": math.radians(SELECTION.angle_offset_deg),
+        "marker_x": SELECTION.marker * side,
+        "marker_y": SELECTION.marker * side,
+        **dict.fromkeys(STRENGTHS, SELECTION.strength),
+        **dict.fromkeys(PULSES, SELECTION.pulse),
     }
 
 
-def is_kept(mode: Mode, name: str, least: Mapping[str, float]) -> bool:
+def is_retained(mode: Mode, name: str, least: Mapping[str, float]) -> bool:
     """Return whether an opened number is so far from the model that it stays open."""
     value, std = mode.value_of(name)
     error = math.hypot(std, 0.5 * least.get(name, 0.0))
-    sigmas = KEPT_MEMORY_SIGMAS if name == "force_memory" else KEPT_SIGMAS
+    memory = name == "force_memory"
+    sigmas = SELECTION.retained_memory_sigmas if memory else SELECTION.retained_sigmas
     return abs(value - NUMBERS[name].model) > sigmas * error
 
 
-class Opening:
+class ForwardSelection:
     """Opens numbers for the recordings of one fit."""
 
-    def __init__(self, modes: Modes, assumptions: Assumptions) -> None:
-        self.modes, self.assumptions = modes, assumptions
-        self.worth = worth(modes.passes.body.side)
+    def __init__(self, search: ModeSearch, assumptions: Assumptions) -> None:
+        self.search, self.assumptions = search, assumptions
+        self.least = least_effects(search.passes.body.side)
 
-    def departed(self, found: LawFound) -> LawFound:
+    def select(self, found: LawResult) -> LawResult:
         """Return the law found, with the departures that the recording asks for."""
-        mode, trial = found.mode, found.trial
-        closed: set[str] = set()
-        for index in range(ROUNDS):
-            names = self._closed_names(mode, closed)
-            if index > 0 or trial is None:
-                trial = self.modes.tested(mode, names) if names else None
-            asked = self._asked(mode, trial, closed)
-            if not asked:
+        mode, tests = found.mode, found.tests
+        rejected: set[str] = set()
+        for index in range(SELECTION.rounds):
+            names = self._closed_names(mode, rejected)
+            if index > 0 or tests is None:
+                tests = score_tests(self.search, mode, names) if names else None
+            pulses = None
+            untried = not set(PULSES) & {*mode.point.opened, *rejected}
+            if tests is not None and self.assumptions.pulses and untried:
+                pulses = find_pulses(self.search.passes, mode)
+            candidates = self._candidates(tests, pulses)
+            if not candidates:
                 break
-            mode, dropped = self._opened_or_strongest(mode, asked, trial)
-            closed |= dropped
+            mode, idle = self._open_together_or_singly(mode, candidates, tests)
+            rejected |= idle
         else:
-            names = self._closed_names(mode, closed)
-            trial = self.modes.tested(mode, names) if names else None
-        return replace(found, mode=self._pruned(mode), trial=trial)
-
-    def _pruned(self, mode: Mode) -> Mode:
-        """Return the mode without numbers that are idle since others were opened."""
-        names = set(mode.point.opened) - set(self.assumptions.opened)
-        return self._without(mode, self._idle(mode, names)) or mode
+            names = self._closed_names(mode, rejected)
+            tests = score_tests(self.search, mode, names) if names else None
+        # Backward elimination: numbers that are idle since others were opened.
+        opened = set(mode.point.opened) - set(self.assumptions.opened)
+        mode = self._without(mode, self._idle(mode, opened)) or mode
+        return replace(found, mode=mode, tests=tests)
 
     def _closed_names(self, mode: Mode, closed: Set[str]) -> list[str]:
         """Return the numbers that may still be opened."""
@@ -97,8 +145,8 @@ class Opening:
         shaped = bool(set(DRAG_SHAPES) & set(mode.point.opened))
         return [name for name in names if not (shaped and name in DRAG_SHAPES)]
 
-    def _opened_or_strongest(
-        self, mode: Mode, asked: Mapping[str, float], trial: Trial | None
+    def _open_together_or_singly(
+        self, mode: Mode, candidates: Mapping[str, float], tests: ScoreTests | None
     ) -> tuple[Mode, set[str]]:
         """Return the mode with numbers opened, or where nothing comes of all together, with some.
 
@@ -106,85 +154,78 @@ class Opening:
         that were not opened alone are not counted as closed: without the mistake they are tested
         again.
         """
-        found, dropped = self._opened(mode, asked)
-        parts = [] if trial is None else _parts(asked, trial)
+        found, idle = self._open(mode, candidates)
+        parts = [] if tests is None else _parts(candidates, tests)
         if found is not mode or len(parts) < 2:
-            return found, dropped
+            return found, idle
         for names in parts:
-            alone, of_alone = self._opened(mode, {name: asked[name] for name in names})
+            alone, of_alone = self._open(mode, {name: candidates[name] for name in names})
             if alone is not mode:
                 return alone, of_alone
-        return found, dropped
+        return found, idle
 
-    def _asked(self, mode: Mode, trial: Trial | None, closed: Set[str]) -> dict[str, float]:
-        """Return the numbers to open, with the values to begin with.
-
-        Those of `closed` were opened before, and nothing came of them.
-        """
-        asked: dict[str, float] = {}
-        if trial is None:
-            return asked
-        for name, sigmas in trial.sigmas.items():
-            estimate, _ = trial.of(name)
-            if name not in (*STRENGTHS, *FLOATING) and self._is_asked(name, sigmas, estimate):
-                asked[name] = _within(name, NUMBERS[name].model + estimate)
-        rivals = sorted(set(DRAG_SHAPES) & set(asked), key=lambda name: abs(trial.sigmas[name]))
+    def _candidates(self, tests: ScoreTests | None, pulses: Pulses | None) -> dict[str, float]:
+        """Return the numbers to open, with the values to begin with."""
+        candidates: dict[str, float] = {}
+        if tests is None:
+            return candidates
+        for name, sigmas in tests.sigmas.items():
+            estimate, _ = tests.of(name)
+            if name not in (*STRENGTHS, *FLOATING) and self._is_candidate(name, sigmas, estimate):
+                candidates[name] = _within(name, NUMBERS[name].model + estimate)
+        rivals = sorted(
+            set(DRAG_SHAPES) & set(candidates), key=lambda name: abs(tests.sigmas[name])
+        )
         for name in rivals[:-1]:
-            del asked[name]
-        strengths = [name for name in STRENGTHS if name in trial.names]
+            del candidates[name]
+        strengths = [name for name in STRENGTHS if name in tests.names]
         if strengths:
-            joint = trial.chi_squared(dict.fromkeys(strengths, 0.0))
-            estimates = {name: trial.of(name)[0] for name in strengths}
+            joint = tests.chi_squared(dict.fromkeys(strengths, 0.0))
+            estimates = {name: tests.of(name)[0] for name in strengths}
             largest = max(map(abs, estimates.values()))
-            if joint > OPENED_STRENGTH and largest > self.worth[strengths[0]]:
-                asked.update({name: _within(name, value) for name, value in estimates.items()})
-        if self.assumptions.pulses and not set(PULSES) & {*mode.point.opened, *closed}:
-            pulses = find_pulses(self.modes.passes, mode)
-            if (
-                pulses is not None
-                and pulses.significant
-                and pulses.amplitude > self.worth[PULSES[0]]
-            ):
-                asked.update(zip(PULSES, (pulses.cosine, pulses.sine), strict=True))
-                asked["pulse_frequency"] = pulses.frequency
-        return asked
+            if joint > SELECTION.strength_chi_squared and largest > SELECTION.strength:
+                candidates.update({name: _within(name, value) for name, value in estimates.items()})
+        if pulses is not None and pulses.significant and pulses.amplitude > SELECTION.pulse:
+            candidates.update(zip(PULSES, (pulses.cosine, pulses.sine), strict=True))
+            candidates["pulse_frequency"] = pulses.frequency
+        return candidates
 
-    def _is_asked(self, name: str, sigmas: float, estimate: float) -> bool:
+    def _is_candidate(self, name: str, sigmas: float, estimate: float) -> bool:
         if name in ("force_memory", "time_variance", "linear_share") and estimate < 0.0:
             return False
         least = MEMORY_SIGMAS if name == "force_memory" else OPENED_SIGMAS
-        return abs(sigmas) > least and abs(estimate) > self.worth.get(name, 0.0)
+        return abs(sigmas) > least and abs(estimate) > self.least.get(name, 0.0)
 
-    def _opened(self, mode: Mode, asked: Mapping[str, float]) -> tuple[Mode, set[str]]:
+    def _open(self, mode: Mode, candidates: Mapping[str, float]) -> tuple[Mode, set[str]]:
         """Return the mode with numbers opened, and those that were closed again."""
-        asked = dict(asked)
+        candidates = dict(candidates)
         fixed = dict(mode.point.fixed)
-        frequency = asked.pop("pulse_frequency", None)
+        frequency = candidates.pop("pulse_frequency", None)
         if frequency is not None:
             fixed["pulse_frequency"] = frequency
         before = mode
-        point = replace(mode.point, opened={**mode.point.opened, **asked}, fixed=fixed)
-        found = self._short(point, mode.weights)
+        point = replace(mode.point, opened={**mode.point.opened, **candidates}, fixed=fixed)
+        found = self._near(point, mode.weights)
         if found is not None and frequency is not None:
             # A frequency has a derivative only once there are pulses.
             fixed.pop("pulse_frequency")
             opened = {**found.point.opened, "pulse_frequency": frequency}
             point = replace(found.point, opened=opened, fixed=fixed)
-            found = self._short(point, found.weights)
+            found = self._near(point, found.weights)
         if found is None:
-            return before, set(asked)
+            return before, set(candidates)
         mode = found
-        dropped = self._idle(mode, set(asked))
-        if dropped >= set(asked):
-            return before, dropped
-        return self._without(mode, dropped) or before, dropped
+        idle = self._idle(mode, set(candidates))
+        if idle >= set(candidates):
+            return before, idle
+        return self._without(mode, idle) or before, idle
 
     def _idle(self, mode: Mode, names: Set[str]) -> set[str]:
         """Return those of some opened numbers that are too near the model to stay open."""
         idle = {
             name
             for name in names
-            if name != "pulse_frequency" and not is_kept(mode, name, self.worth)
+            if name != "pulse_frequency" and not is_retained(mode, name, self.least)
         }
         # The cosines of the strength, and the two parts of a pulse, stay or go together.
         strengths = set(STRENGTHS) & set(mode.point.opened)
@@ -200,30 +241,30 @@ class Opening:
             return mode
         # Without pulses their frequency is the frequency of nothing.
         gone = {*idle, "pulse_frequency"} if set(PULSES) <= idle else idle
-        kept = {name: value for name, value in mode.point.opened.items() if name not in gone}
-        return self._short(replace(mode.point, opened=kept), mode.weights)
+        retained = {name: value for name, value in mode.point.opened.items() if name not in gone}
+        return self._near(replace(mode.point, opened=retained), mode.weights)
 
-    def _short(self, point: Point, weights: Weights) -> Mode | None:
+    def _near(self, point: Point, weights: Weights) -> Mode | None:
         """Return the mode near a point; nothing where the search does not soon come to its end.
 
         Opened numbers must not spoil a fit that has a solution without them.
         """
-        mode = unless_broken(lambda: self.modes.soon().find(point, weights, held=FROM_NEAR))
+        mode = self.search.shortened().find(point, weights, held=FROM_NEAR)
         return mode if mode is not None and mode.converged else None
 
 
-def _parts(asked: Mapping[str, float], trial: Trial) -> list[tuple[str, ...]]:
+def _parts(candidates: Mapping[str, float], tests: ScoreTests) -> list[tuple[str, ...]]:
     """Return the numbers that are opened together, what the recording asks for most first."""
     gains: dict[tuple[str, ...], float] = {}
-    strengths = tuple(name for name in STRENGTHS if name in asked)
+    strengths = tuple(name for name in STRENGTHS if name in candidates)
     if strengths:
-        gains[strengths] = trial.chi_squared(dict.fromkeys(strengths, 0.0)) - len(strengths)
-    pulses = tuple(name for name in asked if name.startswith("pulse_"))
+        gains[strengths] = tests.chi_squared(dict.fromkeys(strengths, 0.0)) - len(strengths)
+    pulses = tuple(name for name in candidates if name.startswith("pulse_"))
     if pulses:
         # Those have no score test, and may be what another departure leaves in the spectrum.
         gains[pulses] = 0.0
-    for name in set(asked) - {*strengths, *pulses}:
-        gains[(name,)] = trial.sigmas[name] ** 2 - 1.0
+    for name in set(candidates) - {*strengths, *pulses}:
+        gains[(name,)] = tests.sigmas[name] ** 2 - 1.0
     return sorted(gains, key=lambda names: (-gains[names], names))
 
 

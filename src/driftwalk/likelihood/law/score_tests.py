@@ -1,4 +1,4 @@
-"""Which numbers of departures a recording asks to be opened: score tests at the end of a search.
+"""Rao's score tests of closed numbers at a mode, and the spectrum of the flow's strength.
 
 At the mode the derivatives of the likelihood by all fitted parameters are zero. Those by a closed
 number are not, if the number is not what the model says. With the information of all parameters the
@@ -14,22 +14,30 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.likelihood.filter_pass import Passes, Series
-from driftwalk.likelihood.newton import Mode, Prior
-from driftwalk.likelihood.solution import cholesky
+from driftwalk.likelihood.filter.filter_pass import Passes
+from driftwalk.likelihood.filter.series import Series
+from driftwalk.likelihood.newton import WORK, Mode, ModeSearch, work_of_pass
+from driftwalk.likelihood.solution import BREAKDOWN, cholesky
 from driftwalk.likelihood.spline import Floats
 
-OVERSAMPLED: Final = 4
-"""Frequencies of the spectrum for each period that the recording holds."""
-LEAST_PERIODS: Final = 6.0
-"""Periods that a recording must hold; a slower change is one of the strength over time."""
-FALSE_PULSES: Final = 1e-6
-"""Chance that a steady flow seems to pulse at any frequency."""
-MEDIAN_OF_TWO: Final = 1.3863
-"""Median of chi squared with two degrees of freedom."""
+
+class PulsePolicy(NamedTuple):
+    """When a line in the spectrum of errors times derivatives is a pulse of the flow."""
+
+    oversampled: int = 4
+    """Frequencies of the spectrum for each period that the recording holds. A line between two of
+    them loses 5 % of its height at most."""
+    least_periods: float = 6.0
+    """Periods that a recording holds at least. A slower change is one of the six cosines of the
+    flow's strength."""
+    false_alarms: float = 1e-6
+    """Chance that a steady flow seems to pulse at any frequency. Chosen by hand."""
 
 
-class Trial(NamedTuple):
+PULSE: Final = PulsePolicy()
+
+
+class ScoreTests(NamedTuple):
     """Estimates of some closed numbers, near the values that they have."""
 
     names: tuple[str, ...]
@@ -58,28 +66,28 @@ class Trial(NamedTuple):
         return float(apart @ information @ apart)
 
 
-def try_numbers(passes: Passes, mode: Mode, prior: Prior, names: Sequence[str]) -> Trial:
-    """Return the score tests of closed numbers at the mode.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        When the information is not positive definite.
-    """
+def score_tests(search: ModeSearch, mode: Mode, names: Sequence[str]) -> ScoreTests | None:
+    """Return the score tests of closed numbers at the mode; None where they break down."""
     from scipy.linalg import cho_solve
 
-    sums = prior.add(passes.sums(mode.point, tried=names), mode.point, mode.weights)
-    fitted = sums.score.size - len(names)
-    factor = cholesky(sums.information[:fitted, :fitted])
-    right = np.column_stack([sums.information[:fitted, fitted:], sums.score[:fitted]])
-    found = cho_solve(factor, right)
-    across = sums.information[fitted:, :fitted]
-    information = sums.information[fitted:, fitted:] - across @ found[:, :-1]
-    score = sums.score[fitted:] - across @ found[:, -1]
-    # Estimates from an information that is not positive definite would be nonsense.
-    cholesky(information)
+    passes = search.passes
+    try:
+        sums = search.prior.add(passes.sums(mode.point, tried=names), mode.point, mode.weights)
+        fitted = sums.score.size - len(names)
+        factor = cholesky(sums.information[:fitted, :fitted])
+        right = np.column_stack([sums.information[:fitted, fitted:], sums.score[:fitted]])
+        found = cho_solve(factor, right)
+        across = sums.information[fitted:, :fitted]
+        information = sums.information[fitted:, fitted:] - across @ found[:, :-1]
+        score = sums.score[fitted:] - across @ found[:, -1]
+        # Estimates from an information that is not positive definite would be nonsense.
+        cholesky(information)
+    except BREAKDOWN:
+        return None
+    finally:
+        search.passed(WORK.score_tests * work_of_pass(passes))
     own = np.diag(information)
-    return Trial(tuple(names), score / own, 1.0 / np.sqrt(own), information, score)
+    return ScoreTests(tuple(names), score / own, 1.0 / np.sqrt(own), information, score)
 
 
 class Pulses(NamedTuple):
@@ -105,12 +113,15 @@ def find_pulses(passes: Passes, mode: Mode) -> Pulses | None:
     nearly that by a change then. So the products of errors and derivatives have a line in their
     spectrum where the strength pulses. The median of the spectrum is its height without pulses.
     """
-    found = [_highest_line(passes, mode, series) for series in passes.series]
-    lines = [line for line in found if line is not None]
+    lines = []
+    for series in passes.series:
+        line = _highest_line(passes, mode, series)
+        if line is not None:
+            lines.append(line)
     if not lines:
         return None
     line = max(lines, key=lambda one: one.height)
-    least = 2.0 * float(np.log(line.frequencies / FALSE_PULSES))
+    least = 2.0 * float(np.log(line.frequencies / PULSE.false_alarms))
     return Pulses(line.frequency, line.cosine, line.sine, line.height > least)
 
 
@@ -132,17 +143,18 @@ def _highest_line(passes: Passes, mode: Mode, series: Series) -> _Line | None:
     time = series.time - series.time[0]
     interval = float(np.median(np.diff(time)))
     place = np.round(time / interval).astype(np.intp)
-    padded = OVERSAMPLED * (int(place[-1]) + 1)
+    padded = PULSE.oversampled * (int(place[-1]) + 1)
     wave = np.fft.rfft(np.bincount(place, weights=products), padded)
     frequencies = np.fft.rfftfreq(padded, interval)
-    slowest = LEAST_PERIODS / max(float(time[-1]), interval)
-    kept = (frequencies > slowest) & (frequencies < 0.5 / interval)
-    if np.count_nonzero(kept) < OVERSAMPLED * LEAST_PERIODS:
+    slowest = PULSE.least_periods / max(float(time[-1]), interval)
+    inside = (frequencies > slowest) & (frequencies < 0.5 / interval)
+    if np.count_nonzero(inside) < PULSE.oversampled * PULSE.least_periods:
         return None
-    wave, frequencies = wave[kept], frequencies[kept]
+    wave, frequencies = wave[inside], frequencies[inside]
     total = float(squares.sum())
     heights = 2.0 * np.abs(wave) ** 2 / total
-    heights *= MEDIAN_OF_TWO / float(np.median(heights))
+    # 1.3863 is the median of chi squared with two degrees of freedom.
+    heights *= 1.3863 / float(np.median(heights))
     best = int(heights.argmax())
     # The spectrum counts time from the first sample, the numbers of a pulse from time 0.
     turned = 2.0 * wave[best] / total * np.exp(-2j * np.pi * frequencies[best] * series.time[0])

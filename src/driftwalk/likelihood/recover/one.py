@@ -82,23 +82,6 @@ def recover_one(truth: Truth, *, recording: int, duration: float, angle: str) ->
     """Simulate, fit and score one setting of a recovery study.
 
     A longer recording begins with the shorter one of the same number.
-
-    Parameters
-    ----------
-    truth : Truth
-        The truth to simulate.
-    recording : int
-        Its number; it gives the random numbers.
-    duration : float
-        Its length [s].
-    angle : str
-        How the fit uses the orientation.
-
-    Returns
-    -------
-    dict
-        ``status``, ``message``, the parts of the score, and facts of the fit; NaN where there is
-        no fit.
     """
     nothing = dict.fromkeys(
         [*(f"{name}{part}" for name in SCORED for part in PARTS), *FLOW_PARTS, *FACTS], math.nan
@@ -129,31 +112,14 @@ def recover_one(truth: Truth, *, recording: int, duration: float, angle: str) ->
         "converged": bool(fit["converged"]),
         "fit_time": took,
     }
-    kept = {key: float(value) for key, value in {**score, **facts}.items() if key in nothing}
-    return {**kept, "status": STATUS["fitted"], "message": ""}
+    retained = {key: float(value) for key, value in {**score, **facts}.items() if key in nothing}
+    return {**retained, "status": STATUS["fitted"], "message": ""}
 
 
 def simulated_recordings(
     truth: Truth, flow: xr.Dataset, *, recording: int, duration: float
 ) -> list[xr.Dataset] | None:
-    """Return what the camera records of one world, or of several that are fitted together.
-
-    Parameters
-    ----------
-    truth : Truth
-        The truth to simulate.
-    flow : xarray.Dataset
-        The water.
-    recording : int
-        Number of the recording.
-    duration : float
-        Length of each [s].
-
-    Returns
-    -------
-    list of xarray.Dataset or None
-        As many `trajectory` datasets as are fitted together; None where a simulation broke down.
-    """
+    """Return what the camera records of one world, or of several that are fitted together."""
     settings = truth.study.recover
     samples = math.floor(duration / settings.sample_interval_s + 1e-6) + 1
     clock = np.asarray(np.arange(samples) * settings.sample_interval_s, np.float64)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from concurrent.futures import Executor
 from contextlib import nullcontext
@@ -10,8 +11,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import numpy as np
 
+from driftwalk.core.errors import InputError
 from driftwalk.core.processors import one_blas_thread
-from driftwalk.likelihood.recover.check import angles_of, check_recovery
+from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.recover.one import (
     FACTS,
     FLOW_PARTS,
@@ -23,8 +25,9 @@ from driftwalk.likelihood.recover.one import (
 )
 from driftwalk.likelihood.recover.score import SCORED
 from driftwalk.likelihood.recover.summary import COVERAGE_CONFIDENCE, NEEDED_CONFIDENCE, add_summary
-from driftwalk.likelihood.refuse import MOST_WALL_SHARE
+from driftwalk.likelihood.refuse import LIMIT
 from driftwalk.model.recover import RANDOM
+from driftwalk.schema import FLAGS, check_flow_field
 from driftwalk.schema.check import described
 from driftwalk.schema.kinds import KINDS
 from driftwalk.sweep import Store, WorkUnit, grid, run_sweep
@@ -162,7 +165,7 @@ def _dataset(
     data["status"] = (dims, tables["status"])
     data["message"] = (dims, tables["message"].astype(object))
     fitted = tables["status"] == STATUS["fitted"]
-    used = fitted & (np.where(fitted, tables["wall_share"], 1.0) <= MOST_WALL_SHARE)
+    used = fitted & (np.where(fitted, tables["wall_share"], 1.0) <= LIMIT.most_wall_share)
     data["used"] = (dims, used.astype(np.int8))
     coords = {
         "duration": ("duration", np.array(study.recover.durations_s)),
@@ -191,7 +194,7 @@ def _attrs(study: Study, flow: xr.Dataset | None) -> dict[str, Any]:
         "confidence": study.fit.confidence,
         "coverage_confidence": COVERAGE_CONFIDENCE,
         "needed_confidence": NEEDED_CONFIDENCE,
-        "most_wall_share": MOST_WALL_SHARE,
+        "most_wall_share": LIMIT.most_wall_share,
         "drag_coefficient_precision": np.nan if asked is None else asked,
         "study": study.to_toml(),
     }
@@ -202,3 +205,107 @@ def _flow_name(study: Study, flow: xr.Dataset | None) -> str:
         return f"random, {study.recover.flow_family}"
     named = study.recover.flow
     return str(flow.attrs.get("source", "given")) if named in (None, RANDOM) else str(named)
+
+
+def check_recovery(study: Study, flow: xr.Dataset | None = None) -> None:
+    """Raise the errors that `recovery_study` would raise; takes almost no time.
+
+    Parameters
+    ----------
+    study, flow
+        As of `recovery_study`.
+
+    Raises
+    ------
+    InputError
+        When a true value is missing, a recording is shorter than the fit needs, or the flow does
+        not cover the tank.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> dw.likelihood.check_recovery(dw.Study(), dw.tank30_flow())
+    Traceback (most recent call last):
+        ...
+    driftwalk.core.errors.InputError: the truth lacks [observation] position_noise_m: ...
+    """
+    _require_truth(study)
+    _require_length(study)
+    if flow is not None:
+        _require_cover(study, flow)
+    elif study.recover.flow != RANDOM:
+        named = study.recover.flow
+        raise InputError(
+            "the flow of the water is missing: name the file of a flow field "
+            '([recover] flow), or flow = "random"'
+            if named is None
+            else f"the flow {named} ([recover] flow) has to be loaded and passed as an argument"
+        )
+
+
+def angles_of(study: Study) -> tuple[str, ...]:
+    """Return the uses of the orientation that a study compares."""
+    return study.recover.angle or (study.fit.angle,)
+
+
+def _require_truth(study: Study) -> None:
+    seen, forces = study.observation, study.forces
+    positive: dict[str, Any] = {
+        "[forces] drag_coefficient": forces.drag_coefficient,
+        "[forces] force_std_N": forces.force_std_N,
+        "[observation] position_noise_m": seen.position_noise_m,
+    }
+    for key, value in positive.items():
+        if isinstance(value, str) or not value > 0.0:
+            raise InputError(
+                f"the truth lacks {key}: a number above 0 is needed for the "
+                f"simulation and the comparison with the fit, got {value!r}"
+            )
+    if isinstance(seen.orientation_noise_rad, str) and set(angles_of(study)) != {"none"}:
+        raise InputError(
+            "the truth lacks [observation] orientation_noise_rad: a number is needed where the "
+            f"fit uses the orientation, got {seen.orientation_noise_rad!r}"
+        )
+
+
+def _require_length(study: Study) -> None:
+    settings = study.recover
+    shortest = min(settings.durations_s)
+    samples = math.floor(shortest / settings.sample_interval_s + 1e-6) + 1
+    # Five standard deviations: chance shall not stop a study half-way.
+    retained = 1.0 - settings.missing_share
+    expected = samples * retained - 5.0 * math.sqrt(samples * retained * settings.missing_share)
+    if expected < LIMIT.fewest_samples:
+        raise InputError(
+            f"[recover] durations_s: {shortest:g} s at a sample every "
+            f"{settings.sample_interval_s:g} s, {settings.missing_share:.0%} of them missing, are "
+            f"about {samples * retained:.0f} positions; the fit needs {LIMIT.fewest_samples} at "
+            "least, and some minutes to be of use"
+        )
+
+
+def _require_cover(study: Study, flow: xr.Dataset) -> None:
+    check_flow_field(flow)
+    if "time" in flow.dims:
+        raise InputError("the true flow has frames: a recovery study needs a steady one")
+    outline = outline_of(study.tank.to_arena())
+    low_x, low_y, high_x, high_y = outline.bounds
+    x, y = flow["x"].values, flow["y"].values
+    cell = float(x[1] - x[0]), float(y[1] - y[0])
+    ends = ((x, cell[0], low_x, high_x), (y, cell[1], low_y, high_y))
+    tank = study.tank.describe()
+    for nodes, size, low, high in ends:
+        if nodes[0] - size > low + 1e-9 or nodes[-1] + size < high - 1e-9:
+            raise InputError(
+                f"the flow field does not cover the tank, a {tank}: it spans x from {x[0]:.4g} to "
+                f"{x[-1]:.4g} m, y from {y[0]:.4g} to {y[-1]:.4g} m; give the field of this tank, "
+                "or the tank of this field ([tank])"
+            )
+    depth = outline.depth(*(part.ravel() for part in np.meshgrid(x, y)))
+    inner = (depth > math.hypot(*cell)).reshape(y.size, x.size)
+    lacking = int(np.count_nonzero(inner & (flow["flag"].values == FLAGS["outside"])))
+    if lacking:
+        raise InputError(
+            f"the flow field does not cover the tank, a {tank}: {lacking} of its nodes in there "
+            "are flagged as outside of the tank that it was made for; give the field of this tank"
+        )

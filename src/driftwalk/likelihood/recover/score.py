@@ -12,8 +12,8 @@ import numpy.typing as npt
 from driftwalk.core.errors import InputError
 from driftwalk.flow import bilinear
 from driftwalk.flow.arena import outline_of
+from driftwalk.likelihood.fitted_flow import fitted_flow, require_fit
 from driftwalk.likelihood.intervals import fitted_intervals
-from driftwalk.likelihood.result import fitted_flow, require_fit
 from driftwalk.likelihood.wall import MARGIN
 from driftwalk.schema import FLAGS, body_track
 from driftwalk.schema.answers.fit_facts import fit_facts
@@ -23,11 +23,6 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
-ANGLES: Final = 4
-"""Orientations of the block over which its flow is averaged; a square turns into itself by pi/2."""
-POINTS_PER_SIDE: Final = 6
-LEAST_SAMPLES: Final = 3
-"""Samples in a cell that make it count."""
 SCORED: Final = ("drag_coefficient", "force_std_N", "tracking_noise_m")
 """The parameters that are scored, as the attributes of a fit name them."""
 
@@ -114,29 +109,16 @@ def score_fit(
 def block_flow(flow: xr.Dataset, x: npt.ArrayLike, y: npt.ArrayLike, *, side: float) -> Floats:
     """Return the velocity of the water averaged over a square block, and over its orientations.
 
-    Parameters
-    ----------
-    flow : xarray.Dataset
-        A `flow_field` without frames.
-    x, y : array_like, shape (n,)
-        Centres of the block [m].
-    side : float
-        Its side [m].
-
-    Returns
-    -------
-    ndarray, shape (n, 2)
-        Mean of u and v [m/s] over 6 x 6 points of the square at four angles, pi/8 apart.
-
     Examples
     --------
     >>> from driftwalk.flow import shear_flow
     >>> block_flow(shear_flow(0.5), [0.0], [0.02], side=0.03).round(9).tolist()
     [[0.01, 0.0]]
     """
-    steps = side * ((np.arange(POINTS_PER_SIDE) + 0.5) / POINTS_PER_SIDE - 0.5)
+    steps = side * ((np.arange(6) + 0.5) / 6 - 0.5)
     along, across = (part.ravel() for part in np.meshgrid(steps, steps))
-    angles = 0.5 * np.pi / ANGLES * np.arange(ANGLES)[:, None]
+    # A square turns into itself by pi / 2.
+    angles = 0.5 * np.pi / 4 * np.arange(4)[:, None]
     dx = (np.cos(angles) * along - np.sin(angles) * across).ravel()
     dy = (np.sin(angles) * along + np.cos(angles) * across).ravel()
     at_x = np.asarray(x, dtype=np.float64)[:, None] + dx
@@ -200,7 +182,7 @@ def _visited_cells(
         free = outline.depth(x, y) > reach
         edges = tuple(_edges(flow[axis].values) for axis in ("y", "x"))
         count += np.histogram2d(y[free], x[free], bins=edges)[0]
-    return np.asarray(count >= LEAST_SAMPLES)
+    return np.asarray(count >= 3)
 
 
 def _edges(nodes: Floats) -> Floats:

@@ -16,8 +16,6 @@ COVERAGE_CONFIDENCE: Final = 0.95
 """Confidence of the Clopper-Pearson interval of a coverage."""
 NEEDED_CONFIDENCE: Final = 0.9
 """Confidence of the interval of the time that one must record."""
-FEWEST: Final = 2
-"""Recordings from which on something is said of their spread."""
 PARAMETERS: Final = ("drag_coefficient", "force_std", "tracking_noise")
 
 
@@ -47,11 +45,6 @@ class Summary(NamedTuple):
 def summarise(error: Floats, z: Floats, covered: Floats) -> Summary:
     """Return the summary of recordings.
 
-    Parameters
-    ----------
-    error, z, covered : ndarray, shape (n,)
-        Relative error, error in stated standard deviations, 1 where the interval holds the truth.
-
     Examples
     --------
     >>> error = np.array([-0.1, 0.2])
@@ -67,7 +60,7 @@ def summarise(error: Floats, z: Floats, covered: Floats) -> Summary:
         absolute_error_90=float(np.quantile(np.abs(error), 0.9)),
         bias=float(error.mean()),
         rms_error=float(np.sqrt(np.mean(np.log1p(error) ** 2))),
-        spread=float(np.log1p(error).std(ddof=1)) if error.size >= FEWEST else np.nan,
+        spread=float(np.log1p(error).std(ddof=1)) if error.size >= 2 else np.nan,
         rms_z=float(np.sqrt(np.mean(z**2))),
         coverage=float(covered.mean()),
         coverage_low=low,
@@ -111,20 +104,6 @@ class Scale(NamedTuple):
 def error_scale(duration: Floats, rms_error: Floats, count: Floats) -> Scale:
     """Fit error = scale / sqrt(T) to the lengths of a study, in logarithms.
 
-    Parameters
-    ----------
-    duration, rms_error : ndarray, shape (k,)
-        Lengths [s], and the root mean square of ln(estimate / truth) at each.
-    count : ndarray, shape (k,)
-        Recordings at each, their weights.
-
-    Returns
-    -------
-    Scale
-        With the 90 % interval that the number of recordings leaves, for normal errors. Shorter
-        recordings are parts of the longer ones, so they do not make it narrower. NaN where no
-        length has two recordings.
-
     Examples
     --------
     >>> round(error_scale(np.array([100.0]), np.array([0.2]), np.array([20])).value, 12)
@@ -132,7 +111,7 @@ def error_scale(duration: Floats, rms_error: Floats, count: Floats) -> Scale:
     """
     from scipy.special import chdtri
 
-    enough = count >= FEWEST
+    enough = count >= 2  # one recording has no spread
     if not enough.any():
         return Scale(np.nan, np.nan, np.nan)
     logs = np.log(rms_error[enough]) + 0.5 * np.log(duration[enough])
@@ -144,24 +123,16 @@ def error_scale(duration: Floats, rms_error: Floats, count: Floats) -> Scale:
 
 
 def add_summary(recovery: xr.Dataset, *, precision: float | None) -> xr.Dataset:
-    """Return the dataset of a study with its summary by duration and use of the angle.
-
-    Parameters
-    ----------
-    recovery : xarray.Dataset
-        With what came out of every recording, and ``used``.
-    precision : float or None
-        Relative standard deviation of C_d that is asked for.
-    """
+    """Return the dataset of a study with its summary by duration and use of the angle."""
     shape = (len(PARAMETERS), recovery.sizes["duration"], recovery.sizes["angle"])
     tables = {name: np.full(shape, np.nan) for name in Summary._fields}
     flow = {name: np.full(shape[1:], np.nan) for name in ("median_flow_error", "flow_error_90")}
     used = recovery["used"].values == 1
     for place in np.ndindex(*shape):
-        name, kept = PARAMETERS[place[0]], used[place[1:]]
+        name, retained = PARAMETERS[place[0]], used[place[1:]]
         found = summarise(
             *(
-                recovery[f"{name}_{part}"].values[place[1:]][kept]
+                recovery[f"{name}_{part}"].values[place[1:]][retained]
                 for part in ("error", "z", "covered")
             )
         )

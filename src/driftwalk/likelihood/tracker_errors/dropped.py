@@ -1,4 +1,4 @@
-"""Frames that a recording lacks although its stamps say a constant rate, found from its track.
+"""Dropped frames, found by expectation and maximisation over the lengths of intervals.
 
 Where a block moves, its step across a missing frame is twice as long as its neighbours', in x, y
 and orientation together. Every interval is compared with what its neighbours predict, once for each
@@ -16,13 +16,14 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.remember import remembered
+from driftwalk.likelihood.angle import ORIENTED_SHARE
 from driftwalk.likelihood.spline import Floats
 from driftwalk.likelihood.tracker_errors.interval_windows import (
     AT_MIDDLE,
     CLASSES,
     CLEAN,
-    DECOY,
-    DECOYS,
+    CONTROL,
+    CONTROL_LENGTHS,
     DROPS,
     HERE,
     KIND,
@@ -37,31 +38,38 @@ from driftwalk.schema import Track
 
 Integers = npt.NDArray[np.int64]
 
-FEWEST: Final = 100
-"""Windows without which no rate can be estimated."""
-REGULAR: Final = 0.1
-"""Share of the interval by which the stamps of a constant rate may be off: they may be rounded."""
-ENOUGH: Final = 30.0
-"""Evidence from which on frames are missing. It is 0.0 on recordings of the model at 10 Hz and at
-most 27 on recordings of animals and robots, but for one whose control says that it means nothing;
-with one frame in twenty missing it is 128 and more after ten minutes."""
-MOST_DECOYS: Final = 0.5
-"""Share of the dropped frames' rate up to which the control may go."""
-BEFORE: Final = 2.0
-"""The same before any is found, when two in one window pass for something else."""
-MOST_ROUNDS: Final = 6
-"""Frames that are found change what is expected of their neighbours."""
-MOST_STEPS: Final = 60
-FIRST_RATE: Final = 3e-3
-MOST_RATE: Final = 0.9
-LEAST_RATE: Final = 1e-6
-LONGEST_SPAN: Final = 3 * (WIDTH - 1)
-"""Of a window, in intervals of the clock; in longer ones nothing is predicted."""
-LEAST_ORIENTED: Final = 0.5
-"""Share of the samples with an orientation from which on it is used."""
-MOST_NAMED: Final = 5
-FAST: Final = 0.99
-"""Quantile of the steps beyond which they do not tell how fast a body is: jumps are among them."""
+
+class DroppedFramesPolicy(NamedTuple):
+    """When frames are missing although the stamps say a constant rate."""
+
+    fewest_windows: int = 100
+    """Windows without which no rate can be estimated. Chosen by hand."""
+    regular: float = 0.1
+    """Share of the interval by which the stamps of a constant rate may be off: they may be rounded.
+    Chosen by hand."""
+    evidence: float = 30.0
+    """Log likelihood ratio from which on frames are missing. It is 0.0 on recordings of the model
+    at 10 Hz and at most 27 on recordings of animals and robots, but for one whose control says that
+    it means nothing; with one frame in twenty missing it is 128 and more after ten minutes."""
+    most_control: float = 0.5
+    """Share of the dropped frames' rate up to which the rate of the control lengths may go. Chosen
+    by hand."""
+    most_control_before: float = 2.0
+    """The same before any frame is found, when two in one window pass for something else. Chosen by
+    hand."""
+    rounds: int = 6
+    """Most rounds: frames that are found change what is expected of their neighbours."""
+    first_rate: float = 3e-3
+    """Rate of everything at which the expectation-maximisation begins. Chosen by hand."""
+    longest_span: int = 21
+    """Intervals of the clock in a window: three times its seven. Nothing is predicted in a longer
+    one. Chosen by hand."""
+    fast_quantile: float = 0.99
+    """Quantile of the steps beyond which they do not tell how fast a body is: jumps are among
+    them. Chosen by hand."""
+
+
+DROPPED: Final = DroppedFramesPolicy()
 
 
 class DroppedFrames(NamedTuple):
@@ -94,17 +102,10 @@ class DroppedFrames(NamedTuple):
 def find_dropped_frames(track: Track, clock: Floats) -> DroppedFrames:
     """Find frames that are missing although the stamps say a constant rate.
 
-    None are found where the evidence is below `ENOUGH`, where the control has more than half of
+    None are found where the evidence is too small, where the control has more than half of
     their rate, or where more of the intervals lack two or three frames than one: then the steps are
     those of a body that moves in leaps. Frames that are missing while a body hardly moves are not
     seen, nor those among the first and the last four samples.
-
-    Parameters
-    ----------
-    track : Track
-        One body, without samples that are mistakes.
-    clock : ndarray, shape (m,)
-        Time stamps of the recording [s], those of samples without a position too.
 
     Examples
     --------
@@ -120,30 +121,34 @@ def find_dropped_frames(track: Track, clock: Floats) -> DroppedFrames:
     none = np.zeros(0, dtype=np.int64)
     still = np.zeros(max(track.time.size - 1, 0))
     nothing = DroppedFrames(none, np.zeros(0), none, np.zeros(0), still, 0.0, 0.0, interval)
-    if math.isnan(interval) or track.time.size < FEWEST + WIDTH:
+    if math.isnan(interval) or track.time.size < DROPPED.fewest_windows + WIDTH:
         return nothing
     stamped = np.rint(np.diff(track.time) / interval)
     lengths = stamped
-    for number in range(MOST_ROUNDS):
+    for number in range(DROPPED.rounds):
         starts = _windows(lengths)
-        if starts.size < FEWEST:
+        if starts.size < DROPPED.fewest_windows:
             return nothing
         axes = _axes(track, _time_of(lengths, interval))
         likelihood = log_likelihoods(axes, starts, lengths, stamped, dt=interval)
         rates, value = _rates(likelihood)
+        # The evidence is that of the first round: later ones have fitted the lengths to the track.
         if number == 0:
             evidence = value - _rates(likelihood, without=DROPS)[1]
-            if evidence < ENOUGH or not _are_dropped_frames(rates, BEFORE):
+            if evidence < DROPPED.evidence or not _are_dropped_frames(
+                rates, DROPPED.most_control_before
+            ):
                 return nothing._replace(evidence=evidence)
         share = _posterior(likelihood, rates)
         some = share.sum(axis=1)
         found = some > 0.5
         before = lengths
         lengths = stamped.copy()
+        # Neighbours of a dropped frame see its true length in the next round.
         lengths[starts[found] + MIDDLE] += 1.0 + share[found].argmax(axis=1)
         if np.array_equal(lengths, before):
             break
-    if not _are_dropped_frames(rates, MOST_DECOYS):
+    if not _are_dropped_frames(rates, DROPPED.most_control):
         return nothing._replace(evidence=evidence)
     after = np.flatnonzero(lengths > stamped)
     still[starts + MIDDLE] = share @ np.arange(1, MOST_MISSING + 1)
@@ -173,8 +178,8 @@ def with_gaps(track: Track, found: DroppedFrames) -> Track:
 
 def places_of(found: DroppedFrames) -> str:
     """Return in words after which stamps frames are missing: the first few."""
-    named = ", ".join(f"{time:.6g} s" for time in found.time[:MOST_NAMED])
-    more = found.time.size - MOST_NAMED
+    named = ", ".join(f"{time:.6g} s" for time in found.time[:5])
+    more = found.time.size - 5
     return f"after {named}" + (f" and {more} more" if more > 0 else "")
 
 
@@ -184,13 +189,13 @@ def _regular_interval(clock: Floats) -> float:
         return math.nan
     interval = float(clock[-1] - clock[0]) / (clock.size - 1)
     off = clock - (clock[0] + interval * np.arange(clock.size))
-    return interval if np.abs(off).max() <= REGULAR * interval else math.nan
+    return interval if np.abs(off).max() <= DROPPED.regular * interval else math.nan
 
 
 def _windows(lengths: Floats) -> npt.NDArray[np.intp]:
     """Return the first samples of the windows that no long gap splits."""
     total = np.concatenate([[0.0], np.cumsum(lengths)])
-    return np.flatnonzero(total[WIDTH - 1 :] - total[: 1 - WIDTH] <= LONGEST_SPAN)
+    return np.flatnonzero(total[WIDTH - 1 :] - total[: 1 - WIDTH] <= DROPPED.longest_span)
 
 
 def _time_of(lengths: Floats, interval: float) -> Floats:
@@ -203,7 +208,7 @@ def _axes(track: Track, time: Floats) -> list[Axis]:
     unknown = np.full(time.size, np.nan)
     axes = _alike(Track(time, track.x, track.y, unknown))
     seen = np.isfinite(track.theta)
-    if seen.mean() < LEAST_ORIENTED or np.ptp(track.theta[seen]) == 0.0:
+    if seen.mean() < ORIENTED_SHARE or np.ptp(track.theta[seen]) == 0.0:
         return axes
     turned = np.unwrap(track.theta[seen])
     # Estimated as if it were both coordinates of a position: those have noise and intensity.
@@ -220,7 +225,9 @@ def _alike(track: Track) -> list[Axis]:
     axes = []
     for values in (track.x, track.y):
         steps = np.abs(np.diff(values))
-        usual = math.sqrt(float((np.minimum(steps, np.quantile(steps, FAST)) ** 2).mean()))
+        usual = math.sqrt(
+            float((np.minimum(steps, np.quantile(steps, DROPPED.fast_quantile)) ** 2).mean())
+        )
         # Neither is exactly zero: a covariance has to be one.
         least = max(1e-2 * usual, 1e-12)
         std = max(np.nan_to_num(noise.position_noise_m), least)
@@ -240,22 +247,22 @@ def _rates(likelihood: Floats, *, without: tuple[int, ...] = ()) -> tuple[Floats
     kinds = [kind == KIND for kind in range(CLASSES)]
     anywhere = np.stack([scaled[:, one].sum(axis=1) for one in kinds], axis=1)
     here = np.stack([scaled[:, one & AT_MIDDLE].sum(axis=1) for one in kinds], axis=1)
-    rates = np.full(CLASSES, FIRST_RATE)
-    for _ in range(MOST_STEPS):
+    rates = np.full(CLASSES, DROPPED.first_rate)
+    for _ in range(60):
         rates[list(without)] = 0.0
         weight = _weights(rates)
         total = anywhere @ weight
         value = float((top + np.log(total)).sum()) / (WIDTH - 1)
         before = rates
-        rates = np.maximum(weight * (here / total[:, None]).mean(axis=0) / HERE, LEAST_RATE)
-        if np.abs(rates - before)[CLEAN + 1 :].max() < LEAST_RATE:
+        rates = np.maximum(weight * (here / total[:, None]).mean(axis=0) / HERE, 1e-6)
+        if np.abs(rates - before)[CLEAN + 1 :].max() < 1e-6:
             break
     return before, value
 
 
 def _weights(rates: Floats) -> Floats:
     """Return the probability of a window in which one thing happens at one place, or nothing."""
-    some = min(float(rates[CLEAN + 1 :].sum()), MOST_RATE)
+    some = min(float(rates[CLEAN + 1 :].sum()), 0.9)
     weight = rates * (1.0 - some) ** (WIDTH - 2)
     weight[CLEAN] = (1.0 - some) ** (WIDTH - 1)
     return weight
@@ -264,7 +271,7 @@ def _weights(rates: Floats) -> Floats:
 def _are_dropped_frames(rates: Floats, most: float) -> bool:
     """Whether the intervals are whole ones rather than any, and mostly lack one frame."""
     single, more = rates[DROPS[0]], rates[list(DROPS[1:])].sum()
-    return bool(len(DECOYS) * rates[DECOY] <= most * (single + more) and more <= single)
+    return bool(len(CONTROL_LENGTHS) * rates[CONTROL] <= most * (single + more) and more <= single)
 
 
 def _posterior(likelihood: Floats, rates: Floats) -> Floats:

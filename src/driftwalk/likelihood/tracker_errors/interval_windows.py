@@ -20,23 +20,18 @@ import numpy.typing as npt
 
 from driftwalk.likelihood.spline import Floats
 
-SIDE: Final = 4
-"""Samples on either side of the interval."""
-WIDTH: Final = 2 * SIDE
-MIDDLE: Final = SIDE - 1
+WIDTH: Final = 8
+"""Samples of a window, four on either side of the interval in question."""
+MIDDLE: Final = 3
 """Which of the window's intervals is the one in question."""
-DEGREE: Final = 2
 MOST_MISSING: Final = 3
 """Missing frames in one interval that are looked for."""
-DECOYS: Final = (0.5, 1.5, 2.5)
+CONTROL_LENGTHS: Final = (0.5, 1.5, 2.5)
 """Lengths that no dropped frame makes. Quick movements of an animal, or a clock that is not
 regular, make them as often as double ones."""
-DOF: Final = 6.0
-"""Of Student's law in place of the normal one: accelerations are not the same everywhere."""
-
-CLEAN: Final = 0
 DROPS: Final = tuple(range(1, MOST_MISSING + 1))
-DECOY, WRONG, BOUNCE, JUMP = range(MOST_MISSING + 1, MOST_MISSING + 5)
+CONTROL, WRONG, BOUNCE, JUMP = range(MOST_MISSING + 1, MOST_MISSING + 5)
+CLEAN: Final = 0
 CLASSES: Final = JUMP + 1
 
 
@@ -66,15 +61,7 @@ class Pattern(NamedTuple):
 
 
 def patterns_of(lengths: Floats, stamped: float) -> list[Pattern]:
-    """Return what may have happened in a window.
-
-    Parameters
-    ----------
-    lengths : ndarray, shape (WIDTH - 1,)
-        What the other intervals are thought to be, in intervals of the clock.
-    stamped : float
-        What the stamps say of the middle one.
-    """
+    """Return what may have happened in a window."""
     plain = lengths.copy()
     plain[MIDDLE] = stamped
     found = [Pattern(CLEAN, MIDDLE, plain, None)]
@@ -89,7 +76,9 @@ def patterns_of(lengths: Floats, stamped: float) -> list[Pattern]:
         Pattern(kind, MIDDLE, longer(MIDDLE, missing), None)
         for missing, kind in enumerate(DROPS[1:], start=2)
     ]
-    found += [Pattern(DECOY, MIDDLE, longer(MIDDLE, length - 1.0), None) for length in DECOYS]
+    found += [
+        Pattern(CONTROL, MIDDLE, longer(MIDDLE, length - 1.0), None) for length in CONTROL_LENGTHS
+    ]
     number = np.arange(WIDTH)
     time = np.concatenate([[0.0], np.cumsum(plain)])
     found += [Pattern(WRONG, at, plain, (number == at).astype(np.float64)) for at in range(WIDTH)]
@@ -116,25 +105,7 @@ def log_likelihoods(
     *,
     dt: float,
 ) -> Floats:
-    """Return the log likelihood of every window under every pattern, less that of the first.
-
-    Parameters
-    ----------
-    axes : sequence of Axis
-        x, y, and the orientation where there is one.
-    starts : ndarray, shape (w,)
-        First sample of each window.
-    lengths : ndarray, shape (n - 1,)
-        What the intervals are thought to be, in intervals of the clock.
-    stamped : ndarray, shape (n - 1,)
-        What the stamps say.
-    dt : float
-        Interval of the clock [s].
-
-    Returns
-    -------
-    ndarray, shape (w, patterns)
-    """
+    """Return the log likelihood of every window under every pattern, less that of the first."""
     around = starts[:, None] + np.arange(WIDTH - 1)
     key = lengths[around]
     key[:, MIDDLE] = stamped[starts + MIDDLE]
@@ -153,17 +124,19 @@ def log_likelihoods(
             values = np.where(known[:, None], values - values[:, :1], 0.0)
             chi[rows] += (np.tensordot(values, factor, axes=(1, 1)) ** 2).sum(axis=2)
             constant[rows] += np.where(known[:, None], half, 0.0)
-            dof[rows] += np.where(known, WIDTH - DEGREE - 1, 0)
+            dof[rows] += np.where(known, WIDTH - 3, 0)
     # Where the model of the path is too narrow, as in a flow with sharp bends, so are all of these.
     usual = max(float(np.median(chi[:, CLEAN])) / max(float(np.median(dof)) - 2.0 / 3.0, 1.0), 1.0)
-    found: Floats = constant - 0.5 * (DOF + dof[:, None]) * np.log1p(chi / (usual * DOF))
+    # Student's law with 6 degrees of freedom, chosen by hand, in place of the normal one:
+    # accelerations are not the same everywhere.
+    found: Floats = constant - 0.5 * (6.0 + dof[:, None]) * np.log1p(chi / (usual * 6.0))
     return found - found[:, :1]
 
 
 def _factors(patterns: Sequence[Pattern], axis: Axis, dt: float) -> tuple[Floats, Floats]:
     """Return for each pattern the matrix whose product with a window is white, and a constant.
 
-    Shapes (p, WIDTH, WIDTH - DEGREE - 1) and (p,): the matrix is blind for parabolas, and the
+    Shapes (p, WIDTH, WIDTH - 3) and (p,): the matrix is blind for parabolas, and the
     constant is the logarithm of its normalisation.
     """
     time = dt * np.array([np.concatenate([[0.0], np.cumsum(one.lengths)]) for one in patterns])
@@ -181,10 +154,10 @@ def _factors(patterns: Sequence[Pattern], axis: Axis, dt: float) -> tuple[Floats
         if one.shift is not None:
             covariance[number] += size[one.kind] ** 2 * np.outer(one.shift, one.shift)
     span = time[:, -1:, None]
-    basis = (time[:, :, None] / span) ** np.arange(DEGREE + 1)
+    basis = (time[:, :, None] / span) ** np.arange(3)
     root = np.linalg.cholesky(covariance)
     q, r = np.linalg.qr(np.linalg.solve(root, basis), mode="complete")
-    blind = q[:, :, DEGREE + 1 :]
+    blind = q[:, :, 3:]
     half = np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
     half += np.log(np.abs(np.diagonal(r, axis1=1, axis2=2))).sum(axis=1)
     return np.linalg.solve(np.swapaxes(root, 1, 2), blind), -half

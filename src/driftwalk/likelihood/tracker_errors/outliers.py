@@ -1,4 +1,4 @@
-"""Samples that are mistakes of the tracker: isolated positions far from both of their neighbours.
+"""Outliers of the tracker: isolated positions far from both of their neighbours.
 
 The filter leaves out a sample that is far from its prediction. But the search of the fit begins
 with so much unrest that nothing is far; if some in a hundred samples are wrong by many times the
@@ -12,33 +12,36 @@ off the wall or a jump to another place has no such pattern, however fast it is.
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.likelihood.filter_pass import Flags
+from driftwalk.likelihood.filter.series import Flags
 from driftwalk.likelihood.spline import Floats
 from driftwalk.schema import Track
 
-FAR: Final = 6.0
-"""Robust standard deviations off the line beyond which a sample may be a mistake: of a normal law
-one in 65 million."""
-OPPOSITE: Final = 0.25
-"""Least part of its own distance by which both neighbours lie off to the other side; of a mistake
-alone it is 0.5."""
-LONG: Final = 1.5
-"""Usual intervals between neighbours up to which they are neighbours."""
-FEWEST: Final = 50
-"""Samples with neighbours without which nothing is usual."""
+
+class OutlierPolicy(NamedTuple):
+    """When a sample is a mistake of the tracker."""
+
+    far: float = 6.0
+    """Robust standard deviations off the line between its neighbours beyond which a sample may be a
+    mistake: of a normal law one in 65 million."""
+    opposite: float = 0.25
+    """Least part of its own distance by which both neighbours lie off to the other side. A mistake
+    alone has 0.5. Chosen by hand."""
+    longest_gap: float = 1.5
+    """Usual intervals between neighbours up to which they are neighbours. Chosen by hand: a missing
+    frame makes it 2."""
+    fewest: int = 50
+    """Samples with neighbours without which no distance is usual. Chosen by hand."""
 
 
-def mistakes_in(track: Track) -> Flags:
+OUTLIER: Final = OutlierPolicy()
+
+
+def outliers_in(track: Track) -> Flags:
     """Return which samples of a track are mistakes of the tracker, shape (n,).
-
-    Parameters
-    ----------
-    track : Track
-        One body.
 
     Examples
     --------
@@ -46,15 +49,15 @@ def mistakes_in(track: Track) -> Flags:
     >>> noise = np.random.default_rng(1).normal(0.0, 3e-4, (2, 1000))
     >>> noise[0, 300] += 5e-3
     >>> x = 0.1 * np.sin(0.5 * time) + noise[0]
-    >>> mistakes_in(Track(time, x, noise[1], 0 * time)).nonzero()[0].tolist()
+    >>> outliers_in(Track(time, x, noise[1], 0 * time)).nonzero()[0].tolist()
     [300]
     """
     found = np.zeros(track.time.size, dtype=bool)
-    if track.time.size < FEWEST:
+    if track.time.size < OUTLIER.fewest:
         return found
     off = _off_the_line(track)
     known = np.isfinite(off[0])
-    if known.sum() < FEWEST:
+    if known.sum() < OUTLIER.fewest:
         return found
     usual = 1.4826 * float(np.median(np.abs(off[:, known])))
     if usual == 0.0:
@@ -64,9 +67,9 @@ def mistakes_in(track: Track) -> Flags:
     middle = square[1:-1]
     with np.errstate(invalid="ignore"):
         found[1:-1] = (
-            (np.sqrt(middle) > FAR * usual)
-            & (aside[:-1] < -OPPOSITE * middle)
-            & (aside[1:] < -OPPOSITE * middle)
+            (np.sqrt(middle) > OUTLIER.far * usual)
+            & (aside[:-1] < -OUTLIER.opposite * middle)
+            & (aside[1:] < -OUTLIER.opposite * middle)
             & (middle > square[:-2])
             & (middle > square[2:])
         )
@@ -84,15 +87,17 @@ def _off_the_line(track: Track) -> Floats:
     off = np.full((2, time.size), math.nan)
     for row, axis in zip(off, (track.x, track.y), strict=True):
         row[1:-1] = axis[1:-1] - (axis[:-2] + share * (axis[2:] - axis[:-2]))
-    apart = np.maximum(interval[:-1], interval[1:]) > LONG * float(np.median(interval))
+    apart = np.maximum(interval[:-1], interval[1:]) > OUTLIER.longest_gap * float(
+        np.median(interval)
+    )
     off[:, 1:-1][:, apart] = math.nan
     return off
 
 
-def without_mistakes(track: Track) -> Track:
+def without_outliers(track: Track) -> Track:
     """Return a track without the samples that are mistakes of the tracker: they become gaps."""
-    wrong = mistakes_in(track)
+    wrong = outliers_in(track)
     if not wrong.any():
         return track
-    kept = ~wrong
-    return Track(track.time[kept], track.x[kept], track.y[kept], track.theta[kept])
+    retained = ~wrong
+    return Track(track.time[retained], track.x[retained], track.y[retained], track.theta[retained])

@@ -1,4 +1,4 @@
-"""Positions that are not what the camera saw: a tracker has smoothed them.
+"""Smoothed positions, recognised by Whittle's likelihood of their spectrum.
 
 A moving average, or a parabola through some frames (Savitzky and Golay), takes certain frequencies
 out of a track altogether, of the motion and of the tracking noise alike; averages over three frames
@@ -22,31 +22,33 @@ from driftwalk.core.errors import InputError
 from driftwalk.likelihood.spline import Floats
 from driftwalk.schema import Track
 
-SEGMENT: Final = 64
-"""Second differences in a segment; segments overlap by half."""
-FEWEST: Final = 8
-"""Segments of x and y together without which nothing is said."""
-LOWEST: Final = 0.08
-"""Cycles per sample: below, the flow rules the motion."""
-ENOUGH: Final = 50.0
-"""Evidence from which on positions are smoothed. Recordings of the model reach 2, those of
-animals and robots 110, but see `MOST_LEFT`; smoothed ones reach 50 in half a minute at 10 Hz."""
-MOST_LEFT: Final = 0.15
-"""Part of the misfit of a motion and its noise that smoothing may leave, or the reason is another:
-smoothed recordings of the model leave 0.01 of it, those of animals and robots 0.25 and more."""
-CLEARLY: Final = 10.0
-"""Evidence by which a way of smoothing is ahead of all others when it is named."""
-INDEPENDENT: Final = 0.36
-"""Degrees of freedom of the spectrum in one of its numbers: neighbours in frequency and
-overlapping segments are correlated by the taper."""
-STEPS: Final = 200
-GRID: Final = 1024
-MEMORIES: Final = (0.3, 0.5, 0.7, 0.85, 0.95)
-"""Correlation of a remembering force from one sample to the next."""
-AVERAGED: Final = (2, 3, 4, 5, 6, 7, 9, 11)
-"""Frames of the plain averages that are looked for."""
-POLYNOMIALS: Final = ((5, 2), (7, 2), (9, 2), (11, 2), (7, 4), (9, 4), (11, 4))
-"""Frames and degrees of the smoothing by Savitzky and Golay; a degree of 3 is that of 2."""
+
+class SmoothingPolicy(NamedTuple):
+    """When the positions of a track are taken for smoothed (docs/explanation/likelihood.md)."""
+
+    segment: int = 64
+    """Second differences in a segment; segments overlap by half. Chosen by hand."""
+    fewest_segments: int = 8
+    """Segments of x and y together without which nothing is said: 16 s at 10 Hz."""
+    lowest_frequency: float = 0.08
+    """Cycles per sample: below, the flow rules the motion. Chosen by hand."""
+    evidence: float = 50.0
+    """Log likelihood ratio from which on positions are smoothed. Recordings of the model reach 2,
+    300 random tracks 10; smoothed ones reach 50 in half a minute at 10 Hz."""
+    most_deviance_left: float = 0.15
+    """Share of the deviance of a motion and its noise that smoothing may leave. Smoothed recordings
+    of the model leave 0.01 of it; those of animals and robots, whose reason is another, 0.25 and
+    more."""
+    clearly: float = 10.0
+    """Log likelihood ratio over all other ways of smoothing when a way is named. Chosen by hand."""
+    independent: float = 0.36
+    """Degrees of freedom of the spectrum in one of its numbers: neighbours in frequency and
+    overlapping segments are correlated by the taper."""
+
+
+SMOOTHING: Final = SmoothingPolicy()
+FREQUENCIES: Final = 1024
+"""Frequencies of a spectrum before the taper, all around the circle."""
 
 
 class Smoothing(NamedTuple):
@@ -61,11 +63,6 @@ class Smoothing(NamedTuple):
 def find_smoothing(track: Track) -> Smoothing | None:
     """Return how the positions of a track are smoothed; None where they do not seem to be.
 
-    Parameters
-    ----------
-    track : Track
-        One body, without samples that are mistakes. Gaps are passed over.
-
     Examples
     --------
     >>> noise = np.random.default_rng(1).normal(0.0, 3e-4, (2, 1000))
@@ -79,31 +76,27 @@ def find_smoothing(track: Track) -> Smoothing | None:
     'averages over 3 frames'
     """
     seen, segments = _spectrum(track)
-    if segments < FEWEST or not seen.all():
+    if segments < SMOOTHING.fewest_segments or not seen.all():
         return None
-    weight = np.full(seen.size, INDEPENDENT * segments)
+    weight = np.full(seen.size, SMOOTHING.independent * segments)
     weight[-1] *= 0.5  # the highest frequency has no phase
     best = -float((weight * (np.log(seen) + 1.0)).sum())
     plain = _likelihood(seen, _plain(), weight)
-    if best - plain < ENOUGH:
+    if best - plain < SMOOTHING.evidence:
         return None
     found = {way: _likelihood(seen, parts, weight) - plain for way, parts in _expected().items()}
     way, *others = sorted(found, key=lambda name: -found[name])
     evidence = found[way]
-    if evidence < ENOUGH or best - plain - evidence > MOST_LEFT * (best - plain):
+    if evidence < SMOOTHING.evidence or best - plain - evidence > SMOOTHING.most_deviance_left * (
+        best - plain
+    ):
         return None
-    clear = evidence - found[others[0]] > CLEARLY
+    clear = evidence - found[others[0]] > SMOOTHING.clearly
     return Smoothing(way if clear else "averages over some frames", evidence)
 
 
 def require_raw(track: Track, *, where: str) -> None:
-    """Refuse positions that a tracker has smoothed.
-
-    Raises
-    ------
-    InputError
-        With how they seem to be smoothed, and what to do.
-    """
+    """Refuse positions that a tracker has smoothed."""
     found = find_smoothing(track)
     if found is not None:
         raise InputError(
@@ -114,20 +107,22 @@ def require_raw(track: Track, *, where: str) -> None:
 
 
 def _spectrum(track: Track) -> tuple[Floats, int]:
-    """Return the mean spectrum of second differences above `LOWEST`, and how many it is made of."""
+    """Return the mean spectrum of second differences in the band, and its number of segments."""
     interval = np.diff(track.time)
     taper = _taper()
-    if interval.size < SEGMENT + 1:
+    if interval.size < SMOOTHING.segment + 1:
         return np.zeros(0), 0
     usual = float(np.median(interval))
     breaks = np.flatnonzero(np.abs(interval - usual) > 0.1 * usual) + 1
-    total, count = np.zeros(SEGMENT // 2 + 1), 0
+    total, count = np.zeros(SMOOTHING.segment // 2 + 1), 0
     for first, last in zip([0, *breaks], [*breaks, track.time.size], strict=True):
         for axis in (track.x, track.y):
             change = np.diff(axis[first:last], 2)
-            if change.size < SEGMENT:
+            if change.size < SMOOTHING.segment:
                 continue
-            parts = np.lib.stride_tricks.sliding_window_view(change, SEGMENT)[:: SEGMENT // 2]
+            parts = np.lib.stride_tricks.sliding_window_view(change, SMOOTHING.segment)[
+                :: SMOOTHING.segment // 2
+            ]
             total += (np.abs(np.fft.rfft(parts * taper, axis=1)) ** 2).sum(axis=0)
             count += len(parts)
     mean: Floats = total / max(count, 1)
@@ -135,26 +130,28 @@ def _spectrum(track: Track) -> tuple[Floats, int]:
 
 
 def _taper() -> Floats:
-    taper: Floats = np.hanning(SEGMENT + 2)[1:-1]
+    taper: Floats = np.hanning(SMOOTHING.segment + 2)[1:-1]
     taper /= np.sqrt((taper**2).sum())
     return taper
 
 
 def _band() -> slice:
-    return slice(int(np.ceil(LOWEST * SEGMENT)), None)
+    return slice(int(np.ceil(SMOOTHING.lowest_frequency * SMOOTHING.segment)), None)
 
 
 def _turn() -> Floats:
-    return 2.0 * np.pi * np.arange(GRID) / GRID
+    return 2.0 * np.pi * np.arange(FREQUENCIES) / FREQUENCIES
 
 
 def _parts() -> Floats:
-    """Return what spectra are made of without smoothing, shape (parts, GRID)."""
+    """Return what spectra are made of without smoothing, shape (parts, FREQUENCIES)."""
     turn = _turn()
     difference = np.abs(1.0 - np.exp(1j * turn)) ** 2
     motion = (2.0 + np.cos(turn)) / 3.0
+    # A force that remembers, by its correlation from one sample to the next.
     forgetting = [
-        motion * (1.0 - one) ** 2 / np.abs(1.0 - one * np.exp(1j * turn)) ** 2 for one in MEMORIES
+        motion * (1.0 - one) ** 2 / np.abs(1.0 - one * np.exp(1j * turn)) ** 2
+        for one in (0.3, 0.5, 0.7, 0.85, 0.95)
     ]
     # Tracking noise, jumps of the position, of the velocity, and of an acceleration that lasts.
     return np.stack([difference**2, difference, motion, *forgetting])
@@ -182,10 +179,11 @@ def _ways() -> dict[str, Floats]:
     # Slow to load, and asked for only where the plain spectrum does not fit.
     from scipy.signal import savgol_coeffs
 
-    ways = {f"averages over {n} frames": np.full(n, 1.0 / n) for n in AVERAGED}
+    ways = {f"averages over {n} frames": np.full(n, 1.0 / n) for n in (2, 3, 4, 5, 6, 7, 9, 11)}
     ways["weighted averages over 3 frames"] = np.array([0.25, 0.5, 0.25])
     ways["weighted averages over 5 frames"] = np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0
-    for frames, degree in POLYNOMIALS:
+    # A degree of 3 is that of 2.
+    for frames, degree in ((5, 2), (7, 2), (9, 2), (11, 2), (7, 4), (9, 4), (11, 4)):
         name = {2: "parabolas", 4: "quartics"}[degree]
         ways[f"{name} through {frames} frames (Savitzky-Golay)"] = savgol_coeffs(frames, degree)
     return ways
@@ -194,11 +192,11 @@ def _ways() -> dict[str, Floats]:
 def _tapered(spectra: Floats) -> Floats:
     """Return the mean of tapered spectra of a segment whose true ones are given, (f, parts)."""
     taper = _taper()
-    covariance = np.fft.ifft(spectra, axis=1).real[:, :SEGMENT]
-    covariance *= np.correlate(taper, taper, mode="full")[SEGMENT - 1 :]
+    covariance = np.fft.ifft(spectra, axis=1).real[:, : SMOOTHING.segment]
+    covariance *= np.correlate(taper, taper, mode="full")[SMOOTHING.segment - 1 :]
     covariance[:, 1:] *= 2.0
-    turn = 2.0 * np.pi * np.arange(SEGMENT // 2 + 1) / SEGMENT
-    found: Floats = np.cos(np.outer(turn, np.arange(SEGMENT))) @ covariance.T
+    turn = 2.0 * np.pi * np.arange(SMOOTHING.segment // 2 + 1) / SMOOTHING.segment
+    found: Floats = np.cos(np.outer(turn, np.arange(SMOOTHING.segment))) @ covariance.T
     return found[_band()]
 
 
@@ -209,7 +207,7 @@ def _likelihood(seen: Floats, parts: Floats, weight: Floats) -> float:
     """
     share = np.array([float(np.median(seen / np.maximum(part, 1e-12))) for part in parts.T])
     share /= share.size
-    for _ in range(STEPS):
+    for _ in range(200):
         expected = parts @ share
         up = parts.T @ (weight * seen / expected**2)
         share *= np.sqrt(up / (parts.T @ (weight / expected)))

@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 from driftwalk.comparison import ks_distance
 from driftwalk.core.errors import InputError
-from driftwalk.likelihood.check.errors import Contrast, Errors, Leverage, velocity_at
+from driftwalk.likelihood.check.errors import Contrast, Innovations, Leverage, velocity_at
 from driftwalk.likelihood.check.motion import compare_motion
 from driftwalk.likelihood.check.place import (
     Layout,
@@ -23,9 +23,9 @@ from driftwalk.likelihood.check.place import (
 )
 from driftwalk.likelihood.check.scan import scan_of
 from driftwalk.likelihood.check.verdict import motion_criterion
-from driftwalk.likelihood.check.white import white_of
+from driftwalk.likelihood.check.white import whiteness_tests
 from driftwalk.likelihood.check.worlds import Replicates
-from driftwalk.likelihood.filter_pass import Series
+from driftwalk.likelihood.filter.series import Series
 from driftwalk.likelihood.spline import Spline
 
 ROWS, PARAMETERS, COMPONENTS = 400, 12, 2
@@ -123,7 +123,7 @@ def test_residuals_of_a_fit_have_the_stated_variance(fresh_seed: Callable[[int],
     assert (np.diag(left) < 0.6 * 50).any()
 
 
-def errors_of_noise(white: np.ndarray, used: np.ndarray | None = None) -> Errors:
+def errors_of_noise(white: np.ndarray, used: np.ndarray | None = None) -> Innovations:
     """Return errors made on a circle of 8 cm, one turn in 40 s, at 10 Hz."""
     time = 0.1 * np.arange(len(white))
     angle = 2.0 * np.pi * time / 40.0
@@ -136,7 +136,7 @@ def errors_of_noise(white: np.ndarray, used: np.ndarray | None = None) -> Errors
         0.0 * time,
         np.zeros(time.size, np.uint8),
     )
-    return Errors(
+    return Innovations(
         series,
         np.where(used[:, None], white, 0.0),
         used,
@@ -151,7 +151,7 @@ def nothing_fitted(components: int = 2) -> Leverage:
 
 def test_portmanteau_without_gaps_is_that_of_ljung_and_box() -> None:
     white = np.random.default_rng(7).normal(size=(800, 2))
-    found = white_of([errors_of_noise(white)], nothing_fitted())
+    found = whiteness_tests([errors_of_noise(white)], nothing_fitted())
     expected = 0.0
     for column in white.T:
         for lag in range(1, 21):
@@ -166,7 +166,7 @@ def test_portmanteau_without_gaps_is_that_of_ljung_and_box() -> None:
 def test_autocorrelation_with_gaps_by_brute_force() -> None:
     generator = np.random.default_rng(8)
     white, used = generator.normal(size=(300, 2)), generator.random(300) < 0.7
-    found = white_of([errors_of_noise(white, used)], nothing_fitted())
+    found = whiteness_tests([errors_of_noise(white, used)], nothing_fitted())
     for lag in (1, 7, 20):
         pairs = [(k, k + lag) for k in range(300 - lag) if used[k] and used[k + lag]]
         mean = np.mean([white[a] * white[b] for a, b in pairs], axis=0)
@@ -177,7 +177,7 @@ def test_autocorrelation_with_gaps_by_brute_force() -> None:
 
 def test_lags_without_a_pair_take_no_degree_of_freedom() -> None:
     white = np.random.default_rng(12).normal(size=(400, 2))
-    found = white_of([errors_of_noise(white, np.arange(400) % 2 == 0)], nothing_fitted())
+    found = whiteness_tests([errors_of_noise(white, np.arange(400) % 2 == 0)], nothing_fitted())
     # Only even lags join samples that are used.
     assert found.portmanteau_dof == 2 * 10
     assert found.p_value == pytest.approx(chi2.sf(found.portmanteau, 20))
@@ -193,8 +193,8 @@ def test_what_fitting_puts_in_is_taken_out_again(fresh_seed: Callable[[int], int
     # J C J' is 1/50 within a block of 50: at lag l a share (50 - l) / 50 of the pairs is in one.
     lags = np.arange(21)
     leverage = Leverage(np.zeros((1, 1)), 800.0, np.tile((50 - lags) / 50**2, (2, 1)))
-    corrected = white_of([errors_of_noise(residual)], leverage)
-    naive = white_of([errors_of_noise(residual)], nothing_fitted())
+    corrected = whiteness_tests([errors_of_noise(residual)], leverage)
+    naive = whiteness_tests([errors_of_noise(residual)], nothing_fitted())
     assert naive.p_value < 1e-6
     assert corrected.p_value > 1e-3
     assert corrected.expected_chi_squared == pytest.approx(0.98)
@@ -205,14 +205,14 @@ def test_what_fitting_puts_in_is_taken_out_again(fresh_seed: Callable[[int], int
 def test_moving_average_and_tails_are_seen(fresh_seed: Callable[[int], int]) -> None:
     generator = np.random.default_rng(fresh_seed(10))
     noise = generator.normal(size=(6001, 2))
-    found = white_of(
+    found = whiteness_tests(
         [errors_of_noise((noise[1:] + 0.5 * noise[:-1]) / np.sqrt(1.25))], nothing_fitted()
     )
     assert found.autocorrelation[:, 0] == pytest.approx([0.4, 0.4], abs=0.05)
     assert found.p_value < 1e-12
     assert found.largest[1] == 1
     # The excess kurtosis of Student's t with 10 degrees of freedom is 6 / (10 - 4).
-    tails = white_of(
+    tails = whiteness_tests(
         [errors_of_noise(generator.standard_t(10, size=(40_000, 2)))], nothing_fitted()
     )
     assert tails.excess_kurtosis == pytest.approx([1.0, 1.0], abs=0.3)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from driftwalk.likelihood.contacts.lattice import Wall
-from driftwalk.likelihood.contacts.parabola import answer, says_nothing
+from driftwalk.likelihood.contacts.parabola import answer, is_undetermined
 
 
 def test_a_parabola_gives_its_top_and_its_width() -> None:
@@ -24,10 +24,10 @@ def test_a_parabola_gives_its_top_and_its_width() -> None:
     hold = 0.2 + np.array([-1, 1]) * 1.644854 * 0.04
     np.testing.assert_allclose(found["wall_friction_interval"][1], hold / (1 - hold), rtol=1e-6)
     assert float(found["wall_friction"][1]) == pytest.approx(0.25)
-    assert not says_nothing(found)
+    assert not is_undetermined(found)
 
 
 def test_walls_that_are_all_alike_are_no_answer() -> None:
     """A block that passes along the wall and never touches it."""
     walls = [Wall(e, hold, -79.0) for e in np.linspace(0, 1, 5) for hold in np.linspace(0, 0.6, 5)]
-    assert says_nothing(answer(walls, 0.9))
+    assert is_undetermined(answer(walls, 0.9))

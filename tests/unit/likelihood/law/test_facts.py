@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from fit_worlds import fitted
 
-from driftwalk.likelihood.filter_pass import Point
+from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.law.assumptions import FLOATING, assumptions_of
 from driftwalk.likelihood.law.facts import law_facts
-from driftwalk.likelihood.law.found import LawFound
+from driftwalk.likelihood.law.forward_selection import LawResult
 from driftwalk.model import Study, apply_overrides
 from driftwalk.schema.check import check_dataset
 
@@ -25,7 +25,7 @@ def facts_of(stated: dict[str, Any]) -> dict[str, Any]:
     fixed = {**assumptions.fixed, **(FLOATING if floating else {})}
     point = Point(np.zeros((2, 1, 1)), 0.0, 0.0, 0.0, opened=assumptions.opened, fixed=fixed)
     law = SimpleNamespace(floating=floating, settled_by=np.inf, mode=SimpleNamespace(point=point))
-    return law_facts(cast(LawFound, law), assumptions)
+    return law_facts(cast(LawResult, law), assumptions)
 
 
 @pytest.mark.parametrize(

@@ -10,27 +10,26 @@ import numpy as np
 import pytest
 from fit_worlds import coarse_study, driven
 
-from driftwalk.core.run_stages import tell_nobody
 from driftwalk.flow.arena import outline_of
-from driftwalk.likelihood.filter_pass import Passes
+from driftwalk.likelihood.filter.departures import STRENGTHS
+from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.fit import _start
 from driftwalk.likelihood.law.assumptions import FLOATING, assumptions_of
-from driftwalk.likelihood.law.departures import STRENGTHS
-from driftwalk.likelihood.law.forward_selection import Opening, _parts
-from driftwalk.likelihood.law.found import LawFound
-from driftwalk.likelihood.law.score_tests import Trial
+from driftwalk.likelihood.law.forward_selection import ForwardSelection, LawResult, _parts
+from driftwalk.likelihood.law.score_tests import ScoreTests
 from driftwalk.likelihood.law.search import LawSearch
-from driftwalk.likelihood.newton import Mode, Prior
+from driftwalk.likelihood.newton import Mode, ModeSearch, require_mode
+from driftwalk.likelihood.prior import Prior
 from driftwalk.likelihood.ready import body_of, prepare, spline_of
 from driftwalk.likelihood.start import first_weights
 
 PULSE = {"pulse_cosine": 0.1, "pulse_sine": 0.0, "pulse_frequency": 0.2}
 
 
-def trial_of(sigmas: Mapping[str, float]) -> Trial:
+def trial_of(sigmas: Mapping[str, float]) -> ScoreTests:
     """Return independent score tests with standard deviations of 1."""
     values = np.array(list(sigmas.values()))
-    return Trial(tuple(sigmas), values, np.ones(values.size), np.eye(values.size), values)
+    return ScoreTests(tuple(sigmas), values, np.ones(values.size), np.eye(values.size), values)
 
 
 def test_what_the_recording_asks_for_most_comes_first() -> None:
@@ -40,13 +39,13 @@ def test_what_the_recording_asks_for_most_comes_first() -> None:
     assert _parts(asked, trial) == [("marker_x",), STRENGTHS, ("force_memory",), tuple(PULSE)]
 
 
-class Stubborn(Opening):
+class Stubborn(ForwardSelection):
     """Opens numbers one group at a time only, and some of them never."""
 
     def __init__(self, never: set[str]) -> None:
         self.never, self.seen = never, []  # type: ignore[var-annotated]
 
-    def _opened(self, mode: Mode, asked: Mapping[str, float]) -> tuple[Mode, set[str]]:
+    def _open(self, mode: Mode, asked: Mapping[str, float]) -> tuple[Mode, set[str]]:
         self.seen.append(set(asked))
         alone = len(asked) == 1 or set(asked) == set(STRENGTHS)
         if alone and not self.never & set(asked):
@@ -62,7 +61,7 @@ def bare_mode() -> Mode:
 def test_where_all_together_fail_each_group_is_opened_alone(never: set[str], tries: int) -> None:
     trial = trial_of({"force_memory": 4.2, **dict.fromkeys(STRENGTHS, 15.0)})
     opening = Stubborn(never)
-    mode, dropped = opening._opened_or_strongest(
+    mode, dropped = opening._open_together_or_singly(
         bare_mode(), dict.fromkeys(trial.names, 0.1), trial
     )
     assert mode.iterations == 99
@@ -75,7 +74,7 @@ def test_where_no_group_can_be_opened_all_are_closed() -> None:
     trial = trial_of({"force_memory": 4.2, **dict.fromkeys(STRENGTHS, 15.0)})
     before, asked = bare_mode(), dict.fromkeys(trial.names, 0.1)
     opening = Stubborn({"force_memory", *STRENGTHS})
-    assert opening._opened_or_strongest(before, asked, trial) == (before, set(asked))
+    assert opening._open_together_or_singly(before, asked, trial) == (before, set(asked))
 
 
 @pytest.mark.slow
@@ -94,13 +93,12 @@ def test_a_law_that_was_found_amid_departures_is_compared_again(settled_by: floa
         spline_of(study, outline_of(study.tank.to_arena())),
     )
     assumptions = assumptions_of(study, ready.angle, recordings=1, flows=1)
-    search = LawSearch(passes, Prior(passes), assumptions, study.fit.iterations, tell_nobody)
+    search = LawSearch(ModeSearch(passes, Prior(passes), study.fit.iterations), assumptions)
     start = _start(passes, ready, study)
     weights = first_weights(ready.tracks, passes.spline)
-    wrong = search.modes.find_from_afar(
-        replace(start, opened={"linear_share": 0.1}, fixed=dict(FLOATING)), weights
-    )
-    found = search._reconsidered(LawFound(wrong, wrong, True, {}, settled_by, None), start)
+    afar = replace(start, opened={"linear_share": 0.1}, fixed=dict(FLOATING))
+    wrong = require_mode(search.search.find_from_afar(afar, weights))
+    found = search._reconsidered(LawResult(wrong, wrong, True, {}, settled_by, None), start)
     assert not found.floating
     assert not found.mode.point.opened
     assert found.settled_by == found.evidence["paper"] - found.evidence["floating"] > 10.0

@@ -16,10 +16,10 @@ from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.study_keys import FIT_KEYS, study_overrides
 from driftwalk.figures import write_laws_figure
 from driftwalk.likelihood import compare_laws
-from driftwalk.likelihood.filter_pass import Point
+from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.interval_inflation import _log_drag_std
 from driftwalk.likelihood.law.assumptions import assumptions_of
 from driftwalk.likelihood.law.held_out import LAWS
-from driftwalk.likelihood.result import _log_drag_std
 from driftwalk.model import Study, apply_overrides
 from driftwalk.schema.answers.fit_facts import fit_facts, fitted_value
 from driftwalk.schema.check import check_dataset

@@ -79,10 +79,10 @@ def test_the_summary_leaves_out_what_is_not_used() -> None:
     for number in range(2):
         for angle in ("given", "none"):
             part = recovery.isel(duration=number).sel(angle=angle)
-            kept = part["force_std_error"].values[1:]
+            retained = part["force_std_error"].values[1:]
             row = part.sel(parameter="force_std")
-            assert float(row["median_absolute_error"]) == pytest.approx(np.median(np.abs(kept)))
-            assert float(row["bias"]) == pytest.approx(kept.mean())
+            assert float(row["median_absolute_error"]) == pytest.approx(np.median(np.abs(retained)))
+            assert float(row["bias"]) == pytest.approx(retained.mean())
             assert float(part["median_flow_error"]) == np.median(part["flow_error"].values[1:])
     # Drawn with 3 / sqrt(T); 58 draws: 9.3 % sd, 4 of them.
     assert recovery["drag_coefficient_error_scale"].values == pytest.approx([3.0, 3.0], rel=0.38)

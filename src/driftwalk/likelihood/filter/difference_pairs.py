@@ -1,0 +1,121 @@
+"""Derivatives by differences: pairs of passes that differ in one parameter alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+
+from driftwalk.likelihood.filter.departures import NUMBERS
+from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.filter.series import Flags
+from driftwalk.likelihood.filter.small_matrices import factor, forward, unpacked
+from driftwalk.likelihood.spline import Floats
+
+
+class DifferencePolicy(NamedTuple):
+    """When two passes give a derivative."""
+
+    step: float = 1e-4
+    """Change of the logarithm of a noise. Chosen by hand."""
+    most_change: float = 1e-2
+    """Largest relative change of a variance between the passes. It is a hundred steps: a larger one
+    means that one pass restarted where the other did not."""
+    most_change_far: float = 1.0
+    """The same for a number that is tried far from its value. Chosen by hand."""
+    least_comparable: float = 0.95
+    """Share of the samples that a pair has to compare; with fewer its step is too long. Chosen by
+    hand."""
+    largest_over_median: float = 8.0
+    """Largest change of a variance over the median one, to shorten a step by. Chosen by hand: the
+    effect of a wrong time grows with the squared speed."""
+
+
+DIFFERENCE: Final = DifferencePolicy()
+
+
+class Difference(NamedTuple):
+    """Values of one parameter between which its derivative is taken."""
+
+    low: float | None
+    """None for the value that the parameter has: that pass exists already."""
+    high: float
+    step: float
+    most_change: float = DIFFERENCE.most_change
+    shortens: bool = False
+    """Whether the step is shortened where variances change too much."""
+
+
+def difference_of(point: Point, name: str, *, shorter: float = 1.0) -> Difference:
+    """Return the two values of a parameter for its derivative, with a step `shorter` times less."""
+    if name not in NUMBERS:
+        return Difference(None, point.extras[name] + DIFFERENCE.step, DIFFERENCE.step)
+    number, value = NUMBERS[name], point.number(name)
+    most = DIFFERENCE.most_change if number.trial is None else DIFFERENCE.most_change_far
+    if number.trial is not None and name not in point.opened:
+        low, high = number.tried_from(value)
+        return Difference(None if low == value else low, high, high - low, most)
+    high = value + number.step / shorter
+    return Difference(None, high, high - value, most, shortens=True)
+
+
+class Pair(NamedTuple):
+    """Two passes that differ in one parameter alone."""
+
+    one: dict[str, Any]
+    other: dict[str, Any]
+    step: float
+    """By how much the parameter differs."""
+    most_change: float = DIFFERENCE.most_change
+    """Of a variance; where it is more, the two cannot be compared."""
+    wave: Floats | None = None
+    """How much of the difference counts at each sample, shape (n,); all of it by default."""
+
+    @property
+    def comparable(self) -> Flags:
+        """Return which samples both passes have used, with nearly the same variances."""
+        # A change that is not a number is not a near one.
+        near = variance_changes(self.one, self.other) <= self.most_change
+        return used_of(self.one) & used_of(self.other) & near
+
+    @property
+    def excess(self) -> float:
+        """Return how many times too long the step is for most samples to be comparable."""
+        both = used_of(self.one) & used_of(self.other)
+        if not both.any() or np.mean(self.comparable[both]) >= DIFFERENCE.least_comparable:
+            return 1.0
+        median = float(np.median(variance_changes(self.one, self.other)[both]))
+        return max(1.0, DIFFERENCE.largest_over_median * median / self.most_change)
+
+
+def used_of(found: dict[str, Any]) -> Flags:
+    """Return which samples a pass has used."""
+    return np.asarray(found["used"], dtype=bool)
+
+
+def variance_changes(base: dict[str, Any], other: dict[str, Any]) -> Floats:
+    """Return the largest relative change of a variance at each sample, shape (n,)."""
+    one, two = (np.einsum("aan->an", unpacked(found["covariance"])) for found in (base, other))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray((np.abs(two - one) / one).max(axis=0))
+
+
+def noise_derivatives(
+    base: dict[str, Any], pairs: Sequence[Pair], used: Flags
+) -> tuple[Floats, list[Floats], list[Floats]]:
+    """Return whitened innovations (n, D), their derivatives by the noises, and those of S.
+
+    The derivatives of S are whitened from both sides, L^-1 dS L^-T, shape (D, D, n).
+    """
+    root = factor(base["covariance"][used])
+    white = forward(root, base["innovation"][used].T).T
+    changes, spreads = [], []
+    for one, other, step, _, wave in pairs:
+        per = 1.0 / step if wave is None else wave[used, None] / step
+        change = (one["innovation"][used] - other["innovation"][used]) * per
+        changes.append(forward(root, change.T).T)
+        widening = unpacked((other["covariance"][used] - one["covariance"][used]) * per)
+        half = forward(root, widening)
+        spreads.append(forward(root, half.transpose(1, 0, 2)))
+    return white, changes, spreads

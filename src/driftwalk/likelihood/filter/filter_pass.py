@@ -1,0 +1,273 @@
+"""One pass of the innovations filter over the recordings: likelihood, score and information.
+
+The filter predicts each position from the past. Its innovations e_k are independent normals with
+covariances S_k if the parameters are right, so twice the negative log likelihood is the sum of
+``ln det S_k + e_k' S_k^-1 e_k``. The parameters are, in this order, the flow's coefficients,
+ln C_d, and the noises: ln q (intensity of the stochastic acceleration), ln r (tracking noise) and,
+where the angle is a part of the state, the logarithms of the force's lever and of the angle's
+noise. For the first two the filter itself adds up the products of the derivatives of its
+predictions; for the noises it is run again with slightly larger values, and the derivatives of S_k
+enter as well. Where the pumps were switched each flow has coefficients of its own; a series is in
+one flow and adds to the block of that flow alone, and to the parameters that all share.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from driftwalk import _core
+from driftwalk.likelihood.filter.departures import STRENGTHS
+from driftwalk.likelihood.filter.difference_pairs import (
+    Pair,
+    difference_of,
+    noise_derivatives,
+    used_of,
+)
+from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.filter.series import (
+    FILTER,
+    Body,
+    Flags,
+    Series,
+    corrected,
+    cosine_of,
+    strength_of,
+)
+from driftwalk.likelihood.filter.small_matrices import factor, forward
+from driftwalk.likelihood.spline import Floats, Spline
+
+Place = tuple[slice, slice]
+
+
+class Sums(NamedTuple):
+    """Sums of a pass over all samples."""
+
+    deviance: float
+    """Negative log likelihood, without its constant."""
+    score: Floats
+    """Its derivatives, with the sign turned."""
+    information: Floats
+    """Expected second derivatives."""
+    used: int
+    """Samples whose innovations were used."""
+
+
+@dataclass(frozen=True, eq=False)
+class Passes:
+    """Passes of the innovations filter over the recordings of one tank."""
+
+    series: Sequence[Series]
+    body: Body
+    spline: Spline
+    flows: int = 1
+    """Number of flows, each with coefficients of its own."""
+
+    def columns_of(self, flow: int, others: int) -> tuple[Place, Place]:
+        """Return where a flow's coefficients and the `others` stand: in one flow, and among all."""
+        count = 2 * self.spline.size
+        shared = self.flows * count
+        return (
+            (slice(0, count), slice(flow * count, (flow + 1) * count)),
+            (slice(count, count + others), slice(shared, shared + others)),
+        )
+
+    def sums(self, point: Point, *, noise: str = "with", tried: Sequence[str] = ()) -> Sums:
+        """Return likelihood, score and information at a point.
+
+        With noise="without" they end with ln C_d. The closed numbers that are `tried` have
+        derivatives too, after those of all other parameters.
+        """
+        names = [*point.extras, *tried] if noise == "with" else []
+        others = 1 + len(names)
+        size = 2 * self.spline.size * self.flows + others
+        deviance, used = 0.0, 0
+        score, information = np.zeros(size), np.zeros((size, size))
+        for series in self.series:
+            local = point.in_flow(series.flow)
+            base = dict(self.kernel(series, local).run(series.time.size))
+            pairs = self._pairs(series, local, names, base)
+            one = self._sums_of(series, local, base, pairs)
+            # A series is in one flow: it adds to that flow's block, and to what all flows share.
+            places = self.columns_of(series.flow, others)
+            for own, row in places:
+                score[row] += one.score[own]
+                for own_column, column in places:
+                    information[row, column] += one.information[own, own_column]
+            deviance, used = deviance + one.deviance, used + one.used
+        return Sums(deviance, score, information, used)
+
+    def _pairs(
+        self, series: Series, point: Point, names: Sequence[str], base: dict[str, Any]
+    ) -> list[Pair]:
+        """Return two passes for each parameter.
+
+        The kernel is called from here, and not from a function for each pass: a call of it is then
+        at most eight frames below `driftwalk.fit`.
+        """
+        # A closed cosine of the flow's strength changes so slowly that its derivative is the one
+        # by a constant change of the strength, times the cosine: all of them share one pair.
+        waves = [name for name in names if name in STRENGTHS and name not in point.opened]
+        found: dict[str, Pair] = {}
+        for name in [*names, *(["strength_0"] if waves else [])]:
+            if name in waves:
+                continue
+            low, high, step, most, *_ = difference = difference_of(point, name)
+            one = base
+            if low is not None:
+                one = dict(self.kernel(series, point.with_extra(name, low)).run(series.time.size))
+            other = dict(self.kernel(series, point.with_extra(name, high)).run(series.time.size))
+            pair = Pair(one, other, step, most)
+            if difference.shortens and (excess := pair.excess) > 1.0:
+                # Where positions are known to some micrometres, a tenth of a millisecond is a long
+                # step in time: the second pass is made again with a shorter one.
+                _, high, step, *_ = difference_of(point, name, shorter=excess)
+                other = dict(
+                    self.kernel(series, point.with_extra(name, high)).run(series.time.size)
+                )
+                pair = Pair(one, other, step, most)
+            found[name] = pair
+        for name in waves:
+            cosine = cosine_of(series, STRENGTHS.index(name) + 1)
+            found[name] = found["strength_0"]._replace(wave=cosine)
+        return [found[name] for name in names]
+
+    def _sums_of(
+        self, series: Series, point: Point, base: dict[str, Any], pairs: Sequence[Pair]
+    ) -> Sums:
+        """Return the sums of one series: of coefficients and ln C_d by the kernel, then noises."""
+        # A sample counts only where every pass has used it: else a difference of two passes would
+        # be that of taking a sample and leaving it out.
+        used = np.logical_and.reduce([used_of(base), *(pair.comparable for pair in pairs)])
+        white, changes, spreads = noise_derivatives(base, pairs, used)
+        # The kernel multiplies its derivatives, which are never held, with the whitened
+        # innovations (the score) and with their changes by each noise (the mixed information).
+        right = np.zeros((used.size, white.shape[1], 1 + len(changes)))
+        right[used] = np.stack([white, *changes], axis=-1)
+        kernel = self.kernel(series, point, sensitivities=True)
+        found = kernel.sums(used.astype(np.uint8), right)
+        # ln det S / 2 is the sum of the logarithms on the diagonal of its Cholesky factor.
+        deviance = 0.5 * float((white**2).sum()) + float(
+            np.log(np.einsum("aan->an", factor(base["covariance"][used]))).sum()
+        )
+        count = len(found["information"])
+        size = count + len(pairs)
+        score, information = np.empty(size), np.empty((size, size))
+        score[:count] = found["products"][0]
+        information[:count, :count] = found["information"]
+        information[count:, :count] = found["products"][1:]
+        information[:count, count:] = found["products"][1:].T
+        # A noise changes the predictions and S: with w white and V = L^-1 dS L^-T the score is
+        # dw' w + (w' V w - tr V) / 2, the expected information dw' dw + tr(V V) / 2.
+        for k, (change, spread) in enumerate(zip(changes, spreads, strict=True)):
+            bent = np.einsum("abn,na,nb->", spread, white, white, optimize=True)
+            score[count + k] = (change * white).sum() + 0.5 * (bent - np.einsum("aan->", spread))
+            for other in range(len(pairs)):
+                information[count + k, count + other] = (change * changes[other]).sum() + 0.5 * (
+                    spread * spreads[other]
+                ).sum()
+        return Sums(deviance, score, information, int(used.sum()))
+
+    def innovations(self, point: Point) -> list[tuple[Floats, Flags]]:
+        """Return each recording's whitened innovations, shape (n, D), and which were used.
+
+        D is 3 with the angle in the state, else 2. The innovation of a missing angle is 0.
+        """
+        found = [self.run(series, point.in_flow(series.flow)) for series in self.series]
+        return [(_whitened(one), used_of(one)) for one in found]
+
+    def states(self, series: Series, point: Point) -> Floats:
+        """Return coordinates and velocities after each sample, shape (n, 2 D); NaN without."""
+        return np.asarray(self.run(series, point)["state"])
+
+    def strength_products(self, series: Series, point: Point) -> tuple[Floats, Floats]:
+        """Return products of the errors with their derivatives by the flow's strength, and squares.
+
+        Shapes (n,); 0 where a sample is not used.
+        """
+        base = dict(self.kernel(series, point).run(series.time.size))
+        (pair,) = self._pairs(series, point, ["strength_0"], base)
+        used = pair.comparable
+        white, (change,), _ = noise_derivatives(base, [pair], used)
+        products, squares = np.zeros(used.size), np.zeros(used.size)
+        products[used] = (white * change).sum(axis=1)
+        squares[used] = (change**2).sum(axis=1)
+        return products, squares
+
+    def run(self, series: Series, point: Point) -> dict[str, Any]:
+        """Return innovations, covariances and states of a pass over one series."""
+        return dict(self.kernel(series, point).run(series.time.size))
+
+    def kernel(self, series: Series, point: Point, *, sensitivities: bool = False) -> Any:
+        """Return the native filter, before the first sample of a series."""
+        body, spline = self.body, self.spline
+        pose: dict[str, float] = {}
+        if point.log_lever is not None and point.log_angle_noise is not None:
+            pose["force_lever"] = math.exp(point.log_lever)
+            pose["angle_noise"] = math.exp(point.log_angle_noise)
+        # Offsets of marker and angle move the data and not the model: the core knows the centre of
+        # mass and the angle of the faces only.
+        x, y, theta = corrected(series, point)
+        share = point.number("linear_share")
+        return _core.InnovationsFilter(
+            series.time,
+            x,
+            y,
+            theta,
+            series.omega,
+            series.excluded,
+            side=body.side,
+            mass=body.mass,
+            depth=body.depth,
+            strips=body.strips,
+            water_density=body.water_density,
+            origin_x=spline.origin_x,
+            origin_y=spline.origin_y,
+            spacing=spline.spacing,
+            columns=spline.columns,
+            rows=spline.rows,
+            coefficients=np.ascontiguousarray(point.coefficients),
+            drag_coefficient=math.exp(point.log_drag),
+            noise_intensity=math.exp(point.log_intensity),
+            position_noise=math.exp(point.log_noise),
+            largest_step=FILTER.largest_step_s,
+            longest_gap=FILTER.longest_gap_s,
+            orientation=body.orientation,
+            sensitivities=sensitivities,
+            strength=strength_of(series, point),
+            quadratic=1.0 - share,
+            # Linear drag acts on all four faces, windward or not: a quarter on each.
+            linear=0.25 * share * body.linear_speed,
+            water_acceleration=point.number("water_acceleration"),
+            water_spin=point.number("water_spin"),
+            drag_power=point.number("drag_power"),
+            drag_speed=body.drag_speed,
+            time_noise=math.sqrt(point.number("time_variance")),
+            force_memory=point.number("force_memory"),
+            **pose,
+        )
+
+
+def _whitened(found: dict[str, Any]) -> Floats:
+    white = forward(factor(found["covariance"]), found["innovation"].T).T
+    # To the filter a missing angle is one measured where it was predicted, with an enormous error.
+    return np.where(found["innovation"] == 0.0, 0.0, white)
+
+
+def log_densities(passes: Passes, series: Series, point: Point) -> Floats:
+    """Return the logarithm of the predicted density of each sample, shape (n,); NaN without one.
+
+    Those that the filter takes for mistakes have one, too: a law pays for what it cannot predict.
+    """
+    found = passes.run(series, point)
+    there = np.isfinite(found["innovation"]).all(axis=1) & (series.excluded == 0)
+    root = factor(found["covariance"][there])
+    white = forward(root, found["innovation"][there].T)
+    size = len(white)
+    density = np.full(there.size, np.nan)
+    density[there] = -0.5 * (white**2).sum(axis=0) - np.log(np.einsum("aan->an", root)).sum(axis=0)
+    return density - 0.5 * size * math.log(2.0 * math.pi)

@@ -1,0 +1,115 @@
+"""The prior: smoothness of the flow, and weak normal priors of ln C_d, lever and angle noise.
+
+Prior of the flow's coefficients: ``exp(-(lam_r c' R c + lam_s c' S c) / 2)`` per component, R and S
+the roughness and the size of `driftwalk.likelihood.spline.penalties`; with several flows the
+weights are the same for all. The two weights follow from the data: each step sets a weight to the
+degrees of freedom that the data have taken from its prior, over ``c' R c`` or ``c' S c`` (MacKay's
+fixed point of the evidence).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from driftwalk.likelihood.filter.departures import NUMBERS
+from driftwalk.likelihood.filter.filter_pass import Passes, Sums
+from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.spline import Floats, penalties
+
+
+class PriorPolicy(NamedTuple):
+    """Centres and widths of the weak priors."""
+
+    drag: float = 0.5
+    """Centre of the prior of C_d, and where the search begins. Chosen by hand."""
+    log_drag_std: float = 0.7
+    """Standard deviation of ln C_d: within a factor of two. Chosen by hand."""
+    lever: float = 0.01
+    """Centre of the prior of the force's lever, in sides of the block, and its first value. On
+    recordings of the model it comes out at 0.001 to 0.004 (docs/explanation/likelihood.md)."""
+    log_lever_std: float = 1.0
+    """Within a factor of three. Chosen by hand."""
+    angle_noise: float = 0.01
+    """Centre of the prior of the angle's noise [rad]. Chosen by hand: half a degree."""
+    log_angle_noise_std: float = 2.3
+    """A factor of ten: it counts only where the turning is so restless that nothing is known of the
+    noise. Chosen by hand."""
+
+
+PRIOR: Final = PriorPolicy()
+LEVER, ANGLE_NOISE = 3, 4
+"""Places of the lever and of the angle's noise, counted from C_d on."""
+MOST_FACTOR: Final = 10.0
+"""Largest factor by which q, r^2 or the weight of a penalty changes in a step. Chosen by hand."""
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Weights of the two penalties."""
+
+    roughness: float
+    size: float
+
+
+class Prior:
+    """The prior of all parameters as a quadratic form."""
+
+    def __init__(self, passes: Passes) -> None:
+        self.roughness, self.size = penalties(passes.spline)
+        self.log_lever = math.log(PRIOR.lever * passes.body.side)
+
+    def matrix(self, weights: Weights) -> Floats:
+        """Return the precision of one component's coefficients."""
+        return weights.roughness * self.roughness + weights.size * self.size
+
+    def add(self, sums: Sums, point: Point, weights: Weights) -> Sums:
+        """Return the sums with the prior of the coefficients, of C_d and of the lever in them."""
+        precision = self.matrix(weights)
+        count = len(precision)
+        coefficients = point.coefficients.reshape(-1, count)
+        score, information = sums.score.copy(), sums.information.copy()
+        pull = coefficients @ precision
+        for component in range(len(coefficients)):
+            part = slice(component * count, (component + 1) * count)
+            information[part, part] += precision
+            score[part] -= pull[component]
+        deviance = sums.deviance + 0.5 * float((pull * coefficients).sum())
+        drag = coefficients.size
+        single = [(drag, point.log_drag - math.log(PRIOR.drag), PRIOR.log_drag_std)]
+        if point.log_lever is not None:
+            single.append((drag + LEVER, point.log_lever - self.log_lever, PRIOR.log_lever_std))
+        if point.log_angle_noise is not None:
+            off = point.log_angle_noise - math.log(PRIOR.angle_noise)
+            single.append((drag + ANGLE_NOISE, off, PRIOR.log_angle_noise_std))
+        first = drag + 1 + len(point.noises)
+        for index, (name, value) in enumerate(point.opened.items(), first):
+            single.append((index, value - NUMBERS[name].model, NUMBERS[name].prior_std))
+        for index, off, std in single:
+            deviance += 0.5 * (off / std) ** 2
+            # Without derivatives by the noises there is no row of the lever.
+            if index < score.size:
+                information[index, index] += 1.0 / std**2
+                score[index] -= off / std**2
+        return Sums(deviance, score, information, sums.used)
+
+    def updated(self, weights: Weights, point: Point, covariance: Floats) -> Weights:
+        """Return the weights after one step of the evidence's fixed point."""
+        inverse = np.linalg.inv(self.matrix(weights))
+        count = len(inverse)
+        coefficients = point.coefficients.reshape(-1, count)
+        parts = [
+            covariance[k * count : (k + 1) * count, k * count : (k + 1) * count]
+            for k in range(len(coefficients))
+        ]
+        new = []
+        for old, form in ((weights.roughness, self.roughness), (weights.size, self.size)):
+            prior = len(parts) * float((form * inverse).sum())
+            posterior = sum(float((form * part).sum()) for part in parts)
+            value = float(np.einsum("ka,ab,kb->", coefficients, form, coefficients))
+            wanted = old * (prior - posterior) / max(value, 1e-300)
+            new.append(float(np.clip(wanted, old / MOST_FACTOR, old * MOST_FACTOR)))
+        return Weights(*new)
