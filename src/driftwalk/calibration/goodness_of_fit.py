@@ -19,13 +19,11 @@ from driftwalk.schema.answers.calibration_facts import is_explained
 
 FAR_ABOVE_FLOOR = 2.0
 """A distance more than this many noise floors is called far above it."""
-FLOOR_REPLICATES = 8
-VALIDATION_REPLICATES = 16
 
 
 def noise_floor_at(problem: Problem, point: Sequence[float]) -> float:
     """Return the median distance between two simulated recordings of the same parameters."""
-    steps = simulated_steps(problem, point, stage="floor", replicates=FLOOR_REPLICATES)
+    steps = simulated_steps(problem, point, stage="floor", replicates=8)
     among = distances_among(problem.statistic, steps, threads=problem.like.threads)
     return float(np.median(among))
 
@@ -116,9 +114,7 @@ def validate_on_halves(
     window = first_window(map_of_half, noise_floor_at(first, lowest))
     maps = Mapper(first, "first_half_refined", executor=executor, progress=progress)
     optimum = locate(maps, window, limits_of(first)).landscape.optimum
-    recordings, distances = recordings_at(
-        second, optimum, stage="second_half", count=VALIDATION_REPLICATES
-    )
+    recordings, distances = recordings_at(second, optimum, stage="second_half", count=16)
     among = distances_among(second.statistic, recordings, threads=second.like.threads)
     return Halves(optimum.point, float(distances.mean()), float(np.median(among)))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -13,10 +13,17 @@ from driftwalk.schema import Track
 if TYPE_CHECKING:
     from driftwalk.model import Study
 
-NOTABLE_SHARE: Final = 0.05
-"""Share of the samples near the wall from which on its friction counts."""
-REACH_M: Final = 0.002
-"""A block may move so far from one sample to the next."""
+
+class WallWarningPolicy(NamedTuple):
+    """When a recording is near a wall often enough for its friction to count. Chosen by hand."""
+
+    notable_share: float = 0.05
+    """Share of the samples near the wall above which a warning is given."""
+    reach_m: float = 0.002
+    """How far a block may move from one sample to the next [m]."""
+
+
+WALL_WARNING: Final = WallWarningPolicy()
 
 
 def wall_warning(track: Track, study: Study) -> str | None:
@@ -43,10 +50,10 @@ def wall_warning(track: Track, study: Study) -> str | None:
     tank = study.tank
     if not (tank.is_default("wall_restitution") and tank.is_default("wall_friction")):
         return None
-    reach = study.block.side_m / math.sqrt(2.0) + REACH_M
+    reach = study.block.side_m / math.sqrt(2.0) + WALL_WARNING.reach_m
     near = outline_of(tank.to_arena()).depth(track.x, track.y) < reach
     share = float(np.mean(near))
-    if share <= NOTABLE_SHARE:
+    if share <= WALL_WARNING.notable_share:
         return None
     return (
         f"the block may touch the wall in {share:.0%} of the samples, and the study takes the "

@@ -10,7 +10,7 @@ import pytest
 
 import driftwalk as dw
 from driftwalk.calibration.problem import Problem, prepare_problem
-from driftwalk.calibration.stationarity import DRAWS, FEWEST_PAIRS, LEVEL, steadiness_of
+from driftwalk.calibration.stationarity import STATIONARITY, steadiness_of
 from driftwalk.comparison.ks import ks_distance
 from driftwalk.conditions import load_with_study, recorded_camera
 from driftwalk.schema import Track, body_track
@@ -38,7 +38,7 @@ def test_a_steady_walk_gets_no_warning() -> None:
     found = [steadiness_of(problem_of(walk(np.full(1000, 2e-3), seed))) for seed in range(40)]
     p_values = np.array([one.p_value for one in found if one is not None])
     assert p_values.size == 40
-    assert np.count_nonzero(p_values <= LEVEL) <= 1
+    assert np.count_nonzero(p_values <= STATIONARITY.level) <= 1
     # Uniform between 1/200 and 1: the mean of 40 has sd 0.046, of which 4 are allowed.
     assert abs(p_values.mean() - 0.5) < 0.19
 
@@ -48,7 +48,7 @@ def test_a_walk_that_slows_down_is_not_steady() -> None:
     problem = problem_of(walk(speed, 1))
     found = steadiness_of(problem)
     assert found is not None
-    assert found.p_value == 1.0 / (1 + DRAWS)
+    assert found.p_value == 1.0 / (1 + STATIONARITY.permutations)
     assert found.distance > 1.5 * found.expected
     assert found.warning is not None
     assert f"D = {found.distance:.3f} between the recording's own two halves" in found.warning
@@ -59,8 +59,8 @@ def test_a_walk_that_slows_down_is_not_steady() -> None:
 
 
 def test_a_short_recording_says_nothing() -> None:
-    short = problem_of(walk(np.full(FEWEST_PAIRS, 2e-3), 1))
-    assert len(short.steps) < FEWEST_PAIRS
+    short = problem_of(walk(np.full(STATIONARITY.fewest_pairs, 2e-3), 1))
+    assert len(short.steps) < STATIONARITY.fewest_pairs
     assert steadiness_of(short) is None
 
 

@@ -9,18 +9,15 @@ Bootstrap (1993), chapter 10).
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk.calibration.estimation.gauss_newton import rounded
-from driftwalk.calibration.estimation.posterior import REACH, Posterior
+from driftwalk.calibration.estimation.posterior import POSTERIOR, Posterior
 
 Floats = npt.NDArray[np.float64]
-
-FEWEST: Final = 40
-"""Recordings from which a bias and a scatter are taken."""
 
 
 class Repeated(NamedTuple):
@@ -52,11 +49,12 @@ def repeat_estimates(
     every = np.linspace(0, len(draws) - 1, min(count, len(draws))).round().astype(np.int64)
     chosen = rounded(draws[every])
     found = [
-        emulator.solve(one, reach=REACH, start=setting)
+        emulator.solve(one, reach=POSTERIOR.reach, start=setting)
         for one, setting in zip(simulate(chosen), chosen, strict=True)
     ]
     misfits = np.array([one.misfit for one in found])
-    if len(found) < FEWEST:
+    # Of fewer, a bias and a scatter would be chance; the covariance's own error stands in.
+    if len(found) < 40:
         none = np.zeros(draws.shape[1])
         return Repeated(misfits, none, none + emulator.widening)
     errors = np.array([one.setting for one in found]) - chosen

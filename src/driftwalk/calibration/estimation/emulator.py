@@ -19,17 +19,10 @@ Floats = npt.NDArray[np.float64]
 Form = Literal["slopes", "squares", "products"]
 FORMS: Final[tuple[Form, ...]] = ("slopes", "squares", "products")
 """A plane, with the square of each parameter, and with the products of two."""
-ENOUGH: Final = 4
-"""Simulations for each coefficient from which a form is tried."""
 SHRUNK: Final = 0.05
 """Part of the correlations of the summaries that is taken away: they come from simulations."""
 CONSTANT: Final = 1e-9
 """A summary that varies by less than this part of its size says nothing."""
-MOST_STEPS: Final = 40
-HELD: Final = 1e-9
-"""A parameter that is held may move by this part of the box."""
-MOST_CORRECTED: Final = 3
-"""Degrees of freedom beyond the summaries from which the errors of a covariance are known."""
 
 
 class Solved(NamedTuple):
@@ -85,7 +78,8 @@ class LocalEmulator:
         """
         count, parameters = self.summaries, self.centre.size
         more = self.freedom - count
-        if more <= MOST_CORRECTED:
+        # With three or fewer the moments of an inverse Wishart matrix do not exist.
+        if more <= 3:
             return float("inf")
         inverse = self.freedom / (more - 1.0)
         first, second = (top / (more * (more - 3.0)) for top in (2.0, more - 1.0))
@@ -157,14 +151,14 @@ class LocalEmulator:
             # A range that is next to nothing: the solver takes no bounds that are equal.
             index, value = held
             place = (value - self.centre[index]) / self.width[index]
-            low[index], high[index] = place - HELD, place + HELD
-            inside[index] = 0.5 * HELD
+            low[index], high[index] = place - 1e-9, place + 1e-9
+            inside[index] = 0.5e-9
         found = least_squares(
             left,
             np.clip(begin, low + inside, high - inside),
             jac=slope,
             bounds=(low, high),
-            max_nfev=MOST_STEPS,
+            max_nfev=40,
         )
         # A box as wide as its standard deviation keeps the inverse finite.
         slopes = slope(found.x)
@@ -233,7 +227,8 @@ def _best_form(place: Floats, summaries: Floats) -> Form:
     Coefficients that a box does not need cost: nine parameters have 36 products, and with 256
     simulations their errors are larger than what they describe.
     """
-    tried = [one for one in FORMS if len(place) >= ENOUGH * _basis(place[:1], one).shape[1]] or [
+    # Fewer than four simulations for each coefficient determine none of them well.
+    tried = [one for one in FORMS if len(place) >= 4 * _basis(place[:1], one).shape[1]] or [
         FORMS[0]
     ]
     errors = [_foretold(_basis(place, one), summaries) for one in tried]

@@ -10,34 +10,40 @@ import numpy.typing as npt
 
 from driftwalk.calibration.estimation import gauss_newton, regression_abc
 from driftwalk.calibration.estimation.bootstrap_correction import Repeated, repeat_estimates
-from driftwalk.calibration.estimation.gauss_newton import WIDEST, Descended, Simulate, descend
+from driftwalk.calibration.estimation.gauss_newton import GAUSS_NEWTON, Descended, Simulate, descend
 from driftwalk.calibration.estimation.modes import Modes, find_modes
-from driftwalk.calibration.estimation.posterior import (
-    MOST_ROUNDS as MOST_REGIONS,
-    Posterior,
-    sample_posterior,
-)
+from driftwalk.calibration.estimation.posterior import POSTERIOR, Posterior, sample_posterior
 from driftwalk.calibration.estimation.profile import Profiles, misfit_profiles
-from driftwalk.calibration.estimation.regression_abc import WIDE_ERRORS, Order, approach
+from driftwalk.calibration.estimation.regression_abc import REGRESSION, Order, approach
 
 Floats = npt.NDArray[np.float64]
 
 Starts = Callable[[], Floats]
 
-MOST_STARTS: Final = 2
-MATCHES: Final = 1.25
-"""Misfit, in summaries, up to which no other start is tried: recordings of the model itself have
-0.7 to 1.2 of it."""
-APART: Final = 0.04
-"""Two starts are at least so far from each other, in parts of the ranges (root mean square)."""
-HOPELESS: Final = 100.0
-"""Misfit, in summaries, from which on another start is no use: the model is another one."""
-MISFIT_QUANTILE: Final = 0.95
-UNSETTLED: Final = 1.0
-"""Draws that have moved by more standard deviations in the last round have not come to rest."""
-UNLIKE: Final = 4.0
-"""Misfit, in usual ones, from which on the recording is that of another model: intervals would have
-to be more than twice as wide."""
+
+class MatchingPolicy(NamedTuple):
+    """Which answers of the summaries count: the true model has a discrepancy of 0.7 to 1.2 each."""
+
+    most_starts: int = 2
+    """Other starts that are tried. Chosen by hand, a bound on the time."""
+    matches: float = 1.25
+    """Discrepancy per summary up to which no other start is tried."""
+    apart: float = 0.04
+    """Least root-mean-square distance of two starts, in parts of the ranges. Chosen by hand."""
+    hopeless: float = 100.0
+    """Discrepancy per summary from which on another start is no use: it is another model."""
+    typical_quantile: float = 0.95
+    """One recording of the model itself in twenty is called unlike it."""
+    unsettled: float = 1.0
+    """Last move of a mean, in standard deviations, above which it is not determined."""
+    unlike: float = 4.0
+    """Discrepancy, in medians of the model's own, above which nothing is determined: intervals
+    would be more than twice as wide. A wrong model on a recorded mouse had 30."""
+    as_close: float = 1.25
+    """Factor by which the summaries' answer may be farther in the six distances. Chosen by hand."""
+
+
+MATCHING: Final = MatchingPolicy()
 
 
 class Summaries(Simulate, Protocol):
@@ -86,16 +92,19 @@ class Matched(NamedTuple):
     @property
     def unlike(self) -> bool:
         """Whether the summaries are so far from the model's that it can determine nothing."""
-        return not self.usual and self.misfit > UNLIKE * self.usual_misfit
+        return not self.usual and self.misfit > MATCHING.unlike * self.usual_misfit
 
 
 def most_simulations(parameters: int, worlds: int) -> int:
     """Return how many settings `match_summaries` simulates at most."""
-    wide = regression_abc.SIMULATIONS * regression_abc.MOST_ROUNDS
     each, last = gauss_newton.simulations_of(parameters)
-    narrow = each * gauss_newton.MOST_ROUNDS
-    regions = MOST_REGIONS * last // 2
-    return wide + (1 + MOST_STARTS) * (narrow + regions) + worlds
+    narrow = each * gauss_newton.GAUSS_NEWTON.most_rounds
+    regions = POSTERIOR.most_rounds * last // 2
+    return (
+        regression_abc.REGRESSION.most_simulations
+        + (1 + MATCHING.most_starts) * (narrow + regions)
+        + worlds
+    )
 
 
 def match_summaries(
@@ -144,7 +153,7 @@ def find_ends(
     *,
     order: Order,
     seed: int,
-    hopeless: float = HOPELESS,
+    hopeless: float = MATCHING.hopeless,
     give_up: float = np.inf,
 ) -> list[Descended]:
     """Return the ends of the searches that are worth a posterior, the most likely first.
@@ -160,7 +169,7 @@ def find_ends(
     box = approach(
         lambda one: objective(one, parts=1)[:, 0], recorded, parameters, order=order, seed=seed
     )
-    width = WIDE_ERRORS * box.error
+    width = REGRESSION.wide_errors * box.error
 
     def search(number: int, start: Floats, width: Floats) -> Descended:
         return descend(
@@ -170,15 +179,15 @@ def find_ends(
     found = [search(1, box.centre, width)]
     if _matches(found[0]) or _misfit(found[0]) > hopeless:
         return found
-    wide = np.full(parameters, WIDEST)
-    for number, start in enumerate(_distinct(order(starts()))[:MOST_STARTS], 2):
+    wide = np.full(parameters, GAUSS_NEWTON.widest)
+    for number, start in enumerate(_distinct(order(starts()))[: MATCHING.most_starts], 2):
         found.append(search(number, start, wide))
     found.sort(key=lambda end: end.unlikely)
     return found[:1] + [end for end in found[1:] if _matches(end)]
 
 
 def _matches(found: Descended) -> bool:
-    return _misfit(found) < MATCHES
+    return _misfit(found) < MATCHING.matches
 
 
 def _misfit(found: Descended) -> float:
@@ -191,7 +200,7 @@ def _matched(
 ) -> Matched:
     best = modes.best
     usual = repeated.misfits
-    middle, most = float(np.median(usual)), float(np.quantile(usual, MISFIT_QUANTILE))
+    middle, most = float(np.median(usual)), float(np.quantile(usual, MATCHING.typical_quantile))
     misfit = best.solved.misfit
     stretch = float(np.sqrt(misfit / middle)) if misfit > most else 1.0
     wider = stretch * repeated.spread
@@ -206,7 +215,7 @@ def _matched(
         even_point=np.clip(best.others[0].setting, 0.0, 1.0),
         profiles=_profiles(order, best, recorded, repeated.bias, wider),
         ambiguous=modes.apart(each),
-        unsettled=np.abs(best.moved) > UNSETTLED,
+        unsettled=np.abs(best.moved) > MATCHING.unsettled,
         rounds=rounds,
     )
 
@@ -229,7 +238,7 @@ def _profiles(
         recorded,
         posterior.solved,
         wider * posterior.draws.std(axis=0),
-        reach=gauss_newton.REACH,
+        reach=GAUSS_NEWTON.reach,
     )
     place = np.clip(found.place - bias[:, None], 0.0, 1.0)
     return Profiles(place, found.rise / wider[:, None] ** 2)
@@ -239,6 +248,6 @@ def _distinct(starts: Floats) -> list[Floats]:
     """Return starts that are not close to one before."""
     kept: list[Floats] = []
     for start in starts:
-        if all(np.sqrt(np.mean((start - one) ** 2)) > APART for one in kept):
+        if all(np.sqrt(np.mean((start - one) ** 2)) > MATCHING.apart for one in kept):
             kept.append(start)
     return kept

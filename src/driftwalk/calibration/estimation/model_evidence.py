@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from concurrent.futures import Executor
-from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -18,30 +17,20 @@ from driftwalk.calibration.evolution.search import Tell
 from driftwalk.calibration.held_out.candidates import Contestant
 from driftwalk.calibration.held_out.held_out_score import even_blocks
 from driftwalk.calibration.held_out.recorded import RecordedMotion
-from driftwalk.calibration.ranking.evidence_ranking import USUAL_QUANTILE, Summarised
+from driftwalk.calibration.ranking.evidence_ranking import EVIDENCE, Summarised
 from driftwalk.calibration.summaries.simulated import SummaryObjective
 from driftwalk.core.processors import one_blas_thread
 from driftwalk.sweep import Store
 
 Floats = npt.NDArray[np.float64]
 
-BLUR: Final = 1e-3
-"""Standard deviation by which simulated summaries are blurred. At a wall without noise of the
-camera, some vary by much less, and a micrometre too much of the clearance would count as another
-motion."""
-HOPELESS: Final = 3.0
-"""Misfit, in summaries, from which on a search is given up and no other start is tried. A recording
-of the model itself has 0.7 to 1.2 of it, and models of other motions would take three times as
-long."""
-STARTS: Final = 2
-"""The box of the regression, and the answer of the comparison."""
-
 
 def most_settings(parameters: int, worlds: int) -> int:
     """Return how many settings `summarised` simulates at most."""
-    wide = regression_abc.SIMULATIONS * regression_abc.MOST_ROUNDS
-    narrow = gauss_newton.simulations_of(parameters)[0] * gauss_newton.MOST_ROUNDS
-    return wide + STARTS * narrow + SIMULATIONS + worlds
+    narrow = gauss_newton.simulations_of(parameters)[0] * gauss_newton.GAUSS_NEWTON.most_rounds
+    return (
+        regression_abc.REGRESSION.most_simulations + EVIDENCE.starts * narrow + SIMULATIONS + worlds
+    )
 
 
 @one_blas_thread()
@@ -95,8 +84,8 @@ def summarised(
         lambda: answer[None],
         order=order,
         seed=seed,
-        hopeless=HOPELESS,
-        give_up=HOPELESS,
+        hopeless=EVIDENCE.hopeless,
+        give_up=EVIDENCE.hopeless,
     )
     best = ends[0].solved
     found = likeness(
@@ -108,7 +97,7 @@ def summarised(
     return Summarised(
         misfit=found.misfit,
         usual_misfit=float(np.median(found.own_misfits)),
-        most_misfit=float(np.quantile(found.own_misfits, USUAL_QUANTILE)),
+        most_misfit=float(np.quantile(found.own_misfits, EVIDENCE.typical_quantile)),
         # Laplace's approximation, with a prior that is even over the ranges.
         unlikely=found.misfit
         + found.log_variance
@@ -128,4 +117,4 @@ class _Blurred:
         """Return the summaries of settings, shape (settings, parts, summaries)."""
         random = np.random.default_rng([self._seed, self._objective.done])
         found = self._objective(settings, parts=parts)
-        return found + BLUR * random.standard_normal(found.shape)
+        return found + EVIDENCE.blur * random.standard_normal(found.shape)

@@ -8,20 +8,15 @@ volume that the draws fill.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk.calibration.estimation.gauss_newton import Descended
-from driftwalk.calibration.estimation.posterior import DRAWS, Posterior
+from driftwalk.calibration.estimation.posterior import POSTERIOR, Posterior
 
 Floats = npt.NDArray[np.float64]
-
-RIVAL: Final = 10.0
-"""Places whose -2 log of the evidence is larger than the least by less than this are not ruled
-out. The covariances come from simulations: a misfit of a hundred has an error of some 5."""
-INTERVAL: Final = (0.05, 0.95)
 
 
 class Modes(NamedTuple):
@@ -39,7 +34,7 @@ class Modes(NamedTuple):
 
     def mixed(self, draws: Sequence[Floats]) -> Floats:
         """Return 512 draws of all places, each with as many as its share of the evidence."""
-        ends = np.round(DRAWS * np.cumsum(self.weights)).astype(np.int64)
+        ends = np.round(POSTERIOR.size * np.cumsum(self.weights)).astype(np.int64)
         counts = np.diff(ends, prepend=0)
         taken = [
             one[np.linspace(0, len(one) - 1, count).round().astype(np.int64)]
@@ -49,7 +44,7 @@ class Modes(NamedTuple):
 
     def apart(self, draws: Sequence[Floats]) -> npt.NDArray[np.bool_]:
         """Return for which parameters a place has an interval that does not meet the first's."""
-        low, high = np.quantile(np.array(draws), INTERVAL, axis=1)
+        low, high = np.quantile(np.array(draws), (0.05, 0.95), axis=1)
         return np.asarray(((low > high[0]) | (high < low[0])).any(axis=0))
 
 
@@ -71,13 +66,11 @@ def find_modes(ends: Sequence[Descended], sample: Callable[[Descended, int], Pos
         if not any(_reaches(one, posterior.draws.mean(axis=0)) for one in found):
             found.append(posterior)
     unlikely = np.array([_unlikely(one) for one in found])
-    order = [place for place in np.argsort(unlikely, kind="stable") if _rivals(unlikely, place)]
+    # The covariances come from simulations: a discrepancy of a hundred has an error of some 5. So
+    # a place is ruled out only where it is behind by 10.
+    order = [k for k in np.argsort(unlikely, kind="stable") if unlikely[k] - unlikely.min() < 10.0]
     weights = np.exp(-0.5 * (unlikely[order] - unlikely.min()))
     return Modes(tuple(found[place] for place in order), weights / weights.sum())
-
-
-def _rivals(unlikely: Floats, place: int) -> bool:
-    return bool(unlikely[place] - unlikely.min() < RIVAL)
 
 
 def _reaches(posterior: Posterior, setting: Floats) -> bool:

@@ -6,7 +6,7 @@ where it is flat, or rises on one side only, the recording does not determine th
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,10 +14,6 @@ import numpy.typing as npt
 from driftwalk.calibration.estimation.emulator import LocalEmulator, Solved
 
 Floats = npt.NDArray[np.float64]
-
-POINTS: Final = 21
-SPAN: Final = 3.0
-"""A profile ends so many standard deviations of the draws from the setting of least misfit."""
 
 
 class Profiles(NamedTuple):
@@ -47,14 +43,15 @@ def misfit_profiles(
     reach : float
         How far outside the box a setting may lie, 1 is the end of the box.
     """
+    points, span = 21, 3.0
     low = np.maximum(emulator.centre - reach * emulator.width, 0.0)
     high = np.minimum(emulator.centre + reach * emulator.width, 1.0)
     places, rises = [], []
     for index in range(solved.setting.size):
         middle = solved.setting[index]
-        first = max(middle - SPAN * std[index], low[index])
-        last = min(middle + SPAN * std[index], high[index])
-        place = np.linspace(first, last, POINTS)
+        first = max(middle - span * std[index], low[index])
+        last = min(middle + span * std[index], high[index])
+        place = np.linspace(first, last, points)
         places.append(place)
         rises.append(_rise(emulator, summaries, solved, index, place, reach))
     return Profiles(np.array(places), np.array(rises))

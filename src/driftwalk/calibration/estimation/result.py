@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.calibration.estimation.determined import DETERMINED
 from driftwalk.calibration.estimation.estimate import Matched
 from driftwalk.calibration.estimation.run import Estimation
 from driftwalk.calibration.held_out.candidates import Contestant
@@ -27,9 +28,6 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 Floats = npt.NDArray[np.float64]
-
-AT_THE_END: Final = 0.01
-"""A value is at the end of its range within this part of it."""
 
 
 def build_model_calibration(
@@ -161,7 +159,7 @@ def _said(found: Estimation, entry: Contestant, explained: bool) -> list[str]:
     ended = [
         one.name
         for one, share in zip(entry.ranges, found.point, strict=True)
-        if min(share, 1.0 - share) < AT_THE_END
+        if min(share, 1.0 - share) < DETERMINED.range_end
     ]
     if ended:
         said.append(

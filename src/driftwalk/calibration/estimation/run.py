@@ -11,7 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.calibration.estimation.determined import Determination, determination
-from driftwalk.calibration.estimation.estimate import Matched, match_summaries, most_simulations
+from driftwalk.calibration.estimation.estimate import (
+    MATCHING,
+    Matched,
+    match_summaries,
+    most_simulations,
+)
 from driftwalk.calibration.estimation.label_switching import Order, order_of
 from driftwalk.calibration.evolution import AspectObjective, Budget, Found, search_minimum
 from driftwalk.calibration.evolution.kept import KeptScores
@@ -33,10 +38,6 @@ Floats = npt.NDArray[np.float64]
 Tell = Callable[[str, int, int], None]
 
 SEARCH: Final = Budget(design=256, starts=3, short=20, long=30, replicates=2, retest=8)
-WEIGHED: Final = 20
-"""Worlds by which the answers of two stages are compared."""
-AS_CLOSE: Final = 1.25
-"""The second stage's answer counts where it is no farther than the first's by this factor."""
 
 
 class Stores(Protocol):
@@ -170,7 +171,7 @@ def _counts(matched: Matched | None, scores: Mapping[str, float]) -> bool:
     """
     if matched is None:
         return False
-    return matched.usual or scores["matched"] <= AS_CLOSE * scores["searched"]
+    return matched.usual or scores["matched"] <= MATCHING.as_close * scores["searched"]
 
 
 class _Search:
@@ -230,10 +231,10 @@ def _matched(
 
 
 def _weighed(even: AspectObjective, answers: Mapping[str, Floats]) -> dict[str, float]:
-    """Return the scores of answers in the even blocks, from the same random numbers."""
+    """Return scores in the even blocks, of 20 replicates with common random numbers."""
     return {
         name: float(
-            even.reference.overall(even.distances(point[None], WEIGHED, stage="weighed")[0]).mean()
+            even.reference.overall(even.distances(point[None], 20, stage="weighed")[0]).mean()
         )
         for name, point in answers.items()
     }

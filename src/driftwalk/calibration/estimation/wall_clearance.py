@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 import numpy.typing as npt
 
@@ -12,11 +10,6 @@ from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.motion import MotionModel, ParticleModel
 
 Floats = npt.NDArray[np.float64]
-
-NEAREST: Final = 0.01
-"""Share of the samples that are looked at: a few of the nearest may be mistakes."""
-NOISY: Final = 4.0
-"""Samples within so many standard deviations of the noise from the nearest are at the wall."""
 
 
 def contact_distance(from_wall: Floats, noise: float) -> float:
@@ -41,9 +34,11 @@ def contact_distance(from_wall: Floats, noise: float) -> float:
     """
     from scipy.stats import norm
 
-    nearest = float(np.quantile(from_wall, NEAREST))
-    at_wall = float(np.mean(from_wall < nearest + NOISY * noise))
-    deep = -float(norm.ppf(min(NEAREST / max(at_wall, NEAREST), 0.5)))
+    # A few of the nearest samples may be tracking errors: the nearest 1 % are not trusted.
+    nearest_share = 0.01
+    nearest = float(np.quantile(from_wall, nearest_share))
+    at_wall = float(np.mean(from_wall < nearest + 4.0 * noise))
+    deep = -float(norm.ppf(min(nearest_share / max(at_wall, nearest_share), 0.5)))
     return max(nearest + noise * deep, 0.0)
 
 

@@ -25,8 +25,6 @@ Tell = Callable[[int, int], None]
 RESOLUTION: Final = 2.0**-20
 """Settings are multiples of this part of a range: the last bits of linear algebra, which differ
 between machines, then rarely reach a simulation."""
-APART: Final = 0.15
-"""Two starts are at least so far from each other, in parts of the ranges (root mean square)."""
 
 
 @dataclass(frozen=True)
@@ -160,7 +158,8 @@ class _Search:
         """Return the best settings of the design that are not close to each other."""
         chosen: list[Floats] = []
         for index in np.argsort(scores, kind="stable"):
-            near = [np.sqrt(np.mean((design[index] - one) ** 2)) < APART for one in chosen]
+            # Closer starts would end in the same valley.
+            near = [np.sqrt(np.mean((design[index] - one) ** 2)) < 0.15 for one in chosen]
             if not any(near):
                 chosen.append(design[index])
             if len(chosen) == self.budget.starts:

@@ -41,15 +41,29 @@ from driftwalk.comparison.statistic import distances_among
 from driftwalk.core.processors import map_in_threads
 from driftwalk.sweep import Store, WorkUnit, grid, run_sweep
 
-SURFACE_INTERVALS: Final[dict[int, int]] = {1: 32, 2: 10}
-"""Intervals along each axis of the stored surface, by the number of parameters."""
-LEAST_BANDWIDTH_STEPS: Final = 1.5
-KEPT: Final = 1.5
-"""Places less than this many floors above the minimum are kept of the stored surface."""
-SURFACE_REPLICATES = 4
-"""Simulations of every setting of the stored surface; a recording meets one of them."""
-RECORDINGS_PER_UNIT = 10
-FLOOR_REFERENCES = 8
+
+class BootstrapPolicy(NamedTuple):
+    """The stored surface on which bootstrap recordings are estimated.
+
+    Sizes are a compromise of time and noise, chosen by hand. The coverage of the region is
+    counted by `studies/coverage`.
+    """
+
+    surface_intervals: tuple[int, int] = (32, 10)
+    """Intervals along an axis, with one and with two parameters."""
+    least_bandwidth_steps: float = 1.5
+    """Least bandwidth in steps: a quadratic needs three settings along each axis."""
+    retained_floors: float = 1.5
+    """Height above the minimum, in floors, below which places are retained."""
+    surface_replicates: int = 4
+    """Simulations of every setting; a recording meets one of them, in turn."""
+    recordings_per_unit: int = 10
+    """Recordings of a work unit; all of a unit meet the same replicate."""
+    floor_references: int = 8
+    """Recordings whose distances to the others give the noise floor."""
+
+
+BOOTSTRAP: Final = BootstrapPolicy()
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +90,7 @@ class StoredSurface:
 
         It is infinite where nothing is kept.
         """
-        met = _replicate(self.replicates, self.apart.size, replicate % SURFACE_REPLICATES)
+        met = _replicate(self.replicates, self.apart.size, replicate % BOOTSTRAP.surface_replicates)
         distance = self.statistic.matrix(recordings, met, threads=self.threads)
         score = (distance - 0.5 * self.apart) @ self.matrix.T
         surface = np.full((len(distance), *self.kept.shape), np.inf)
@@ -101,12 +115,12 @@ def build_surface(problem: Problem, refined: Refined) -> StoredSurface:
     """
     from scipy.ndimage import binary_dilation
 
-    intervals = SURFACE_INTERVALS[len(refined.map.axes)]
+    intervals = BOOTSTRAP.surface_intervals[len(refined.map.axes) - 1]
     axes = tuple(
         np.linspace(axis[0], axis[-1], min(intervals + 1, axis.size)) for axis in refined.map.axes
     )
     bandwidth = [
-        max(width, LEAST_BANDWIDTH_STEPS * float(np.ptp(axis)) / max(axis.size - 1, 1))
+        max(width, BOOTSTRAP.least_bandwidth_steps * float(np.ptp(axis)) / max(axis.size - 1, 1))
         for axis, width in zip(axes, refined.bandwidth, strict=True)
     ]
     lattice = lattice_of(axes)
@@ -115,18 +129,18 @@ def build_surface(problem: Problem, refined: Refined) -> StoredSurface:
         for values in (refined.landscape.height, refined.landscape.floor)
     )
     # Settings around them, too: a quadratic needs three along each axis, however narrow the valley.
-    low = at_settings(height) <= KEPT
+    low = at_settings(height) <= BOOTSTRAP.retained_floors
     low[nearest_point(axes, refined.landscape.optimum.point)] = True
     simulated = binary_dilation(low, structure=np.ones((3,) * low.ndim, dtype=np.bool_))
     smoother = make_smoother(axes, bandwidth=bandwidth, weights=simulated.astype(float))
     # Weights add up to 1 wherever there are settings to say what the surface is.
     supported = smoother.matrix.sum(axis=1).reshape(height.shape) > 0.99
-    kept = (height <= KEPT) & supported
+    kept = (height <= BOOTSTRAP.retained_floors) & supported
     cells = np.flatnonzero(simulated)
     settings = [values.ravel()[cells] for values in np.meshgrid(*axes, indexing="ij")]
     replicates = simulated_steps(
         problem,
-        [np.tile(values, SURFACE_REPLICATES) for values in settings],
+        [np.tile(values, BOOTSTRAP.surface_replicates) for values in settings],
         stage="surface",
         replicates=1,
     )
@@ -261,9 +275,9 @@ def run_bootstrap(
     alone = surface if executor is None else replace(surface, threads=1)
     truth = nearest_point(surface.axes, optimum.point)
     function = _Estimates(recordings, alone, names, truth, floor)
-    units = grid(recording=np.arange(count)).units(RECORDINGS_PER_UNIT)
+    units = grid(recording=np.arange(count)).units(BOOTSTRAP.recordings_per_unit)
     estimates = run_sweep(function, units, store=store, executor=executor, progress=progress)
-    few = min(FLOOR_REFERENCES, count // 2)
+    few = min(BOOTSTRAP.floor_references, count // 2)
     among = problem.statistic.matrix(
         recordings.rows(slice(0, few)),
         recordings.rows(slice(few, count)),
@@ -293,7 +307,7 @@ class _Estimates:
 
     def __call__(self, unit: WorkUnit) -> dict[str, npt.NDArray[Any]]:
         rows = self.recordings.rows(slice(unit.start, unit.stop))
-        found = self.surface.reliefs(rows, unit.start // RECORDINGS_PER_UNIT)
+        found = self.surface.reliefs(rows, unit.start // BOOTSTRAP.recordings_per_unit)
         columns = np.array([lowest_point(self.surface.axes, one) for one in found]).T
         return {
             **dict(zip(self.names, columns, strict=True)),

@@ -15,7 +15,7 @@ its height above the minimum is counted in floors.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -30,9 +30,6 @@ from driftwalk.calibration.grid.surface import (
 )
 
 Floats = npt.NDArray[np.float64]
-
-LEAST_FLOOR: Final = 0.2
-"""Smallest floor of a setting, as a share of the median: its smooth surface stays above 0."""
 
 
 class Landscape(NamedTuple):
@@ -83,7 +80,8 @@ def landscape_of(found: Map, bandwidth: Sequence[float]) -> Landscape:
 
 def smooth_floor(smoother: Smoother, apart: Floats) -> Floats:
     """Return the floor of every point of the lattice, from the floors of the settings."""
-    least = LEAST_FLOOR * float(np.median(apart)) or np.finfo(np.float64).tiny
+    # Kept away from 0, so that heights in floors stay finite.
+    least = 0.2 * float(np.median(apart)) or np.finfo(np.float64).tiny
     return np.asarray(np.clip(smoother.surface(apart.ravel()), least, None))
 
 

@@ -20,9 +20,6 @@ from driftwalk.sweep import Design, Store, WorkUnit, grid, run_sweep, settings_p
 Progress = Callable[[int, int], None]
 Integers = npt.NDArray[np.int64]
 
-WORLDS_TOGETHER: Final = 64
-"""Worlds of a work unit at least: fewer leave lanes empty, and each then takes longer."""
-
 
 class Map(NamedTuple):
     """Distances over a grid of settings."""
@@ -305,7 +302,8 @@ def _spread(values: npt.NDArray[Any], cells: Integers, design: Design) -> npt.ND
 def _per_unit(problem: Problem, cells: Integers, replicates: int) -> int:
     """Return how many settings make a work unit: by their worlds, as long as the recording."""
     time_steps = problem.duration / problem.study.time_step_s
-    together = max(WORLDS_TOGETHER // replicates, 1)
+    # Fewer than 64 worlds leave lanes empty, and each then takes longer.
+    together = max(64 // replicates, 1)
     return settings_per_unit(cells.size, replicates * time_steps, multiple=together)
 
 

@@ -1,7 +1,7 @@
 """The refined map: windows that close in on the valley until they resolve it.
 
 A window is a grid of the same few nodes, whatever its extent. The settings that the recording does
-not exclude, those less than `PLAUSIBLE` floors above the minimum, say where the next window lies:
+not exclude, those less than 1.25 floors above the minimum, say where the next window lies:
 smaller where they fill a small part of this one, wider or moved where they reach its end. So the
 last one has steps that suit the valley along each axis, and a bandwidth narrow against it.
 """
@@ -23,30 +23,42 @@ from driftwalk.calibration.problem import Axes, Floats
 Box = tuple[tuple[float, float], ...]
 """Both ends along each parameter, in its coordinate."""
 
-LOCATING: Final[dict[int, int]] = {1: 24, 2: 12}
-"""Intervals along an axis of a window that locates the valley, by the number of parameters."""
-MOST: Final[dict[int, int]] = {1: 96, 2: 18}
-"""Intervals along an axis of the refined map, at most."""
-ABOUT: Final = 1.3
-"""A step may be larger than it should be by this factor."""
-MOST_WINDOWS: Final = 6
-"""Windows that locate the valley, at most."""
-LOCATING_REPLICATES: Final = 2
-BANDWIDTH_STEPS: Final = 2.0
-"""Bandwidth of the surface in steps, at least."""
-BANDWIDTH_SHARE: Final = 0.125
-"""Bandwidth of the surface as a share of the window."""
-PLAUSIBLE: Final = 1.25
-"""Settings less than this many floors above the minimum are plausible."""
-PADDING: Final = 0.2
-"""A window goes beyond the plausible settings by this share of their extent on each side."""
-SMALLER: Final = 0.6
-"""A window is replaced by one that is smaller by this factor along an axis, or more."""
-BEATEN: Final = 1e-3
-"""Share of maps in which chance alone makes a setting nearer than the optimum."""
-RACED: Final = 0.8
-"""Settings less than this many floors above the minimum get all replicates."""
-NICE: Final = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
+
+class RefinementPolicy(NamedTuple):
+    """How windows close in on the minimum of the energy score.
+
+    Chosen by hand on slow, regular orbits, where the valley is narrow. The coverage of the 90 %
+    regions that follow is counted by `studies/coverage`.
+    """
+
+    locating_intervals: tuple[int, int] = (24, 12)
+    """Intervals along an axis of a locating window, with one and with two parameters."""
+    most_intervals: tuple[int, int] = (96, 18)
+    """Most intervals along an axis of the refined map. Its time grows with their product."""
+    step_tolerance: float = 1.3
+    """A step may exceed the wanted one by this factor before a window is mapped again."""
+    most_windows: int = 6
+    """Most locating windows: a bound on the time."""
+    locating_replicates: int = 2
+    """Fewest replicates from which the floor of a setting can be measured."""
+    bandwidth_steps: float = 2.0
+    """Least bandwidth of the surface, in steps. Wider ones shift the minimum to the flatter
+    side."""
+    bandwidth_share: float = 0.125
+    """Least bandwidth of the surface, as a share of the window."""
+    plausible_floors: float = 1.25
+    """Height above the minimum, in floors, below which a setting is plausible."""
+    padding: float = 0.2
+    """A window exceeds the plausible settings by this share of their extent on each side."""
+    smaller: float = 0.6
+    """A window is replaced by one at most this share of its extent along an axis."""
+    false_alarm_rate: float = 1e-3
+    """Share of maps in which chance alone makes a setting better than the optimum."""
+    retained_floors: float = 0.8
+    """Height above the minimum, in floors, below which settings get all replicates."""
+
+
+REFINEMENT: Final = RefinementPolicy()
 
 
 class Maps(Protocol):
@@ -111,9 +123,10 @@ def locate(maps: Maps, window: Box, limits: Box) -> Refined:
         become better.
     """
     seen = set()
-    for _ in range(MOST_WINDOWS):
-        axes = window_axes(window, limits, [LOCATING[len(window)]] * len(window))
-        found = refined(maps.full(axes, LOCATING_REPLICATES), window, limits)
+    for _ in range(REFINEMENT.most_windows):
+        intervals = REFINEMENT.locating_intervals[len(window) - 1]
+        axes = window_axes(window, limits, [intervals] * len(window))
+        found = refined(maps.full(axes, REFINEMENT.locating_replicates), window, limits)
         seen.add(window)
         following = next_window(found, limits)
         if following in seen:
@@ -125,7 +138,10 @@ def locate(maps: Maps, window: Box, limits: Box) -> Refined:
 def refined(found: Map, window: Box, limits: Box) -> Refined:
     """Return a map with its surface and the extent of its plausible settings."""
     widths = tuple(
-        max(BANDWIDTH_STEPS * _step(axis), BANDWIDTH_SHARE * float(np.ptp(axis)))
+        max(
+            REFINEMENT.bandwidth_steps * _step(axis),
+            REFINEMENT.bandwidth_share * float(np.ptp(axis)),
+        )
         for axis in found.axes
     )
     landscape = landscape_of(found, widths)
@@ -139,7 +155,7 @@ def _plausible(landscape: Landscape, limits: Box) -> Box:
     """
     from scipy.ndimage import label
 
-    labels, _ = label(landscape.height <= PLAUSIBLE)
+    labels, _ = label(landscape.height <= REFINEMENT.plausible_floors)
     lowest = np.unravel_index(int(np.argmin(landscape.height)), landscape.height.shape)
     inside = np.argwhere(labels == labels[lowest])
     box = []
@@ -160,12 +176,13 @@ def beating_cell(found: Map, landscape: Landscape) -> tuple[int, ...] | None:
 
     Half of the smooth floor is taken off the distance of each. Chance is the scatter of the
     replicates of the plausible settings; among all settings of a map without such a setting, one
-    is found in a share `BEATEN` of maps.
+    is found in one of 1000 maps.
     """
     # Not scipy.stats, whose import takes half a second.
     from scipy.special import ndtri
 
-    plausible = (at_settings(landscape.height) <= PLAUSIBLE) & (found.replicates > 1)
+    height = at_settings(landscape.height)
+    plausible = (height <= REFINEMENT.plausible_floors) & (found.replicates > 1)
     if not plausible.any():
         return None
     error = found.standard_error[plausible] * np.sqrt(found.replicates[plausible])
@@ -174,7 +191,7 @@ def beating_cell(found: Map, landscape: Landscape) -> tuple[int, ...] | None:
     lowest = landscape.optimum.distance - 0.5 * landscape.floor_at_optimum
     better = (lowest - score) * np.sqrt(found.replicates)
     best = np.unravel_index(int(np.argmax(better)), better.shape)
-    if better[best] <= -spread * ndtri(BEATEN / better.size):
+    if better[best] <= -spread * ndtri(REFINEMENT.false_alarm_rate / better.size):
         return None
     return tuple(int(index) for index in best)
 
@@ -191,10 +208,10 @@ def next_window(found: Refined, limits: Box) -> Box:
         step, extent = _step(axis), float(np.ptp(axis))
         cut = math.isinf(low), math.isinf(high)
         first, last = (axis[0] if cut[0] else low), (axis[-1] if cut[1] else high)
-        pad = max(PADDING * (last - first), step)
+        pad = max(REFINEMENT.padding * (last - first), step)
         first = max(first - (max(pad, 0.5 * extent) if cut[0] else pad), ends[0])
         last = min(last + (max(pad, 0.5 * extent) if cut[1] else pad), ends[1])
-        if not any(cut) and last - first > SMALLER * extent:
+        if not any(cut) and last - first > REFINEMENT.smaller * extent:
             following.append(window)
         else:
             following.append((float(first), float(last)))
@@ -245,7 +262,8 @@ def round_step(step: float) -> float:
     0.015
     """
     power = 10.0 ** math.floor(math.log10(step) + 1e-9)
-    return max(nice for nice in NICE if nice * power <= step * (1.0 + 1e-9)) * power
+    nice = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
+    return max(one for one in nice if one * power <= step * (1.0 + 1e-9)) * power
 
 
 def refine(
@@ -271,20 +289,20 @@ def refine(
     if finer is not None:
         window = padded(located, limits)
         axes = window_axes(window, limits, finer)
-        found = refined(maps.full(axes, LOCATING_REPLICATES), window, limits)
-    low = at_settings(found.landscape.height) <= RACED
+        found = refined(maps.full(axes, REFINEMENT.locating_replicates), window, limits)
+    low = at_settings(found.landscape.height) <= REFINEMENT.retained_floors
     return refined(maps.more(found.map, low, wanted), found.window, limits)
 
 
 def _intervals(located: Refined, steps: Sequence[float]) -> list[float] | None:
     """Return how many intervals each axis should have; None where it has them."""
-    most = MOST[len(steps)]
+    most = REFINEMENT.most_intervals[len(steps) - 1]
     wanted = []
     for axis, step in zip(located.map.axes, steps, strict=True):
         intervals = min(float(np.ptp(axis)) / step, most)
         wanted.append(max(intervals, axis.size - 1))
     enough = all(
-        ABOUT * (axis.size - 1) >= intervals
+        REFINEMENT.step_tolerance * (axis.size - 1) >= intervals
         for axis, intervals in zip(located.map.axes, wanted, strict=True)
     )
     return None if enough else wanted
@@ -295,7 +313,7 @@ def padded(found: Refined, limits: Box) -> Box:
     box = []
     for axis, (low, high), ends in zip(found.map.axes, found.plausible, limits, strict=True):
         first, last = (axis[at] if math.isinf(end) else end for at, end in ((0, low), (-1, high)))
-        pad = max(PADDING * (last - first), _step(axis))
+        pad = max(REFINEMENT.padding * (last - first), _step(axis))
         box.append((float(max(first - pad, ends[0])), float(min(last + pad, ends[1]))))
     return tuple(box)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -16,9 +15,6 @@ from driftwalk.calibration.problem import Axes, Problem
 from driftwalk.core.run_stages import MORE
 from driftwalk.motion import Details
 from driftwalk.sweep import Store
-
-PARTS: Final = 1000
-"""Of which progress through sweeps is counted."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +90,7 @@ class InTurn:
     Parameters
     ----------
     say : callable
-        Called with how much is done, of `PARTS`.
+        Called with how much is done, of `1000`.
     share_of : callable
         Returns how much of all is done, from the share of each sweep that has begun: `share_of_map`
         or `share_of_windows`.
@@ -117,7 +113,7 @@ class InTurn:
         """Tell how much is done when so many settings of a sweep are."""
         share = self._share_of([*[1.0] * self._finished, done / max(total, 1)])
         self._finished += done >= total
-        self._say(round(PARTS * share), PARTS)
+        self._say(round(1000 * share), 1000)
 
 
 def window_id(window: Axes) -> str:

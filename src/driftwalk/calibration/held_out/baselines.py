@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     from driftwalk.conditions import Conditions
     from driftwalk.motion.protocol import Floats, Keys, Values
     from driftwalk.schema import Parameter
-
-JOINED: Final = 1.5
-"""Steps follow each other where their times are not further apart, in step intervals."""
 
 
 class Walk:
@@ -126,7 +123,8 @@ class HiddenMarkovWalk(Walk):
 
 def runs_of(steps: Aspect, interval: float) -> list[npt.NDArray[np.float64]]:
     """Return the steps as runs in which each follows the one before."""
-    breaks = np.flatnonzero(np.diff(steps.time) > JOINED * interval) + 1
+    # A step is missing between two whose times are more than 1.5 intervals apart.
+    breaks = np.flatnonzero(np.diff(steps.time) > 1.5 * interval) + 1
     return [run for run in np.split(steps.points, breaks) if len(run)]
 
 

@@ -25,8 +25,6 @@ Tell = Callable[[int, int], None]
 
 JUDGED: Final = 20
 """Worlds by which the answer of a search is judged."""
-TRIED: Final = 8
-"""Settings at which a model is tried before it is searched."""
 
 
 class Judged(NamedTuple):
@@ -96,7 +94,8 @@ def require_numbers(objective: AspectObjective) -> None:
     """Refuse a model that loses its numbers wherever it is tried: no search could mend that."""
     from scipy.stats import qmc
 
-    tried = qmc.Sobol(len(objective.ranges), seed=objective.seed).random(TRIED)
+    # Eight settings: a model without numbers at all of them has none where a search would look.
+    tried = qmc.Sobol(len(objective.ranges), seed=objective.seed).random(8)
     seen = objective.simulated(tried, 1, stage="tried")
     if broken_worlds(seen.status).all():
         values = {name: float(column[0]) for name, column in objective.values(tried).items()}

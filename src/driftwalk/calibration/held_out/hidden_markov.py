@@ -15,12 +15,6 @@ import numpy.typing as npt
 
 Floats = npt.NDArray[np.float64]
 
-STATES: Final = 3
-ITERATIONS: Final = 200
-CONVERGED_NATS: Final = 0.01
-"""Gain of a step below which the fit has converged [nat]."""
-LARGEST_CONCENTRATION: Final = 500.0
-LARGEST_SHAPE: Final = 1e4
 LEAST_PROBABILITY: Final = 1e-6
 NEWTON_STEPS: Final = 8
 
@@ -49,7 +43,7 @@ class HiddenWalk(NamedTuple):
         return 4 * states + states * (states - 1)
 
 
-def fit_hidden_walk(runs: Sequence[Floats], *, states: int = STATES) -> HiddenWalk:
+def fit_hidden_walk(runs: Sequence[Floats], *, states: int = 3) -> HiddenWalk:
     """Fit a hidden Markov walk to runs of steps that follow each other.
 
     Parameters
@@ -71,10 +65,10 @@ def fit_hidden_walk(runs: Sequence[Floats], *, states: int = STATES) -> HiddenWa
     steps, there = _side_by_side(runs)
     walk = _first(steps[there], states)
     last = -np.inf
-    for _ in range(ITERATIONS):
+    for _ in range(200):
         state, joint, log_likelihood = _expected(walk, steps, there)
         walk = _most_likely(steps, there, state, joint)._replace(log_likelihood=log_likelihood)
-        if log_likelihood - last < CONVERGED_NATS:
+        if log_likelihood - last < 0.01:
             break
         last = log_likelihood
     return walk
@@ -189,7 +183,7 @@ def _gamma_shape(spread: Floats) -> Floats:
         apart = np.log(shape) - digamma(shape) - spread
         slope = 1.0 / shape - polygamma(1, shape)
         shape = np.maximum(shape - apart / slope, 0.5 * shape)
-    return np.asarray(np.clip(shape, 1.0 / LARGEST_SHAPE, LARGEST_SHAPE))
+    return np.asarray(np.clip(shape, 1.0 / 1e4, 1e4))
 
 
 def _concentration(resultant: Floats) -> Floats:
@@ -203,4 +197,4 @@ def _concentration(resultant: Floats) -> Floats:
         ratio = i1e(kappa) / i0e(kappa)
         slope = np.maximum(1.0 - ratio**2 - ratio / kappa, 1e-12)
         kappa = np.clip(kappa - (ratio - resultant) / slope, 0.1 * kappa, 10.0 * kappa)
-    return np.asarray(np.clip(kappa, 1e-6, LARGEST_CONCENTRATION))
+    return np.asarray(np.clip(kappa, 1e-6, 500.0))

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar, Final
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -28,15 +28,6 @@ Tell = Callable[[int, int, str], None]
 Finished = Callable[[str, float, float, int], None]
 """Hears of a model that was judged: its name, its score, the standard error of that, and how many
 models there are."""
-
-USUAL_PART: Final = 4
-"""Searches by summaries simulate a quarter of what they may: most are given up after a few rounds,
-or find their end soon."""
-USUALLY_ASKED: Final = 3
-"""Models whose summaries are usually asked,"""
-SUMMARY_WORK: Final = 3.0
-"""each setting of which takes as long as so many of the first stage (5 minutes of the bundled
-recording): all blocks of time are simulated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,8 +124,11 @@ class Stages:
         """How far all stages are together."""
         able = [one for one in self.work.entries if one.ranges and not one.baseline]
         asks = self.worlds > 1 and len(able) > 1
-        usual = sorted(map(self._usual, able))[-USUALLY_ASKED:] if asks else []
-        parts = {"models": sum(self.work.costs()), "summaries": SUMMARY_WORK * sum(usual)}
+        # Three models are usually matched.
+        usual = sorted(map(self._usual, able))[-3:] if asks else []
+        # A setting takes three times as long as one of the first stage (5 minutes of the bundled
+        # recording): all blocks of time are simulated.
+        parts = {"models": sum(self.work.costs()), "summaries": 3.0 * sum(usual)}
         return Course(self.tell, {**parts, "figures": 0.0})
 
     def _each_once(self, units: Sequence[WorkUnit], kept: Store) -> Callable[[int, int], None]:
@@ -228,7 +222,8 @@ class Stages:
 
     def _usual(self, entry: Contestant) -> int:
         """Return how many settings the summaries of a model usually need."""
-        return most_settings(len(entry.ranges), self.worlds) // USUAL_PART
+        # Most searches are given up after a few rounds, or find their optimum soon.
+        return most_settings(len(entry.ranges), self.worlds) // 4
 
 
 def _packed(judged: Judged, most: int, searches: int) -> dict[str, np.ndarray]:

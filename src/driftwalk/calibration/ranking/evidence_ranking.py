@@ -10,14 +10,31 @@ import numpy as np
 from driftwalk.calibration.held_out.candidates import Contestant
 from driftwalk.calibration.held_out.held_out_score import Judged, without_error
 
-ASKED_SIGMAS: Final = 4.0
-"""Models tie that are behind the closest one by less than so many standard errors. There are ten
-held-out blocks: their errors are known to a quarter, and of six models one is far off."""
-MOST_ASKED: Final = 5
-RIVAL: Final = 10.0
-"""Models whose -2 log of the evidence differs by less count as equally likely. A misfit of about a
-hundred has an error of some 5, for the covariance comes from simulations."""
-USUAL_QUANTILE: Final = 0.99
+
+class EvidencePolicy(NamedTuple):
+    """Which models are compared by their evidence, and when one is ahead."""
+
+    tied_sigmas: float = 4.0
+    """Models tie within this many standard errors. With ten blocks, errors are known to a quarter,
+    and one of six models is far off."""
+    most_models: int = 5
+    """Most models that are matched: a bound on the time."""
+    rival: float = 10.0
+    """Difference of deviance below which models are equally likely: a discrepancy of a hundred has
+    an error of some 5, from the simulated covariance."""
+    typical_quantile: float = 0.99
+    """One recording of the model itself in a hundred is called unlike it."""
+    hopeless: float = 3.0
+    """Discrepancy per summary above which a search is given up. The true model has 0.7 to 1.2;
+    wrong ones would take three times as long."""
+    starts: int = 2
+    """Starts: from the regression, and from the answer of the distances."""
+    blur: float = 1e-3
+    """Noise added to simulated summaries. At a wall without camera noise some vary by less, and a
+    micrometre of clearance would count as another motion."""
+
+
+EVIDENCE: Final = EvidencePolicy()
 
 
 class Summarised(NamedTuple):
@@ -70,11 +87,13 @@ def asked_models(entries: Sequence[Contestant], judged: Sequence[Judged]) -> Ask
 
     def ties(k: int) -> bool:
         error = without_error(judged[k].without - closest.without)
-        return judged[k].score - closest.score <= ASKED_SIGMAS * error
+        return judged[k].score - closest.score <= EVIDENCE.tied_sigmas * error
 
     tied = [k for k in able if ties(k)]
     behind = [k for k in able if not ties(k)]
-    return Asked(tuple([*tied, *behind][:MOST_ASKED]), min(len(tied), MOST_ASKED))
+    return Asked(
+        tuple([*tied, *behind][: EVIDENCE.most_models]), min(len(tied), EVIDENCE.most_models)
+    )
 
 
 def naming(entries: Sequence[Contestant], said: Mapping[int, Summarised]) -> Naming:
@@ -87,7 +106,7 @@ def naming(entries: Sequence[Contestant], said: Mapping[int, Summarised]) -> Nam
     if not usual:
         return Naming(None, ())
     least = min(said[k].unlikely for k in usual)
-    left = [k for k in usual if said[k].unlikely < least + RIVAL]
+    left = [k for k in usual if said[k].unlikely < least + EVIDENCE.rival]
     named = min(left, key=lambda k: (entries[k].numbers, said[k].unlikely))
     return Naming(named, tuple(k for k in left if k != named))
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.calibration.estimation.determined import DETERMINED
 from driftwalk.calibration.held_out.candidates import Contestant
 from driftwalk.calibration.held_out.checks import CHECKS, UNITS
 from driftwalk.calibration.held_out.held_out_score import JUDGED, Judged, without_error
@@ -19,7 +20,7 @@ from driftwalk.calibration.ranking.evidence_ranking import (
     said_of,
     tie_sentence,
 )
-from driftwalk.calibration.ranking.verdict import Verdict, verdict_of
+from driftwalk.calibration.ranking.verdict import VERDICT, Verdict, verdict_of
 from driftwalk.calibration.stationarity import Steadiness, steadiness_of_steps
 from driftwalk.comparison import KsReference
 from driftwalk.comparison.aspects import points_distance
@@ -33,11 +34,6 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 Floats = npt.NDArray[np.float64]
-
-TIED_SIGMAS: Final = 2.0
-"""Models tie where the difference of their scores is below so many standard errors."""
-AT_THE_END: Final = 0.01
-"""A value is at the end of its range within this part of it."""
 
 
 def build_comparison(
@@ -66,7 +62,7 @@ def build_comparison(
             motion,
             baseline=entry.baseline,
             clearly_behind=names[0]
-            if behind[k] > TIED_SIGMAS * behind_std[k] and k != answer.named
+            if behind[k] > VERDICT.tied_sigmas * behind_std[k] and k != answer.named
             else None,
             unlike=None if answer.named is None or k not in asked else said_of(asked[k]),
         )
@@ -78,7 +74,7 @@ def build_comparison(
         for k, one in enumerate(judged)
         if k > closest
         and one.score - judged[closest].score
-        < TIED_SIGMAS * without_error(one.without - judged[closest].without)
+        < VERDICT.tied_sigmas * without_error(one.without - judged[closest].without)
     ]
     units, values = _estimates(entries, judged)
     steady = _steadiness(motion)
@@ -184,7 +180,7 @@ def _edge_warnings(entries: Sequence[Contestant], judged: Sequence[Judged]) -> l
         at_end = [
             parameter.name
             for parameter, share in zip(entry.ranges, one.point, strict=True)
-            if min(share, 1.0 - share) < AT_THE_END
+            if min(share, 1.0 - share) < DETERMINED.range_end
         ]
         if at_end:
             found.append(

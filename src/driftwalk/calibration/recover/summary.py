@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.calibration.estimation.determined import SMALL_PART
+from driftwalk.calibration.estimation.determined import DETERMINED
 
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
@@ -49,7 +49,9 @@ def relative_errors(
                 error[:, index] = np.log(found / value)
         else:
             low, high = ranges[:, index].T
-            error[:, index] = (found - value) / np.maximum(abs(value), SMALL_PART * (high - low))
+            error[:, index] = (found - value) / np.maximum(
+                abs(value), DETERMINED.small_part * (high - low)
+            )
     return error
 
 

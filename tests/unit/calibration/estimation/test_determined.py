@@ -43,7 +43,7 @@ def test_a_value_near_zero_counts_as_a_twentieth_of_the_range(middle):
 @pytest.mark.parametrize("excess", [-0.002, 0.002])
 def test_a_parameter_is_determined_up_to_a_part_of_its_value(scale, excess):
     """Draws whose 90 % interval ends a little less or more than that part from the middle."""
-    wanted = DETERMINED + excess
+    wanted = DETERMINED.most_half_width + excess
     if scale == "log":
         parameter, half = LOG, wanted / math.log(100.0)
     else:

@@ -9,8 +9,7 @@ import pytest
 from scipy.stats import chi2
 
 from driftwalk.calibration.estimation.estimate import (
-    HOPELESS,
-    MATCHES,
+    MATCHING,
     Matched,
     match_summaries,
     most_simulations,
@@ -97,7 +96,7 @@ def test_a_recording_of_the_model_is_matched_by_its_summaries_alone():
     np.testing.assert_allclose(found.draws.std(axis=0), std, rtol=0.25)
     assert found.usual_misfit == pytest.approx(chi2(4).median(), abs=1.1)
     assert found.most_misfit == pytest.approx(chi2(4).ppf(0.95), abs=4.0)
-    assert found.misfit < MATCHES * SPREAD.size
+    assert found.misfit < MATCHING.matches * SPREAD.size
 
 
 def test_what_the_model_cannot_give_widens_the_draws():
@@ -106,7 +105,7 @@ def test_what_the_model_cannot_give_widens_the_draws():
     found = matched(Toy(bent, 2, off=10.0), starts)
     assert starts.calls == 1
     assert not found.usual
-    assert MATCHES * SPREAD.size < found.misfit < HOPELESS * SPREAD.size
+    assert MATCHING.matches * SPREAD.size < found.misfit < MATCHING.hopeless * SPREAD.size
     assert found.stretch == pytest.approx(np.sqrt(found.misfit / found.usual_misfit))
     assert found.stretch > 2.0
     assert found.unlike
@@ -125,7 +124,7 @@ def test_another_start_is_no_use_for_another_model():
     starts = Starts((0.4, 0.6))
     found = matched(Toy(bent, 3, off=300.0), starts)
     assert starts.calls == 0
-    assert found.misfit > HOPELESS * SPREAD.size
+    assert found.misfit > MATCHING.hopeless * SPREAD.size
     assert not found.usual
     assert ((found.draws >= 0.0) & (found.draws <= 1.0)).all()
 

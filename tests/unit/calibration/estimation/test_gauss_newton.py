@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 
 from driftwalk.calibration.estimation.gauss_newton import (
-    FEWEST_ROUNDS,
-    MOST_ROUNDS,
-    WIDEST,
+    GAUSS_NEWTON,
     Descended,
     descend,
     drawn_settings,
@@ -43,7 +41,7 @@ class Recorder:
 
 
 def from_start(
-    truth: list[float], start: list[float], seed: int, *, width: float = WIDEST
+    truth: list[float], start: list[float], seed: int, *, width: float = GAUSS_NEWTON.widest
 ) -> tuple[Descended, Recorder]:
     simulate = Recorder(valley, seed)
     recorded = valley(np.array([truth]))[0]
@@ -65,7 +63,7 @@ def test_the_end_of_a_bent_valley_is_reached(
     apart = (found.solved.setting - truth) / found.solved.std
     assert np.abs(apart).max() < 1.0
     assert found.solved.misfit < found.emulator.summaries
-    assert found.rounds == len(simulate.asked) <= MOST_ROUNDS
+    assert found.rounds == len(simulate.asked) <= GAUSS_NEWTON.most_rounds
 
 
 @pytest.mark.parametrize("truth", [(0.0, 0.8), (1.0, 0.8), (0.5, 0.2), (1.4, 0.9)])
@@ -100,7 +98,7 @@ def test_a_model_far_from_the_recording_still_ends():
     simulate = Recorder(valley, 6)
     recorded = np.array([0.0, 0.5, 5.0, -3.0])
     found = descend(simulate, recorded, np.array([0.5, 0.5]), np.full(2, 0.1), seed=6)
-    assert found.rounds <= MOST_ROUNDS
+    assert found.rounds <= GAUSS_NEWTON.most_rounds
     assert np.isfinite(found.solved.setting).all()
     assert found.solved.misfit > 100.0
 
@@ -114,7 +112,7 @@ def test_a_search_that_stays_far_from_the_recording_is_given_up_early():
         for recorded in (far, near)
         for give_up in (np.inf, 3.0)
     ]
-    assert rounds[0] > rounds[1] == FEWEST_ROUNDS
+    assert rounds[0] > rounds[1] == GAUSS_NEWTON.fewest_rounds
     assert rounds[2] == rounds[3]
 
 

@@ -12,7 +12,7 @@ import pytest
 from driftwalk.calibration.estimation.emulator import fit_emulator
 from driftwalk.calibration.estimation.gauss_newton import Descended, drawn_settings
 from driftwalk.calibration.estimation.modes import Modes, find_modes
-from driftwalk.calibration.estimation.posterior import DRAWS, Posterior, sample_posterior
+from driftwalk.calibration.estimation.posterior import POSTERIOR, Posterior, sample_posterior
 
 SPREAD = np.array([0.006, 0.01, 0.05])
 TRUTH = np.array([0.7, 0.4])
@@ -65,7 +65,7 @@ def test_both_places_have_their_shares(steep: float):
     first_is_below = modes.places[0].draws[:, 0].mean() < 0.5
     above = modes.weights[int(first_is_below)]
     draws = modes.mixed([one.draws for one in modes.places])
-    assert draws.shape == (DRAWS, 2)
+    assert draws.shape == (POSTERIOR.size, 2)
     assert np.mean(draws[:, 0] > 0.5) == pytest.approx(share_above(steep), abs=0.12)
     assert above == pytest.approx(share_above(steep), abs=0.12)
 

@@ -15,7 +15,7 @@ from scipy.stats import truncnorm
 
 from driftwalk.calibration.estimation.emulator import fit_emulator
 from driftwalk.calibration.estimation.gauss_newton import drawn_settings, rounded
-from driftwalk.calibration.estimation.posterior import DRAWS, Posterior, sample_posterior
+from driftwalk.calibration.estimation.posterior import POSTERIOR, Posterior, sample_posterior
 
 SLOPES = np.array([[1.0, 0.3], [0.2, 1.0], [0.5, 0.5], [0.4, -0.3]])
 SPREAD = np.array([0.02, 0.04, 0.03, 0.05])
@@ -72,7 +72,7 @@ def test_mean_and_covariance_are_those_of_a_normal_posterior(fresh_seed: Callabl
         truth = rng.uniform(0.35, 0.65, 2)
         recorded = np.array([truth @ SLOPES.T + SPREAD * rng.normal(size=4)] * 2)
         found = sampled(recorded, seed).posterior
-        assert found.draws.shape == (DRAWS, 2)
+        assert found.draws.shape == (POSTERIOR.size, 2)
         mean = centre_of(recorded[0])
         apart.append((found.draws.mean(axis=0) - mean) / STD)
         spreads.append(np.log(found.draws.std(axis=0) / STD))

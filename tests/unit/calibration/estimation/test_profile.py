@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from driftwalk.calibration.estimation.emulator import LocalEmulator
-from driftwalk.calibration.estimation.profile import POINTS, SPAN, misfit_profiles
+from driftwalk.calibration.estimation.profile import misfit_profiles
 
 CENTRE, WIDTH = np.array([0.4, 0.6]), np.array([0.1, 0.05])
 REACH = 1.25
@@ -27,8 +27,8 @@ def test_profiles_are_parabolas_of_the_standard_error():
     solved = emulator.solve(summaries, reach=REACH)
     std = WIDTH * np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))
     found = misfit_profiles(emulator, summaries, solved, std, reach=REACH)
-    assert found.place.shape == found.rise.shape == (2, POINTS)
-    np.testing.assert_allclose(found.place[:, -1] - solved.setting, SPAN * std, rtol=1e-9)
+    assert found.place.shape == found.rise.shape == (2, 21)
+    np.testing.assert_allclose(found.place[:, -1] - solved.setting, 3.0 * std, rtol=1e-9)
     steps = (found.place - solved.setting[:, None]) / std[:, None]
     # The solver stops within 1e-8 of the misfit, and a held value may move by 1e-9 of the box.
     np.testing.assert_allclose(found.rise, steps**2, atol=1e-5)

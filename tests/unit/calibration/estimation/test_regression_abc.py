@@ -7,12 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from driftwalk.calibration.estimation.regression_abc import (
-    LOST,
-    MOST_ROUNDS,
-    SIMULATIONS,
-    approach,
-)
+from driftwalk.calibration.estimation.regression_abc import REGRESSION, approach
 from driftwalk.core.errors import InputError
 
 Simulate = Callable[[np.ndarray], np.ndarray]
@@ -106,9 +101,9 @@ def test_settings_are_simulated_in_order_and_in_the_cube():
         return model(settings)
 
     approach(simulate, alike(np.array([[0.02, 0.97, 1.0]]))[0], 3, order=ordered, seed=5)
-    assert 1 < len(seen) <= MOST_ROUNDS
+    assert 1 < len(seen) <= REGRESSION.most_rounds
     for settings in seen:
-        assert settings.shape == (SIMULATIONS, 3)
+        assert settings.shape == (REGRESSION.simulations, 3)
         assert (settings[:, 0] <= settings[:, 1]).all()
         assert settings.min() >= 0.0
         assert settings.max() <= 1.0
@@ -129,7 +124,7 @@ def test_summaries_that_say_nothing_find_nothing():
     box = approach(simulate, np.zeros(80), 4, order=as_they_are, seed=6)
     assert not box.found
     # A uniform number has an error of 0.29, and a regression on noise no smaller one than LOST.
-    assert (box.error > LOST).all()
+    assert (box.error > REGRESSION.lost).all()
     assert len(rounds) == 2
 
 
@@ -151,7 +146,7 @@ def test_one_parameter_that_says_nothing_does_not_hide_the_others():
     box = approach(simulate, simulate(truth)[0], 4, order=as_they_are, seed=7)
     assert box.found
     assert (np.abs(box.centre - truth[0]) < 5 * box.error)[:3].all()
-    assert box.error[3] > LOST > box.error[:3].max()
+    assert box.error[3] > REGRESSION.lost > box.error[:3].max()
 
 
 def test_a_summary_far_from_all_simulations_is_bounded():

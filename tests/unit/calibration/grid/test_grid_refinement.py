@@ -10,7 +10,7 @@ import pytest
 from driftwalk.calibration.grid.energy_score import landscape_of
 from driftwalk.calibration.grid.grid_map import Map, full_map
 from driftwalk.calibration.grid.grid_refinement import (
-    MOST,
+    REFINEMENT,
     beating_cell,
     first_window,
     locate,
@@ -91,7 +91,7 @@ def test_a_valley_across_both_axes_is_resolved():
 def test_a_wide_valley_costs_no_more_settings_than_a_narrow_one():
     maps = Painted((0.8, 1e-3), (0.4, 4e-4))
     found = calibrated(maps)
-    assert max(axis.size for axis in found.map.axes) <= 1.4 * MOST[2] + 2
+    assert max(axis.size for axis in found.map.axes) <= 1.4 * REFINEMENT.most_intervals[1] + 2
     assert found.landscape.optimum.point == pytest.approx((0.8, 1e-3), rel=0.15)
 
 

@@ -209,11 +209,12 @@ def test_a_users_own_model_that_fails_is_not_waited_for(recorded: xr.Dataset) ->
 @pytest.fixture
 def asked(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let every model be asked, and simulate little for it."""
-    monkeypatch.setattr(evidence_ranking, "ASKED_SIGMAS", 1e6)
-    monkeypatch.setattr(regression_abc, "SIMULATIONS", 64)
-    monkeypatch.setattr(regression_abc, "MOST_ROUNDS", 2)
-    monkeypatch.setattr(gauss_newton, "FEWEST_SIMULATIONS", (128, 128))
-    monkeypatch.setattr(gauss_newton, "MOST_ROUNDS", 2)
+    every = evidence_ranking.EVIDENCE._replace(tied_sigmas=1e6)
+    monkeypatch.setattr(evidence_ranking, "EVIDENCE", every)
+    wide = regression_abc.REGRESSION._replace(simulations=64, most_rounds=2)
+    monkeypatch.setattr(regression_abc, "REGRESSION", wide)
+    narrow = gauss_newton.GAUSS_NEWTON._replace(fewest_simulations=(128, 128), most_rounds=2)
+    monkeypatch.setattr(gauss_newton, "GAUSS_NEWTON", narrow)
     monkeypatch.setattr(synthetic_likelihood, "SIMULATIONS", 256)
 
 

@@ -11,9 +11,7 @@ import pytest
 from driftwalk.calibration.held_out.candidates import Contestant
 from driftwalk.calibration.held_out.held_out_score import Judged, without_error
 from driftwalk.calibration.ranking.evidence_ranking import (
-    ASKED_SIGMAS,
-    MOST_ASKED,
-    RIVAL,
+    EVIDENCE,
     Asked,
     Naming,
     Summarised,
@@ -48,7 +46,7 @@ def test_the_error_of_a_score_is_the_jackknife_s() -> None:
 
 def test_models_about_as_close_as_the_closest_are_asked_in_any_case() -> None:
     # Differences between the two signs have twice the error.
-    near, far = (1.0 + 2 * ERROR * (ASKED_SIGMAS + off) for off in (-0.1, 0.1))
+    near, far = (1.0 + 2 * ERROR * (EVIDENCE.tied_sigmas + off) for off in (-0.1, 0.1))
     scores = [judged(far, sign=-1.0), judged(1.0), judged(near, sign=-1.0)]
     assert asked_models([entry(3)] * 3, scores) == Asked((1, 2, 0), 2)
 
@@ -71,8 +69,8 @@ def test_walks_are_never_asked_even_where_they_are_the_closest() -> None:
 
 def test_no_more_than_a_handful_are_asked() -> None:
     scores = [judged(1.0 + 0.001 * k, sign=-1.0 if k else 1.0) for k in reversed(range(9))]
-    assert asked_models([entry(3)] * 9, scores) == Asked((8, 7, 6, 5, 4), MOST_ASKED)
-    assert MOST_ASKED == 5
+    assert asked_models([entry(3)] * 9, scores) == Asked((8, 7, 6, 5, 4), EVIDENCE.most_models)
+    assert EVIDENCE.most_models == 5
 
 
 def said(misfit: float, unlikely: float) -> Summarised:
@@ -87,12 +85,12 @@ def test_a_model_that_gives_the_summaries_is_named_before_a_likelier_that_does_n
 
 
 def test_of_those_that_give_them_the_likeliest_is_named() -> None:
-    found = naming(ENTRIES, {k: said(120.0, -400.0 - 2 * RIVAL * k) for k in range(3)})
+    found = naming(ENTRIES, {k: said(120.0, -400.0 - 2 * EVIDENCE.rival * k) for k in range(3)})
     assert found == Naming(2, ())
 
 
 def test_of_those_that_are_not_told_apart_the_one_with_the_fewest_numbers_is_named() -> None:
-    found = naming(ENTRIES, {k: said(120.0, -400.0 - 0.4 * RIVAL * k) for k in range(3)})
+    found = naming(ENTRIES, {k: said(120.0, -400.0 - 0.4 * EVIDENCE.rival * k) for k in range(3)})
     assert found == Naming(1, (0, 2))
 
 
