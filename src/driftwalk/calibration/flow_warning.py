@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from driftwalk.calibration.goodness_of_fit import Quality
+from driftwalk.calibration.goodness_of_fit import GoodnessOfFit
 from driftwalk.motion import BlockModel, MotionModel
 
 
-def own_flow_warning(model: MotionModel, quality: Quality | None) -> str | None:
+def own_flow_warning(model: MotionModel, quality: GoodnessOfFit | None) -> str | None:
     """Return what to do where a block is not explained in a flow from its own recording.
 
     Such a flow is too slow where the block seldom was, and its inward part near the wall is half of

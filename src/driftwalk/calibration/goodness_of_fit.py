@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from driftwalk.calibration.grid.bootstrap_region import Bootstrap, recordings_at, simulated_steps
 from driftwalk.calibration.grid.grid_map import Map, Progress, run_map
-from driftwalk.calibration.grid.grid_refinement import first_window, locate
-from driftwalk.calibration.grid.map_stores import Mapper
+from driftwalk.calibration.grid.grid_refinement import first_window, locate_minimum
+from driftwalk.calibration.grid.map_stores import MapSimulator
 from driftwalk.calibration.problem import Problem, limits_of
 from driftwalk.comparison.statistic import distances_among
 from driftwalk.schema.answers.calibration_facts import is_explained
@@ -28,7 +28,7 @@ def noise_floor_at(problem: Problem, point: Sequence[float]) -> float:
     return float(np.median(among))
 
 
-class Quality(NamedTuple):
+class GoodnessOfFit(NamedTuple):
     """Distance at the optimum against what chance alone gives."""
 
     distance: float
@@ -50,10 +50,10 @@ class Quality(NamedTuple):
         return is_explained(self.distance, self.floor, self.floor_upper, FAR_ABOVE_FLOOR)
 
 
-def quality_of_fit(bootstrap: Bootstrap) -> Quality:
+def goodness_of_fit(bootstrap: Bootstrap) -> GoodnessOfFit:
     """Return the quality of fit from the recordings that the bootstrap simulated."""
     to_recording = bootstrap.to_recording
-    return Quality(
+    return GoodnessOfFit(
         float(to_recording.mean()),
         float(to_recording.std(ddof=1) / np.sqrt(to_recording.size)),
         float(np.median(bootstrap.to_each_other)),
@@ -112,8 +112,8 @@ def validate_on_halves(
     )
     lowest = map_of_half.point(map_of_half.cell_of_minimum())
     window = first_window(map_of_half, noise_floor_at(first, lowest))
-    maps = Mapper(first, "first_half_refined", executor=executor, progress=progress)
-    optimum = locate(maps, window, limits_of(first)).landscape.optimum
+    maps = MapSimulator(first, "first_half_refined", executor=executor, progress=progress)
+    optimum = locate_minimum(maps, window, limits_of(first)).energy_score.optimum
     recordings, distances = recordings_at(second, optimum, stage="second_half", count=16)
     among = distances_among(second.statistic, recordings, threads=second.like.threads)
     return Halves(optimum.point, float(distances.mean()), float(np.median(among)))

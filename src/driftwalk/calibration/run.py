@@ -13,10 +13,10 @@ from driftwalk.calibration.estimation import Stores, Tell, calibrate_many
 from driftwalk.calibration.flow_warning import own_flow_warning
 from driftwalk.calibration.goodness_of_fit import (
     FAR_ABOVE_FLOOR,
+    GoodnessOfFit,
     Halves,
-    Quality,
+    goodness_of_fit,
     noise_floor_at,
-    quality_of_fit,
     validate_on_halves,
 )
 from driftwalk.calibration.grid.bootstrap_region import (
@@ -26,27 +26,31 @@ from driftwalk.calibration.grid.bootstrap_region import (
     confidence_region,
     run_bootstrap,
 )
-from driftwalk.calibration.grid.boundary_warnings import End, interval_warnings, optimum_warnings
+from driftwalk.calibration.grid.boundary_warnings import (
+    Boundary,
+    interval_warnings,
+    optimum_warnings,
+)
 from driftwalk.calibration.grid.grid_map import Map, Progress
 from driftwalk.calibration.grid.grid_refinement import (
-    Refined,
-    beating_cell,
+    RefinedMap,
+    better_cell,
     first_window,
-    locate,
+    locate_minimum,
     refine,
 )
-from driftwalk.calibration.grid.map_stores import InTurn, Mapper, window_id
+from driftwalk.calibration.grid.map_stores import MapSimulator, SweepProgress, window_id
 from driftwalk.calibration.grid.surface import Optimum, at_settings
 from driftwalk.calibration.problem import Problem, limits_of, prepare_problem
 from driftwalk.calibration.refuse import MOST_PARAMETERS, require_samples, require_searchable
 from driftwalk.calibration.result import (
-    Found,
+    CalibrationParts,
     answer_facts,
     build_calibration,
     estimate_facts,
     interval_facts,
 )
-from driftwalk.calibration.stationarity import Steadiness, steadiness_of
+from driftwalk.calibration.stationarity import Stationarity, stationarity_of
 from driftwalk.calibration.wall import wall_warning
 from driftwalk.comparison import Statistic, StepDistance
 from driftwalk.conditions import (
@@ -57,7 +61,7 @@ from driftwalk.conditions import (
     study_in_arena,
     unstated_warning,
 )
-from driftwalk.core.background_task import aside
+from driftwalk.core.background_task import run_in_background
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.run_stages import share_of_map, share_of_windows, tell_nobody
 from driftwalk.motion import BlockModel, Details, MotionModel, ParticleModel
@@ -203,8 +207,8 @@ def calibrate(
     in_tank = is_block or isinstance(searched, ParticleModel)
     unstated = unstated_warning(chosen, about="block" if is_block else "tank") if in_tank else None
     of_wall = wall_warning(track, chosen) if is_block else None
-    steadiness = steadiness_of(problem)
-    of_time = None if steadiness is None else steadiness.warning
+    stationarity = stationarity_of(problem)
+    of_time = None if stationarity is None else stationarity.warning
     of_flow = own_flow_warning(searched, result.quality) if flow is None else None
     result.warnings += jump_warnings(recording, body, track=track)
     said = (unstated, of_flow, of_wall, of_time)
@@ -213,7 +217,7 @@ def calibrate(
     result.warnings += series_warnings(problem.like.flow, duration=duration)
 
     def finish(halves: Halves | None) -> xr.Dataset:
-        return _finish(result, halves, steadiness, recording, problem)
+        return _finish(result, halves, stationarity, recording, problem)
 
     def compare_halves(progress: Progress | None = None) -> Halves | None:
         return _halves(track, problem, result.coarse, flow_of, executor, progress)
@@ -223,10 +227,10 @@ def calibrate(
     else:
         say("validation", 0, 1)
         if meanwhile is not None and _is_left_to_threads(problem, executor):
-            halves = aside(compare_halves, partial(meanwhile, finish(None)))
+            halves = run_in_background(compare_halves, partial(meanwhile, finish(None)))
             meanwhile = None
         else:
-            halves = compare_halves(InTurn(partial(say, "validation"), share_of_windows))
+            halves = compare_halves(SweepProgress(partial(say, "validation"), share_of_windows))
         say("validation", 1, 1)
     found = finish(halves)
     if meanwhile is not None:
@@ -288,7 +292,7 @@ class _Calibration:
         self.problem = problem
         self.warnings: list[str] = []
         self.bootstrap: Bootstrap | None = None
-        self.quality: Quality | None = None
+        self.quality: GoodnessOfFit | None = None
         self.region: Region | None = None
         self._keep = keep
         self._executor = executor
@@ -302,7 +306,7 @@ class _Calibration:
         self._require_numbers()
         cell = self.coarse.cell_of_minimum()
         self.optimum = Optimum(self.coarse.point(cell), float(self.coarse.mean[cell]))
-        self.refined: Refined | None = None
+        self.refined: RefinedMap | None = None
         if search.refine == "auto":
             self._refine(search.refined_replicates)
         at_ends = optimum_warnings(self.problem.parameters, self.coarse.axes, self.optimum.point)
@@ -314,7 +318,7 @@ class _Calibration:
     def _coarse_map(self, replicates: int) -> Map:
         """Return the coarse map: one replicate of every setting, all where the optimum could be."""
         axes = tuple(np.array(one.coordinates) for one in self.problem.parameters)
-        progress = InTurn(self._progress("coarse"), share_of_map)
+        progress = SweepProgress(self._progress("coarse"), share_of_map)
         maps = self._maps("coarse", "all", progress, apart=False)
         once = maps.full(axes, 1)
         self.floor = noise_floor_at(self.problem, once.point(once.cell_of_minimum()))
@@ -334,8 +338,10 @@ class _Calibration:
     def _progress(self, stage: str) -> Progress:
         return partial(self._say, stage)
 
-    def _maps(self, stage: str, details: Details, progress: Progress, *, apart: bool) -> Mapper:
-        return Mapper(
+    def _maps(
+        self, stage: str, details: Details, progress: Progress, *, apart: bool
+    ) -> MapSimulator:
+        return MapSimulator(
             self.problem,
             stage,
             details=details,
@@ -347,12 +353,12 @@ class _Calibration:
 
     def _refine(self, wanted: int) -> None:
         limits = limits_of(self.problem)
-        narrowing = InTurn(self._progress("refined"), share_of_windows)
+        narrowing = SweepProgress(self._progress("refined"), share_of_windows)
         maps = self._maps("refined", "none", narrowing, apart=True)
-        located = locate(maps, first_window(self.coarse, self.floor), limits)
+        located = locate_minimum(maps, first_window(self.coarse, self.floor), limits)
         self.refined = refine(maps, located, limits, self._steps, wanted)
-        self.optimum = self.refined.landscape.optimum
-        cell = beating_cell(self.refined.map, self.refined.landscape)
+        self.optimum = self.refined.energy_score.optimum
+        cell = better_cell(self.refined.map, self.refined.energy_score)
         if cell is not None:
             self.warnings.append(self._unresolved(self.refined.map.point(cell)))
 
@@ -368,9 +374,9 @@ class _Calibration:
             "wider than stated"
         )
 
-    def _bootstrap(self, refined: Refined, count: int, known: Container[End]) -> None:
+    def _bootstrap(self, refined: RefinedMap, count: int, known: Container[Boundary]) -> None:
         surface = build_surface(self.problem, refined)
-        landscape = refined.landscape
+        energy_score = refined.energy_score
         fingerprint = {
             "optimum": [*self.optimum.point, self.optimum.distance],
             "axes": [axis.tolist() for axis in surface.axes],
@@ -381,17 +387,17 @@ class _Calibration:
             self.problem,
             self.optimum,
             surface,
-            floor=landscape.floor_at_optimum,
+            floor=energy_score.floor_at_optimum,
             count=count,
             store=self._keep(f"bootstrap-{window_id(refined.map.axes)}", fingerprint),
             executor=self._executor,
             progress=self._progress("bootstrap"),
         )
-        self.quality = quality_of_fit(self.bootstrap)
+        self.quality = goodness_of_fit(self.bootstrap)
         self.floor = self.quality.floor
         self.region = confidence_region(
-            landscape.smoother,
-            landscape.surface,
+            energy_score.smoother,
+            energy_score.surface,
             self.bootstrap,
             confidence=self.problem.study.calibration.confidence,
             stretch=self.quality.stretch,
@@ -452,7 +458,7 @@ def _halves(
 def _finish(
     found: _Calibration,
     halves: Halves | None,
-    steadiness: Steadiness | None,
+    stationarity: Stationarity | None,
     recording: xr.Dataset,
     problem: Problem,
 ) -> xr.Dataset:
@@ -474,18 +480,18 @@ def _finish(
         facts |= estimate_facts(problem, halves.point, "first_half_")
         facts["second_half_ks_distance"] = halves.distance
         facts["second_half_noise_floor"] = halves.floor
-    if steadiness is not None:
-        facts["halves_ks_distance"] = steadiness.distance
-        facts["halves_ks_distance_expected"] = steadiness.expected
-        facts["halves_p_value"] = steadiness.p_value
+    if stationarity is not None:
+        facts["halves_ks_distance"] = stationarity.distance
+        facts["halves_ks_distance_expected"] = stationarity.expected
+        facts["halves_p_value"] = stationarity.p_value
     refined, surface = None, None
     if found.refined is not None:
-        refined, surface = found.refined.map, at_settings(found.refined.landscape.surface)
-    pieces = Found(found.coarse, refined, surface, found.bootstrap, found.region)
+        refined, surface = found.refined.map, at_settings(found.refined.energy_score.surface)
+    pieces = CalibrationParts(found.coarse, refined, surface, found.bootstrap, found.region)
     return build_calibration(problem, pieces, facts)
 
 
-def _quality_facts(quality: Quality, region: Region, problem: Problem) -> dict[str, Any]:
+def _quality_facts(quality: GoodnessOfFit, region: Region, problem: Problem) -> dict[str, Any]:
     """Return what only a bootstrap tells: how sure the answer is, and how good."""
     return {
         **interval_facts(problem, region),

@@ -33,7 +33,7 @@ class StationarityPolicy(NamedTuple):
 STATIONARITY: Final = StationarityPolicy()
 
 
-class Steadiness(NamedTuple):
+class Stationarity(NamedTuple):
     """How far the two halves of a recording are from each other."""
 
     distance: float
@@ -55,22 +55,22 @@ class Steadiness(NamedTuple):
         )
 
 
-def steadiness_of(problem: Problem) -> Steadiness | None:
+def stationarity_of(problem: Problem) -> Stationarity | None:
     """Compare the halves of a recording with each other, by the statistic of its calibration.
 
-    See `steadiness_of_steps`.
+    See `stationarity_of_steps`.
     """
 
     def distance(first: Floats, second: Floats) -> float:
         tables = [replace(problem.reference, steps=half).table for half in (first, second)]
         return float(problem.statistic.matrix(*tables)[0, 0])
 
-    return steadiness_of_steps(problem.steps, distance)
+    return stationarity_of_steps(problem.steps, distance)
 
 
-def steadiness_of_steps(
+def stationarity_of_steps(
     steps: Floats, distance: Callable[[Floats, Floats], float]
-) -> Steadiness | None:
+) -> Stationarity | None:
     """Compare the halves of a series of steps with each other.
 
     The steps, in their order in time, are cut into 20 parts of equal numbers. Ten of them drawn at
@@ -101,4 +101,4 @@ def steadiness_of_steps(
         permutations=STATIONARITY.permutations,
         seed=STATIONARITY.seed,
     )
-    return Steadiness(distance(first, second), drawn.noise_floor, drawn.p_value)
+    return Stationarity(distance(first, second), drawn.noise_floor, drawn.p_value)

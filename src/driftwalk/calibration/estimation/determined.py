@@ -41,13 +41,13 @@ class Determination(NamedTuple):
 
 
 def determination(
-    draws: Floats, ranges: Sequence[Parameter], *, confidence: float
+    sample: Floats, ranges: Sequence[Parameter], *, confidence: float
 ) -> Determination:
     """Return the intervals of parameters, and which of them are determined.
 
     Parameters
     ----------
-    draws : ndarray, shape (draws, parameters)
+    sample : ndarray, shape (draws, parameters)
         Settings in the unit cube that could have given the recording.
     ranges : sequence of Parameter
         The parameters with the ranges of the search.
@@ -62,7 +62,7 @@ def determination(
     ([[0.096, 0.104]], [True])
     """
     intervals, widths = [], []
-    for column, one in zip(draws.T, ranges, strict=True):
+    for column, one in zip(sample.T, ranges, strict=True):
         tail = 0.5 * (1.0 - confidence)
         intervals.append(one.value_at(np.quantile(column, [tail, 1.0 - tail])))
         widths.append(_half_width(column, one))

@@ -25,14 +25,14 @@ CONSTANT: Final = 1e-9
 """A summary that varies by less than this part of its size says nothing."""
 
 
-class Solved(NamedTuple):
+class Solution(NamedTuple):
     """The setting that fits summaries best."""
 
     setting: Floats
     """In the unit cube, shape (parameters,)."""
     place: Floats
     """The same in the box: 0 is its centre, 1 its end."""
-    misfit: float
+    discrepancy: float
     """Sum of the squares of what is left, in standard deviations."""
     std: Floats
     """Standard deviations by the curvature there, in parts of the ranges."""
@@ -95,8 +95,8 @@ class LocalEmulator:
     def log_variance(self) -> float:
         """Logarithm of the determinant of the covariance of what is left of the summaries.
 
-        Misfits count in standard deviations, which differ from one emulator to another. With this
-        added, two of them compare: it is -2 log of the likelihood, but for a constant.
+        Discrepancies count in standard deviations, which differ from one emulator to another. With
+        this added, two of them compare: it is -2 log of the likelihood, but for a constant.
         """
         return -2.0 * float(np.linalg.slogdet(self.whitening)[1])
 
@@ -104,7 +104,7 @@ class LocalEmulator:
         """Return summaries as they are compared."""
         return np.asarray(self.whitening @ summaries[self.used])
 
-    def misfits(self, settings: Floats, summaries: Floats) -> Floats:
+    def discrepancies(self, settings: Floats, summaries: Floats) -> Floats:
         """Return how far summaries are from those expected at each setting, shape (settings,)."""
         place = (settings - self.centre) / self.width
         left = _basis(place, self.form) @ self.coefficients.T - self.whitened(summaries)
@@ -117,7 +117,7 @@ class LocalEmulator:
         reach: float,
         start: Floats | None = None,
         held: tuple[int, float] | None = None,
-    ) -> Solved:
+    ) -> Solution:
         """Return the setting that fits summaries best.
 
         Parameters
@@ -163,10 +163,10 @@ class LocalEmulator:
         # A box as wide as its standard deviation keeps the inverse finite.
         slopes = slope(found.x)
         curvature = slopes.T @ slopes + np.eye(begin.size)
-        return Solved(
+        return Solution(
             setting=self.centre + found.x * self.width,
             place=found.x,
-            misfit=2.0 * float(found.cost),
+            discrepancy=2.0 * float(found.cost),
             std=np.sqrt(np.diag(np.linalg.inv(curvature))) * self.width,
             log_volume=2.0 * float(np.log(self.width).sum())
             - float(np.linalg.slogdet(curvature)[1]),

@@ -1,4 +1,4 @@
-"""From a start to the setting of least misfit, box by box."""
+"""From a start to the setting of least discrepancy, box by box."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Final, NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.calibration.estimation.emulator import LocalEmulator, Solved, fit_emulator
+from driftwalk.calibration.estimation.emulator import LocalEmulator, Solution, fit_emulator
 from driftwalk.calibration.evolution.search import RESOLUTION
 
 Floats = npt.NDArray[np.float64]
@@ -60,20 +60,20 @@ class Simulate(Protocol):
         """Return summaries of the first parts of a recording, shape (n, parts, summaries)."""
 
 
-class Descended(NamedTuple):
+class LocalOptimum(NamedTuple):
     """Where a search has ended."""
 
     emulator: LocalEmulator
-    solved: Solved
+    solution: Solution
     rounds: int
 
     @property
-    def unlikely(self) -> float:
+    def deviance(self) -> float:
         """-2 log of the likelihood, but for a constant: ends of other searches compare by it."""
-        return self.solved.misfit + self.emulator.log_variance
+        return self.solution.discrepancy + self.emulator.log_variance
 
 
-def descend(
+def minimise_discrepancy(
     simulate: Simulate,
     recorded: Floats,
     start: Floats,
@@ -81,13 +81,13 @@ def descend(
     *,
     seed: int,
     give_up: float = np.inf,
-) -> Descended:
+) -> LocalOptimum:
     """Go from a start to the setting that fits the summaries of a recording best.
 
     Every round draws settings from a box, simulates them, and solves for the recording by the
     emulator that they give (Gauss and Newton's way, with derivatives from a regression). The next
     box lies about the solution, a few standard deviations wide; where the model is far from the
-    recording the deviations are enlarged by the misfit.
+    recording the deviations are enlarged by the discrepancy.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def descend(
     seed : int
         Of the settings that are drawn.
     give_up : float
-        Misfit, in summaries, that the search has to reach in three rounds, or it ends.
+        Discrepancy, in summaries, that the search has to reach in three rounds, or it ends.
     """
     policy = GAUSS_NEWTON
     centre, width = start, np.clip(width, policy.narrowest, policy.widest)
@@ -110,28 +110,28 @@ def descend(
         settings = drawn_settings(centre, width, count, seed + number)
         summaries = simulate(settings, parts=1)[:, 0]
         emulator = fit_emulator(settings, summaries, centre=centre, width=width)
-        solved = emulator.solve(recorded, reach=policy.reach)
-        misfit = solved.misfit / max(emulator.summaries, 1)
-        least = min(least, misfit)
-        excess = np.sqrt(max(1.0, misfit))
-        far = np.abs(solved.place).max()
-        wanted = np.clip(policy.wide_stds * excess * solved.std, policy.narrowest, policy.widest)
+        solution = emulator.solve(recorded, reach=policy.reach)
+        discrepancy = solution.discrepancy / max(emulator.summaries, 1)
+        least = min(least, discrepancy)
+        excess = np.sqrt(max(1.0, discrepancy))
+        far = np.abs(solution.place).max()
+        wanted = np.clip(policy.wide_stds * excess * solution.std, policy.narrowest, policy.widest)
         following = np.clip(wanted, policy.shrinks[int(far > 1.0)] * width, policy.grows * width)
         settled = bool(
             number + 1 >= policy.fewest_rounds
             and far < policy.inside
             and (following >= policy.settled * width).all()
             and (wanted <= policy.grows * width).all()
-            and solved.misfit < policy.typical * emulator.summaries
+            and solution.discrepancy < policy.typical * emulator.summaries
         )
-        # A quadratic that holds badly leaves much, and then a large misfit looks small.
-        unlikely = solved.misfit + emulator.log_variance
-        lowest, since = min(lowest, unlikely), 0 if unlikely < lowest else since + 1
+        # A quadratic that holds badly leaves much, and then a large discrepancy looks small.
+        deviance = solution.discrepancy + emulator.log_variance
+        lowest, since = min(lowest, deviance), 0 if deviance < lowest else since + 1
         hopeless = number + 1 >= policy.fewest_rounds and least > give_up
         if settled or hopeless or since == policy.most_in_vain:
             break
-        centre, width = rounded(np.clip(solved.setting, 0.0, 1.0)), rounded(following)
-    return Descended(emulator, solved, number + 1)
+        centre, width = rounded(np.clip(solution.setting, 0.0, 1.0)), rounded(following)
+    return LocalOptimum(emulator, solution, number + 1)
 
 
 def simulations_of(parameters: int) -> tuple[int, int]:

@@ -1,10 +1,10 @@
 """Settings that could have given a recording: draws by the synthetic likelihood in a region.
 
 Summaries are close to normal about their expected values, so a setting's likelihood falls with its
-misfit: exp(-misfit / 2) (Wood, Nature 466 (2010) 1102). Within the region of an emulator that costs
-nothing to evaluate, and a Markov chain of many walkers samples it, with an even prior over the
-ranges on their scales (emcee; Foreman-Mackey et al., Publ. Astron. Soc. Pac. 125 (2013) 306).
-Simulations follow the draws: the next ones fill a region about them, until the draws stay.
+discrepancy: exp(-discrepancy / 2) (Wood, Nature 466 (2010) 1102). Within the region of an emulator
+that costs nothing to evaluate, and a Markov chain of many walkers samples it, with an even prior
+over the ranges on their scales (emcee; Foreman-Mackey et al., Publ. Astron. Soc. Pac. 125 (2013)
+306). Simulations follow the draws: the next ones fill a region about them, until the draws stay.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.calibration.estimation.emulator import LocalEmulator, Solved, fit_emulator
+from driftwalk.calibration.estimation.emulator import LocalEmulator, Solution, fit_emulator
 from driftwalk.calibration.estimation.gauss_newton import Simulate, simulations_of
 from driftwalk.calibration.estimation.region import REGION, Region, region_about
 
@@ -56,22 +56,22 @@ POSTERIOR: Final = PosteriorPolicy()
 class Posterior(NamedTuple):
     """Settings that could have given a recording."""
 
-    draws: Floats
+    sample: Floats
     """Settings in the unit cube, shape (512, parameters)."""
     emulator: LocalEmulator
     """Of the last region,"""
     region: Region
     """and that region."""
-    solved: Solved
-    """The setting of least misfit in it."""
-    others: tuple[Solved, ...]
+    solution: Solution
+    """The setting of least discrepancy in it."""
+    others: tuple[Solution, ...]
     """Those for the other parts of the recording."""
     moved: Floats
     """How far the last round moved the mean of the draws, in their standard deviations."""
 
 
 def sample_posterior(
-    simulate: Simulate, recorded: Floats, emulator: LocalEmulator, solved: Solved, *, seed: int
+    simulate: Simulate, recorded: Floats, emulator: LocalEmulator, solution: Solution, *, seed: int
 ) -> Posterior:
     """Return settings that could have given a recording.
 
@@ -82,16 +82,16 @@ def sample_posterior(
     recorded : ndarray, shape (parts, summaries)
         Of the whole recording, then of parts of it.
     emulator : LocalEmulator
-        About the setting of least misfit.
-    solved : Solved
+        About the setting of least discrepancy.
+    solution : Solved
         That setting.
     seed : int
         Of the settings and of the chain.
     """
     count = emulator.centre.size
     half = simulations_of(count)[1] // 2
-    draws = _chain(emulator, None, recorded[0], solved, seed)
-    region = region_about(draws)
+    sample = _chain(emulator, None, recorded[0], solution, seed)
+    region = region_about(sample)
     known, seen = np.empty((0, count)), np.empty((0, *recorded.shape))
     for number in range(POSTERIOR.most_rounds):
         settings = region.filled(half, seed + number)
@@ -104,19 +104,19 @@ def sample_posterior(
             for part in range(len(recorded))
         ]
         emulator = emulators[0]
-        solved, *others = (
+        solution, *others = (
             one.solve(part, reach=POSTERIOR.reach)
             for one, part in zip(emulators, recorded, strict=True)
         )
-        draws = _chain(emulator, region, recorded[0], solved, seed + number + 1)
-        moved = draws.mean(axis=0) - region.centre
-        std = draws.std(axis=0)
+        sample = _chain(emulator, region, recorded[0], solution, seed + number + 1)
+        moved = sample.mean(axis=0) - region.centre
+        std = sample.std(axis=0)
         enough = np.count_nonzero(near) >= 1.5 * half
         if enough and _stayed(moved, std, region):
             break
         if number < POSTERIOR.most_rounds - 1:
-            region = region_about(draws)
-    return Posterior(draws, emulator, region, solved, tuple(others), moved / std)
+            region = region_about(sample)
+    return Posterior(sample, emulator, region, solution, tuple(others), moved / std)
 
 
 def _stayed(moved: Floats, std: Floats, region: Region) -> bool:
@@ -129,7 +129,7 @@ def _stayed(moved: Floats, std: Floats, region: Region) -> bool:
 
 
 def _chain(
-    emulator: LocalEmulator, region: Region | None, recorded: Floats, solved: Solved, seed: int
+    emulator: LocalEmulator, region: Region | None, recorded: Floats, solution: Solution, seed: int
 ) -> Floats:
     """Return draws by the synthetic likelihood within a region and the ranges."""
     import emcee
@@ -141,12 +141,12 @@ def _chain(
         inside = ((settings >= low) & (settings <= high)).all(axis=1)
         if region is not None:
             inside &= region.distances(settings) <= 1.0
-        return np.where(inside, -0.5 * emulator.misfits(settings, recorded), -np.inf)
+        return np.where(inside, -0.5 * emulator.discrepancies(settings, recorded), -np.inf)
 
     # emcee takes a generator of the older kind, whose seeds have 32 bits.
     random = np.random.RandomState(seed % 2**32)
-    about = solved.setting + POSTERIOR.begin * solved.std * random.standard_normal(
-        (POSTERIOR.walkers, solved.setting.size)
+    about = solution.setting + POSTERIOR.begin * solution.std * random.standard_normal(
+        (POSTERIOR.walkers, solution.setting.size)
     )
     margin = 1e-6 * (high - low)
     about = np.clip(about, low + margin * (1 + random.random(about.shape)), high - margin)
@@ -154,7 +154,7 @@ def _chain(
         pull = np.minimum(1.0, POSTERIOR.inner / np.maximum(region.distances(about), 1e-12))
         about = region.centre + pull[:, None] * (about - region.centre)
     sampler = emcee.EnsembleSampler(
-        POSTERIOR.walkers, solved.setting.size, log_likelihood, vectorize=True
+        POSTERIOR.walkers, solution.setting.size, log_likelihood, vectorize=True
     )
     begin = emcee.State(about, random_state=random.get_state())
     sampler.run_mcmc(begin, POSTERIOR.steps, skip_initial_state_check=True)

@@ -83,19 +83,19 @@ def radius_of(parameters: int) -> float:
     return REGION.spread * float(np.sqrt(parameters + 2.0))
 
 
-def region_about(draws: Floats) -> Region:
+def region_about(sample: Floats) -> Region:
     """Return the region of draws.
 
     Parameters
     ----------
-    draws : ndarray, shape (draws, parameters)
+    sample : ndarray, shape (draws, parameters)
         Settings in the unit cube.
     """
-    parameters = draws.shape[1]
-    covariance = np.atleast_2d(np.cov(draws.T))
+    parameters = sample.shape[1]
+    covariance = np.atleast_2d(np.cov(sample.T))
     covariance += REGION.narrowest**2 * np.eye(parameters)
     most = REGION.widest / radius_of(parameters)
     shrink = np.minimum(1.0, most / np.sqrt(np.diag(covariance)))
     covariance *= np.outer(shrink, shrink)
     root = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
-    return Region(rounded(np.clip(draws.mean(axis=0), 0.0, 1.0)), root)
+    return Region(rounded(np.clip(sample.mean(axis=0), 0.0, 1.0)), root)

@@ -51,7 +51,7 @@ class RegressionPolicy(NamedTuple):
 REGRESSION: Final = RegressionPolicy()
 
 
-class Box(NamedTuple):
+class RegressionEstimate(NamedTuple):
     """Where the parameters lie."""
 
     centre: Floats
@@ -65,9 +65,9 @@ class Box(NamedTuple):
         return bool(np.median(self.error) < REGRESSION.lost)
 
 
-def approach(
+def sequential_regression(
     simulate: Simulate, recorded: Floats, parameters: int, *, order: Order, seed: int
-) -> Box:
+) -> RegressionEstimate:
     """Return the box in which the parameters of a recording lie.
 
     Parameters
@@ -93,28 +93,29 @@ def approach(
     --------
     >>> def simulate(settings):
     ...     return np.column_stack([settings[:, 0] ** 2, settings[:, 0] + settings[:, 1]])
-    >>> box = approach(simulate, np.array([0.25, 1.2]), 2, order=np.asarray, seed=1)
-    >>> box.centre.round(2).tolist()
+    >>> recorded = np.array([0.25, 1.2])
+    >>> found = sequential_regression(simulate, recorded, 2, order=np.asarray, seed=1)
+    >>> found.centre.round(2).tolist()
     [0.5, 0.7]
     """
     from scipy.stats import qmc
 
     low, high = np.zeros(parameters), np.ones(parameters)
-    box = Box(0.5 * (low + high), np.full(parameters, np.sqrt(1.0 / 12.0)))
+    regression = RegressionEstimate(0.5 * (low + high), np.full(parameters, np.sqrt(1.0 / 12.0)))
     for number in range(REGRESSION.most_rounds):
         drawn = qmc.Sobol(parameters, seed=seed + number).random(REGRESSION.simulations)
         settings = order(rounded(low + (high - low) * drawn))
         summaries = simulate(settings)
         _require_change(summaries)
-        before, box = box, _regressed(settings, summaries, recorded)
-        if box.error.max() < REGRESSION.narrow or (number and not box.found):
+        before, regression = regression, _ridge_regression(settings, summaries, recorded)
+        if regression.error.max() < REGRESSION.narrow or (number and not regression.found):
             break
-        if number and (box.error > 0.9 * before.error).all():
+        if number and (regression.error > 0.9 * before.error).all():
             break
-        reach = REGRESSION.wide_errors * box.error
-        low = np.clip(box.centre - reach, 0.0, 1.0 - REGRESSION.narrow)
-        high = np.clip(box.centre + reach, low + 0.2 * REGRESSION.narrow, 1.0)
-    return box
+        reach = REGRESSION.wide_errors * regression.error
+        low = np.clip(regression.centre - reach, 0.0, 1.0 - REGRESSION.narrow)
+        high = np.clip(regression.centre + reach, low + 0.2 * REGRESSION.narrow, 1.0)
+    return regression
 
 
 def _require_change(summaries: Floats) -> None:
@@ -127,7 +128,7 @@ def _require_change(summaries: Floats) -> None:
         )
 
 
-def _regressed(settings: Floats, summaries: Floats, recorded: Floats) -> Box:
+def _ridge_regression(settings: Floats, summaries: Floats, recorded: Floats) -> RegressionEstimate:
     """Return the parameters that a regression on summaries gives a recording, and its errors.
 
     Of several ridges each parameter has that of the smallest error; errors are those of leaving
@@ -158,4 +159,4 @@ def _regressed(settings: Floats, summaries: Floats, recorded: Floats) -> Box:
     best = np.argmin(errors, axis=0)
     each = np.arange(settings.shape[1])
     centre = np.clip(np.array(answers)[best, each], 0.0, 1.0)
-    return Box(centre, np.sqrt(np.array(errors)[best, each]))
+    return RegressionEstimate(centre, np.sqrt(np.array(errors)[best, each]))

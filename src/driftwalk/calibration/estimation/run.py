@@ -17,15 +17,15 @@ from driftwalk.calibration.estimation.estimate import (
     match_summaries,
     most_simulations,
 )
-from driftwalk.calibration.estimation.label_switching import Order, order_of
-from driftwalk.calibration.evolution import AspectObjective, Budget, Found, search_minimum
-from driftwalk.calibration.evolution.kept import KeptScores
-from driftwalk.calibration.held_out.candidates import Contestant
+from driftwalk.calibration.estimation.label_switching import Order, label_order
+from driftwalk.calibration.evolution import AspectObjective, Budget, SearchResult, search_minimum
+from driftwalk.calibration.evolution.kept import CachedObjective
+from driftwalk.calibration.held_out.candidates import Candidate
 from driftwalk.calibration.held_out.held_out_score import (
-    Judged,
+    HeldOutScore,
     even_blocks,
-    judge_setting,
     require_numbers,
+    score_setting,
 )
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.calibration.summaries.simulated import SummaryObjective
@@ -63,7 +63,7 @@ class Estimation:
         Mean of distance over floor in the even blocks of time, of each answer.
     known : Determination or None
         How well the parameters are determined; None where the second stage does not count.
-    judged : Judged
+    held_out : Judged
         The answer for the even blocks, judged on the odd ones.
     """
 
@@ -72,16 +72,16 @@ class Estimation:
     matched: Matched | None
     scores: Mapping[str, float]
     known: Determination | None
-    judged: Judged
+    held_out: HeldOutScore
 
 
 @one_blas_thread()
 def estimate(
-    entry: Contestant,
+    entry: Candidate,
     motion: RecordedMotion,
     *,
     seed: int,
-    worlds: int,
+    replicates: int,
     confidence: float,
     executor: Executor | None = None,
     stores: Stores,
@@ -93,8 +93,8 @@ def estimate(
     matches summaries of the whole recording. Where these are like those of the model's own
     recordings, the search is not needed. Where they are not, both are made, and the answer of the
     summaries counts only if it is as close in the six distances: summaries that a model cannot give
-    at once pull it away from the motion. It determines parameters only if the misfit is not more
-    than four times the usual one: values of another model are no measurement.
+    at once pull it away from the motion. It determines parameters only if the discrepancy is not
+    more than four times the usual one: values of another model are no measurement.
 
     Parameters
     ----------
@@ -104,8 +104,8 @@ def estimate(
         The recording.
     seed : int
         Of the search and of all simulations.
-    worlds : int
-        Recordings of the model by which the misfit of the summaries is judged; 0 leaves the
+    replicates : int
+        Recordings of the model by which the discrepancy of the summaries is judged; 0 leaves the
         summaries out.
     confidence : float
         Of the intervals.
@@ -123,15 +123,15 @@ def estimate(
     """
     even = even_blocks(entry, motion, seed)
     require_numbers(even)
-    order = order_of(entry)
+    order = label_order(entry)
     search = _Search(even, stores, tell)
     matched = (
-        _matched(even, motion, search, order, worlds, executor, stores, tell)
-        if worlds > 1
+        _matched(even, motion, search, order, replicates, executor, stores, tell)
+        if replicates > 1
         else None
     )
     if matched is None or not matched.usual:
-        search.ends()
+        search.optima()
     answers = {
         **({} if search.best is None else {"searched": order(search.best[None])[0]}),
         **({} if matched is None else {"matched": matched.point, "even": matched.even_point}),
@@ -146,7 +146,7 @@ def estimate(
             answers["searched"], scores["searched"] = longer["longer"], score
     known = None
     if matched is not None and counts:
-        known = determination(matched.draws, entry.ranges, confidence=confidence)
+        known = determination(matched.sample, entry.ranges, confidence=confidence)
         open_ones = matched.ambiguous | matched.unsettled | matched.unlike
         known = known._replace(determined=known.determined & ~open_ones)
     # The odd blocks judge the better answer that has not seen them.
@@ -159,7 +159,7 @@ def estimate(
         matched=matched,
         scores=scores,
         known=known,
-        judged=judge_setting(even, motion, answers[best]),
+        held_out=score_setting(even, motion, answers[best]),
     )
 
 
@@ -180,25 +180,25 @@ class _Search:
     def __init__(self, even: AspectObjective, stores: Stores, tell: Tell) -> None:
         self.best: Floats | None = None
         self._even, self._stores, self._tell = even, stores, tell
-        self._ends: Floats | None = None
+        self._optima: Floats | None = None
 
-    def ends(self) -> Floats:
+    def optima(self) -> Floats:
         """Return the ends of the searches, the best first."""
-        if self._ends is None:
+        if self._optima is None:
             found = self._search("search", SEARCH)
             self.best = found.best
-            self._ends = found.settings[np.argsort(found.ends, kind="stable")]
-        return self._ends
+            self._optima = found.settings[np.argsort(found.optimum_scores, kind="stable")]
+        return self._optima
 
     def longer(self) -> Floats:
         """Return the answer of a longer search."""
         return self._search("longer-search", Budget()).best
 
-    def _search(self, stage: str, budget: Budget) -> Found:
+    def _search(self, stage: str, budget: Budget) -> SearchResult:
         count = len(self._even.ranges)
         most = budget.evaluations(count)
         return search_minimum(
-            KeptScores(self._even, self._stores(stage, {"budget": vars(budget)})),
+            CachedObjective(self._even, self._stores(stage, {"budget": vars(budget)})),
             count,
             budget=budget,
             seed=self._even.seed,
@@ -211,7 +211,7 @@ def _matched(
     motion: RecordedMotion,
     search: _Search,
     order: Order,
-    worlds: int,
+    replicates: int,
     executor: Executor | None,
     stores: Stores,
     tell: Tell,
@@ -220,13 +220,13 @@ def _matched(
     objective = SummaryObjective(
         even,
         motion,
-        store=stores("summaries", {"worlds": worlds}),
+        store=stores("summaries", {"worlds": replicates}),
         executor=executor,
         tell=lambda done, most: tell("summaries", done, most),
-        most=most_simulations(count, worlds),
+        most=most_simulations(count, replicates),
     )
     return match_summaries(
-        objective, count, search.ends, order=order, worlds=worlds, seed=even.seed
+        objective, count, search.optima, order=order, replicates=replicates, seed=even.seed
     )
 
 

@@ -42,7 +42,7 @@ def contact_distance(from_wall: Floats, noise: float) -> float:
     return max(nearest + noise * deep, 0.0)
 
 
-def at_the_wall(model: MotionModel, motion: RecordedMotion) -> MotionModel:
+def with_contact_clearance(model: MotionModel, motion: RecordedMotion) -> MotionModel:
     """Return the model with the recording's distance from the wall at contact, if it has no own.
 
     A comparison gives its models the least recorded distance but for one sample in a hundred, and

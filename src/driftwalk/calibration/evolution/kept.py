@@ -11,7 +11,7 @@ from driftwalk.sweep import Store, WorkUnit, run_sweep
 
 
 @dataclass(frozen=True, eq=False)
-class KeptScores:
+class CachedObjective:
     """An objective that computes nothing twice.
 
     A search asks for the same settings in the same order whenever it is run, so a call is known by
@@ -27,8 +27,8 @@ class KeptScores:
     Examples
     --------
     >>> from driftwalk.sweep import MemoryStore
-    >>> kept = KeptScores(lambda settings, first, replicates: settings.sum(axis=1), MemoryStore())
-    >>> kept(np.array([[0.25, 0.5]]), 0, 2).tolist()
+    >>> retained = CachedObjective(lambda settings, *_: settings.sum(axis=1), MemoryStore())
+    >>> retained(np.array([[0.25, 0.5]]), 0, 2).tolist()
     [0.75]
     """
 

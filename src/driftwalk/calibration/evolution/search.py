@@ -61,14 +61,14 @@ class Budget:
         return self.design + generations * population(parameters) + self.starts + 1
 
 
-class Found(NamedTuple):
+class SearchResult(NamedTuple):
     """The answer of a search."""
 
     best: Floats
     """Best setting, in the unit cube."""
     score: float
     """Its mean score, from worlds that the search has not seen."""
-    ends: Floats
+    optimum_scores: Floats
     """Scores at the ends of the short searches and of the long one: how much they differ says how
     far the search is to be trusted."""
     evaluations: int
@@ -95,7 +95,7 @@ def search_minimum(
     budget: Budget | None = None,
     seed: int = 0,
     tell: Tell | None = None,
-) -> Found:
+) -> SearchResult:
     """Search the unit cube for the smallest mean score.
 
     Parameters
@@ -131,22 +131,22 @@ class _Search:
         self.done = 0
         self.most = budget.evaluations(parameters)
 
-    def run(self) -> Found:
+    def run(self) -> SearchResult:
         """Search, and test again."""
         design = self._design()
         scores = self._scores(design, self.budget.replicates)
         starts = self._apart(design, scores)
-        ends = [
+        optima = [
             self._evolve(start, 0.12, self.budget.short, number)
             for number, start in enumerate(starts, 1)
         ]
-        first = self._retest(np.array(ends))
-        long = self._evolve(ends[int(first.argmin())], 0.06, self.budget.long, 0)
+        first = self._retest(np.array(optima))
+        long = self._evolve(optima[int(first.argmin())], 0.06, self.budget.long, 0)
         last = self._retest(long[None])
-        means = np.array([*ends, long])
+        means = np.array([*optima, long])
         found = np.array([*first, *last])
         best = int(found.argmin())
-        return Found(means[best], float(found[best]), found, self.done, means)
+        return SearchResult(means[best], float(found[best]), found, self.done, means)
 
     def _design(self) -> Floats:
         from scipy.stats import qmc

@@ -25,7 +25,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.calibration.grid.grid_map import Progress
-from driftwalk.calibration.grid.grid_refinement import Refined
+from driftwalk.calibration.grid.grid_refinement import RefinedMap
 from driftwalk.calibration.grid.surface import (
     Optimum,
     Smoother,
@@ -72,7 +72,7 @@ class StoredSurface:
 
     axes: Axes
     """Axes of its lattice."""
-    kept: npt.NDArray[np.bool_]
+    retained: npt.NDArray[np.bool_]
     """Points of the lattice where a recording's estimate may lie."""
     matrix: Floats
     """Weights of the settings in the value at each of them, (points, settings)."""
@@ -85,7 +85,7 @@ class StoredSurface:
     statistic: Statistic
     threads: int
 
-    def reliefs(self, recordings: StepTable, replicate: int) -> Floats:
+    def heights_in_floors(self, recordings: StepTable, replicate: int) -> Floats:
         """Return each recording's surface above its minimum, in floors, (recording, *lattice).
 
         It is infinite where nothing is kept.
@@ -93,12 +93,12 @@ class StoredSurface:
         met = _replicate(self.replicates, self.apart.size, replicate % BOOTSTRAP.surface_replicates)
         distance = self.statistic.matrix(recordings, met, threads=self.threads)
         score = (distance - 0.5 * self.apart) @ self.matrix.T
-        surface = np.full((len(distance), *self.kept.shape), np.inf)
-        surface[:, self.kept] = (score - score.min(axis=1, keepdims=True)) / self.floor
+        surface = np.full((len(distance), *self.retained.shape), np.inf)
+        surface[:, self.retained] = (score - score.min(axis=1, keepdims=True)) / self.floor
         return surface
 
 
-def build_surface(problem: Problem, refined: Refined) -> StoredSurface:
+def build_surface(problem: Problem, refined: RefinedMap) -> StoredSurface:
     """Simulate settings of the refined window again, to estimate recordings against them.
 
     Parameters
@@ -125,17 +125,17 @@ def build_surface(problem: Problem, refined: Refined) -> StoredSurface:
     ]
     lattice = lattice_of(axes)
     height, floor = (
-        _between(refined.landscape.smoother.axes, values, lattice)
-        for values in (refined.landscape.height, refined.landscape.floor)
+        _between(refined.energy_score.smoother.axes, values, lattice)
+        for values in (refined.energy_score.height, refined.energy_score.floor)
     )
     # Settings around them, too: a quadratic needs three along each axis, however narrow the valley.
     low = at_settings(height) <= BOOTSTRAP.retained_floors
-    low[nearest_point(axes, refined.landscape.optimum.point)] = True
+    low[nearest_point(axes, refined.energy_score.optimum.point)] = True
     simulated = binary_dilation(low, structure=np.ones((3,) * low.ndim, dtype=np.bool_))
     smoother = make_smoother(axes, bandwidth=bandwidth, weights=simulated.astype(float))
     # Weights add up to 1 wherever there are settings to say what the surface is.
     supported = smoother.matrix.sum(axis=1).reshape(height.shape) > 0.99
-    kept = (height <= BOOTSTRAP.retained_floors) & supported
+    retained = (height <= BOOTSTRAP.retained_floors) & supported
     cells = np.flatnonzero(simulated)
     settings = [values.ravel()[cells] for values in np.meshgrid(*axes, indexing="ij")]
     replicates = simulated_steps(
@@ -146,11 +146,11 @@ def build_surface(problem: Problem, refined: Refined) -> StoredSurface:
     )
     return StoredSurface(
         lattice,
-        kept,
-        smoother.matrix[kept.ravel()][:, cells],
+        retained,
+        smoother.matrix[retained.ravel()][:, cells],
         replicates,
         _apart(problem, replicates, cells.size),
-        floor[kept],
+        floor[retained],
         problem.statistic,
         problem.like.threads,
     )
@@ -307,7 +307,7 @@ class _Estimates:
 
     def __call__(self, unit: WorkUnit) -> dict[str, npt.NDArray[Any]]:
         rows = self.recordings.rows(slice(unit.start, unit.stop))
-        found = self.surface.reliefs(rows, unit.start // BOOTSTRAP.recordings_per_unit)
+        found = self.surface.heights_in_floors(rows, unit.start // BOOTSTRAP.recordings_per_unit)
         columns = np.array([lowest_point(self.surface.axes, one) for one in found]).T
         return {
             **dict(zip(self.names, columns, strict=True)),
@@ -315,10 +315,10 @@ class _Estimates:
         }
 
 
-def _excess(relief: Floats, truth: tuple[int, ...]) -> tuple[float, ...]:
+def _excess(height_in_floors: Floats, truth: tuple[int, ...]) -> tuple[float, ...]:
     """Return how far the truth lies above the minimum: jointly, and along each profile."""
-    profiles = [relief.take(index, axis=axis).min() for axis, index in enumerate(truth)]
-    return tuple(float(value) for value in (relief[truth], *profiles))
+    profiles = [height_in_floors.take(index, axis=axis).min() for axis, index in enumerate(truth)]
+    return tuple(float(value) for value in (height_in_floors[truth], *profiles))
 
 
 class Region(NamedTuple):

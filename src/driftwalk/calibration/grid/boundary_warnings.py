@@ -10,13 +10,13 @@ import numpy as np
 from driftwalk.calibration.problem import Axes, Floats
 from driftwalk.schema import Parameter
 
-End = tuple[int, int]
+Boundary = tuple[int, int]
 """A parameter, and the side of its axis: 0 or -1."""
 
 
 def optimum_warnings(
     parameters: Sequence[Parameter], axes: Axes, optimum: Sequence[float]
-) -> dict[End, str]:
+) -> dict[Boundary, str]:
     """Return a warning for every end of the search at which an optimum lies.
 
     Parameters
@@ -57,7 +57,7 @@ def interval_warnings(
     window: Axes,
     lattice: Axes,
     steps: Sequence[float],
-    known: Container[End] = (),
+    known: Container[Boundary] = (),
 ) -> list[str]:
     """Return a warning for every end of what was searched that cuts an interval off.
 

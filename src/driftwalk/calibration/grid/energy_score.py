@@ -32,7 +32,7 @@ from driftwalk.calibration.grid.surface import (
 Floats = npt.NDArray[np.float64]
 
 
-class Landscape(NamedTuple):
+class EnergyScore(NamedTuple):
     """The smooth surface of a map, on a lattice finer than its grid."""
 
     smoother: Smoother
@@ -55,7 +55,7 @@ class Landscape(NamedTuple):
         return np.asarray((self.surface - self.surface.min()) / self.floor_at_optimum)
 
 
-def landscape_of(found: Map, bandwidth: Sequence[float]) -> Landscape:
+def smooth_energy_score(found: Map, bandwidth: Sequence[float]) -> EnergyScore:
     """Return the smooth surface of a map.
 
     Parameters
@@ -69,11 +69,11 @@ def landscape_of(found: Map, bandwidth: Sequence[float]) -> Landscape:
         found.axes, bandwidth=bandwidth, weights=found.replicates.astype(float)
     )
     floor = smooth_floor(smoother, found.apart)
-    surface = relief(smoother, found.mean, found.apart, floor)
+    surface = height_in_floors(smoother, found.mean, found.apart, floor)
     lowest = np.unravel_index(int(np.argmin(surface)), surface.shape)
     point = lowest_point(smoother.axes, surface)
     distance = float(smoother.surface(found.mean.ravel())[lowest])
-    return Landscape(
+    return EnergyScore(
         smoother, Optimum(point, distance), floor, distance + float(floor[lowest]) * surface
     )
 
@@ -85,7 +85,7 @@ def smooth_floor(smoother: Smoother, apart: Floats) -> Floats:
     return np.asarray(np.clip(smoother.surface(apart.ravel()), least, None))
 
 
-def relief(smoother: Smoother, distance: Floats, apart: Floats, floor: Floats) -> Floats:
+def height_in_floors(smoother: Smoother, distance: Floats, apart: Floats, floor: Floats) -> Floats:
     """Return how far S lies above its minimum, in floors, on the lattice.
 
     Parameters

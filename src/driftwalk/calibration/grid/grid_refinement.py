@@ -15,12 +15,12 @@ from typing import Final, NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.calibration.grid.energy_score import Landscape, landscape_of
+from driftwalk.calibration.grid.energy_score import EnergyScore, smooth_energy_score
 from driftwalk.calibration.grid.grid_map import Map
 from driftwalk.calibration.grid.surface import at_settings
 from driftwalk.calibration.problem import Axes, Floats
 
-Box = tuple[tuple[float, float], ...]
+Window = tuple[tuple[float, float], ...]
 """Both ends along each parameter, in its coordinate."""
 
 
@@ -71,18 +71,18 @@ class Maps(Protocol):
         """Give some settings of a map more replicates."""
 
 
-class Refined(NamedTuple):
+class RefinedMap(NamedTuple):
     """A refined map with its surface."""
 
     map: Map
-    landscape: Landscape
+    energy_score: EnergyScore
     bandwidth: tuple[float, ...]
-    window: Box
-    plausible: Box
+    window: Window
+    plausible: Window
     """Extent of the plausible settings."""
 
 
-def first_window(coarse: Map, margin: float) -> Box:
+def first_window(coarse: Map, margin: float) -> Window:
     """Return the extent of the coarse cells that could hold the optimum, and one around.
 
     Parameters
@@ -104,7 +104,7 @@ def first_window(coarse: Map, margin: float) -> Box:
     )
 
 
-def locate(maps: Maps, window: Box, limits: Box) -> Refined:
+def locate_minimum(maps: Maps, window: Window, limits: Window) -> RefinedMap:
     """Close in on the valley, from a window that holds part of it.
 
     Parameters
@@ -135,7 +135,7 @@ def locate(maps: Maps, window: Box, limits: Box) -> Refined:
     return found
 
 
-def refined(found: Map, window: Box, limits: Box) -> Refined:
+def refined(found: Map, window: Window, limits: Window) -> RefinedMap:
     """Return a map with its surface and the extent of its plausible settings."""
     widths = tuple(
         max(
@@ -144,34 +144,34 @@ def refined(found: Map, window: Box, limits: Box) -> Refined:
         )
         for axis in found.axes
     )
-    landscape = landscape_of(found, widths)
-    return Refined(found, landscape, widths, window, _plausible(landscape, limits))
+    energy_score = smooth_energy_score(found, widths)
+    return RefinedMap(found, energy_score, widths, window, _plausible(energy_score, limits))
 
 
-def _plausible(landscape: Landscape, limits: Box) -> Box:
+def _plausible(energy_score: EnergyScore, limits: Window) -> Window:
     """Return the extent of the plausible settings; infinite where they reach the end of a window.
 
     An end of the search is none of a window.
     """
     from scipy.ndimage import label
 
-    labels, _ = label(landscape.height <= REFINEMENT.plausible_floors)
-    lowest = np.unravel_index(int(np.argmin(landscape.height)), landscape.height.shape)
+    labels, _ = label(energy_score.height <= REFINEMENT.plausible_floors)
+    lowest = np.unravel_index(int(np.argmin(energy_score.height)), energy_score.height.shape)
     inside = np.argwhere(labels == labels[lowest])
-    box = []
+    bounds = []
     for axis, low, high, ends in zip(
-        landscape.smoother.axes, inside.min(axis=0), inside.max(axis=0), limits, strict=True
+        energy_score.smoother.axes, inside.min(axis=0), inside.max(axis=0), limits, strict=True
     ):
         slack = 1e-6 * float(np.ptp(axis))
         cut = (
             low == 0 and axis[0] - ends[0] > slack,
             (high == axis.size - 1 and ends[1] - axis[-1] > slack),
         )
-        box.append((-math.inf if cut[0] else axis[low], math.inf if cut[1] else axis[high]))
-    return tuple((float(low), float(high)) for low, high in box)
+        bounds.append((-math.inf if cut[0] else axis[low], math.inf if cut[1] else axis[high]))
+    return tuple((float(low), float(high)) for low, high in bounds)
 
 
-def beating_cell(found: Map, landscape: Landscape) -> tuple[int, ...] | None:
+def better_cell(found: Map, energy_score: EnergyScore) -> tuple[int, ...] | None:
     """Return the setting that is nearer than the optimum by more than chance; None without one.
 
     Half of the smooth floor is taken off the distance of each. Chance is the scatter of the
@@ -181,14 +181,14 @@ def beating_cell(found: Map, landscape: Landscape) -> tuple[int, ...] | None:
     # Not scipy.stats, whose import takes half a second.
     from scipy.special import ndtri
 
-    height = at_settings(landscape.height)
+    height = at_settings(energy_score.height)
     plausible = (height <= REFINEMENT.plausible_floors) & (found.replicates > 1)
     if not plausible.any():
         return None
     error = found.standard_error[plausible] * np.sqrt(found.replicates[plausible])
     spread = float(np.sqrt(np.nanmean(error**2)))
-    score = found.mean - 0.5 * at_settings(landscape.floor)
-    lowest = landscape.optimum.distance - 0.5 * landscape.floor_at_optimum
+    score = found.mean - 0.5 * at_settings(energy_score.floor)
+    lowest = energy_score.optimum.distance - 0.5 * energy_score.floor_at_optimum
     better = (lowest - score) * np.sqrt(found.replicates)
     best = np.unravel_index(int(np.argmax(better)), better.shape)
     if better[best] <= -spread * ndtri(REFINEMENT.false_alarm_rate / better.size):
@@ -196,9 +196,9 @@ def beating_cell(found: Map, landscape: Landscape) -> tuple[int, ...] | None:
     return tuple(int(index) for index in best)
 
 
-def next_window(found: Refined, limits: Box) -> Box:
+def next_window(found: RefinedMap, limits: Window) -> Window:
     """Return the window that follows one: itself where it resolves the valley."""
-    cell = beating_cell(found.map, found.landscape)
+    cell = better_cell(found.map, found.energy_score)
     if cell is not None:
         return _half_around(found.map.point(cell), found.map.axes)
     following = []
@@ -218,16 +218,16 @@ def next_window(found: Refined, limits: Box) -> Box:
     return tuple(following)
 
 
-def _half_around(point: Sequence[float], axes: Axes) -> Box:
+def _half_around(point: Sequence[float], axes: Axes) -> Window:
     """Return a window of half the extent around a point, within a grid."""
-    box = []
+    bounds = []
     for value, axis in zip(point, axes, strict=True):
         quarter = 0.25 * float(np.ptp(axis))
-        box.append((max(value - quarter, float(axis[0])), min(value + quarter, float(axis[-1]))))
-    return tuple(box)
+        bounds.append((max(value - quarter, float(axis[0])), min(value + quarter, float(axis[-1]))))
+    return tuple(bounds)
 
 
-def window_axes(window: Box, limits: Box, intervals: Sequence[float]) -> Axes:
+def window_axes(window: Window, limits: Window, intervals: Sequence[float]) -> Axes:
     """Return a grid over a window, of round numbers.
 
     Examples
@@ -267,8 +267,8 @@ def round_step(step: float) -> float:
 
 
 def refine(
-    maps: Maps, located: Refined, limits: Box, steps: Sequence[float], wanted: int
-) -> Refined:
+    maps: Maps, located: RefinedMap, limits: Window, steps: Sequence[float], wanted: int
+) -> RefinedMap:
     """Give the located window the replicates that are wanted, where the optimum could be.
 
     Parameters
@@ -290,11 +290,11 @@ def refine(
         window = padded(located, limits)
         axes = window_axes(window, limits, finer)
         found = refined(maps.full(axes, REFINEMENT.locating_replicates), window, limits)
-    low = at_settings(found.landscape.height) <= REFINEMENT.retained_floors
+    low = at_settings(found.energy_score.height) <= REFINEMENT.retained_floors
     return refined(maps.more(found.map, low, wanted), found.window, limits)
 
 
-def _intervals(located: Refined, steps: Sequence[float]) -> list[float] | None:
+def _intervals(located: RefinedMap, steps: Sequence[float]) -> list[float] | None:
     """Return how many intervals each axis should have; None where it has them."""
     most = REFINEMENT.most_intervals[len(steps) - 1]
     wanted = []
@@ -308,14 +308,14 @@ def _intervals(located: Refined, steps: Sequence[float]) -> list[float] | None:
     return None if enough else wanted
 
 
-def padded(found: Refined, limits: Box) -> Box:
+def padded(found: RefinedMap, limits: Window) -> Window:
     """Return the extent of the plausible settings with some around."""
-    box = []
+    bounds = []
     for axis, (low, high), ends in zip(found.map.axes, found.plausible, limits, strict=True):
         first, last = (axis[at] if math.isinf(end) else end for at, end in ((0, low), (-1, high)))
         pad = max(REFINEMENT.padding * (last - first), _step(axis))
-        box.append((float(max(first - pad, ends[0])), float(min(last + pad, ends[1]))))
-    return tuple(box)
+        bounds.append((float(max(first - pad, ends[0])), float(min(last + pad, ends[1]))))
+    return tuple(bounds)
 
 
 def _step(axis: Floats) -> float:

@@ -18,7 +18,7 @@ from driftwalk.sweep import Store
 
 
 @dataclass(frozen=True)
-class Mapper:
+class MapSimulator:
     """Simulates the maps of one stage.
 
     Attributes
@@ -84,7 +84,7 @@ class Mapper:
         return self.stores(f"{name}-{window_id(axes)}", fingerprint)
 
 
-class InTurn:
+class SweepProgress:
     """Progress through sweeps that follow each other.
 
     Parameters
@@ -99,7 +99,7 @@ class InTurn:
     --------
     >>> from driftwalk.core.run_stages import share_of_windows
     >>> shares = []
-    >>> narrowing = InTurn(lambda done, total: shares.append(done / total), share_of_windows)
+    >>> narrowing = SweepProgress(lambda done, total: shares.append(done / total), share_of_windows)
     >>> for done in (5, 10, 5, 10):
     ...     narrowing(done, 10)
     >>> shares

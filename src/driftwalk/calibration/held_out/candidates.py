@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from driftwalk.calibration.evolution import recorded_ranges
 from driftwalk.calibration.held_out.baselines import HiddenMarkovWalk, ResampledSteps, runs_of
-from driftwalk.calibration.held_out.hidden_markov import fit_hidden_walk
+from driftwalk.calibration.held_out.hidden_markov import fit_hidden_markov_model
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.comparison.aspects import block_of, interleaved
 from driftwalk.conditions import Conditions, unstated_warning
@@ -30,7 +30,7 @@ BLOCK: Final = "block"
 Chosen = str | MotionModel
 
 
-class Contestant(NamedTuple):
+class Candidate(NamedTuple):
     """A model that takes part in a comparison."""
 
     model: MotionModel
@@ -62,9 +62,9 @@ def made_models(
     return found
 
 
-def contestants(
+def prepare_candidates(
     models: Sequence[MotionModel], motion: RecordedMotion, study: Study
-) -> tuple[list[Contestant], list[str]]:
+) -> tuple[list[Candidate], list[str]]:
     """Return the models with their conditions and ranges, and warnings.
 
     Where the flow is not known, models that need one get that of the even blocks of time. Where
@@ -76,11 +76,11 @@ def contestants(
     InputError
         When no model is left.
     """
-    found: list[Contestant] = []
+    found: list[Candidate] = []
     warnings: list[str] = []
     for model in models:
         try:
-            found.append(_contestant(model, motion, study))
+            found.append(_prepare_candidate(model, motion, study))
         except InputError as error:
             if len(models) == 1:
                 raise
@@ -94,14 +94,14 @@ def contestants(
     return found, warnings if unstated is None else [unstated, *warnings]
 
 
-def walks(motion: RecordedMotion) -> list[Contestant]:
+def resampling_baselines(motion: RecordedMotion) -> list[Candidate]:
     """Return walks of the steps in the even blocks."""
     (steps,), _ = interleaved([motion.steps], duration=motion.duration)
     interval = motion.plan.short.step_interval
-    hidden = fit_hidden_walk(runs_of(steps, interval))
+    hidden = fit_hidden_markov_model(runs_of(steps, interval))
     return [
-        Contestant(ResampledSteps(steps.points, interval), motion.like, (), 0, baseline=True),
-        Contestant(
+        Candidate(ResampledSteps(steps.points, interval), motion.like, (), 0, baseline=True),
+        Candidate(
             HiddenMarkovWalk(hidden, interval), motion.like, (), hidden.parameters, baseline=True
         ),
     ]
@@ -129,7 +129,7 @@ def _within_reach(parameter: Parameter, motion: RecordedMotion) -> Parameter:
     return replace(parameter, low=low, step=0.0)
 
 
-def _contestant(model: MotionModel, motion: RecordedMotion, study: Study) -> Contestant:
+def _prepare_candidate(model: MotionModel, motion: RecordedMotion, study: Study) -> Candidate:
     ranges = model.parameters
     if isinstance(model, ParticleModel):
         model.require_others(motion.like)
@@ -141,4 +141,4 @@ def _contestant(model: MotionModel, motion: RecordedMotion, study: Study) -> Con
         even = block_of(motion.track.time, motion.duration) % 2 == 0
         track = Track(*(part[even] for part in motion.track))
         like = replace(like, flow=flow_from_track(track, study))
-    return Contestant(model, like, ranges, len(ranges), baseline=False)
+    return Candidate(model, like, ranges, len(ranges), baseline=False)

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.calibration.held_out.checks import CHECKS
-from driftwalk.calibration.held_out.held_out_score import Judged
+from driftwalk.calibration.held_out.held_out_score import HeldOutScore
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.schema.answers.model_words import ASPECT_WORDS, CHECK_WORDS
 
@@ -46,7 +46,7 @@ class Verdict(NamedTuple):
 
 
 def verdict_of(
-    judged: Judged,
+    held_out: HeldOutScore,
     motion: RecordedMotion,
     *,
     baseline: bool,
@@ -57,7 +57,7 @@ def verdict_of(
 
     Parameters
     ----------
-    judged : Judged
+    held_out : Judged
         The model's distances and facts.
     motion : RecordedMotion
         The recording.
@@ -68,10 +68,10 @@ def verdict_of(
     unlike : str, optional
         How far its summaries are from those of the recording, where another model gives them.
     """
-    over = judged.held / motion.own
-    off = checks_off(judged.checks, motion.recorded_checks)
+    over = held_out.held / motion.own
+    off = checks_off(held_out.checks, motion.recorded_checks)
     parts = [
-        f"{ASPECT_WORDS[motion.held.names[k]]}: D = {judged.held[k]:.3f}, "
+        f"{ASPECT_WORDS[motion.held.names[k]]}: D = {held_out.held[k]:.3f}, "
         f"the recording's own parts {motion.own[k]:.3f}"
         for k in np.argsort(-over)
         if over[k] > VERDICT.most_over_own

@@ -103,4 +103,6 @@ def summary_by_parameter(
 def _medians(size: Floats, counts: Bools) -> Floats:
     """Return the median of what counts in each column, NaN where nothing does."""
     columns = zip(size.T, counts.T, strict=True)
-    return np.array([np.median(one[kept]) if kept.any() else np.nan for one, kept in columns])
+    return np.array(
+        [np.median(one[retained]) if retained.any() else np.nan for one, retained in columns]
+    )

@@ -33,10 +33,10 @@ def test_most_of_normal_draws_lie_inside():
     """A chi-square with as many degrees of freedom as parameters, below the squared radius."""
     for count in (1, 3, 9):
         region = Region(np.full(count, 0.5), 0.01 * np.eye(count))
-        draws = 0.5 + 0.01 * np.random.default_rng(2).normal(size=(20_000, count))
+        sample = 0.5 + 0.01 * np.random.default_rng(2).normal(size=(20_000, count))
         share = gammainc(count / 2, region.radius**2 / 2)
         assert share > 0.985
-        assert np.mean(region.distances(draws) < 1.0) == pytest.approx(share, abs=0.003)
+        assert np.mean(region.distances(sample) < 1.0) == pytest.approx(share, abs=0.003)
 
 
 def test_settings_beyond_an_end_are_mirrored_into_the_cube():
@@ -50,19 +50,19 @@ def test_settings_beyond_an_end_are_mirrored_into_the_cube():
 
 
 def test_a_region_has_the_mean_and_the_axes_of_the_draws():
-    draws = MIDDLE + np.random.default_rng(4).normal(size=(5000, 3)) @ ROOT.T
-    region = region_about(draws)
-    np.testing.assert_allclose(region.centre, draws.mean(axis=0), atol=1e-6)
-    wanted = np.cov(draws.T) + REGION.narrowest**2 * np.eye(3)
+    sample = MIDDLE + np.random.default_rng(4).normal(size=(5000, 3)) @ ROOT.T
+    region = region_about(sample)
+    np.testing.assert_allclose(region.centre, sample.mean(axis=0), atol=1e-6)
+    wanted = np.cov(sample.T) + REGION.narrowest**2 * np.eye(3)
     np.testing.assert_allclose(region.root @ region.root.T, wanted, rtol=1e-9)
     np.testing.assert_allclose(region.std, np.sqrt(np.diag(wanted)))
 
 
 def test_it_is_no_wider_than_a_part_of_the_ranges():
     """The other parameters keep their widths, and the correlations stay."""
-    draws = np.random.default_rng(6).uniform(size=(5000, 3))
-    draws[:, 2] = 0.5 + 0.01 * (draws[:, 1] - 0.5)
-    region = region_about(draws)
+    sample = np.random.default_rng(6).uniform(size=(5000, 3))
+    sample[:, 2] = 0.5 + 0.01 * (sample[:, 1] - 0.5)
+    region = region_about(sample)
     np.testing.assert_allclose(region.width[:2], REGION.widest)
     assert region.width[2] < 0.1 * REGION.widest
     covariance = region.root @ region.root.T

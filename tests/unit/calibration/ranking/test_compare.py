@@ -69,9 +69,12 @@ def test_models_come_from_the_closest_to_the_farthest(found: xr.Dataset) -> None
 
 
 def test_walks_of_recorded_steps_are_near_in_steps_and_never_explained(found: xr.Dataset) -> None:
-    walks = found.isel(model=found["baseline"].values.astype(bool))
-    assert not walks["explained"].values.any()
-    apart, best = walks["held_out_distance"], found["held_out_distance"].isel(model=0)
+    resampling_baselines = found.isel(model=found["baseline"].values.astype(bool))
+    assert not resampling_baselines["explained"].values.any()
+    apart, best = (
+        resampling_baselines["held_out_distance"],
+        found["held_out_distance"].isel(model=0),
+    )
     own = float(found["own_distance"].sel(aspect="steps"))
     assert float(apart.sel(model="resampled steps", aspect="steps")) < own + 0.05
     assert (apart.sel(aspect="wall") > 2.0 * best.sel(aspect="wall")).all()
