@@ -27,8 +27,8 @@ from driftwalk.calibration.grid.bootstrap_region import (
     region_contains,
     run_bootstrap,
 )
+from driftwalk.calibration.grid.grid_map import MapSimulator
 from driftwalk.calibration.grid.grid_refinement import RefinedMap, locate_minimum, refine
-from driftwalk.calibration.grid.map_stores import MapSimulator
 from driftwalk.calibration.problem import Problem, limits_of, prepare_problem
 from driftwalk.conditions import recorded_camera
 from driftwalk.core.seeds import world_keys

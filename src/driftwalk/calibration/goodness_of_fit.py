@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import Executor
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.calibration.grid.bootstrap_region import Bootstrap, recordings_at, simulated_steps
-from driftwalk.calibration.grid.grid_map import Map, Progress, run_map
+from driftwalk.calibration.grid.bootstrap_region import Bootstrap, simulated_steps
+from driftwalk.calibration.grid.grid_map import Map, MapSimulator, Progress
 from driftwalk.calibration.grid.grid_refinement import first_window, locate_minimum
-from driftwalk.calibration.grid.map_stores import MapSimulator
 from driftwalk.calibration.problem import Problem, limits_of
 from driftwalk.comparison.statistic import distances_among
 from driftwalk.schema.answers.calibration_facts import is_explained
@@ -23,7 +23,7 @@ FAR_ABOVE_FLOOR = 2.0
 
 def noise_floor_at(problem: Problem, point: Sequence[float]) -> float:
     """Return the median distance between two simulated recordings of the same parameters."""
-    steps = simulated_steps(problem, point, stage="floor", replicates=8)
+    steps, _ = simulated_steps(problem, point, stage="floor", replicates=8)
     among = distances_among(problem.statistic, steps, threads=problem.like.threads)
     return float(np.median(among))
 
@@ -101,20 +101,15 @@ def validate_on_halves(
     progress : callable, optional
         Called after every work unit with the settings of its map that are done, and all of them.
     """
-    map_of_half = run_map(
-        first,
-        coarse.axes,
-        stage="first_half",
-        replicates=1,
-        only=could_be_best(whole, coarse, first),
-        executor=executor,
-        progress=progress,
-    )
+    halves = MapSimulator(first, "first_half", apart=False, executor=executor, progress=progress)
+    map_of_half = halves.full(coarse.axes, 1, could_be_best(whole, coarse, first))
     lowest = map_of_half.point(map_of_half.cell_of_minimum())
     window = first_window(map_of_half, noise_floor_at(first, lowest))
-    maps = MapSimulator(first, "first_half_refined", executor=executor, progress=progress)
+    maps = replace(halves, stage="first_half_refined", apart=True)
     optimum = locate_minimum(maps, window, limits_of(first)).energy_score.optimum
-    recordings, distances = recordings_at(second, optimum, stage="second_half", count=16)
+    recordings, distances = simulated_steps(
+        second, optimum.point, stage="second_half", replicates=16
+    )
     among = distances_among(second.statistic, recordings, threads=second.like.threads)
     return Halves(optimum.point, float(distances.mean()), float(np.median(among)))
 

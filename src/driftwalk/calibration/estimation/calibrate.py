@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 from driftwalk.calibration.estimation.result import build_model_calibration
 from driftwalk.calibration.estimation.run import Stores, Tell, estimate
-from driftwalk.calibration.estimation.wall_clearance import with_contact_clearance
-from driftwalk.calibration.held_out.candidates import prepare_candidates
+from driftwalk.calibration.held_out.candidates import prepare_candidates, with_contact_clearance
 from driftwalk.calibration.held_out.recorded import body_motion
 from driftwalk.conditions import jump_warnings
 from driftwalk.motion import MotionModel

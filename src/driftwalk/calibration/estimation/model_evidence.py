@@ -15,9 +15,8 @@ from driftwalk.calibration.estimation.synthetic_likelihood import (
     SIMULATIONS,
     synthetic_likelihood_at,
 )
-from driftwalk.calibration.estimation.wall_clearance import with_contact_clearance
 from driftwalk.calibration.evolution.search import Tell
-from driftwalk.calibration.held_out.candidates import Candidate
+from driftwalk.calibration.held_out.candidates import Candidate, with_contact_clearance
 from driftwalk.calibration.held_out.held_out_score import even_blocks
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.calibration.ranking.evidence_ranking import EVIDENCE, Evidence

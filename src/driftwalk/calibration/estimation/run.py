@@ -18,8 +18,13 @@ from driftwalk.calibration.estimation.estimate import (
     most_simulations,
 )
 from driftwalk.calibration.estimation.label_switching import Order, label_order
-from driftwalk.calibration.evolution import AspectObjective, Budget, SearchResult, search_minimum
-from driftwalk.calibration.evolution.kept import CachedObjective
+from driftwalk.calibration.evolution import (
+    AspectObjective,
+    Budget,
+    CachedObjective,
+    SearchResult,
+    search_minimum,
+)
 from driftwalk.calibration.held_out.candidates import Candidate
 from driftwalk.calibration.held_out.held_out_score import (
     HeldOutScore,

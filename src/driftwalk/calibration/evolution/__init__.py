@@ -2,11 +2,17 @@
 
 from driftwalk.calibration.evolution.objective import AspectObjective, wall_distance
 from driftwalk.calibration.evolution.ranges import Scales, recorded_ranges, scales_of
-from driftwalk.calibration.evolution.search import Budget, SearchResult, search_minimum
+from driftwalk.calibration.evolution.search import (
+    Budget,
+    CachedObjective,
+    SearchResult,
+    search_minimum,
+)
 
 __all__ = [
     "AspectObjective",
     "Budget",
+    "CachedObjective",
     "Scales",
     "SearchResult",
     "recorded_ranges",

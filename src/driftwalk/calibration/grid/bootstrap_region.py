@@ -138,7 +138,7 @@ def build_surface(problem: Problem, refined: RefinedMap) -> StoredSurface:
     retained = (height <= BOOTSTRAP.retained_floors) & supported
     cells = np.flatnonzero(simulated)
     settings = [values.ravel()[cells] for values in np.meshgrid(*axes, indexing="ij")]
-    replicates = simulated_steps(
+    replicates, _ = simulated_steps(
         problem,
         [np.tile(values, BOOTSTRAP.surface_replicates) for values in settings],
         stage="surface",
@@ -191,25 +191,7 @@ def _apart(problem: Problem, table: StepTable, settings: int) -> Floats:
 
 
 def simulated_steps(
-    problem: Problem,
-    settings: Sequence[npt.ArrayLike],
-    *,
-    stage: str,
-    replicates: int,
-) -> StepTable:
-    """Simulate settings and return the steps of every world, replicates fastest."""
-    return _scored_steps(problem, settings, stage, replicates)[0]
-
-
-def recordings_at(
-    problem: Problem, optimum: Optimum, *, stage: str, count: int
-) -> tuple[StepTable, Floats]:
-    """Simulate recordings at an optimum; return their steps and distances to the real one."""
-    return _scored_steps(problem, optimum.point, stage, count)
-
-
-def _scored_steps(
-    problem: Problem, settings: Sequence[npt.ArrayLike], stage: str, replicates: int
+    problem: Problem, settings: Sequence[npt.ArrayLike], *, stage: str, replicates: int
 ) -> tuple[StepTable, Floats]:
     """Simulate settings; return the steps of every world and its distance to the recording."""
     found = score_settings(
@@ -270,7 +252,9 @@ def run_bootstrap(
     progress : callable, optional
         Called with the number of finished recordings and the total.
     """
-    recordings, to_recording = recordings_at(problem, optimum, stage="bootstrap", count=count)
+    recordings, to_recording = simulated_steps(
+        problem, optimum.point, stage="bootstrap", replicates=count
+    )
     names = tuple(parameter.name for parameter in problem.parameters)
     alone = surface if executor is None else replace(surface, threads=1)
     truth = nearest_point(surface.axes, optimum.point)

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from driftwalk.calibration.evolution import Budget, SearchResult, search_minimum
-from driftwalk.calibration.evolution.kept import CachedObjective
+from driftwalk.calibration.evolution import Budget, CachedObjective, SearchResult, search_minimum
 from driftwalk.sweep import MemoryStore, ShardStore, Store, SweepError
 
 QUICK = Budget(design=32, starts=2, short=6, long=8)

@@ -1,4 +1,4 @@
-"""Whether the wall, of which nobody said how it is, moves the answer of a calibration."""
+"""Warnings of inputs that a calibration takes for right: the wall, the recording's own flow."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from driftwalk.calibration.goodness_of_fit import GoodnessOfFit
 from driftwalk.flow.arena import outline_of
+from driftwalk.motion import BlockModel, MotionModel
 from driftwalk.schema import Track
 
 if TYPE_CHECKING:
@@ -60,4 +62,32 @@ def wall_warning(track: Track, study: Study) -> str | None:
         f"default wall (restitution {tank.wall_restitution:g}, friction {tank.wall_friction:g}): a "
         "wrong friction can move C_d by a third; the likelihood fit estimates both from the "
         "contacts (`estimate_wall`): state them (`tank.wall_restitution`, `tank.wall_friction`)"
+    )
+
+
+def own_flow_warning(model: MotionModel, quality: GoodnessOfFit | None) -> str | None:
+    """Return what to do where a block is not explained in a flow from its own recording.
+
+    Such a flow is too slow where the block seldom was, and its inward part near the wall is half of
+    the true one (docs/validation.md); C_d and sigma_F make up for that.
+
+    Parameters
+    ----------
+    model : MotionModel
+        What was calibrated. Only a block has a fit of flow and parameters together.
+    quality : Quality or None
+        How well it explains the recording; None where nobody asked.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> own_flow_warning(BlockModel(dw.Study()), None) is None
+    True
+    """
+    if not isinstance(model, BlockModel) or quality is None or quality.explained:
+        return None
+    return (
+        "the flow was taken from the recording itself, and the parameters make up for its errors: "
+        "for a body that drifts, fit flow and parameters together (driftwalk fit) or give a "
+        "measured flow; for one that moves by itself, compare models (driftwalk compare-models)"
     )
