@@ -20,15 +20,15 @@ from typing import Any
 import numpy as np
 
 import driftwalk as dw
-from driftwalk.calibration.goodness_of_fit import quality_of_fit
+from driftwalk.calibration.goodness_of_fit import goodness_of_fit
 from driftwalk.calibration.grid.bootstrap_region import (
     build_surface,
     confidence_region,
     region_contains,
     run_bootstrap,
 )
-from driftwalk.calibration.grid.grid_refinement import Refined, locate, refine
-from driftwalk.calibration.grid.map_stores import Mapper
+from driftwalk.calibration.grid.grid_map import MapSimulator
+from driftwalk.calibration.grid.grid_refinement import RefinedMap, locate_minimum, refine
 from driftwalk.calibration.problem import Problem, limits_of, prepare_problem
 from driftwalk.conditions import recorded_camera
 from driftwalk.core.seeds import world_keys
@@ -76,41 +76,43 @@ def simulated_recording(
     return prepare_problem(track, study, dw.tank30_flow(), camera=camera, threads=threads)
 
 
-def refined_map(problem: Problem, truth: tuple[float, float]) -> Refined:
+def refined_map(problem: Problem, truth: tuple[float, float]) -> RefinedMap:
     """Return the refined map of a recording, from a window about the truth on."""
     limits = limits_of(problem)
     first = tuple((0.5 * value, 1.5 * value) for value in truth)
-    maps = Mapper(problem, "refined")
+    maps = MapSimulator(problem, "refined")
     replicates = problem.study.calibration.refined_replicates
-    return refine(maps, locate(maps, first, limits), limits, problem.refined_steps, replicates)
+    return refine(
+        maps, locate_minimum(maps, first, limits), limits, problem.refined_steps, replicates
+    )
 
 
 def answer_of(
-    problem: Problem, found: Refined, truth: tuple[float, float], bootstrap: int
+    problem: Problem, found: RefinedMap, truth: tuple[float, float], bootstrap: int
 ) -> dict[str, Any]:
     """Return what a calibration says from its refined map, and what holds the truth."""
-    landscape = found.landscape
+    energy_score = found.energy_score
     stored = build_surface(problem, found)
     simulated = run_bootstrap(
         problem,
-        landscape.optimum,
+        energy_score.optimum,
         stored,
-        floor=landscape.floor_at_optimum,
+        floor=energy_score.floor_at_optimum,
         count=bootstrap,
     )
-    quality = quality_of_fit(simulated)
+    quality = goodness_of_fit(simulated)
     region = confidence_region(
-        landscape.smoother,
-        landscape.surface,
+        energy_score.smoother,
+        energy_score.surface,
         simulated,
         confidence=0.9,
         stretch=quality.stretch,
     )
     drag, force = region.intervals
     return {
-        "drag_coefficient": landscape.optimum.point[0],
-        "force_std_N": landscape.optimum.point[1],
-        "region_holds": region_contains(landscape.smoother, landscape.surface, region, truth),
+        "drag_coefficient": energy_score.optimum.point[0],
+        "force_std_N": energy_score.optimum.point[1],
+        "region_holds": region_contains(energy_score.smoother, energy_score.surface, region, truth),
         "drag_coefficient_holds": drag[0] <= truth[0] <= drag[1],
         "force_std_holds": force[0] <= truth[1] <= force[1],
         "drag_coefficient_interval": drag,

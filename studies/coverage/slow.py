@@ -77,7 +77,7 @@ def calibrated(number: int, bootstrap: int, threads: int | None) -> dict[str, An
     truth = world.drag_coefficient, world.force_std_N
     problem = problem_of(world, 100 * number, threads)
     found = refined_map(problem, truth)
-    smoother = found.landscape.smoother
+    smoother = found.energy_score.smoother
     return {
         "world": number,
         "true_drag_coefficient": truth[0],

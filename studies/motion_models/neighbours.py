@@ -24,9 +24,9 @@ from recordings import RECORDINGS, read_lines
 
 import driftwalk as dw
 from driftwalk.calibration.evolution import AspectObjective, Budget, search_minimum
-from driftwalk.calibration.held_out.candidates import contestants
+from driftwalk.calibration.held_out.candidates import prepare_candidates
 from driftwalk.calibration.held_out.checks import CHECKS
-from driftwalk.calibration.held_out.held_out_score import JUDGED, even_blocks
+from driftwalk.calibration.held_out.held_out_score import HELD_OUT_REPLICATES, even_blocks
 from driftwalk.calibration.held_out.recorded import RecordedMotion, body_motion
 from driftwalk.calibration.ranking.verdict import checks_off
 from driftwalk.comparison.aspects.form import resampled
@@ -106,10 +106,10 @@ def searched(motion: RecordedMotion, study: Study, name: str) -> dict[str, Any]:
     """Search a model on the even blocks with the displacements besides."""
     ranges = RANGES if "neighbours" in name else {}
     model = dw.motion_model(name, clearance=motion.clearance, **ranges)
-    (entry,), _ = contestants([model], motion, study)
+    (entry,), _ = prepare_candidates([model], motion, study)
     objective = FarObjective(**vars(even_blocks(entry, motion, SEED)), motion=motion)
     found = search_minimum(objective, len(entry.ranges), budget=Budget(), seed=SEED)
-    seen = objective.simulated(found.best[None], JUDGED, stage="judged")
+    seen = objective.simulated(found.best[None], HELD_OUT_REPLICATES, stage="judged")
     aspects = objective.aspects(seen)
     facts = np.array([motion.checks(x, y) for x, y in zip(seen.x, seen.y, strict=True)])
     off = checks_off(facts, motion.recorded_checks)

@@ -29,8 +29,7 @@ def simulate_little(patch: pytest.MonkeyPatch, *, matched: bool = False) -> None
     """
     patch.setattr(run, "SEARCH", FEW)
     _approach_little(patch)
-    patch.setattr(posterior, "MOST_ROUNDS", 2)
-    patch.setattr(posterior, "STEPS", 60)
+    patch.setattr(posterior, "POSTERIOR", posterior.POSTERIOR._replace(most_rounds=2, steps=60))
     if not matched:
         _descend_little(patch)
 
@@ -44,11 +43,12 @@ def compare_after_little(patch: pytest.MonkeyPatch) -> None:
 
 
 def _approach_little(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(regression_abc, "SIMULATIONS", 64)
-    patch.setattr(regression_abc, "MOST_ROUNDS", 2)
+    few = regression_abc.REGRESSION._replace(simulations=64, most_rounds=2)
+    patch.setattr(regression_abc, "REGRESSION", few)
 
 
 def _descend_little(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(gauss_newton, "FEWEST_SIMULATIONS", (128, 128))
-    patch.setattr(gauss_newton, "COEFFICIENTS", (4, 8))
-    patch.setattr(gauss_newton, "MOST_ROUNDS", 2)
+    few = gauss_newton.GAUSS_NEWTON._replace(
+        fewest_simulations=(128, 128), per_coefficient=(4, 8), most_rounds=2
+    )
+    patch.setattr(gauss_newton, "GAUSS_NEWTON", few)

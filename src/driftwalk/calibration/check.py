@@ -5,11 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from driftwalk.calibration.held_out.recorded import body_motion
-from driftwalk.calibration.problem import prepare_problem
-from driftwalk.calibration.refuse import MOST_PARAMETERS, require_samples, require_searchable
-from driftwalk.conditions import neighbours_of, recorded_camera, require_travel
+from driftwalk.calibration.problem import recorded_problem
+from driftwalk.calibration.refuse import MOST_PARAMETERS, require_searchable
 from driftwalk.motion import BlockModel, MotionModel, ParticleModel
-from driftwalk.schema import body_track
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -59,13 +57,13 @@ def check_recording(
         return
     if model is not None:
         require_searchable(model)
-    track = body_track(recording, body)
-    require_samples(track)
-    of_block = model is None or isinstance(model, BlockModel)
-    require_travel(track, study, of_block=of_block)
-    camera = recorded_camera(track, study, position_quantum=0.0)
-    others = neighbours_of(recording, body, study.tank)
-    problem = prepare_problem(track, study, flow, camera=camera, model=model, neighbours=others)
+    _, problem = recorded_problem(
+        recording,
+        study,
+        lambda _: flow,
+        model=BlockModel(study) if model is None else model,
+        body=body,
+    )
     if isinstance(problem.model, ParticleModel):
         problem.model.require_others(problem.like)
     if isinstance(problem.model, BlockModel):

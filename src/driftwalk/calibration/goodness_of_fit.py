@@ -4,33 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import Executor
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.calibration.grid.bootstrap_region import Bootstrap, recordings_at, simulated_steps
-from driftwalk.calibration.grid.grid_map import Map, Progress, run_map
-from driftwalk.calibration.grid.grid_refinement import first_window, locate
-from driftwalk.calibration.grid.map_stores import Mapper
+from driftwalk.calibration.grid.bootstrap_region import Bootstrap, simulated_steps
+from driftwalk.calibration.grid.grid_map import Map, MapSimulator, Progress
+from driftwalk.calibration.grid.grid_refinement import first_window, locate_minimum
 from driftwalk.calibration.problem import Problem, limits_of
 from driftwalk.comparison.statistic import distances_among
 from driftwalk.schema.answers.calibration_facts import is_explained
 
 FAR_ABOVE_FLOOR = 2.0
 """A distance more than this many noise floors is called far above it."""
-FLOOR_REPLICATES = 8
-VALIDATION_REPLICATES = 16
 
 
 def noise_floor_at(problem: Problem, point: Sequence[float]) -> float:
     """Return the median distance between two simulated recordings of the same parameters."""
-    steps = simulated_steps(problem, point, stage="floor", replicates=FLOOR_REPLICATES)
+    steps, _ = simulated_steps(problem, point, stage="floor", replicates=8)
     among = distances_among(problem.statistic, steps, threads=problem.like.threads)
     return float(np.median(among))
 
 
-class Quality(NamedTuple):
+class GoodnessOfFit(NamedTuple):
     """Distance at the optimum against what chance alone gives."""
 
     distance: float
@@ -52,10 +50,10 @@ class Quality(NamedTuple):
         return is_explained(self.distance, self.floor, self.floor_upper, FAR_ABOVE_FLOOR)
 
 
-def quality_of_fit(bootstrap: Bootstrap) -> Quality:
+def goodness_of_fit(bootstrap: Bootstrap) -> GoodnessOfFit:
     """Return the quality of fit from the recordings that the bootstrap simulated."""
     to_recording = bootstrap.to_recording
-    return Quality(
+    return GoodnessOfFit(
         float(to_recording.mean()),
         float(to_recording.std(ddof=1) / np.sqrt(to_recording.size)),
         float(np.median(bootstrap.to_each_other)),
@@ -103,21 +101,14 @@ def validate_on_halves(
     progress : callable, optional
         Called after every work unit with the settings of its map that are done, and all of them.
     """
-    map_of_half = run_map(
-        first,
-        coarse.axes,
-        stage="first_half",
-        replicates=1,
-        only=could_be_best(whole, coarse, first),
-        executor=executor,
-        progress=progress,
-    )
+    halves = MapSimulator(first, "first_half", apart=False, executor=executor, progress=progress)
+    map_of_half = halves.full(coarse.axes, 1, could_be_best(whole, coarse, first))
     lowest = map_of_half.point(map_of_half.cell_of_minimum())
     window = first_window(map_of_half, noise_floor_at(first, lowest))
-    maps = Mapper(first, "first_half_refined", executor=executor, progress=progress)
-    optimum = locate(maps, window, limits_of(first)).landscape.optimum
-    recordings, distances = recordings_at(
-        second, optimum, stage="second_half", count=VALIDATION_REPLICATES
+    maps = replace(halves, stage="first_half_refined", apart=True)
+    optimum = locate_minimum(maps, window, limits_of(first)).energy_score.optimum
+    recordings, distances = simulated_steps(
+        second, optimum.point, stage="second_half", replicates=16
     )
     among = distances_among(second.statistic, recordings, threads=second.like.threads)
     return Halves(optimum.point, float(distances.mean()), float(np.median(among)))

@@ -12,17 +12,17 @@ from contextlib import contextmanager
 from dataclasses import replace
 from threading import Lock
 
-from driftwalk.calibration.held_out.candidates import Contestant
-from driftwalk.core.background_task import Waiting
+from driftwalk.calibration.held_out.candidates import Candidate
+from driftwalk.core.background_task import CancelOnError
 from driftwalk.motion import BlockModel, ParticleModel
 
 
-def is_ours(entry: Contestant) -> bool:
+def runs_in_threads(entry: Candidate) -> bool:
     """Return whether several threads may simulate a model: nobody knows of a user's own."""
     return entry.baseline or isinstance(entry.model, BlockModel | ParticleModel)
 
 
-def longest_first(places: Sequence[int], entries: Sequence[Contestant]) -> list[int]:
+def longest_first(places: Sequence[int], entries: Sequence[Candidate]) -> list[int]:
     """Return places of models so that none is left over for one processor at the end.
 
     The block takes more steps of time than the others, which take the longer the more they have to
@@ -34,14 +34,14 @@ def longest_first(places: Sequence[int], entries: Sequence[Contestant]) -> list[
     )
 
 
-def sharing(entry: Contestant, count: int) -> Contestant:
+def with_thread_share(entry: Candidate, count: int) -> Candidate:
     """Return a model with its share of the threads, where so many are searched at a time."""
     each = max(entry.like.threads // max(count, 1), 1)
     return entry._replace(like=replace(entry.like, threads=each))
 
 
 @contextmanager
-def threads_beside(count: int) -> Iterator[ThreadPoolExecutor | None]:
+def thread_pool(count: int) -> Iterator[ThreadPoolExecutor | None]:
     """Give threads for several models; none where there is one processor.
 
     Left by an error, also by Ctrl-C, they are not waited for.
@@ -56,7 +56,7 @@ def threads_beside(count: int) -> Iterator[ThreadPoolExecutor | None]:
         pool.shutdown(wait=False, cancel_futures=True)
 
 
-class Together:
+class SearchProgress:
     """How far several searches are.
 
     Parameters
@@ -70,7 +70,7 @@ class Together:
 
     Attributes
     ----------
-    waiting : Waiting
+    cancellation : Waiting
         The block that waits for the searches; they end with it.
     """
 
@@ -81,7 +81,7 @@ class Together:
         self._done = [0] * len(names)
         self._under_way: set[int] = set()
         self._lock = Lock()
-        self.waiting = Waiting()
+        self.cancellation = CancelOnError()
 
     def finished(self, indices: Sequence[int]) -> None:
         """Hear which models were searched before."""
@@ -90,7 +90,7 @@ class Together:
 
     def __call__(self, index: int, done: int) -> None:
         """Hear how many settings of a model are done; all of them when it is finished."""
-        self.waiting.go_on()
+        self.cancellation.raise_if_cancelled()
         with self._lock:
             self._done[index] = done
             if done < self._costs[index]:

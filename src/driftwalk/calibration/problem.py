@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -11,21 +11,30 @@ import numpy.typing as npt
 
 from driftwalk.calibration.refuse import require_samples
 from driftwalk.comparison import Statistic, StepDistance, StepReference, plan_steps
-from driftwalk.conditions import Conditions, Neighbours, recorded_conditions
+from driftwalk.conditions import (
+    Conditions,
+    Neighbours,
+    neighbours_of,
+    recorded_camera,
+    recorded_conditions,
+    require_travel,
+)
 from driftwalk.core.seeds import world_keys
 from driftwalk.core.streams import trial_in
 from driftwalk.motion import BlockModel, Details, MotionModel, Parameter, Scores, score_worlds
+from driftwalk.schema import Track, body_track
 from driftwalk.simulation.backend import Camera
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
-    from driftwalk.schema import Track
 
 Floats = npt.NDArray[np.float64]
 Axes = tuple[Floats, ...]
 """One array per parameter, in its coordinate."""
+FlowSource = Callable[[Track], "xr.Dataset | None"]
+"""Gives the flow for a track."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +131,34 @@ def prepare_problem(
         plan = plan_steps(like.sample_time, step_interval=reference.plan.step_interval)
         reference = replace(reference, plan=plan)
     return Problem(BlockModel(study) if model is None else model, study, like, chosen, reference)
+
+
+def recorded_problem(
+    recording: xr.Dataset,
+    study: Study,
+    flow_of: FlowSource,
+    *,
+    model: MotionModel,
+    statistic: Statistic | None = None,
+    body: str | None = None,
+    threads: int | None = None,
+) -> tuple[Track, Problem]:
+    """Return the track of a body of a recording, and its problem; see `prepare_problem`."""
+    track = body_track(recording, body)
+    require_samples(track)
+    require_travel(track, study, of_block=isinstance(model, BlockModel))
+    quantum = float(recording.attrs.get("position_quantum_m", 0.0))
+    problem = prepare_problem(
+        track,
+        study,
+        flow_of(track),
+        camera=recorded_camera(track, study, position_quantum=quantum),
+        model=model,
+        statistic=statistic,
+        neighbours=neighbours_of(recording, body, study.tank),
+        threads=threads,
+    )
+    return track, problem
 
 
 def limits_of(problem: Problem) -> tuple[tuple[float, float], ...]:

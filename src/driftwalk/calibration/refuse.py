@@ -13,7 +13,6 @@ from driftwalk.schema.answers.calibration_facts import taken_keys, taken_names
 
 MOST_PARAMETERS: Final = 2
 """Of a grid; with more a model is searched."""
-FEWEST_SAMPLES: Final = 3
 
 
 def require_samples(track: Track) -> None:
@@ -24,10 +23,9 @@ def require_samples(track: Track) -> None:
     InputError
         When it has fewer than three samples.
     """
-    if track.time.size < FEWEST_SAMPLES:
+    if track.time.size < 3:
         raise InputError(
-            f"the recording has {track.time.size} samples of this body; at least {FEWEST_SAMPLES} "
-            "are needed"
+            f"the recording has {track.time.size} samples of this body; at least 3 are needed"
         )
 
 

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 _Variable = tuple[tuple[str, ...], npt.NDArray[Any]]
 
 
-class Found(NamedTuple):
+class CalibrationParts(NamedTuple):
     """Pieces of a calibration that its dataset is made of."""
 
     coarse: Map
@@ -46,7 +46,9 @@ class Found(NamedTuple):
     region: Region | None
 
 
-def build_calibration(problem: Problem, found: Found, facts: dict[str, Any]) -> xr.Dataset:
+def build_calibration(
+    problem: Problem, found: CalibrationParts, facts: dict[str, Any]
+) -> xr.Dataset:
     """Return the dataset of a calibration.
 
     Parameters

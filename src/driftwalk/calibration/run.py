@@ -2,69 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Sequence
+from collections.abc import Callable
 from concurrent.futures import Executor
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from driftwalk.calibration.estimation import Stores, Tell, calibrate_many
-from driftwalk.calibration.flow_warning import own_flow_warning
-from driftwalk.calibration.goodness_of_fit import (
-    FAR_ABOVE_FLOOR,
-    Halves,
-    Quality,
-    noise_floor_at,
-    quality_of_fit,
-    validate_on_halves,
-)
-from driftwalk.calibration.grid.bootstrap_region import (
-    Bootstrap,
-    Region,
-    build_surface,
-    confidence_region,
-    run_bootstrap,
-)
-from driftwalk.calibration.grid.boundary_warnings import End, interval_warnings, optimum_warnings
-from driftwalk.calibration.grid.grid_map import Map, Progress
-from driftwalk.calibration.grid.grid_refinement import (
-    Refined,
-    beating_cell,
-    first_window,
-    locate,
-    refine,
-)
-from driftwalk.calibration.grid.map_stores import InTurn, Mapper, window_id
-from driftwalk.calibration.grid.surface import Optimum, at_settings
-from driftwalk.calibration.problem import Problem, limits_of, prepare_problem
-from driftwalk.calibration.refuse import MOST_PARAMETERS, require_samples, require_searchable
-from driftwalk.calibration.result import (
-    Found,
-    answer_facts,
-    build_calibration,
-    estimate_facts,
-    interval_facts,
-)
-from driftwalk.calibration.stationarity import Steadiness, steadiness_of
-from driftwalk.calibration.wall import wall_warning
+from driftwalk.calibration.goodness_of_fit import Halves, validate_on_halves
+from driftwalk.calibration.grid.grid_map import Progress, SweepProgress
+from driftwalk.calibration.grid.stages import GridCalibration
+from driftwalk.calibration.input_warnings import own_flow_warning, wall_warning
+from driftwalk.calibration.problem import FlowSource, Problem, prepare_problem, recorded_problem
+from driftwalk.calibration.refuse import MOST_PARAMETERS, require_searchable
+from driftwalk.calibration.stationarity import stationarity_of
 from driftwalk.comparison import Statistic, StepDistance
-from driftwalk.conditions import (
-    jump_warnings,
-    neighbours_of,
-    recorded_camera,
-    require_travel,
-    study_in_arena,
-    unstated_warning,
-)
-from driftwalk.core.background_task import aside
+from driftwalk.conditions import jump_warnings, study_in_arena, unstated_warning
+from driftwalk.core.background_task import run_in_background
 from driftwalk.core.errors import ConfigurationError, InputError
-from driftwalk.core.run_stages import share_of_map, share_of_windows, tell_nobody
-from driftwalk.motion import BlockModel, Details, MotionModel, ParticleModel
-from driftwalk.motion.batches import no_numbers
+from driftwalk.core.run_stages import share_of_windows, tell_nobody
+from driftwalk.motion import BlockModel, MotionModel, ParticleModel
 from driftwalk.motion.protocol import ScoresItself
-from driftwalk.motion.score import broken_worlds
-from driftwalk.schema import Track, body_track
+from driftwalk.schema import Track
 from driftwalk.simulation.series import series_warnings
 
 if TYPE_CHECKING:
@@ -72,8 +30,6 @@ if TYPE_CHECKING:
 
     from driftwalk.model import Study
     from driftwalk.sweep import Store
-
-FlowSource = Callable[[Track], "xr.Dataset | None"]
 
 
 def calibrate(
@@ -157,6 +113,8 @@ def calibrate(
     0.39
     """
     chosen, searched = _study_and_model(model, study, recording)
+    keep: Stores = stores if stores is not None else _in_memory
+    say = tell if tell is not None else tell_nobody
     if len(searched.parameters) > MOST_PARAMETERS:
         if statistic is not None:
             raise ConfigurationError(
@@ -171,62 +129,51 @@ def calibrate(
             body=body,
             threads=threads,
             executor=executor,
-            stores=stores if stores is not None else _in_memory,
-            tell=tell if tell is not None else tell_nobody,
+            stores=keep,
+            tell=say,
         )
         if meanwhile is not None:
             meanwhile(many)
         return many
     require_searchable(searched)
-    track = body_track(recording, body)
-    require_samples(track)
-    of_block = isinstance(searched, BlockModel)
-    require_travel(track, chosen, of_block=of_block)
-    quantum = float(recording.attrs.get("position_quantum_m", 0.0))
     flow_of = _flow_source(chosen, searched, flow)
-    camera = recorded_camera(track, chosen, position_quantum=quantum)
-    others = neighbours_of(recording, body, chosen.tank)
-    problem = prepare_problem(
-        track,
-        chosen,
-        flow_of(track),
-        camera=camera,
-        model=searched,
-        statistic=statistic,
-        neighbours=others,
-        threads=threads,
+    track, problem = recorded_problem(
+        recording, chosen, flow_of, model=searched, statistic=statistic, body=body, threads=threads
     )
-    keep = stores if stores is not None else _in_memory
-    say = tell if tell is not None else tell_nobody
-    result = _Calibration(problem, keep, say, executor).run()
+    stages = GridCalibration(problem, keep, say, executor).run()
+    stationarity = stationarity_of(problem)
+    in_tank = isinstance(searched, BlockModel | ParticleModel)
     is_block = isinstance(searched, BlockModel)
-    in_tank = is_block or isinstance(searched, ParticleModel)
     unstated = unstated_warning(chosen, about="block" if is_block else "tank") if in_tank else None
-    of_wall = wall_warning(track, chosen) if is_block else None
-    steadiness = steadiness_of(problem)
-    of_time = None if steadiness is None else steadiness.warning
-    of_flow = own_flow_warning(searched, result.quality) if flow is None else None
-    result.warnings += jump_warnings(recording, body, track=track)
-    said = (unstated, of_flow, of_wall, of_time)
-    result.warnings += [text for text in said if text is not None]
-    duration = float(problem.like.sample_time[-1])
-    result.warnings += series_warnings(problem.like.flow, duration=duration)
+    stages.warnings += jump_warnings(recording, body, track=track)
+    stages.warnings += [
+        text
+        for text in (
+            unstated,
+            own_flow_warning(searched, stages.quality) if flow is None else None,
+            wall_warning(track, chosen) if is_block else None,
+            None if stationarity is None else stationarity.warning,
+        )
+        if text is not None
+    ]
+    stages.warnings += series_warnings(problem.like.flow, duration=problem.duration)
 
     def finish(halves: Halves | None) -> xr.Dataset:
-        return _finish(result, halves, steadiness, recording, problem)
+        return stages.dataset(halves, stationarity, recording)
 
     def compare_halves(progress: Progress | None = None) -> Halves | None:
-        return _halves(track, problem, result.coarse, flow_of, executor, progress)
+        return _halves(track, stages, flow_of, executor, progress)
 
     if problem.study.calibration.refine == "none":
         halves = None
     else:
         say("validation", 0, 1)
+        # The figures show nothing of the halves, so they are drawn while the core compares them.
         if meanwhile is not None and _is_left_to_threads(problem, executor):
-            halves = aside(compare_halves, partial(meanwhile, finish(None)))
+            halves = run_in_background(compare_halves, partial(meanwhile, finish(None)))
             meanwhile = None
         else:
-            halves = compare_halves(InTurn(partial(say, "validation"), share_of_windows))
+            halves = compare_halves(SweepProgress(partial(say, "validation"), share_of_windows))
         say("validation", 1, 1)
     found = finish(halves)
     if meanwhile is not None:
@@ -279,150 +226,15 @@ def _flow_source(study: Study, model: MotionModel, flow: xr.Dataset | None) -> F
     return lambda track: flow_from_track(track, study)
 
 
-class _Calibration:
-    """The stages of a calibration in their order, and what each leaves for the next."""
-
-    def __init__(
-        self, problem: Problem, keep: Stores, say: Tell, executor: Executor | None
-    ) -> None:
-        self.problem = problem
-        self.warnings: list[str] = []
-        self.bootstrap: Bootstrap | None = None
-        self.quality: Quality | None = None
-        self.region: Region | None = None
-        self._keep = keep
-        self._executor = executor
-        self._say = say
-        self._steps = problem.refined_steps
-
-    def run(self) -> _Calibration:
-        """Run every stage that the study asks for."""
-        search = self.problem.study.calibration
-        self.coarse = self._coarse_map(search.replicates)
-        self._require_numbers()
-        cell = self.coarse.cell_of_minimum()
-        self.optimum = Optimum(self.coarse.point(cell), float(self.coarse.mean[cell]))
-        self.refined: Refined | None = None
-        if search.refine == "auto":
-            self._refine(search.refined_replicates)
-        at_ends = optimum_warnings(self.problem.parameters, self.coarse.axes, self.optimum.point)
-        self.warnings += at_ends.values()
-        if search.bootstrap >= 2 and self.refined is not None:
-            self._bootstrap(self.refined, search.bootstrap, at_ends)
-        return self
-
-    def _coarse_map(self, replicates: int) -> Map:
-        """Return the coarse map: one replicate of every setting, all where the optimum could be."""
-        axes = tuple(np.array(one.coordinates) for one in self.problem.parameters)
-        progress = InTurn(self._progress("coarse"), share_of_map)
-        maps = self._maps("coarse", "all", progress, apart=False)
-        once = maps.full(axes, 1)
-        self.floor = noise_floor_at(self.problem, once.point(once.cell_of_minimum()))
-        return maps.more(once, once.mean <= once.mean.min() + self.floor, replicates)
-
-    def _require_numbers(self) -> None:
-        """Refuse a model that has lost its numbers in every world."""
-        if not broken_worlds(self.coarse.arrays["status"])[self.coarse.simulated].all():
-            return
-        first = self.coarse.point((0,) * len(self.coarse.axes))
-        setting = {
-            one.name: float(one.to_value(value))
-            for one, value in zip(self.problem.parameters, first, strict=True)
-        }
-        raise InputError(no_numbers(self.problem.model.name, setting))
-
-    def _progress(self, stage: str) -> Progress:
-        return partial(self._say, stage)
-
-    def _maps(self, stage: str, details: Details, progress: Progress, *, apart: bool) -> Mapper:
-        return Mapper(
-            self.problem,
-            stage,
-            details=details,
-            apart=apart,
-            stores=self._keep,
-            executor=self._executor,
-            progress=progress,
-        )
-
-    def _refine(self, wanted: int) -> None:
-        limits = limits_of(self.problem)
-        narrowing = InTurn(self._progress("refined"), share_of_windows)
-        maps = self._maps("refined", "none", narrowing, apart=True)
-        located = locate(maps, first_window(self.coarse, self.floor), limits)
-        self.refined = refine(maps, located, limits, self._steps, wanted)
-        self.optimum = self.refined.landscape.optimum
-        cell = beating_cell(self.refined.map, self.refined.landscape)
-        if cell is not None:
-            self.warnings.append(self._unresolved(self.refined.map.point(cell)))
-
-    def _unresolved(self, point: Sequence[float]) -> str:
-        """Return the warning of a setting that is nearer to the recording than the optimum."""
-        place = ", ".join(
-            f"{one.label} = {float(one.to_value(value)):.4g}"
-            for one, value in zip(self.problem.parameters, point, strict=True)
-        )
-        return (
-            f"the setting {place} is closer to the recording than the optimum, by more than "
-            "chance: the valley is narrower than the refined grid resolves, and the intervals are "
-            "wider than stated"
-        )
-
-    def _bootstrap(self, refined: Refined, count: int, known: Container[End]) -> None:
-        surface = build_surface(self.problem, refined)
-        landscape = refined.landscape
-        fingerprint = {
-            "optimum": [*self.optimum.point, self.optimum.distance],
-            "axes": [axis.tolist() for axis in surface.axes],
-            "settings": len(surface.apart),
-            "count": count,
-        }
-        self.bootstrap = run_bootstrap(
-            self.problem,
-            self.optimum,
-            surface,
-            floor=landscape.floor_at_optimum,
-            count=count,
-            store=self._keep(f"bootstrap-{window_id(refined.map.axes)}", fingerprint),
-            executor=self._executor,
-            progress=self._progress("bootstrap"),
-        )
-        self.quality = quality_of_fit(self.bootstrap)
-        self.floor = self.quality.floor
-        self.region = confidence_region(
-            landscape.smoother,
-            landscape.surface,
-            self.bootstrap,
-            confidence=self.problem.study.calibration.confidence,
-            stretch=self.quality.stretch,
-        )
-        self.warnings += interval_warnings(
-            self.problem.parameters,
-            self.region.intervals,
-            self.bootstrap.estimates,
-            search=self.coarse.axes,
-            window=refined.map.axes,
-            lattice=surface.axes,
-            steps=self._steps,
-            known=known,
-        )
-        if not self.quality.explained:
-            self.warnings.append(
-                f"the model does not explain the recording: D = {self.quality.distance:.3f} at the "
-                f"optimum is {self.quality.distance / self.quality.floor:.1f} times the noise "
-                f"floor {self.quality.floor:.3f}; the parameters are the best of bad fits"
-            )
-
-
 def _halves(
     track: Track,
-    problem: Problem,
-    coarse: Map,
+    stages: GridCalibration,
     flow_of: FlowSource,
     executor: Executor | None,
     progress: Progress | None,
 ) -> Halves | None:
     """Calibrate on the first half, judge on the second; None where a half is too short."""
+    problem = stages.problem
     middle = 0.5 * (track.time[0] + track.time[-1])
     others = problem.like.neighbours
     if others is not None:
@@ -446,56 +258,6 @@ def _halves(
         )
     except InputError:
         return None
-    return validate_on_halves(problem, coarse, first, second, executor=executor, progress=progress)
-
-
-def _finish(
-    found: _Calibration,
-    halves: Halves | None,
-    steadiness: Steadiness | None,
-    recording: xr.Dataset,
-    problem: Problem,
-) -> xr.Dataset:
-    """Put the pieces into one dataset and state the answer."""
-    lowest = found.coarse.point(found.coarse.cell_of_minimum())
-    facts: dict[str, Any] = {
-        **answer_facts(problem, found.optimum.point),
-        **estimate_facts(problem, lowest, "coarse_"),
-        "ks_distance": found.optimum.distance,
-        "noise_floor": found.floor,
-        "warnings": found.warnings,
-        "recording_name": str(recording.attrs.get("source", "")),
-        "simulated_recording": str(recording.attrs.get("simulated", "no")),
-        "study": problem.study.to_toml(),
-    }
-    if found.quality is not None and found.region is not None:
-        facts |= _quality_facts(found.quality, found.region, problem)
-    if halves is not None:
-        facts |= estimate_facts(problem, halves.point, "first_half_")
-        facts["second_half_ks_distance"] = halves.distance
-        facts["second_half_noise_floor"] = halves.floor
-    if steadiness is not None:
-        facts["halves_ks_distance"] = steadiness.distance
-        facts["halves_ks_distance_expected"] = steadiness.expected
-        facts["halves_p_value"] = steadiness.p_value
-    refined, surface = None, None
-    if found.refined is not None:
-        refined, surface = found.refined.map, at_settings(found.refined.landscape.surface)
-    pieces = Found(found.coarse, refined, surface, found.bootstrap, found.region)
-    return build_calibration(problem, pieces, facts)
-
-
-def _quality_facts(quality: Quality, region: Region, problem: Problem) -> dict[str, Any]:
-    """Return what only a bootstrap tells: how sure the answer is, and how good."""
-    return {
-        **interval_facts(problem, region),
-        "confidence": problem.study.calibration.confidence,
-        "ks_distance": quality.distance,
-        "ks_distance_standard_error": quality.standard_error,
-        "noise_floor_upper": quality.floor_upper,
-        "distance_to_floor_ratio": quality.distance / quality.floor,
-        "far_above_floor": FAR_ABOVE_FLOOR,
-        "explained": quality.explained,
-        "region_level": region.level,
-        "interval_stretch": quality.stretch,
-    }
+    return validate_on_halves(
+        problem, stages.coarse, first, second, executor=executor, progress=progress
+    )

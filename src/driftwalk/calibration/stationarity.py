@@ -14,16 +14,26 @@ from driftwalk.comparison import block_permutation_test
 
 Floats = npt.NDArray[np.float64]
 
-PARTS: Final = 20
-"""Parts of which halves are drawn at random."""
-FEWEST_PAIRS: Final = 200
-DRAWS: Final = 199
-LEVEL: Final = 0.005
-"""A recording is not steady when no half drawn at random differs as much as those in time."""
-SEED: Final = 20
+
+class StationarityPolicy(NamedTuple):
+    """The permutation test of the two halves of a recording."""
+
+    parts: int = 20
+    """Parts that are permuted. What lasts less than a part counts as chance."""
+    fewest_pairs: int = 200
+    """Fewest pairs of steps: ten in each part. Chosen by hand."""
+    permutations: int = 199
+    """Permutations; with the observed halves they resolve a p-value of 0.005."""
+    level: float = 0.005
+    """False-alarm rate: a steady recording is called unsteady once in 200."""
+    seed: int = 20
+    """Of the permutations: the same recording gives the same p-value."""
 
 
-class Steadiness(NamedTuple):
+STATIONARITY: Final = StationarityPolicy()
+
+
+class Stationarity(NamedTuple):
     """How far the two halves of a recording are from each other."""
 
     distance: float
@@ -36,7 +46,7 @@ class Steadiness(NamedTuple):
     @property
     def warning(self) -> str | None:
         """Return a warning where the motion is not steady."""
-        if self.p_value > LEVEL:
+        if self.p_value > STATIONARITY.level:
             return None
         return (
             f"the motion is not steady: D = {self.distance:.3f} between the recording's own two "
@@ -45,22 +55,22 @@ class Steadiness(NamedTuple):
         )
 
 
-def steadiness_of(problem: Problem) -> Steadiness | None:
+def stationarity_of(problem: Problem) -> Stationarity | None:
     """Compare the halves of a recording with each other, by the statistic of its calibration.
 
-    See `steadiness_of_steps`.
+    See `stationarity_of_steps`.
     """
 
     def distance(first: Floats, second: Floats) -> float:
         tables = [replace(problem.reference, steps=half).table for half in (first, second)]
         return float(problem.statistic.matrix(*tables)[0, 0])
 
-    return steadiness_of_steps(problem.steps, distance)
+    return stationarity_of_steps(problem.steps, distance)
 
 
-def steadiness_of_steps(
+def stationarity_of_steps(
     steps: Floats, distance: Callable[[Floats, Floats], float]
-) -> Steadiness | None:
+) -> Stationarity | None:
     """Compare the halves of a series of steps with each other.
 
     The steps, in their order in time, are cut into 20 parts of equal numbers. Ten of them drawn at
@@ -80,11 +90,15 @@ def steadiness_of_steps(
         Nothing where there are fewer than 200 pairs of steps.
     """
     count = len(steps)
-    if count < FEWEST_PAIRS:
+    if count < STATIONARITY.fewest_pairs:
         return None
     middle = (count + 1) // 2
     first, second = steps[:middle], steps[middle:]
     drawn = block_permutation_test(
-        first, second, block_length=count // PARTS, permutations=DRAWS, seed=SEED
+        first,
+        second,
+        block_length=count // STATIONARITY.parts,
+        permutations=STATIONARITY.permutations,
+        seed=STATIONARITY.seed,
     )
-    return Steadiness(distance(first, second), drawn.noise_floor, drawn.p_value)
+    return Stationarity(distance(first, second), drawn.noise_floor, drawn.p_value)

@@ -11,36 +11,38 @@ Progress = Callable[[int, int], None]
 Result = TypeVar("Result")
 
 
-class LeftOff(Exception):
+class Cancelled(Exception):
     """Ends work whose result nobody waits for any more."""
 
 
-class Waiting:
+class CancelOnError:
     """A block that waits for work of other threads, and ends it when an error or Ctrl-C ends it.
 
     Examples
     --------
-    >>> with Waiting() as waiting:
-    ...     waiting.go_on()
+    >>> with CancelOnError() as cancellation:
+    ...     cancellation.raise_if_cancelled()
     """
 
     def __init__(self) -> None:
-        self._left_off = threading.Event()
+        self._cancelled = threading.Event()
 
-    def __enter__(self) -> Waiting:
+    def __enter__(self) -> CancelOnError:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if kind is not None:
-            self._left_off.set()
+            self._cancelled.set()
 
-    def go_on(self) -> None:
-        """Raise `LeftOff` where nobody waits any more; the work calls it often."""
-        if self._left_off.is_set():
-            raise LeftOff
+    def raise_if_cancelled(self) -> None:
+        """Raise `Cancelled` where nobody waits any more; the work calls it often."""
+        if self._cancelled.is_set():
+            raise Cancelled
 
 
-def aside(work: Callable[[Progress], Result], meanwhile: Callable[[], object]) -> Result:
+def run_in_background(
+    work: Callable[[Progress], Result], meanwhile: Callable[[], object]
+) -> Result:
     """Return what some work gives; it goes on in another thread during `meanwhile`.
 
     Parameters
@@ -53,11 +55,11 @@ def aside(work: Callable[[Progress], Result], meanwhile: Callable[[], object]) -
 
     Examples
     --------
-    >>> aside(lambda progress: 6 * 7, lambda: print("meanwhile"))
+    >>> run_in_background(lambda progress: 6 * 7, lambda: print("meanwhile"))
     meanwhile
     42
     """
-    with ThreadPoolExecutor(1) as pool, Waiting() as waiting:
-        future = pool.submit(work, lambda _done, _total: waiting.go_on())
+    with ThreadPoolExecutor(1) as pool, CancelOnError() as cancellation:
+        future = pool.submit(work, lambda _done, _total: cancellation.raise_if_cancelled())
         meanwhile()
         return future.result()

@@ -8,7 +8,7 @@ import numpy as np
 
 import driftwalk as dw
 from driftwalk.calibration.goodness_of_fit import could_be_best
-from driftwalk.calibration.grid.grid_map import full_map, run_map
+from driftwalk.calibration.grid.grid_map import MapSimulator, full_map
 from driftwalk.calibration.problem import prepare_problem
 from driftwalk.schema import Track, body_track
 from driftwalk.simulation.backend import Camera
@@ -24,8 +24,8 @@ def test_the_best_setting_of_a_half_is_among_those_that_could_be():
         for one in (track, half)
     )
     axes = np.arange(1, 9) * 0.1, np.arange(0, 9) * 2e-4
-    coarse = run_map(whole, axes, stage="coarse", replicates=1)
-    of_half = run_map(first, axes, stage="first_half", replicates=1)
+    coarse = MapSimulator(whole, "coarse", apart=False).full(axes, 1)
+    of_half = MapSimulator(first, "first_half", apart=False).full(axes, 1)
     possible = could_be_best(whole, coarse, first)
     assert possible[of_half.mean <= of_half.mean.min() + 0.02].all()
     assert 0.02 < possible.mean() < 0.7

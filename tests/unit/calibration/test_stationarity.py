@@ -10,7 +10,7 @@ import pytest
 
 import driftwalk as dw
 from driftwalk.calibration.problem import Problem, prepare_problem
-from driftwalk.calibration.stationarity import DRAWS, FEWEST_PAIRS, LEVEL, steadiness_of
+from driftwalk.calibration.stationarity import STATIONARITY, stationarity_of
 from driftwalk.comparison.ks import ks_distance
 from driftwalk.conditions import load_with_study, recorded_camera
 from driftwalk.schema import Track, body_track
@@ -35,10 +35,10 @@ def walk(speed: np.ndarray, seed: int) -> Track:
 
 def test_a_steady_walk_gets_no_warning() -> None:
     """Each of 40 walks has p = 1/200 once in 200; two and more of them once in 60 seeds."""
-    found = [steadiness_of(problem_of(walk(np.full(1000, 2e-3), seed))) for seed in range(40)]
+    found = [stationarity_of(problem_of(walk(np.full(1000, 2e-3), seed))) for seed in range(40)]
     p_values = np.array([one.p_value for one in found if one is not None])
     assert p_values.size == 40
-    assert np.count_nonzero(p_values <= LEVEL) <= 1
+    assert np.count_nonzero(p_values <= STATIONARITY.level) <= 1
     # Uniform between 1/200 and 1: the mean of 40 has sd 0.046, of which 4 are allowed.
     assert abs(p_values.mean() - 0.5) < 0.19
 
@@ -46,9 +46,9 @@ def test_a_steady_walk_gets_no_warning() -> None:
 def test_a_walk_that_slows_down_is_not_steady() -> None:
     speed = np.where(np.arange(1000) < 500, 2e-3, 1.6e-3)
     problem = problem_of(walk(speed, 1))
-    found = steadiness_of(problem)
+    found = stationarity_of(problem)
     assert found is not None
-    assert found.p_value == 1.0 / (1 + DRAWS)
+    assert found.p_value == 1.0 / (1 + STATIONARITY.permutations)
     assert found.distance > 1.5 * found.expected
     assert found.warning is not None
     assert f"D = {found.distance:.3f} between the recording's own two halves" in found.warning
@@ -59,9 +59,9 @@ def test_a_walk_that_slows_down_is_not_steady() -> None:
 
 
 def test_a_short_recording_says_nothing() -> None:
-    short = problem_of(walk(np.full(FEWEST_PAIRS, 2e-3), 1))
-    assert len(short.steps) < FEWEST_PAIRS
-    assert steadiness_of(short) is None
+    short = problem_of(walk(np.full(STATIONARITY.fewest_pairs, 2e-3), 1))
+    assert len(short.steps) < STATIONARITY.fewest_pairs
+    assert stationarity_of(short) is None
 
 
 @pytest.mark.parametrize(
@@ -77,6 +77,6 @@ def test_real_recordings(
     folder, _, rest = file.partition("/")
     study = dw.load_study(STUDIES / f"{name}.toml")
     recording = load_with_study(shared_data(folder) / rest, study)
-    found = steadiness_of(problem_of(body_track(recording, study.recording.body), study))
+    found = stationarity_of(problem_of(body_track(recording, study.recording.body), study))
     assert found is not None
     assert (found.warning is None) == steady

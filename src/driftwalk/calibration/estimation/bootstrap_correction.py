@@ -9,24 +9,21 @@ Bootstrap (1993), chapter 10).
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk.calibration.estimation.gauss_newton import rounded
-from driftwalk.calibration.estimation.posterior import REACH, Posterior
+from driftwalk.calibration.estimation.posterior import POSTERIOR, Posterior
 
 Floats = npt.NDArray[np.float64]
 
-FEWEST: Final = 40
-"""Recordings from which a bias and a scatter are taken."""
 
-
-class Repeated(NamedTuple):
+class BootstrapEstimates(NamedTuple):
     """Estimates of simulated recordings of the model."""
 
-    misfits: Floats
+    discrepancies: Floats
     """Of each at the setting that fits it best, shape (recordings,)."""
     bias: Floats
     """Mean of estimate less truth, shape (parameters,)."""
@@ -34,9 +31,9 @@ class Repeated(NamedTuple):
     """Factor by which the draws are too narrow, from 1 on, shape (parameters,)."""
 
 
-def repeat_estimates(
+def bootstrap_estimates(
     simulate: Callable[[Floats], Floats], posterior: Posterior, count: int
-) -> Repeated:
+) -> BootstrapEstimates:
     """Simulate recordings at draws and estimate each as the recording was.
 
     Parameters
@@ -48,17 +45,18 @@ def repeat_estimates(
     count : int
         Recordings.
     """
-    draws, emulator = posterior.draws, posterior.emulator
-    every = np.linspace(0, len(draws) - 1, min(count, len(draws))).round().astype(np.int64)
-    chosen = rounded(draws[every])
+    sample, emulator = posterior.sample, posterior.emulator
+    every = np.linspace(0, len(sample) - 1, min(count, len(sample))).round().astype(np.int64)
+    chosen = rounded(sample[every])
     found = [
-        emulator.solve(one, reach=REACH, start=setting)
+        emulator.solve(one, reach=POSTERIOR.reach, start=setting)
         for one, setting in zip(simulate(chosen), chosen, strict=True)
     ]
-    misfits = np.array([one.misfit for one in found])
-    if len(found) < FEWEST:
-        none = np.zeros(draws.shape[1])
-        return Repeated(misfits, none, none + emulator.widening)
+    discrepancies = np.array([one.discrepancy for one in found])
+    # Of fewer, a bias and a scatter would be chance; the covariance's own error stands in.
+    if len(found) < 40:
+        none = np.zeros(sample.shape[1])
+        return BootstrapEstimates(discrepancies, none, none + emulator.widening)
     errors = np.array([one.setting for one in found]) - chosen
-    spread = errors.std(axis=0) / draws.std(axis=0)
-    return Repeated(misfits, errors.mean(axis=0), np.maximum(spread, 1.0))
+    spread = errors.std(axis=0) / sample.std(axis=0)
+    return BootstrapEstimates(discrepancies, errors.mean(axis=0), np.maximum(spread, 1.0))

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 from driftwalk.calibration.estimation.result import build_model_calibration
 from driftwalk.calibration.estimation.run import Stores, Tell, estimate
-from driftwalk.calibration.estimation.wall_clearance import at_the_wall
-from driftwalk.calibration.held_out.candidates import contestants
+from driftwalk.calibration.held_out.candidates import prepare_candidates, with_contact_clearance
 from driftwalk.calibration.held_out.recorded import body_motion
 from driftwalk.conditions import jump_warnings
 from driftwalk.motion import MotionModel
@@ -41,7 +40,7 @@ def calibrate_many(
         What is calibrated. A self-propelled body without a clearance has that of the recording.
     study : Study
         Tank, camera, step interval, seed, confidence; ``bootstrap`` is the number of simulated
-        recordings by which the misfit is judged, 0 leaves the second stage out.
+        recordings by which the discrepancy is judged, 0 leaves the second stage out.
     flow : xarray.Dataset or None
         The water's velocity.
     body : str or None
@@ -61,14 +60,14 @@ def calibrate_many(
         When the recording is too short or does not move, or the model gives no numbers.
     """
     motion = body_motion(recording, study, flow=flow, body=body, threads=threads)
-    entries, warnings = contestants([at_the_wall(model, motion)], motion, study)
+    entries, warnings = prepare_candidates([with_contact_clearance(model, motion)], motion, study)
     warnings += jump_warnings(recording, body)
     search = study.calibration
     found = estimate(
         entries[0],
         motion,
         seed=search.seed,
-        worlds=search.bootstrap if search.refine == "auto" else 0,
+        replicates=search.bootstrap if search.refine == "auto" else 0,
         confidence=search.confidence,
         executor=executor,
         stores=stores,

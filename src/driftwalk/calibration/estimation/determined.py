@@ -12,15 +12,22 @@ from driftwalk.schema import Parameter
 
 Floats = npt.NDArray[np.float64]
 
-DETERMINED: Final = 0.15
-"""A parameter is determined where its 90 % interval ends no farther than this part of its value
-from its middle: half of the answers are then within 6 % of the truth. With a quarter, the median
-error of some parameters came to more than a tenth in the recovery study."""
-QUOTED: Final = 0.9
-"""The confidence for which that is said."""
-SMALL_PART: Final = 0.05
-"""On a linear scale a value near 0 counts as large as this part of the range."""
-AT_THE_END: Final = 0.01
+
+class DeterminedPolicy(NamedTuple):
+    """When a recording determines a parameter (`studies/motion_models/recover.py`)."""
+
+    most_half_width: float = 0.15
+    """Half-width over the value: half of the answers are then within 6 % of the truth. With a
+    quarter, the median error of some parameters exceeded a tenth."""
+    confidence: float = 0.9
+    """The confidence of the interval that is judged."""
+    small_part: float = 0.05
+    """On a linear scale, values near 0 count as large as this part of the range."""
+    range_end: float = 0.01
+    """An answer within this part of a range of its end is called open. Chosen by hand."""
+
+
+DETERMINED: Final = DeterminedPolicy()
 
 
 class Determination(NamedTuple):
@@ -34,13 +41,13 @@ class Determination(NamedTuple):
 
 
 def determination(
-    draws: Floats, ranges: Sequence[Parameter], *, confidence: float
+    sample: Floats, ranges: Sequence[Parameter], *, confidence: float
 ) -> Determination:
     """Return the intervals of parameters, and which of them are determined.
 
     Parameters
     ----------
-    draws : ndarray, shape (draws, parameters)
+    sample : ndarray, shape (draws, parameters)
         Settings in the unit cube that could have given the recording.
     ranges : sequence of Parameter
         The parameters with the ranges of the search.
@@ -55,22 +62,22 @@ def determination(
     ([[0.096, 0.104]], [True])
     """
     intervals, widths = [], []
-    for column, one in zip(draws.T, ranges, strict=True):
+    for column, one in zip(sample.T, ranges, strict=True):
         tail = 0.5 * (1.0 - confidence)
         intervals.append(one.value_at(np.quantile(column, [tail, 1.0 - tail])))
         widths.append(_half_width(column, one))
     half_width = np.array(widths)
-    return Determination(np.array(intervals), half_width, half_width <= DETERMINED)
+    return Determination(np.array(intervals), half_width, half_width <= DETERMINED.most_half_width)
 
 
 def _half_width(column: Floats, parameter: Parameter) -> float:
     """Return half the 90 % interval over the value; infinite where it reaches the range's end."""
-    tail = 0.5 * (1.0 - QUOTED)
+    tail = 0.5 * (1.0 - DETERMINED.confidence)
     low, middle, high = np.quantile(column, [tail, 0.5, 1.0 - tail])
-    if low < AT_THE_END or high > 1.0 - AT_THE_END:
+    if low < DETERMINED.range_end or high > 1.0 - DETERMINED.range_end:
         return float("inf")
     start, value, end = (float(parameter.value_at(share)) for share in (low, middle, high))
     if parameter.scale == "log":
         return 0.5 * float(np.log(end / start))
-    size = max(abs(value), SMALL_PART * (parameter.high - parameter.low))
+    size = max(abs(value), DETERMINED.small_part * (parameter.high - parameter.low))
     return 0.5 * (end - start) / size

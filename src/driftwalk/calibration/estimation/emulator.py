@@ -19,27 +19,20 @@ Floats = npt.NDArray[np.float64]
 Form = Literal["slopes", "squares", "products"]
 FORMS: Final[tuple[Form, ...]] = ("slopes", "squares", "products")
 """A plane, with the square of each parameter, and with the products of two."""
-ENOUGH: Final = 4
-"""Simulations for each coefficient from which a form is tried."""
 SHRUNK: Final = 0.05
 """Part of the correlations of the summaries that is taken away: they come from simulations."""
 CONSTANT: Final = 1e-9
 """A summary that varies by less than this part of its size says nothing."""
-MOST_STEPS: Final = 40
-HELD: Final = 1e-9
-"""A parameter that is held may move by this part of the box."""
-MOST_CORRECTED: Final = 3
-"""Degrees of freedom beyond the summaries from which the errors of a covariance are known."""
 
 
-class Solved(NamedTuple):
+class Solution(NamedTuple):
     """The setting that fits summaries best."""
 
     setting: Floats
     """In the unit cube, shape (parameters,)."""
     place: Floats
     """The same in the box: 0 is its centre, 1 its end."""
-    misfit: float
+    discrepancy: float
     """Sum of the squares of what is left, in standard deviations."""
     std: Floats
     """Standard deviations by the curvature there, in parts of the ranges."""
@@ -85,7 +78,8 @@ class LocalEmulator:
         """
         count, parameters = self.summaries, self.centre.size
         more = self.freedom - count
-        if more <= MOST_CORRECTED:
+        # With three or fewer the moments of an inverse Wishart matrix do not exist.
+        if more <= 3:
             return float("inf")
         inverse = self.freedom / (more - 1.0)
         first, second = (top / (more * (more - 3.0)) for top in (2.0, more - 1.0))
@@ -101,8 +95,8 @@ class LocalEmulator:
     def log_variance(self) -> float:
         """Logarithm of the determinant of the covariance of what is left of the summaries.
 
-        Misfits count in standard deviations, which differ from one emulator to another. With this
-        added, two of them compare: it is -2 log of the likelihood, but for a constant.
+        Discrepancies count in standard deviations, which differ from one emulator to another. With
+        this added, two of them compare: it is -2 log of the likelihood, but for a constant.
         """
         return -2.0 * float(np.linalg.slogdet(self.whitening)[1])
 
@@ -110,7 +104,7 @@ class LocalEmulator:
         """Return summaries as they are compared."""
         return np.asarray(self.whitening @ summaries[self.used])
 
-    def misfits(self, settings: Floats, summaries: Floats) -> Floats:
+    def discrepancies(self, settings: Floats, summaries: Floats) -> Floats:
         """Return how far summaries are from those expected at each setting, shape (settings,)."""
         place = (settings - self.centre) / self.width
         left = _basis(place, self.form) @ self.coefficients.T - self.whitened(summaries)
@@ -123,7 +117,7 @@ class LocalEmulator:
         reach: float,
         start: Floats | None = None,
         held: tuple[int, float] | None = None,
-    ) -> Solved:
+    ) -> Solution:
         """Return the setting that fits summaries best.
 
         Parameters
@@ -157,22 +151,22 @@ class LocalEmulator:
             # A range that is next to nothing: the solver takes no bounds that are equal.
             index, value = held
             place = (value - self.centre[index]) / self.width[index]
-            low[index], high[index] = place - HELD, place + HELD
-            inside[index] = 0.5 * HELD
+            low[index], high[index] = place - 1e-9, place + 1e-9
+            inside[index] = 0.5e-9
         found = least_squares(
             left,
             np.clip(begin, low + inside, high - inside),
             jac=slope,
             bounds=(low, high),
-            max_nfev=MOST_STEPS,
+            max_nfev=40,
         )
         # A box as wide as its standard deviation keeps the inverse finite.
         slopes = slope(found.x)
         curvature = slopes.T @ slopes + np.eye(begin.size)
-        return Solved(
+        return Solution(
             setting=self.centre + found.x * self.width,
             place=found.x,
-            misfit=2.0 * float(found.cost),
+            discrepancy=2.0 * float(found.cost),
             std=np.sqrt(np.diag(np.linalg.inv(curvature))) * self.width,
             log_volume=2.0 * float(np.log(self.width).sum())
             - float(np.linalg.slogdet(curvature)[1]),
@@ -233,7 +227,8 @@ def _best_form(place: Floats, summaries: Floats) -> Form:
     Coefficients that a box does not need cost: nine parameters have 36 products, and with 256
     simulations their errors are larger than what they describe.
     """
-    tried = [one for one in FORMS if len(place) >= ENOUGH * _basis(place[:1], one).shape[1]] or [
+    # Fewer than four simulations for each coefficient determine none of them well.
+    tried = [one for one in FORMS if len(place) >= 4 * _basis(place[:1], one).shape[1]] or [
         FORMS[0]
     ]
     errors = [_foretold(_basis(place, one), summaries) for one in tried]

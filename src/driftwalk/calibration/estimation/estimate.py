@@ -9,35 +9,49 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.calibration.estimation import gauss_newton, regression_abc
-from driftwalk.calibration.estimation.bootstrap_correction import Repeated, repeat_estimates
-from driftwalk.calibration.estimation.gauss_newton import WIDEST, Descended, Simulate, descend
-from driftwalk.calibration.estimation.modes import Modes, find_modes
-from driftwalk.calibration.estimation.posterior import (
-    MOST_ROUNDS as MOST_REGIONS,
-    Posterior,
-    sample_posterior,
+from driftwalk.calibration.estimation.bootstrap_correction import (
+    BootstrapEstimates,
+    bootstrap_estimates,
 )
-from driftwalk.calibration.estimation.profile import Profiles, misfit_profiles
-from driftwalk.calibration.estimation.regression_abc import WIDE_ERRORS, Order, approach
+from driftwalk.calibration.estimation.gauss_newton import (
+    GAUSS_NEWTON,
+    LocalOptimum,
+    Simulate,
+    minimise_discrepancy,
+)
+from driftwalk.calibration.estimation.modes import Modes, find_modes
+from driftwalk.calibration.estimation.posterior import POSTERIOR, Posterior, sample_posterior
+from driftwalk.calibration.estimation.profile import Profiles, discrepancy_profiles
+from driftwalk.calibration.estimation.regression_abc import REGRESSION, Order, sequential_regression
 
 Floats = npt.NDArray[np.float64]
 
 Starts = Callable[[], Floats]
 
-MOST_STARTS: Final = 2
-MATCHES: Final = 1.25
-"""Misfit, in summaries, up to which no other start is tried: recordings of the model itself have
-0.7 to 1.2 of it."""
-APART: Final = 0.04
-"""Two starts are at least so far from each other, in parts of the ranges (root mean square)."""
-HOPELESS: Final = 100.0
-"""Misfit, in summaries, from which on another start is no use: the model is another one."""
-MISFIT_QUANTILE: Final = 0.95
-UNSETTLED: Final = 1.0
-"""Draws that have moved by more standard deviations in the last round have not come to rest."""
-UNLIKE: Final = 4.0
-"""Misfit, in usual ones, from which on the recording is that of another model: intervals would have
-to be more than twice as wide."""
+
+class MatchingPolicy(NamedTuple):
+    """Which answers of the summaries count: the true model has a discrepancy of 0.7 to 1.2 each."""
+
+    most_starts: int = 2
+    """Other starts that are tried. Chosen by hand, a bound on the time."""
+    matches: float = 1.25
+    """Discrepancy per summary up to which no other start is tried."""
+    apart: float = 0.04
+    """Least root-mean-square distance of two starts, in parts of the ranges. Chosen by hand."""
+    hopeless: float = 100.0
+    """Discrepancy per summary from which on another start is no use: it is another model."""
+    typical_quantile: float = 0.95
+    """One recording of the model itself in twenty is called unlike it."""
+    unsettled: float = 1.0
+    """Last move of a mean, in standard deviations, above which it is not determined."""
+    unlike: float = 4.0
+    """Discrepancy, in medians of the model's own, above which nothing is determined: intervals
+    would be more than twice as wide. A wrong model on a recorded mouse had 30."""
+    as_close: float = 1.25
+    """Factor by which the summaries' answer may be farther in the six distances. Chosen by hand."""
+
+
+MATCHING: Final = MatchingPolicy()
 
 
 class Summaries(Simulate, Protocol):
@@ -57,21 +71,21 @@ class Matched(NamedTuple):
 
     point: Floats
     """In the unit cube."""
-    draws: Floats
+    sample: Floats
     """Settings that could have given the recording, shape (draws, parameters)."""
-    misfit: float
+    discrepancy: float
     """Sum of squares of the summaries' deviations, in standard deviations."""
-    usual_misfit: float
+    median_discrepancy: float
     """Its median over simulated recordings of the model,"""
-    most_misfit: float
+    upper_discrepancy: float
     """and their 95 % quantile."""
     stretch: float
     """Factor by which the draws are spread for what the model leaves unexplained, from 1 on."""
     even_point: Floats
     """The setting that matches the even blocks of time."""
     profiles: Profiles | None
-    """How the misfit rises along each parameter, over the square of the factor by which the draws
-    are spread; None where states of the model have changed places."""
+    """How the discrepancy rises along each parameter, over the square of the factor by which the
+    draws are spread; None where states of the model have changed places."""
     ambiguous: npt.NDArray[np.bool_]
     """Parameters for which another place, which fits as well, has other values,"""
     unsettled: npt.NDArray[np.bool_]
@@ -81,21 +95,24 @@ class Matched(NamedTuple):
     @property
     def usual(self) -> bool:
         """Whether the summaries are like those of the model's own recordings."""
-        return self.misfit <= self.most_misfit
+        return self.discrepancy <= self.upper_discrepancy
 
     @property
     def unlike(self) -> bool:
         """Whether the summaries are so far from the model's that it can determine nothing."""
-        return not self.usual and self.misfit > UNLIKE * self.usual_misfit
+        return not self.usual and self.discrepancy > MATCHING.unlike * self.median_discrepancy
 
 
-def most_simulations(parameters: int, worlds: int) -> int:
+def most_simulations(parameters: int, replicates: int) -> int:
     """Return how many settings `match_summaries` simulates at most."""
-    wide = regression_abc.SIMULATIONS * regression_abc.MOST_ROUNDS
     each, last = gauss_newton.simulations_of(parameters)
-    narrow = each * gauss_newton.MOST_ROUNDS
-    regions = MOST_REGIONS * last // 2
-    return wide + (1 + MOST_STARTS) * (narrow + regions) + worlds
+    narrow = each * gauss_newton.GAUSS_NEWTON.most_rounds
+    regions = POSTERIOR.most_rounds * last // 2
+    return (
+        regression_abc.REGRESSION.most_simulations
+        + (1 + MATCHING.most_starts) * (narrow + regions)
+        + replicates
+    )
 
 
 def match_summaries(
@@ -104,7 +121,7 @@ def match_summaries(
     starts: Starts,
     *,
     order: Order,
-    worlds: int,
+    replicates: int,
     seed: int,
 ) -> Matched:
     """Find the setting whose summaries match those of a recording.
@@ -120,116 +137,122 @@ def match_summaries(
         summaries alone do not find a match.
     order : callable
         Puts states of the model that could change places in order.
-    worlds : int
-        Recordings of the model by which the misfit is judged.
+    replicates : int
+        Recordings of the model by which the discrepancy is judged.
     seed : int
         Of the settings that are simulated.
     """
     recorded = objective.recorded
-    ends = find_ends(objective, parameters, starts, order=order, seed=seed)
+    optima = find_optima(objective, parameters, starts, order=order, seed=seed)
     modes = find_modes(
-        ends,
-        lambda end, number: sample_posterior(
-            objective, recorded, end.emulator, end.solved, seed=seed + 10_000 * (1 + number)
+        optima,
+        lambda optimum, number: sample_posterior(
+            objective,
+            recorded,
+            optimum.emulator,
+            optimum.solution,
+            seed=seed + 10_000 * (1 + number),
         ),
     )
-    repeated = repeat_estimates(lambda one: objective(one, parts=1)[:, 0], modes.best, worlds)
-    return _matched(order, modes, recorded[0], repeated, ends[0].rounds)
+    bootstrap = bootstrap_estimates(
+        lambda one: objective(one, parts=1)[:, 0], modes.best, replicates
+    )
+    return _matched(order, modes, recorded[0], bootstrap, optima[0].rounds)
 
 
-def find_ends(
+def find_optima(
     objective: Summaries,
     parameters: int,
     starts: Starts,
     *,
     order: Order,
     seed: int,
-    hopeless: float = HOPELESS,
+    hopeless: float = MATCHING.hopeless,
     give_up: float = np.inf,
-) -> list[Descended]:
+) -> list[LocalOptimum]:
     """Return the ends of the searches that are worth a posterior, the most likely first.
 
-    The arguments are those of `match_summaries`, the misfit, in summaries, from which on no other
-    start is tried, and that from which on a search is not worth its end (see `descend`). The first
-    search begins where a regression puts the parameters. Even where its errors are large, its
-    centre is closer to the truth than they say: they are mostly those of settings that move unlike
-    the recording. Where the end does not match, the model has more than one place to look, and an
-    end that matches may not be the best that does.
+    The arguments are those of `match_summaries`, the discrepancy, in summaries, from which on no
+    other start is tried, and that from which on a search is not worth its end (see
+    `minimise_discrepancy`). The first search begins where a regression puts the parameters. Even
+    where its errors are large, its centre is closer to the truth than they say: they are mostly
+    those of settings that move unlike the recording. Where the end does not match, the model has
+    more than one place to look, and an end that matches may not be the best that does.
     """
     recorded = objective.recorded[0]
-    box = approach(
+    regression = sequential_regression(
         lambda one: objective(one, parts=1)[:, 0], recorded, parameters, order=order, seed=seed
     )
-    width = WIDE_ERRORS * box.error
+    width = REGRESSION.wide_errors * regression.error
 
-    def search(number: int, start: Floats, width: Floats) -> Descended:
-        return descend(
+    def search(number: int, start: Floats, width: Floats) -> LocalOptimum:
+        return minimise_discrepancy(
             objective, recorded, start, width, seed=seed + 1000 * number, give_up=give_up
         )
 
-    found = [search(1, box.centre, width)]
-    if _matches(found[0]) or _misfit(found[0]) > hopeless:
+    found = [search(1, regression.centre, width)]
+    if _matches(found[0]) or _discrepancy(found[0]) > hopeless:
         return found
-    wide = np.full(parameters, WIDEST)
-    for number, start in enumerate(_distinct(order(starts()))[:MOST_STARTS], 2):
+    wide = np.full(parameters, GAUSS_NEWTON.widest)
+    for number, start in enumerate(_distinct(order(starts()))[: MATCHING.most_starts], 2):
         found.append(search(number, start, wide))
-    found.sort(key=lambda end: end.unlikely)
-    return found[:1] + [end for end in found[1:] if _matches(end)]
+    found.sort(key=lambda optimum: optimum.deviance)
+    return found[:1] + [optimum for optimum in found[1:] if _matches(optimum)]
 
 
-def _matches(found: Descended) -> bool:
-    return _misfit(found) < MATCHES
+def _matches(found: LocalOptimum) -> bool:
+    return _discrepancy(found) < MATCHING.matches
 
 
-def _misfit(found: Descended) -> float:
-    """Return the misfit in summaries; there may be none that vary."""
-    return found.solved.misfit / max(found.emulator.summaries, 1)
+def _discrepancy(found: LocalOptimum) -> float:
+    """Return the discrepancy in summaries; there may be none that vary."""
+    return found.solution.discrepancy / max(found.emulator.summaries, 1)
 
 
 def _matched(
-    order: Order, modes: Modes, recorded: Floats, repeated: Repeated, rounds: int
+    order: Order, modes: Modes, recorded: Floats, bootstrap: BootstrapEstimates, rounds: int
 ) -> Matched:
     best = modes.best
-    usual = repeated.misfits
-    middle, most = float(np.median(usual)), float(np.quantile(usual, MISFIT_QUANTILE))
-    misfit = best.solved.misfit
-    stretch = float(np.sqrt(misfit / middle)) if misfit > most else 1.0
-    wider = stretch * repeated.spread
-    each = [order(_corrected(one.draws, repeated.bias, wider)) for one in modes.places]
+    usual = bootstrap.discrepancies
+    middle, most = float(np.median(usual)), float(np.quantile(usual, MATCHING.typical_quantile))
+    discrepancy = best.solution.discrepancy
+    stretch = float(np.sqrt(discrepancy / middle)) if discrepancy > most else 1.0
+    wider = stretch * bootstrap.spread
+    each = [order(_corrected(one.sample, bootstrap.bias, wider)) for one in modes.places]
     return Matched(
         point=np.median(each[0], axis=0),
-        draws=modes.mixed(each),
-        misfit=misfit,
-        usual_misfit=middle,
-        most_misfit=most,
+        sample=modes.mixed(each),
+        discrepancy=discrepancy,
+        median_discrepancy=middle,
+        upper_discrepancy=most,
         stretch=stretch,
         even_point=np.clip(best.others[0].setting, 0.0, 1.0),
-        profiles=_profiles(order, best, recorded, repeated.bias, wider),
+        profiles=_profiles(order, best, recorded, bootstrap.bias, wider),
         ambiguous=modes.apart(each),
-        unsettled=np.abs(best.moved) > UNSETTLED,
+        unsettled=np.abs(best.moved) > MATCHING.unsettled,
         rounds=rounds,
     )
 
 
-def _corrected(draws: Floats, bias: Floats, wider: Floats) -> Floats:
+def _corrected(sample: Floats, bias: Floats, wider: Floats) -> Floats:
     """Return draws less the bias of the estimate, spread about their median."""
-    middle = np.median(draws, axis=0)
-    return np.clip(middle - bias + wider * (draws - middle), 0.0, 1.0)
+    middle = np.median(sample, axis=0)
+    return np.clip(middle - bias + wider * (sample - middle), 0.0, 1.0)
 
 
 def _profiles(
     order: Order, posterior: Posterior, recorded: Floats, bias: Floats, wider: Floats
 ) -> Profiles | None:
-    """Return how the misfit rises along each parameter, in the measure of the intervals."""
-    setting = posterior.solved.setting
+    """Return how the discrepancy rises along each parameter, in the measure of the intervals."""
+    setting = posterior.solution.setting
     if not np.array_equal(order(setting[None])[0], setting):
         return None
-    found = misfit_profiles(
+    found = discrepancy_profiles(
         posterior.emulator,
         recorded,
-        posterior.solved,
-        wider * posterior.draws.std(axis=0),
-        reach=gauss_newton.REACH,
+        posterior.solution,
+        wider * posterior.sample.std(axis=0),
+        reach=GAUSS_NEWTON.reach,
     )
     place = np.clip(found.place - bias[:, None], 0.0, 1.0)
     return Profiles(place, found.rise / wider[:, None] ** 2)
@@ -237,8 +260,8 @@ def _profiles(
 
 def _distinct(starts: Floats) -> list[Floats]:
     """Return starts that are not close to one before."""
-    kept: list[Floats] = []
+    retained: list[Floats] = []
     for start in starts:
-        if all(np.sqrt(np.mean((start - one) ** 2)) > APART for one in kept):
-            kept.append(start)
-    return kept
+        if all(np.sqrt(np.mean((start - one) ** 2)) > MATCHING.apart for one in retained):
+            retained.append(start)
+    return retained

@@ -1,4 +1,4 @@
-"""From a start to the setting of least misfit, box by box."""
+"""From a start to the setting of least discrepancy, box by box."""
 
 from __future__ import annotations
 
@@ -7,37 +7,50 @@ from typing import Final, NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.calibration.estimation.emulator import LocalEmulator, Solved, fit_emulator
+from driftwalk.calibration.estimation.emulator import LocalEmulator, Solution, fit_emulator
 from driftwalk.calibration.evolution.search import RESOLUTION
 
 Floats = npt.NDArray[np.float64]
 
-COEFFICIENTS: Final = (4, 16)
-"""Simulations of a box for each coefficient of its emulator, and of the last box."""
-FEWEST_SIMULATIONS: Final = (256, 512)
-"""However few the coefficients are: there is a covariance of some hundred summaries, too."""
-FEWEST_ROUNDS: Final = 3
-"""A search neither settles nor is given up before. A true model comes close to the recording in
-two, as a rule."""
-MOST_ROUNDS: Final = 12
-MOST_IN_VAIN: Final = 4
-"""Rounds without a better fit after which the search ends."""
-REACH: Final = 1.25
-"""A solution may lie outside the box by a quarter of it: the quadratic holds a little farther."""
-INSIDE: Final = 0.8
-"""A solution is inside where it lies within this part of the box."""
-WIDEST: Final = 0.15
-NARROWEST: Final = 0.01
-"""Half-widths of boxes, in parts of the ranges."""
-WIDE_STDS: Final = 4.0
-"""A box ends so many standard deviations from its centre."""
-SHRINKS: Final = (0.35, 0.8)
-"""A box becomes smaller by no more than the first, or the second where the solution lay outside."""
-GROWS: Final = 1.5
-SETTLED: Final = 0.7
-"""The search has settled where the next box is no smaller than this part of the last,"""
-USUAL: Final = 1.4
-"""and the misfit no larger than so many times the number of summaries."""
+
+class GaussNewtonPolicy(NamedTuple):
+    """How a trust region moves, shrinks and settles.
+
+    Chosen by hand on simulated recordings; the errors and coverage that come of it are counted by
+    `studies/motion_models/recover.py`.
+    """
+
+    per_coefficient: tuple[int, int] = (4, 16)
+    """Simulations for each coefficient of an emulator: in a trust region, and for the posterior."""
+    fewest_simulations: tuple[int, int] = (256, 512)
+    """Fewest simulations: they also give the covariance of a hundred summaries."""
+    fewest_rounds: int = 3
+    """Rounds before a search settles or is given up. A true model is close after two or three."""
+    most_rounds: int = 12
+    """A bound on the time."""
+    most_in_vain: int = 4
+    """Rounds without a better fit after which the search ends."""
+    reach: float = 1.25
+    """A solution may lie this far from the centre, in half-widths of the trust region."""
+    inside: float = 0.8
+    """A search settles on solutions within this part of the trust region."""
+    widest: float = 0.15
+    """Largest half-width, in parts of the ranges: a quadratic does not hold in more."""
+    narrowest: float = 0.01
+    """Smallest half-width, in parts of the ranges."""
+    wide_stds: float = 4.0
+    """Half-width in standard deviations of the solution."""
+    shrinks: tuple[float, float] = (0.35, 0.8)
+    """Strongest shrinkage per round: of a solution inside, and outside."""
+    grows: float = 1.5
+    """Strongest growth per round."""
+    settled: float = 0.7
+    """A search has settled when the next trust region is at least this part of the last."""
+    typical: float = 1.4
+    """Discrepancy per summary below which a search may settle; the true model has 0.7 to 1.2."""
+
+
+GAUSS_NEWTON: Final = GaussNewtonPolicy()
 
 
 class Simulate(Protocol):
@@ -47,20 +60,20 @@ class Simulate(Protocol):
         """Return summaries of the first parts of a recording, shape (n, parts, summaries)."""
 
 
-class Descended(NamedTuple):
+class LocalOptimum(NamedTuple):
     """Where a search has ended."""
 
     emulator: LocalEmulator
-    solved: Solved
+    solution: Solution
     rounds: int
 
     @property
-    def unlikely(self) -> float:
+    def deviance(self) -> float:
         """-2 log of the likelihood, but for a constant: ends of other searches compare by it."""
-        return self.solved.misfit + self.emulator.log_variance
+        return self.solution.discrepancy + self.emulator.log_variance
 
 
-def descend(
+def minimise_discrepancy(
     simulate: Simulate,
     recorded: Floats,
     start: Floats,
@@ -68,13 +81,13 @@ def descend(
     *,
     seed: int,
     give_up: float = np.inf,
-) -> Descended:
+) -> LocalOptimum:
     """Go from a start to the setting that fits the summaries of a recording best.
 
     Every round draws settings from a box, simulates them, and solves for the recording by the
     emulator that they give (Gauss and Newton's way, with derivatives from a regression). The next
     box lies about the solution, a few standard deviations wide; where the model is far from the
-    recording the deviations are enlarged by the misfit.
+    recording the deviations are enlarged by the discrepancy.
 
     Parameters
     ----------
@@ -87,37 +100,38 @@ def descend(
     seed : int
         Of the settings that are drawn.
     give_up : float
-        Misfit, in summaries, that the search has to reach in `FEWEST_ROUNDS`, or it ends.
+        Discrepancy, in summaries, that the search has to reach in three rounds, or it ends.
     """
-    centre, width = start, np.clip(width, NARROWEST, WIDEST)
+    policy = GAUSS_NEWTON
+    centre, width = start, np.clip(width, policy.narrowest, policy.widest)
     lowest, since, least = np.inf, 0, np.inf
-    for number in range(MOST_ROUNDS):
+    for number in range(policy.most_rounds):
         count = simulations_of(centre.size)[0]
         settings = drawn_settings(centre, width, count, seed + number)
         summaries = simulate(settings, parts=1)[:, 0]
         emulator = fit_emulator(settings, summaries, centre=centre, width=width)
-        solved = emulator.solve(recorded, reach=REACH)
-        misfit = solved.misfit / max(emulator.summaries, 1)
-        least = min(least, misfit)
-        excess = np.sqrt(max(1.0, misfit))
-        far = np.abs(solved.place).max()
-        wanted = np.clip(WIDE_STDS * excess * solved.std, NARROWEST, WIDEST)
-        following = np.clip(wanted, SHRINKS[int(far > 1.0)] * width, GROWS * width)
+        solution = emulator.solve(recorded, reach=policy.reach)
+        discrepancy = solution.discrepancy / max(emulator.summaries, 1)
+        least = min(least, discrepancy)
+        excess = np.sqrt(max(1.0, discrepancy))
+        far = np.abs(solution.place).max()
+        wanted = np.clip(policy.wide_stds * excess * solution.std, policy.narrowest, policy.widest)
+        following = np.clip(wanted, policy.shrinks[int(far > 1.0)] * width, policy.grows * width)
         settled = bool(
-            number + 1 >= FEWEST_ROUNDS
-            and far < INSIDE
-            and (following >= SETTLED * width).all()
-            and (wanted <= GROWS * width).all()
-            and solved.misfit < USUAL * emulator.summaries
+            number + 1 >= policy.fewest_rounds
+            and far < policy.inside
+            and (following >= policy.settled * width).all()
+            and (wanted <= policy.grows * width).all()
+            and solution.discrepancy < policy.typical * emulator.summaries
         )
-        # A quadratic that holds badly leaves much, and then a large misfit looks small.
-        unlikely = solved.misfit + emulator.log_variance
-        lowest, since = min(lowest, unlikely), 0 if unlikely < lowest else since + 1
-        hopeless = number + 1 >= FEWEST_ROUNDS and least > give_up
-        if settled or hopeless or since == MOST_IN_VAIN:
+        # A quadratic that holds badly leaves much, and then a large discrepancy looks small.
+        deviance = solution.discrepancy + emulator.log_variance
+        lowest, since = min(lowest, deviance), 0 if deviance < lowest else since + 1
+        hopeless = number + 1 >= policy.fewest_rounds and least > give_up
+        if settled or hopeless or since == policy.most_in_vain:
             break
-        centre, width = rounded(np.clip(solved.setting, 0.0, 1.0)), rounded(following)
-    return Descended(emulator, solved, number + 1)
+        centre, width = rounded(np.clip(solution.setting, 0.0, 1.0)), rounded(following)
+    return LocalOptimum(emulator, solution, number + 1)
 
 
 def simulations_of(parameters: int) -> tuple[int, int]:
@@ -131,7 +145,9 @@ def simulations_of(parameters: int) -> tuple[int, int]:
     coefficients = 1 + 2 * parameters + parameters * (parameters - 1) // 2
     least = (
         max(each * coefficients, fewest)
-        for each, fewest in zip(COEFFICIENTS, FEWEST_SIMULATIONS, strict=True)
+        for each, fewest in zip(
+            GAUSS_NEWTON.per_coefficient, GAUSS_NEWTON.fewest_simulations, strict=True
+        )
     )
     first, last = (2 ** int(np.ceil(np.log2(one))) for one in least)
     return first, last

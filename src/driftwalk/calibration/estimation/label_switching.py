@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.calibration.held_out.candidates import Contestant
+from driftwalk.calibration.held_out.candidates import Candidate
 from driftwalk.motion import ParticleModel
 
 Floats = npt.NDArray[np.float64]
@@ -15,7 +15,7 @@ Order = Callable[[Floats], Floats]
 """Settings in the unit cube (n, parameters) to the same with their states in order."""
 
 
-def order_of(entry: Contestant) -> Order:
+def label_order(entry: Candidate) -> Order:
     """Return the function that puts the states of a model in order.
 
     It changes nothing where a model has no such states, or they are searched in different ranges.

@@ -3,59 +3,53 @@
 from __future__ import annotations
 
 from concurrent.futures import Executor
-from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk.calibration.estimation import gauss_newton, regression_abc
-from driftwalk.calibration.estimation.estimate import find_ends
+from driftwalk.calibration.estimation.estimate import find_optima
 from driftwalk.calibration.estimation.gauss_newton import rounded
-from driftwalk.calibration.estimation.label_switching import order_of
-from driftwalk.calibration.estimation.synthetic_likelihood import SIMULATIONS, likeness
-from driftwalk.calibration.estimation.wall_clearance import at_the_wall
+from driftwalk.calibration.estimation.label_switching import label_order
+from driftwalk.calibration.estimation.synthetic_likelihood import (
+    SIMULATIONS,
+    synthetic_likelihood_at,
+)
 from driftwalk.calibration.evolution.search import Tell
-from driftwalk.calibration.held_out.candidates import Contestant
+from driftwalk.calibration.held_out.candidates import Candidate, with_contact_clearance
 from driftwalk.calibration.held_out.held_out_score import even_blocks
 from driftwalk.calibration.held_out.recorded import RecordedMotion
-from driftwalk.calibration.ranking.evidence_ranking import USUAL_QUANTILE, Summarised
+from driftwalk.calibration.ranking.evidence_ranking import EVIDENCE, Evidence
 from driftwalk.calibration.summaries.simulated import SummaryObjective
 from driftwalk.core.processors import one_blas_thread
 from driftwalk.sweep import Store
 
 Floats = npt.NDArray[np.float64]
 
-BLUR: Final = 1e-3
-"""Standard deviation by which simulated summaries are blurred. At a wall without noise of the
-camera, some vary by much less, and a micrometre too much of the clearance would count as another
-motion."""
-HOPELESS: Final = 3.0
-"""Misfit, in summaries, from which on a search is given up and no other start is tried. A recording
-of the model itself has 0.7 to 1.2 of it, and models of other motions would take three times as
-long."""
-STARTS: Final = 2
-"""The box of the regression, and the answer of the comparison."""
 
-
-def most_settings(parameters: int, worlds: int) -> int:
-    """Return how many settings `summarised` simulates at most."""
-    wide = regression_abc.SIMULATIONS * regression_abc.MOST_ROUNDS
-    narrow = gauss_newton.simulations_of(parameters)[0] * gauss_newton.MOST_ROUNDS
-    return wide + STARTS * narrow + SIMULATIONS + worlds
+def most_settings(parameters: int, replicates: int) -> int:
+    """Return how many settings `estimate_evidence` simulates at most."""
+    narrow = gauss_newton.simulations_of(parameters)[0] * gauss_newton.GAUSS_NEWTON.most_rounds
+    return (
+        regression_abc.REGRESSION.most_simulations
+        + EVIDENCE.starts * narrow
+        + SIMULATIONS
+        + replicates
+    )
 
 
 @one_blas_thread()
-def summarised(
-    entry: Contestant,
+def estimate_evidence(
+    entry: Candidate,
     motion: RecordedMotion,
     answer: Floats,
     *,
     seed: int,
-    worlds: int,
+    replicates: int,
     executor: Executor | None,
     store: Store | None,
     tell: Tell,
-) -> Summarised:
+) -> Evidence:
     """Match the summaries of a recording with a model, and say how well that went.
 
     Parameters
@@ -68,8 +62,8 @@ def summarised(
         Another setting to begin at, in the unit cube: that of the comparison.
     seed : int
         Of all simulations.
-    worlds : int
-        Simulated recordings by which the misfit is judged.
+    replicates : int
+        Simulated recordings by which the discrepancy is judged.
     executor : concurrent.futures.Executor or None
         Simulates and summarises elsewhere; linear algebra is done here.
     store : Store or None
@@ -77,7 +71,7 @@ def summarised(
     tell : callable
         Called with the settings done and the largest number of them.
     """
-    entry = entry._replace(model=at_the_wall(entry.model, motion))
+    entry = entry._replace(model=with_contact_clearance(entry.model, motion))
     parameters = len(entry.ranges)
     objective = SummaryObjective(
         even_blocks(entry, motion, seed),
@@ -85,32 +79,32 @@ def summarised(
         store=store,
         executor=executor,
         tell=tell,
-        most=most_settings(parameters, worlds),
+        most=most_settings(parameters, replicates),
     )
     simulate = _Blurred(objective, seed)
-    order = order_of(entry)
-    ends = find_ends(
+    order = label_order(entry)
+    optima = find_optima(
         simulate,
         parameters,
         lambda: answer[None],
         order=order,
         seed=seed,
-        hopeless=HOPELESS,
-        give_up=HOPELESS,
+        hopeless=EVIDENCE.hopeless,
+        give_up=EVIDENCE.hopeless,
     )
-    best = ends[0].solved
-    found = likeness(
+    best = optima[0].solution
+    found = synthetic_likelihood_at(
         lambda settings: simulate(settings)[:, 0],
         objective.recorded[0],
         rounded(np.clip(best.setting, 0.0, 1.0)),
-        worlds,
+        replicates,
     )
-    return Summarised(
-        misfit=found.misfit,
-        usual_misfit=float(np.median(found.own_misfits)),
-        most_misfit=float(np.quantile(found.own_misfits, USUAL_QUANTILE)),
+    return Evidence(
+        discrepancy=found.discrepancy,
+        median_discrepancy=float(np.median(found.own_discrepancies)),
+        upper_discrepancy=float(np.quantile(found.own_discrepancies, EVIDENCE.typical_quantile)),
         # Laplace's approximation, with a prior that is even over the ranges.
-        unlikely=found.misfit
+        deviance=found.discrepancy
         + found.log_variance
         - best.log_volume
         - parameters * float(np.log(2.0 * np.pi)),
@@ -128,4 +122,4 @@ class _Blurred:
         """Return the summaries of settings, shape (settings, parts, summaries)."""
         random = np.random.default_rng([self._seed, self._objective.done])
         found = self._objective(settings, parts=parts)
-        return found + BLUR * random.standard_normal(found.shape)
+        return found + EVIDENCE.blur * random.standard_normal(found.shape)

@@ -8,20 +8,15 @@ volume that the draws fill.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.calibration.estimation.gauss_newton import Descended
-from driftwalk.calibration.estimation.posterior import DRAWS, Posterior
+from driftwalk.calibration.estimation.gauss_newton import LocalOptimum
+from driftwalk.calibration.estimation.posterior import POSTERIOR, Posterior
 
 Floats = npt.NDArray[np.float64]
-
-RIVAL: Final = 10.0
-"""Places whose -2 log of the evidence is larger than the least by less than this are not ruled
-out. The covariances come from simulations: a misfit of a hundred has an error of some 5."""
-INTERVAL: Final = (0.05, 0.95)
 
 
 class Modes(NamedTuple):
@@ -37,47 +32,47 @@ class Modes(NamedTuple):
         """The likeliest."""
         return self.places[0]
 
-    def mixed(self, draws: Sequence[Floats]) -> Floats:
+    def mixed(self, sample: Sequence[Floats]) -> Floats:
         """Return 512 draws of all places, each with as many as its share of the evidence."""
-        ends = np.round(DRAWS * np.cumsum(self.weights)).astype(np.int64)
-        counts = np.diff(ends, prepend=0)
+        upper = np.round(POSTERIOR.size * np.cumsum(self.weights)).astype(np.int64)
+        counts = np.diff(upper, prepend=0)
         taken = [
             one[np.linspace(0, len(one) - 1, count).round().astype(np.int64)]
-            for one, count in zip(draws, counts, strict=True)
+            for one, count in zip(sample, counts, strict=True)
         ]
         return np.concatenate(taken)
 
-    def apart(self, draws: Sequence[Floats]) -> npt.NDArray[np.bool_]:
+    def apart(self, sample: Sequence[Floats]) -> npt.NDArray[np.bool_]:
         """Return for which parameters a place has an interval that does not meet the first's."""
-        low, high = np.quantile(np.array(draws), INTERVAL, axis=1)
+        low, high = np.quantile(np.array(sample), (0.05, 0.95), axis=1)
         return np.asarray(((low > high[0]) | (high < low[0])).any(axis=0))
 
 
-def find_modes(ends: Sequence[Descended], sample: Callable[[Descended, int], Posterior]) -> Modes:
+def find_modes(
+    optima: Sequence[LocalOptimum], sample_about: Callable[[LocalOptimum, int], Posterior]
+) -> Modes:
     """Return the posteriors at the ends of searches, those alone that the recording allows.
 
     Parameters
     ----------
-    ends : sequence of Descended
+    optima : sequence of Descended
         Where searches have ended, the likeliest first.
-    sample : callable
+    sample_about : callable
         Returns the posterior about an end, which has a number.
     """
     found: list[Posterior] = []
-    for number, end in enumerate(ends):
-        if any(_reaches(one, end.solved.setting) for one in found):
+    for number, optimum in enumerate(optima):
+        if any(_reaches(one, optimum.solution.setting) for one in found):
             continue
-        posterior = sample(end, number)
-        if not any(_reaches(one, posterior.draws.mean(axis=0)) for one in found):
+        posterior = sample_about(optimum, number)
+        if not any(_reaches(one, posterior.sample.mean(axis=0)) for one in found):
             found.append(posterior)
-    unlikely = np.array([_unlikely(one) for one in found])
-    order = [place for place in np.argsort(unlikely, kind="stable") if _rivals(unlikely, place)]
-    weights = np.exp(-0.5 * (unlikely[order] - unlikely.min()))
+    deviance = np.array([_deviance(one) for one in found])
+    # The covariances come from simulations: a discrepancy of a hundred has an error of some 5. So
+    # a place is ruled out only where it is behind by 10.
+    order = [k for k in np.argsort(deviance, kind="stable") if deviance[k] - deviance.min() < 10.0]
+    weights = np.exp(-0.5 * (deviance[order] - deviance.min()))
     return Modes(tuple(found[place] for place in order), weights / weights.sum())
-
-
-def _rivals(unlikely: Floats, place: int) -> bool:
-    return bool(unlikely[place] - unlikely.min() < RIVAL)
 
 
 def _reaches(posterior: Posterior, setting: Floats) -> bool:
@@ -85,7 +80,7 @@ def _reaches(posterior: Posterior, setting: Floats) -> bool:
     return bool(posterior.region.distances(setting[None])[0] < 1.0)
 
 
-def _unlikely(posterior: Posterior) -> float:
+def _deviance(posterior: Posterior) -> float:
     """Return -2 log of the evidence, but for a constant: of a normal law as wide as the draws."""
-    volume = np.linalg.slogdet(np.atleast_2d(np.cov(posterior.draws.T)))[1]
-    return posterior.solved.misfit + posterior.emulator.log_variance - float(volume)
+    volume = np.linalg.slogdet(np.atleast_2d(np.cov(posterior.sample.T)))[1]
+    return posterior.solution.discrepancy + posterior.emulator.log_variance - float(volume)

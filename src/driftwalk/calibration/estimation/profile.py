@@ -1,4 +1,4 @@
-"""How the misfit rises along one parameter, with all others where they fit best.
+"""How the discrepancy rises along one parameter, with all others where they fit best.
 
 A profile likelihood: where it is a parabola, its curvature gives the same interval as the draws;
 where it is flat, or rises on one side only, the recording does not determine the parameter.
@@ -6,76 +6,73 @@ where it is flat, or rises on one side only, the recording does not determine th
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.calibration.estimation.emulator import LocalEmulator, Solved
+from driftwalk.calibration.estimation.emulator import LocalEmulator, Solution
 
 Floats = npt.NDArray[np.float64]
 
-POINTS: Final = 21
-SPAN: Final = 3.0
-"""A profile ends so many standard deviations of the draws from the setting of least misfit."""
-
 
 class Profiles(NamedTuple):
-    """The least misfit along each parameter."""
+    """The least discrepancy along each parameter."""
 
     place: Floats
     """Values of the parameter in the unit cube, shape (parameters, 21)."""
     rise: Floats
-    """The misfit less its least value, same shape."""
+    """The discrepancy less its least value, same shape."""
 
 
-def misfit_profiles(
-    emulator: LocalEmulator, summaries: Floats, solved: Solved, std: Floats, *, reach: float
+def discrepancy_profiles(
+    emulator: LocalEmulator, summaries: Floats, solution: Solution, std: Floats, *, reach: float
 ) -> Profiles:
-    """Return the profile of the misfit of each parameter.
+    """Return the profile of the discrepancy of each parameter.
 
     Parameters
     ----------
     emulator : LocalEmulator
-        About the setting of least misfit.
+        About the setting of least discrepancy.
     summaries : ndarray, shape (summaries,)
         Of the recording.
-    solved : Solved
-        The setting of least misfit.
+    solution : Solved
+        The setting of least discrepancy.
     std : ndarray, shape (parameters,)
         Of each parameter, in parts of its range: how far a profile goes.
     reach : float
         How far outside the box a setting may lie, 1 is the end of the box.
     """
+    points, span = 21, 3.0
     low = np.maximum(emulator.centre - reach * emulator.width, 0.0)
     high = np.minimum(emulator.centre + reach * emulator.width, 1.0)
     places, rises = [], []
-    for index in range(solved.setting.size):
-        middle = solved.setting[index]
-        first = max(middle - SPAN * std[index], low[index])
-        last = min(middle + SPAN * std[index], high[index])
-        place = np.linspace(first, last, POINTS)
+    for index in range(solution.setting.size):
+        middle = solution.setting[index]
+        first = max(middle - span * std[index], low[index])
+        last = min(middle + span * std[index], high[index])
+        place = np.linspace(first, last, points)
         places.append(place)
-        rises.append(_rise(emulator, summaries, solved, index, place, reach))
+        rises.append(_rise(emulator, summaries, solution, index, place, reach))
     return Profiles(np.array(places), np.array(rises))
 
 
 def _rise(
     emulator: LocalEmulator,
     summaries: Floats,
-    solved: Solved,
+    solution: Solution,
     index: int,
     place: Floats,
     reach: float,
 ) -> Floats:
-    """Return the misfit along one parameter less the least, going out from the solution."""
-    misfit = np.empty(place.size)
-    middle = int(np.abs(place - solved.setting[index]).argmin())
+    """Return the discrepancy along one parameter less the least, going out from the solution."""
+    discrepancy = np.empty(place.size)
+    middle = int(np.abs(place - solution.setting[index]).argmin())
     for way in (range(middle, place.size), range(middle - 1, -1, -1)):
-        start = solved.setting
+        start = solution.setting
         for number in way:
             found = emulator.solve(
                 summaries, reach=reach, start=start, held=(index, float(place[number]))
             )
-            misfit[number], start = found.misfit, found.setting
-    return np.asarray(np.maximum(misfit - solved.misfit, 0.0))
+            discrepancy[number], start = found.discrepancy, found.setting
+    return np.asarray(np.maximum(discrepancy - solution.discrepancy, 0.0))

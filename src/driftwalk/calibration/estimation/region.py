@@ -15,12 +15,19 @@ from driftwalk.calibration.estimation.gauss_newton import rounded
 
 Floats = npt.NDArray[np.float64]
 
-SPREAD: Final = 1.5
-"""Standard deviation of the settings along every axis, in those of the draws."""
-WIDEST: Final = 0.3
-"""A region reaches so far from its centre at most, in parts of the ranges,"""
-NARROWEST: Final = 0.003
-"""and its draws have at least this standard deviation."""
+
+class RegionPolicy(NamedTuple):
+    """How large the region is that is simulated for a posterior sample. Chosen by hand."""
+
+    spread: float = 1.5
+    """Standard deviation of the settings along every axis, in those of the sample."""
+    widest: float = 0.3
+    """Largest half-width, in parts of the ranges: an emulator does not hold in more."""
+    narrowest: float = 0.003
+    """Smallest standard deviation, in parts of the ranges: keeps the covariance regular."""
+
+
+REGION: Final = RegionPolicy()
 
 
 class Region(NamedTuple):
@@ -66,29 +73,29 @@ class Region(NamedTuple):
 
 
 def radius_of(parameters: int) -> float:
-    """Return the radius of an even ball with the standard deviation `SPREAD` along every axis.
+    """Return the radius of an even ball with the standard deviation 1.5 along every axis.
 
     Examples
     --------
     >>> round(radius_of(2), 3)
     3.0
     """
-    return SPREAD * float(np.sqrt(parameters + 2.0))
+    return REGION.spread * float(np.sqrt(parameters + 2.0))
 
 
-def region_about(draws: Floats) -> Region:
+def region_about(sample: Floats) -> Region:
     """Return the region of draws.
 
     Parameters
     ----------
-    draws : ndarray, shape (draws, parameters)
+    sample : ndarray, shape (draws, parameters)
         Settings in the unit cube.
     """
-    parameters = draws.shape[1]
-    covariance = np.atleast_2d(np.cov(draws.T))
-    covariance += NARROWEST**2 * np.eye(parameters)
-    most = WIDEST / radius_of(parameters)
+    parameters = sample.shape[1]
+    covariance = np.atleast_2d(np.cov(sample.T))
+    covariance += REGION.narrowest**2 * np.eye(parameters)
+    most = REGION.widest / radius_of(parameters)
     shrink = np.minimum(1.0, most / np.sqrt(np.diag(covariance)))
     covariance *= np.outer(shrink, shrink)
     root = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
-    return Region(rounded(np.clip(draws.mean(axis=0), 0.0, 1.0)), root)
+    return Region(rounded(np.clip(sample.mean(axis=0), 0.0, 1.0)), root)

@@ -23,20 +23,35 @@ Order = Callable[[Floats], Floats]
 Simulate = Callable[[Floats], Floats]
 """Settings in the unit cube (n, parameters) to summaries (n, summaries)."""
 
-SIMULATIONS: Final = 256
-MOST_ROUNDS: Final = 6
-WIDE_ERRORS: Final = 2.5
-"""The next box ends so many errors from its centre."""
-NARROW: Final = 0.05
-"""Errors at which a box is small enough for `descend`, in parts of the ranges."""
-LOST: Final = 0.2
-"""A regression with larger errors than this has learnt next to nothing: a uniform one has 0.29."""
-RIDGES: Final = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
-BOUNDED: Final = 2.0
-"""Summaries farther from the usual than some of these standard deviations count as that far."""
+
+class RegressionPolicy(NamedTuple):
+    """Sequential regression from the whole ranges to a trust region. Chosen by hand."""
+
+    simulations: int = 256
+    """Of a round: some two for each of a hundred summaries, a power of two."""
+    most_rounds: int = 6
+    """A bound on the time."""
+    wide_errors: float = 2.5
+    """Half-width of the next box in standard errors: 99 % of a normal law."""
+    narrow: float = 0.05
+    """Errors, in parts of the ranges, at which a quadratic holds in the box."""
+    lost: float = 0.2
+    """Larger errors say next to nothing: a uniform distribution has 0.29."""
+    ridges: tuple[float, ...] = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
+    """Ridge penalties that are tried; each parameter takes that of the least error."""
+    bounded: float = 2.0
+    """Summaries count as at most this many standard deviations from the usual."""
+
+    @property
+    def most_simulations(self) -> int:
+        """Simulations of all rounds."""
+        return self.simulations * self.most_rounds
 
 
-class Box(NamedTuple):
+REGRESSION: Final = RegressionPolicy()
+
+
+class RegressionEstimate(NamedTuple):
     """Where the parameters lie."""
 
     centre: Floats
@@ -47,12 +62,12 @@ class Box(NamedTuple):
     @property
     def found(self) -> bool:
         """Whether the summaries say where, for most parameters."""
-        return bool(np.median(self.error) < LOST)
+        return bool(np.median(self.error) < REGRESSION.lost)
 
 
-def approach(
+def sequential_regression(
     simulate: Simulate, recorded: Floats, parameters: int, *, order: Order, seed: int
-) -> Box:
+) -> RegressionEstimate:
     """Return the box in which the parameters of a recording lie.
 
     Parameters
@@ -78,28 +93,29 @@ def approach(
     --------
     >>> def simulate(settings):
     ...     return np.column_stack([settings[:, 0] ** 2, settings[:, 0] + settings[:, 1]])
-    >>> box = approach(simulate, np.array([0.25, 1.2]), 2, order=np.asarray, seed=1)
-    >>> box.centre.round(2).tolist()
+    >>> recorded = np.array([0.25, 1.2])
+    >>> found = sequential_regression(simulate, recorded, 2, order=np.asarray, seed=1)
+    >>> found.centre.round(2).tolist()
     [0.5, 0.7]
     """
     from scipy.stats import qmc
 
     low, high = np.zeros(parameters), np.ones(parameters)
-    box = Box(0.5 * (low + high), np.full(parameters, np.sqrt(1.0 / 12.0)))
-    for number in range(MOST_ROUNDS):
-        drawn = qmc.Sobol(parameters, seed=seed + number).random(SIMULATIONS)
+    regression = RegressionEstimate(0.5 * (low + high), np.full(parameters, np.sqrt(1.0 / 12.0)))
+    for number in range(REGRESSION.most_rounds):
+        drawn = qmc.Sobol(parameters, seed=seed + number).random(REGRESSION.simulations)
         settings = order(rounded(low + (high - low) * drawn))
         summaries = simulate(settings)
         _require_change(summaries)
-        before, box = box, _regressed(settings, summaries, recorded)
-        if box.error.max() < NARROW or (number and not box.found):
+        before, regression = regression, _ridge_regression(settings, summaries, recorded)
+        if regression.error.max() < REGRESSION.narrow or (number and not regression.found):
             break
-        if number and (box.error > 0.9 * before.error).all():
+        if number and (regression.error > 0.9 * before.error).all():
             break
-        reach = WIDE_ERRORS * box.error
-        low = np.clip(box.centre - reach, 0.0, 1.0 - NARROW)
-        high = np.clip(box.centre + reach, low + 0.2 * NARROW, 1.0)
-    return box
+        reach = REGRESSION.wide_errors * regression.error
+        low = np.clip(regression.centre - reach, 0.0, 1.0 - REGRESSION.narrow)
+        high = np.clip(regression.centre + reach, low + 0.2 * REGRESSION.narrow, 1.0)
+    return regression
 
 
 def _require_change(summaries: Floats) -> None:
@@ -112,7 +128,7 @@ def _require_change(summaries: Floats) -> None:
         )
 
 
-def _regressed(settings: Floats, summaries: Floats, recorded: Floats) -> Box:
+def _ridge_regression(settings: Floats, summaries: Floats, recorded: Floats) -> RegressionEstimate:
     """Return the parameters that a regression on summaries gives a recording, and its errors.
 
     Of several ridges each parameter has that of the smallest error; errors are those of leaving
@@ -122,7 +138,7 @@ def _regressed(settings: Floats, summaries: Floats, recorded: Floats) -> Box:
     used = spread > 0.0
     middle, scale = np.median(summaries, axis=0)[used], spread[used]
     known, asked = (
-        BOUNDED * np.tanh((one[..., used] - middle) / (BOUNDED * scale))
+        REGRESSION.bounded * np.tanh((one[..., used] - middle) / (REGRESSION.bounded * scale))
         for one in (summaries, recorded)
     )
     apart = ((known - asked) ** 2).mean(axis=1)
@@ -131,7 +147,7 @@ def _regressed(settings: Floats, summaries: Floats, recorded: Floats) -> Box:
     row = np.concatenate([[1.0], asked])
     gram, target = (table.T * weight) @ table, (table.T * weight) @ settings
     errors, answers = [], []
-    for ridge in RIDGES:
+    for ridge in REGRESSION.ridges:
         penalty = np.full(row.size, ridge)
         penalty[0] = 1e-9
         inverse = np.linalg.inv(gram + np.diag(penalty))
@@ -143,4 +159,4 @@ def _regressed(settings: Floats, summaries: Floats, recorded: Floats) -> Box:
     best = np.argmin(errors, axis=0)
     each = np.arange(settings.shape[1])
     centre = np.clip(np.array(answers)[best, each], 0.0, 1.0)
-    return Box(centre, np.sqrt(np.array(errors)[best, each]))
+    return RegressionEstimate(centre, np.sqrt(np.array(errors)[best, each]))

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.calibration.estimation.determined import DETERMINED
 from driftwalk.calibration.estimation.estimate import Matched
 from driftwalk.calibration.estimation.run import Estimation
-from driftwalk.calibration.held_out.candidates import Contestant
+from driftwalk.calibration.held_out.candidates import Candidate
 from driftwalk.calibration.held_out.checks import CHECKS, UNITS
-from driftwalk.calibration.held_out.held_out_score import JUDGED, without_error
+from driftwalk.calibration.held_out.held_out_score import HELD_OUT_REPLICATES, without_error
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.calibration.ranking.result import motion_warnings
 from driftwalk.calibration.ranking.verdict import verdict_of
@@ -28,21 +29,18 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
-AT_THE_END: Final = 0.01
-"""A value is at the end of its range within this part of it."""
-
 
 def build_model_calibration(
     found: Estimation,
-    entry: Contestant,
+    entry: Candidate,
     motion: RecordedMotion,
     study: Study,
     recording: xr.Dataset,
     warnings: Sequence[str],
 ) -> xr.Dataset:
     """Return the dataset of a calibration of many parameters."""
-    ranges, judged = entry.ranges, found.judged
-    verdict = verdict_of(judged, motion, baseline=False)
+    ranges, held_out = entry.ranges, found.held_out
+    verdict = verdict_of(held_out, motion, baseline=False)
     count = len(ranges)
     known = found.known
     data: dict[str, Any] = {
@@ -59,17 +57,17 @@ def build_model_calibration(
         "unit": ("parameter", texts([one.unit for one in ranges])),
         "scale": ("parameter", texts([one.scale for one in ranges])),
         "meaning": ("parameter", texts([one.meaning or one.label for one in ranges])),
-        "held_out_distance": ("aspect", judged.held),
-        "trained_distance": ("aspect", judged.trained),
+        "held_out_distance": ("aspect", held_out.held),
+        "trained_distance": ("aspect", held_out.trained),
         "own_distance": ("aspect", motion.own),
         "floor": ("aspect", motion.held.floor),
         "check_recorded": ("check", motion.recorded_checks),
-        "check_median": ("check", np.median(judged.checks, axis=0)),
-        "check_low": ("check", judged.checks.min(axis=0)),
-        "check_high": ("check", judged.checks.max(axis=0)),
+        "check_median": ("check", np.median(held_out.checks, axis=0)),
+        "check_low": ("check", held_out.checks.min(axis=0)),
+        "check_high": ("check", held_out.checks.max(axis=0)),
         "check_unit": ("check", texts(UNITS)),
-        "score": ((), judged.score),
-        "score_std": ((), without_error(judged.without)),
+        "score": ((), held_out.score),
+        "score_std": ((), without_error(held_out.without)),
         "explained": ((), verdict.explained),
         "verdict": ((), np.array(verdict.text)),
         **_stages(found, entry),
@@ -90,7 +88,7 @@ def build_model_calibration(
         "step_interval_s": float(motion.plan.short.step_interval),
         "duration_s": motion.duration,
         "position_noise_m": motion.like.camera.position_noise,
-        "worlds": JUDGED,
+        "worlds": HELD_OUT_REPLICATES,
         "seed": study.calibration.seed,
         "arena": study.tank.to_arena_json(),
         "source": str(recording.attrs.get("source", "")),
@@ -99,7 +97,7 @@ def build_model_calibration(
     return build_dataset("model_calibration", data, coords, attrs)
 
 
-def _stages(found: Estimation, entry: Contestant) -> dict[str, Any]:
+def _stages(found: Estimation, entry: Candidate) -> dict[str, Any]:
     """Return what the two stages left, where they were made."""
     data: dict[str, Any] = {}
     if found.searched is not None:
@@ -108,11 +106,11 @@ def _stages(found: Estimation, entry: Contestant) -> dict[str, Any]:
     matched = found.matched
     if matched is not None:
         data |= {
-            "draws": (("draw", "parameter"), _values(entry, matched.draws)),
+            "draws": (("draw", "parameter"), _values(entry, matched.sample)),
             "matched_score": ((), found.scores["matched"]),
-            "misfit": ((), matched.misfit),
-            "usual_misfit": ((), matched.usual_misfit),
-            "most_misfit": ((), matched.most_misfit),
+            "misfit": ((), matched.discrepancy),
+            "usual_misfit": ((), matched.median_discrepancy),
+            "most_misfit": ((), matched.upper_discrepancy),
             "interval_stretch": ((), matched.stretch),
         }
         if matched.profiles is not None:
@@ -122,20 +120,20 @@ def _stages(found: Estimation, entry: Contestant) -> dict[str, Any]:
     return data
 
 
-def _values(entry: Contestant, points: Floats) -> Floats:
+def _values(entry: Candidate, points: Floats) -> Floats:
     """Return the values at points of the unit cube, shape (points, parameters)."""
     columns = [one.value_at(share) for one, share in zip(entry.ranges, points.T, strict=True)]
     return np.stack(columns, axis=1)
 
 
-def _fixed(entry: Contestant) -> dict[str, float]:
+def _fixed(entry: Candidate) -> dict[str, float]:
     model = entry.model
     if not isinstance(model, ParticleModel):
         return {}
     return {**model.fixed, "clearance": model.clearance}
 
 
-def _said(found: Estimation, entry: Contestant, explained: bool) -> list[str]:
+def _said(found: Estimation, entry: Candidate, explained: bool) -> list[str]:
     """Return the warnings of the estimate."""
     said = []
     matched = found.matched
@@ -147,10 +145,11 @@ def _said(found: Estimation, entry: Contestant, explained: bool) -> list[str]:
         )
     elif matched is not None and not matched.usual:
         said.append(
-            f"the summaries of the motion differ from the model's: a misfit of {matched.misfit:.0f}"
-            f" where its own recordings come to {matched.usual_misfit:.0f} (95 % below "
-            f"{matched.most_misfit:.0f}); the intervals are {matched.stretch:.1f} times as wide as "
-            f"the draws{', and no parameter is determined' if matched.unlike else ''}"
+            "the summaries of the motion differ from the model's: a misfit of "
+            f"{matched.discrepancy:.0f} where its own recordings come to "
+            f"{matched.median_discrepancy:.0f} (95 % below {matched.upper_discrepancy:.0f}); the "
+            f"intervals are {matched.stretch:.1f} times as wide as the draws"
+            f"{', and no parameter is determined' if matched.unlike else ''}"
         )
     if matched is not None and found.known is not None:
         said += _open(matched, entry)
@@ -161,7 +160,7 @@ def _said(found: Estimation, entry: Contestant, explained: bool) -> list[str]:
     ended = [
         one.name
         for one, share in zip(entry.ranges, found.point, strict=True)
-        if min(share, 1.0 - share) < AT_THE_END
+        if min(share, 1.0 - share) < DETERMINED.range_end
     ]
     if ended:
         said.append(
@@ -170,7 +169,7 @@ def _said(found: Estimation, entry: Contestant, explained: bool) -> list[str]:
     return said
 
 
-def _open(matched: Matched, entry: Contestant) -> list[str]:
+def _open(matched: Matched, entry: Candidate) -> list[str]:
     """Return why parameters are not determined whatever their intervals are."""
     said = []
     names = np.array([one.name for one in entry.ranges])

@@ -11,16 +11,26 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.calibration.estimation.determined import Determination, determination
-from driftwalk.calibration.estimation.estimate import Matched, match_summaries, most_simulations
-from driftwalk.calibration.estimation.label_switching import Order, order_of
-from driftwalk.calibration.evolution import AspectObjective, Budget, Found, search_minimum
-from driftwalk.calibration.evolution.kept import KeptScores
-from driftwalk.calibration.held_out.candidates import Contestant
+from driftwalk.calibration.estimation.estimate import (
+    MATCHING,
+    Matched,
+    match_summaries,
+    most_simulations,
+)
+from driftwalk.calibration.estimation.label_switching import Order, label_order
+from driftwalk.calibration.evolution import (
+    AspectObjective,
+    Budget,
+    CachedObjective,
+    SearchResult,
+    search_minimum,
+)
+from driftwalk.calibration.held_out.candidates import Candidate
 from driftwalk.calibration.held_out.held_out_score import (
-    Judged,
+    HeldOutScore,
     even_blocks,
-    judge_setting,
     require_numbers,
+    score_setting,
 )
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.calibration.summaries.simulated import SummaryObjective
@@ -33,10 +43,6 @@ Floats = npt.NDArray[np.float64]
 Tell = Callable[[str, int, int], None]
 
 SEARCH: Final = Budget(design=256, starts=3, short=20, long=30, replicates=2, retest=8)
-WEIGHED: Final = 20
-"""Worlds by which the answers of two stages are compared."""
-AS_CLOSE: Final = 1.25
-"""The second stage's answer counts where it is no farther than the first's by this factor."""
 
 
 class Stores(Protocol):
@@ -62,7 +68,7 @@ class Estimation:
         Mean of distance over floor in the even blocks of time, of each answer.
     known : Determination or None
         How well the parameters are determined; None where the second stage does not count.
-    judged : Judged
+    held_out : Judged
         The answer for the even blocks, judged on the odd ones.
     """
 
@@ -71,16 +77,16 @@ class Estimation:
     matched: Matched | None
     scores: Mapping[str, float]
     known: Determination | None
-    judged: Judged
+    held_out: HeldOutScore
 
 
 @one_blas_thread()
 def estimate(
-    entry: Contestant,
+    entry: Candidate,
     motion: RecordedMotion,
     *,
     seed: int,
-    worlds: int,
+    replicates: int,
     confidence: float,
     executor: Executor | None = None,
     stores: Stores,
@@ -92,8 +98,8 @@ def estimate(
     matches summaries of the whole recording. Where these are like those of the model's own
     recordings, the search is not needed. Where they are not, both are made, and the answer of the
     summaries counts only if it is as close in the six distances: summaries that a model cannot give
-    at once pull it away from the motion. It determines parameters only if the misfit is not more
-    than four times the usual one: values of another model are no measurement.
+    at once pull it away from the motion. It determines parameters only if the discrepancy is not
+    more than four times the usual one: values of another model are no measurement.
 
     Parameters
     ----------
@@ -103,8 +109,8 @@ def estimate(
         The recording.
     seed : int
         Of the search and of all simulations.
-    worlds : int
-        Recordings of the model by which the misfit of the summaries is judged; 0 leaves the
+    replicates : int
+        Recordings of the model by which the discrepancy of the summaries is judged; 0 leaves the
         summaries out.
     confidence : float
         Of the intervals.
@@ -122,15 +128,15 @@ def estimate(
     """
     even = even_blocks(entry, motion, seed)
     require_numbers(even)
-    order = order_of(entry)
+    order = label_order(entry)
     search = _Search(even, stores, tell)
     matched = (
-        _matched(even, motion, search, order, worlds, executor, stores, tell)
-        if worlds > 1
+        _matched(even, motion, search, order, replicates, executor, stores, tell)
+        if replicates > 1
         else None
     )
     if matched is None or not matched.usual:
-        search.ends()
+        search.optima()
     answers = {
         **({} if search.best is None else {"searched": order(search.best[None])[0]}),
         **({} if matched is None else {"matched": matched.point, "even": matched.even_point}),
@@ -145,7 +151,7 @@ def estimate(
             answers["searched"], scores["searched"] = longer["longer"], score
     known = None
     if matched is not None and counts:
-        known = determination(matched.draws, entry.ranges, confidence=confidence)
+        known = determination(matched.sample, entry.ranges, confidence=confidence)
         open_ones = matched.ambiguous | matched.unsettled | matched.unlike
         known = known._replace(determined=known.determined & ~open_ones)
     # The odd blocks judge the better answer that has not seen them.
@@ -158,7 +164,7 @@ def estimate(
         matched=matched,
         scores=scores,
         known=known,
-        judged=judge_setting(even, motion, answers[best]),
+        held_out=score_setting(even, motion, answers[best]),
     )
 
 
@@ -170,7 +176,7 @@ def _counts(matched: Matched | None, scores: Mapping[str, float]) -> bool:
     """
     if matched is None:
         return False
-    return matched.usual or scores["matched"] <= AS_CLOSE * scores["searched"]
+    return matched.usual or scores["matched"] <= MATCHING.as_close * scores["searched"]
 
 
 class _Search:
@@ -179,25 +185,25 @@ class _Search:
     def __init__(self, even: AspectObjective, stores: Stores, tell: Tell) -> None:
         self.best: Floats | None = None
         self._even, self._stores, self._tell = even, stores, tell
-        self._ends: Floats | None = None
+        self._optima: Floats | None = None
 
-    def ends(self) -> Floats:
+    def optima(self) -> Floats:
         """Return the ends of the searches, the best first."""
-        if self._ends is None:
+        if self._optima is None:
             found = self._search("search", SEARCH)
             self.best = found.best
-            self._ends = found.settings[np.argsort(found.ends, kind="stable")]
-        return self._ends
+            self._optima = found.settings[np.argsort(found.optimum_scores, kind="stable")]
+        return self._optima
 
     def longer(self) -> Floats:
         """Return the answer of a longer search."""
         return self._search("longer-search", Budget()).best
 
-    def _search(self, stage: str, budget: Budget) -> Found:
+    def _search(self, stage: str, budget: Budget) -> SearchResult:
         count = len(self._even.ranges)
         most = budget.evaluations(count)
         return search_minimum(
-            KeptScores(self._even, self._stores(stage, {"budget": vars(budget)})),
+            CachedObjective(self._even, self._stores(stage, {"budget": vars(budget)})),
             count,
             budget=budget,
             seed=self._even.seed,
@@ -210,7 +216,7 @@ def _matched(
     motion: RecordedMotion,
     search: _Search,
     order: Order,
-    worlds: int,
+    replicates: int,
     executor: Executor | None,
     stores: Stores,
     tell: Tell,
@@ -219,21 +225,21 @@ def _matched(
     objective = SummaryObjective(
         even,
         motion,
-        store=stores("summaries", {"worlds": worlds}),
+        store=stores("summaries", {"worlds": replicates}),
         executor=executor,
         tell=lambda done, most: tell("summaries", done, most),
-        most=most_simulations(count, worlds),
+        most=most_simulations(count, replicates),
     )
     return match_summaries(
-        objective, count, search.ends, order=order, worlds=worlds, seed=even.seed
+        objective, count, search.optima, order=order, replicates=replicates, seed=even.seed
     )
 
 
 def _weighed(even: AspectObjective, answers: Mapping[str, Floats]) -> dict[str, float]:
-    """Return the scores of answers in the even blocks, from the same random numbers."""
+    """Return scores in the even blocks, of 20 replicates with common random numbers."""
     return {
         name: float(
-            even.reference.overall(even.distances(point[None], WEIGHED, stage="weighed")[0]).mean()
+            even.reference.overall(even.distances(point[None], 20, stage="weighed")[0]).mean()
         )
         for name, point in answers.items()
     }

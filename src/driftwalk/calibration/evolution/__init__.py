@@ -2,13 +2,19 @@
 
 from driftwalk.calibration.evolution.objective import AspectObjective, wall_distance
 from driftwalk.calibration.evolution.ranges import Scales, recorded_ranges, scales_of
-from driftwalk.calibration.evolution.search import Budget, Found, search_minimum
+from driftwalk.calibration.evolution.search import (
+    Budget,
+    CachedObjective,
+    SearchResult,
+    search_minimum,
+)
 
 __all__ = [
     "AspectObjective",
     "Budget",
-    "Found",
+    "CachedObjective",
     "Scales",
+    "SearchResult",
     "recorded_ranges",
     "scales_of",
     "search_minimum",

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.run_stages import tell_nobody
+from driftwalk.sweep import Store, WorkUnit, run_sweep
 
 Floats = npt.NDArray[np.float64]
 Objective = Callable[[Floats, int, int], Floats]
@@ -25,8 +26,6 @@ Tell = Callable[[int, int], None]
 RESOLUTION: Final = 2.0**-20
 """Settings are multiples of this part of a range: the last bits of linear algebra, which differ
 between machines, then rarely reach a simulation."""
-APART: Final = 0.15
-"""Two starts are at least so far from each other, in parts of the ranges (root mean square)."""
 
 
 @dataclass(frozen=True)
@@ -63,19 +62,54 @@ class Budget:
         return self.design + generations * population(parameters) + self.starts + 1
 
 
-class Found(NamedTuple):
+class SearchResult(NamedTuple):
     """The answer of a search."""
 
     best: Floats
     """Best setting, in the unit cube."""
     score: float
     """Its mean score, from worlds that the search has not seen."""
-    ends: Floats
+    optimum_scores: Floats
     """Scores at the ends of the short searches and of the long one: how much they differ says how
     far the search is to be trusted."""
     evaluations: int
     settings: Floats
     """The settings at these ends, shape (ends, parameters)."""
+
+
+@dataclass(frozen=True, eq=False)
+class CachedObjective:
+    """An objective that computes nothing twice.
+
+    A search asks for the same settings in the same order whenever it is run, so a call is known by
+    the numbers of its evaluations.
+
+    Attributes
+    ----------
+    objective : callable
+        Scores of settings, see `search_minimum`.
+    store : Store or None
+        Where they are kept; None keeps nothing.
+
+    Examples
+    --------
+    >>> from driftwalk.sweep import MemoryStore
+    >>> retained = CachedObjective(lambda settings, *_: settings.sum(axis=1), MemoryStore())
+    >>> retained(np.array([[0.25, 0.5]]), 0, 2).tolist()
+    [0.75]
+    """
+
+    objective: Objective
+    store: Store | None
+
+    def __call__(self, settings: Floats, first: int, replicates: int) -> Floats:
+        """Return the scores of settings, shape (settings,)."""
+        unit = WorkUnit(first, first + len(settings), {})
+
+        def compute(_: WorkUnit) -> dict[str, Floats]:
+            return {"score": np.asarray(self.objective(settings, first, replicates))}
+
+        return np.asarray(run_sweep(compute, [unit], store=self.store)["score"])
 
 
 def population(parameters: int) -> int:
@@ -97,7 +131,7 @@ def search_minimum(
     budget: Budget | None = None,
     seed: int = 0,
     tell: Tell | None = None,
-) -> Found:
+) -> SearchResult:
     """Search the unit cube for the smallest mean score.
 
     Parameters
@@ -133,22 +167,22 @@ class _Search:
         self.done = 0
         self.most = budget.evaluations(parameters)
 
-    def run(self) -> Found:
+    def run(self) -> SearchResult:
         """Search, and test again."""
         design = self._design()
         scores = self._scores(design, self.budget.replicates)
         starts = self._apart(design, scores)
-        ends = [
+        optima = [
             self._evolve(start, 0.12, self.budget.short, number)
             for number, start in enumerate(starts, 1)
         ]
-        first = self._retest(np.array(ends))
-        long = self._evolve(ends[int(first.argmin())], 0.06, self.budget.long, 0)
+        first = self._retest(np.array(optima))
+        long = self._evolve(optima[int(first.argmin())], 0.06, self.budget.long, 0)
         last = self._retest(long[None])
-        means = np.array([*ends, long])
+        means = np.array([*optima, long])
         found = np.array([*first, *last])
         best = int(found.argmin())
-        return Found(means[best], float(found[best]), found, self.done, means)
+        return SearchResult(means[best], float(found[best]), found, self.done, means)
 
     def _design(self) -> Floats:
         from scipy.stats import qmc
@@ -160,7 +194,8 @@ class _Search:
         """Return the best settings of the design that are not close to each other."""
         chosen: list[Floats] = []
         for index in np.argsort(scores, kind="stable"):
-            near = [np.sqrt(np.mean((design[index] - one) ** 2)) < APART for one in chosen]
+            # Closer starts would end in the same valley.
+            near = [np.sqrt(np.mean((design[index] - one) ** 2)) < 0.15 for one in chosen]
             if not any(near):
                 chosen.append(design[index])
             if len(chosen) == self.budget.starts:

@@ -25,7 +25,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.calibration.grid.grid_map import Progress
-from driftwalk.calibration.grid.grid_refinement import Refined
+from driftwalk.calibration.grid.grid_refinement import RefinedMap
 from driftwalk.calibration.grid.surface import (
     Optimum,
     Smoother,
@@ -41,15 +41,29 @@ from driftwalk.comparison.statistic import distances_among
 from driftwalk.core.processors import map_in_threads
 from driftwalk.sweep import Store, WorkUnit, grid, run_sweep
 
-SURFACE_INTERVALS: Final[dict[int, int]] = {1: 32, 2: 10}
-"""Intervals along each axis of the stored surface, by the number of parameters."""
-LEAST_BANDWIDTH_STEPS: Final = 1.5
-KEPT: Final = 1.5
-"""Places less than this many floors above the minimum are kept of the stored surface."""
-SURFACE_REPLICATES = 4
-"""Simulations of every setting of the stored surface; a recording meets one of them."""
-RECORDINGS_PER_UNIT = 10
-FLOOR_REFERENCES = 8
+
+class BootstrapPolicy(NamedTuple):
+    """The stored surface on which bootstrap recordings are estimated.
+
+    Sizes are a compromise of time and noise, chosen by hand. The coverage of the region is
+    counted by `studies/coverage`.
+    """
+
+    surface_intervals: tuple[int, int] = (32, 10)
+    """Intervals along an axis, with one and with two parameters."""
+    least_bandwidth_steps: float = 1.5
+    """Least bandwidth in steps: a quadratic needs three settings along each axis."""
+    retained_floors: float = 1.5
+    """Height above the minimum, in floors, below which places are retained."""
+    surface_replicates: int = 4
+    """Simulations of every setting; a recording meets one of them, in turn."""
+    recordings_per_unit: int = 10
+    """Recordings of a work unit; all of a unit meet the same replicate."""
+    floor_references: int = 8
+    """Recordings whose distances to the others give the noise floor."""
+
+
+BOOTSTRAP: Final = BootstrapPolicy()
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +72,7 @@ class StoredSurface:
 
     axes: Axes
     """Axes of its lattice."""
-    kept: npt.NDArray[np.bool_]
+    retained: npt.NDArray[np.bool_]
     """Points of the lattice where a recording's estimate may lie."""
     matrix: Floats
     """Weights of the settings in the value at each of them, (points, settings)."""
@@ -71,20 +85,20 @@ class StoredSurface:
     statistic: Statistic
     threads: int
 
-    def reliefs(self, recordings: StepTable, replicate: int) -> Floats:
+    def heights_in_floors(self, recordings: StepTable, replicate: int) -> Floats:
         """Return each recording's surface above its minimum, in floors, (recording, *lattice).
 
         It is infinite where nothing is kept.
         """
-        met = _replicate(self.replicates, self.apart.size, replicate % SURFACE_REPLICATES)
+        met = _replicate(self.replicates, self.apart.size, replicate % BOOTSTRAP.surface_replicates)
         distance = self.statistic.matrix(recordings, met, threads=self.threads)
         score = (distance - 0.5 * self.apart) @ self.matrix.T
-        surface = np.full((len(distance), *self.kept.shape), np.inf)
-        surface[:, self.kept] = (score - score.min(axis=1, keepdims=True)) / self.floor
+        surface = np.full((len(distance), *self.retained.shape), np.inf)
+        surface[:, self.retained] = (score - score.min(axis=1, keepdims=True)) / self.floor
         return surface
 
 
-def build_surface(problem: Problem, refined: Refined) -> StoredSurface:
+def build_surface(problem: Problem, refined: RefinedMap) -> StoredSurface:
     """Simulate settings of the refined window again, to estimate recordings against them.
 
     Parameters
@@ -101,42 +115,42 @@ def build_surface(problem: Problem, refined: Refined) -> StoredSurface:
     """
     from scipy.ndimage import binary_dilation
 
-    intervals = SURFACE_INTERVALS[len(refined.map.axes)]
+    intervals = BOOTSTRAP.surface_intervals[len(refined.map.axes) - 1]
     axes = tuple(
         np.linspace(axis[0], axis[-1], min(intervals + 1, axis.size)) for axis in refined.map.axes
     )
     bandwidth = [
-        max(width, LEAST_BANDWIDTH_STEPS * float(np.ptp(axis)) / max(axis.size - 1, 1))
+        max(width, BOOTSTRAP.least_bandwidth_steps * float(np.ptp(axis)) / max(axis.size - 1, 1))
         for axis, width in zip(axes, refined.bandwidth, strict=True)
     ]
     lattice = lattice_of(axes)
     height, floor = (
-        _between(refined.landscape.smoother.axes, values, lattice)
-        for values in (refined.landscape.height, refined.landscape.floor)
+        _between(refined.energy_score.smoother.axes, values, lattice)
+        for values in (refined.energy_score.height, refined.energy_score.floor)
     )
     # Settings around them, too: a quadratic needs three along each axis, however narrow the valley.
-    low = at_settings(height) <= KEPT
-    low[nearest_point(axes, refined.landscape.optimum.point)] = True
+    low = at_settings(height) <= BOOTSTRAP.retained_floors
+    low[nearest_point(axes, refined.energy_score.optimum.point)] = True
     simulated = binary_dilation(low, structure=np.ones((3,) * low.ndim, dtype=np.bool_))
     smoother = make_smoother(axes, bandwidth=bandwidth, weights=simulated.astype(float))
     # Weights add up to 1 wherever there are settings to say what the surface is.
     supported = smoother.matrix.sum(axis=1).reshape(height.shape) > 0.99
-    kept = (height <= KEPT) & supported
+    retained = (height <= BOOTSTRAP.retained_floors) & supported
     cells = np.flatnonzero(simulated)
     settings = [values.ravel()[cells] for values in np.meshgrid(*axes, indexing="ij")]
-    replicates = simulated_steps(
+    replicates, _ = simulated_steps(
         problem,
-        [np.tile(values, SURFACE_REPLICATES) for values in settings],
+        [np.tile(values, BOOTSTRAP.surface_replicates) for values in settings],
         stage="surface",
         replicates=1,
     )
     return StoredSurface(
         lattice,
-        kept,
-        smoother.matrix[kept.ravel()][:, cells],
+        retained,
+        smoother.matrix[retained.ravel()][:, cells],
         replicates,
         _apart(problem, replicates, cells.size),
-        floor[kept],
+        floor[retained],
         problem.statistic,
         problem.like.threads,
     )
@@ -177,25 +191,7 @@ def _apart(problem: Problem, table: StepTable, settings: int) -> Floats:
 
 
 def simulated_steps(
-    problem: Problem,
-    settings: Sequence[npt.ArrayLike],
-    *,
-    stage: str,
-    replicates: int,
-) -> StepTable:
-    """Simulate settings and return the steps of every world, replicates fastest."""
-    return _scored_steps(problem, settings, stage, replicates)[0]
-
-
-def recordings_at(
-    problem: Problem, optimum: Optimum, *, stage: str, count: int
-) -> tuple[StepTable, Floats]:
-    """Simulate recordings at an optimum; return their steps and distances to the real one."""
-    return _scored_steps(problem, optimum.point, stage, count)
-
-
-def _scored_steps(
-    problem: Problem, settings: Sequence[npt.ArrayLike], stage: str, replicates: int
+    problem: Problem, settings: Sequence[npt.ArrayLike], *, stage: str, replicates: int
 ) -> tuple[StepTable, Floats]:
     """Simulate settings; return the steps of every world and its distance to the recording."""
     found = score_settings(
@@ -256,14 +252,16 @@ def run_bootstrap(
     progress : callable, optional
         Called with the number of finished recordings and the total.
     """
-    recordings, to_recording = recordings_at(problem, optimum, stage="bootstrap", count=count)
+    recordings, to_recording = simulated_steps(
+        problem, optimum.point, stage="bootstrap", replicates=count
+    )
     names = tuple(parameter.name for parameter in problem.parameters)
     alone = surface if executor is None else replace(surface, threads=1)
     truth = nearest_point(surface.axes, optimum.point)
     function = _Estimates(recordings, alone, names, truth, floor)
-    units = grid(recording=np.arange(count)).units(RECORDINGS_PER_UNIT)
+    units = grid(recording=np.arange(count)).units(BOOTSTRAP.recordings_per_unit)
     estimates = run_sweep(function, units, store=store, executor=executor, progress=progress)
-    few = min(FLOOR_REFERENCES, count // 2)
+    few = min(BOOTSTRAP.floor_references, count // 2)
     among = problem.statistic.matrix(
         recordings.rows(slice(0, few)),
         recordings.rows(slice(few, count)),
@@ -293,7 +291,7 @@ class _Estimates:
 
     def __call__(self, unit: WorkUnit) -> dict[str, npt.NDArray[Any]]:
         rows = self.recordings.rows(slice(unit.start, unit.stop))
-        found = self.surface.reliefs(rows, unit.start // RECORDINGS_PER_UNIT)
+        found = self.surface.heights_in_floors(rows, unit.start // BOOTSTRAP.recordings_per_unit)
         columns = np.array([lowest_point(self.surface.axes, one) for one in found]).T
         return {
             **dict(zip(self.names, columns, strict=True)),
@@ -301,10 +299,10 @@ class _Estimates:
         }
 
 
-def _excess(relief: Floats, truth: tuple[int, ...]) -> tuple[float, ...]:
+def _excess(height_in_floors: Floats, truth: tuple[int, ...]) -> tuple[float, ...]:
     """Return how far the truth lies above the minimum: jointly, and along each profile."""
-    profiles = [relief.take(index, axis=axis).min() for axis, index in enumerate(truth)]
-    return tuple(float(value) for value in (relief[truth], *profiles))
+    profiles = [height_in_floors.take(index, axis=axis).min() for axis, index in enumerate(truth)]
+    return tuple(float(value) for value in (height_in_floors[truth], *profiles))
 
 
 class Region(NamedTuple):

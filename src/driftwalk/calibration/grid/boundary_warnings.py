@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Container, Sequence
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
 from driftwalk.calibration.problem import Axes, Floats
 from driftwalk.schema import Parameter
 
-WIDE_SHARE: Final = 0.05
-"""Share of a bootstrap's estimates that may lie at an end of the grid."""
-SIDES: Final = (0, -1)
-End = tuple[int, int]
+Boundary = tuple[int, int]
 """A parameter, and the side of its axis: 0 or -1."""
 
 
 def optimum_warnings(
     parameters: Sequence[Parameter], axes: Axes, optimum: Sequence[float]
-) -> dict[End, str]:
+) -> dict[Boundary, str]:
     """Return a warning for every end of the search at which an optimum lies.
 
     Parameters
@@ -41,7 +38,7 @@ def optimum_warnings(
     found = {}
     for index, (parameter, axis, value) in enumerate(zip(parameters, axes, optimum, strict=True)):
         spacing = np.diff(axis).min() if axis.size > 1 else 0.0
-        for side in SIDES[: axis.size]:
+        for side in (0, -1)[: axis.size]:
             if abs(value - axis[side]) <= 0.5 * spacing:
                 there, end = (_shown(parameter, one) for one in (value, axis[side]))
                 found[index, side] = (
@@ -60,7 +57,7 @@ def interval_warnings(
     window: Axes,
     lattice: Axes,
     steps: Sequence[float],
-    known: Container[End] = (),
+    known: Container[Boundary] = (),
 ) -> list[str]:
     """Return a warning for every end of what was searched that cuts an interval off.
 
@@ -84,8 +81,9 @@ def interval_warnings(
     for index, parameter in enumerate(parameters):
         axis = window[index]
         step = float(np.diff(axis).min()) if axis.size > 1 else steps[index]
-        for side in SIDES:
-            crowded = np.mean(_close(estimates[:, index], lattice[index][side], step)) > WIDE_SHARE
+        for side in (0, -1):
+            # The bootstrap's own 5 % tail may lie there; more means that the grid cuts it off.
+            crowded = np.mean(_close(estimates[:, index], lattice[index][side], step)) > 0.05
             cut = _close(intervals[index][side], axis[side], step)
             reaches = f"the interval of the {parameter.label} reaches the end of the"
             end = _shown(parameter, axis[side])

@@ -15,7 +15,7 @@ its height above the minimum is counted in floors.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -31,11 +31,8 @@ from driftwalk.calibration.grid.surface import (
 
 Floats = npt.NDArray[np.float64]
 
-LEAST_FLOOR: Final = 0.2
-"""Smallest floor of a setting, as a share of the median: its smooth surface stays above 0."""
 
-
-class Landscape(NamedTuple):
+class EnergyScore(NamedTuple):
     """The smooth surface of a map, on a lattice finer than its grid."""
 
     smoother: Smoother
@@ -58,7 +55,7 @@ class Landscape(NamedTuple):
         return np.asarray((self.surface - self.surface.min()) / self.floor_at_optimum)
 
 
-def landscape_of(found: Map, bandwidth: Sequence[float]) -> Landscape:
+def smooth_energy_score(found: Map, bandwidth: Sequence[float]) -> EnergyScore:
     """Return the smooth surface of a map.
 
     Parameters
@@ -72,22 +69,23 @@ def landscape_of(found: Map, bandwidth: Sequence[float]) -> Landscape:
         found.axes, bandwidth=bandwidth, weights=found.replicates.astype(float)
     )
     floor = smooth_floor(smoother, found.apart)
-    surface = relief(smoother, found.mean, found.apart, floor)
+    surface = height_in_floors(smoother, found.mean, found.apart, floor)
     lowest = np.unravel_index(int(np.argmin(surface)), surface.shape)
     point = lowest_point(smoother.axes, surface)
     distance = float(smoother.surface(found.mean.ravel())[lowest])
-    return Landscape(
+    return EnergyScore(
         smoother, Optimum(point, distance), floor, distance + float(floor[lowest]) * surface
     )
 
 
 def smooth_floor(smoother: Smoother, apart: Floats) -> Floats:
     """Return the floor of every point of the lattice, from the floors of the settings."""
-    least = LEAST_FLOOR * float(np.median(apart)) or np.finfo(np.float64).tiny
+    # Kept away from 0, so that heights in floors stay finite.
+    least = 0.2 * float(np.median(apart)) or np.finfo(np.float64).tiny
     return np.asarray(np.clip(smoother.surface(apart.ravel()), least, None))
 
 
-def relief(smoother: Smoother, distance: Floats, apart: Floats, floor: Floats) -> Floats:
+def height_in_floors(smoother: Smoother, distance: Floats, apart: Floats, floor: Floats) -> Floats:
     """Return how far S lies above its minimum, in floors, on the lattice.
 
     Parameters

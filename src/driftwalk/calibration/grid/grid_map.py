@@ -1,4 +1,4 @@
-"""Maps of a calibration: distances over a grid, and more replicates where they matter."""
+"""Grid maps: distances of all settings of a grid, and more replicates where they matter."""
 
 from __future__ import annotations
 
@@ -10,18 +10,17 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.calibration.estimation import Stores
 from driftwalk.calibration.problem import Axes, Floats, Problem, score_settings
 from driftwalk.comparison import StepTable
 from driftwalk.core.processors import map_in_threads
+from driftwalk.core.run_stages import MORE
 from driftwalk.motion import Details
 from driftwalk.motion.score import broken_worlds
 from driftwalk.sweep import Design, Store, WorkUnit, grid, run_sweep, settings_per_unit
 
 Progress = Callable[[int, int], None]
 Integers = npt.NDArray[np.int64]
-
-WORLDS_TOGETHER: Final = 64
-"""Worlds of a work unit at least: fewer leave lanes empty, and each then takes longer."""
 
 
 class Map(NamedTuple):
@@ -81,115 +80,109 @@ def full_map(axes: Axes, distance: Floats, arrays: dict[str, npt.NDArray[Any]]) 
     return Map(axes, distance, arrays, np.full(distance.shape[:-1], distance.shape[-1]))
 
 
-def run_map(
-    problem: Problem,
-    axes: Sequence[npt.ArrayLike],
-    *,
-    stage: str,
-    replicates: int,
-    details: Details = "none",
-    apart: bool = False,
-    only: npt.NDArray[np.bool_] | None = None,
-    store: Store | None = None,
-    executor: Executor | None = None,
-    progress: Progress | None = None,
-) -> Map:
-    """Simulate the settings of a grid and compare each with the recording.
+@dataclass(frozen=True)
+class MapSimulator:
+    """Simulates the maps of one stage and compares each setting with the recording.
 
-    Parameters
+    Attributes
     ----------
     problem : Problem
         The recording and the model.
-    axes : sequence of array_like
-        Coordinates of the grid, one array per parameter.
     stage : str
         Name of the stage; its random streams are its own.
-    replicates : int
-        Simulations per setting.
     details : {"none", "all"}
-        Whether to keep densities and excerpts.
+        Whether densities and excerpts are retained.
     apart : bool
-        Whether to measure how far the replicates of a setting are from each other.
-    only : ndarray of bool, shape of the grid, optional
-        Settings to simulate; the others count as being as far as can be. Default: all.
-    store : Store, optional
-        Where finished work units are kept.
+        Whether the distance between replicates of a setting is measured.
+    stores : callable, optional
+        Where finished work units are kept; memory when left out.
     executor : concurrent.futures.Executor, optional
         Computes the work units elsewhere, with one thread each.
     progress : callable, optional
         Called with the number of finished settings and the total.
     """
-    design = _design(problem, axes)
-    cells = np.arange(design.size) if only is None else np.flatnonzero(only)
-    function = _Cells(_for_units(problem, executor), stage, cells, 0, replicates, details, apart)
-    units = _units(design, cells, _per_unit(problem, cells, replicates))
-    rows = run_sweep(function, units, store=store, executor=executor, progress=progress)
-    arrays = design.unstack({name: _spread(values, cells, design) for name, values in rows.items()})
-    distance = arrays.pop("ks_distance")
-    if only is not None:
-        distance[~only] = 1.0
-    return full_map(tuple(design.axes.values()), distance, arrays)
 
+    problem: Problem
+    stage: str
+    details: Details = "none"
+    apart: bool = True
+    stores: Stores | None = None
+    executor: Executor | None = None
+    progress: Progress | None = None
 
-def add_replicates(
-    problem: Problem,
-    found: Map,
-    chosen: npt.NDArray[np.bool_],
-    *,
-    stage: str,
-    replicates: int,
-    details: Details = "none",
-    apart: bool = False,
-    store: Store | None = None,
-    executor: Executor | None = None,
-    progress: Progress | None = None,
-) -> Map:
-    """Simulate more replicates of some settings of a map; see `run_map`.
+    def full(self, axes: Axes, replicates: int, only: npt.NDArray[np.bool_] | None = None) -> Map:
+        """Simulate every setting of a grid; those not in `only` count as far as can be."""
+        store = self._store(self.stage, axes, {"replicates": replicates})
+        design = self._design(axes)
+        cells = np.arange(design.size) if only is None else np.flatnonzero(only)
+        rows = self._sweep(design, cells, range(replicates), store)
+        arrays = design.unstack(
+            {name: _spread(values, cells, design) for name, values in rows.items()}
+        )
+        distance = arrays.pop("ks_distance")
+        if only is not None:
+            distance[~only] = 1.0
+        return full_map(tuple(design.axes.values()), distance, arrays)
 
-    Parameters
-    ----------
-    problem : Problem
-        The recording and the model.
-    found : Map
-        The map, with equally many replicates of every setting.
-    chosen : ndarray of bool, shape of the grid
-        The settings.
-    stage : str
-        Name of the map's stage.
-    replicates : int
-        Simulations that the chosen settings will have. Their numbers are those that a map with as
-        many replicates of every setting has.
-    details : {"none", "all"}
-        As of the map.
-    apart : bool
-        As of the map.
-    store, executor
-        As of `run_map`.
-    progress : callable, optional
-        Called with the number of chosen settings that are finished, and of all of them.
-    """
-    before = found.distance.shape[-1]
-    cells = np.flatnonzero(chosen)
-    if replicates <= before or not cells.size:
-        return found
-    design = _design(problem, found.axes)
-    shared = _for_units(problem, executor)
-    # A single new replicate has none to be apart from.
-    among = apart and replicates - before > 1
-    function = _Cells(shared, stage, cells, before, replicates - before, details, among)
-    units = _units(design, cells, _per_unit(problem, cells, replicates - before))
-    new = run_sweep(function, units, store=store, executor=executor, progress=progress)
-    old = {**found.arrays, "ks_distance": found.distance}
-    joined = {
-        name: _joined(name, values, new[name], cells, before / replicates, replicates)
-        if name in new
-        else values
-        for name, values in old.items()
-    }
-    distance = joined.pop("ks_distance")
-    count = found.replicates.copy()
-    count.reshape(-1)[cells] = replicates
-    return Map(found.axes, distance, joined, count)
+    def more(self, found: Map, chosen: npt.NDArray[np.bool_], replicates: int) -> Map:
+        """Give some settings of a map more replicates, with the numbers of a map that has them."""
+        cells, before = np.flatnonzero(chosen), found.distance.shape[-1]
+        facts = {"replicates": replicates, "chosen": cells.tolist()}
+        store = self._store(f"{MORE}{self.stage}", found.axes, facts)
+        if replicates <= before or not cells.size:
+            return found
+        new = self._sweep(self._design(found.axes), cells, range(before, replicates), store)
+        old = {**found.arrays, "ks_distance": found.distance}
+        joined = {
+            name: _joined(name, values, new[name], cells, before / replicates, replicates)
+            if name in new
+            else values
+            for name, values in old.items()
+        }
+        distance = joined.pop("ks_distance")
+        count = found.replicates.copy()
+        count.reshape(-1)[cells] = replicates
+        return Map(found.axes, distance, joined, count)
+
+    def _sweep(
+        self, design: Design, cells: Integers, replicates: range, store: Store | None
+    ) -> dict[str, npt.NDArray[Any]]:
+        """Simulate some settings of a design in work units of equal work."""
+        problem = self.problem
+        count = len(replicates)
+        # Fewer than 64 worlds leave lanes empty, and each then takes longer.
+        size = settings_per_unit(
+            cells.size,
+            count * problem.duration / problem.study.time_step_s,
+            multiple=max(64 // count, 1),
+        )
+        settings = design.settings()
+        units = [
+            WorkUnit(
+                start,
+                min(start + size, cells.size),
+                {name: values[cells[start : start + size]] for name, values in settings.items()},
+            )
+            for start in range(0, cells.size, size)
+        ]
+        if self.executor is not None:
+            problem = replace(problem, like=replace(problem.like, threads=1))
+        # A single replicate has none to be apart from.
+        apart = self.apart and count > 1
+        function = _Cells(problem, self.stage, cells, replicates, self.details, apart)
+        return run_sweep(
+            function, units, store=store, executor=self.executor, progress=self.progress
+        )
+
+    def _design(self, axes: Sequence[npt.ArrayLike]) -> Design:
+        names = [parameter.name for parameter in self.problem.parameters]
+        return grid(**dict(zip(names, axes, strict=True)))
+
+    def _store(self, name: str, axes: Axes, facts: dict[str, object]) -> Store | None:
+        if self.stores is None:
+            return None
+        fingerprint = {"axes": [axis.tolist() for axis in axes], **facts}
+        return self.stores(f"{name}-{window_id(axes)}", fingerprint)
 
 
 OF_A_REPLICATE: Final[dict[str, float]] = {
@@ -236,8 +229,7 @@ class _Cells:
     stage: str
     cells: Integers
     """Number within the grid of every setting of the sweep: part of the address."""
-    first_replicate: int
-    replicates: int
+    replicates: range
     details: Details
     apart: bool
 
@@ -247,12 +239,12 @@ class _Cells:
             [unit.settings[one.name] for one in self.problem.parameters],
             stage=self.stage,
             numbers=self.cells[unit.start : unit.stop],
-            replicates=range(self.first_replicate, self.first_replicate + self.replicates),
+            replicates=self.replicates,
             details="steps" if self.apart else self.details,
         )
         if self.apart:
             worlds["apart"] = self._apart(worlds)
-        return _by_setting(worlds, self.replicates)
+        return _by_setting(worlds, len(self.replicates))
 
     def _apart(self, worlds: dict[str, npt.NDArray[Any]]) -> Floats:
         """Return how far every setting's replicates are from each other, once per world.
@@ -260,7 +252,7 @@ class _Cells:
         The first half of the replicates meets the second. A setting with a world that does not
         move, or lost its numbers, gets 0: no allowance is made for it.
         """
-        count = self.replicates
+        count = len(self.replicates)
         steps = StepTable(worlds.pop("step_length"), worlds.pop("turning_angle"), worlds["pairs"])
         sound = (worlds["status"].reshape(-1, count) == 0).all(axis=1)
 
@@ -275,24 +267,6 @@ class _Cells:
         return np.repeat(apart, count)
 
 
-def _design(problem: Problem, axes: Sequence[npt.ArrayLike]) -> Design:
-    names = [parameter.name for parameter in problem.parameters]
-    return grid(**dict(zip(names, axes, strict=True)))
-
-
-def _units(design: Design, cells: Integers, count: int) -> list[WorkUnit]:
-    """Cut some settings of a design into work units of so many."""
-    settings = design.settings()
-    return [
-        WorkUnit(
-            start,
-            min(start + count, cells.size),
-            {name: values[cells[start : start + count]] for name, values in settings.items()},
-        )
-        for start in range(0, cells.size, count)
-    ]
-
-
 def _spread(values: npt.NDArray[Any], cells: Integers, design: Design) -> npt.NDArray[Any]:
     """Return the rows of some settings as rows of all; those of the others are 0."""
     if cells.size == design.size:
@@ -300,20 +274,6 @@ def _spread(values: npt.NDArray[Any], cells: Integers, design: Design) -> npt.ND
     spread = np.zeros((design.size, *values.shape[1:]), dtype=values.dtype)
     spread[cells] = values
     return spread
-
-
-def _per_unit(problem: Problem, cells: Integers, replicates: int) -> int:
-    """Return how many settings make a work unit: by their worlds, as long as the recording."""
-    time_steps = problem.duration / problem.study.time_step_s
-    together = max(WORLDS_TOGETHER // replicates, 1)
-    return settings_per_unit(cells.size, replicates * time_steps, multiple=together)
-
-
-def _for_units(problem: Problem, executor: Executor | None) -> Problem:
-    """Return the problem as units get it: with one thread where an executor has many units."""
-    if executor is None:
-        return problem
-    return replace(problem, like=replace(problem.like, threads=1))
 
 
 def _by_setting(
@@ -333,3 +293,41 @@ def _by_setting(
         rows["excerpt_x"] = rows["excerpt_x"][:, 0]
         rows["excerpt_y"] = rows["excerpt_y"][:, 0]
     return rows
+
+
+class SweepProgress:
+    """Progress through sweeps that follow each other.
+
+    Parameters
+    ----------
+    say : callable
+        Called with how much is done, of 1000.
+    share_of : callable
+        Returns how much of all is done, from the share of each sweep that has begun: `share_of_map`
+        or `share_of_windows`.
+
+    Examples
+    --------
+    >>> from driftwalk.core.run_stages import share_of_windows
+    >>> shares = []
+    >>> narrowing = SweepProgress(lambda done, total: shares.append(done / total), share_of_windows)
+    >>> for done in (5, 10, 5, 10):
+    ...     narrowing(done, 10)
+    >>> shares
+    [0.25, 0.5, 0.625, 0.75]
+    """
+
+    def __init__(self, say: Progress, share_of: Callable[[Sequence[float]], float]) -> None:
+        self._say, self._share_of, self._finished = say, share_of, 0
+
+    def __call__(self, done: int, total: int) -> None:
+        """Tell how much is done when so many settings of a sweep are."""
+        share = self._share_of([*[1.0] * self._finished, done / max(total, 1)])
+        self._finished += done >= total
+        self._say(round(1000 * share), 1000)
+
+
+def window_id(window: Axes) -> str:
+    """Name a grid by its ends and sizes, so that a moved window has a store of its own."""
+    ends = [f"{axis[0]:.6g}-{axis[-1]:.6g}-{axis.size}" for axis in window]
+    return "x".join(ends).replace(".", "p").replace("+", "")

@@ -1,7 +1,7 @@
 """The refined map: windows that close in on the valley until they resolve it.
 
 A window is a grid of the same few nodes, whatever its extent. The settings that the recording does
-not exclude, those less than `PLAUSIBLE` floors above the minimum, say where the next window lies:
+not exclude, those less than 1.25 floors above the minimum, say where the next window lies:
 smaller where they fill a small part of this one, wider or moved where they reach its end. So the
 last one has steps that suit the valley along each axis, and a bandwidth narrow against it.
 """
@@ -15,38 +15,50 @@ from typing import Final, NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.calibration.grid.energy_score import Landscape, landscape_of
+from driftwalk.calibration.grid.energy_score import EnergyScore, smooth_energy_score
 from driftwalk.calibration.grid.grid_map import Map
 from driftwalk.calibration.grid.surface import at_settings
 from driftwalk.calibration.problem import Axes, Floats
 
-Box = tuple[tuple[float, float], ...]
+Window = tuple[tuple[float, float], ...]
 """Both ends along each parameter, in its coordinate."""
 
-LOCATING: Final[dict[int, int]] = {1: 24, 2: 12}
-"""Intervals along an axis of a window that locates the valley, by the number of parameters."""
-MOST: Final[dict[int, int]] = {1: 96, 2: 18}
-"""Intervals along an axis of the refined map, at most."""
-ABOUT: Final = 1.3
-"""A step may be larger than it should be by this factor."""
-MOST_WINDOWS: Final = 6
-"""Windows that locate the valley, at most."""
-LOCATING_REPLICATES: Final = 2
-BANDWIDTH_STEPS: Final = 2.0
-"""Bandwidth of the surface in steps, at least."""
-BANDWIDTH_SHARE: Final = 0.125
-"""Bandwidth of the surface as a share of the window."""
-PLAUSIBLE: Final = 1.25
-"""Settings less than this many floors above the minimum are plausible."""
-PADDING: Final = 0.2
-"""A window goes beyond the plausible settings by this share of their extent on each side."""
-SMALLER: Final = 0.6
-"""A window is replaced by one that is smaller by this factor along an axis, or more."""
-BEATEN: Final = 1e-3
-"""Share of maps in which chance alone makes a setting nearer than the optimum."""
-RACED: Final = 0.8
-"""Settings less than this many floors above the minimum get all replicates."""
-NICE: Final = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
+
+class RefinementPolicy(NamedTuple):
+    """How windows close in on the minimum of the energy score.
+
+    Chosen by hand on slow, regular orbits, where the valley is narrow. The coverage of the 90 %
+    regions that follow is counted by `studies/coverage`.
+    """
+
+    locating_intervals: tuple[int, int] = (24, 12)
+    """Intervals along an axis of a locating window, with one and with two parameters."""
+    most_intervals: tuple[int, int] = (96, 18)
+    """Most intervals along an axis of the refined map. Its time grows with their product."""
+    step_tolerance: float = 1.3
+    """A step may exceed the wanted one by this factor before a window is mapped again."""
+    most_windows: int = 6
+    """Most locating windows: a bound on the time."""
+    locating_replicates: int = 2
+    """Fewest replicates from which the floor of a setting can be measured."""
+    bandwidth_steps: float = 2.0
+    """Least bandwidth of the surface, in steps. Wider ones shift the minimum to the flatter
+    side."""
+    bandwidth_share: float = 0.125
+    """Least bandwidth of the surface, as a share of the window."""
+    plausible_floors: float = 1.25
+    """Height above the minimum, in floors, below which a setting is plausible."""
+    padding: float = 0.2
+    """A window exceeds the plausible settings by this share of their extent on each side."""
+    smaller: float = 0.6
+    """A window is replaced by one at most this share of its extent along an axis."""
+    false_alarm_rate: float = 1e-3
+    """Share of maps in which chance alone makes a setting better than the optimum."""
+    retained_floors: float = 0.8
+    """Height above the minimum, in floors, below which settings get all replicates."""
+
+
+REFINEMENT: Final = RefinementPolicy()
 
 
 class Maps(Protocol):
@@ -59,18 +71,18 @@ class Maps(Protocol):
         """Give some settings of a map more replicates."""
 
 
-class Refined(NamedTuple):
+class RefinedMap(NamedTuple):
     """A refined map with its surface."""
 
     map: Map
-    landscape: Landscape
+    energy_score: EnergyScore
     bandwidth: tuple[float, ...]
-    window: Box
-    plausible: Box
+    window: Window
+    plausible: Window
     """Extent of the plausible settings."""
 
 
-def first_window(coarse: Map, margin: float) -> Box:
+def first_window(coarse: Map, margin: float) -> Window:
     """Return the extent of the coarse cells that could hold the optimum, and one around.
 
     Parameters
@@ -92,7 +104,7 @@ def first_window(coarse: Map, margin: float) -> Box:
     )
 
 
-def locate(maps: Maps, window: Box, limits: Box) -> Refined:
+def locate_minimum(maps: Maps, window: Window, limits: Window) -> RefinedMap:
     """Close in on the valley, from a window that holds part of it.
 
     Parameters
@@ -111,9 +123,10 @@ def locate(maps: Maps, window: Box, limits: Box) -> Refined:
         become better.
     """
     seen = set()
-    for _ in range(MOST_WINDOWS):
-        axes = window_axes(window, limits, [LOCATING[len(window)]] * len(window))
-        found = refined(maps.full(axes, LOCATING_REPLICATES), window, limits)
+    for _ in range(REFINEMENT.most_windows):
+        intervals = REFINEMENT.locating_intervals[len(window) - 1]
+        axes = window_axes(window, limits, [intervals] * len(window))
+        found = refined(maps.full(axes, REFINEMENT.locating_replicates), window, limits)
         seen.add(window)
         following = next_window(found, limits)
         if following in seen:
@@ -122,66 +135,70 @@ def locate(maps: Maps, window: Box, limits: Box) -> Refined:
     return found
 
 
-def refined(found: Map, window: Box, limits: Box) -> Refined:
+def refined(found: Map, window: Window, limits: Window) -> RefinedMap:
     """Return a map with its surface and the extent of its plausible settings."""
     widths = tuple(
-        max(BANDWIDTH_STEPS * _step(axis), BANDWIDTH_SHARE * float(np.ptp(axis)))
+        max(
+            REFINEMENT.bandwidth_steps * _step(axis),
+            REFINEMENT.bandwidth_share * float(np.ptp(axis)),
+        )
         for axis in found.axes
     )
-    landscape = landscape_of(found, widths)
-    return Refined(found, landscape, widths, window, _plausible(landscape, limits))
+    energy_score = smooth_energy_score(found, widths)
+    return RefinedMap(found, energy_score, widths, window, _plausible(energy_score, limits))
 
 
-def _plausible(landscape: Landscape, limits: Box) -> Box:
+def _plausible(energy_score: EnergyScore, limits: Window) -> Window:
     """Return the extent of the plausible settings; infinite where they reach the end of a window.
 
     An end of the search is none of a window.
     """
     from scipy.ndimage import label
 
-    labels, _ = label(landscape.height <= PLAUSIBLE)
-    lowest = np.unravel_index(int(np.argmin(landscape.height)), landscape.height.shape)
+    labels, _ = label(energy_score.height <= REFINEMENT.plausible_floors)
+    lowest = np.unravel_index(int(np.argmin(energy_score.height)), energy_score.height.shape)
     inside = np.argwhere(labels == labels[lowest])
-    box = []
+    bounds = []
     for axis, low, high, ends in zip(
-        landscape.smoother.axes, inside.min(axis=0), inside.max(axis=0), limits, strict=True
+        energy_score.smoother.axes, inside.min(axis=0), inside.max(axis=0), limits, strict=True
     ):
         slack = 1e-6 * float(np.ptp(axis))
         cut = (
             low == 0 and axis[0] - ends[0] > slack,
             (high == axis.size - 1 and ends[1] - axis[-1] > slack),
         )
-        box.append((-math.inf if cut[0] else axis[low], math.inf if cut[1] else axis[high]))
-    return tuple((float(low), float(high)) for low, high in box)
+        bounds.append((-math.inf if cut[0] else axis[low], math.inf if cut[1] else axis[high]))
+    return tuple((float(low), float(high)) for low, high in bounds)
 
 
-def beating_cell(found: Map, landscape: Landscape) -> tuple[int, ...] | None:
+def better_cell(found: Map, energy_score: EnergyScore) -> tuple[int, ...] | None:
     """Return the setting that is nearer than the optimum by more than chance; None without one.
 
     Half of the smooth floor is taken off the distance of each. Chance is the scatter of the
     replicates of the plausible settings; among all settings of a map without such a setting, one
-    is found in a share `BEATEN` of maps.
+    is found in one of 1000 maps.
     """
     # Not scipy.stats, whose import takes half a second.
     from scipy.special import ndtri
 
-    plausible = (at_settings(landscape.height) <= PLAUSIBLE) & (found.replicates > 1)
+    height = at_settings(energy_score.height)
+    plausible = (height <= REFINEMENT.plausible_floors) & (found.replicates > 1)
     if not plausible.any():
         return None
     error = found.standard_error[plausible] * np.sqrt(found.replicates[plausible])
     spread = float(np.sqrt(np.nanmean(error**2)))
-    score = found.mean - 0.5 * at_settings(landscape.floor)
-    lowest = landscape.optimum.distance - 0.5 * landscape.floor_at_optimum
+    score = found.mean - 0.5 * at_settings(energy_score.floor)
+    lowest = energy_score.optimum.distance - 0.5 * energy_score.floor_at_optimum
     better = (lowest - score) * np.sqrt(found.replicates)
     best = np.unravel_index(int(np.argmax(better)), better.shape)
-    if better[best] <= -spread * ndtri(BEATEN / better.size):
+    if better[best] <= -spread * ndtri(REFINEMENT.false_alarm_rate / better.size):
         return None
     return tuple(int(index) for index in best)
 
 
-def next_window(found: Refined, limits: Box) -> Box:
+def next_window(found: RefinedMap, limits: Window) -> Window:
     """Return the window that follows one: itself where it resolves the valley."""
-    cell = beating_cell(found.map, found.landscape)
+    cell = better_cell(found.map, found.energy_score)
     if cell is not None:
         return _half_around(found.map.point(cell), found.map.axes)
     following = []
@@ -191,26 +208,26 @@ def next_window(found: Refined, limits: Box) -> Box:
         step, extent = _step(axis), float(np.ptp(axis))
         cut = math.isinf(low), math.isinf(high)
         first, last = (axis[0] if cut[0] else low), (axis[-1] if cut[1] else high)
-        pad = max(PADDING * (last - first), step)
+        pad = max(REFINEMENT.padding * (last - first), step)
         first = max(first - (max(pad, 0.5 * extent) if cut[0] else pad), ends[0])
         last = min(last + (max(pad, 0.5 * extent) if cut[1] else pad), ends[1])
-        if not any(cut) and last - first > SMALLER * extent:
+        if not any(cut) and last - first > REFINEMENT.smaller * extent:
             following.append(window)
         else:
             following.append((float(first), float(last)))
     return tuple(following)
 
 
-def _half_around(point: Sequence[float], axes: Axes) -> Box:
+def _half_around(point: Sequence[float], axes: Axes) -> Window:
     """Return a window of half the extent around a point, within a grid."""
-    box = []
+    bounds = []
     for value, axis in zip(point, axes, strict=True):
         quarter = 0.25 * float(np.ptp(axis))
-        box.append((max(value - quarter, float(axis[0])), min(value + quarter, float(axis[-1]))))
-    return tuple(box)
+        bounds.append((max(value - quarter, float(axis[0])), min(value + quarter, float(axis[-1]))))
+    return tuple(bounds)
 
 
-def window_axes(window: Box, limits: Box, intervals: Sequence[float]) -> Axes:
+def window_axes(window: Window, limits: Window, intervals: Sequence[float]) -> Axes:
     """Return a grid over a window, of round numbers.
 
     Examples
@@ -245,12 +262,13 @@ def round_step(step: float) -> float:
     0.015
     """
     power = 10.0 ** math.floor(math.log10(step) + 1e-9)
-    return max(nice for nice in NICE if nice * power <= step * (1.0 + 1e-9)) * power
+    nice = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
+    return max(one for one in nice if one * power <= step * (1.0 + 1e-9)) * power
 
 
 def refine(
-    maps: Maps, located: Refined, limits: Box, steps: Sequence[float], wanted: int
-) -> Refined:
+    maps: Maps, located: RefinedMap, limits: Window, steps: Sequence[float], wanted: int
+) -> RefinedMap:
     """Give the located window the replicates that are wanted, where the optimum could be.
 
     Parameters
@@ -271,33 +289,33 @@ def refine(
     if finer is not None:
         window = padded(located, limits)
         axes = window_axes(window, limits, finer)
-        found = refined(maps.full(axes, LOCATING_REPLICATES), window, limits)
-    low = at_settings(found.landscape.height) <= RACED
+        found = refined(maps.full(axes, REFINEMENT.locating_replicates), window, limits)
+    low = at_settings(found.energy_score.height) <= REFINEMENT.retained_floors
     return refined(maps.more(found.map, low, wanted), found.window, limits)
 
 
-def _intervals(located: Refined, steps: Sequence[float]) -> list[float] | None:
+def _intervals(located: RefinedMap, steps: Sequence[float]) -> list[float] | None:
     """Return how many intervals each axis should have; None where it has them."""
-    most = MOST[len(steps)]
+    most = REFINEMENT.most_intervals[len(steps) - 1]
     wanted = []
     for axis, step in zip(located.map.axes, steps, strict=True):
         intervals = min(float(np.ptp(axis)) / step, most)
         wanted.append(max(intervals, axis.size - 1))
     enough = all(
-        ABOUT * (axis.size - 1) >= intervals
+        REFINEMENT.step_tolerance * (axis.size - 1) >= intervals
         for axis, intervals in zip(located.map.axes, wanted, strict=True)
     )
     return None if enough else wanted
 
 
-def padded(found: Refined, limits: Box) -> Box:
+def padded(found: RefinedMap, limits: Window) -> Window:
     """Return the extent of the plausible settings with some around."""
-    box = []
+    bounds = []
     for axis, (low, high), ends in zip(found.map.axes, found.plausible, limits, strict=True):
         first, last = (axis[at] if math.isinf(end) else end for at, end in ((0, low), (-1, high)))
-        pad = max(PADDING * (last - first), _step(axis))
-        box.append((float(max(first - pad, ends[0])), float(min(last + pad, ends[1]))))
-    return tuple(box)
+        pad = max(REFINEMENT.padding * (last - first), _step(axis))
+        bounds.append((float(max(first - pad, ends[0])), float(min(last + pad, ends[1]))))
+    return tuple(bounds)
 
 
 def _step(axis: Floats) -> float:

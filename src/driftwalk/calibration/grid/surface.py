@@ -23,9 +23,6 @@ FINENESS = 4
 """Lattice points per cell of a grid along each axis."""
 REACH = 2.0
 """How far the cells are that count, in bandwidths."""
-_RIDGE = 1e-9
-_NOTHING = 1e-12
-"""Added to every normal matrix: far from any cell the surface is 0, and not an error."""
 
 
 class Optimum(NamedTuple):
@@ -149,7 +146,8 @@ def _fit_points(
     normal = np.einsum("lca,lcb->lab", weighted, terms)
     # Where a narrow grid cannot tell two terms apart the ridge decides, and the value stays sound.
     count = terms.shape[-1]
-    normal += np.eye(count) * (_RIDGE * weight.sum(axis=1) + _NOTHING)[:, None, None]
+    # The second number keeps the surface at 0, not undefined, far from any cell.
+    normal += np.eye(count) * (1e-9 * weight.sum(axis=1) + 1e-12)[:, None, None]
     value = np.zeros((points, count, 1))
     value[:, 0] = 1.0
     solution = np.linalg.solve(normal, value)[..., 0]

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.calibration.held_out.hidden_markov import HiddenWalk
+from driftwalk.calibration.held_out.hidden_markov import HiddenMarkovModel
 from driftwalk.comparison.aspects import Aspect
 from driftwalk.motion import Worlds
 from driftwalk.motion.random import WorldRandom
@@ -19,11 +19,8 @@ if TYPE_CHECKING:
     from driftwalk.motion.protocol import Floats, Keys, Values
     from driftwalk.schema import Parameter
 
-JOINED: Final = 1.5
-"""Steps follow each other where their times are not further apart, in step intervals."""
 
-
-class Walk:
+class Baseline:
     """A walk of whole steps in an open plane, seen at the recording's time stamps.
 
     Recorded steps hold the noise of the camera, so none is added.
@@ -67,7 +64,7 @@ class Walk:
 
 
 @dataclass(eq=False)
-class ResampledSteps(Walk):
+class ResampledSteps(Baseline):
     """Recorded steps, drawn independently of each other.
 
     Attributes
@@ -83,13 +80,13 @@ class ResampledSteps(Walk):
     name = "resampled steps"
 
     def steps(self, random: WorldRandom, count: int) -> tuple[Floats, Floats]:
-        """Return step lengths and turning angles; see `Walk.steps`."""
+        """Return step lengths and turning angles; see `Baseline.steps`."""
         drawn = self.recorded[(random.uniform(count) * len(self.recorded)).astype(np.int64)]
         return drawn[..., 0], drawn[..., 1]
 
 
 @dataclass(eq=False)
-class HiddenMarkovWalk(Walk):
+class HiddenMarkovWalk(Baseline):
     """Steps of a hidden Markov walk.
 
     Attributes
@@ -100,12 +97,12 @@ class HiddenMarkovWalk(Walk):
         Step interval [s].
     """
 
-    walk: HiddenWalk
+    walk: HiddenMarkovModel
     interval: float
     name = "hidden Markov walk"
 
     def steps(self, random: WorldRandom, count: int) -> tuple[Floats, Floats]:
-        """Return step lengths and turning angles; see `Walk.steps`."""
+        """Return step lengths and turning angles; see `Baseline.steps`."""
         walk = self.walk
         begin, moves = np.cumsum(walk.begin), np.cumsum(walk.transition, axis=1)
         chance = random.uniform(count)
@@ -126,7 +123,8 @@ class HiddenMarkovWalk(Walk):
 
 def runs_of(steps: Aspect, interval: float) -> list[npt.NDArray[np.float64]]:
     """Return the steps as runs in which each follows the one before."""
-    breaks = np.flatnonzero(np.diff(steps.time) > JOINED * interval) + 1
+    # A step is missing between two whose times are more than 1.5 intervals apart.
+    breaks = np.flatnonzero(np.diff(steps.time) > 1.5 * interval) + 1
     return [run for run in np.split(steps.points, breaks) if len(run)]
 
 

@@ -17,13 +17,6 @@ LAGS: Final = (1, 3, 10, 30, 100)
 """Of the mean squared displacement, in step intervals."""
 CHECKS: Final = (*(f"displacement_{lag}" for lag in LAGS), "speed_time", "wall_share", "rest_share")
 UNITS: Final = (*("m2" for _ in LAGS), "s", "1", "1")
-NEAR_WALL: Final = 0.2
-"""Part of the way from the wall to the middle that counts as being at the wall."""
-RESTING: Final = 0.2
-"""A step counts as a rest below this part of the recorded median step."""
-ROUNDING: Final = 1e-9
-LONGEST_MEMORY: Final = 500
-"""Longest time over which the speed's memory is followed, in step intervals."""
 
 
 def motion_checks(
@@ -69,8 +62,8 @@ def motion_checks(
     steps = length[there]
     if not steps.size:
         return np.full(len(CHECKS), np.nan)
-    near = wall(px, py)[:-1][there] < NEAR_WALL * depth
-    found += [float(near.mean()), float((steps < RESTING * usual_step).mean())]
+    near = wall(px, py)[:-1][there] < 0.2 * depth
+    found += [float(near.mean()), float((steps < 0.2 * usual_step).mean())]
     return np.array(found)
 
 
@@ -91,10 +84,10 @@ def _memory(length: Floats, there: Bools) -> float:
     apart = np.where(there, apart - apart[there].mean(), 0.0)
     variance = float((apart**2).sum()) / np.count_nonzero(there)
     # A speed that is the same all along differs by rounding alone.
-    if variance <= (ROUNDING * float(length[there].mean())) ** 2:
+    if variance <= (1e-9 * float(length[there].mean())) ** 2:
         return float("nan")
-    before = 1.0
-    for lag in range(1, min(LONGEST_MEMORY, length.size // 4)):
+    before, longest = 1.0, 500
+    for lag in range(1, min(longest, length.size // 4)):
         pairs = int(np.count_nonzero(there[lag:] & there[:-lag]))
         if not pairs:
             break
@@ -102,4 +95,4 @@ def _memory(length: Floats, there: Bools) -> float:
         if now < np.exp(-1.0):
             return float(lag - 1 + (before - np.exp(-1.0)) / (before - now))
         before = now
-    return float(min(LONGEST_MEMORY, length.size // 4))
+    return float(min(longest, length.size // 4))

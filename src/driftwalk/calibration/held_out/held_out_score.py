@@ -13,7 +13,7 @@ from driftwalk.calibration.evolution import (
     Budget,
     search_minimum,
 )
-from driftwalk.calibration.held_out.candidates import Contestant
+from driftwalk.calibration.held_out.candidates import Candidate
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.comparison.aspects import AspectReference
 from driftwalk.core.errors import InputError
@@ -23,13 +23,11 @@ from driftwalk.motion.score import broken_worlds
 Floats = npt.NDArray[np.float64]
 Tell = Callable[[int, int], None]
 
-JUDGED: Final = 20
+HELD_OUT_REPLICATES: Final = 20
 """Worlds by which the answer of a search is judged."""
-TRIED: Final = 8
-"""Settings at which a model is tried before it is searched."""
 
 
-class Judged(NamedTuple):
+class HeldOutScore(NamedTuple):
     """A model's answer and how far it is from the recording."""
 
     point: Floats
@@ -44,32 +42,34 @@ class Judged(NamedTuple):
     """The same without each of the odd blocks, shape (blocks / 2,)."""
     checks: Floats
     """Facts that are not fitted, of each world, shape (worlds, checks)."""
-    ends: Floats
+    optimum_scores: Floats
     """Scores at the ends of the searches."""
     evaluations: int
 
 
-def judge(
-    entry: Contestant, motion: RecordedMotion, *, budget: Budget, seed: int, tell: Tell | None
-) -> Judged:
+def score_candidate(
+    entry: Candidate, motion: RecordedMotion, *, budget: Budget, seed: int, tell: Tell | None
+) -> HeldOutScore:
     """Search a model on the even blocks of a recording, and judge it on the odd ones."""
     objective = even_blocks(entry, motion, seed)
     if not entry.ranges:
-        return judge_setting(objective, motion, np.empty(0))
+        return score_setting(objective, motion, np.empty(0))
     require_numbers(objective)
     found = search_minimum(objective, len(entry.ranges), budget=budget, seed=seed, tell=tell)
-    judged = judge_setting(objective, motion, found.best)
-    return judged._replace(ends=found.ends, evaluations=found.evaluations)
+    held_out = score_setting(objective, motion, found.best)
+    return held_out._replace(optimum_scores=found.optimum_scores, evaluations=found.evaluations)
 
 
-def even_blocks(entry: Contestant, motion: RecordedMotion, seed: int) -> AspectObjective:
+def even_blocks(entry: Candidate, motion: RecordedMotion, seed: int) -> AspectObjective:
     """Return how far a model's settings are from the even blocks of a recording."""
     return AspectObjective(entry.model, entry.ranges, entry.like, motion.plan, motion.fitted, seed)
 
 
-def judge_setting(objective: AspectObjective, motion: RecordedMotion, point: Floats) -> Judged:
+def score_setting(
+    objective: AspectObjective, motion: RecordedMotion, point: Floats
+) -> HeldOutScore:
     """Judge a setting, in the unit cube, on the odd blocks of a recording."""
-    seen = objective.simulated(point[None], JUDGED, stage="judged")
+    seen = objective.simulated(point[None], HELD_OUT_REPLICATES, stage="judged")
     aspects, broken = objective.aspects(seen), broken_worlds(seen.status)
 
     def distances(reference: AspectReference) -> Floats:
@@ -78,7 +78,7 @@ def judge_setting(objective: AspectObjective, motion: RecordedMotion, point: Flo
         return apart
 
     held = distances(motion.held)
-    return Judged(
+    return HeldOutScore(
         point=point,
         trained=np.median(distances(motion.fitted), axis=0),
         held=np.median(held, axis=0),
@@ -87,7 +87,7 @@ def judge_setting(objective: AspectObjective, motion: RecordedMotion, point: Flo
             [float(part.overall(distances(part)).mean()) for part in motion.without_each_block]
         ),
         checks=np.array([motion.checks(x, y) for x, y in zip(seen.x, seen.y, strict=True)]),
-        ends=np.empty(0),
+        optimum_scores=np.empty(0),
         evaluations=0,
     )
 
@@ -96,7 +96,8 @@ def require_numbers(objective: AspectObjective) -> None:
     """Refuse a model that loses its numbers wherever it is tried: no search could mend that."""
     from scipy.stats import qmc
 
-    tried = qmc.Sobol(len(objective.ranges), seed=objective.seed).random(TRIED)
+    # Eight settings: a model without numbers at all of them has none where a search would look.
+    tried = qmc.Sobol(len(objective.ranges), seed=objective.seed).random(8)
     seen = objective.simulated(tried, 1, stage="tried")
     if broken_worlds(seen.status).all():
         values = {name: float(column[0]) for name, column in objective.values(tried).items()}

@@ -15,17 +15,11 @@ import numpy.typing as npt
 
 Floats = npt.NDArray[np.float64]
 
-STATES: Final = 3
-ITERATIONS: Final = 200
-CONVERGED_NATS: Final = 0.01
-"""Gain of a step below which the fit has converged [nat]."""
-LARGEST_CONCENTRATION: Final = 500.0
-LARGEST_SHAPE: Final = 1e4
 LEAST_PROBABILITY: Final = 1e-6
 NEWTON_STEPS: Final = 8
 
 
-class HiddenWalk(NamedTuple):
+class HiddenMarkovModel(NamedTuple):
     """Steps in hidden states, shapes (states,) unless said."""
 
     begin: Floats
@@ -49,7 +43,7 @@ class HiddenWalk(NamedTuple):
         return 4 * states + states * (states - 1)
 
 
-def fit_hidden_walk(runs: Sequence[Floats], *, states: int = STATES) -> HiddenWalk:
+def fit_hidden_markov_model(runs: Sequence[Floats], *, states: int = 3) -> HiddenMarkovModel:
     """Fit a hidden Markov walk to runs of steps that follow each other.
 
     Parameters
@@ -64,23 +58,23 @@ def fit_hidden_walk(runs: Sequence[Floats], *, states: int = STATES) -> HiddenWa
     >>> random = np.random.default_rng(1)
     >>> slow = np.column_stack([random.gamma(4.0, 1e-3, 300), random.vonmises(0.0, 1.0, 300)])
     >>> quick = np.column_stack([random.gamma(4.0, 1e-2, 300), random.vonmises(0.0, 9.0, 300)])
-    >>> walk = fit_hidden_walk([slow, quick], states=2)
+    >>> walk = fit_hidden_markov_model([slow, quick], states=2)
     >>> (1e3 * walk.shape * walk.scale).round()  # mean lengths [mm]; the truth is 4 and 40
     array([ 4., 42.])
     """
     steps, there = _side_by_side(runs)
     walk = _first(steps[there], states)
     last = -np.inf
-    for _ in range(ITERATIONS):
+    for _ in range(200):
         state, joint, log_likelihood = _expected(walk, steps, there)
         walk = _most_likely(steps, there, state, joint)._replace(log_likelihood=log_likelihood)
-        if log_likelihood - last < CONVERGED_NATS:
+        if log_likelihood - last < 0.01:
             break
         last = log_likelihood
     return walk
 
 
-def log_densities(walk: HiddenWalk, steps: Floats) -> Floats:
+def log_densities(walk: HiddenMarkovModel, steps: Floats) -> Floats:
     """Return the logarithm of the density of steps (..., 2) in each state, shape (..., states)."""
     from scipy.special import gammaln, i0e
 
@@ -106,7 +100,7 @@ def _side_by_side(runs: Sequence[Floats]) -> tuple[Floats, npt.NDArray[np.bool_]
     return steps, there
 
 
-def _first(steps: Floats, states: int) -> HiddenWalk:
+def _first(steps: Floats, states: int) -> HiddenMarkovModel:
     order = np.argsort(steps[:, 0], kind="stable")
     weights = np.zeros((len(steps), states))
     for state, part in enumerate(np.array_split(order, states)):
@@ -119,7 +113,7 @@ def _first(steps: Floats, states: int) -> HiddenWalk:
 
 
 def _expected(
-    walk: HiddenWalk, steps: Floats, there: npt.NDArray[np.bool_]
+    walk: HiddenMarkovModel, steps: Floats, there: npt.NDArray[np.bool_]
 ) -> tuple[Floats, Floats, float]:
     """Return the probability of each state at each step, of each change, and the likelihood.
 
@@ -154,7 +148,7 @@ def _expected(
 
 def _most_likely(
     steps: Floats, there: npt.NDArray[np.bool_], state: Floats, joint: Floats
-) -> HiddenWalk:
+) -> HiddenMarkovModel:
     begin = state[:, 0].mean(axis=0) + LEAST_PROBABILITY
     moves = joint + LEAST_PROBABILITY
     return _of_steps(steps[there], state[there])._replace(
@@ -162,7 +156,7 @@ def _most_likely(
     )
 
 
-def _of_steps(steps: Floats, weights: Floats) -> HiddenWalk:
+def _of_steps(steps: Floats, weights: Floats) -> HiddenMarkovModel:
     """Return the distributions that are most likely for steps that belong to states in parts."""
     total = weights.sum(axis=0)
     share = weights / total
@@ -172,7 +166,7 @@ def _of_steps(steps: Floats, weights: Floats) -> HiddenWalk:
     along, across = share.T @ np.cos(steps[:, 1]), share.T @ np.sin(steps[:, 1])
     concentration = _concentration(np.hypot(along, across))
     none = np.zeros(total.size)
-    return HiddenWalk(
+    return HiddenMarkovModel(
         none, np.zeros((total.size, total.size)), shape, mean / shape, np.arctan2(across, along),
         concentration, -np.inf,
     )  # fmt: skip
@@ -189,7 +183,7 @@ def _gamma_shape(spread: Floats) -> Floats:
         apart = np.log(shape) - digamma(shape) - spread
         slope = 1.0 / shape - polygamma(1, shape)
         shape = np.maximum(shape - apart / slope, 0.5 * shape)
-    return np.asarray(np.clip(shape, 1.0 / LARGEST_SHAPE, LARGEST_SHAPE))
+    return np.asarray(np.clip(shape, 1.0 / 1e4, 1e4))
 
 
 def _concentration(resultant: Floats) -> Floats:
@@ -203,4 +197,4 @@ def _concentration(resultant: Floats) -> Floats:
         ratio = i1e(kappa) / i0e(kappa)
         slope = np.maximum(1.0 - ratio**2 - ratio / kappa, 1e-12)
         kappa = np.clip(kappa - (ratio - resultant) / slope, 0.1 * kappa, 10.0 * kappa)
-    return np.asarray(np.clip(kappa, 1e-6, LARGEST_CONCENTRATION))
+    return np.asarray(np.clip(kappa, 1e-6, 500.0))

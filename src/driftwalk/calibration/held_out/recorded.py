@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -44,9 +44,6 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 Floats = npt.NDArray[np.float64]
-
-CONTACT_QUANTILE: Final = 0.01
-"""The distance at contact is this quantile of the recorded ones: a few may be mistakes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -261,7 +258,8 @@ def recorded_motion(
             [own_distance(one, duration=duration) for one in aspects if one.name in held.names]
         ),
         scales=scales_of(track, step_interval=plan.short.step_interval, steps=steps),
-        clearance=max(float(np.quantile(from_wall, CONTACT_QUANTILE)), 0.0),
+        # Not the least: a few of the nearest samples may be tracking errors.
+        clearance=max(float(np.quantile(from_wall, 0.01)), 0.0),
         depth=depth,
         usual_step=usual_step,
         noises=noises,

@@ -11,12 +11,12 @@ from driftwalk.calibration.evolution import Budget
 from driftwalk.calibration.held_out.candidates import (
     BLOCK,
     Chosen,
-    contestants,
     made_models,
-    walks,
+    prepare_candidates,
+    resampling_baselines,
 )
 from driftwalk.calibration.held_out.recorded import body_motion
-from driftwalk.calibration.parallel_search import threads_beside
+from driftwalk.calibration.parallel_search import thread_pool
 from driftwalk.calibration.ranking.comparison_stages import Finished, Searches, Stages, Tell
 from driftwalk.calibration.ranking.result import build_comparison
 from driftwalk.conditions import jump_warnings, study_in_arena
@@ -79,8 +79,8 @@ def compare_models(
         Names of the family with their parts, "block", or models.
     study : Study, optional
         Tank, camera, step interval and seed; default: the paper's, in the arena of the recording.
-        ``bootstrap`` is the number of simulated recordings by which a misfit of the summaries is
-        judged; below 2 leaves the summaries out.
+        ``bootstrap`` is the number of simulated recordings by which a discrepancy of the summaries
+        is judged; below 2 leaves the summaries out.
     flow : xarray.Dataset, optional
         The water's velocity. For the block it is extracted from the even blocks when left out.
     body : str, optional
@@ -127,18 +127,18 @@ def compare_models(
     motion = body_motion(
         recording, chosen, flow=flow, body=body, threads=threads_of_unit(threads, executor)
     )
-    entries, warnings = contestants(made_models(models, motion, chosen), motion, chosen)
-    entries += walks(motion)
+    entries, warnings = prepare_candidates(made_models(models, motion, chosen), motion, chosen)
+    entries += resampling_baselines(motion)
     warnings += jump_warnings(recording, body)
     search = chosen.calibration
-    worlds = search.bootstrap if search.refine == "auto" else 0
+    replicates = search.bootstrap if search.refine == "auto" else 0
     work = Searches(entries, motion, search.seed, budget or Budget())
-    with threads_beside(motion.like.threads if executor is None else 1) as beside:
-        stages = Stages(work, worlds, stores, executor, tell or tell_nobody, beside, finished)
-        judged = stages.judged()
-        said = stages.summarised(judged)
+    with thread_pool(motion.like.threads if executor is None else 1) as pool:
+        stages = Stages(work, replicates, stores, executor, tell or tell_nobody, pool, finished)
+        held_out = stages.held_out()
+        evidence = stages.evidence(held_out)
     stages.finish()
-    return build_comparison(entries, judged, motion, chosen, recording, warnings, said)
+    return build_comparison(entries, held_out, motion, chosen, recording, warnings, evidence)
 
 
 def check_models(

@@ -7,18 +7,27 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar, Final
+from typing import Any, ClassVar
 
 import numpy as np
 
 from driftwalk.calibration.estimation import Stores
-from driftwalk.calibration.estimation.model_evidence import most_settings, summarised
+from driftwalk.calibration.estimation.model_evidence import estimate_evidence, most_settings
 from driftwalk.calibration.evolution import Budget
-from driftwalk.calibration.held_out.candidates import Contestant
-from driftwalk.calibration.held_out.held_out_score import Judged, judge, without_error
+from driftwalk.calibration.held_out.candidates import Candidate
+from driftwalk.calibration.held_out.held_out_score import (
+    HeldOutScore,
+    score_candidate,
+    without_error,
+)
 from driftwalk.calibration.held_out.recorded import RecordedMotion
-from driftwalk.calibration.parallel_search import Together, is_ours, longest_first, sharing
-from driftwalk.calibration.ranking.evidence_ranking import Asked, Summarised, asked_models
+from driftwalk.calibration.parallel_search import (
+    SearchProgress,
+    longest_first,
+    runs_in_threads,
+    with_thread_share,
+)
+from driftwalk.calibration.ranking.evidence_ranking import Evidence, Shortlist, shortlist_models
 from driftwalk.core.files.shards import Arrays
 from driftwalk.core.processors import one_blas_thread
 from driftwalk.core.run_stages import Course, tell_nobody
@@ -29,21 +38,12 @@ Finished = Callable[[str, float, float, int], None]
 """Hears of a model that was judged: its name, its score, the standard error of that, and how many
 models there are."""
 
-USUAL_PART: Final = 4
-"""Searches by summaries simulate a quarter of what they may: most are given up after a few rounds,
-or find their end soon."""
-USUALLY_ASKED: Final = 3
-"""Models whose summaries are usually asked,"""
-SUMMARY_WORK: Final = 3.0
-"""each setting of which takes as long as so many of the first stage (5 minutes of the bundled
-recording): all blocks of time are simulated."""
-
 
 @dataclass(frozen=True, eq=False)
 class Searches:
     """The function of the sweep: one model, searched and judged wherever it is sent."""
 
-    entries: Sequence[Contestant]
+    entries: Sequence[Candidate]
     motion: RecordedMotion
     seed: int
     budget: Budget
@@ -62,7 +62,7 @@ class Searches:
 
         say(0, 0)
         with one_blas_thread():
-            found = judge(
+            found = score_candidate(
                 self.entries[index], self.motion, budget=self.budget, seed=self.seed, tell=say
             )
         say(self.costs()[index], 0)
@@ -90,38 +90,44 @@ class Stages:
     """The two stages, and how far they are together."""
 
     work: Searches
-    worlds: int
-    """Recordings by which a misfit is judged; below 2 nobody is asked."""
+    replicates: int
+    """Recordings by which a discrepancy is judged; below 2 nobody is asked."""
     stores: Stores | None
     executor: Executor | None
     """Elsewhere."""
     tell: Tell
-    beside: Executor | None = None
+    pool: Executor | None = None
     """Threads of this process, where there is no executor."""
     finished: Finished = tell_nobody
     """Hears of each model that was searched and judged."""
 
-    def judged(self) -> list[Judged]:
+    def held_out(self) -> list[HeldOutScore]:
         """Judge every model, one work unit each."""
         entries = self.work.entries
         units = grid(model=np.arange(len(entries))).units(1)
-        kept = self._store("models", self.work.fingerprint())
-        kept = MemoryStore() if kept is None else kept
+        retained = self._store("models", self.work.fingerprint())
+        retained = MemoryStore() if retained is None else retained
         searched = self._searched_here if self.executor is None else self._searched_elsewhere
-        arrays = searched(units, kept, self._each_once(units, kept))
+        arrays = searched(units, retained, self._each_once(units, retained))
         return [
             _unpacked({name: values[index] for name, values in arrays.items()}, entry)
             for index, entry in enumerate(entries)
         ]
 
-    def summarised(self, judged: Sequence[Judged]) -> dict[int, Summarised]:
+    def evidence(self, held_out: Sequence[HeldOutScore]) -> dict[int, Evidence]:
         """Ask the summaries of those that tie, and of others while none of them gives them."""
-        asked = asked_models(self.work.entries, judged) if self.worlds > 1 else Asked((), 0)
-        found: dict[int, Summarised] = {}
-        for number, index in enumerate(asked.models):
-            if number >= asked.tied and any(one.usual for one in found.values()):
+        shortlist = (
+            shortlist_models(self.work.entries, held_out)
+            if self.replicates > 1
+            else Shortlist((), 0)
+        )
+        found: dict[int, Evidence] = {}
+        for number, index in enumerate(shortlist.models):
+            if number >= shortlist.tied and any(one.usual for one in found.values()):
                 break
-            found[index] = self._matched(number, index, judged[index].point, max(asked.tied, 1))
+            found[index] = self._matched(
+                number, index, held_out[index].point, max(shortlist.tied, 1)
+            )
         return found
 
     def finish(self) -> None:
@@ -132,24 +138,27 @@ class Stages:
     def course(self) -> Course:
         """How far all stages are together."""
         able = [one for one in self.work.entries if one.ranges and not one.baseline]
-        asks = self.worlds > 1 and len(able) > 1
-        usual = sorted(map(self._usual, able))[-USUALLY_ASKED:] if asks else []
-        parts = {"models": sum(self.work.costs()), "summaries": SUMMARY_WORK * sum(usual)}
+        asks = self.replicates > 1 and len(able) > 1
+        # Three models are usually matched.
+        usual = sorted(map(self._usual, able))[-3:] if asks else []
+        # A setting takes three times as long as one of the first stage (5 minutes of the bundled
+        # recording): all blocks of time are simulated.
+        parts = {"models": sum(self.work.costs()), "summaries": 3.0 * sum(usual)}
         return Course(self.tell, {**parts, "figures": 0.0})
 
-    def _each_once(self, units: Sequence[WorkUnit], kept: Store) -> Callable[[int, int], None]:
+    def _each_once(self, units: Sequence[WorkUnit], retained: Store) -> Callable[[int, int], None]:
         """Return what a sweep tells its progress, which hears of each finished model once."""
-        told: set[int] = set()
+        reported: set[int] = set()
 
         def look(_done: int, _total: int) -> None:
-            missing = {unit.start for unit in kept.missing(units)}
+            missing = {unit.start for unit in retained.missing(units)}
             for unit in units:
                 index = unit.start
-                if index in missing or index in told:
+                if index in missing or index in reported:
                     continue
-                told.add(index)
+                reported.add(index)
                 entry = self.work.entries[index]
-                arrays = {name: values[0] for name, values in kept.read(unit).items()}
+                arrays = {name: values[0] for name, values in retained.read(unit).items()}
                 one = _unpacked(arrays, entry)
                 std = without_error(one.without)
                 self.finished(entry.model.name, one.score, std, len(units))
@@ -157,34 +166,36 @@ class Stages:
         return look
 
     def _searched_here(
-        self, units: Sequence[WorkUnit], kept: Store, look: Callable[[int, int], None]
+        self, units: Sequence[WorkUnit], retained: Store, look: Callable[[int, int], None]
     ) -> Arrays:
         """Search a user's own models, one by one, then those of driftwalk at the same time.
 
         A user's model may fail: that is said before the others take minutes.
         """
         entries = self.work.entries
-        together = Together(
+        together = SearchProgress(
             [one.model.name for one in entries],
             self.work.costs(),
             lambda done, names: self.course.stage("models")(done, sum(self.work.costs()), names),
         )
-        missing = [unit.start for unit in kept.missing(units)]
+        missing = [unit.start for unit in retained.missing(units)]
         together.finished([unit.start for unit in units if unit.start not in missing])
-        ours = [k for k in missing if is_ours(entries[k])] if self.beside is not None else []
-        others = [k for k in missing if k not in ours]
+        threaded = (
+            [k for k in missing if runs_in_threads(entries[k])] if self.pool is not None else []
+        )
+        others = [k for k in missing if k not in threaded]
         alone = replace(self.work, within=together)
-        shared = replace(alone, entries=[sharing(one, len(ours)) for one in entries])
-        with together.waiting:
+        shared = replace(alone, entries=[with_thread_share(one, len(threaded)) for one in entries])
+        with together.cancellation:
             if others:
-                run_sweep(alone, [units[k] for k in others], store=kept, progress=look)
-            if ours:
-                first = [units[k] for k in longest_first(ours, entries)]
-                run_sweep(shared, first, store=kept, executor=self.beside, progress=look)
-        return collect(kept, units)
+                run_sweep(alone, [units[k] for k in others], store=retained, progress=look)
+            if threaded:
+                first = [units[k] for k in longest_first(threaded, entries)]
+                run_sweep(shared, first, store=retained, executor=self.pool, progress=look)
+        return collect(retained, units)
 
     def _searched_elsewhere(
-        self, units: Sequence[WorkUnit], kept: Store, look: Callable[[int, int], None]
+        self, units: Sequence[WorkUnit], retained: Store, look: Callable[[int, int], None]
     ) -> Arrays:
         """Search models where an executor puts them: only whole ones are heard of."""
 
@@ -192,9 +203,11 @@ class Stages:
             self.course.stage("models")(done, total)
             look(done, total)
 
-        return run_sweep(self.work, units, store=kept, executor=self.executor, progress=finished)
+        return run_sweep(
+            self.work, units, store=retained, executor=self.executor, progress=finished
+        )
 
-    def _matched(self, number: int, index: int, answer: np.ndarray, planned: int) -> Summarised:
+    def _matched(self, number: int, index: int, answer: np.ndarray, planned: int) -> Evidence:
         """Match the summaries with one model: units of 16 settings, the rest in this process.
 
         So many models as `planned` are asked, or some more.
@@ -210,15 +223,15 @@ class Stages:
 
         fingerprint = {
             **self.work.fingerprint(), "asked": index, "answer": answer.tolist(),
-            "worlds": self.worlds,
+            "worlds": self.replicates,
         }  # fmt: skip
-        return summarised(
+        return estimate_evidence(
             entry,
             self.work.motion,
             answer,
             seed=self.work.seed,
-            worlds=self.worlds,
-            executor=self.executor or (self.beside if is_ours(entry) else None),
+            replicates=self.replicates,
+            executor=self.executor or (self.pool if runs_in_threads(entry) else None),
             store=self._store(f"summaries-{number}", fingerprint),
             tell=say,
         )
@@ -226,29 +239,30 @@ class Stages:
     def _store(self, name: str, fingerprint: dict[str, Any]) -> Store | None:
         return None if self.stores is None else self.stores(name, fingerprint)
 
-    def _usual(self, entry: Contestant) -> int:
+    def _usual(self, entry: Candidate) -> int:
         """Return how many settings the summaries of a model usually need."""
-        return most_settings(len(entry.ranges), self.worlds) // USUAL_PART
+        # Most searches are given up after a few rounds, or find their optimum soon.
+        return most_settings(len(entry.ranges), self.replicates) // 4
 
 
-def _packed(judged: Judged, most: int, searches: int) -> dict[str, np.ndarray]:
+def _packed(held_out: HeldOutScore, most: int, searches: int) -> dict[str, np.ndarray]:
     """Return arrays of the same shapes for every model, with one entry each."""
     point = np.full(most, np.nan)
-    point[: judged.point.size] = judged.point
-    ends = np.full(searches, np.nan)
-    ends[: judged.ends.size] = judged.ends
-    arrays = {**judged._asdict(), "point": point, "ends": ends}
+    point[: held_out.point.size] = held_out.point
+    optimum_scores = np.full(searches, np.nan)
+    optimum_scores[: held_out.optimum_scores.size] = held_out.optimum_scores
+    arrays = {**held_out._asdict(), "point": point, "optimum_scores": optimum_scores}
     return {name: np.asarray(values)[None] for name, values in arrays.items()}
 
 
-def _unpacked(arrays: Mapping[str, np.ndarray], entry: Contestant) -> Judged:
-    return Judged(
+def _unpacked(arrays: Mapping[str, np.ndarray], entry: Candidate) -> HeldOutScore:
+    return HeldOutScore(
         point=arrays["point"][: len(entry.ranges)],
         trained=arrays["trained"],
         held=arrays["held"],
         score=float(arrays["score"]),
         without=arrays["without"],
         checks=arrays["checks"],
-        ends=arrays["ends"][np.isfinite(arrays["ends"])],
+        optimum_scores=arrays["optimum_scores"][np.isfinite(arrays["optimum_scores"])],
         evaluations=int(arrays["evaluations"]),
     )

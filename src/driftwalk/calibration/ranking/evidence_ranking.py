@@ -7,47 +7,64 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.calibration.held_out.candidates import Contestant
-from driftwalk.calibration.held_out.held_out_score import Judged, without_error
-
-ASKED_SIGMAS: Final = 4.0
-"""Models tie that are behind the closest one by less than so many standard errors. There are ten
-held-out blocks: their errors are known to a quarter, and of six models one is far off."""
-MOST_ASKED: Final = 5
-RIVAL: Final = 10.0
-"""Models whose -2 log of the evidence differs by less count as equally likely. A misfit of about a
-hundred has an error of some 5, for the covariance comes from simulations."""
-USUAL_QUANTILE: Final = 0.99
+from driftwalk.calibration.held_out.candidates import Candidate
+from driftwalk.calibration.held_out.held_out_score import HeldOutScore, without_error
 
 
-class Summarised(NamedTuple):
+class EvidencePolicy(NamedTuple):
+    """Which models are compared by their evidence, and when one is ahead."""
+
+    tied_sigmas: float = 4.0
+    """Models tie within this many standard errors. With ten blocks, errors are known to a quarter,
+    and one of six models is far off."""
+    most_models: int = 5
+    """Most models that are matched: a bound on the time."""
+    rival: float = 10.0
+    """Difference of deviance below which models are equally likely: a discrepancy of a hundred has
+    an error of some 5, from the simulated covariance."""
+    typical_quantile: float = 0.99
+    """One recording of the model itself in a hundred is called unlike it."""
+    hopeless: float = 3.0
+    """Discrepancy per summary above which a search is given up. The true model has 0.7 to 1.2;
+    wrong ones would take three times as long."""
+    starts: int = 2
+    """Starts: from the regression, and from the answer of the distances."""
+    blur: float = 1e-3
+    """Noise added to simulated summaries. At a wall without camera noise some vary by less, and a
+    micrometre of clearance would count as another motion."""
+
+
+EVIDENCE: Final = EvidencePolicy()
+
+
+class Evidence(NamedTuple):
     """The summaries of the motion, as one model gives them."""
 
-    misfit: float
+    discrepancy: float
     """Sum of squares of the summaries' deviations, in standard deviations."""
-    usual_misfit: float
+    median_discrepancy: float
     """Its median over simulated recordings of the model,"""
-    most_misfit: float
+    upper_discrepancy: float
     """and their 99 % quantile."""
-    unlikely: float
+    deviance: float
     """-2 log of the evidence, but for a constant that all models share."""
 
     @property
     def usual(self) -> bool:
         """Whether the summaries are like those of the model's own recordings."""
-        return self.misfit <= self.most_misfit
+        return self.discrepancy <= self.upper_discrepancy
 
 
-class Naming(NamedTuple):
+class EvidenceRanking(NamedTuple):
     """The answer of the summaries of the motion."""
 
-    named: int | None
+    best: int | None
     """The model that they speak for; None where no model gives them."""
     rivals: tuple[int, ...]
     """Others that give them as well."""
 
 
-class Asked(NamedTuple):
+class Shortlist(NamedTuple):
     """Models whose summaries are asked, in turn."""
 
     models: tuple[int, ...]
@@ -57,75 +74,81 @@ class Asked(NamedTuple):
     by distances may have missed the place of the true model."""
 
 
-def asked_models(entries: Sequence[Contestant], judged: Sequence[Judged]) -> Asked:
+def shortlist_models(entries: Sequence[Candidate], held_out: Sequence[HeldOutScore]) -> Shortlist:
     """Return the models whose summaries decide; none where there are not two to choose from.
 
     Walks of recorded steps are never asked, nor are models without parameters.
     """
-    order = np.argsort([one.score for one in judged], kind="stable")
+    order = np.argsort([one.score for one in held_out], kind="stable")
     able = [int(k) for k in order if not entries[k].baseline and entries[k].ranges]
     if len(able) < 2:
-        return Asked((), 0)
-    closest = judged[able[0]]
+        return Shortlist((), 0)
+    closest = held_out[able[0]]
 
-    def ties(k: int) -> bool:
-        error = without_error(judged[k].without - closest.without)
-        return judged[k].score - closest.score <= ASKED_SIGMAS * error
+    def is_tied(k: int) -> bool:
+        error = without_error(held_out[k].without - closest.without)
+        return held_out[k].score - closest.score <= EVIDENCE.tied_sigmas * error
 
-    tied = [k for k in able if ties(k)]
-    behind = [k for k in able if not ties(k)]
-    return Asked(tuple([*tied, *behind][:MOST_ASKED]), min(len(tied), MOST_ASKED))
+    tied = [k for k in able if is_tied(k)]
+    behind = [k for k in able if not is_tied(k)]
+    return Shortlist(
+        tuple([*tied, *behind][: EVIDENCE.most_models]), min(len(tied), EVIDENCE.most_models)
+    )
 
 
-def naming(entries: Sequence[Contestant], said: Mapping[int, Summarised]) -> Naming:
+def rank_by_evidence(
+    entries: Sequence[Candidate], evidence: Mapping[int, Evidence]
+) -> EvidenceRanking:
     """Return which model the summaries speak for.
 
-    Among those whose misfit is usual it is the one of the largest evidence, which has a price for
-    each parameter. Where others are equally likely, it is the one with the fewest numbers.
+    Among those whose discrepancy is usual it is the one of the largest evidence, which has a price
+    for each parameter. Where others are equally likely, it is the one with the fewest numbers.
     """
-    usual = [k for k, one in said.items() if one.usual]
+    usual = [k for k, one in evidence.items() if one.usual]
     if not usual:
-        return Naming(None, ())
-    least = min(said[k].unlikely for k in usual)
-    left = [k for k in usual if said[k].unlikely < least + RIVAL]
-    named = min(left, key=lambda k: (entries[k].numbers, said[k].unlikely))
-    return Naming(named, tuple(k for k in left if k != named))
+        return EvidenceRanking(None, ())
+    least = min(evidence[k].deviance for k in usual)
+    left = [k for k in usual if evidence[k].deviance < least + EVIDENCE.rival]
+    best = min(left, key=lambda k: (entries[k].numbers, evidence[k].deviance))
+    return EvidenceRanking(best, tuple(k for k in left if k != best))
 
 
-def said_of(one: Summarised) -> str | None:
+def discrepancy_sentence(one: Evidence) -> str | None:
     """Return how far a model's summaries are from the recording's; None where they are like them.
 
     Examples
     --------
-    >>> said_of(Summarised(812.3, 101.0, 140.2, 900.0))
-    "summaries of the motion: a misfit of 812, that of the model's own recordings is below 140"
+    >>> discrepancy_sentence(Evidence(812.3, 101.0, 140.2, 900.0))
+    "summaries of the motion: a discrepancy of 812, that of the model's own recordings is below 140"
     """
     if one.usual:
         return None
     return (
-        f"summaries of the motion: a misfit of {one.misfit:.0f}, that of the model's own "
-        f"recordings is below {one.most_misfit:.0f}"
+        f"summaries of the motion: a misfit of {one.discrepancy:.0f}, that of the model's own "
+        f"recordings is below {one.upper_discrepancy:.0f}"
     )
 
 
-def tie_sentence(names: Sequence[str], said: Mapping[int, Summarised], answer: Naming) -> str:
+def ranking_sentence(
+    names: Sequence[str], evidence: Mapping[int, Evidence], answer: EvidenceRanking
+) -> str:
     """Return what the summaries of the motion say, in a sentence."""
-    misfits = {k: f"{names[k]} {one.misfit:.0f}" for k, one in said.items()}
-    if answer.named is None:
+    discrepancies = {k: f"{names[k]} {one.discrepancy:.0f}" for k, one in evidence.items()}
+    if answer.best is None:
         return (
             "The summaries of the motion tell nothing more, for no model gives them: the misfits "
-            f"are {', '.join(misfits.values())}, those of the models' own recordings below "
-            f"{max(one.most_misfit for one in said.values()):.0f}"
+            f"are {', '.join(discrepancies.values())}, those of the models' own recordings below "
+            f"{max(one.upper_discrepancy for one in evidence.values()):.0f}"
         )
-    best = said[answer.named]
+    best = evidence[answer.best]
     sentence = (
-        f"{names[answer.named]} is named by the summaries of the motion: a misfit of "
-        f"{best.misfit:.0f}, that of its own recordings is below {best.most_misfit:.0f}"
+        f"{names[answer.best]} is named by the summaries of the motion: a misfit of "
+        f"{best.discrepancy:.0f}, that of its own recordings is below {best.upper_discrepancy:.0f}"
     )
     if answer.rivals:
         rivals = ", ".join(names[k] for k in answer.rivals)
         sentence += f"; no clear difference from {rivals}, with as many numbers or more"
-    others = [k for k in said if k != answer.named and k not in answer.rivals]
+    others = [k for k in evidence if k != answer.best and k not in answer.rivals]
     if others:
-        sentence += f"; less likely are {', '.join(misfits[k] for k in others)}"
+        sentence += f"; less likely are {', '.join(discrepancies[k] for k in others)}"
     return sentence

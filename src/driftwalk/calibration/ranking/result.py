@@ -3,24 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.calibration.held_out.candidates import Contestant
+from driftwalk.calibration.estimation.determined import DETERMINED
+from driftwalk.calibration.held_out.candidates import Candidate
 from driftwalk.calibration.held_out.checks import CHECKS, UNITS
-from driftwalk.calibration.held_out.held_out_score import JUDGED, Judged, without_error
+from driftwalk.calibration.held_out.held_out_score import (
+    HELD_OUT_REPLICATES,
+    HeldOutScore,
+    without_error,
+)
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.calibration.ranking.evidence_ranking import (
-    Naming,
-    Summarised,
-    naming,
-    said_of,
-    tie_sentence,
+    Evidence,
+    EvidenceRanking,
+    discrepancy_sentence,
+    rank_by_evidence,
+    ranking_sentence,
 )
-from driftwalk.calibration.ranking.verdict import Verdict, verdict_of
-from driftwalk.calibration.stationarity import Steadiness, steadiness_of_steps
+from driftwalk.calibration.ranking.verdict import VERDICT, Verdict, verdict_of
+from driftwalk.calibration.stationarity import Stationarity, stationarity_of_steps
 from driftwalk.comparison import KsReference
 from driftwalk.comparison.aspects import points_distance
 from driftwalk.schema.answers.fit_facts import texts
@@ -34,31 +39,26 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
-TIED_SIGMAS: Final = 2.0
-"""Models tie where the difference of their scores is below so many standard errors."""
-AT_THE_END: Final = 0.01
-"""A value is at the end of its range within this part of it."""
-
 
 def build_comparison(
-    entries: Sequence[Contestant],
-    judged: Sequence[Judged],
+    entries: Sequence[Candidate],
+    held_out: Sequence[HeldOutScore],
     motion: RecordedMotion,
     study: Study,
     recording: xr.Dataset,
     warnings: Sequence[str],
-    summarised: Mapping[int, Summarised],
+    evidence_by_model: Mapping[int, Evidence],
 ) -> xr.Dataset:
-    """Return the dataset of a comparison; `entries` and `judged` have one item for each model.
+    """Return the dataset of a comparison; `entries` and `held_out` have one item for each model.
 
-    `summarised` has those whose summaries were matched, by their places among them.
+    `evidence_by_model` has those whose summaries were matched, by their places among them.
     """
-    order = np.argsort([one.score for one in judged], kind="stable")
-    entries, judged = [entries[k] for k in order], [judged[k] for k in order]
-    asked = {at: summarised[k] for at, k in enumerate(order) if k in summarised}
-    answer = naming(entries, asked)
-    behind = np.array([one.score - judged[0].score for one in judged])
-    behind_std = np.array([without_error(one.without - judged[0].without) for one in judged])
+    order = np.argsort([one.score for one in held_out], kind="stable")
+    entries, held_out = [entries[k] for k in order], [held_out[k] for k in order]
+    evidence = {at: evidence_by_model[k] for at, k in enumerate(order) if k in evidence_by_model}
+    answer = rank_by_evidence(entries, evidence)
+    behind = np.array([one.score - held_out[0].score for one in held_out])
+    behind_std = np.array([without_error(one.without - held_out[0].without) for one in held_out])
     names = [entry.model.name for entry in entries]
     verdicts = [
         verdict_of(
@@ -66,51 +66,53 @@ def build_comparison(
             motion,
             baseline=entry.baseline,
             clearly_behind=names[0]
-            if behind[k] > TIED_SIGMAS * behind_std[k] and k != answer.named
+            if behind[k] > VERDICT.tied_sigmas * behind_std[k] and k != answer.best
             else None,
-            unlike=None if answer.named is None or k not in asked else said_of(asked[k]),
+            unlike=None
+            if answer.best is None or k not in evidence
+            else discrepancy_sentence(evidence[k]),
         )
-        for k, (entry, one) in enumerate(zip(entries, judged, strict=True))
+        for k, (entry, one) in enumerate(zip(entries, held_out, strict=True))
     ]
     closest = next((k for k, entry in enumerate(entries) if not entry.baseline), 0)
     tied = [
         k
-        for k, one in enumerate(judged)
+        for k, one in enumerate(held_out)
         if k > closest
-        and one.score - judged[closest].score
-        < TIED_SIGMAS * without_error(one.without - judged[closest].without)
+        and one.score - held_out[closest].score
+        < VERDICT.tied_sigmas * without_error(one.without - held_out[closest].without)
     ]
-    units, values = _estimates(entries, judged)
-    steady = _steadiness(motion)
-    said = [*warnings, *_edge_warnings(entries, judged), *motion_warnings(motion)]
+    units, values = _estimates(entries, held_out)
+    stationarity = _stationarity(motion)
+    said = [*warnings, *_edge_warnings(entries, held_out), *motion_warnings(motion)]
     why = _findings(names, entries, verdicts, closest, tied)
-    if asked:
-        why.insert(0 if answer.named is not None else 1, tie_sentence(names, asked, answer))
+    if evidence:
+        why.insert(0 if answer.best is not None else 1, ranking_sentence(names, evidence, answer))
     best = answer_sentence(names, verdicts, closest, answer)
     findings = [best, *(one for one in why if one != best)]
     data: dict[str, Any] = {
-        "score": ("model", [one.score for one in judged]),
-        "score_std": ("model", [without_error(one.without) for one in judged]),
+        "score": ("model", [one.score for one in held_out]),
+        "score_std": ("model", [without_error(one.without) for one in held_out]),
         "behind": ("model", behind),
         "behind_std": ("model", behind_std),
         "free_numbers": ("model", [entry.numbers for entry in entries]),
         "baseline": ("model", [entry.baseline for entry in entries]),
         "explained": ("model", [one.explained for one in verdicts]),
         "verdict": ("model", texts([one.text for one in verdicts])),
-        "held_out_distance": (("model", "aspect"), [one.held for one in judged]),
-        "trained_distance": (("model", "aspect"), [one.trained for one in judged]),
+        "held_out_distance": (("model", "aspect"), [one.held for one in held_out]),
+        "trained_distance": (("model", "aspect"), [one.trained for one in held_out]),
         "own_distance": ("aspect", motion.own),
         "floor": ("aspect", motion.held.floor),
         "check_recorded": ("check", motion.recorded_checks),
-        "check_median": (("model", "check"), [np.median(one.checks, axis=0) for one in judged]),
-        "check_low": (("model", "check"), [one.checks.min(axis=0) for one in judged]),
-        "check_high": (("model", "check"), [one.checks.max(axis=0) for one in judged]),
+        "check_median": (("model", "check"), [np.median(one.checks, axis=0) for one in held_out]),
+        "check_low": (("model", "check"), [one.checks.min(axis=0) for one in held_out]),
+        "check_high": (("model", "check"), [one.checks.max(axis=0) for one in held_out]),
         "check_unit": ("check", texts(UNITS)),
         "estimate": (("model", "parameter"), values),
         "parameter_unit": ("parameter", texts(list(units.values()))),
-        "end_score": (("model", "end"), _padded([one.ends for one in judged])),
-        "evaluations": ("model", [one.evaluations for one in judged]),
-        **_summaries(len(entries), asked, answer.named),
+        "end_score": (("model", "end"), _padded([one.optimum_scores for one in held_out])),
+        "evaluations": ("model", [one.evaluations for one in held_out]),
+        **_summaries(len(entries), evidence, answer.best),
     }
     coords = {
         "model": ("model", texts(names)),
@@ -123,27 +125,31 @@ def build_comparison(
     attrs: dict[str, Any] = {
         "step_interval_s": float(motion.plan.short.step_interval),
         "duration_s": motion.duration,
-        "worlds": JUDGED,
+        "worlds": HELD_OUT_REPLICATES,
         "seed": study.calibration.seed,
         "arena": study.tank.to_arena_json(),
         "source": str(recording.attrs.get("source", "")),
         "simulated_recording": str(recording.attrs.get("simulated", "no")),
     }
-    if steady is not None:
-        attrs |= {"halves_ks_distance": steady.distance, "halves_p_value": steady.p_value}
+    if stationarity is not None:
+        attrs |= {
+            "halves_ks_distance": stationarity.distance,
+            "halves_p_value": stationarity.p_value,
+        }
     return build_dataset("model_comparison", data, coords, attrs)
 
 
-def _summaries(models: int, asked: Mapping[int, Summarised], named: int | None) -> dict[str, Any]:
+def _summaries(models: int, evidence: Mapping[int, Evidence], best: int | None) -> dict[str, Any]:
     """Return what the summaries of the motion say; nothing where no model was asked."""
-    if not asked:
+    if not evidence:
         return {}
     data: dict[str, Any] = {
-        "asked": ("model", [k in asked for k in range(models)]),
-        "named": ("model", [k == named for k in range(models)]),
+        "asked": ("model", [k in evidence for k in range(models)]),
+        "named": ("model", [k == best for k in range(models)]),
     }
-    for name in Summarised._fields:
-        values = [getattr(asked[k], name) if k in asked else np.nan for k in range(models)]
+    stored = ("misfit", "usual_misfit", "most_misfit", "unlikely")
+    for place, name in enumerate(stored):
+        values = [evidence[k][place] if k in evidence else np.nan for k in range(models)]
         data[name] = ("model", values)
     return data
 
@@ -156,12 +162,12 @@ def _padded(rows: Sequence[Floats]) -> Floats:
 
 
 def _estimates(
-    entries: Sequence[Contestant], judged: Sequence[Judged]
+    entries: Sequence[Candidate], held_out: Sequence[HeldOutScore]
 ) -> tuple[dict[str, str], Floats]:
     """Return all parameters with their units, and the models' values, (models, parameters)."""
     units: dict[str, str] = {}
     answers: list[dict[str, float]] = []
-    for entry, one in zip(entries, judged, strict=True):
+    for entry, one in zip(entries, held_out, strict=True):
         answer = {}
         for parameter, share in zip(entry.ranges, one.point, strict=True):
             # Two models may give one name to numbers of different units.
@@ -177,14 +183,14 @@ def _estimates(
     return units, values.reshape(len(entries), len(units))
 
 
-def _edge_warnings(entries: Sequence[Contestant], judged: Sequence[Judged]) -> list[str]:
+def _edge_warnings(entries: Sequence[Candidate], held_out: Sequence[HeldOutScore]) -> list[str]:
     """Return a sentence for each model of which a parameter is at the end of its range."""
     found = []
-    for entry, one in zip(entries, judged, strict=True):
+    for entry, one in zip(entries, held_out, strict=True):
         at_end = [
             parameter.name
             for parameter, share in zip(entry.ranges, one.point, strict=True)
-            if min(share, 1.0 - share) < AT_THE_END
+            if min(share, 1.0 - share) < DETERMINED.range_end
         ]
         if at_end:
             found.append(
@@ -194,9 +200,9 @@ def _edge_warnings(entries: Sequence[Contestant], judged: Sequence[Judged]) -> l
     return found
 
 
-def _steadiness(motion: RecordedMotion) -> Steadiness | None:
+def _stationarity(motion: RecordedMotion) -> Stationarity | None:
     steps = next(one for one in motion.aspects if one.name == "steps").points
-    return steadiness_of_steps(steps, lambda one, other: points_distance(KsReference(one), other))
+    return stationarity_of_steps(steps, lambda one, other: points_distance(KsReference(one), other))
 
 
 def motion_warnings(motion: RecordedMotion) -> list[str]:
@@ -206,10 +212,10 @@ def motion_warnings(motion: RecordedMotion) -> list[str]:
     series that goes on beyond its frames.
     """
     said = series_warnings(motion.like.flow, duration=motion.duration)
-    steady = _steadiness(motion)
-    if steady is None or steady.warning is None:
+    stationarity = _stationarity(motion)
+    if stationarity is None or stationarity.warning is None:
         return said
-    return [steady.warning + _change(motion), *said]
+    return [stationarity.warning + _change(motion), *said]
 
 
 def _change(motion: RecordedMotion) -> str:
@@ -230,14 +236,14 @@ def _change(motion: RecordedMotion) -> str:
 
 
 def answer_sentence(
-    names: Sequence[str], verdicts: Sequence[Verdict], closest: int, answer: Naming
+    names: Sequence[str], verdicts: Sequence[Verdict], closest: int, answer: EvidenceRanking
 ) -> str:
     """Return the answer in one sentence: the best model, and whether it explains the recording.
 
     The summaries of the motion decide where they name a model, the distance otherwise; a model that
     explains the recording is better than one that does not.
     """
-    first = closest if answer.named is None else answer.named
+    first = closest if answer.best is None else answer.best
     explained = [k for k, one in enumerate(verdicts) if one.explained]
     if not explained:
         return f"No model explains the recording; the best one is {names[first]}"
@@ -249,7 +255,7 @@ def answer_sentence(
 
 def _findings(
     names: Sequence[str],
-    entries: Sequence[Contestant],
+    entries: Sequence[Candidate],
     verdicts: Sequence[Verdict],
     closest: int,
     tied: Sequence[int],
@@ -261,10 +267,10 @@ def _findings(
         found[0] += f"; no clear difference from {', '.join(rivals)}"
     if not any(one.explained for one in verdicts):
         found.append(f"{names[closest]} does not explain it: {verdicts[closest].text}")
-    walks = [names[k] for k in tied if entries[k].baseline]
+    baselines = [names[k] for k in tied if entries[k].baseline]
     nearer = [names[k] for k in range(closest)]
     if nearer:
         found.append(f"A walk of recorded steps is closer than all models: {', '.join(nearer)}")
-    elif walks:
-        found.append(f"No clear difference from a walk of recorded steps: {', '.join(walks)}")
+    elif baselines:
+        found.append(f"No clear difference from a walk of recorded steps: {', '.join(baselines)}")
     return found

@@ -8,23 +8,33 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.calibration.held_out.checks import CHECKS
-from driftwalk.calibration.held_out.held_out_score import Judged
+from driftwalk.calibration.held_out.held_out_score import HeldOutScore
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.schema.answers.model_words import ASPECT_WORDS, CHECK_WORDS
 
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 
-MOST_OVER_OWN: Final = 2.0
-"""A model explains an aspect up to so many times the distance of the recording's own parts. The
-parts of one recording share slow changes that another recording of the same motion has not: the
-answers for simulated recordings of the right model came to 0.8 to 1.9 times it."""
-MOST_RATIO: Final = 1.5
-"""A fact is far off beyond all worlds of a model by more than this factor,"""
-MOST_SHARE_APART: Final = 0.1
-"""a share of the time by more than this. A KS distance hardly sees the tails of a distribution, and
-the answer for the right model may miss those."""
-MOST_CHECKS_OFF: Final = 1
+
+class VerdictPolicy(NamedTuple):
+    """When a model explains a recording."""
+
+    most_over_own: float = 2.0
+    """Distance in distances of the recording's own parts. Simulated recordings of the right model
+    have 0.8 to 1.9: the parts of one recording share slow changes."""
+    most_ratio: float = 1.5
+    """A fact is far off when it exceeds those of all replicates by this factor. Chosen by hand."""
+    most_share_apart: float = 0.1
+    """A share of the time is far off when it exceeds those of all replicates by this. Chosen by
+    hand."""
+    most_checks_off: int = 1
+    """Facts that may be far off: a KS distance hardly sees tails, which the right model may
+    miss."""
+    tied_sigmas: float = 2.0
+    """Models tie within this many standard errors of their difference: the usual 95 %."""
+
+
+VERDICT: Final = VerdictPolicy()
 
 
 class Verdict(NamedTuple):
@@ -36,7 +46,7 @@ class Verdict(NamedTuple):
 
 
 def verdict_of(
-    judged: Judged,
+    held_out: HeldOutScore,
     motion: RecordedMotion,
     *,
     baseline: bool,
@@ -47,7 +57,7 @@ def verdict_of(
 
     Parameters
     ----------
-    judged : Judged
+    held_out : Judged
         The model's distances and facts.
     motion : RecordedMotion
         The recording.
@@ -58,15 +68,15 @@ def verdict_of(
     unlike : str, optional
         How far its summaries are from those of the recording, where another model gives them.
     """
-    over = judged.held / motion.own
-    off = checks_off(judged.checks, motion.recorded_checks)
+    over = held_out.held / motion.own
+    off = checks_off(held_out.checks, motion.recorded_checks)
     parts = [
-        f"{ASPECT_WORDS[motion.held.names[k]]}: D = {judged.held[k]:.3f}, "
+        f"{ASPECT_WORDS[motion.held.names[k]]}: D = {held_out.held[k]:.3f}, "
         f"the recording's own parts {motion.own[k]:.3f}"
         for k in np.argsort(-over)
-        if over[k] > MOST_OVER_OWN
+        if over[k] > VERDICT.most_over_own
     ]
-    if np.count_nonzero(off) > MOST_CHECKS_OFF:
+    if np.count_nonzero(off) > VERDICT.most_checks_off:
         names = [words for words, is_off in zip(CHECK_WORDS.values(), off, strict=True) if is_off]
         parts.append(f"far beyond all its worlds: {', '.join(names)}")
     if unlike is not None:
@@ -90,8 +100,8 @@ def checks_off(worlds: Floats, recorded: Floats) -> Bools:
     """
     low, high = worlds.min(axis=0), worlds.max(axis=0)
     share = np.array([name.endswith("_share") for name in CHECKS])
-    lowest = np.where(share, low - MOST_SHARE_APART, low / MOST_RATIO)
-    highest = np.where(share, high + MOST_SHARE_APART, high * MOST_RATIO)
+    lowest = np.where(share, low - VERDICT.most_share_apart, low / VERDICT.most_ratio)
+    highest = np.where(share, high + VERDICT.most_share_apart, high * VERDICT.most_ratio)
     with np.errstate(invalid="ignore"):
         near = (lowest <= recorded) & (recorded <= highest)
     return np.asarray(np.isfinite(recorded) & ~near)

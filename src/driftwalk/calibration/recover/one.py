@@ -8,12 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.calibration.estimation.determined import (
-    AT_THE_END,
-    DETERMINED,
-    QUOTED,
-    SMALL_PART,
-)
+from driftwalk.calibration.estimation.determined import DETERMINED
 from driftwalk.calibration.recover.truth import KnownTruth
 from driftwalk.calibration.run import calibrate
 from driftwalk.core.errors import InputError
@@ -87,14 +82,16 @@ def answer_of(found: xr.Dataset, parameters: Sequence[Parameter]) -> dict[str, A
         half_width = found["half_width"].values.astype(np.float64)
         determined = found["determined"].values.astype(bool)
     else:
-        confidence = float(found["confidence"]) if np.isfinite(interval).any() else QUOTED
+        confidence = (
+            float(found["confidence"]) if np.isfinite(interval).any() else DETERMINED.confidence
+        )
         half_width = np.array(
             [
                 interval_half_width(ends, value, one, confidence=confidence)
                 for ends, value, one in zip(interval, estimate, parameters, strict=True)
             ]
         )
-        determined = half_width <= DETERMINED
+        determined = half_width <= DETERMINED.most_half_width
     return {
         "estimate": estimate,
         "interval": interval,
@@ -137,14 +134,14 @@ def interval_half_width(
     if not np.isfinite(ends).all():
         return float("nan")
     low, high = (float(parameter.to_coordinate(end)) for end in (parameter.low, parameter.high))
-    room = AT_THE_END * (high - low)
+    room = DETERMINED.range_end * (high - low)
     start, end = (float(one) for one in parameter.to_coordinate(ends))
     if start < low + room or end > high - room:
         return float("inf")
-    factor = float(ndtri(0.5 + 0.5 * QUOTED) / ndtri(0.5 + 0.5 * confidence))
+    factor = float(ndtri(0.5 + 0.5 * DETERMINED.confidence) / ndtri(0.5 + 0.5 * confidence))
     if parameter.scale == "log":
         return 0.5 * factor * float(np.log(ends[1] / ends[0]))
-    size = max(abs(value), SMALL_PART * (parameter.high - parameter.low))
+    size = max(abs(value), DETERMINED.small_part * (parameter.high - parameter.low))
     return 0.5 * factor * float(ends[1] - ends[0]) / size
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
-from driftwalk.calibration.recover.summary import relative_errors, summary_by_parameter
+from driftwalk.calibration.estimation.determined import DETERMINED
 from driftwalk.calibration.recover.truth import KnownTruth
 from driftwalk.motion import MotionModel, ParticleModel
 from driftwalk.schema.answers.fit_facts import BOUNDS, texts
@@ -16,6 +17,10 @@ from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+Floats = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
 
 
 def build_model_recovery(known: KnownTruth, found: Mapping[str, Any]) -> xr.Dataset:
@@ -82,3 +87,98 @@ def _fixed(model: MotionModel) -> dict[str, float]:
     fixed: Mapping[str, float] = getattr(model, "fixed", {})
     clearance = model.clearance if isinstance(model, ParticleModel) else 0.0
     return {**fixed, **({"clearance": clearance} if clearance else {})}
+
+
+def relative_errors(
+    estimate: Floats, truth: Floats, ranges: Floats, scales: Sequence[str]
+) -> Floats:
+    """Return the errors of estimates, shape (recordings, parameters).
+
+    Parameters
+    ----------
+    estimate : ndarray, shape (recordings, parameters)
+        Estimates in the units of the parameters.
+    truth : ndarray, shape (parameters,)
+        The true values.
+    ranges : ndarray, shape (recordings, parameters, 2)
+        Ranges of the search.
+    scales : sequence of {"linear", "log"}
+        Scales of the parameters.
+
+    Returns
+    -------
+    ndarray
+        ln(estimate / truth) on a logarithmic scale. On a linear one the difference over the truth,
+        or over a twentieth of the range where the truth is smaller than that.
+
+    Examples
+    --------
+    >>> ends = np.array([[[-5.0, 5.0]]])
+    >>> relative_errors(np.array([[0.2]]), np.array([0.0]), ends, ["linear"]).tolist()
+    [[0.4]]
+    """
+    error = np.empty_like(estimate)
+    for index, scale in enumerate(scales):
+        found, value = estimate[:, index], float(truth[index])
+        if scale == "log":
+            with np.errstate(divide="ignore"):
+                error[:, index] = np.log(found / value)
+        else:
+            low, high = ranges[:, index].T
+            error[:, index] = (found - value) / np.maximum(
+                abs(value), DETERMINED.small_part * (high - low)
+            )
+    return error
+
+
+def summary_by_parameter(
+    error: Floats, interval: Floats, determined: Bools, truth: Floats, *, confidence: float
+) -> dict[str, Floats]:
+    """Return the summary of a study, an array by parameter each.
+
+    Parameters
+    ----------
+    error : ndarray, shape (recordings, parameters)
+        Relative errors; NaN in the row of a recording without a calibration.
+    interval : ndarray, shape (recordings, parameters, 2)
+        Intervals, NaN where there is none: these do not count for the coverage.
+    determined : ndarray, shape (recordings, parameters)
+        Whether the recording determines the parameter.
+    truth : ndarray, shape (parameters,)
+        The true values.
+    confidence : float
+        Of the intervals.
+
+    Examples
+    --------
+    >>> ends = np.array([[[0.9, 1.2]], [[1.1, 1.3]]])
+    >>> found = summary_by_parameter(
+    ...     np.array([[0.05], [0.2]]), ends, np.array([[True], [False]]), np.array([1.0]),
+    ...     confidence=0.9,
+    ... )
+    >>> found["coverage"].tolist(), found["determined_median_error"].tolist()
+    ([0.5], [0.05])
+    """
+    size = np.abs(error)
+    calibrated = np.isfinite(size)
+    known = np.isfinite(interval).all(axis=2)
+    held = known & (interval[..., 0] <= truth) & (truth <= interval[..., 1])
+    counted = known.sum(axis=0).astype(np.float64)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return {
+            "median_error": _medians(size, calibrated),
+            "determined_median_error": _medians(size, calibrated & determined),
+            "determined_share": (calibrated & determined).sum(axis=0) / calibrated.sum(axis=0),
+            "coverage": held.sum(axis=0) / counted,
+            "coverage_standard_error": np.where(
+                counted > 0.0, np.sqrt(confidence * (1.0 - confidence) / counted), np.nan
+            ),
+        }
+
+
+def _medians(size: Floats, counts: Bools) -> Floats:
+    """Return the median of what counts in each column, NaN where nothing does."""
+    columns = zip(size.T, counts.T, strict=True)
+    return np.array(
+        [np.median(one[retained]) if retained.any() else np.nan for one, retained in columns]
+    )

@@ -9,7 +9,7 @@ other. Each is a smooth function of the parameters, whatever the model.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -26,22 +26,39 @@ from driftwalk.calibration.summaries.displacements import (
 
 Numbers = Iterator[float]
 
-STEP_QUANTILES: Final = (0.02, 0.1, 0.25, 0.5, 0.75, 0.9, 0.98)
-LONGER_QUANTILES: Final = (0.05, 0.25, 0.5, 0.75, 0.95)
-MEMORY_LAGS: Final = (1, 2, 3, 5, 10, 20, 50)
-DISPLACEMENT_LAGS: Final = (1, 3, 10, 30, 100)
-WALL_QUANTILES: Final = (0.05, 0.25, 0.5, 0.75)
-WALL_EDGES: Final = (0.05, 0.15, 0.4)
-"""Zones from the wall inwards, in parts of the largest distance; the rest is the middle."""
-SPEED_LEVELS: Final = (0.3, 0.7, 1.2)
-"""Speeds that part fast bouts from slow ones, in usual steps."""
-FASTER: Final = 0.4
-"""A step is faster than the one before by more than this in the logarithm; slower likewise."""
-STEADY: Final = 0.1
-STRAIGHT: Final = 0.3
-"""Turns [rad] above which they count as one kind."""
-FEWEST: Final = 4
-"""A mean of fewer is taken as 0: it would be chance."""
+
+class SummaryPolicy(NamedTuple):
+    """Which statistics summarise a motion.
+
+    Chosen by hand. The errors of the estimates that follow from them are counted by
+    `studies/motion_models/recover.py`.
+    """
+
+    step_quantiles: tuple[float, ...] = (0.02, 0.1, 0.25, 0.5, 0.75, 0.9, 0.98)
+    """Of the logarithm of step lengths."""
+    longer_quantiles: tuple[float, ...] = (0.05, 0.25, 0.5, 0.75, 0.95)
+    """Of steps over longer intervals, and of changes of speed."""
+    memory_lags: tuple[int, ...] = (1, 2, 3, 5, 10, 20, 50)
+    """Of autocorrelations, in step intervals."""
+    displacement_lags: tuple[int, ...] = (1, 3, 10, 30, 100)
+    """Of mean squared displacements, in step intervals."""
+    wall_quantiles: tuple[float, ...] = (0.05, 0.25, 0.5, 0.75)
+    """Of the distance from the wall."""
+    wall_edges: tuple[float, ...] = (0.05, 0.15, 0.4)
+    """Ends of zones from the wall inwards, in parts of the largest distance."""
+    speed_levels: tuple[float, ...] = (0.3, 0.7, 1.2)
+    """Speeds that separate fast bouts from slow ones, in usual steps."""
+    faster: float = 0.4
+    """Rise of the logarithm of the speed that counts as faster; slower likewise."""
+    steady: float = 0.1
+    """Change of the logarithm of the speed below which it is steady."""
+    straight: float = 0.3
+    """Turns [rad] above this count alike: the mean is of small turns."""
+    fewest: int = 4
+    """Fewest values of a mean; of fewer it would be chance and counts as 0."""
+
+
+SUMMARIES: Final = SummaryPolicy()
 
 
 def summarise(plan: SummaryPlan, x: npt.ArrayLike, y: npt.ArrayLike) -> Floats:
@@ -74,7 +91,7 @@ def summarise(plan: SummaryPlan, x: npt.ArrayLike, y: npt.ArrayLike) -> Floats:
     True
     """
     one = series_of(plan, x, y)
-    if np.count_nonzero(one.there) < FEWEST:
+    if np.count_nonzero(one.there) < SUMMARIES.fewest:
         return np.zeros(count_summaries(plan))
     numbers = [
         *_step_lengths(one),
@@ -84,7 +101,7 @@ def summarise(plan: SummaryPlan, x: npt.ArrayLike, y: npt.ArrayLike) -> Floats:
         *_displacement(one),
         *_place(one),
         *_peaks(one),
-        *(number for level in SPEED_LEVELS for number in _bouts(one, level)),
+        *(number for level in SUMMARIES.speed_levels for number in _bouts(one, level)),
     ]
     return np.array(numbers, dtype=np.float64)
 
@@ -92,25 +109,25 @@ def summarise(plan: SummaryPlan, x: npt.ArrayLike, y: npt.ArrayLike) -> Floats:
 def count_summaries(plan: SummaryPlan) -> int:
     """Return how many summaries a motion has."""
     return (
-        len(STEP_QUANTILES)
+        len(SUMMARIES.step_quantiles)
         + 6 * len(plan.intervals)
-        + len(LONGER_QUANTILES) * (len(plan.intervals) - 1)
-        + 6 + len(LONGER_QUANTILES)
-        + 2 * len(MEMORY_LAGS) + len(DISPLACEMENT_LAGS)
-        + len(WALL_QUANTILES) + len(WALL_EDGES)
+        + len(SUMMARIES.longer_quantiles) * (len(plan.intervals) - 1)
+        + 6 + len(SUMMARIES.longer_quantiles)
+        + 2 * len(SUMMARIES.memory_lags) + len(SUMMARIES.displacement_lags)
+        + len(SUMMARIES.wall_quantiles) + len(SUMMARIES.wall_edges)
         + 3
-        + 9 * len(SPEED_LEVELS)
+        + 9 * len(SUMMARIES.speed_levels)
     )  # fmt: skip
 
 
 def _mean(values: Floats, chosen: Bools) -> float:
     """Return the mean over those that are chosen, 0 where they are too few."""
-    return float(values[chosen].mean()) if np.count_nonzero(chosen) >= FEWEST else 0.0
+    return float(values[chosen].mean()) if np.count_nonzero(chosen) >= SUMMARIES.fewest else 0.0
 
 
 def _step_lengths(one: Series) -> Numbers:
     """Yield quantiles of the logarithm of the step lengths."""
-    yield from np.quantile(one.log_length[one.there], STEP_QUANTILES)
+    yield from np.quantile(one.log_length[one.there], SUMMARIES.step_quantiles)
 
 
 def _turns(plan: SummaryPlan, x: npt.ArrayLike, y: npt.ArrayLike) -> Numbers:
@@ -124,10 +141,10 @@ def _turns(plan: SummaryPlan, x: npt.ArrayLike, y: npt.ArrayLike) -> Numbers:
         yield _mean(np.cos(2.0 * angle), all_of)
         yield _mean((cos < 0.0).astype(np.float64), all_of)
         yield _mean(cos, fast)
-        yield float(np.log(_mean(np.minimum(np.abs(angle), STRAIGHT), fast) + 1e-3))
+        yield float(np.log(_mean(np.minimum(np.abs(angle), SUMMARIES.straight), fast) + 1e-3))
         if index:
-            enough = length.size >= FEWEST
-            far = np.quantile(length, LONGER_QUANTILES) if enough else np.zeros(5)
+            enough = length.size >= SUMMARIES.fewest
+            far = np.quantile(length, SUMMARIES.longer_quantiles) if enough else np.zeros(5)
             yield from np.log(far / plan.unit + SMALLEST)
 
 
@@ -137,12 +154,16 @@ def _changes(one: Series) -> Numbers:
     change = np.where(pair, one.log_length[1:] - one.log_length[:-1], 0.0)
     product = np.maximum(one.length[1:] * one.length[:-1], 1e-300)
     cos = (one.dx[1:] * one.dx[:-1] + one.dy[1:] * one.dy[:-1]) / product
-    kinds = (change > FASTER, change < -FASTER, np.abs(change) < STEADY)
+    kinds = (
+        change > SUMMARIES.faster,
+        change < -SUMMARIES.faster,
+        np.abs(change) < SUMMARIES.steady,
+    )
     for kind in kinds:
         yield float((kind & pair).sum()) / max(float(pair.sum()), 1.0)
         yield _mean(cos, kind & pair)
-    enough = np.count_nonzero(pair) >= FEWEST
-    yield from np.quantile(change[pair], LONGER_QUANTILES) if enough else np.zeros(5)
+    enough = np.count_nonzero(pair) >= SUMMARIES.fewest
+    yield from np.quantile(change[pair], SUMMARIES.longer_quantiles) if enough else np.zeros(5)
 
 
 def _memory(one: Series) -> Numbers:
@@ -152,9 +173,9 @@ def _memory(one: Series) -> Numbers:
     dx, dy = (np.where(there, part, 0.0) for part in (one.dx, one.dy))
     variance = float((speed**2).sum()) / np.count_nonzero(there)
     square = float((dx**2 + dy**2).sum()) / np.count_nonzero(there)
-    for lag in MEMORY_LAGS:
+    for lag in SUMMARIES.memory_lags:
         pairs = np.count_nonzero(there[lag:] & there[:-lag])
-        if pairs < FEWEST or not variance > 0.0 or not square > 0.0:
+        if pairs < SUMMARIES.fewest or not variance > 0.0 or not square > 0.0:
             yield from (0.0, 0.0)
             continue
         yield float((speed[lag:] * speed[:-lag]).sum()) / pairs / variance
@@ -164,9 +185,9 @@ def _memory(one: Series) -> Numbers:
 def _displacement(one: Series) -> Numbers:
     """Yield logarithms of mean squared displacements over unbroken stretches."""
     broken = np.concatenate([[0], np.cumsum(~one.there)])
-    for lag in DISPLACEMENT_LAGS:
+    for lag in SUMMARIES.displacement_lags:
         whole = broken[lag:] == broken[:-lag]
-        if np.count_nonzero(whole) < FEWEST:
+        if np.count_nonzero(whole) < SUMMARIES.fewest:
             yield 0.0
             continue
         square = (one.x[lag:] - one.x[:-lag]) ** 2 + (one.y[lag:] - one.y[:-lag]) ** 2
@@ -175,13 +196,13 @@ def _displacement(one: Series) -> Numbers:
 
 def _place(one: Series) -> Numbers:
     """Yield quantiles of the distance from the wall, and how much slower the body is near it."""
-    yield from np.quantile(one.from_wall[one.there], WALL_QUANTILES)
-    middle = one.there & (one.from_wall > WALL_EDGES[-1])
+    yield from np.quantile(one.from_wall[one.there], SUMMARIES.wall_quantiles)
+    middle = one.there & (one.from_wall > SUMMARIES.wall_edges[-1])
     usual = _mean(one.log_length, middle)
     inner = -np.inf
-    for edge in WALL_EDGES:
+    for edge in SUMMARIES.wall_edges:
         zone = one.there & (one.from_wall > inner) & (one.from_wall <= edge)
-        few = min(np.count_nonzero(zone), np.count_nonzero(middle)) < FEWEST
+        few = min(np.count_nonzero(zone), np.count_nonzero(middle)) < SUMMARIES.fewest
         yield 0.0 if few else _mean(one.log_length, zone) - usual
         inner = edge
 

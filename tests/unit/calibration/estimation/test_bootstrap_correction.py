@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from driftwalk.calibration.estimation.bootstrap_correction import FEWEST, Repeated, repeat_estimates
+from driftwalk.calibration.estimation.bootstrap_correction import (
+    BootstrapEstimates,
+    bootstrap_estimates,
+)
 from driftwalk.calibration.estimation.emulator import fit_emulator
 from driftwalk.calibration.estimation.posterior import Posterior
 from driftwalk.calibration.estimation.region import Region
@@ -14,7 +17,9 @@ STD = 0.01
 CENTRE = np.array([0.4, 0.6])
 
 
-def repeated(count: int, *, noise: float = 1.0, off: tuple[float, float] = (0.0, 0.0)) -> Repeated:
+def repeated(
+    count: int, *, noise: float = 1.0, off: tuple[float, float] = (0.0, 0.0)
+) -> BootstrapEstimates:
     """Repeat with summaries that are the parameters and noise of `STD`; the model's differ."""
     rng = np.random.default_rng(1)
 
@@ -25,16 +30,16 @@ def repeated(count: int, *, noise: float = 1.0, off: tuple[float, float] = (0.0,
     settings = region.filled(4096, 1)
     summaries = settings + STD * rng.normal(size=settings.shape)
     emulator = fit_emulator(settings, summaries, centre=region.centre, width=6 * region.width)
-    draws = CENTRE + STD * rng.normal(size=(512, 2))
-    solved = emulator.solve(CENTRE, reach=1.0)
-    posterior = Posterior(draws, emulator, region, solved, (), np.zeros(2))
-    return repeat_estimates(simulate, posterior, count)
+    sample = CENTRE + STD * rng.normal(size=(512, 2))
+    solution = emulator.solve(CENTRE, reach=1.0)
+    posterior = Posterior(sample, emulator, region, solution, (), np.zeros(2))
+    return bootstrap_estimates(simulate, posterior, count)
 
 
 def test_a_right_emulator_needs_no_correction():
     """The bias of 400 has an error of 0.05 deviations, the scatter one of 4 %, draws one of 3 %."""
     found = repeated(400)
-    assert found.misfits.shape == (400,)
+    assert found.discrepancies.shape == (400,)
     np.testing.assert_allclose(found.bias, 0.0, atol=0.2 * STD)
     assert (found.spread >= 1.0).all()
     assert (found.spread < 1.2).all()
@@ -55,7 +60,7 @@ def test_a_bias_is_found():
 
 
 def test_few_recordings_tell_misfits_alone():
-    found = repeated(FEWEST - 1, noise=2.0, off=(STD, STD))
-    assert found.misfits.size == FEWEST - 1
+    found = repeated(39, noise=2.0, off=(STD, STD))
+    assert found.discrepancies.size == 39
     assert (found.bias == 0.0).all()
     assert found.spread == pytest.approx([1.0, 1.0], abs=0.02)

@@ -114,18 +114,18 @@ def test_the_misfit_at_the_truth_is_that_of_the_known_noise(
     misfit is chi-square with 8 degrees of freedom. 4000 draws give the mean within 4 errors and
     the variance within 15 % (its own error is 3.5 %); 4096 simulations add less than 1 % to each.
     """
-    model, draws = Quadratic(fresh_seed(3), related=related), 4000
+    model, sample = Quadratic(fresh_seed(3), related=related), 4000
     emulator = model.emulator(4096)
     truth = CENTRE + WIDTH * [0.3, -0.4]
-    summaries = model.expected(truth[None]) + model.noise(draws)
-    misfits = np.array([emulator.misfits(truth[None], one)[0] for one in summaries])
+    summaries = model.expected(truth[None]) + model.noise(sample)
+    discrepancies = np.array([emulator.discrepancies(truth[None], one)[0] for one in summaries])
     shrunk = (1 - SHRUNK) * model.covariance + SHRUNK * np.diag(np.diag(model.covariance))
     product = np.linalg.solve(shrunk, model.covariance)
     mean, variance = np.trace(product), 2 * np.trace(product @ product)
     if not related:
         assert (mean, variance) == pytest.approx((SUMMARIES, 2 * SUMMARIES))
-    assert abs(misfits.mean() - mean) < 4 * np.sqrt(variance / draws) + 0.01 * mean
-    assert misfits.var() == pytest.approx(variance, rel=0.15)
+    assert abs(discrepancies.mean() - mean) < 4 * np.sqrt(variance / sample) + 0.01 * mean
+    assert discrepancies.var() == pytest.approx(variance, rel=0.15)
 
 
 @pytest.mark.slow
@@ -139,18 +139,18 @@ def test_a_solution_is_as_near_the_truth_as_it_says(fresh_seed: Callable[[int], 
     """
     model, recordings = Quadratic(fresh_seed(4), related=False), 300
     emulator = model.emulator(4096)
-    apart, misfits = [], []
+    apart, discrepancies = [], []
     for _ in range(recordings):
         truth = CENTRE + WIDTH * model.rng.uniform(-0.6, 0.6, 2)
         summaries = (model.expected(truth[None]) + model.noise(1))[0]
-        solved = emulator.solve(summaries, reach=1.25)
-        np.testing.assert_allclose(solved.setting, CENTRE + WIDTH * solved.place)
-        apart.append((solved.setting - truth) / solved.std)
-        misfits.append(solved.misfit)
+        solution = emulator.solve(summaries, reach=1.25)
+        np.testing.assert_allclose(solution.setting, CENTRE + WIDTH * solution.place)
+        apart.append((solution.setting - truth) / solution.std)
+        discrepancies.append(solution.discrepancy)
     assert 0.84 < np.mean(np.abs(apart) < 1.645) < 0.96
-    assert abs(np.mean(misfits) - (SUMMARIES - 2)) < 0.9
+    assert abs(np.mean(discrepancies) - (SUMMARIES - 2)) < 0.9
     # Standard deviations are of use: a part of the box.
-    assert (solved.std < 0.3 * WIDTH).all()
+    assert (solution.std < 0.3 * WIDTH).all()
 
 
 def test_no_point_of_the_box_fits_better():
@@ -161,12 +161,14 @@ def test_no_point_of_the_box_fits_better():
     grid = CENTRE + WIDTH * np.stack(np.meshgrid(at, at), axis=-1).reshape(-1, 2)
     for truth in ([0.2, 0.7], [1.2, -1.1], [1.6, 0.4]):
         summaries = (model.expected(CENTRE + WIDTH * [truth]) + model.noise(1))[0]
-        solved = emulator.solve(summaries, reach=1.25)
-        misfits = emulator.misfits(grid, summaries)
-        assert solved.misfit == pytest.approx(emulator.misfits(solved.setting[None], summaries)[0])
-        assert solved.misfit <= misfits.min()
-        best = grid[misfits.argmin()]
-        assert (np.abs(solved.setting - best) <= 2 * WIDTH * 2.5 / 300).all()
+        solution = emulator.solve(summaries, reach=1.25)
+        discrepancies = emulator.discrepancies(grid, summaries)
+        assert solution.discrepancy == pytest.approx(
+            emulator.discrepancies(solution.setting[None], summaries)[0]
+        )
+        assert solution.discrepancy <= discrepancies.min()
+        best = grid[discrepancies.argmin()]
+        assert (np.abs(solution.setting - best) <= 2 * WIDTH * 2.5 / 300).all()
 
 
 def test_misfits_are_squares_of_what_is_left_over_its_covariance():
@@ -184,7 +186,7 @@ def test_misfits_are_squares_of_what_is_left_over_its_covariance():
     at = settings[:7]
     apart = terms((at - CENTRE) / WIDTH) @ coefficients - recorded
     wanted = [one @ np.linalg.inv(covariance) @ one for one in apart]
-    np.testing.assert_allclose(emulator.misfits(at, recorded), wanted)
+    np.testing.assert_allclose(emulator.discrepancies(at, recorded), wanted)
 
 
 def test_summaries_that_do_not_vary_say_nothing():
@@ -202,7 +204,8 @@ def test_summaries_that_do_not_vary_say_nothing():
     assert found.summaries == SUMMARIES
     recorded = np.insert(summaries[5], [0, 3, 3, 8], [4.0, 8.0, -1.0, 100.0])
     np.testing.assert_allclose(
-        found.misfits(settings[:9], recorded), without.misfits(settings[:9], summaries[5])
+        found.discrepancies(settings[:9], recorded),
+        without.discrepancies(settings[:9], summaries[5]),
     )
 
 
@@ -218,11 +221,11 @@ def test_solutions_stay_within_reach_and_within_the_ranges(corner: tuple[float, 
     for angle in np.linspace(0.0, 2 * np.pi, 16, endpoint=False):
         away = 8.0 * np.array([np.cos(angle), np.sin(angle)])
         for start in (None, np.array([0.5, 0.5]), centre):
-            solved = emulator.solve(slopes @ away, reach=1.25, start=start)
-            assert (np.abs(solved.place) <= 1.25).all()
-            assert (solved.setting >= 0.0).all()
-            assert (solved.setting <= 1.0).all()
-            assert np.isfinite(solved.std).all()
+            solution = emulator.solve(slopes @ away, reach=1.25, start=start)
+            assert (np.abs(solution.place) <= 1.25).all()
+            assert (solution.setting >= 0.0).all()
+            assert (solution.setting <= 1.0).all()
+            assert np.isfinite(solution.std).all()
 
 
 def test_a_parameter_that_changes_nothing_has_the_width_of_the_box():
@@ -230,8 +233,8 @@ def test_a_parameter_that_changes_nothing_has_the_width_of_the_box():
     rng = np.random.default_rng(9)
     settings = CENTRE + WIDTH * rng.uniform(-1, 1, (4000, 2))
     summaries = np.column_stack([settings[:, 0] / WIDTH[0]] * 3) + 0.01 * rng.normal(size=(4000, 3))
-    solved = fit_emulator(settings, summaries, centre=CENTRE, width=WIDTH).solve(
+    solution = fit_emulator(settings, summaries, centre=CENTRE, width=WIDTH).solve(
         np.full(3, CENTRE[0] / WIDTH[0]), reach=1.25
     )
-    assert solved.std[1] == pytest.approx(WIDTH[1], rel=0.05)
-    assert solved.std[0] == pytest.approx(WIDTH[0] * 0.01 / np.sqrt(3), rel=0.1)
+    assert solution.std[1] == pytest.approx(WIDTH[1], rel=0.05)
+    assert solution.std[0] == pytest.approx(WIDTH[0] * 0.01 / np.sqrt(3), rel=0.1)

@@ -9,8 +9,7 @@ import pytest
 from scipy.stats import chi2
 
 from driftwalk.calibration.estimation.estimate import (
-    HOPELESS,
-    MATCHES,
+    MATCHING,
     Matched,
     match_summaries,
     most_simulations,
@@ -64,9 +63,9 @@ class Starts:
         return self.points
 
 
-def matched(toy: Toy, starts: Starts, *, worlds: int = 60, seed: int = 1) -> Matched:
-    found = match_summaries(toy, 2, starts, order=np.asarray, worlds=worlds, seed=seed)
-    assert toy.simulated <= most_simulations(2, worlds)
+def matched(toy: Toy, starts: Starts, *, replicates: int = 60, seed: int = 1) -> Matched:
+    found = match_summaries(toy, 2, starts, order=np.asarray, replicates=replicates, seed=seed)
+    assert toy.simulated <= most_simulations(2, replicates)
     return found
 
 
@@ -87,7 +86,7 @@ def test_a_recording_of_the_model_is_matched_by_its_summaries_alone():
     200 such numbers has an error of 0.24, their 95 % quantile one of 0.8.
     """
     starts = Starts()
-    found = matched(Toy(bent, 1), starts, worlds=200)
+    found = matched(Toy(bent, 1), starts, replicates=200)
     assert starts.calls == 0
     assert found.usual
     assert not found.unlike
@@ -95,10 +94,10 @@ def test_a_recording_of_the_model_is_matched_by_its_summaries_alone():
     std = deviations()
     assert (np.abs(found.point - TRUTH) < 0.6 * std).all()
     assert (np.abs(found.even_point - EVEN) < 0.6 * std).all()
-    np.testing.assert_allclose(found.draws.std(axis=0), std, rtol=0.25)
-    assert found.usual_misfit == pytest.approx(chi2(4).median(), abs=1.1)
-    assert found.most_misfit == pytest.approx(chi2(4).ppf(0.95), abs=4.0)
-    assert found.misfit < MATCHES * SPREAD.size
+    np.testing.assert_allclose(found.sample.std(axis=0), std, rtol=0.25)
+    assert found.median_discrepancy == pytest.approx(chi2(4).median(), abs=1.1)
+    assert found.upper_discrepancy == pytest.approx(chi2(4).ppf(0.95), abs=4.0)
+    assert found.discrepancy < MATCHING.matches * SPREAD.size
 
 
 @pytest.mark.slow
@@ -108,19 +107,19 @@ def test_what_the_model_cannot_give_widens_the_draws():
     found = matched(Toy(bent, 2, off=10.0), starts)
     assert starts.calls == 1
     assert not found.usual
-    assert MATCHES * SPREAD.size < found.misfit < HOPELESS * SPREAD.size
-    assert found.stretch == pytest.approx(np.sqrt(found.misfit / found.usual_misfit))
+    assert MATCHING.matches * SPREAD.size < found.discrepancy < MATCHING.hopeless * SPREAD.size
+    assert found.stretch == pytest.approx(np.sqrt(found.discrepancy / found.median_discrepancy))
     assert found.stretch > 2.0
     assert found.unlike
-    np.testing.assert_allclose(found.draws.std(axis=0), found.stretch * deviations(), rtol=0.35)
-    np.testing.assert_allclose(found.point, np.median(found.draws, axis=0), atol=1e-9)
+    np.testing.assert_allclose(found.sample.std(axis=0), found.stretch * deviations(), rtol=0.35)
+    np.testing.assert_allclose(found.point, np.median(found.sample, axis=0), atol=1e-9)
 
 
 @pytest.mark.slow
 def test_a_small_misfit_leaves_parameters_determined():
     """One summary is three deviations off, 9 of misfit beside the usual 3.4 of 4 degrees."""
-    found = matched(Toy(bent, 2, off=3.0), Starts((0.4, 0.6)), worlds=200)
-    assert 1.0 < found.misfit / found.usual_misfit < 4.0
+    found = matched(Toy(bent, 2, off=3.0), Starts((0.4, 0.6)), replicates=200)
+    assert 1.0 < found.discrepancy / found.median_discrepancy < 4.0
     assert not found.unlike
 
 
@@ -129,9 +128,9 @@ def test_another_start_is_no_use_for_another_model():
     starts = Starts((0.4, 0.6))
     found = matched(Toy(bent, 3, off=300.0), starts)
     assert starts.calls == 0
-    assert found.misfit > HOPELESS * SPREAD.size
+    assert found.discrepancy > MATCHING.hopeless * SPREAD.size
     assert not found.usual
-    assert ((found.draws >= 0.0) & (found.draws <= 1.0)).all()
+    assert ((found.sample >= 0.0) & (found.sample <= 1.0)).all()
 
 
 @pytest.mark.slow
@@ -166,13 +165,13 @@ def test_draws_are_put_in_order():
         return -np.sort(-settings, axis=1)
 
     toy = Toy(alike, 5)
-    found = match_summaries(toy, 2, Starts(), order=larger_first, worlds=20, seed=5)
-    assert (found.draws[:, 0] >= found.draws[:, 1]).all()
-    np.testing.assert_allclose(found.point, TRUTH[::-1], atol=4 * found.draws.std(axis=0).max())
+    found = match_summaries(toy, 2, Starts(), order=larger_first, replicates=20, seed=5)
+    assert (found.sample[:, 0] >= found.sample[:, 1]).all()
+    np.testing.assert_allclose(found.point, TRUTH[::-1], atol=4 * found.sample.std(axis=0).max())
 
 
 @pytest.mark.slow
 def test_the_same_seed_gives_the_same_answer():
-    first, again = (matched(Toy(bent, 6), Starts(), worlds=10) for _ in range(2))
+    first, again = (matched(Toy(bent, 6), Starts(), replicates=10) for _ in range(2))
     for one, other in zip(first, again, strict=True):
         np.testing.assert_array_equal(one, other)

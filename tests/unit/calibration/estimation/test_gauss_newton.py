@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 
 from driftwalk.calibration.estimation.gauss_newton import (
-    FEWEST_ROUNDS,
-    MOST_ROUNDS,
-    WIDEST,
-    Descended,
-    descend,
+    GAUSS_NEWTON,
+    LocalOptimum,
     drawn_settings,
+    minimise_discrepancy,
     rounded,
     simulations_of,
 )
@@ -43,12 +41,12 @@ class Recorder:
 
 
 def from_start(
-    truth: list[float], start: list[float], seed: int, *, width: float = WIDEST
-) -> tuple[Descended, Recorder]:
+    truth: list[float], start: list[float], seed: int, *, width: float = GAUSS_NEWTON.widest
+) -> tuple[LocalOptimum, Recorder]:
     simulate = Recorder(valley, seed)
     recorded = valley(np.array([truth]))[0]
     wide = np.full(2, width)
-    return descend(simulate, recorded, np.array(start), wide, seed=seed), simulate
+    return minimise_discrepancy(simulate, recorded, np.array(start), wide, seed=seed), simulate
 
 
 @pytest.mark.false_alarm(1e-4)
@@ -62,10 +60,10 @@ def test_the_end_of_a_bent_valley_is_reached(
     That is about a sixth of the standard deviation of the answer; one of it is allowed.
     """
     found, simulate = from_start(truth, list(start), fresh_seed(3))
-    apart = (found.solved.setting - truth) / found.solved.std
+    apart = (found.solution.setting - truth) / found.solution.std
     assert np.abs(apart).max() < 1.0
-    assert found.solved.misfit < found.emulator.summaries
-    assert found.rounds == len(simulate.asked) <= MOST_ROUNDS
+    assert found.solution.discrepancy < found.emulator.summaries
+    assert found.rounds == len(simulate.asked) <= GAUSS_NEWTON.most_rounds
 
 
 @pytest.mark.parametrize("truth", [(0.0, 0.8), (1.0, 0.8), (0.5, 0.2), (1.4, 0.9)])
@@ -78,10 +76,10 @@ def test_settings_are_always_in_the_cube(truth: list[float], start: list[float])
         assert settings.min() >= 0.0
         assert settings.max() <= 1.0
         np.testing.assert_array_equal(settings, rounded(settings))
-    assert (found.solved.setting >= 0.0).all()
-    assert (found.solved.setting <= 1.0).all()
+    assert (found.solution.setting >= 0.0).all()
+    assert (found.solution.setting <= 1.0).all()
     if truth[0] in (0.0, 1.0):
-        assert abs(found.solved.setting[0] - truth[0]) < 2 * found.solved.std[0]
+        assert abs(found.solution.setting[0] - truth[0]) < 2 * found.solution.std[0]
 
 
 def test_the_deviations_at_the_end_are_those_of_the_model():
@@ -92,17 +90,17 @@ def test_the_deviations_at_the_end_are_those_of_the_model():
     slopes = np.array([[-4.8 * (a - 0.5), 1.0], [1.0, 1.0], [np.exp(a), 0.0], [b, a]])
     scaled = slopes / SPREAD[:, None]
     wanted = np.sqrt(np.diag(np.linalg.inv(scaled.T @ scaled)))
-    np.testing.assert_allclose(found.solved.std, wanted, rtol=0.25)
+    np.testing.assert_allclose(found.solution.std, wanted, rtol=0.25)
 
 
 def test_a_model_far_from_the_recording_still_ends():
     """No setting gives these summaries: the search stops by itself, at the least bad place."""
     simulate = Recorder(valley, 6)
     recorded = np.array([0.0, 0.5, 5.0, -3.0])
-    found = descend(simulate, recorded, np.array([0.5, 0.5]), np.full(2, 0.1), seed=6)
-    assert found.rounds <= MOST_ROUNDS
-    assert np.isfinite(found.solved.setting).all()
-    assert found.solved.misfit > 100.0
+    found = minimise_discrepancy(simulate, recorded, np.array([0.5, 0.5]), np.full(2, 0.1), seed=6)
+    assert found.rounds <= GAUSS_NEWTON.most_rounds
+    assert np.isfinite(found.solution.setting).all()
+    assert found.solution.discrepancy > 100.0
 
 
 def test_a_search_that_stays_far_from_the_recording_is_given_up_early():
@@ -110,17 +108,19 @@ def test_a_search_that_stays_far_from_the_recording_is_given_up_early():
     far, near = np.array([0.0, 0.5, 5.0, -3.0]), valley(np.array([[0.8, 0.416]]))[0]
     start, width = np.array([0.5, 0.5]), np.full(2, 0.1)
     rounds = [
-        descend(Recorder(valley, 6), recorded, start, width, seed=6, give_up=give_up).rounds
+        minimise_discrepancy(
+            Recorder(valley, 6), recorded, start, width, seed=6, give_up=give_up
+        ).rounds
         for recorded in (far, near)
         for give_up in (np.inf, 3.0)
     ]
-    assert rounds[0] > rounds[1] == FEWEST_ROUNDS
+    assert rounds[0] > rounds[1] == GAUSS_NEWTON.fewest_rounds
     assert rounds[2] == rounds[3]
 
 
 def test_the_same_seed_gives_the_same_end():
     first, again, other = (
-        from_start([0.8, 0.416], [0.3, 0.3], seed)[0].solved.setting for seed in (7, 7, 8)
+        from_start([0.8, 0.416], [0.3, 0.3], seed)[0].solution.setting for seed in (7, 7, 8)
     )
     np.testing.assert_array_equal(first, again)
     assert not np.array_equal(first, other)

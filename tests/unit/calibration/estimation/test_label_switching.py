@@ -9,9 +9,9 @@ import pytest
 from scipy.stats import ks_2samp
 
 import driftwalk as dw
-from driftwalk.calibration.estimation.label_switching import order_of
+from driftwalk.calibration.estimation.label_switching import label_order
 from driftwalk.calibration.evolution import Scales, recorded_ranges
-from driftwalk.calibration.held_out.candidates import Contestant
+from driftwalk.calibration.held_out.candidates import Candidate
 from driftwalk.conditions import Conditions
 from driftwalk.core.seeds import world_keys
 from driftwalk.model import Tank
@@ -33,24 +33,24 @@ LIKE = Conditions(
 STATES = ("speed", "time", "rotational_diffusion")
 
 
-def entry_of(model: MotionModel, ranges: tuple[Parameter, ...] | None = None) -> Contestant:
+def entry_of(model: MotionModel, ranges: tuple[Parameter, ...] | None = None) -> Candidate:
     chosen = recorded_ranges(model.parameters, SCALES) if ranges is None else ranges
-    return Contestant(model, LIKE, chosen, len(chosen), baseline=False)
+    return Candidate(model, LIKE, chosen, len(chosen), baseline=False)
 
 
-def drawn(entry: Contestant, count: int = 200) -> np.ndarray:
+def drawn(entry: Candidate, count: int = 200) -> np.ndarray:
     return np.random.default_rng(8).random((count, len(entry.ranges)))
 
 
 @pytest.fixture
-def two_state() -> Contestant:
+def two_state() -> Candidate:
     return entry_of(dw.motion_model("two_state"))
 
 
 def test_the_slower_of_two_states_comes_first(two_state):
     settings = drawn(two_state)
     given = settings.copy()
-    ordered = order_of(two_state)(settings)
+    ordered = label_order(two_state)(settings)
     np.testing.assert_array_equal(settings, given)
     names = [one.name for one in two_state.ranges]
     turned = 0
@@ -69,7 +69,7 @@ def test_the_slower_of_two_states_comes_first(two_state):
 
 
 def test_order_is_kept_where_it_is(two_state):
-    order = order_of(two_state)
+    order = label_order(two_state)
     once = order(drawn(two_state))
     np.testing.assert_array_equal(order(once), once)
 
@@ -80,7 +80,7 @@ def test_states_that_change_places_make_the_same_motion(two_state):
     Paths show whether speeds and times have changed places, distances whether the turns have.
     """
     setting = np.array([[0.8, 0.2, 0.3, 0.3, 0.5, 0.9, 0.1, 0.5, 0.2]])
-    ordered = order_of(two_state)(setting)
+    ordered = label_order(two_state)(setting)
     assert not np.array_equal(setting, ordered)
     paths, ways = [], []
     for seed, one in enumerate((setting, ordered)):
@@ -100,7 +100,7 @@ def test_states_that_change_places_make_the_same_motion(two_state):
 def test_models_without_such_states_stay_as_they_are(name):
     entry = entry_of(dw.motion_model(name))
     settings = drawn(entry)
-    np.testing.assert_array_equal(order_of(entry)(settings), settings)
+    np.testing.assert_array_equal(label_order(entry)(settings), settings)
 
 
 @pytest.mark.parametrize("other", ["fast_speed", "slow_time", "fast_rotational_diffusion"])
@@ -110,7 +110,7 @@ def test_states_with_ranges_of_their_own_are_told_apart_by_them(two_state, other
     )
     entry = entry_of(two_state.model, ranges)
     settings = drawn(entry)
-    np.testing.assert_array_equal(order_of(entry)(settings), settings)
+    np.testing.assert_array_equal(label_order(entry)(settings), settings)
 
 
 @pytest.mark.parametrize("known", ["slow_time", "fast_speed"])
@@ -119,4 +119,4 @@ def test_a_state_of_which_something_is_known_keeps_its_place(known):
     entry = entry_of(model)
     assert len(entry.ranges) == 8
     settings = drawn(entry)
-    np.testing.assert_array_equal(order_of(entry)(settings), settings)
+    np.testing.assert_array_equal(label_order(entry)(settings), settings)

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from driftwalk.calibration.estimation.emulator import fit_emulator
-from driftwalk.calibration.estimation.gauss_newton import Descended, drawn_settings
+from driftwalk.calibration.estimation.gauss_newton import LocalOptimum, drawn_settings
 from driftwalk.calibration.estimation.modes import Modes, find_modes
-from driftwalk.calibration.estimation.posterior import DRAWS, Posterior, sample_posterior
+from driftwalk.calibration.estimation.posterior import POSTERIOR, Posterior, sample_posterior
 
 SPREAD = np.array([0.006, 0.01, 0.05])
 TRUTH = np.array([0.7, 0.4])
@@ -23,12 +23,12 @@ def expected(settings: np.ndarray, steep: float) -> np.ndarray:
     return np.column_stack([(a - 0.5) ** 2, b, steep * a])
 
 
-def end_at(centre: tuple[float, float], steep: float, seed: int) -> Descended:
+def end_at(centre: tuple[float, float], steep: float, seed: int) -> LocalOptimum:
     middle, width = np.array(centre), np.full(2, 0.05)
     settings = drawn_settings(middle, width, 512, seed)
     noise = SPREAD * np.random.default_rng(seed).normal(size=(512, 3))
     emulator = fit_emulator(settings, expected(settings, steep) + noise, centre=middle, width=width)
-    return Descended(emulator, emulator.solve(expected(TRUTH[None], steep)[0], reach=1.25), 1)
+    return LocalOptimum(emulator, emulator.solve(expected(TRUTH[None], steep)[0], reach=1.25), 1)
 
 
 def found_from(*centres: tuple[float, float], steep: float = 0.0) -> tuple[Modes, list[int]]:
@@ -41,12 +41,12 @@ def found_from(*centres: tuple[float, float], steep: float = 0.0) -> tuple[Modes
         noise = SPREAD * rng.normal(size=(len(settings), parts, 3))
         return expected(settings, steep)[:, None] + noise
 
-    def sample(end: Descended, number: int) -> Posterior:
+    def sample_about(end: LocalOptimum, number: int) -> Posterior:
         sampled.append(number)
-        return sample_posterior(simulate, recorded, end.emulator, end.solved, seed=10 * number)
+        return sample_posterior(simulate, recorded, end.emulator, end.solution, seed=10 * number)
 
-    ends = [end_at(one, steep, 5 + place) for place, one in enumerate(centres)]
-    return find_modes(ends, sample), sampled
+    optima = [end_at(one, steep, 5 + place) for place, one in enumerate(centres)]
+    return find_modes(optima, sample_about), sampled
 
 
 def share_above(steep: float) -> float:
@@ -62,17 +62,17 @@ def test_both_places_have_their_shares(steep: float):
     """The misfits of covariances from simulations have errors of 0.1: 0.05 of a share, at most."""
     modes, _ = found_from((0.71, 0.41), (0.29, 0.39), steep=steep)
     assert len(modes.places) == 2
-    first_is_below = modes.places[0].draws[:, 0].mean() < 0.5
+    first_is_below = modes.places[0].sample[:, 0].mean() < 0.5
     above = modes.weights[int(first_is_below)]
-    draws = modes.mixed([one.draws for one in modes.places])
-    assert draws.shape == (DRAWS, 2)
-    assert np.mean(draws[:, 0] > 0.5) == pytest.approx(share_above(steep), abs=0.12)
+    sample = modes.mixed([one.sample for one in modes.places])
+    assert sample.shape == (POSTERIOR.size, 2)
+    assert np.mean(sample[:, 0] > 0.5) == pytest.approx(share_above(steep), abs=0.12)
     assert above == pytest.approx(share_above(steep), abs=0.12)
 
 
 def test_a_parameter_is_apart_where_its_places_are():
     modes, _ = found_from((0.71, 0.41), (0.29, 0.39))
-    assert modes.apart([one.draws for one in modes.places]).tolist() == [True, False]
+    assert modes.apart([one.sample for one in modes.places]).tolist() == [True, False]
 
 
 def test_a_place_that_the_recording_rules_out_is_left_out():
@@ -81,8 +81,8 @@ def test_a_place_that_the_recording_rules_out_is_left_out():
     assert sampled == [0, 1]
     assert len(modes.places) == 1
     assert modes.weights.tolist() == [1.0]
-    np.testing.assert_allclose(modes.best.draws.mean(axis=0), TRUTH, atol=0.01)
-    assert not modes.apart([modes.best.draws]).any()
+    np.testing.assert_allclose(modes.best.sample.mean(axis=0), TRUTH, atol=0.01)
+    assert not modes.apart([modes.best.sample]).any()
 
 
 def test_searches_with_one_end_are_one_place():

@@ -15,7 +15,7 @@ from scipy.stats import truncnorm
 
 from driftwalk.calibration.estimation.emulator import fit_emulator
 from driftwalk.calibration.estimation.gauss_newton import drawn_settings, rounded
-from driftwalk.calibration.estimation.posterior import DRAWS, Posterior, sample_posterior
+from driftwalk.calibration.estimation.posterior import POSTERIOR, Posterior, sample_posterior
 
 SLOPES = np.array([[1.0, 0.3], [0.2, 1.0], [0.5, 0.5], [0.4, -0.3]])
 SPREAD = np.array([0.02, 0.04, 0.03, 0.05])
@@ -51,8 +51,8 @@ def sampled(recorded: np.ndarray, seed: int, *, width: float = 0.1) -> Sampled:
     first = drawn_settings(centre, wide, 512, seed)
     summaries = first @ SLOPES.T + SPREAD * rng.normal(size=(512, len(SPREAD)))
     emulator = fit_emulator(first, summaries, centre=centre, width=wide)
-    solved = emulator.solve(recorded[0], reach=1.25)
-    return Sampled(sample_posterior(simulate, recorded, emulator, solved, seed=seed), len(boxes))
+    solution = emulator.solve(recorded[0], reach=1.25)
+    return Sampled(sample_posterior(simulate, recorded, emulator, solution, seed=seed), len(boxes))
 
 
 @pytest.mark.slow
@@ -72,13 +72,13 @@ def test_mean_and_covariance_are_those_of_a_normal_posterior(fresh_seed: Callabl
         truth = rng.uniform(0.35, 0.65, 2)
         recorded = np.array([truth @ SLOPES.T + SPREAD * rng.normal(size=4)] * 2)
         found = sampled(recorded, seed).posterior
-        assert found.draws.shape == (DRAWS, 2)
+        assert found.sample.shape == (POSTERIOR.size, 2)
         mean = centre_of(recorded[0])
-        apart.append((found.draws.mean(axis=0) - mean) / STD)
-        spreads.append(np.log(found.draws.std(axis=0) / STD))
-        correlations.append(np.corrcoef(found.draws.T)[0, 1])
+        apart.append((found.sample.mean(axis=0) - mean) / STD)
+        spreads.append(np.log(found.sample.std(axis=0) / STD))
+        correlations.append(np.corrcoef(found.sample.T)[0, 1])
         assert np.abs(apart[-1]).max() < 0.6
-        np.testing.assert_allclose(found.solved.setting, mean, atol=0.5 * STD.min())
+        np.testing.assert_allclose(found.solution.setting, mean, atol=0.5 * STD.min())
     wanted = COVARIANCE[0, 1] / STD.prod()
     assert np.abs(np.mean(apart, axis=0)).max() < 0.2
     assert np.abs(np.mean(spreads, axis=0)).max() < 0.1
@@ -121,8 +121,8 @@ def cut_off(end: float, outside: float, seed: int) -> np.ndarray:
     centre, width = np.array([end, 0.5]), np.full(2, 0.08)
     first = drawn_settings(centre, width, 512, seed)
     emulator = fit_emulator(first, simulate(first, parts=1)[:, 0], centre=centre, width=width)
-    solved = emulator.solve(recorded[0], reach=1.25)
-    return sample_posterior(simulate, recorded, emulator, solved, seed=seed).draws[:, 0]
+    solution = emulator.solve(recorded[0], reach=1.25)
+    return sample_posterior(simulate, recorded, emulator, solution, seed=seed).sample[:, 0]
 
 
 def test_draws_at_the_end_of_a_range_pile_up_there():
@@ -143,17 +143,17 @@ def test_a_box_that_is_too_small_is_widened(width: float):
     """
     recorded = np.array([[0.5, 0.5] @ SLOPES.T, [0.52, 0.46] @ SLOPES.T])
     found, boxes = sampled(recorded, 3, width=width)
-    np.testing.assert_allclose(found.draws.std(axis=0), STD, rtol=0.25)
-    assert (np.abs(found.draws.mean(axis=0) - 0.5) < 0.6 * STD).all()
+    np.testing.assert_allclose(found.sample.std(axis=0), STD, rtol=0.25)
+    assert (np.abs(found.sample.mean(axis=0) - 0.5) < 0.6 * STD).all()
     assert (found.emulator.width > 1.5 * STD).all()
     assert boxes == (2 if width > STD.max() else 4)
     # Each part of the recording has a solution of its own.
-    np.testing.assert_allclose(found.solved.setting, [0.5, 0.5], atol=0.4 * STD.max())
+    np.testing.assert_allclose(found.solution.setting, [0.5, 0.5], atol=0.4 * STD.max())
     (other,) = found.others
     np.testing.assert_allclose(other.setting, [0.52, 0.46], atol=0.4 * STD.max())
 
 
 def test_the_same_seed_gives_the_same_draws():
     recorded = np.array([[0.5, 0.5] @ SLOPES.T] * 2)
-    first, again = (sampled(recorded, 5).posterior.draws for _ in range(2))
+    first, again = (sampled(recorded, 5).posterior.sample for _ in range(2))
     np.testing.assert_array_equal(first, again)

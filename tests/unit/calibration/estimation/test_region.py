@@ -7,13 +7,7 @@ import pytest
 from scipy.special import gammainc
 
 from driftwalk.calibration.estimation.gauss_newton import rounded
-from driftwalk.calibration.estimation.region import (
-    NARROWEST,
-    SPREAD,
-    WIDEST,
-    Region,
-    region_about,
-)
+from driftwalk.calibration.estimation.region import REGION, Region, region_about
 
 ROOT = np.array([[0.02, 0.0, 0.0], [0.015, 0.01, 0.0], [-0.01, 0.004, 0.005]])
 MIDDLE = np.full(3, 0.5)
@@ -27,7 +21,7 @@ def test_settings_fill_the_ball_evenly():
     region = Region(MIDDLE, ROOT)
     settings = region.filled(4096, 1)
     np.testing.assert_array_equal(settings, rounded(settings))
-    wanted = SPREAD**2 * ROOT @ ROOT.T
+    wanted = REGION.spread**2 * ROOT @ ROOT.T
     np.testing.assert_allclose(np.cov(settings.T), wanted, atol=0.03 * wanted.max())
     apart = region.distances(settings)
     assert apart.max() < 1.001
@@ -39,10 +33,10 @@ def test_most_of_normal_draws_lie_inside():
     """A chi-square with as many degrees of freedom as parameters, below the squared radius."""
     for count in (1, 3, 9):
         region = Region(np.full(count, 0.5), 0.01 * np.eye(count))
-        draws = 0.5 + 0.01 * np.random.default_rng(2).normal(size=(20_000, count))
+        sample = 0.5 + 0.01 * np.random.default_rng(2).normal(size=(20_000, count))
         share = gammainc(count / 2, region.radius**2 / 2)
         assert share > 0.985
-        assert np.mean(region.distances(draws) < 1.0) == pytest.approx(share, abs=0.003)
+        assert np.mean(region.distances(sample) < 1.0) == pytest.approx(share, abs=0.003)
 
 
 def test_settings_beyond_an_end_are_mirrored_into_the_cube():
@@ -52,26 +46,26 @@ def test_settings_beyond_an_end_are_mirrored_into_the_cube():
     assert settings.max() <= 1.0
     # Half of the ball lies beyond, and none of it is heaped up at the end.
     assert np.mean(settings[:, 0] == 0.0) < 0.01
-    assert settings[:, 0].mean() == pytest.approx(SPREAD * 0.02 * 0.8, rel=0.15)
+    assert settings[:, 0].mean() == pytest.approx(REGION.spread * 0.02 * 0.8, rel=0.15)
 
 
 def test_a_region_has_the_mean_and_the_axes_of_the_draws():
-    draws = MIDDLE + np.random.default_rng(4).normal(size=(5000, 3)) @ ROOT.T
-    region = region_about(draws)
-    np.testing.assert_allclose(region.centre, draws.mean(axis=0), atol=1e-6)
-    wanted = np.cov(draws.T) + NARROWEST**2 * np.eye(3)
+    sample = MIDDLE + np.random.default_rng(4).normal(size=(5000, 3)) @ ROOT.T
+    region = region_about(sample)
+    np.testing.assert_allclose(region.centre, sample.mean(axis=0), atol=1e-6)
+    wanted = np.cov(sample.T) + REGION.narrowest**2 * np.eye(3)
     np.testing.assert_allclose(region.root @ region.root.T, wanted, rtol=1e-9)
     np.testing.assert_allclose(region.std, np.sqrt(np.diag(wanted)))
 
 
 def test_it_is_no_wider_than_a_part_of_the_ranges():
     """The other parameters keep their widths, and the correlations stay."""
-    draws = np.random.default_rng(6).uniform(size=(5000, 3))
-    draws[:, 2] = 0.5 + 0.01 * (draws[:, 1] - 0.5)
-    region = region_about(draws)
-    np.testing.assert_allclose(region.width[:2], WIDEST)
-    assert region.width[2] < 0.1 * WIDEST
+    sample = np.random.default_rng(6).uniform(size=(5000, 3))
+    sample[:, 2] = 0.5 + 0.01 * (sample[:, 1] - 0.5)
+    region = region_about(sample)
+    np.testing.assert_allclose(region.width[:2], REGION.widest)
+    assert region.width[2] < 0.1 * REGION.widest
     covariance = region.root @ region.root.T
     found = covariance[1, 2] / np.sqrt(covariance[1, 1] * covariance[2, 2])
     small = 0.01 * np.sqrt(1 / 12)
-    assert found == pytest.approx(small / np.hypot(small, NARROWEST), abs=0.02)
+    assert found == pytest.approx(small / np.hypot(small, REGION.narrowest), abs=0.02)

@@ -7,12 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from driftwalk.calibration.estimation.regression_abc import (
-    LOST,
-    MOST_ROUNDS,
-    SIMULATIONS,
-    approach,
-)
+from driftwalk.calibration.estimation.regression_abc import REGRESSION, sequential_regression
 from driftwalk.core.errors import InputError
 
 Simulate = Callable[[np.ndarray], np.ndarray]
@@ -65,11 +60,13 @@ def test_the_box_holds_the_truth(fresh_seed: Callable[[int], int]):
     for number in range(20):
         truth = rng.uniform(0.1, 0.9, (1, 3))
         simulate = noisy(bent, 0.02, fresh_seed(100 + number))
-        box = approach(simulate, simulate(truth)[0], 3, order=as_they_are, seed=number)
-        assert box.found
-        assert (box.error < 0.15).all()
-        assert ((box.centre >= 0.0) & (box.centre <= 1.0)).all()
-        apart += (np.abs(box.centre - truth[0]) / box.error).tolist()
+        regression = sequential_regression(
+            simulate, simulate(truth)[0], 3, order=as_they_are, seed=number
+        )
+        assert regression.found
+        assert (regression.error < 0.15).all()
+        assert ((regression.centre >= 0.0) & (regression.centre <= 1.0)).all()
+        apart += (np.abs(regression.centre - truth[0]) / regression.error).tolist()
     assert max(apart) < 5.0
     assert sum(one > 2.0 for one in apart) <= 9
 
@@ -78,8 +75,10 @@ def test_less_noise_makes_a_smaller_box():
     errors = []
     for spread in (0.3, 0.1, 0.03):
         simulate = noisy(bent, spread, 3)
-        box = approach(simulate, bent(np.array([[0.4, 0.6, 0.5]]))[0], 3, order=as_they_are, seed=3)
-        errors.append(np.median(box.error))
+        regression = sequential_regression(
+            simulate, bent(np.array([[0.4, 0.6, 0.5]]))[0], 3, order=as_they_are, seed=3
+        )
+        errors.append(np.median(regression.error))
     assert errors[0] > errors[1] > errors[2]
 
 
@@ -87,11 +86,11 @@ def test_parameters_in_order_are_found_and_out_of_order_end_between():
     truth = np.array([[0.25, 0.7, 0.4]])
     simulate = noisy(alike, 0.01, 4)
     recorded = alike(truth)[0]
-    box = approach(simulate, recorded, 3, order=ordered, seed=4)
-    assert box.found
-    np.testing.assert_allclose(box.centre, truth[0], atol=0.05)
-    assert (box.error < 0.05).all()
-    loose = approach(simulate, recorded, 3, order=as_they_are, seed=4)
+    regression = sequential_regression(simulate, recorded, 3, order=ordered, seed=4)
+    assert regression.found
+    np.testing.assert_allclose(regression.centre, truth[0], atol=0.05)
+    assert (regression.error < 0.05).all()
+    loose = sequential_regression(simulate, recorded, 3, order=as_they_are, seed=4)
     # Half of the simulations near the recording have one order, half the other.
     np.testing.assert_allclose(loose.centre[:2], 0.475, atol=0.15)
     assert (loose.error[:2] > 0.15).all()
@@ -105,10 +104,12 @@ def test_settings_are_simulated_in_order_and_in_the_cube():
         seen.append(settings)
         return model(settings)
 
-    approach(simulate, alike(np.array([[0.02, 0.97, 1.0]]))[0], 3, order=ordered, seed=5)
-    assert 1 < len(seen) <= MOST_ROUNDS
+    sequential_regression(
+        simulate, alike(np.array([[0.02, 0.97, 1.0]]))[0], 3, order=ordered, seed=5
+    )
+    assert 1 < len(seen) <= REGRESSION.most_rounds
     for settings in seen:
-        assert settings.shape == (SIMULATIONS, 3)
+        assert settings.shape == (REGRESSION.simulations, 3)
         assert (settings[:, 0] <= settings[:, 1]).all()
         assert settings.min() >= 0.0
         assert settings.max() <= 1.0
@@ -126,17 +127,17 @@ def test_summaries_that_say_nothing_find_nothing():
         rounds.append(len(settings))
         return rng.normal(size=(len(settings), 80))
 
-    box = approach(simulate, np.zeros(80), 4, order=as_they_are, seed=6)
-    assert not box.found
+    regression = sequential_regression(simulate, np.zeros(80), 4, order=as_they_are, seed=6)
+    assert not regression.found
     # A uniform number has an error of 0.29, and a regression on noise no smaller one than LOST.
-    assert (box.error > LOST).all()
+    assert (regression.error > REGRESSION.lost).all()
     assert len(rounds) == 2
 
 
 @pytest.mark.parametrize("size", [0.0, 3.0, 1e-12])
 def test_a_model_that_always_moves_alike_is_refused(size: float):
     with pytest.raises(InputError, match="in the same way at all settings"):
-        approach(
+        sequential_regression(
             lambda settings: np.full((len(settings), 5), size),
             np.ones(5),
             2,
@@ -148,10 +149,10 @@ def test_a_model_that_always_moves_alike_is_refused(size: float):
 def test_one_parameter_that_says_nothing_does_not_hide_the_others():
     simulate = noisy(lambda one: bent(one[:, :3]), 0.02, 7)
     truth = np.array([[0.3, 0.6, 0.5, 0.9]])
-    box = approach(simulate, simulate(truth)[0], 4, order=as_they_are, seed=7)
-    assert box.found
-    assert (np.abs(box.centre - truth[0]) < 5 * box.error)[:3].all()
-    assert box.error[3] > LOST > box.error[:3].max()
+    regression = sequential_regression(simulate, simulate(truth)[0], 4, order=as_they_are, seed=7)
+    assert regression.found
+    assert (np.abs(regression.centre - truth[0]) < 5 * regression.error)[:3].all()
+    assert regression.error[3] > REGRESSION.lost > regression.error[:3].max()
 
 
 def test_a_summary_far_from_all_simulations_is_bounded():
@@ -163,15 +164,17 @@ def test_a_summary_far_from_all_simulations_is_bounded():
     def simulate(settings: np.ndarray) -> np.ndarray:
         return np.column_stack([noisy(bent, 0.02, 8)(settings), rng.normal(size=len(settings))])
 
-    box = approach(simulate, recorded, 3, order=as_they_are, seed=8)
-    assert box.found
-    np.testing.assert_allclose(box.centre, truth[0], atol=0.15)
+    regression = sequential_regression(simulate, recorded, 3, order=as_they_are, seed=8)
+    assert regression.found
+    np.testing.assert_allclose(regression.centre, truth[0], atol=0.15)
 
 
 def test_the_units_of_summaries_do_not_matter():
     truth, factor = np.array([[0.4, 0.6, 0.5]]), np.array([1e-6, 1.0, 1e6, 3.0, 1e3, 1e-3])
     plain, scaled = (
-        approach(lambda s, k=k: k * bent(s), k * bent(truth)[0], 3, order=as_they_are, seed=9)
+        sequential_regression(
+            lambda s, k=k: k * bent(s), k * bent(truth)[0], 3, order=as_they_are, seed=9
+        )
         for k in (np.ones(6), factor)
     )
     np.testing.assert_allclose(plain.centre, scaled.centre, atol=1e-6)
@@ -181,7 +184,7 @@ def test_the_units_of_summaries_do_not_matter():
 def test_the_same_seed_gives_the_same_box_and_another_another():
     recorded = bent(np.array([[0.4, 0.6, 0.5]]))[0]
     first, again, other = (
-        approach(noisy(bent, 0.1, 1), recorded, 3, order=as_they_are, seed=seed)
+        sequential_regression(noisy(bent, 0.1, 1), recorded, 3, order=as_they_are, seed=seed)
         for seed in (1, 1, 2)
     )
     np.testing.assert_array_equal(first.centre, again.centre)

@@ -17,7 +17,7 @@ from self_propelled import moving
 
 import driftwalk as dw
 from driftwalk.calibration.estimation import estimate as matching, run
-from driftwalk.calibration.estimation.estimate import UNLIKE
+from driftwalk.calibration.estimation.estimate import MATCHING
 from driftwalk.calibration.evolution import Budget
 from driftwalk.calibration.run import calibrate
 from driftwalk.sweep import ShardStore
@@ -171,8 +171,9 @@ def test_summaries_like_the_models_own_count_however_close_a_search_comes(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """No end of a descent matches, so a search is made; no score is close enough to its own."""
-    monkeypatch.setattr(matching, "MATCHES", 0.0)
-    monkeypatch.setattr(run, "AS_CLOSE", 0.0)
+    strict = MATCHING._replace(matches=0.0, as_close=0.0)
+    monkeypatch.setattr(matching, "MATCHING", strict)
+    monkeypatch.setattr(run, "MATCHING", strict)
     monkeypatch.setattr(run, "SEARCH", Budget(design=64, starts=1, short=8, long=8))
     recording = moving(dw.motion_model("active"), ACTIVE, 100.0, seed=3, noise=NOISE)
     told: list[str] = []
@@ -195,12 +196,12 @@ def test_another_model_is_not_believed() -> None:
     assert "search" in told
     assert float(found["misfit"]) > 3 * float(found["most_misfit"])
     warnings = " ".join(found["warning"].values.tolist())
-    assert float(found["misfit"]) > UNLIKE * float(found["usual_misfit"])
+    assert float(found["misfit"]) > MATCHING.unlike * float(found["usual_misfit"])
     assert not found["determined"].any()
     if found.attrs["estimate_from"] == "search":
         assert "the summaries of the motion pull the model away" in warnings
     else:
-        assert float(found["matched_score"]) <= run.AS_CLOSE * float(found["searched_score"])
+        assert float(found["matched_score"]) <= MATCHING.as_close * float(found["searched_score"])
         assert float(found["interval_stretch"]) > 2.0
         assert "the summaries of the motion differ from the model's" in warnings
         assert "no parameter is determined" in warnings

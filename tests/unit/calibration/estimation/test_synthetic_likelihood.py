@@ -7,7 +7,10 @@ import pytest
 from scipy.stats import chi2
 
 from driftwalk.calibration.estimation.emulator import SHRUNK
-from driftwalk.calibration.estimation.synthetic_likelihood import SIMULATIONS, likeness
+from driftwalk.calibration.estimation.synthetic_likelihood import (
+    SIMULATIONS,
+    synthetic_likelihood_at,
+)
 
 SPREAD = np.array([0.02, 0.5, 3.0, 0.1])
 SETTING = np.array([0.3, 0.7])
@@ -28,22 +31,24 @@ class Law:
 
 def test_every_simulation_is_of_the_setting() -> None:
     law = Law(1)
-    found = likeness(law, np.zeros(4), SETTING, 30)
+    found = synthetic_likelihood_at(law, np.zeros(4), SETTING, 30)
     assert law.given.shape == (SIMULATIONS + 30, 2)
     assert (law.given == SETTING).all()
-    assert found.own_misfits.shape == (30,)
+    assert found.own_discrepancies.shape == (30,)
 
 
 def test_own_misfits_have_the_quantiles_of_chi_squared() -> None:
-    found = likeness(Law(2), np.zeros(4), SETTING, 2000)
+    found = synthetic_likelihood_at(Law(2), np.zeros(4), SETTING, 2000)
     for share in (0.5, 0.95, 0.99):
-        assert np.quantile(found.own_misfits, share) == pytest.approx(chi2.ppf(share, 4), rel=0.15)
+        assert np.quantile(found.own_discrepancies, share) == pytest.approx(
+            chi2.ppf(share, 4), rel=0.15
+        )
 
 
 def test_a_misfit_counts_standard_deviations() -> None:
     for off in (0.0, 3.0, 20.0):
         recorded = np.array([0.0, 0.0, off * SPREAD[2], 0.0])
-        assert likeness(Law(3), recorded, SETTING, 2).misfit == pytest.approx(
+        assert synthetic_likelihood_at(Law(3), recorded, SETTING, 2).discrepancy == pytest.approx(
             off**2, rel=0.15, abs=0.1
         )
 
@@ -52,4 +57,6 @@ def test_the_variance_is_that_of_the_law() -> None:
     law = Law(4, correlation=0.9)
     # A part of the correlations is taken away.
     wanted = np.log(np.linalg.det(np.diag(SPREAD**2))) + np.log1p(-((0.9 * (1 - SHRUNK)) ** 2))
-    assert likeness(law, np.zeros(4), SETTING, 2).log_variance == pytest.approx(wanted, abs=0.4)
+    assert synthetic_likelihood_at(law, np.zeros(4), SETTING, 2).log_variance == pytest.approx(
+        wanted, abs=0.4
+    )

@@ -62,7 +62,7 @@ def test_the_best_of_two_valleys_wins():
 
     found = search_minimum(noisy(two, 0.0), 3)
     np.testing.assert_allclose(found.best, [0.2, 0.5, 0.8], atol=0.02)
-    assert found.ends.shape == (Budget().starts + 1,)
+    assert found.optimum_scores.shape == (Budget().starts + 1,)
 
 
 @pytest.mark.slow

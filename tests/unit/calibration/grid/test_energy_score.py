@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from driftwalk.calibration.grid.energy_score import landscape_of
+from driftwalk.calibration.grid.energy_score import smooth_energy_score
 from driftwalk.calibration.grid.grid_map import full_map
 
 SHIFT = np.linspace(-1.0, 1.0, 21)
@@ -34,7 +34,7 @@ def expected_map():
 
 
 def test_half_the_floor_off_the_optimum_is_the_truth():
-    found = landscape_of(expected_map(), (0.1, 0.1))
+    found = smooth_energy_score(expected_map(), (0.1, 0.1))
     assert found.optimum.point == pytest.approx((0.0, TRUE_SPREAD), abs=0.03)
     # The mean distance alone is smallest where simulations scatter least.
     lowest = np.unravel_index(np.argmin(expected_map().mean), expected_map().mean.shape)
@@ -43,7 +43,7 @@ def test_half_the_floor_off_the_optimum_is_the_truth():
 
 def test_the_surface_counts_height_in_floors():
     """S is D - apart / 2 in closed form; its height over the floor is that over the optimum's."""
-    found = landscape_of(expected_map(), (0.1, 0.1))
+    found = smooth_energy_score(expected_map(), (0.1, 0.1))
     shift, spread = np.meshgrid(*found.smoother.axes, indexing="ij")
     floor = mean_size(0.0, np.sqrt(2) * spread)
     score = mean_size(shift, np.hypot(spread, TRUE_SPREAD)) - 0.5 * floor
@@ -58,4 +58,4 @@ def test_the_floor_stays_above_0_where_noise_would_take_it_below():
     apart = np.full((SHIFT.size, SPREAD.size), 0.1)
     apart[:4, :4] = 0.0
     noisy = expected_map()._replace(arrays={"apart": apart})
-    assert landscape_of(noisy, (0.1, 0.1)).floor.min() >= 0.02
+    assert smooth_energy_score(noisy, (0.1, 0.1)).floor.min() >= 0.02

@@ -9,8 +9,7 @@ import pytest
 
 import driftwalk as dw
 from driftwalk.calibration.grid.bootstrap_region import simulated_steps
-from driftwalk.calibration.grid.grid_map import add_replicates, run_map
-from driftwalk.calibration.grid.map_stores import InTurn, Mapper
+from driftwalk.calibration.grid.grid_map import MapSimulator, SweepProgress
 from driftwalk.calibration.problem import prepare_problem
 from driftwalk.comparison import apply_steps
 from driftwalk.conditions import recorded_camera
@@ -32,6 +31,15 @@ def track():
 def problem(track):
     camera = Camera(3e-4, 0.0, 0.0)
     return prepare_problem(track, dw.Study(), dw.tank30_flow(), camera=camera, threads=1)
+
+
+def run_map(problem, axes, *, stage, replicates, only=None, apart=False, **each):
+    maps = MapSimulator(problem, stage, apart=apart, **each)
+    return maps.full(tuple(map(np.asarray, axes)), replicates, only)
+
+
+def add_replicates(problem, found, chosen, *, stage, replicates, apart=False, **each):
+    return MapSimulator(problem, stage, apart=apart, **each).more(found, chosen, replicates)
 
 
 def test_a_map_is_what_simulating_and_comparing_each_setting_gives(problem):
@@ -110,8 +118,8 @@ def test_more_replicates_are_those_of_a_map_that_has_them_everywhere(problem):
 
 def test_a_map_and_its_more_replicates_say_how_far_they_are_and_never_go_back(problem):
     shares = []
-    progress = InTurn(lambda done, total: shares.append(done / total), share_of_map)
-    maps = Mapper(problem, "coarse", apart=False, progress=progress)
+    progress = SweepProgress(lambda done, total: shares.append(done / total), share_of_map)
+    maps = MapSimulator(problem, "coarse", apart=False, progress=progress)
     axes = tuple(np.array(values) for values in ([0.3, 0.5], [4e-4, 8e-4]))
     once = maps.full(axes, 1)
     assert (shares[0], shares[-1]) == (0.0, 0.9)

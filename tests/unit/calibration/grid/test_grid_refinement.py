@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from driftwalk.calibration.grid.energy_score import landscape_of
+from driftwalk.calibration.grid.energy_score import smooth_energy_score
 from driftwalk.calibration.grid.grid_map import Map, full_map
 from driftwalk.calibration.grid.grid_refinement import (
-    MOST,
-    beating_cell,
+    REFINEMENT,
+    better_cell,
     first_window,
-    locate,
+    locate_minimum,
     refine,
     window_axes,
 )
@@ -62,7 +62,7 @@ class Painted:
 def calibrated(maps):
     """Search as a calibration does, from the paper's coarse grid on."""
     coarse = maps.full((np.arange(41) * 0.05, np.arange(41) * 5e-5), 1)
-    return refine(maps, locate(maps, first_window(coarse, FLOOR), LIMITS), LIMITS, STEPS, 8)
+    return refine(maps, locate_minimum(maps, first_window(coarse, FLOOR), LIMITS), LIMITS, STEPS, 8)
 
 
 @pytest.mark.fast_cases(1)
@@ -72,19 +72,19 @@ def test_a_valley_is_resolved_however_narrow_it_is(lowest, scale):
     """The lowest point is found to a third of the valley's scale, some 5 standard errors."""
     found = calibrated(Painted(lowest, scale))
     for index in (0, 1):
-        off = found.landscape.optimum.point[index] - lowest[index]
+        off = found.energy_score.optimum.point[index] - lowest[index]
         assert abs(off) < scale[index] / 3
         assert found.bandwidth[index] < 1.6 * scale[index]
     # Smoothing over such a bandwidth raises the bottom of the valley by a tenth of the floor.
-    assert found.landscape.optimum.distance == pytest.approx(FLOOR, rel=0.15)
-    assert beating_cell(found.map, found.landscape) is None
+    assert found.energy_score.optimum.distance == pytest.approx(FLOOR, rel=0.15)
+    assert better_cell(found.map, found.energy_score) is None
 
 
 def test_a_valley_across_both_axes_is_resolved():
     maps = Painted((0.6123, 0.618e-3), (0.01, 6e-5), tilt=0.85)
     found = calibrated(maps)
     for value, lowest, scale in zip(
-        found.landscape.optimum.point, maps.lowest, maps.scale, strict=True
+        found.energy_score.optimum.point, maps.lowest, maps.scale, strict=True
     ):
         assert abs(value - lowest) < scale / 2
 
@@ -93,8 +93,8 @@ def test_a_valley_across_both_axes_is_resolved():
 def test_a_wide_valley_costs_no_more_settings_than_a_narrow_one():
     maps = Painted((0.8, 1e-3), (0.4, 4e-4))
     found = calibrated(maps)
-    assert max(axis.size for axis in found.map.axes) <= 1.4 * MOST[2] + 2
-    assert found.landscape.optimum.point == pytest.approx((0.8, 1e-3), rel=0.15)
+    assert max(axis.size for axis in found.map.axes) <= 1.4 * REFINEMENT.most_intervals[1] + 2
+    assert found.energy_score.optimum.point == pytest.approx((0.8, 1e-3), rel=0.15)
 
 
 @pytest.mark.slow
@@ -107,14 +107,14 @@ def test_the_steps_of_the_study_are_kept_where_there_is_room():
 @pytest.mark.slow
 def test_an_optimum_outside_the_first_window_is_followed():
     maps = Painted((0.9, 1.2e-3), (0.02, 1e-4))
-    found = locate(maps, ((0.75, 0.85), (0.8e-3, 1.0e-3)), LIMITS)
-    assert found.landscape.optimum.point == pytest.approx((0.9, 1.2e-3), rel=0.03)
+    found = locate_minimum(maps, ((0.75, 0.85), (0.8e-3, 1.0e-3)), LIMITS)
+    assert found.energy_score.optimum.point == pytest.approx((0.9, 1.2e-3), rel=0.03)
 
 
 @pytest.mark.slow
 def test_a_window_ends_with_the_search():
     found = calibrated(Painted((0.0, 2e-3), (0.05, 1e-4)))
-    assert found.landscape.optimum.point == pytest.approx((0.0, 2e-3), abs=0.02)
+    assert found.energy_score.optimum.point == pytest.approx((0.0, 2e-3), abs=0.02)
     for axis, limits in zip(found.map.axes, LIMITS, strict=True):
         assert limits[0] <= axis[0] < axis[-1] <= limits[1] * (1 + 1e-12)
 
@@ -133,9 +133,9 @@ def test_a_setting_that_beats_the_optimum_by_more_than_chance_is_found():
     axes = window_axes(((0.7, 0.8), (2e-4, 4e-4)), LIMITS, (12, 12))
     found = Painted((0.75, 3e-4), (0.05, 1e-4)).full(axes, 8)
     widths = [2 * (axis[1] - axis[0]) for axis in axes]
-    assert beating_cell(found, landscape_of(found, widths)) is None
+    assert better_cell(found, smooth_energy_score(found, widths)) is None
     found.distance[3, 4] -= 10 * NOISE / np.sqrt(8)
-    assert beating_cell(found, landscape_of(found, widths)) == (3, 4)
+    assert better_cell(found, smooth_energy_score(found, widths)) == (3, 4)
 
 
 @pytest.mark.slow
@@ -147,7 +147,7 @@ def test_chance_alone_beats_the_optimum_in_next_to_no_map():
     beaten = 0
     for _ in range(60):
         found = maps.full(axes, 2)
-        beaten += beating_cell(found, landscape_of(found, widths)) is not None
+        beaten += better_cell(found, smooth_energy_score(found, widths)) is not None
     assert beaten <= 1
 
 

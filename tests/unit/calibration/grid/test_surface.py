@@ -89,8 +89,8 @@ def test_the_weight_of_a_cell_is_how_often_it_counts():
     cells = np.repeat(np.arange(6), weights.astype(int))
     terms = np.vander(axis[cells] - smoother.axes[0][at], 3, increasing=True)
     root = np.sqrt(near[cells])
-    solved = np.linalg.lstsq(terms * root[:, None], values[cells] * root, rcond=None)[0]
-    assert smoother.surface(values)[at] == pytest.approx(solved[0], abs=1e-6)
+    solution = np.linalg.lstsq(terms * root[:, None], values[cells] * root, rcond=None)[0]
+    assert smoother.surface(values)[at] == pytest.approx(solution[0], abs=1e-6)
 
 
 def test_far_from_any_cell_the_surface_is_0():

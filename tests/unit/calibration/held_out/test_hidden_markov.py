@@ -10,16 +10,16 @@ import pytest
 from scipy import stats
 
 from driftwalk.calibration.held_out.hidden_markov import (
-    HiddenWalk,
+    HiddenMarkovModel,
     _concentration,
     _expected,
     _gamma_shape,
     _side_by_side,
-    fit_hidden_walk,
+    fit_hidden_markov_model,
     log_densities,
 )
 
-WALK = HiddenWalk(
+WALK = HiddenMarkovModel(
     begin=np.array([0.6, 0.4]),
     transition=np.array([[0.9, 0.1], [0.3, 0.7]]),
     shape=np.array([4.0, 6.0]),
@@ -92,7 +92,7 @@ def test_the_concentration_of_angles_is_found(concentration: float) -> None:
 @pytest.mark.slow
 def test_the_truth_is_found_from_steps_alone() -> None:
     """6,000 steps: standard errors of some 2 %; the bound is about five of them."""
-    found = fit_hidden_walk([drawn(3000, 4), drawn(3000, 5)], states=2)
+    found = fit_hidden_markov_model([drawn(3000, 4), drawn(3000, 5)], states=2)
     assert found.shape * found.scale == pytest.approx(WALK.shape * WALK.scale, rel=0.1)
     assert found.transition == pytest.approx(WALK.transition, abs=0.06)
     assert found.concentration == pytest.approx(WALK.concentration, rel=0.15)

@@ -73,9 +73,12 @@ def test_models_come_from_the_closest_to_the_farthest(found: xr.Dataset) -> None
 
 @pytest.mark.slow
 def test_walks_of_recorded_steps_are_near_in_steps_and_never_explained(found: xr.Dataset) -> None:
-    walks = found.isel(model=found["baseline"].values.astype(bool))
-    assert not walks["explained"].values.any()
-    apart, best = walks["held_out_distance"], found["held_out_distance"].isel(model=0)
+    resampling_baselines = found.isel(model=found["baseline"].values.astype(bool))
+    assert not resampling_baselines["explained"].values.any()
+    apart, best = (
+        resampling_baselines["held_out_distance"],
+        found["held_out_distance"].isel(model=0),
+    )
     own = float(found["own_distance"].sel(aspect="steps"))
     assert float(apart.sel(model="resampled steps", aspect="steps")) < own + 0.05
     assert (apart.sel(aspect="wall") > 2.0 * best.sel(aspect="wall")).all()
@@ -218,11 +221,12 @@ def test_a_users_own_model_that_fails_is_not_waited_for(recorded: xr.Dataset) ->
 @pytest.fixture
 def asked(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let every model be asked, and simulate little for it."""
-    monkeypatch.setattr(evidence_ranking, "ASKED_SIGMAS", 1e6)
-    monkeypatch.setattr(regression_abc, "SIMULATIONS", 64)
-    monkeypatch.setattr(regression_abc, "MOST_ROUNDS", 2)
-    monkeypatch.setattr(gauss_newton, "FEWEST_SIMULATIONS", (128, 128))
-    monkeypatch.setattr(gauss_newton, "MOST_ROUNDS", 2)
+    every = evidence_ranking.EVIDENCE._replace(tied_sigmas=1e6)
+    monkeypatch.setattr(evidence_ranking, "EVIDENCE", every)
+    wide = regression_abc.REGRESSION._replace(simulations=64, most_rounds=2)
+    monkeypatch.setattr(regression_abc, "REGRESSION", wide)
+    narrow = gauss_newton.GAUSS_NEWTON._replace(fewest_simulations=(128, 128), most_rounds=2)
+    monkeypatch.setattr(gauss_newton, "GAUSS_NEWTON", narrow)
     monkeypatch.setattr(synthetic_likelihood, "SIMULATIONS", 256)
 
 

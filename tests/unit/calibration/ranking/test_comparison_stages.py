@@ -10,7 +10,7 @@ import pytest
 
 from driftwalk.calibration.ranking import comparison_stages
 from driftwalk.calibration.ranking.comparison_stages import Stages
-from driftwalk.calibration.ranking.evidence_ranking import Asked, Summarised
+from driftwalk.calibration.ranking.evidence_ranking import Evidence, Shortlist
 
 
 @pytest.mark.parametrize(
@@ -26,16 +26,18 @@ from driftwalk.calibration.ranking.evidence_ranking import Asked, Summarised
 def test_others_than_those_that_tie_are_asked_until_one_gives_the_summaries(
     tied: int, giving: set[int], wanted: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def answer(entry: int, *_: Any, **__: Any) -> Summarised:
-        return Summarised(100.0 if entry in giving else 500.0, 90.0, 140.0, 0.0)
+    def answer(entry: int, *_: Any, **__: Any) -> Evidence:
+        return Evidence(100.0 if entry in giving else 500.0, 90.0, 140.0, 0.0)
 
-    monkeypatch.setattr(comparison_stages, "asked_models", lambda *_: Asked((3, 0, 2), tied))
+    monkeypatch.setattr(
+        comparison_stages, "shortlist_models", lambda *_: Shortlist((3, 0, 2), tied)
+    )
     monkeypatch.setattr(comparison_stages, "most_settings", lambda *_: 4)
     monkeypatch.setattr(Stages, "_matched", lambda _, number, index, point, before: answer(index))
     entry = SimpleNamespace(ranges=("a",), baseline=False)
     work: Any = SimpleNamespace(entries=[entry] * 4, costs=lambda: [1] * 4)
     judged: Any = [SimpleNamespace(point=np.zeros(1))] * 4
     made = Stages(work, 20, None, None, lambda *_: None)
-    assert list(made.summarised(judged)) == wanted
+    assert list(made.evidence(judged)) == wanted
     # With fewer than two recordings that could judge a misfit nobody is asked.
-    assert Stages(work, 0, None, None, lambda *_: None).summarised(judged) == {}
+    assert Stages(work, 0, None, None, lambda *_: None).evidence(judged) == {}

@@ -8,19 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from driftwalk.calibration.held_out.candidates import Contestant
-from driftwalk.calibration.held_out.held_out_score import Judged, without_error
+from driftwalk.calibration.held_out.candidates import Candidate
+from driftwalk.calibration.held_out.held_out_score import HeldOutScore, without_error
 from driftwalk.calibration.ranking.evidence_ranking import (
-    ASKED_SIGMAS,
-    MOST_ASKED,
-    RIVAL,
-    Asked,
-    Naming,
-    Summarised,
-    asked_models,
-    naming,
-    said_of,
-    tie_sentence,
+    EVIDENCE,
+    Evidence,
+    EvidenceRanking,
+    Shortlist,
+    discrepancy_sentence,
+    rank_by_evidence,
+    ranking_sentence,
+    shortlist_models,
 )
 from driftwalk.calibration.ranking.result import answer_sentence
 from driftwalk.calibration.ranking.verdict import Verdict
@@ -28,18 +26,18 @@ from driftwalk.calibration.ranking.verdict import Verdict
 ERROR = 0.05
 
 
-def entry(numbers: int, *, baseline: bool = False) -> Contestant:
+def entry(numbers: int, *, baseline: bool = False) -> Candidate:
     like: Any = None
     model: Any = SimpleNamespace(name=f"with {numbers}")
     ranges: Any = () if baseline else ("a parameter",) * numbers
-    return Contestant(model, like, ranges, numbers, baseline)
+    return Candidate(model, like, ranges, numbers, baseline)
 
 
-def judged(score: float, *, sign: float = 1.0) -> Judged:
+def judged(score: float, *, sign: float = 1.0) -> HeldOutScore:
     """Return a score whose differences from others have a known error, but for the first's."""
     without = score + sign * ERROR * np.array([1.0, -1.0] * 5) / np.sqrt(9.0)
     nothing = np.empty(0)
-    return Judged(nothing, nothing, nothing, score, without, nothing, nothing, 0)
+    return HeldOutScore(nothing, nothing, nothing, score, without, nothing, nothing, 0)
 
 
 def test_the_error_of_a_score_is_the_jackknife_s() -> None:
@@ -48,77 +46,87 @@ def test_the_error_of_a_score_is_the_jackknife_s() -> None:
 
 def test_models_about_as_close_as_the_closest_are_asked_in_any_case() -> None:
     # Differences between the two signs have twice the error.
-    near, far = (1.0 + 2 * ERROR * (ASKED_SIGMAS + off) for off in (-0.1, 0.1))
+    near, far = (1.0 + 2 * ERROR * (EVIDENCE.tied_sigmas + off) for off in (-0.1, 0.1))
     scores = [judged(far, sign=-1.0), judged(1.0), judged(near, sign=-1.0)]
-    assert asked_models([entry(3)] * 3, scores) == Asked((1, 2, 0), 2)
+    assert shortlist_models([entry(3)] * 3, scores) == Shortlist((1, 2, 0), 2)
 
 
 def test_one_that_ties_comes_before_a_closer_one_that_does_not() -> None:
     # The second differs from the first by little, but in the same way in every block.
     scores = [judged(1.0), judged(1.1), judged(1.2, sign=-1.0)]
-    assert asked_models([entry(3)] * 3, scores) == Asked((0, 2, 1), 2)
+    assert shortlist_models([entry(3)] * 3, scores) == Shortlist((0, 2, 1), 2)
 
 
 def test_of_one_model_nobody_is_asked() -> None:
-    assert asked_models([entry(3)], [judged(1.0)]) == Asked((), 0)
+    assert shortlist_models([entry(3)], [judged(1.0)]) == Shortlist((), 0)
 
 
 def test_walks_are_never_asked_even_where_they_are_the_closest() -> None:
     entries = [entry(18, baseline=True), entry(3), entry(9)]
     scores = [judged(1.0), judged(1.01, sign=-1.0), judged(1.02)]
-    assert asked_models(entries, scores) == Asked((1, 2), 2)
+    assert shortlist_models(entries, scores) == Shortlist((1, 2), 2)
 
 
 def test_no_more_than_a_handful_are_asked() -> None:
     scores = [judged(1.0 + 0.001 * k, sign=-1.0 if k else 1.0) for k in reversed(range(9))]
-    assert asked_models([entry(3)] * 9, scores) == Asked((8, 7, 6, 5, 4), MOST_ASKED)
-    assert MOST_ASKED == 5
+    assert shortlist_models([entry(3)] * 9, scores) == Shortlist(
+        (8, 7, 6, 5, 4), EVIDENCE.most_models
+    )
+    assert EVIDENCE.most_models == 5
 
 
-def said(misfit: float, unlikely: float) -> Summarised:
-    return Summarised(misfit, 100.0, 140.0, unlikely)
+def said(discrepancy: float, deviance: float) -> Evidence:
+    return Evidence(discrepancy, 100.0, 140.0, deviance)
 
 
 ENTRIES = [entry(9), entry(3), entry(12)]
 
 
 def test_a_model_that_gives_the_summaries_is_named_before_a_likelier_that_does_not() -> None:
-    assert naming(ENTRIES, {0: said(300.0, -500.0), 2: said(120.0, -400.0)}) == Naming(2, ())
+    assert rank_by_evidence(
+        ENTRIES, {0: said(300.0, -500.0), 2: said(120.0, -400.0)}
+    ) == EvidenceRanking(2, ())
 
 
 def test_of_those_that_give_them_the_likeliest_is_named() -> None:
-    found = naming(ENTRIES, {k: said(120.0, -400.0 - 2 * RIVAL * k) for k in range(3)})
-    assert found == Naming(2, ())
+    found = rank_by_evidence(
+        ENTRIES, {k: said(120.0, -400.0 - 2 * EVIDENCE.rival * k) for k in range(3)}
+    )
+    assert found == EvidenceRanking(2, ())
 
 
 def test_of_those_that_are_not_told_apart_the_one_with_the_fewest_numbers_is_named() -> None:
-    found = naming(ENTRIES, {k: said(120.0, -400.0 - 0.4 * RIVAL * k) for k in range(3)})
-    assert found == Naming(1, (0, 2))
+    found = rank_by_evidence(
+        ENTRIES, {k: said(120.0, -400.0 - 0.4 * EVIDENCE.rival * k) for k in range(3)}
+    )
+    assert found == EvidenceRanking(1, (0, 2))
 
 
 def test_nobody_is_named_where_no_model_gives_the_summaries() -> None:
-    assert naming(ENTRIES, {0: said(300.0, 1.0), 1: said(200.0, 2.0)}) == Naming(None, ())
-    assert naming(ENTRIES, {}) == Naming(None, ())
+    assert rank_by_evidence(ENTRIES, {0: said(300.0, 1.0), 1: said(200.0, 2.0)}) == EvidenceRanking(
+        None, ()
+    )
+    assert rank_by_evidence(ENTRIES, {}) == EvidenceRanking(None, ())
 
 
 def test_the_sentence_says_whom_and_why() -> None:
     names = ["nine", "three", "twelve"]
     all_of = {0: said(812.4, 0.0), 1: said(101.0, -400.0), 2: said(99.0, -401.0)}
-    assert tie_sentence(names, all_of, naming(ENTRIES, all_of)) == (
+    assert ranking_sentence(names, all_of, rank_by_evidence(ENTRIES, all_of)) == (
         "three is named by the summaries of the motion: a misfit of 101, that of its own "
         "recordings is below 140; no clear difference from twelve, with as many numbers or more; "
         "less likely are nine 812"
     )
     none = {0: said(812.4, 0.0), 1: said(201.0, -400.0)}
-    assert tie_sentence(names, none, naming(ENTRIES, none)) == (
+    assert ranking_sentence(names, none, rank_by_evidence(ENTRIES, none)) == (
         "The summaries of the motion tell nothing more, for no model gives them: the misfits are "
         "nine 812, three 201, those of the models' own recordings below 140"
     )
 
 
 def test_a_model_that_does_not_give_them_is_told_by_how_much() -> None:
-    assert said_of(said(139.0, 0.0)) is None
-    assert "a misfit of 300" in str(said_of(said(300.0, 0.0)))
+    assert discrepancy_sentence(said(139.0, 0.0)) is None
+    assert "a misfit of 300" in str(discrepancy_sentence(said(300.0, 0.0)))
 
 
 @pytest.mark.parametrize(
@@ -134,4 +142,4 @@ def test_a_model_that_does_not_give_them_is_told_by_how_much() -> None:
 def test_the_answer_names_one_model(explained: set[int], named: int | None, sentence: str) -> None:
     verdicts = [Verdict(k in explained, "" if k in explained else "far off") for k in range(3)]
     names = ["nine", "three", "twelve"]
-    assert answer_sentence(names, verdicts, 0, Naming(named, ())) == sentence
+    assert answer_sentence(names, verdicts, 0, EvidenceRanking(named, ())) == sentence

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from driftwalk.calibration.held_out.checks import CHECKS
-from driftwalk.calibration.held_out.held_out_score import JUDGED, Judged
+from driftwalk.calibration.held_out.held_out_score import HELD_OUT_REPLICATES, HeldOutScore
 from driftwalk.calibration.ranking.verdict import checks_off, verdict_of
 
 NAMES = ("steps", "steps_3", "steps_9", "frame", "wall", "memory")
@@ -21,17 +21,17 @@ def motion() -> Any:
     )
 
 
-def judged(held: float = 0.12, facts: float = 1.0) -> Judged:
+def judged(held: float = 0.12, facts: float = 1.0) -> HeldOutScore:
     """Return a model at the same distance in every aspect, with facts around a number."""
-    around = np.linspace(0.9, 1.1, JUDGED)[:, None] * facts
-    return Judged(
+    around = np.linspace(0.9, 1.1, HELD_OUT_REPLICATES)[:, None] * facts
+    return HeldOutScore(
         point=np.empty(0),
         trained=np.full(6, held),
         held=np.full(6, held),
         score=1.0,
         without=np.ones(10),
         checks=np.repeat(around, len(CHECKS), axis=1),
-        ends=np.empty(0),
+        optimum_scores=np.empty(0),
         evaluations=0,
     )
 
@@ -77,7 +77,7 @@ def test_facts_that_were_not_fitted_count() -> None:
 
 def test_a_fact_is_far_off_by_a_factor_and_a_share_by_a_tenth() -> None:
     """The worlds lie between 1 and 2, those of the shares between 0.3 and 0.4."""
-    worlds = np.tile([[1.0], [2.0]], (JUDGED // 2, len(CHECKS)))
+    worlds = np.tile([[1.0], [2.0]], (HELD_OUT_REPLICATES // 2, len(CHECKS)))
     worlds[:, -2:] = worlds[:, -2:] / 10.0 + 0.2
     recorded = np.array([0.6, 0.7, 1.5, 2.9, 3.1, np.nan, 0.21, 0.51])
     expected = [True, False, False, False, True, False, False, True]

@@ -10,7 +10,7 @@ from self_propelled import moving
 
 import driftwalk as dw
 from driftwalk.calibration.evolution import AspectObjective, wall_distance
-from driftwalk.calibration.held_out.candidates import contestants
+from driftwalk.calibration.held_out.candidates import prepare_candidates
 from driftwalk.calibration.held_out.held_out_score import even_blocks
 from driftwalk.calibration.held_out.recorded import RecordedMotion, body_motion
 from driftwalk.calibration.summaries.displacements import plan_summaries
@@ -36,7 +36,7 @@ def motion() -> RecordedMotion:
 
 @pytest.fixture(scope="module")
 def worlds(motion: RecordedMotion) -> AspectObjective:
-    (entry,), _ = contestants([dw.motion_model("active")], motion, STUDY)
+    (entry,), _ = prepare_candidates([dw.motion_model("active")], motion, STUDY)
     return even_blocks(entry, motion, seed=4)
 
 

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from driftwalk.calibration.evolution import Budget, Found, search_minimum
-from driftwalk.calibration.evolution.kept import KeptScores
+from driftwalk.calibration.evolution import Budget, CachedObjective, SearchResult, search_minimum
 from driftwalk.sweep import MemoryStore, ShardStore, Store, SweepError
 
 QUICK = Budget(design=32, starts=2, short=6, long=8)
@@ -33,17 +32,17 @@ def store_in(folder: Path) -> ShardStore:
     return ShardStore(folder, fingerprint={"seed": 1})
 
 
-def search(objective: Counted, store: Store | None) -> Found:
-    return search_minimum(KeptScores(objective, store), 3, budget=QUICK, seed=1)
+def search(objective: Counted, store: Store | None) -> SearchResult:
+    return search_minimum(CachedObjective(objective, store), 3, budget=QUICK, seed=1)
 
 
-def assert_same(first: Found, second: Found) -> None:
+def assert_same(first: SearchResult, second: SearchResult) -> None:
     for one, other in zip(first, second, strict=True):
         np.testing.assert_array_equal(one, other)
 
 
 @pytest.fixture(scope="module")
-def plain() -> tuple[Found, Counted]:
+def plain() -> tuple[SearchResult, Counted]:
     """Return the answer without anything kept, and its objective."""
     objective = Counted()
     return search_minimum(objective, 3, budget=QUICK, seed=1), objective
@@ -60,10 +59,10 @@ def test_keeping_changes_no_answer(kind, plain, tmp_path):
 def test_a_call_is_computed_once_and_read_again(tmp_path):
     settings = np.random.default_rng(2).random((5, 3))
     objective = Counted()
-    kept = KeptScores(objective, store_in(tmp_path))
+    kept = CachedObjective(objective, store_in(tmp_path))
     first = kept(settings, 40, 2)
     again = kept(settings, 40, 2)
-    another = KeptScores(Counted(fails_after=0), store_in(tmp_path))(settings, 40, 2)
+    another = CachedObjective(Counted(fails_after=0), store_in(tmp_path))(settings, 40, 2)
     np.testing.assert_array_equal(first, again)
     np.testing.assert_array_equal(first, another)
     assert objective.calls == [(40, 5, 2)]
@@ -95,7 +94,7 @@ def test_an_interrupted_search_goes_on_where_it_was(calls, tmp_path, plain):
 
 def test_without_a_store_everything_is_computed_again():
     objective = Counted()
-    kept = KeptScores(objective, None)
+    kept = CachedObjective(objective, None)
     for _ in range(2):
         kept(np.full((1, 3), 0.5), 0, 1)
     assert len(objective.calls) == 2

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import driftwalk as dw
-from driftwalk.calibration.wall import NOTABLE_SHARE, REACH_M, wall_warning
+from driftwalk.calibration.input_warnings import WALL_WARNING, wall_warning
 from driftwalk.schema import Track, build_trajectory
 
-TOUCHING_M = 0.15 - 0.015 * np.sqrt(2.0) - REACH_M
+TOUCHING_M = 0.15 - 0.015 * np.sqrt(2.0) - WALL_WARNING.reach_m
 """From the centre of the default tank: beyond, a corner of the block may be at the wall."""
 
 
@@ -25,7 +25,7 @@ def test_it_says_how_often_and_what_was_taken() -> None:
     assert found is not None
     assert "in 25% of the samples" in found
     assert "restitution 0.5, friction 0" in found
-    assert wall_warning(track(NOTABLE_SHARE), dw.Study()) is None
+    assert wall_warning(track(WALL_WARNING.notable_share), dw.Study()) is None
 
 
 @pytest.mark.parametrize("stated", [{"tank.wall_friction": 1.0}, {"tank.wall_restitution": 0.2}])
