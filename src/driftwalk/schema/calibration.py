@@ -1,7 +1,7 @@
 """Which parameters a stored calibration is about: their names, units and scales.
 
-They are the dimensions of its map. Units and labels are those of the coordinates; a
-calibration of the block without them, of an early version, has the block's units.
+They are the dimensions of its map. Units and labels are those of the coordinates; without a map the
+parameters are the block's.
 """
 
 from __future__ import annotations
