@@ -3,7 +3,7 @@
 from driftwalk.likelihood.check.run import Judged, check_model, judge_fit
 from driftwalk.likelihood.contacts.estimate import estimate_wall
 from driftwalk.likelihood.fit import check_fit, fit_motion
-from driftwalk.likelihood.fitted_flow import fitted_flow
+from driftwalk.likelihood.flow_of_fit import fitted_flow
 from driftwalk.likelihood.law.held_out import compare_laws
 from driftwalk.likelihood.recover.run import check_recovery, recovery_study
 from driftwalk.likelihood.recover.score import score_fit

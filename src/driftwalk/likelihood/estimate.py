@@ -13,7 +13,7 @@ from driftwalk.conditions.study import fitted_law
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.filter.parameters import Point
-from driftwalk.likelihood.fitted_flow import require_fit
+from driftwalk.likelihood.flow_of_fit import require_fit
 from driftwalk.likelihood.law.facts import effective_logs, stored_numbers
 from driftwalk.likelihood.prior import Weights
 from driftwalk.likelihood.ready import body_of, prepare

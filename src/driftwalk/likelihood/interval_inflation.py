@@ -1,4 +1,4 @@
-"""Intervals of the parameters: those of theory, inflated by calibrated factors.
+"""Intervals of the parameters: intervals of theory, inflated by calibrated factors.
 
 Theory takes the filter's innovations for independent normals and the smoothness of the flow for
 known. It omits some effects: the filter is Gaussian, flows are not drawn from the prior, and a
@@ -76,8 +76,8 @@ def parameter_covariance(mode: Mode, restricted: Restricted) -> Floats:
     """Return the covariance of ln C_d, the noises and opened numbers.
 
     C_d's variance comes from its own criterion, in which the numbers are known; it is made larger
-    by the share that they add to it. The rest is that of theory, with the factors that were
-    measured.
+    by the share that they add to it. The rest comes from theory. All of it has the calibrated
+    factors.
     """
     drag = mode.point.coefficients.size
     covariance = mode.covariance[drag:, drag:].copy()

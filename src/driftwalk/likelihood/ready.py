@@ -129,7 +129,7 @@ def prepare(
     if _is_fitted_arena(many[0], study):
         require_own_arena(study, intervals=count, near_wall=near_wall, where=_name_of(many[0]))
     _require_usable(series, study)
-    # Each flow has coefficients of its own, so each needs enough intervals.
+    # Each flow has its own coefficients, so each needs enough intervals.
     for flow in range(0 if intervals.steady else len(intervals.labels)):
         _require_usable(
             [one for one in series if one.flow == flow],
@@ -168,7 +168,7 @@ def _name_of(recording: xr.Dataset) -> str:
 def _jumps_removed(recording: xr.Dataset, body: str | None) -> int:
     """Return how many samples of a body the reading of its recording left out as jumps."""
     found = parse_json(str(recording.attrs.get("counts", "{}")))
-    # A file may hold other counts than those of `driftwalk.record`.
+    # A file may hold counts that `driftwalk.record` did not write.
     for key in ("per_body", str(recording["body"].values[0]) if body is None else body):
         found = found.get(key) if isinstance(found, dict) else None
     number = found.get("jumps_removed") if isinstance(found, dict) else None

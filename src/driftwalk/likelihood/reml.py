@@ -103,7 +103,7 @@ def restricted_drag(
     """Minimise the restricted criterion over ln C_d."""
     start = mode.point
     drag = start.coefficients.size
-    # The profile is that of a C_d beside numbers that are known.
+    # The profile takes the opened numbers for known.
     sd = math.sqrt(known_numbers_variance(mode))
     slopes = mode.covariance[:, drag] / mode.covariance[drag, drag]
     found = [profile_at(passes, mode, prior, start.log_drag, start.coefficients.ravel())]
@@ -145,8 +145,8 @@ def _with_restricted_intensity(
 ) -> Point:
     """Return the point after one Newton step in ln q on the restricted criterion.
 
-    The other noises go along the ridge of the likelihood; their own slopes, and that of the lever,
-    are too small to matter.
+    The other noises go along the ridge of the likelihood; their own slopes, and the slope of
+    the lever, are too small to matter.
     """
     at = np.array([one.log_drag for one in found])
     order = np.argsort(at)
@@ -173,7 +173,7 @@ def _minimum(found: list[Profile]) -> tuple[float, float]:
 
     The standard deviation is infinite where there is no minimum near the points.
 
-    Slopes alone are used of the likelihood. They are those of the predictions, as in the search;
+    Of the likelihood only the slopes are used. They come from the predictions, as in the search;
     its values also hold what the covariances of the innovations have to say about C_d, which is
     wrong to the order in which a Kalman filter is.
     """

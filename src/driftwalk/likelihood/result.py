@@ -66,7 +66,7 @@ class Whiteness(NamedTuple):
 def whiteness_of(innovations: list[tuple[Floats, npt.NDArray[np.bool_]]]) -> Whiteness:
     """Return the check of whitened innovations (n, D), given with which of them were used.
 
-    Innovations of exactly 0 are those of missing angles, and do not count.
+    An innovation of exactly 0 means a missing angle and does not count.
 
     Examples
     --------

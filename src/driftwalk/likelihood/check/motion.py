@@ -65,7 +65,7 @@ class MotionComparison(NamedTuple):
     def p_value(self) -> float:
         """The same from a normal distribution of the logarithms, which goes beyond the ranks.
 
-        Replicates in one flow are alike, so the degrees of freedom are those of the flows.
+        Replicates in one flow are alike, so the flows count the degrees of freedom.
         """
         from scipy.stats import t
 

@@ -199,7 +199,7 @@ def contrasts_of(layout: Layout, groups: Sequence[Groups], components: int) -> C
 
 
 class LocalMeans(NamedTuple):
-    """Sums over cells, with their distance from zero; the first axis is that of the groups."""
+    """Sums over cells, with their distance from zero; the first axis counts the groups."""
 
     samples: Floats
     mean: Floats
@@ -262,7 +262,7 @@ def trend_of(contrast: Contrast, covariance: Floats) -> Trend:
 
 
 class Spread(NamedTuple):
-    """Mean square of the errors in each group, relative to that of all."""
+    """Mean square of the errors in each group, relative to all groups."""
 
     ratio: Floats
     """NaN where there are too few samples."""

@@ -26,7 +26,7 @@ from driftwalk.likelihood.check.worlds import (
     replicates_at_estimate,
 )
 from driftwalk.likelihood.estimate import estimate_of
-from driftwalk.likelihood.fitted_flow import require_fit
+from driftwalk.likelihood.flow_of_fit import require_fit
 from driftwalk.likelihood.ready import as_list
 from driftwalk.likelihood.solution import BREAKDOWN
 from driftwalk.schema.answers.fit_facts import texts

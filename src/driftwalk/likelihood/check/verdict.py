@@ -71,7 +71,7 @@ def criteria_of(
     angle: str,
     mistakes: int,
 ) -> list[Criterion]:
-    """Ask everything of a fit with this use of the angle, and so many mistakes left out."""
+    """Ask everything of a fit with this use of the angle, after the mistakes were left out."""
     where = Places(found.layout)
     names = components_of(errors[0].components)
     return [
@@ -260,7 +260,7 @@ def noise_criterion(spread: Spread, where: Places, *, by: str) -> Criterion:
     known = np.flatnonzero(np.isfinite(spread.ratio))
     if known.size < 2:
         return Criterion(name, math.nan, "")
-    # A mean of squares: its distribution is that of chi squared, with a longer tail upwards.
+    # A mean of squares has a scaled chi squared distribution, with a longer tail upwards.
     shape = 1.0 / spread.std[known] ** 2
     ratio = np.asarray(spread.ratio[known])
     above, below = (tail(ratio, shape, scale=1.0 / shape) for tail in (gamma.sf, gamma.cdf))

@@ -48,7 +48,7 @@ def whiteness_tests(
 
     Ljung and Box's statistic takes the residuals of a fit for errors. Here each autocorrelation is
     first freed of what the fitted flow has put into it (minus the mean of J C J' at that lag); the
-    degrees of freedom are then those of the lags. The two noises, which are fitted as well, take up
+    degrees of freedom are then the number of lags. The two noises, which are fitted too, take up
     to four of the forty: p is up to four times too large, on the safe side.
     """
     from scipy.stats import chi2, kurtosistest

@@ -19,7 +19,7 @@ from driftwalk.core.seeds import world_keys
 from driftwalk.core.streams import CheckStream
 from driftwalk.likelihood.estimate import Estimate
 from driftwalk.likelihood.filter.series import Series
-from driftwalk.likelihood.fitted_flow import fitted_flow
+from driftwalk.likelihood.flow_of_fit import fitted_flow
 from driftwalk.likelihood.intervals import fitted_intervals
 from driftwalk.likelihood.spline import Floats
 from driftwalk.schema import Track

@@ -14,7 +14,7 @@ from driftwalk.likelihood.contacts.parabola import answer, is_undetermined
 from driftwalk.likelihood.contacts.particles import Part, WallLikelihood
 from driftwalk.likelihood.contacts.passages import Passages, passages_of, thinned
 from driftwalk.likelihood.estimate import Estimate, estimate_of
-from driftwalk.likelihood.fitted_flow import fitted_flow
+from driftwalk.likelihood.flow_of_fit import fitted_flow
 from driftwalk.likelihood.intervals import fitted_intervals
 from driftwalk.likelihood.newton import Tell
 from driftwalk.likelihood.solution import BREAKDOWN

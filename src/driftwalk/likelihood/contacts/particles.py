@@ -202,7 +202,7 @@ def _resampled(state: Sequence[Floats], weight: Floats, uniform: Floats) -> list
 def filtered_covariance(noise: float, intensity: float, interval: float) -> Floats:
     """Return the covariance of a coordinate and its rate after many samples, without drag.
 
-    `noise` is the camera's, `intensity` that of the white noise of the acceleration.
+    `noise` is the camera's, `intensity` the intensity of the white acceleration.
     """
     moved = np.array([[1.0, interval], [0.0, 1.0]])
     added = intensity * np.array(

@@ -104,7 +104,7 @@ def variance_changes(base: dict[str, Any], other: dict[str, Any]) -> Floats:
 def noise_derivatives(
     base: dict[str, Any], pairs: Sequence[Pair], used: Flags
 ) -> tuple[Floats, list[Floats], list[Floats]]:
-    """Return whitened innovations (n, D), their derivatives by the noises, and those of S.
+    """Return whitened innovations (n, D), and the derivatives of them and of S by the noises.
 
     The derivatives of S are whitened from both sides, L^-1 dS L^-T, shape (D, D, n).
     """

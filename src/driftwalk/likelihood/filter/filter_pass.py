@@ -7,7 +7,7 @@ ln C_d, and the noises: ln q (intensity of the stochastic acceleration), ln r (t
 where the angle is a part of the state, the logarithms of the force's lever and of the angle's
 noise. For the first two the filter itself adds up the products of the derivatives of its
 predictions; for the noises it is run again with slightly larger values, and the derivatives of S_k
-enter as well. Where the pumps were switched each flow has coefficients of its own; a series is in
+enter as well. Where the pumps were switched each flow has its own coefficients; a series is in
 one flow and adds to the block of that flow alone, and to the parameters that all share.
 """
 
@@ -65,7 +65,7 @@ class Passes:
     body: Body
     spline: Spline
     flows: int = 1
-    """Number of flows, each with coefficients of its own."""
+    """Number of flows, each with its own coefficients."""
 
     def columns_of(self, flow: int, others: int) -> tuple[Place, Place]:
         """Return where a flow's coefficients and the `others` stand: in one flow, and among all."""
@@ -80,7 +80,7 @@ class Passes:
         """Return likelihood, score and information at a point.
 
         With noise="without" they end with ln C_d. The closed numbers that are `tried` have
-        derivatives too, after those of all other parameters.
+        derivatives too, at the end.
         """
         names = [*point.extras, *tried] if noise == "with" else []
         others = 1 + len(names)
@@ -141,7 +141,7 @@ class Passes:
     ) -> Sums:
         """Return the sums of one series: of coefficients and ln C_d by the kernel, then noises."""
         # A sample counts only where every pass has used it: else a difference of two passes would
-        # be that of taking a sample and leaving it out.
+        # mix the effect of the parameter with the effect of leaving a sample out.
         used = np.logical_and.reduce([used_of(base), *(pair.comparable for pair in pairs)])
         white, changes, spreads = noise_derivatives(base, pairs, used)
         # The kernel multiplies its derivatives, which are never held, with the whitened

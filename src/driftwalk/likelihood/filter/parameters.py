@@ -45,7 +45,7 @@ class Point:
         return {**self.noises, **self.opened}
 
     def number(self, name: str) -> float:
-        """Return a number of a departure, that of the model where nothing else is said."""
+        """Return a number of a departure; the model's where it is neither opened nor fixed."""
         return self.opened.get(name, self.fixed.get(name, NUMBERS[name].model))
 
     def with_extra(self, name: str, value: float) -> Point:

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 FLOATING: Final[Mapping[str, float]] = {"water_acceleration": 1.0, "water_spin": 1.0}
 """Numbers of a body that floats: it displaces its own mass of water."""
 USUAL_ADDED_MASS: Final = (0.5, 0.2)
-"""Added mass of a floating body as a share of its mass, and its standard deviation, where nobody
-says more."""
+"""Added mass of a floating body as a share of its mass, and its standard deviation, where the
+user states none: 0.3 to 1 is possible (docs/explanation/likelihood.md)."""
 CAMERA: Final = ("time_variance", "angle_offset", "marker_x", "marker_y")
 
 
@@ -28,7 +28,7 @@ class Assumptions:
     opened: Mapping[str, float]
     """Numbers that are estimated in any case, with their first values."""
     fixed: Mapping[str, float]
-    """Numbers that are known, and not those of the model."""
+    """Numbers that are known and differ from the model."""
     tried: tuple[str, ...]
     """Numbers that are opened where the recording asks for it."""
     pulses: bool

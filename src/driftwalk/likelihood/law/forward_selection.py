@@ -221,7 +221,7 @@ class ForwardSelection:
         return self._without(mode, idle) or before, idle
 
     def _idle(self, mode: Mode, names: Set[str]) -> set[str]:
-        """Return those of some opened numbers that are too near the model to stay open."""
+        """Return which of some opened numbers are too near the model to stay open."""
         idle = {
             name
             for name in names

@@ -1,6 +1,6 @@
 """Model selection: the force law and the departures that a recording supports.
 
-The search of the likelihood is made for the paper's law, and for that of a floating body where
+The search of the likelihood is made for the paper's law, and for a floating body's where
 score tests under the first cast doubt on it. At the better one, such tests say which further
 numbers the recording asks for (`driftwalk.likelihood.law.score_tests`). Those are opened and
 fitted, and closed again where nothing comes of them.
@@ -43,7 +43,7 @@ class LawPolicy(NamedTuple):
     """A lever of the force counts when it is above the notable one by this many standard
     deviations: 5 % of the recordings whose lever is just notable."""
     notable_lever: float = 0.005
-    """Lever of the force, in sides of the block, above which the turning is not that of the model.
+    """Lever of the force, in sides of the block, above which the turning does not follow the model.
     On recordings of the model it comes out at 0.001 to 0.004, with angles 5 degrees off at
     0.015."""
 
@@ -122,7 +122,7 @@ class LawSearch:
         )
 
     def _undoubted(self, paper: Mode, tests: ScoreTests) -> LawResult:
-        """Return the paper's law, and whether that of a floating body would do as well."""
+        """Return the paper's law, and whether a floating body's would do as well."""
         names = self._floating_names
         own = tests.chi_squared(dict.fromkeys(names, 0.0))
         other = tests.chi_squared({name: FLOATING[name] for name in names})
@@ -225,7 +225,7 @@ class LawSearch:
         return self.selection.select(other)
 
     def _is_challenged(self, mode: Mode) -> bool:
-        """Return whether the numbers of a floating body seem to be others than those of the law."""
+        """Return whether the score tests of a floating body's numbers contradict the law."""
         names = self._floating_names
         tests = score_tests(self.search, mode, names)
         return tests is not None and (

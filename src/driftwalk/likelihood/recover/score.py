@@ -12,7 +12,7 @@ import numpy.typing as npt
 from driftwalk.core.errors import InputError
 from driftwalk.flow import bilinear
 from driftwalk.flow.arena import outline_of
-from driftwalk.likelihood.fitted_flow import fitted_flow, require_fit
+from driftwalk.likelihood.flow_of_fit import fitted_flow, require_fit
 from driftwalk.likelihood.intervals import fitted_intervals
 from driftwalk.likelihood.wall import MARGIN
 from driftwalk.schema import FLAGS, body_track

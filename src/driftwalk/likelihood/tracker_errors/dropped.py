@@ -90,7 +90,7 @@ class DroppedFrames(NamedTuple):
     evidence: float
     """Logarithm of the likelihood ratio of that rate over none."""
     interval: float
-    """Between frames [s]; NaN where the stamps are not those of a constant rate."""
+    """Between frames [s]; NaN where the stamps have no constant rate."""
 
     @property
     def frames(self) -> int:
@@ -132,7 +132,7 @@ def find_dropped_frames(track: Track, clock: Floats) -> DroppedFrames:
         axes = _axes(track, _time_of(lengths, interval))
         likelihood = log_likelihoods(axes, starts, lengths, stamped, dt=interval)
         rates, value = _rates(likelihood)
-        # The evidence is that of the first round: later ones have fitted the lengths to the track.
+        # The evidence comes from the first round: later ones have fitted the lengths to the track.
         if number == 0:
             evidence = value - _rates(likelihood, without=DROPS)[1]
             if evidence < DROPPED.evidence or not _are_dropped_frames(

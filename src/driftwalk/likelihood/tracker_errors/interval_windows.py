@@ -105,7 +105,7 @@ def log_likelihoods(
     *,
     dt: float,
 ) -> Floats:
-    """Return the log likelihood of every window under every pattern, less that of the first."""
+    """Return the log likelihood of every window under every pattern, relative to the first."""
     around = starts[:, None] + np.arange(WIDTH - 1)
     key = lengths[around]
     key[:, MIDDLE] = stamped[starts + MIDDLE]

@@ -4,7 +4,7 @@ A moving average, or a parabola through some frames (Savitzky and Golay), takes 
 out of a track altogether, of the motion and of the tracking noise alike; averages over three frames
 have nothing left at a third of the frame rate. No motion with white noise on it has such holes: its
 spectrum only falls, and ends in the floor of the noise. The spectrum of the second differences is
-compared with that of a motion and its noise, smoothed in each of these ways and not at all.
+compared with the spectrum of a motion and its noise, smoothed in each of these ways and not at all.
 
 An exponential filter leaves no holes. It turns a motion with its noise into one whose force seems
 to remember, and is not looked for.
@@ -182,7 +182,7 @@ def _ways() -> dict[str, Floats]:
     ways = {f"averages over {n} frames": np.full(n, 1.0 / n) for n in (2, 3, 4, 5, 6, 7, 9, 11)}
     ways["weighted averages over 3 frames"] = np.array([0.25, 0.5, 0.25])
     ways["weighted averages over 5 frames"] = np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0
-    # A degree of 3 is that of 2.
+    # A degree of 3 gives the same weights as 2.
     for frames, degree in ((5, 2), (7, 2), (9, 2), (11, 2), (7, 4), (9, 4), (11, 4)):
         name = {2: "parabolas", 4: "quartics"}[degree]
         ways[f"{name} through {frames} frames (Savitzky-Golay)"] = savgol_coeffs(frames, degree)
