@@ -181,12 +181,6 @@ def _unknown_blocks(poses: Poses, hold: float) -> Booleans:
     return unknown
 
 
-def _known_time(time: Floats, known: Booleans, hold: float) -> Floats:
-    """Return for how long each sample stands [s]: until the next one, if that comes in time."""
-    lasts = np.append(np.minimum(np.diff(time), hold), 0.0)
-    return np.where(known, lasts, 0.0)
-
-
 def _shares(outcome: npt.NDArray[np.int32], lasts: Floats, classes: int) -> Floats:
     """Return the share of each class in the time in which the class is known."""
     known = outcome >= 0
@@ -204,7 +198,9 @@ def _dataset(
     sound: Booleans = np.logical_and.reduce(known, axis=1)
     outcome = np.where(sound, _places(history.outcome, classes), UNKNOWN).astype(np.int32)
     assembly = np.where(known, history.assembly, UNKNOWN).astype(np.int32)
-    lasts = _known_time(poses.time, sound, rules.hold)
+    # A sample holds until the next one, if that comes in time.
+    lasts = np.append(np.minimum(np.diff(poses.time), rules.hold), 0.0)
+    lasts = np.where(sound, lasts, 0.0)
     data: dict[str, Any] = {
         "outcome": ("time", outcome),
         "assembly": (("time", "body"), assembly),

@@ -104,7 +104,7 @@ def require_motion(
             f"{_begin(recording, where)}holds {rows} in the time that is kept, at least "
             f"{_MOTION.fewest_positions} are needed for a motion"
         )
-    if not any(_moves(track) for track in tracks):
+    if not any(one.x.size and (np.ptp(one.x) > 0 or np.ptp(one.y) > 0) for one in tracks):
         still = body_names(recording) if body is None else names
         which = ", ".join(f"'{name}'" for name in still)
         raise InputError(
@@ -203,10 +203,6 @@ def typical_speed(tracks: Sequence[Track]) -> float:
 def _begin(recording: xr.Dataset, where: str | PathLike[str]) -> str:
     name = str(where) or recording.attrs.get("source", "")
     return f"{name}: " if name else ""
-
-
-def _moves(track: Track) -> bool:
-    return bool(track.x.size and (np.ptp(track.x) > 0 or np.ptp(track.y) > 0))
 
 
 def jump_warnings(

@@ -24,7 +24,7 @@ Family = Literal["swirl", "eddies"]
 
 
 class RandomFlowPolicy(NamedTuple):
-    """What random flows are made of."""
+    """Parts of a random flow."""
 
     cells: int = 60
     """Cells across the tank: smaller than any jet or eddy; chosen by hand."""

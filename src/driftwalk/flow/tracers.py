@@ -34,7 +34,7 @@ class TracerPolicy(NamedTuple):
     """Position noise of a tracker of particles, where the tracks are too short to tell
     [pixels]; chosen by hand."""
     many_rejected: float = 0.1
-    """Share of false links above which the linking as a whole is in doubt."""
+    """Share of false links above which the linking as a whole is in doubt; chosen by hand."""
     long_step: float = 1.0
     """Median step, in cells, above which the steps blur the field; chosen by hand."""
 

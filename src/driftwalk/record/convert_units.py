@@ -65,7 +65,8 @@ def convert_units(
     flip, flip_theta = _flips(raw, y_axis=y_axis, in_pixels=in_pixels)
     quantum = common_quantum(values for body in raw.bodies[:4] for values in (body.x, body.y))
     attrs: dict[str, object] = dict(raw.attrs)
-    attrs["y_axis"] = _describe_flips(raw, flip, flip_theta)
+    negated = _describe_negated(raw, flip, flip_theta)
+    attrs["y_axis"] = f"{raw.plane}; {negated}" if raw.plane else negated
     attrs.setdefault("position_quantum_m", float(quantum * scale))
     if rate is not None:
         attrs["sample_rate_Hz"] = rate
@@ -166,11 +167,6 @@ def _flips(raw: RawRecording, *, y_axis: str | None, in_pixels: bool) -> tuple[b
     return positions == "down", angles == "down"
 
 
-def _describe_flips(raw: RawRecording, flip: bool, flip_theta: bool) -> str:
-    done = _describe_negated(raw, flip, flip_theta)
-    return f"{raw.plane}; {done}" if raw.plane else done
-
-
 def _describe_negated(raw: RawRecording, flip: bool, flip_theta: bool) -> str:
     has_theta = any(body.theta is not None for body in raw.bodies)
     if not flip and not (flip_theta and has_theta):
@@ -190,7 +186,8 @@ def _convert_clocks(raw: RawRecording, ticks: float, attrs: dict[str, object]) -
     known = [(clock, np.isfinite(clock)) for clock in arrays.values()]
     starts = [float(c.min(where=k, initial=np.inf)) for c, k in known if k.any()]
     origin = min(starts, default=0.0)
-    begin = float(_exactly(raw.clock_origin, origin) / Fraction(ticks))
+    # As fractions, because float64 rounds nanoseconds since 1970.
+    begin = float((Fraction(raw.clock_origin) + Fraction(origin)) / Fraction(ticks))
     dated = raw.calendar in (UTC, LOCAL)
     if raw.clock_unit == "frame" or (begin < CLOCK.first_day_s and not dated):
         origin = -float(raw.clock_origin)
@@ -206,11 +203,6 @@ def _convert_clocks(raw: RawRecording, ticks: float, attrs: dict[str, object]) -
             np.subtract(clock, origin, out=clock)
             np.divide(clock, ticks, out=clock)
     return converted
-
-
-def _exactly(whole: int, more: float) -> Fraction:
-    """Return a sum that float64 would round, of nanoseconds since 1970."""
-    return Fraction(whole) + Fraction(more)
 
 
 def _writable(values: Array) -> Array:

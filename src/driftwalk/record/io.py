@@ -175,6 +175,7 @@ def load(
     origin = origin_of(path, options, format=format, replicate=replicate)
     try:
         raw = origin.read(options)
+        # Markers become bodies before `body` chooses among the names.
         join_markers(raw, options)
         raw.bodies = _select(raw.bodies, body)
         refuse_many_bodies([one.name for one in raw.bodies])
@@ -192,6 +193,7 @@ def load(
             columns=raw.body_columns,
         )
         cleaned, counts = _clean(bodies, clean)
+        # The arrays before the cleaning are freed before the dataset is made.
         del bodies
         if not any(body.clock.size for body in cleaned):
             if start is not None or stop is not None:

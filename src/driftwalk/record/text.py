@@ -318,7 +318,8 @@ class _Collected:
             except FormatError as error:
                 errors.append(error)
                 continue
-            if _all_numbers(frame, layout) and (decimal == self._decimal or self._only_whole()):
+            numeric = all(frame[column].dtype.kind in "iuf" for column in layout.numbers)
+            if numeric and (decimal == self._decimal or self._only_whole()):
                 self._decimal = decimal
                 return frame
             errors.append(_bad_row(block, layout, path=path, line=line, decimal=decimal))
@@ -331,7 +332,8 @@ class _Collected:
 
     def _begin(self, frame: Any, block: bytes) -> None:
         """Make room for as many rows as the file holds, by its size and its first block."""
-        rows = int(1.02 * len(frame) * _text_size(self._path) / len(block)) + len(frame)
+        # A packed file has fewer bytes than its text: the columns then grow.
+        rows = int(1.02 * len(frame) * self._path.stat().st_size / len(block)) + len(frame)
         numbers = (*self._layout.numbers, *self._layout.stamps[:1])
         self._numbers = {column: GrowingColumn(np.float64, expected=rows) for column in numbers}
         self._codes = {
@@ -380,16 +382,6 @@ def _line_of_row(block: bytes, row: int) -> int:
     """Return the line of a block, from 0, in which a row of data stands."""
     lines = (at for at, line in enumerate(block.split(b"\n")) if line.strip())
     return next(islice(lines, row, None), 0)
-
-
-def _all_numbers(frame: Any, layout: TableLayout) -> bool:
-    """Whether the columns that are to be numbers are."""
-    return all(frame[column].dtype.kind in "iuf" for column in layout.numbers)
-
-
-def _text_size(path: Path) -> int:
-    """Return the bytes of a text file; of a packed one those of the file, which are fewer."""
-    return path.stat().st_size
 
 
 def far_origin(values: npt.NDArray[Any]) -> int:

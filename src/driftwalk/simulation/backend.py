@@ -37,7 +37,7 @@ class SizePolicy(NamedTuple):
     """Nodes of all tables of a flow field; chosen by hand."""
     steps: int = 2_000_000_000
     """Steps of one world: half an hour of one processor. The longest run of a study, 1e7 s, has
-    half as many steps of 10 ms"""
+    half as many steps of 10 ms. Chosen by hand."""
     step_takes_s: float = 0.85e-6
     """Duration of a step [s], measured on a Haswell core."""
 

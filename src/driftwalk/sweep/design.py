@@ -164,7 +164,7 @@ class CutPolicy(NamedTuple):
 
     block_steps_per_second: float = 25e6
     """Steps of single blocks, or bodies, that one core makes: 12 to 40 million, by its
-    instruction set (docs/explanation/performance.md); chosen by hand."""
+    instruction set (measured: docs/explanation/performance.md)."""
     largest_s: float = 40.0
     """Longest unit [s of one core]: as much is lost where its worker dies; chosen by hand."""
     many: int = 256

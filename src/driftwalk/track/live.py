@@ -29,7 +29,7 @@ LOOPBACK: Final = "127.0.0.1"
 
 
 class LivePolicy(NamedTuple):
-    """What one live output serves."""
+    """Limits of one live output."""
 
     most_clients: int = 32
     """Clients at one time; chosen by hand."""

@@ -58,7 +58,8 @@ class LatticeWorld:
         self.quarter = [0] * blocks
         self.accepted: list[Join] = []
         self.dropped: list[Join] = []
-        for join in sorted(joins, key=_tightest_first):
+        # The tightest joins first: they are the most certain.
+        for join in sorted(joins, key=lambda one: (one.looseness, one.blocks, one.start)):
             (self.accepted if self._put(join) else self.dropped).append(join)
 
     def shape(self, members: Sequence[int], chirality: Chirality) -> str:
@@ -92,10 +93,6 @@ class LatticeWorld:
             self.cell[block] = cell
             self.quarter[block] = (self.quarter[block] + turn) % 4
         return self.partition.unite(join.blocks)
-
-
-def _tightest_first(join: Join) -> tuple[float, tuple[int, int], int]:
-    return join.looseness, join.blocks, join.start
 
 
 def _sum(one: Cell, other: Cell) -> Cell:

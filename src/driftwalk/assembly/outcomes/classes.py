@@ -93,7 +93,7 @@ def class_name(shapes: Iterable[str]) -> str:
     >>> class_name(["1", "I3"])
     'I3+1'
     """
-    return "+".join(sorted(shapes, key=_largest_first))
+    return "+".join(sorted(shapes, key=lambda one: (-shape_size(one), shape_order(one))))
 
 
 def class_shapes(name: str) -> tuple[str, ...]:
@@ -243,10 +243,6 @@ def listed_shapes(occurred: Iterable[str], blocks: int, *, chirality: Chirality)
         sizes = range(1, blocks + 1)
         return tuple(name for size in sizes for name in polyominoes(size, chirality=chirality))
     return tuple(sorted(set(occurred), key=shape_order))
-
-
-def _largest_first(shape: str) -> tuple[int, tuple[int, int, str, str]]:
-    return -shape_size(shape), shape_order(shape)
 
 
 def _class_order(name: str) -> tuple[list[int], list[tuple[int, int, str, str]]]:

@@ -179,11 +179,12 @@ def l1_noise_floor(
         raise InputError(f"seed must not be negative, got {seed}")
     p = p[p > 0] / p.sum()
     distance = _drawn_distances(p, int(runs_a), runs_b, samples, seed)
+    per_run = 1.0 / runs_a + (0.0 if runs_b is None else 1.0 / runs_b)
     return L1NoiseFloor(
         mean=float(distance.mean()),
         quantile=float(np.quantile(distance, quantile)),
         standard_error=float(distance.std(ddof=1) / math.sqrt(samples)),
-        normal_mean=float(_normal_mean(p, np.array(_per_run(runs_a, runs_b)))),
+        normal_mean=float(_normal_mean(p, np.array(per_run))),
     )
 
 
@@ -269,10 +270,6 @@ def _normal_mean(p: Floats, per_run: Floats) -> Floats:
     # A rounded proportion may exceed one by a hair.
     variance = np.maximum(p * (1 - p), 0.0)
     return np.asarray(np.sqrt(2 / np.pi * variance).sum(axis=-1) * np.sqrt(per_run))
-
-
-def _per_run(runs_a: int, runs_b: int | None) -> float:
-    return 1.0 / runs_a + (0.0 if runs_b is None else 1.0 / runs_b)
 
 
 def _drawn_distances(p: Floats, runs_a: int, runs_b: int | None, samples: int, seed: int) -> Floats:

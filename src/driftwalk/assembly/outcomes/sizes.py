@@ -111,6 +111,7 @@ def assembly_sizes(
     size = np.array([shape_size(name) for name in shapes], dtype=np.int64)
     event_shape = assembly["event_shape"].values[sound].astype(np.int64)
     number = _numbers_at_end(event_shape, size, blocks)
+    # Beyond eight blocks in groups whose width doubles, so that each has enough runs.
     first, last = _groups(blocks)
     grouped = np.add.reduceat(number, first - 1, axis=1)
     share = np.add.reduceat(number * np.arange(1, blocks + 1), first - 1, axis=1) / blocks

@@ -108,6 +108,7 @@ def class_times(
     time = checked_times(times, duration(assembly))
     names = class_names(assembly)
     sound = assembly["outcome"].values >= 0
+    # Runs that failed have no outcome and count neither as events nor as censored.
     runs = int(sound.sum())
     if runs == 0:
         raise InputError("there is no run with an outcome: times need at least one")

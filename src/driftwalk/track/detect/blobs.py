@@ -18,7 +18,7 @@ _EITHER: Final[tuple[Polarity, Polarity]] = ("dark", "bright")
 
 
 class BlobPolicy(NamedTuple):
-    """What counts as an object before a still background."""
+    """Which regions before a still background are objects."""
 
     noise_factor: float = 6.0
     """Contrast of an object, in standard deviations of the noise; chosen by hand."""

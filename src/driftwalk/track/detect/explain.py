@@ -55,7 +55,7 @@ def explain_frame(
     picture = image.copy()
     for number, found in enumerate(detections):
         centre = (round(found.column), round(found.row))
-        radius = _radius(found.area_px)
+        radius = max(1.3 * math.sqrt(found.area_px / math.pi), 5.0)
         cv2.circle(picture, centre, round(radius), _ACCEPTED, 1, cv2.LINE_AA)
         if math.isfinite(found.theta):
             end = _arrow_end(found, radius, camera)
@@ -67,10 +67,6 @@ def explain_frame(
         cv2.drawMarker(picture, centre, _REJECTED, cv2.MARKER_TILTED_CROSS, 9, 1, cv2.LINE_AA)
         _write(picture, item.reason, (centre[0] + 7, centre[1] + 4), _REJECTED)
     return picture
-
-
-def _radius(area_px: float) -> float:
-    return max(1.3 * math.sqrt(area_px / math.pi), 5.0)
 
 
 def _arrow_end(found: Detection, radius: float, camera: PixelToWorld | None) -> tuple[int, int]:

@@ -325,7 +325,8 @@ def observe(recording: xr.Dataset, *, side: float, **rules: Any) -> xr.Dataset:
         *("chirality", "join_distance_m", "join_angle_rad", "release_distance_m"),
         *("release_angle_rad", "min_duration_s", "hold_s"),
     )
-    given = {_without_unit(key): found.attrs[key] for key in used}
+    # The arguments have the names of the attributes, without the unit.
+    given = {key.rpartition("_")[0] or key: found.attrs[key] for key in used}
     observer = AssemblyObserver(names, side=side, **given)
     poses = np.stack([recording[name].values for name in ("x", "y", "theta")], axis=-1)
     seen = [
@@ -341,20 +342,12 @@ def observe(recording: xr.Dataset, *, side: float, **rules: Any) -> xr.Dataset:
     # Beyond eight blocks `classify` lists what occurred; what is merely possible is added.
     further = sorted(set().union(*sets) - set(classes))
     if further:
-        found = _with_classes(found, classes + further)
         classes += further
+        found = found.reindex({"class": list(classes)}, fill_value={"proportion": 0.0})
     possible = np.array([[name in one for name in classes] for one in sets])
     known = outcome >= 0
     possible[known] = np.arange(len(classes)) == outcome[known, None]
     return described(found.assign(possible=(("time", "class"), possible), hidden=("time", hidden)))
-
-
-def _with_classes(found: xr.Dataset, classes: Sequence[str]) -> xr.Dataset:
-    return found.reindex({"class": list(classes)}, fill_value={"proportion": 0.0})
-
-
-def _without_unit(key: str) -> str:
-    return key.rpartition("_")[0] if key != "chirality" else key
 
 
 def _look(time: float, one: Pose, other: Pose) -> PairPoses:
