@@ -83,7 +83,7 @@ def compare(
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", metavar="FILE.nc", help="File for the comparison.", show_default=False
+            "--out", "-o", metavar="FILE.nc", help="File for the comparison.", show_default=False
         ),
     ] = None,
     overwrite: Replace = False,
