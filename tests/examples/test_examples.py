@@ -90,11 +90,11 @@ def test_two_commands_of_the_front_page_do_all_the_set_up() -> None:
     assert not [words for words in console("README.md", text) if words[0] == "pip"]
 
 
-def test_a_fit_on_the_front_page_states_what_no_recording_tells() -> None:
+def test_a_recording_on_the_front_page_states_what_no_tracker_tells() -> None:
     own = console("README.md", section("README.md", "With your own recording"))
-    fits = [words for words in own if words[:2] == ["driftwalk", "fit"]]
-    assert fits
-    for words in fits:
+    read = [words for words in own if words[:2] == ["driftwalk", "read"]]
+    assert read
+    for words in read:
         assert {"--tank", "--side", "--mass"} <= set(words)
 
 

@@ -12,7 +12,7 @@ import typer
 
 from driftwalk.cli.inputs.motion import load_motion
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import Json
+from driftwalk.cli.options.shared import Json, Replace
 from driftwalk.cli.options.study import study_option
 from driftwalk.cli.terminal.output import (
     print_json,
@@ -83,12 +83,10 @@ def compare(
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", metavar="FILE.nc", help="File for the comparison.", show_default=False
+            "--out", "-o", metavar="FILE.nc", help="File for the comparison.", show_default=False
         ),
     ] = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace a file that exists.")
-    ] = False,
+    overwrite: Replace = False,
     json: Json = False,
 ) -> None:
     """Measure how far apart two motions are.

@@ -10,7 +10,7 @@ import typer
 
 from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import FlowVariables, FrameInterval, Json
+from driftwalk.cli.options.shared import FlowVariables, FrameInterval, Json, Replace
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.answer import print_warnings
 from driftwalk.cli.terminal.argument_names import to_options
@@ -51,9 +51,7 @@ def flow(
             "--tracers", help="The bodies are passive tracers: their tracks make one flow (PTV)."
         ),
     ] = False,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace a file that exists.")
-    ] = False,
+    overwrite: Replace = False,
     json: Json = False,
 ) -> None:
     """Take the flow field from a recording, or from a file of PIV.

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from driftwalk.cli.main import paragraphs
-from driftwalk.cli.options.shared import Json
+from driftwalk.cli.options.shared import Json, Replace
 from driftwalk.cli.study_recover import recover
 from driftwalk.cli.terminal.help import HelpCommand, HelpGroup
 from driftwalk.cli.terminal.output import print_json, print_next, print_note, require_place
@@ -34,9 +34,7 @@ def new(
     full: Annotated[
         bool, typer.Option("--full", help="List every parameter with its unit and meaning.")
     ] = False,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace a file that exists.")
-    ] = False,
+    overwrite: Replace = False,
 ) -> None:
     """Print a study file with what differs from tank to tank, or with --full every parameter."""
     from driftwalk.core.files.atomic import write_atomic

@@ -220,7 +220,7 @@ def test_values_of_a_calibration(
         (("--model", "active", *parameters(ACTIVE), "--backend", "reference"), "for the block"),
         (("--model", "active", "nowhere"), "nowhere does not exist"),
         (("--model", "active", "."), "is not a run directory"),
-        (("--model", "active", "mine.py"), "not a NetCDF file"),
+        (("--model", "active", "mine.py"), "is not a run directory"),
         (("--model", "mine.py:fails", "--parameter", "speed=0.1"), "ValueError: no such speed"),
         (("--model", "mine.py:nowhere", "--parameter", "speed=0.1"), "such as at speed=0.1"),
         (("--model", f"command:{sys.executable} {PROGRAM} die", "--parameter", "speed=0.02",

@@ -128,7 +128,7 @@ def test_a_video_without_colours_teaches_nothing_and_says_what_to_do(tmp_path: P
         (("--bodies", "0"), "--bodies is the number of objects"),
         (("--max-speed", "0"), "--max-speed must be above zero"),
         (("--lost-after=-1s",), "--lost-after must be above zero"),
-        (("--scale", "nan"), "--scale must be above zero"),
+        (("--scale", "0"), "--scale must be above zero"),
         (("--tank", "30"), "pixels wide at this scale: check --tank"),
         (("--live", "5000", "--live-nmea", "5000"), "take two ports, got 5000 for both"),
         (("--live", "70000"), "a port is a number from 0 to 65535"),

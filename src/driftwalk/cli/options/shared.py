@@ -155,3 +155,4 @@ Threads = Annotated[
 Overwrite = Annotated[
     bool, typer.Option("--overwrite", help="Move a finished run aside and start a new one.")
 ]
+Replace = Annotated[bool, typer.Option("--overwrite", help="Replace a file that exists.")]

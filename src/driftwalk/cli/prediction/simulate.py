@@ -18,7 +18,7 @@ from driftwalk.cli.options.model import (
     known_model,
 )
 from driftwalk.cli.options.recording import RecordingOptions
-from driftwalk.cli.options.shared import Json, flow_of_run
+from driftwalk.cli.options.shared import Json, Replace, flow_of_run
 from driftwalk.cli.options.study import StudyOptions, option_name, with_study_options
 from driftwalk.cli.terminal.answer import print_report_next, print_warnings
 from driftwalk.cli.terminal.output import print_json, print_next, print_note, require_place
@@ -87,9 +87,7 @@ def simulate(
             help="Backend: cpu for single, reference for double precision.",
         ),
     ] = "cpu",
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace a file that exists.")
-    ] = False,
+    overwrite: Replace = False,
     json: Json = False,
 ) -> None:
     """Simulate the motion of the block, or of another motion model.

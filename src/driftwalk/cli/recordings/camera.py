@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 import typer
 
 from driftwalk.cli.main import paragraphs
-from driftwalk.cli.options.shared import Json, quantity_option
+from driftwalk.cli.options.shared import Json, Replace, quantity_option
 from driftwalk.cli.terminal.help import HelpCommand, HelpGroup
 from driftwalk.cli.terminal.output import print_json, print_next, print_note, print_table
 from driftwalk.core.errors import FormatError, InputError
@@ -53,9 +53,7 @@ def calibrate(
             "--no-lens", help="Find only the plane; one image is enough, and lines stay straight."
         ),
     ] = False,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace a file that exists.")
-    ] = False,
+    overwrite: Replace = False,
     json: Json = False,
 ) -> None:
     """Find the lens and the plane of the water from images of a board.

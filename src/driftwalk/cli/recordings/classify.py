@@ -9,7 +9,7 @@ import typer
 
 from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import Json, quantity_option
+from driftwalk.cli.options.shared import Json, Replace, quantity_option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import (
     print_json,
@@ -86,9 +86,7 @@ def classify(
             "--out", "-o", metavar="FILE.nc", help="File for the result.", show_default=False
         ),
     ] = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace a file that exists.")
-    ] = False,
+    overwrite: Replace = False,
     json: Json = False,
 ) -> None:
     """Say what the blocks of a recording assembled into, and when.

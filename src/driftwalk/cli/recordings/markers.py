@@ -9,6 +9,7 @@ import typer
 
 from driftwalk.cli.main import paragraphs
 from driftwalk.cli.options.flatten_options import with_options
+from driftwalk.cli.options.shared import Replace
 from driftwalk.cli.options.tracking import TrackingOptions
 from driftwalk.cli.terminal.help import HelpCommand, HelpGroup
 from driftwalk.cli.terminal.output import print_next, print_note, print_table
@@ -25,9 +26,7 @@ markers_app = typer.Typer(add_completion=False, cls=HelpGroup)
 def teach(
     options: TrackingOptions,
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.toml", help="File to write.")],
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace files that exist.")
-    ] = False,
+    overwrite: Replace = False,
 ) -> None:
     """Propose the two colours and the size of the markers from a few frames.
 

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import Json
+from driftwalk.cli.options.shared import Json, Replace
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_json, print_next, print_note, sibling
 from driftwalk.core.study_keys import STUDY_KEYS
@@ -25,9 +25,7 @@ def read(
     ],
     how: RecordingOptions,
     given: StudyOptions,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace a file that exists.")
-    ] = False,
+    overwrite: Replace = False,
     json: Json = False,
 ) -> None:
     """Read a tracker's file into a recording (.nc), once for all other commands.

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from driftwalk.cli.options.flatten_options import with_options
-from driftwalk.cli.options.shared import Json
+from driftwalk.cli.options.shared import Json, Replace
 from driftwalk.cli.options.tracking import TrackingOptions
 from driftwalk.cli.terminal.output import print_json, print_next, print_note, print_table, sibling
 from driftwalk.core.errors import InputError
@@ -40,9 +40,7 @@ def track(
             show_default=False,
         ),
     ] = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace files that exist.")
-    ] = False,
+    overwrite: Replace = False,
     json: Json = False,
 ) -> None:
     """Track blocks in a video or before a camera.

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from driftwalk.cli.options.flatten_options import with_options
+from driftwalk.cli.options.shared import Replace
 from driftwalk.cli.options.tracking import TrackingOptions
 from driftwalk.cli.terminal.output import print_note
 from driftwalk.core.errors import InputError
@@ -32,9 +33,7 @@ def watch(
             "--out", "-o", metavar="FILE.nc", help="Recording to write as well.", show_default=False
         ),
     ] = None,
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace files that exist.")
-    ] = False,
+    overwrite: Replace = False,
 ) -> None:
     """Watch blocks assemble: poses, joins and the outcome class, as they happen.
 

@@ -11,6 +11,7 @@ import typer
 
 from driftwalk.cli.inputs.motion import load_simulation
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
+from driftwalk.cli.options.shared import Replace
 from driftwalk.cli.terminal.answer import print_warnings
 from driftwalk.cli.terminal.output import print_note, require_place
 from driftwalk.core.errors import InputError
@@ -29,9 +30,7 @@ def report(
     out: Annotated[
         Path, typer.Option("--out", "-o", metavar="FILE", help="HTML file to write.")
     ] = Path("report.html"),
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace a file that exists.")
-    ] = False,
+    overwrite: Replace = False,
 ) -> None:
     """Write a report of runs or recordings: one HTML file that loads nothing from anywhere.
 

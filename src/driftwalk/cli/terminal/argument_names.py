@@ -14,66 +14,31 @@ from typing import Any, Final
 
 from driftwalk.core.study_keys import TABLES, option_of
 
-# The tables have most keys in common, each by the same name in all of them.
+_SAME: Final = (
+    "angle backend body cell_size cells columns flow format frame_interval header_line "
+    "heading host inertia keypoint length_unit mass max_speed min_confidence min_count port "
+    "position_noise replicate seed sheet side step_interval study tank theta topic up window "
+    "x y y_axis"
+)
+_WITHOUT: Final = (
+    "area block_length body_b clearance folder like noise outlier_threshold seconds "
+    "sample_time settings timeout"
+)
 OPTIONS: Final[dict[str, str | None]] = {
-    "angle": "--angle",
-    "area": None,
+    **{name: option_of(name) for name in _SAME.split()},
+    **dict.fromkeys(_WITHOUT.split()),
     "arena": "--tank",
-    "backend": "--backend",
     "block": "--side",
-    "block_length": None,
-    "body": "--body",
-    "body_b": None,
-    "cell_size": "--cell-size",
-    "cells": "--cells",
-    "clearance": None,
-    "columns": "--columns",
     "diameter": "--tank",
-    "flow": "--flow",
-    "folder": None,
-    "format": "--format",
-    "frame_interval": "--frame-interval",
     "frame_rate": "--fps",
-    "header_line": "--header-line",
-    "heading": "--heading",
-    "host": "--host",
-    "inertia": "--inertia",
-    "keypoint": "--keypoint",
-    "like": None,
-    "length_unit": "--length-unit",
-    "mass": "--mass",
-    "max_speed": "--max-speed",
     "metres_per_pixel": "--scale",
-    "min_confidence": "--min-confidence",
-    "min_count": "--min-count",
-    "noise": None,
     "origin": "--tank",
-    "outlier_threshold": None,
     "parameters": "--parameter",
-    "port": "--port",
-    "position_noise": "--position-noise",
     "rate": "--fps",
-    "replicate": "--replicate",
-    "seconds": None,
-    "seed": "--seed",
-    "sample_time": None,
-    "settings": None,
-    "sheet": "--sheet",
-    "side": "--side",
     "start": "--from",
-    "step_interval": "--step-interval",
     "stop": "--to",
-    "study": "--study",
-    "tank": "--tank",
-    "theta": "--theta",
-    "timeout": None,
-    "topic": "--topic",
-    "up": "--up",
-    "window": "--window",
     "variables": "--flow-variables",
-    "x": "--x",
-    "y": "--y",
-    "y_axis": "--y-axis",
+    # The tables have most keys in common, each by the same name in all of them.
     **{key: option_of(name) for table in TABLES for name, key in table.items()},
 }
 """From an argument, or a key of the study, to its option; None where there is no option."""

@@ -106,7 +106,7 @@ def _usage_message(error: BaseException) -> str:
     option = getattr(error, "option_name", None)
     wanted = _SYNONYMS.get(option or message.partition("'")[2].rstrip("'"))
     if wanted is not None:
-        message = f"{message}; did you mean {wanted}?"
+        message = f"{message.partition(' (Possible')[0]}; did you mean {wanted}?"
     return f"{message} (see '{context.command_path} --help{'' if option is None else '-all'}')"
 
 
