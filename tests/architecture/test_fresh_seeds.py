@@ -1,4 +1,4 @@
-"""The seeds and examples of `make test-fresh`: the base seed decides them."""
+"""What conftest.py decides: seeds and examples of `make test-fresh`, and which cases are fast."""
 
 from __future__ import annotations
 
@@ -31,13 +31,26 @@ def test_seed(fresh_seed):
 """
 
 
-def run(folder: Path, text: str, seed: int | None) -> subprocess.CompletedProcess[str]:
+CASES = """
+import pytest
+
+@pytest.mark.fast_cases(2)
+@pytest.mark.parametrize("case", range(5))
+def test_case(case):
+    print("CASE", case)
+"""
+
+
+def run(folder: Path, text: str, seed: int | None, *more: str) -> subprocess.CompletedProcess[str]:
     """Run tests of this text under the project's own conftest."""
     (folder / "conftest.py").write_text((TESTS / "conftest.py").read_text())
-    (folder / "pytest.ini").write_text("[pytest]\nmarkers =\n  false_alarm(rate): as here\n")
+    markers = "false_alarm(rate): as here\n  slow: as here\n  fast_cases(number): as here"
+    (folder / "pytest.ini").write_text(
+        f"[pytest]\npythonpath = {TESTS / 'helpers'}\nmarkers =\n  {markers}\n"
+    )
     (folder / "test_it.py").write_text(text)
     environment = {k: v for k, v in os.environ.items() if k != "DRIFTWALK_TEST_SEED"}
-    options = ["-s", "-p", "no:xdist", "-p", "no:cacheprovider"]
+    options = ["-s", "-p", "no:xdist", "-p", "no:cacheprovider", *more]
     if seed is not None:
         environment["DRIFTWALK_TEST_SEED"] = str(seed)
         options.append(f"--hypothesis-seed={seed}")
@@ -74,3 +87,10 @@ def test_a_test_with_new_seeds_states_its_rate(tmp_path: Path) -> None:
     assert "test_it.py::test_seed: `fresh_seed` and `@pytest.mark.false_alarm(rate)`" in (
         found.stdout + found.stderr
     )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("chosen", "cases"), [("not slow", "02"), ("slow", "134")])
+def test_cases_of_a_costly_test_are_fast_or_slow(tmp_path: Path, chosen: str, cases: str) -> None:
+    done = run(tmp_path, CASES, None, "-m", chosen)
+    assert re.findall(r"CASE (\d)", done.stdout) == list(cases), done.stdout

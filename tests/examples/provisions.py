@@ -548,7 +548,9 @@ PAGES: dict[str, Page] = {
         slow=True,
     ),
     "docs/how-to/report.md": Page(
-        provide=_files(_recording(60.0), _calibrated, _simulated, _fitted), slow=True
+        provide=_files(_recording(60.0), _calibrated, _simulated, _fitted),
+        draws=False,
+        slow=True,
     ),
     "docs/how-to/take-your-tracks-elsewhere.md": Page(
         provide=_files(_one_recording, _several_worlds, _calibrated),

@@ -41,9 +41,13 @@ def visited(recording: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("realisation", ["first", "second"])
 @pytest.mark.parametrize(
-    ("angle", "most_drag", "most_flow"), [("state", 0.05, 0.02), ("given", 0.10, 0.04)]
+    ("realisation", "angle", "most_drag", "most_flow"),
+    [
+        ("first", "state", 0.05, 0.02),
+        ("second", "state", 0.05, 0.02),
+        ("first", "given", 0.1, 0.04),
+    ],
 )
 def test_half_an_hour_of_the_bundled_recording(
     realisation: str, angle: str, most_drag: float, most_flow: float

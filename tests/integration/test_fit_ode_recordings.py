@@ -20,9 +20,13 @@ NOISE_M = 0.3e-3
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["ode-002", "ode-003"])
 @pytest.mark.parametrize(
-    ("angle", "most_drag", "most_flow"), [("state", 0.03, 0.03), ("given", 0.10, 0.08)]
+    ("name", "angle", "most_drag", "most_flow"),
+    [
+        ("ode-002", "state", 0.03, 0.03),
+        ("ode-003", "state", 0.03, 0.03),
+        ("ode-002", "given", 0.1, 0.08),
+    ],
 )
 def test_half_an_hour_of_another_engine(
     name: str, angle: str, most_drag: float, most_flow: float
