@@ -46,7 +46,7 @@ from driftwalk.likelihood.start import first_point, first_weights
 from driftwalk.likelihood.tracker_errors.mirrored import spin_correlation
 from driftwalk.likelihood.warnings import precision_facts, warnings_of
 from driftwalk.schema import Track
-from driftwalk.schema.answers.fit_facts import texts
+from driftwalk.schema.answers.facts import texts
 from driftwalk.schema.check import described
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from driftwalk.likelihood.newton import NOTABLE_LEVER
 from driftwalk.likelihood.refuse import MOST_WALL_SHARE
 from driftwalk.likelihood.result import Whiteness
 from driftwalk.likelihood.tracker_errors.mirrored import MIRRORED
-from driftwalk.schema.answers.fit_facts import is_open
+from driftwalk.schema.answers.facts import is_open
 
 if TYPE_CHECKING:
     from driftwalk.model import Study

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.schema.answers.calibration_facts import calibration_parts, is_explained
-from driftwalk.schema.answers.fit_facts import fit_variables, texts
+from driftwalk.schema.answers.facts import calibration_parts, fit_parts, is_explained, texts
 from driftwalk.schema.calibration import stored_parameters
 from driftwalk.schema.check import with_descriptions
 from driftwalk.schema.kinds import KINDS
@@ -73,7 +72,7 @@ def _fit_of_attributes(fit: xr.Dataset) -> xr.Dataset:
     names = {"parameter": "log_parameter", "other_parameter": "other_log_parameter"}
     # The dimension has to make room for the variable of that name.
     names |= {"interval": "flow_interval"} if "interval" in fit.dims else {}
-    data, coords = fit_variables(fit.attrs)
+    data, coords, _ = fit_parts(fit.attrs)
     kept = ("kind", *(one.name for one in KINDS["fit"].attributes))
     found = fit.rename(names).assign(data).assign_coords(coords)
     found.attrs = {name: fit.attrs[name] for name in kept if name in fit.attrs}

@@ -13,9 +13,10 @@ from fit_worlds import coarse_study, recording
 import driftwalk as dw
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.schema import check_dataset
-from driftwalk.schema.answers.fit_facts import ESTIMATES, fit_facts, fit_variables, fitted_value
+from driftwalk.schema.answers.facts import facts_of, fit_parts, fitted_value
 from driftwalk.schema.check import unknown_names
 from driftwalk.schema.earlier import current_form
+from driftwalk.schema.kinds.fit import PARAMETERS
 from driftwalk.schema.stores.netcdf import open_netcdf
 
 OLD = Path(__file__).resolve().parents[2] / "data" / "old_datasets"
@@ -41,7 +42,7 @@ def stored(dataset: xr.Dataset, folder: Path) -> xr.Dataset:
 
 def test_what_is_stored_is_what_is_in_memory(fit: xr.Dataset, tmp_path: Path) -> None:
     xr.testing.assert_identical(stored(fit, tmp_path), fit)
-    assert fit_facts(stored(fit, tmp_path)) == fit_facts(fit)
+    assert facts_of(stored(fit, tmp_path)) == facts_of(fit)
 
 
 @pytest.mark.parametrize("count", [0, 1, 2])
@@ -52,7 +53,7 @@ def test_warnings_are_kept_however_many_there_are(
     told = fit.drop_vars("warning").assign_coords(warning=("warning", np.array(texts, np.str_)))
     found = stored(told, tmp_path)
     xr.testing.assert_identical(found, told)
-    assert fit_facts(found)["warnings"] == texts
+    assert facts_of(found)["warnings"] == texts
     check_dataset(found)
 
 
@@ -89,7 +90,8 @@ def test_a_fit_of_version_1_is_read_as_a_current_one(name: str) -> None:
     assert bool(found["converged"]) == (old.attrs["converged"] == "yes")
     assert found["wall_share"] == old.attrs["wall_share"]
     assert found["samples"] == old.attrs["samples"]
-    for key, (parameter, _) in ESTIMATES.items():
+    for parameter, declared in PARAMETERS.items():
+        key = declared.key
         if key in old.attrs:
             assert fitted_value(found, parameter) == old.attrs[key]
             ends = found["interval"].sel(parameter=parameter).values
@@ -100,7 +102,7 @@ def test_a_fit_of_version_1_is_read_as_a_current_one(name: str) -> None:
 
 def test_nothing_that_version_1_said_is_lost() -> None:
     for name in FITS:
-        old, facts = as_stored(OLD / name), fit_facts(open_netcdf(OLD / name))
+        old, facts = as_stored(OLD / name), facts_of(open_netcdf(OLD / name))
         for key, value in old.attrs.items():
             if key == "warnings":
                 assert facts[key] == json.loads(value)
@@ -144,7 +146,7 @@ def test_a_fit_from_the_beginning_of_version_1_is_read() -> None:
 
 
 def test_flat_facts_and_variables_are_each_other_s_inverse(fit: xr.Dataset) -> None:
-    data, coords = fit_variables(fit_facts(fit))
+    data, coords, _ = fit_parts(facts_of(fit))
     made = xr.Dataset(data, coords)
     for name in made.variables:
         np.testing.assert_array_equal(made[name].values, fit[name].values)

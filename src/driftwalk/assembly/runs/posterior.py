@@ -18,7 +18,7 @@ from driftwalk.assembly.runs.address import stream_keys
 from driftwalk.assembly.runs.drawn_flow import RUNS_PER_FLOW
 from driftwalk.core.errors import InputError
 from driftwalk.model import declared
-from driftwalk.schema.answers.fit_facts import fitted_value
+from driftwalk.schema.answers.facts import fitted_value
 from driftwalk.schema.earlier import current_form
 
 if TYPE_CHECKING:

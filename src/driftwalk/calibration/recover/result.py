@@ -11,7 +11,7 @@ import numpy as np
 from driftwalk.calibration.recover.summary import relative_errors, summary_by_parameter
 from driftwalk.calibration.recover.truth import KnownTruth
 from driftwalk.motion import MotionModel, ParticleModel
-from driftwalk.schema.answers.fit_facts import BOUNDS, texts
+from driftwalk.schema.answers.facts import BOUNDS, texts
 from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:

@@ -10,6 +10,7 @@ from types import TracebackType
 from typing import Any, Self, TextIO
 
 from driftwalk.core.run_stages import WHOLE
+from driftwalk.schema.answers.parts import duration_text
 
 SECONDS_BETWEEN_LINES = 10.0
 SECONDS_TO_JUDGE = 1.0
@@ -170,19 +171,3 @@ def _count(done: int, total: int) -> str:
         return f"{done} of {total}"
     share = f"{100 * done / total:.0f} %"
     return share if total == WHOLE else f"{done} of {total} ({share})"
-
-
-def duration_text(seconds: float) -> str:
-    """Return a duration in words of at most two units.
-
-    Examples
-    --------
-    >>> duration_text(3725)
-    '1 h 2 min'
-    """
-    whole = round(seconds)
-    if whole < 60:
-        return f"{whole} s"
-    if whole < 3600:
-        return f"{whole // 60} min {whole % 60} s"
-    return f"{whole // 3600} h {whole % 3600 // 60} min"

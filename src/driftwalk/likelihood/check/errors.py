@@ -26,7 +26,7 @@ from driftwalk.likelihood.ready import body_of, prepare
 from driftwalk.likelihood.result import require_fit
 from driftwalk.likelihood.spline import DEGREE, Floats, Spline, basis
 from driftwalk.schema import Track
-from driftwalk.schema.answers.fit_facts import fitted_value
+from driftwalk.schema.answers.facts import fitted_value
 
 if TYPE_CHECKING:
     import xarray as xr

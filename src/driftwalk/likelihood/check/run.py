@@ -27,7 +27,7 @@ from driftwalk.likelihood.check.worlds import (
 )
 from driftwalk.likelihood.ready import as_list
 from driftwalk.likelihood.result import require_fit
-from driftwalk.schema.answers.fit_facts import texts
+from driftwalk.schema.answers.facts import texts
 from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:

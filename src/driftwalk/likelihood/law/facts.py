@@ -13,7 +13,7 @@ from driftwalk.likelihood.filter_pass import Passes, Point
 from driftwalk.likelihood.law.assumptions import USUAL_ADDED_MASS, added_mass_of, is_stated
 from driftwalk.likelihood.law.departures import DRAG_SHAPES, STRENGTHS
 from driftwalk.likelihood.solution import BREAKDOWN
-from driftwalk.schema.answers.fit_facts import fitted_value
+from driftwalk.schema.answers.facts import fitted_value
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -18,7 +18,7 @@ from driftwalk.likelihood.law.found import LawFound
 from driftwalk.likelihood.law.modes import Modes, unless_broken
 from driftwalk.likelihood.law.score_tests import Trial, find_pulses
 from driftwalk.likelihood.newton import FROM_NEAR, Mode, Weights
-from driftwalk.schema.answers.law_words import MEMORY_SIGMAS, OPENED_SIGMAS
+from driftwalk.schema.answers.force_law import MEMORY_SIGMAS, OPENED_SIGMAS
 
 KEPT_SIGMAS: Final = 3.0
 """An opened number stays open when the fit finds it so far from the model [standard deviations],

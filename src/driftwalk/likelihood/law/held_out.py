@@ -18,7 +18,7 @@ from driftwalk.likelihood.law.departures import DRAG_SHAPES, DRAGS
 from driftwalk.likelihood.law.search import evidence_of
 from driftwalk.likelihood.newton import Passed, Prior, Tell, find_mode
 from driftwalk.likelihood.solution import BREAKDOWN
-from driftwalk.schema.answers.answer import undetermined
+from driftwalk.schema.answers.parts import undetermined
 from driftwalk.schema.check import described
 
 if TYPE_CHECKING:

@@ -33,7 +33,7 @@ from driftwalk.likelihood.newton import (
     Prior,
     Weights,
 )
-from driftwalk.schema.answers.law_words import LEAST_EVIDENCE, OPENED_SIGMAS
+from driftwalk.schema.answers.force_law import LEAST_EVIDENCE, OPENED_SIGMAS
 
 DOUBTED_CHI_SQUARED: Final = 30.0
 """The paper's law is in doubt when the numbers of a floating body are so far from its own,"""
