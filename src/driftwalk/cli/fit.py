@@ -86,8 +86,9 @@ def fit(
             print_note(to_options(f"{effort.describe()}; to take less, {effort.advice()}"))
 
     # Each part of the answer is printed as soon as it is there; JSON at the end, in one piece.
+    hint = "" if wall else "; --wall estimates restitution and friction from them"
     said: dict[str, Any] = {
-        "fitted": lambda fit: print_parts(fitted_parts(fit, hint=not wall)),
+        "fitted": lambda fit: print_parts(fitted_parts(fit, hint=hint)),
         "checked": lambda fit, check: print_parts(checked_parts(fit, check)),
     }
     if json:

@@ -16,7 +16,7 @@ from driftwalk.schema import check_dataset
 from driftwalk.schema.answers.facts import facts_of, fit_parts, fitted_value
 from driftwalk.schema.check import unknown_names
 from driftwalk.schema.earlier import current_form
-from driftwalk.schema.kinds.fit import PARAMETERS
+from driftwalk.schema.kinds.fit_numbers import PARAMETERS
 from driftwalk.schema.stores.netcdf import open_netcdf
 
 OLD = Path(__file__).resolve().parents[2] / "data" / "old_datasets"

@@ -21,7 +21,6 @@ from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.answer import print_prediction
 from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import ASSEMBLY_KEYS
-from driftwalk.schema.answers.assembly import assembly_answer
 from driftwalk.schema.kinds.flow_series import flow_series_words
 
 if TYPE_CHECKING:
@@ -85,6 +84,8 @@ def _check_film(film: str) -> None:
 
 def assembled(study: Study, result: AssemblyResult) -> Answer:
     """Return the answer of an assembly run."""
+    from driftwalk.schema.answers.assembly import assembly_answer
+
     forces = study.forces
     return assembly_answer(
         result.distribution,

@@ -27,7 +27,6 @@ from driftwalk.cli.options.vary import VARY_KEYS, Vary, vary_overrides
 from driftwalk.cli.terminal.answer import print_prediction
 from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import SENSITIVITY_KEYS
-from driftwalk.schema.answers.sensitivity import sensitivity_answer
 from driftwalk.schema.kinds.flow_series import flow_series_words
 
 if TYPE_CHECKING:
@@ -103,6 +102,7 @@ def sensitivity(
 def sensitivity_of(result: SensitivityResult) -> Answer:
     """Return the answer of a sensitivity study."""
     from driftwalk.assembly import disconnected_alignment
+    from driftwalk.schema.answers.sensitivity import sensitivity_answer
 
     aligned = None
     if result.components is not None:

@@ -16,12 +16,11 @@ from driftwalk.cli.terminal.output import (
     printable,
     sibling,
 )
-from driftwalk.schema.answers.answer import answer_of
-from driftwalk.schema.answers.parts import Answer, Part, Row, lines_of, undetermined
-from driftwalk.schema.calibration import is_block
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from driftwalk.schema.answers.parts import Answer, Part
 
 _FILES: Final = {
     "fit": {"flow": "flow.nc"},
@@ -48,6 +47,8 @@ def print_result(found: xr.Dataset, folder: Path, *, json: bool, **more: Any) ->
     **more
         What else the run made, see `answer_of`.
     """
+    from driftwalk.schema.answers.answer import answer_of
+
     answer = answer_of(found, **more)
     if answer is None:
         raise TypeError(f"a {found.attrs.get('kind')} has no answer")
@@ -60,6 +61,8 @@ def print_result(found: xr.Dataset, folder: Path, *, json: bool, **more: Any) ->
 
 def print_parts(parts: Iterable[Part]) -> None:
     """Print parts of an answer."""
+    from driftwalk.schema.answers.parts import lines_of
+
     for line in lines_of(parts):
         print(printable(to_options(line)))
     # Through a pipe the answer would wait in the buffer for what follows, such as the figures.
@@ -74,6 +77,8 @@ def print_row(label: str, text: object) -> None:
     >>> print_row("flow", "fit/flow.nc")
     flow                   fit/flow.nc
     """
+    from driftwalk.schema.answers.parts import Row
+
     print_parts([Row(label, str(text))])
 
 
@@ -94,6 +99,9 @@ def print_places(found: xr.Dataset, folder: Path, warnings: Iterable[str]) -> No
 
 def _following(found: xr.Dataset, kind: str) -> list[str]:
     """Return the command that takes a run further, its options, and a name for its result."""
+    from driftwalk.schema.answers.parts import undetermined
+    from driftwalk.schema.calibration import is_block
+
     if kind == "fit" or (kind == "calibration" and is_block(found)):
         # Nothing can be simulated with what is not known.
         return [] if kind == "fit" and undetermined(found) else ["assemble", "assembly"]

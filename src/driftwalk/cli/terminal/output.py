@@ -15,7 +15,6 @@ from driftwalk.cli.terminal.argument_names import in_options, to_options
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.atomic import require_free
 from driftwalk.core.text.json_text import json_value
-from driftwalk.schema.answers.parts import table_lines
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -79,6 +78,8 @@ def print_table(
     samples       18001
     duration [s]  1800
     """
+    from driftwalk.schema.answers.parts import table_lines
+
     for line in table_lines(rows, columns or (), title or ""):
         print(printable(line))
 

@@ -10,7 +10,6 @@ from types import TracebackType
 from typing import Any, Self, TextIO
 
 from driftwalk.core.run_stages import WHOLE
-from driftwalk.schema.answers.parts import duration_text
 
 SECONDS_BETWEEN_LINES = 10.0
 SECONDS_TO_JUDGE = 1.0
@@ -87,6 +86,8 @@ class ProgressReporter:
     @property
     def left(self) -> str:
         """The time left in words; empty where nobody knows, or nothing is left."""
+        from driftwalk.schema.answers.parts import duration_text
+
         return f"{duration_text(self.left_s)} left" if self.left_s else ""
 
     def __call__(self, done: int, total: int, text: str = "") -> None:

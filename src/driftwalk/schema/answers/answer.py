@@ -26,7 +26,7 @@ _ANSWERS: Final[dict[str, Callable[..., Answer]]] = {
     "outcome_distribution": assembly_answer,
     "sensitivity": sensitivity_answer,
 }
-"""By kind of dataset; a new kind is an entry here, and a function beside these."""
+"""By kind of dataset; a new kind has a function like these, and an entry here."""
 
 
 def answer_of(found: xr.Dataset, **more: Any) -> Answer | None:

@@ -1,7 +1,7 @@
 """The numbers of a fit and of a calibration under flat names, with the unit in the name.
 
-``--json`` prints them under these names, which follow from the kind's schema: ``force_std_N`` is
-the value at ``force_std`` of the variable ``estimate``, ``position_noise_m`` the variable
+The JSON of a command has these names, which follow from the kind's schema: ``force_std_N`` is the
+value at ``force_std`` of the variable ``estimate``, ``position_noise_m`` the variable
 ``position_noise`` in m. Two names differ: ``ks_distance`` is the variable ``optimum_ks_distance``
 (the map has the plain name), and ``switching_times_s`` holds several times.
 """
@@ -18,7 +18,8 @@ from driftwalk.core.text.json_text import parse_json
 from driftwalk.schema.calibration import BLOCK, StoredParameter, stored_parameters
 from driftwalk.schema.description import Kind, Number, Variable
 from driftwalk.schema.kinds.calibration import CALIBRATION, OPTIMUM, calibration_of
-from driftwalk.schema.kinds.fit import FIT, PARAMETERS
+from driftwalk.schema.kinds.fit import FIT
+from driftwalk.schema.kinds.fit_numbers import PARAMETERS
 from driftwalk.schema.parameters import Parameter, flat_name
 
 if TYPE_CHECKING:

@@ -14,7 +14,8 @@ from driftwalk.schema.answers.force_law import (
     wall_estimates,
 )
 from driftwalk.schema.answers.parts import Answer, Estimate, Part, Row, Table, estimates, origin
-from driftwalk.schema.kinds.fit import FIT, LAW_NUMBERS, PARAMETERS
+from driftwalk.schema.kinds.fit import FIT
+from driftwalk.schema.kinds.fit_numbers import LAW_NUMBERS, PARAMETERS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -45,15 +46,15 @@ def fit_answer(fit: xr.Dataset, *, check: xr.Dataset | None = None) -> Answer:
     return Answer(parts, fit_json(fit, check), sentences(fit, "warning"))
 
 
-def fitted_parts(fit: xr.Dataset, *, hint: bool = False) -> list[Part]:
+def fitted_parts(fit: xr.Dataset, *, hint: str = "") -> list[Part]:
     """Return the estimates and the force law: what is known before the model is checked.
 
     Parameters
     ----------
     fit : xarray.Dataset
         A `fit`.
-    hint : bool
-        Whether to name the option that estimates the wall, where there are enough contacts.
+    hint : str
+        How to have the wall estimated: said where there are enough contacts, and nobody asked.
     """
     facts, parts = facts_of(fit), origin(fit)
     if facts.get("drag_law") == "linear":
@@ -62,10 +63,9 @@ def fitted_parts(fit: xr.Dataset, *, hint: bool = False) -> list[Part]:
     parts += [Row(label, words) for label, words in law_words(facts).items()]
     parts += law_estimates(fit)
     if "wall_share" in facts:
-        asked = not hint or "wall_contacts" in facts or "wall_left_out" in facts
+        asked = "wall_contacts" in facts or "wall_left_out" in facts
         tells = facts.get("angle") == "state" and facts["wall_share"] > TELLING_SHARE
-        more = "; --wall estimates restitution and friction from them"
-        said = f"{facts['wall_share']:.1%}, left out{more if tells and not asked else ''}"
+        said = f"{facts['wall_share']:.1%}, left out{hint if tells and not asked else ''}"
         parts.append(Row("intervals at the wall", said))
     if "flow" in fit.dims and "switching_times_s" in facts:
         names = ", ".join(map(str, fit["flow"].values[fit["interval_flow"].values]))
@@ -124,7 +124,7 @@ def _verdict(fit: xr.Dataset, check: xr.Dataset | None) -> list[Part]:
 
 
 def fit_json(fit: xr.Dataset, check: xr.Dataset | None = None) -> dict[str, Any]:
-    """Return what ``--json`` prints; None for what the recording does not determine."""
+    """Return the JSON of a fit; None for what the recording does not determine."""
     facts = facts_of(fit)
     for one in PARAMETERS.values():
         if is_open(facts, one.key):

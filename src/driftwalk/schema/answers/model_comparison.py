@@ -118,7 +118,7 @@ def _explained(one: xr.Dataset) -> str:
 
 
 def _model(one: xr.Dataset) -> dict[str, Any]:
-    """Return a model as ``--json`` prints it."""
+    """Return a model for programs."""
     ends, summaries = one["end_score"].values, {}
     if "asked" in one and bool(one["asked"]):
         names = ("misfit", "usual_misfit", "most_misfit", "unlikely")

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 from driftwalk.schema.description import Number
-from driftwalk.schema.kinds.fit import PARAMETERS
+from driftwalk.schema.kinds.fit_numbers import PARAMETERS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,7 +35,7 @@ class Estimate(NamedTuple):
     ends: tuple[float, float] | None = None
     confidence: float | None = None
     after: str = ""
-    """What follows the value: ", redrawn every 16 ms"."""
+    """Words after the value: ", redrawn every 16 ms"."""
     determined: bool = True
     role: Literal["model", "law", "wall"] = "model"
     """A number of the force law may be stated; one of the law or the wall may have one end."""
@@ -108,12 +108,12 @@ Part = Row | Estimate | Table | str
 
 
 class Answer(NamedTuple):
-    """What a result says."""
+    """An answer, for people and for programs."""
 
     parts: list[Part]
     """For people, in the order in which they are read."""
     facts: dict[str, Any]
-    """For programs: what ``--json`` prints."""
+    """For programs: the JSON of the command."""
     warnings: list[str]
 
 

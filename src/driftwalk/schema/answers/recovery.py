@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.schema.answers.parts import Answer, Part, Table, each, length_text
-from driftwalk.schema.kinds.fit import PARAMETERS
+from driftwalk.schema.kinds.fit_numbers import PARAMETERS
 from driftwalk.schema.parameters import flat_name
 
 if TYPE_CHECKING:
@@ -246,7 +246,7 @@ def model_recovery_answer(found: xr.Dataset) -> Answer:
         f"{', which is known' if set_up['noise'] == 'known' else ''}",
         Table([_model_row(one) for one in each(found, "parameter")], columns),
     ]
-    warnings = _model_warnings(found)
+    warnings = model_warnings(found)
     facts = {
         "model": set_up["model"],
         "fixed": json.loads(set_up["fixed"]),
@@ -265,7 +265,7 @@ def model_recovery_answer(found: xr.Dataset) -> Answer:
     return Answer(parts, facts, warnings)
 
 
-def _model_warnings(found: xr.Dataset) -> list[str]:
+def model_warnings(found: xr.Dataset) -> list[str]:
     """Return what the user should know, in sentences."""
     said = []
     status = found["status"].values
