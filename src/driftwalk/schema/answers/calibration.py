@@ -9,7 +9,15 @@ import numpy as np
 
 from driftwalk.schema.answers.facts import facts_of, flat_variables, sentences
 from driftwalk.schema.answers.model_comparison import own_score
-from driftwalk.schema.answers.parts import Answer, Row, by_name, each, estimates, origin
+from driftwalk.schema.answers.parts import (
+    Answer,
+    Row,
+    by_name,
+    each,
+    estimates,
+    intensity_row,
+    origin,
+)
 from driftwalk.schema.calibration import is_block, stored_parameters
 from driftwalk.schema.kinds.calibration import CALIBRATION
 from driftwalk.schema.parameters import flat_name
@@ -24,8 +32,7 @@ def calibration_answer(found: xr.Dataset) -> Answer:
     """Return the answer of a calibration."""
     facts, parts = facts_of(found), [*origin(found), *estimates(found)]
     if "force_noise_intensity_N2_s" in facts:
-        intensity = facts["force_noise_intensity_N2_s"]
-        parts.append(Row("noise intensity σ_F²·τ", f"{intensity:.4g} N² s"))
+        parts.append(intensity_row(facts["force_noise_intensity_N2_s"]))
     if "ks_distance" in facts and "noise_floor" in facts:
         said = f"{facts['ks_distance']:.4f} at the optimum, noise floor {facts['noise_floor']:.4f}"
         parts.append(Row("KS distance", said))

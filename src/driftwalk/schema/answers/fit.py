@@ -13,7 +13,16 @@ from driftwalk.schema.answers.force_law import (
     law_words,
     wall_estimates,
 )
-from driftwalk.schema.answers.parts import Answer, Estimate, Part, Row, Table, estimates, origin
+from driftwalk.schema.answers.parts import (
+    Answer,
+    Estimate,
+    Part,
+    Row,
+    Table,
+    estimates,
+    intensity_row,
+    origin,
+)
 from driftwalk.schema.kinds.fit import FIT
 from driftwalk.schema.kinds.fit_numbers import LAW_NUMBERS, PARAMETERS
 
@@ -59,7 +68,13 @@ def fitted_parts(fit: xr.Dataset, *, hint: str = "") -> list[Part]:
     facts, parts = facts_of(fit), origin(fit)
     if facts.get("drag_law") == "linear":
         parts.append(Row(PARAMETERS["drag_coefficient"].words, LINEAR_DRAG_ALONE))
-    parts += model_estimates(fit)
+    found = model_estimates(fit)
+    parts += [one for one in found if one.number.name != "force_noise_intensity"]
+    parts += [
+        intensity_row(one.value)
+        for one in found
+        if one.number.name == "force_noise_intensity" and not one.open
+    ]
     parts += [Row(label, words) for label, words in law_words(facts).items()]
     parts += law_estimates(fit)
     if "wall_share" in facts:

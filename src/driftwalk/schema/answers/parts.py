@@ -203,6 +203,11 @@ def _number(found: xr.Dataset, name: str, unit: str) -> Number:
     return Number(name, unit, str(stored.get("long_name", "")))
 
 
+def intensity_row(value: float) -> Row:
+    """Return the row of σ_F²·τ [N² s], which is what a recording tells of the force."""
+    return Row("noise intensity σ_F²·τ", f"{value:.4g} N² s")
+
+
 def undetermined(found: xr.Dataset) -> list[str]:
     """Return which of C_d and σ_F a recording does not determine: both are needed to simulate.
 
