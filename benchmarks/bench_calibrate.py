@@ -34,7 +34,7 @@ from driftwalk.datasets import tank30_flow, tank30_recording, tank30_truth
 from driftwalk.figures import write_figures
 from driftwalk.motion import BlockModel
 from driftwalk.schema import body_track
-from driftwalk.schema.answers.calibration_facts import calibration_facts
+from driftwalk.schema.answers.facts import facts_of
 from driftwalk.simulation.backend import world_table
 from driftwalk.simulation.initial import world_orientations
 
@@ -137,7 +137,7 @@ def main() -> None:
     print(f"{'all':<20} {wall:>9.1f} {processor:>14.1f} {target}")
     print(f"{'map, plain (double)':<20} {'':>9} {'~' + format(plain, '.0f'):>14}")
     print(f"peak memory {memory:.2f} GB (target {TARGET_MEMORY_GB:.0f} GB)")
-    truth, facts = tank30_truth(), calibration_facts(found)
+    truth, facts = tank30_truth(), facts_of(found)
     for key in ("drag_coefficient", "force_std_N"):
         low, high = facts[f"{key}_interval"]
         print(

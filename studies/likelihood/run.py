@@ -28,7 +28,7 @@ import driftwalk as dw
 from driftwalk.core.errors import DriftwalkError
 from driftwalk.core.provenance import plain
 from driftwalk.likelihood.ready import AngleUse
-from driftwalk.schema.answers.fit_facts import fit_facts
+from driftwalk.schema.answers.facts import facts_of
 
 ROOT: Final = Path(__file__).resolve().parents[2]
 INFER: Final = "cpp/include/driftwalk/infer"
@@ -115,7 +115,7 @@ def fit_one(case: Case, folder: Path, angle: str) -> dict[str, Any]:
         flow=world.flow(),
         recordings=recording,
     )
-    kept = {name: fit_facts(fit)[name] for name in KEPT}
+    kept = {name: facts_of(fit)[name] for name in KEPT}
     return dict(plain({**facts, **score, **kept, "seconds": round(seconds, 2)}))
 
 

@@ -25,8 +25,7 @@ from table import markdown
 import driftwalk as dw
 from driftwalk.core.files.atomic import write_atomic
 from driftwalk.core.provenance import manifest, plain, write_manifest
-from driftwalk.schema.answers.calibration_facts import calibration_facts
-from driftwalk.schema.answers.fit_facts import fit_facts
+from driftwalk.schema.answers.facts import facts_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -131,7 +130,7 @@ def by_likelihood(known: Known, fit: xr.Dataset, seconds: float) -> Answer:
     begin = time.process_time()
     check = dw.check_model(fit, known.recording)
     return Answer(
-        fit_facts(fit),
+        facts_of(fit),
         dw.fitted_flow(fit),
         check.attrs["ks_distance"],
         check.attrs["ks_noise_floor"],
@@ -146,7 +145,7 @@ def by_distance(known: Known, flow_of: Callable[[], xr.Dataset]) -> Answer:
     begin = time.process_time()
     flow = flow_of()
     study = dw.apply_overrides(known.study, SEARCH)
-    found = calibration_facts(dw.calibrate(known.recording, study, flow=flow, threads=1))
+    found = facts_of(dw.calibrate(known.recording, study, flow=flow, threads=1))
     distance, floor = found["ks_distance"], found["noise_floor"]
     warnings = found["warnings"]
     findings = [one for one in warnings if "does not explain" in one]

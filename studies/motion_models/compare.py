@@ -17,9 +17,9 @@ from recordings import RECORDINGS, read_lines
 
 import driftwalk as dw
 from driftwalk.calibration import ALL_MODELS
-from driftwalk.cli.terminal.models_answer import summary
 from driftwalk.conditions import read_recordings
 from driftwalk.model import load_study
+from driftwalk.schema.answers.model_comparison import comparison_answer
 
 
 def compared(data: Path, name: str, models: list[str] | None, threads: int) -> dict[str, Any]:
@@ -42,7 +42,7 @@ def compared(data: Path, name: str, models: list[str] | None, threads: int) -> d
         threads=threads,
     )
     seconds = round(time.perf_counter() - began, 1)
-    return {"recording": name, "seconds": seconds, **summary(found)}
+    return {"recording": name, "seconds": seconds, **comparison_answer(found).facts}
 
 
 def main() -> None:

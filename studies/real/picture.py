@@ -29,7 +29,7 @@ from driftwalk.plot.parts.style import (
 )
 from driftwalk.plot.step_densities import DENSITY_LABEL, density_mesh, density_of
 from driftwalk.schema import body_track
-from driftwalk.schema.answers.fit_facts import fitted_value
+from driftwalk.schema.answers.facts import fitted_value
 from driftwalk.schema.stores.netcdf import open_netcdf
 
 if TYPE_CHECKING:

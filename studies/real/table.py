@@ -28,9 +28,9 @@ COLUMNS = (
 def row(name: str, found: xr.Dataset) -> list[str]:
     """Return the cells of one calibration; what is interpreted, each with its 90 % interval."""
     from driftwalk.model import parse_study
-    from driftwalk.schema.answers.calibration_facts import calibration_facts
+    from driftwalk.schema.answers.facts import facts_of
 
-    facts = calibration_facts(found)
+    facts = facts_of(found)
     study = parse_study(facts["study"])
     per_mass = 1.0 / study.block.mass_kg
     drag = per_mass * study.wetted_depth_m

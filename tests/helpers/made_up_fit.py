@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 from synthetic_calibration import ARENA, bundled_flow
 
-from driftwalk.schema.answers.fit_facts import fit_variables
+from driftwalk.schema.answers.facts import fit_parts
 
 LAGS, CELLS, PARTS, BINS = 5, 4, 4, 6
 
@@ -20,7 +20,7 @@ def made_up_fit(*, flows: tuple[str, ...] = ()) -> xr.Dataset:
         fit = fit.expand_dims(flow=np.array(flows, dtype=object))
     answer = {"drag_coefficient": 0.39, "force_std_N": 6e-4, "tracking_noise_m": 3e-4}
     answer["force_noise_intensity_N2_s"] = 6e-4**2 * 0.016
-    numbers, names = fit_variables(
+    numbers, names, _ = fit_parts(
         {
             **answer,
             **{f"{name}_interval": [0.9 * v, 1.1 * v] for name, v in answer.items()},

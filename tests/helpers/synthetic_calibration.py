@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 
 from driftwalk.schema import FLAGS, build_flow_field, build_trajectory
-from driftwalk.schema.answers.calibration_facts import calibration_facts, calibration_parts
+from driftwalk.schema.answers.facts import calibration_parts, facts_of
 from driftwalk.schema.calibration import stored_parameters
 
 BUNDLED = Path(__file__).parents[2] / "src" / "driftwalk" / "datasets" / "tank30_ode_a"
@@ -162,9 +162,7 @@ def synthetic_calibration(*, simulated: str = "yes", points: int = 17) -> xr.Dat
 
 def answered(calibration: xr.Dataset, facts: dict[str, Any]) -> xr.Dataset:
     """Return a calibration that says more under flat names, as attributes or in variables."""
-    parts = calibration_parts(
-        {**calibration_facts(calibration), **facts}, stored_parameters(calibration)
-    )
+    parts = calibration_parts({**facts_of(calibration), **facts}, stored_parameters(calibration))
     found = calibration.assign(parts.data).assign_coords(parts.coords)
     found.attrs = parts.attrs
     return found

@@ -5,7 +5,7 @@ from __future__ import annotations
 import xarray as xr
 from synthetic_calibration import answered, synthetic_calibration
 
-from driftwalk.schema.answers.calibration_facts import calibration_facts
+from driftwalk.schema.answers.facts import facts_of
 
 NAMES = {"drag_coefficient": "speed", "force_std": "tumble_rate"}
 UNITS = {"speed": "m/s", "tumble_rate": "1/s"}
@@ -22,7 +22,7 @@ def two_parameters(points: int = 9) -> xr.Dataset:
     for prefix in PREFIXES:
         for name, unit in UNITS.items():
             renamed[f"{prefix}{name}"].attrs = {"units": unit, "long_name": LABELS[name]}
-    facts = calibration_facts(found)
+    facts = facts_of(found)
     kept = {
         name: value
         for name, value in facts.items()

@@ -11,7 +11,7 @@ import driftwalk as dw
 from driftwalk.figures import write_figures
 from driftwalk.model import apply_overrides
 from driftwalk.schema import build_trajectory
-from driftwalk.schema.answers.calibration_facts import calibration_facts
+from driftwalk.schema.answers.facts import facts_of
 
 TRUTH = {"drag_coefficient": 0.45, "force_std_N": 0.6e-3}
 SMALL = {
@@ -72,9 +72,7 @@ def test_the_truth_of_a_synthetic_recording_is_found(found):
     In steps of 0.1 s, which are mostly camera noise, three replicates tell sigma_F to a third at
     best (the 12 recordings gave 0.67 to 0.82 mN); what they tell of it is tested below.
     """
-    assert calibration_facts(found)["drag_coefficient"] == pytest.approx(
-        TRUTH["drag_coefficient"], abs=0.03
-    )
+    assert facts_of(found)["drag_coefficient"] == pytest.approx(TRUTH["drag_coefficient"], abs=0.03)
     assert found["distance_to_floor_ratio"] < 1.5
     assert bool(found["explained"])
     # In so few and coarse steps what they do not exclude of sigma_F goes on beyond the search.
@@ -93,14 +91,14 @@ def test_the_truth_explains_a_recording_best(fresh_seed):
     """
     study = apply_overrides(dw.Study(), {**AROUND_THE_TRUTH, "calibration.seed": fresh_seed(1)})
     recording = synthetic_recording(1200.0, seed=fresh_seed(5))
-    found = calibration_facts(dw.calibrate(recording, study, flow=dw.tank30_flow(), threads=2))
+    found = facts_of(dw.calibrate(recording, study, flow=dw.tank30_flow(), threads=2))
     assert found["drag_coefficient"] == pytest.approx(TRUTH["drag_coefficient"])
     assert found["force_std_N"] == pytest.approx(TRUTH["force_std_N"])
 
 
 @pytest.mark.slow
 def test_sigma_f_comes_with_its_interval_and_the_intensity(found):
-    facts = calibration_facts(found)
+    facts = facts_of(found)
     assert facts["force_noise_intensity_N2_s"] == pytest.approx(
         facts["force_std_N"] ** 2 * facts["force_interval_s"]
     )
@@ -229,7 +227,7 @@ def test_a_coarse_map_alone_is_possible():
     assert "refined_ks_distance" not in found
     assert "interval" not in found
     assert "explained" not in found
-    assert calibration_facts(found)["drag_coefficient"] in found["drag_coefficient"].values
+    assert facts_of(found)["drag_coefficient"] in found["drag_coefficient"].values
 
 
 @pytest.mark.slow
@@ -308,6 +306,6 @@ def test_the_truth_of_a_slow_orbit_is_in_the_intervals():
     recording = slow_recording(seed=11)
     found = dw.calibrate(recording, study, flow=slow_flow(), threads=2)
     for name, truth in SLOW.items():
-        low, high = calibration_facts(found)[f"{name}_interval"]
+        low, high = facts_of(found)[f"{name}_interval"]
         assert low <= truth <= high, name
     assert bool(found["explained"])

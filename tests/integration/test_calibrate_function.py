@@ -21,7 +21,7 @@ from driftwalk.core.seeds import world_keys
 from driftwalk.model import apply_overrides
 from driftwalk.motion import Parameter, motion_model
 from driftwalk.schema import build_trajectory
-from driftwalk.schema.answers.calibration_facts import calibration_facts
+from driftwalk.schema.answers.facts import facts_of
 from driftwalk.simulation import Start
 from driftwalk.simulation.backend import Camera
 
@@ -76,7 +76,7 @@ def diffusing():
 
 @pytest.mark.slow
 def test_both_parameters_of_a_tumbling_particle_are_found(tumbling):
-    facts = calibration_facts(tumbling)
+    facts = facts_of(tumbling)
     tumbles = DURATION * TUMBLE_RATE
     assert facts["tumble_rate_per_s"] == pytest.approx(TUMBLE_RATE, rel=ALLOWED / np.sqrt(tumbles))
     # The noise of a step's length, sqrt(2) NOISE, is all that hides the speed.
@@ -105,7 +105,7 @@ def test_everything_stands_under_the_names_of_the_parameters(tumbling):
     assert tumbling.attrs["model"] == "tumble"
     assert tumbling["parameter"].values.tolist() == ["speed", "tumble_rate"]
     assert tumbling["unit"].values.tolist() == ["m/s", "1/s"]
-    assert not {"drag_coefficient", "force_interval_s"} & set(calibration_facts(tumbling))
+    assert not {"drag_coefficient", "force_interval_s"} & set(facts_of(tumbling))
     assert tumbling["step_density"].shape == (9, 11, 32, 32)
     border = tumbling["region_speed"], tumbling["region_tumble_rate"]
     assert border[0][0] == border[0][-1]

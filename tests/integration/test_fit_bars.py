@@ -13,7 +13,7 @@ from fit_worlds import DRAG, FORCE_N, NOISE_M, TRUTH
 
 import driftwalk as dw
 from driftwalk.flow import bilinear
-from driftwalk.schema.answers.fit_facts import fit_facts
+from driftwalk.schema.answers.facts import facts_of
 
 STUDIES = Path(__file__).resolve().parents[2] / "studies" / "real"
 
@@ -59,10 +59,10 @@ def test_half_an_hour_of_the_bundled_recording(
     recording = dw.tank30_recording(realisation)
     study = dw.apply_overrides(dw.Study(), {"forces.force_interval_s": TRUTH["force_interval_s"]})
     fit = dw.fit_motion(recording, study, angle=angle)
-    assert fit_facts(fit)["drag_coefficient"] == pytest.approx(DRAG, rel=most_drag)
-    assert fit_facts(fit)["force_std_N"] == pytest.approx(FORCE_N, rel=0.03)
-    assert fit_facts(fit)["tracking_noise_m"] == pytest.approx(NOISE_M, rel=0.03)
-    assert fit_facts(fit)["iterations"] <= 12
+    assert facts_of(fit)["drag_coefficient"] == pytest.approx(DRAG, rel=most_drag)
+    assert facts_of(fit)["force_std_N"] == pytest.approx(FORCE_N, rel=0.03)
+    assert facts_of(fit)["tracking_noise_m"] == pytest.approx(NOISE_M, rel=0.03)
+    assert facts_of(fit)["iterations"] <= 12
     assert fit.attrs.get("angle_disagreement_std", 0.0) < 3.0
     x, y = visited(recording)
     assert x.size > 300

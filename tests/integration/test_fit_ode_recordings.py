@@ -12,7 +12,7 @@ import pytest
 
 import driftwalk as dw
 from driftwalk.schema import build_flow_field, build_trajectory
-from driftwalk.schema.answers.fit_facts import fit_facts
+from driftwalk.schema.answers.facts import facts_of
 
 FOLDER = Path(__file__).resolve().parents[1] / "data" / "ode_recordings"
 AXIS = np.linspace(-0.165, 0.165, 133)
@@ -50,7 +50,7 @@ def test_half_an_hour_of_another_engine(
         flow=flow,
         recordings=recording,
     )
-    assert fit_facts(fit)["wall_share"] < 0.3
+    assert facts_of(fit)["wall_share"] < 0.3
     assert abs(score["drag_coefficient_error"]) <= most_drag
     assert abs(score["force_std_N_error"]) <= 0.03
     assert abs(score["tracking_noise_m_error"]) <= 0.03

@@ -15,7 +15,7 @@ from driftwalk.calibration.grid.grid_map import Map, MapSimulator, Progress
 from driftwalk.calibration.grid.grid_refinement import first_window, locate_minimum
 from driftwalk.calibration.problem import Problem, limits_of
 from driftwalk.comparison.statistic import distances_among
-from driftwalk.schema.answers.calibration_facts import is_explained
+from driftwalk.schema.answers.facts import is_explained
 
 FAR_ABOVE_FLOOR = 2.0
 """A distance more than this many noise floors is called far above it."""

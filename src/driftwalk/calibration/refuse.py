@@ -9,7 +9,7 @@ from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.grid import MOST_SETTINGS
 from driftwalk.motion import MotionModel
 from driftwalk.schema import Track
-from driftwalk.schema.answers.calibration_facts import taken_keys, taken_names
+from driftwalk.schema.answers.facts import taken_keys, taken_names
 
 MOST_PARAMETERS: Final = 2
 """Of a grid; with more a model is searched."""

@@ -4,7 +4,7 @@ Coarse map on the model's parameters by name, ``(drag_coefficient, force_std[, r
 block, refined map on the same names with the prefix ``refined_``, what is kept of every setting
 (excerpt, step density, place of the KS maximum), the recording's own steps, the bootstrap and the
 joint region. The answer is ``estimate`` and ``interval`` along ``parameter``, and variables without
-a dimension; see `driftwalk.schema.answers.calibration_facts`.
+a dimension; see `driftwalk.schema.answers.facts`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from driftwalk.calibration.problem import Floats, Problem
 from driftwalk.comparison.density import BINS
 from driftwalk.motion.score import broken_worlds, excerpt_samples
 from driftwalk.schema import Parameter
-from driftwalk.schema.answers.calibration_facts import calibration_parts
+from driftwalk.schema.answers.facts import calibration_parts
 from driftwalk.schema.check import build_dataset
 from driftwalk.schema.kinds.calibration import CELL_STATUS
 from driftwalk.simulation.backend import STATUS
@@ -58,7 +58,7 @@ def build_calibration(
     found : Found
         Maps, bootstrap and region; those that were not made are None.
     facts : dict
-        The answer under flat names, see `driftwalk.schema.answers.calibration_facts`.
+        The answer under flat names, see `driftwalk.schema.answers.facts`.
     """
     parameters = problem.parameters
     names = tuple(parameter.name for parameter in parameters)

@@ -12,8 +12,7 @@ from driftwalk.cli.options.model import ModelName, ParameterChoices, chosen_mode
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import FlowFile, Json, Overwrite, RunFolder, Threads
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal import calibration_answer, model_answer
-from driftwalk.cli.terminal.output import print_json
+from driftwalk.cli.terminal.answer import print_result
 from driftwalk.core.study_keys import CALIBRATION_KEYS
 
 
@@ -73,9 +72,4 @@ def calibrate(
     begun = opening_note(read.study, given, how=how, about=about, warnings=jumps)
     with Workers(cluster, cluster_options).reported("calibrate") as told:
         found = run_calibration(work, out, overwrite=overwrite, begun=begun, **told)
-    many = found.attrs["kind"] == "model_calibration"
-    answer = model_answer if many else calibration_answer
-    if json:
-        print_json(answer.summary(found))
-    else:
-        answer.print_answer(found, out)
+    print_result(found, out, json=json)

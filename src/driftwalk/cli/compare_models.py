@@ -13,8 +13,9 @@ from driftwalk.cli.options.model import ComparedParameters, parameter_choices
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import FlowFile, Json, Overwrite, RunFolder, Threads
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal.models_answer import Ranking, print_answer, summary
-from driftwalk.cli.terminal.output import print_json
+from driftwalk.cli.terminal.answer import print_result
+from driftwalk.cli.terminal.output import printable
+from driftwalk.cli.terminal.progress import ProgressReporter
 from driftwalk.core.study_keys import CALIBRATION_KEYS
 
 
@@ -82,7 +83,28 @@ def compare_models(
     with Workers(cluster, cluster_options).reported("compare models") as told:
         said: dict[str, Any] = {} if json else {"finished": Ranking(told["progress"])}
         found = run_model_comparison(work, out, overwrite=overwrite, begun=begun, **said, **told)
-    if json:
-        print_json(summary(found))
-    else:
-        print_answer(found, out)
+    print_result(found, out, json=json)
+
+
+class Ranking:
+    """Prints each model as soon as it is judged, its place so far, and how long the rest takes.
+
+    Parameters
+    ----------
+    progress : ProgressReporter
+        Knows the time left.
+    """
+
+    def __init__(self, progress: ProgressReporter) -> None:
+        self._progress = progress
+        self._scores: list[float] = []
+
+    def __call__(self, name: str, score: float, std: float, models: int) -> None:
+        """Print a model."""
+        place = 1 + sum(one < score for one in self._scores)
+        self._scores.append(score)
+        count = len(self._scores)
+        words = f"{name}: distance {score:.2f} ± {std:.2f}, place {place} of {count} so far"
+        rest = f"; {models - count} to go" if models > count else ""
+        left = f"; {self._progress.left}" if self._progress.left else ""
+        print(printable(f"{words}{rest}{left}"), flush=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,8 +11,9 @@ from driftwalk.cli.inputs.study_recording import opening_note, read_for_run
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import Json, Overwrite
 from driftwalk.cli.options.study import StudyOptions, with_study_options
+from driftwalk.cli.terminal.answer import print_parts, print_places, print_result
 from driftwalk.cli.terminal.argument_names import to_options
-from driftwalk.cli.terminal.output import print_json, print_note
+from driftwalk.cli.terminal.output import print_note
 from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.study_keys import FIT_KEYS
 
@@ -66,9 +66,10 @@ def fit(
     (fit.nc), the flow (flow.nc) for every command that takes one, the recording, the check of the
     model (check.nc), figures and manifest.json.
     """
-    from driftwalk.cli.terminal.fit_answer import answer, print_found, print_places, print_verdict
     from driftwalk.likelihood import fit_work
     from driftwalk.runs import FitWork, run_fit
+    from driftwalk.schema.answers.facts import sentences
+    from driftwalk.schema.answers.fit import checked_parts, fitted_parts
 
     read = read_for_run(recordings, given, how)
     inputs = {"recording" if n == 0 else f"recording-{n + 1}": p for n, p in enumerate(recordings)}
@@ -85,12 +86,16 @@ def fit(
             print_note(to_options(f"{effort.describe()}; to take less, {effort.advice()}"))
 
     # Each part of the answer is printed as soon as it is there; JSON at the end, in one piece.
-    said: dict[str, Any] = {"fitted": partial(print_found, wall=wall), "checked": print_verdict}
+    hint = "" if wall else "; --wall estimates restitution and friction from them"
+    said: dict[str, Any] = {
+        "fitted": lambda fit: print_parts(fitted_parts(fit, hint=hint)),
+        "checked": lambda fit, check: print_parts(checked_parts(fit, check)),
+    }
     if json:
         said = {}
     with reported("fit") as told:
         found = run_fit(work, out, overwrite=overwrite, begun=begun, **said, **told)
     if json:
-        print_json(answer(found.fit, found.check))
+        print_result(found.fit, out, json=True, check=found.check)
     else:
-        print_places(found.fit, out)
+        print_places(found.fit, out, sentences(found.fit, "warning"))

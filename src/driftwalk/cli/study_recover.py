@@ -22,7 +22,8 @@ from driftwalk.cli.options.model import (
 from driftwalk.cli.options.recording import RecordingOptions
 from driftwalk.cli.options.shared import Json, Overwrite, RunFolder, quantity_option
 from driftwalk.cli.options.study import StudyOptions, option_name, with_study_options
-from driftwalk.cli.terminal.output import print_json, print_note
+from driftwalk.cli.terminal.answer import print_result
+from driftwalk.cli.terminal.output import print_note
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.study_keys import RECOVER_KEYS
 
@@ -170,7 +171,6 @@ def _of_model(
     json: bool,
 ) -> None:
     from driftwalk.cli.inputs.assembly_source import load_flow_for
-    from driftwalk.cli.terminal.model_recover_answer import print_answer, summary
     from driftwalk.runs import ModelRecoveryWork, run_model_recovery
 
     recording = None
@@ -209,10 +209,7 @@ def _of_model(
         print_note(f"warning: {warning}")
     with workers.reported("recover") as told:
         found = run_model_recovery(work, out, overwrite=overwrite, **told)
-    if json:
-        print_json(summary(found))
-    else:
-        print_answer(found, out)
+    print_result(found, out, json=json)
 
 
 def _of_block(
@@ -225,7 +222,6 @@ def _of_block(
     overwrite: bool,
     json: bool,
 ) -> None:
-    from driftwalk.cli.terminal.recover_answer import print_answer, summary
     from driftwalk.runs import RecoveryWork, run_recovery
 
     named = given.overrides.get(RECOVER_KEYS["flow"])
@@ -240,10 +236,7 @@ def _of_block(
     work = RecoveryWork(chosen, field, inputs, threads)
     with workers.reported("recover") as told:
         found = run_recovery(work, out, overwrite=overwrite, **told)
-    if json:
-        print_json(summary(found))
-    else:
-        print_answer(found, out)
+    print_result(found, out, json=json)
 
 
 def _of_run(

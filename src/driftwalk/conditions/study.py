@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 from driftwalk.conditions.tank import OUTLINE, require_inside, study_in_arena
 from driftwalk.core.errors import InputError
 from driftwalk.flow.arena import read_arena
-from driftwalk.schema.answers.answer import undetermined
-from driftwalk.schema.answers.fit_facts import fitted_value
+from driftwalk.schema.answers.facts import fitted_value
+from driftwalk.schema.answers.parts import undetermined
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -12,7 +12,7 @@ import numpy as np
 from driftwalk.core.errors import InputError
 from driftwalk.figures.write import write_each
 from driftwalk.plot.parts.style import BLUE, MUTED, SINGLE_COLUMN_MM, new_figure
-from driftwalk.schema.answers.compared_laws import compared_laws
+from driftwalk.schema.answers.force_law import compared_laws
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -21,7 +21,7 @@ from driftwalk.plot.parts.style import (
     letter_panels,
     new_figure,
 )
-from driftwalk.schema.answers.compared_models import own_score
+from driftwalk.schema.answers.model_comparison import own_score
 
 if TYPE_CHECKING:
     import xarray as xr

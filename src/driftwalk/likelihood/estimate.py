@@ -19,7 +19,7 @@ from driftwalk.likelihood.prior import Weights
 from driftwalk.likelihood.ready import body_of, prepare
 from driftwalk.likelihood.spline import Spline
 from driftwalk.schema import Track
-from driftwalk.schema.answers.fit_facts import fitted_value
+from driftwalk.schema.answers.facts import fitted_value
 
 if TYPE_CHECKING:
     import xarray as xr

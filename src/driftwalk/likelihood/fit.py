@@ -43,7 +43,7 @@ from driftwalk.likelihood.result import Whiteness, build_fit, visited_shares, wh
 from driftwalk.likelihood.solution import BREAKDOWN, require_noise_below_motion, solved
 from driftwalk.likelihood.start import first_point, first_weights
 from driftwalk.likelihood.warnings import precision_facts, warnings_of
-from driftwalk.schema.answers.fit_facts import texts
+from driftwalk.schema.answers.facts import texts
 from driftwalk.schema.check import described
 
 if TYPE_CHECKING:

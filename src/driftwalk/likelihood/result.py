@@ -28,7 +28,7 @@ from driftwalk.likelihood.law.forward_selection import LawResult
 from driftwalk.likelihood.reml import Restricted
 from driftwalk.likelihood.spline import Floats, Spline
 from driftwalk.schema import FLAGS
-from driftwalk.schema.answers.fit_facts import fit_variables
+from driftwalk.schema.answers.facts import fit_parts
 from driftwalk.schema.kinds import KINDS
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ def build_fit(
 ) -> xr.Dataset:
     """Assemble the dataset of a fit, without warnings and the share of the tank that was visited.
 
-    `first` is the first recording's first time stamp [s]; for `facts` see `fit_variables`.
+    `first` is the first recording's first time stamp [s]; for `facts` see `fit_parts`.
     """
     import xarray as xr
 
@@ -161,7 +161,7 @@ def build_fit(
         data["interval_flow"] = ("flow_interval", np.array(intervals.flows, dtype=np.int32))
         facts["switching_times_s"] = list(intervals.times)
         facts["recording_start_s"] = first
-    numbers, names_of = fit_variables(facts)
+    numbers, names_of, _ = fit_parts(facts)
     found, names_found = number_variables(restricted.point, law)
     data, coords = data | found, coords | names_found
     attrs = {

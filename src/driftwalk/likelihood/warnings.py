@@ -11,7 +11,7 @@ from driftwalk.likelihood.law.search import LAW
 from driftwalk.likelihood.length import LENGTH, in_words, needed_duration
 from driftwalk.likelihood.refuse import LIMIT
 from driftwalk.likelihood.result import Whiteness
-from driftwalk.schema.answers.fit_facts import is_open
+from driftwalk.schema.answers.facts import is_open
 
 if TYPE_CHECKING:
     from driftwalk.model import Study

@@ -6,7 +6,8 @@ from html import escape
 
 import xarray as xr
 
-from driftwalk.schema.answers.answer import answer_lines
+from driftwalk.schema.answers.answer import answer_of
+from driftwalk.schema.answers.parts import lines_of
 
 
 class Result(xr.Dataset):  # type: ignore[no-untyped-call]
@@ -18,8 +19,8 @@ class Result(xr.Dataset):  # type: ignore[no-untyped-call]
     --------
     >>> answer = {"estimate": ("parameter", [2.0]), "interval": (("parameter", "bound"), [[1, 3]])}
     >>> names = {"parameter": ["speed"], "unit": ("parameter", ["m/s"])}
-    >>> print(str(Result(answer, names)).splitlines()[0])
-    speed  2 m/s  [1, 3]
+    >>> print(str(Result(answer, names, {"kind": "fit"})).splitlines()[0])
+    speed                  2.000 m/s   interval 1.000 to 3.000
     """
 
     __slots__ = ()
@@ -38,3 +39,15 @@ def as_result(dataset: xr.Dataset) -> Result:
     found = Result(dataset.data_vars, dataset.coords, dataset.attrs)
     found.encoding = dataset.encoding
     return found
+
+
+def answer_lines(found: xr.Dataset) -> list[str]:
+    """Return the answer and its warnings as lines; none of a part that lacks some of it."""
+    try:
+        answer = answer_of(found)
+    except (LookupError, TypeError, ValueError):
+        # A dataset that was sliced is no whole result.
+        return []
+    if answer is None:
+        return []
+    return [*lines_of(answer.parts), *(f"warning: {text}" for text in answer.warnings)]

@@ -12,11 +12,10 @@ import numpy as np
 from driftwalk.core.errors import DriftwalkError, InputError
 from driftwalk.core.text.json_text import json_value
 from driftwalk.page.arrays import number
+from driftwalk.page.words import percent
 from driftwalk.plot.parts.arena import arena_of
-from driftwalk.plot.parts.labels import interval_of
-from driftwalk.schema.answers.answer import NOT_DETERMINED
-from driftwalk.schema.answers.calibration_facts import facts_of
-from driftwalk.schema.answers.fit_facts import is_open, sentences
+from driftwalk.schema.answers.facts import facts_of, sentences
+from driftwalk.schema.answers.parts import NOT_DETERMINED, Estimate
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -140,22 +139,32 @@ def axis(name: str, label: str, unit: str, values: Any) -> dict[str, Any]:
     return {"name": name, "label": label, "unit": unit, "values": [number(v) for v in found]}
 
 
-def estimate(
-    dataset: xr.Dataset, name: str, *, label: str, symbol: str, unit: str, note: str | None = None
-) -> dict[str, Any]:
-    """Return an estimate of the facts with its interval, for a summary."""
-    ends = interval_of(dataset, f"{name}_interval")
-    unknown = is_open(facts_of(dataset), name)
-    return {
-        "label": label,
-        "symbol": symbol,
-        "value": None if unknown else number(required(dataset, name)),
-        "unit": unit,
-        "low": None if ends is None else ends[0],
-        "high": None if ends is None else ends[1],
-        "confidence": None if ends is None else value_of(dataset, "confidence"),
-        "note": NOT_DETERMINED if unknown else note,
-    }
+def card(one: Estimate) -> dict[str, Any]:
+    """Return an estimate with its interval, for a summary.
+
+    Its unit is SI, unless the number has one in which it is shown everywhere.
+    """
+    number_of = one.number
+    scale, unit = (number_of.factor, number_of.shown) if number_of.shown else (1.0, number_of.unit)
+    value, low, high = (scale * v for v in (one.value, *(one.ends or (math.nan, math.nan))))
+    note = number_of.note or one.after.removeprefix(", ") or None
+    if one.unknown:
+        note = NOT_DETERMINED
+    elif one.stated:
+        note = f"stated; {note}"
+    elif one.open:
+        share = "" if one.confidence is None else f"{percent(one.confidence)}: "
+        note = f"{share}{low:.2g} or more; {note}"
+    found = figure(
+        number_of.words.removesuffix(number_of.symbol).rstrip(),
+        None if one.unknown else value,
+        unit or "1",
+        symbol=number_of.symbol,
+        note=note,
+    )
+    if one.stated or not (math.isfinite(low) and math.isfinite(high)):
+        return found
+    return found | {"low": low, "high": high, "confidence": one.confidence}
 
 
 def figure(

@@ -15,7 +15,7 @@ from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.files.run_layout import MANIFEST_FILE, faults_of, run_file, state_of
 from driftwalk.core.provenance import read_manifest
 from driftwalk.motion import MotionModel, estimated_values
-from driftwalk.schema.answers.fit_facts import sentences
+from driftwalk.schema.answers.facts import sentences
 from driftwalk.schema.calibration import is_block
 from driftwalk.schema.check import refuse_other_version
 from driftwalk.schema.stores.contents import check_contents

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from driftwalk.schema.parameters import unit_suffix
+from driftwalk.schema.parameters import flat_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,8 +30,7 @@ class StoredParameter(NamedTuple):
     @property
     def key(self) -> str:
         """Flat name of its estimate: its name with the unit."""
-        suffix = unit_suffix(self.unit)
-        return f"{self.name}_{suffix}" if suffix else self.name
+        return flat_name(self.name, self.unit)
 
     @property
     def is_log(self) -> bool:

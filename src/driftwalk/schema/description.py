@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -9,6 +10,8 @@ from typing import Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
+
+from driftwalk.schema.parameters import flat_name
 
 Holds = Literal["float", "int", "bool", "text"]
 Said = Literal["number", "numbers", "text", "yes or no", "object", "list"]
@@ -87,6 +90,58 @@ class Variable:
             found["flag_masks" if self.bits else "flag_values"] = values
             found["flag_meanings"] = " ".join(self.flags)
         return found
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number of an answer: what the terminal, a notebook and a page call it.
+
+    Attributes
+    ----------
+    name, unit : str
+        Its name in the dataset, and its unit there; "1" for none.
+    label, symbol : str
+        Words and symbol for it; the label is the name in words where it is empty.
+    shown : str
+        Unit in which it is shown everywhere; where it is empty, a page chooses the prefix and a
+        terminal shows mm and mN.
+    note : str
+        What else a page says of it.
+    """
+
+    name: str
+    unit: str = "1"
+    label: str = ""
+    symbol: str = ""
+    shown: str = ""
+    note: str = ""
+
+    @property
+    def key(self) -> str:
+        """Name with the unit, as JSON has it: "force_std_N"."""
+        return flat_name(self.name, self.unit)
+
+    @property
+    def words(self) -> str:
+        """Label and symbol: "drag coefficient C_d"."""
+        return f"{self.label or self.name.replace('_', ' ')} {self.symbol}".rstrip()
+
+    @property
+    def reader_unit(self) -> str:
+        """Unit in a row: "mN"; empty for a number without a unit."""
+        return self.shown or _READER_UNITS.get(self.unit, self.unit)
+
+    @property
+    def factor(self) -> float:
+        """Number of these units in the SI unit."""
+        return _FACTORS.get(self.reader_unit, 1.0)
+
+
+_READER_UNITS: Final = MappingProxyType({"N": "mN", "m": "mm", "1": ""})
+"""Units that suit a block of 3 cm."""
+_FACTORS: Final = MappingProxyType(
+    {"mN": 1e3, "mm": 1e3, "ms": 1e3, "g/s": 1e3, "%": 1e2, "°": math.degrees(1.0)}
+)
 
 
 @dataclass(frozen=True)

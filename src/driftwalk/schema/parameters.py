@@ -101,8 +101,7 @@ class Parameter:
     @property
     def key(self) -> str:
         """Name with the unit, for attributes and JSON: "force_std_N"."""
-        suffix = unit_suffix(self.unit)
-        return f"{self.name}_{suffix}" if suffix else self.name
+        return flat_name(self.name, self.unit)
 
     @property
     def coordinates(self) -> tuple[float, ...]:
@@ -174,3 +173,15 @@ def unit_suffix(unit: str) -> str:
     """
     words = re.sub(r"^1\s*/\s*", "per ", unit.strip())
     return "" if words == "1" else re.sub(r"\W+", "_", words.replace("^", "")).strip("_")
+
+
+def flat_name(name: str, unit: str) -> str:
+    """Return a name with its unit, as attributes and JSON have it.
+
+    Examples
+    --------
+    >>> flat_name("speed", "m/s"), flat_name("linear_drag", "kg s-1"), flat_name("share", "1")
+    ('speed_m_s', 'linear_drag_kg_s', 'share')
+    """
+    suffix = unit_suffix(unit.replace(" s-1", "/s"))
+    return f"{name}_{suffix}" if suffix else name

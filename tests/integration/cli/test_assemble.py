@@ -30,8 +30,7 @@ from redrawn import assert_drawn_alike
 from signals_at_units import after_units
 
 from driftwalk.page import report_page
-from driftwalk.schema.answers.calibration_facts import calibration_facts
-from driftwalk.schema.answers.fit_facts import fitted_value
+from driftwalk.schema.answers.facts import facts_of, fitted_value
 
 CLASSES = ["I", "O", "T", "S", "L", "I3+1", "L3+1", "2+2", "2+1+1", "1+1+1+1"]
 REQUIRED = {"proportions", "intervals", "complete", "runs"}
@@ -98,7 +97,7 @@ def test_json_holds_both_distributions(whole: tuple[Path, Done]) -> None:
 def test_the_parameters_are_the_calibrations(whole: tuple[Path, Done], calibrated: Path) -> None:
     found, known = json.loads(whole[1].out), dataset(calibrated / "calibration.nc")
     for name in ("drag_coefficient", "force_std_N", "force_interval_s"):
-        assert found[name] == calibration_facts(known)[name]
+        assert found[name] == facts_of(known)[name]
     fixed, drawn = (dataset(whole[0] / name) for name in ("assembly.nc", "assembly_drawn.nc"))
     assert (fixed["drag_coefficient"] == fitted_value(known, "drag_coefficient")).all()
     assert (fixed["force_std"] == fitted_value(known, "force_std")).all()

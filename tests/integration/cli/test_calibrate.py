@@ -34,7 +34,7 @@ from command_line import (
 import driftwalk
 from driftwalk.figures.calibration import ks_map_figure
 from driftwalk.plot.parts.style import print_style
-from driftwalk.schema.answers.calibration_facts import calibration_facts
+from driftwalk.schema.answers.facts import facts_of
 
 FIGURES = (
     *("flow", "trajectory", "steps", "ks_map"),
@@ -81,7 +81,7 @@ def test_json_holds_the_answer_with_its_intervals(finished: tuple[Path, Done]) -
     assert found["force_noise_intensity_N2_s"] == pytest.approx(intensity)
     stored = calibration(finished[0])
     for name in ("drag_coefficient", "force_std_N", "noise_floor", "ks_distance"):
-        assert found[name] == calibration_facts(stored)[name]
+        assert found[name] == facts_of(stored)[name]
     assert 0 < found["noise_floor"] < found["ks_distance"] < 0.5
     # The estimate is the lowest point of the stored surface, to half a step of its grid.
     surface = stored["refined_surface"]
@@ -140,7 +140,7 @@ def test_the_calibration_has_units_and_no_missing_cell(finished: tuple[Path, Don
     assert np.isfinite(found["ks_distance"]).all()
     assert np.isfinite(found["refined_ks_distance"]).all()
     assert (found["status"] == 0).all()
-    assert calibration_facts(found)["force_std_N"] == json.loads(finished[1].out)["force_std_N"]
+    assert facts_of(found)["force_std_N"] == json.loads(finished[1].out)["force_std_N"]
 
 
 @pytest.mark.slow

@@ -12,7 +12,7 @@ from redrawn import assert_drawn_alike
 from self_propelled import moving
 
 import driftwalk as dw
-from driftwalk.cli.terminal.model_answer import print_answer
+from driftwalk.cli.terminal.answer import print_result
 from driftwalk.record import save_trajectory
 from driftwalk.schema.stores.netcdf import open_netcdf
 
@@ -88,11 +88,11 @@ def test_people_read_which_parameters_are_determined(
 ) -> None:
     folder, said = run
     found = open_netcdf(folder / "run" / "model_calibration.nc")
-    print_answer(found, folder / "run")
+    print_result(found, folder / "run", json=False)
     rows = capsys.readouterr().out.splitlines()
     for row, one in zip(rows, said["parameters"].values(), strict=False):
         assert ("not determined" in row) != one["determined"]
-    print_answer(found.assign(determined=("parameter", [False] * 3)), folder / "run")
+    print_result(found.assign(determined=("parameter", [False] * 3)), folder / "run", json=False)
     rows = capsys.readouterr().out.splitlines()
     assert [row.split()[-1] for row in rows[:3]] == ["m/s)", "rad2/s)", "rad/s)"]
 

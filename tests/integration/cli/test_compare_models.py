@@ -13,7 +13,7 @@ from redrawn import assert_drawn_alike
 
 import driftwalk as dw
 from driftwalk.calibration import DEFAULT_MODELS
-from driftwalk.cli.terminal.models_answer import print_answer
+from driftwalk.cli.terminal.answer import print_result
 from driftwalk.runs import read_found
 from driftwalk.schema.stores.netcdf import open_netcdf
 
@@ -63,7 +63,7 @@ def test_the_folder_holds_everything(run: tuple[Path, dict]) -> None:
 @pytest.mark.slow
 def test_people_read_the_answer(run: tuple[Path, dict], capsys: pytest.CaptureFixture[str]) -> None:
     folder, said = run
-    print_answer(open_netcdf(folder / "comparison.nc"), folder)
+    print_result(open_netcdf(folder / "comparison.nc"), folder, json=False)
     out = capsys.readouterr().out
     assert out.startswith(f"{said['findings'][0]}.\n")
     for one in said["models"]:

@@ -10,7 +10,7 @@ from command_line import here
 from self_propelled import moving
 
 import driftwalk as dw
-from driftwalk.cli.terminal.models_answer import print_answer
+from driftwalk.cli.terminal.answer import print_result
 from driftwalk.schema.stores.netcdf import netcdf_bytes, open_netcdf
 
 RESTING = {
@@ -40,5 +40,5 @@ def test_summaries_name_the_true_model(tmp_path: Path, capsys: pytest.CaptureFix
     assert "misfit" not in by_name["resampled steps"]
     assert said["findings"][0].startswith("run_rest explains the recording")
     assert said["findings"][1].startswith("run_rest is named by the summaries of the motion")
-    print_answer(open_netcdf(out / "comparison.nc"), out)
+    print_result(open_netcdf(out / "comparison.nc"), out, json=False)
     assert "own below" in capsys.readouterr().out

@@ -15,7 +15,7 @@ import xarray as xr
 from command_line import DATA, FIT, RECORDING, Done, here, refusal
 
 import driftwalk as dw
-from driftwalk.schema.answers.fit_facts import fit_facts
+from driftwalk.schema.answers.facts import facts_of
 
 SECOND = DATA / "recording_second_seed.csv"
 REQUIRED = (
@@ -67,7 +67,7 @@ def test_the_run_directory_is_whole(fitted: tuple[Path, Done]) -> None:
         assert (folder / "figures" / f"{name}.svg").stat().st_size > 1000
     with xr.open_dataset(folder / "fit.nc", engine="h5netcdf") as stored:
         assert stored.attrs["kind"] == "fit"
-        assert fit_facts(stored)["drag_coefficient"] == answer(fitted[1])["drag_coefficient"]
+        assert facts_of(stored)["drag_coefficient"] == answer(fitted[1])["drag_coefficient"]
         flow = dw.load_flow(folder / "flow.nc")
         assert dw.fitted_flow(stored)["u"].values == pytest.approx(flow["u"].values)
 

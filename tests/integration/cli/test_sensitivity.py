@@ -31,7 +31,7 @@ from command_line import (
 from redrawn import assert_drawn_alike
 from signals_at_units import after_units
 
-from driftwalk.schema.answers.calibration_facts import calibration_facts
+from driftwalk.schema.answers.facts import facts_of
 
 SIZE = ["--blocks", "3", "--runs", "15", "--realisations", "3", "--duration", "60s"]
 MAP = ["--vary", "drag-coefficient=0.2:1:0.4", "--vary", "force-std=0.2mN,1mN"]
@@ -77,7 +77,7 @@ def test_json_says_what_the_files_hold(whole: tuple[Path, Done], calibrated: Pat
     assert (said["settings"], said["runs"], said["blocks"]) == (6, 15, 3)
     assert said["axes"] == {"drag_coefficient": [0.2, 0.6, 1.0], "force_std_N": [2e-4, 1e-3]}
     assert said["classes"] == ["I3", "L3", "2+1", "1+1+1"]
-    known = calibration_facts(dataset(calibrated / "calibration.nc"))
+    known = facts_of(dataset(calibrated / "calibration.nc"))
     for key in ("drag_coefficient", "force_std_N", "force_interval_s"):
         assert said["reference"][key] == known[key]
     assert said["reference"]["runs"] == 45
@@ -134,7 +134,7 @@ def test_a_study_file_says_what_is_simulated(calibrated: Path, tmp_path: Path) -
     said = json.loads(done.out)
     assert said["axes"] == {"latching": ["collision", "none"]}
     assert (said["settings"], said["runs"], said["blocks"], said["duration_s"]) == (2, 5, 2, 5.0)
-    known = calibration_facts(dataset(calibrated / "calibration.nc"))
+    known = facts_of(dataset(calibrated / "calibration.nc"))
     assert said["reference"]["drag_coefficient"] == known["drag_coefficient"]
     words = ["--blocks", "2", "--duration", "5s", "--runs", "5", "--realisations", "2"]
     again = here(

@@ -21,7 +21,7 @@ from driftwalk.core.provenance import MANIFEST_KIND
 from driftwalk.model import Study
 from driftwalk.runs import read_found
 from driftwalk.schema import build_dataset
-from driftwalk.schema.answers.fit_facts import fit_facts, fitted_value
+from driftwalk.schema.answers.facts import facts_of, fitted_value
 
 TANK = ("--tank", "30cm")
 BODY = ("--side", "28mm", "--mass", "10g", "--depth", "9mm")
@@ -123,7 +123,7 @@ def test_a_fit_is_assembled_with_all_that_it_knows(
 ) -> None:
     folder, done = assembled
     assert done.code == 0, done.err
-    printed, known = json.loads(done.out), fit_facts(dataset(fitted / "fit.nc"))
+    printed, known = json.loads(done.out), facts_of(dataset(fitted / "fit.nc"))
     for name in ("drag_coefficient", "force_std_N"):
         assert printed[name] == known[name]
     assert printed["force_interval_s"] == 0.016

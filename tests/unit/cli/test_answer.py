@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from driftwalk.cli.terminal.answer import print_estimates, print_figures, print_origin
+from driftwalk.cli.terminal.answer import print_parts, print_row
+from driftwalk.schema.answers.parts import Row, Table, estimates, origin
 
 
 def answer() -> xr.Dataset:
@@ -30,24 +31,24 @@ def answer() -> xr.Dataset:
 
 def test_an_estimate_is_a_row_in_the_units_of_a_reader(capsys: pytest.CaptureFixture[str]) -> None:
     found = answer()
-    print_estimates(found, *(str(name) for name in found["parameter"].values))
+    print_parts(estimates(found))
     assert capsys.readouterr().out.splitlines() == [
         "drag coefficient C_d   0.4000   95% interval 0.3500 to 0.4500",
         "stochastic force σ_F   not determined by this recording",
-        "tracking noise         2e-05 mm   95% interval 1e-05 to 4e-05",
-        "swim speed             0.0500 m/s   no interval without a bootstrap",
+        "tracking noise         2.000e-05 mm   95% interval 1.000e-05 to 4.000e-05",
+        "swim speed             0.05000 m/s   no interval without a bootstrap",
     ]
 
 
 def test_without_intervals_that_is_said(capsys: pytest.CaptureFixture[str]) -> None:
-    print_estimates(answer().drop_vars(["interval", "confidence"]), "drag_coefficient")
+    print_parts(estimates(answer().drop_vars(["interval", "confidence"]))[:1])
     (line,) = capsys.readouterr().out.splitlines()
     assert line == "drag coefficient C_d   0.4000   no interval without a bootstrap"
 
 
 def test_values_of_all_rows_begin_in_one_column(capsys: pytest.CaptureFixture[str]) -> None:
-    print_estimates(answer(), "drag_coefficient", "force_std")
-    print_figures(Path("run"))
+    print_parts(estimates(answer())[:2])
+    print_row("figures", Path("run") / "figures")
     lines = capsys.readouterr().out.splitlines()
     assert [line[:22].rstrip() == line[:23].rstrip() for line in lines] == [True] * 3
     assert [line[23] for line in lines] == ["0", "n", "r"]
@@ -57,5 +58,14 @@ def test_values_of_all_rows_begin_in_one_column(capsys: pytest.CaptureFixture[st
 def test_a_simulated_recording_is_called_so(
     simulated: str, lines: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    print_origin(answer().assign_attrs(simulated_recording=simulated))
+    print_parts(origin(answer().assign_attrs(simulated_recording=simulated)))
     assert len(capsys.readouterr().out.splitlines()) == lines
+
+
+def test_what_a_terminal_obeys_is_spelled_out(capsys: pytest.CaptureFixture[str]) -> None:
+    print_parts([Table([["a\x1b[2J"]]), Row("\x1b[1m", "\u202eflow.nc"), "\x9bA"])
+    assert capsys.readouterr().out.splitlines() == [
+        r"a\x1b[2J",
+        r"\x1b[1m                   \u202eflow.nc".replace("                   ", " " * 19),
+        r"\x9bA",
+    ]

@@ -7,13 +7,14 @@ from pathlib import Path
 import pytest
 from model_recovery_worlds import lost, made_up, made_up_recovery
 
-from driftwalk.cli.terminal.model_recover_answer import print_answer, summary, warnings
+from driftwalk.cli.terminal.answer import print_result
+from driftwalk.schema.answers.recovery import model_recovery_answer
 
 
 def test_the_table_has_the_counts(capsys: pytest.CaptureFixture[str]) -> None:
     made = lost(made_up(), 3, 2, "it lost its numbers")
     found = made_up_recovery(made)
-    print_answer(found, Path("run"))
+    print_result(found, Path("run"), json=False)
     captured = capsys.readouterr()
     head, _, *rows = captured.out.splitlines()
     assert head == "active: 12 recordings of 10 min at 10 Hz, tracking noise 0.3 mm"
@@ -40,7 +41,7 @@ def test_json_has_no_number_where_there_is_none() -> None:
     found = made_up(2)
     for which in range(2):
         found = lost(found, which, 1, "too short")
-    said = summary(made_up_recovery(found))
+    said = model_recovery_answer(made_up_recovery(found)).facts
     assert (said["recordings"], said["calibrated"]) == (2, 0)
     one = said["parameters"]["speed_m_s"]
     assert (one["truth"], one["median_error"], one["coverage"]) == (0.03, None, None)
@@ -52,6 +53,6 @@ def test_without_intervals_none_is_counted(capsys: pytest.CaptureFixture[str]) -
     found = made_up()
     found["interval"][:] = float("nan")
     study = made_up_recovery(found)
-    print_answer(study, Path("run"))
+    print_result(study, Path("run"), json=False)
     assert capsys.readouterr().out.count("no intervals") == 3
-    assert warnings(study) == []
+    assert model_recovery_answer(study).warnings == []

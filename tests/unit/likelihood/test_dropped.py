@@ -21,7 +21,7 @@ from driftwalk.likelihood.tracker_errors.dropped import (
     with_gaps,
 )
 from driftwalk.schema import Track, body_track, build_trajectory
-from driftwalk.schema.answers.fit_facts import fit_facts
+from driftwalk.schema.answers.facts import facts_of
 
 
 class Filmed(NamedTuple):
@@ -202,12 +202,12 @@ def test_one_frame_in_twenty_may_be_missing() -> None:
     found = dw.fit_motion(film, coarse_study())
     std = np.sqrt(np.diag(clean["covariance"].values))[:2] * (1.0, 0.5)
     names = ("drag_coefficient", "force_std_N")
-    moved = [np.log(fit_facts(found)[name] / fit_facts(clean)[name]) for name in names]
+    moved = [np.log(facts_of(found)[name] / facts_of(clean)[name]) for name in names]
     assert np.abs(np.array(moved) / std).max() < 2.0
-    missing = fit_facts(found)["dropped_frames"]
+    missing = facts_of(found)["dropped_frames"]
     assert missing == pytest.approx(np.sum(np.diff(frame) - 1), rel=0.1)
-    assert any(f"{missing} frames are missing" in text for text in fit_facts(found)["warnings"])
-    assert fit_facts(clean)["dropped_frames"] == 0
+    assert any(f"{missing} frames are missing" in text for text in facts_of(found)["warnings"])
+    assert facts_of(clean)["dropped_frames"] == 0
 
 
 def test_the_interval_of_the_force_knows_of_mended_frames() -> None:

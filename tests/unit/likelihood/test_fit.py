@@ -16,7 +16,7 @@ from driftwalk.likelihood.filter.series import Series
 from driftwalk.likelihood.result import footprint_count, whiteness_of
 from driftwalk.model import apply_overrides
 from driftwalk.schema import FLAGS, build_trajectory
-from driftwalk.schema.answers.fit_facts import fit_facts
+from driftwalk.schema.answers.facts import facts_of
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +46,7 @@ def standard_deviations(fit: xr.Dataset) -> np.ndarray:
 def deviations(fit: xr.Dataset) -> np.ndarray:
     """Return how far the parameters are from the truth, in their standard deviations."""
     truth = np.array([DRAG * np.exp(STEP_16_MS), FORCE_N, NOISE_M])
-    return np.log(np.array([fit_facts(fit)[name] for name in NAMES]) / truth) / standard_deviations(
+    return np.log(np.array([facts_of(fit)[name] for name in NAMES]) / truth) / standard_deviations(
         fit
     )
 
@@ -54,29 +54,27 @@ def deviations(fit: xr.Dataset) -> np.ndarray:
 def test_the_truth_is_within_the_errors(fit: xr.Dataset) -> None:
     """4 sd for each of three: once in 5000 runs, if the errors are right."""
     assert np.abs(deviations(fit)).max() < 4.0
-    assert fit_facts(fit)["converged"] == "yes"
+    assert facts_of(fit)["converged"] == "yes"
     for name in ("drag_coefficient", "force_std_N", "force_noise_intensity_N2_s"):
-        low, high = fit_facts(fit)[f"{name}_interval"]
-        assert low < fit_facts(fit)[name] < high
-    assert fit_facts(fit)["force_noise_intensity_N2_s"] == pytest.approx(
-        fit_facts(fit)["force_std_N"] ** 2 * fit_facts(fit)["force_interval_s"]
+        low, high = facts_of(fit)[f"{name}_interval"]
+        assert low < facts_of(fit)[name] < high
+    assert facts_of(fit)["force_noise_intensity_N2_s"] == pytest.approx(
+        facts_of(fit)["force_std_N"] ** 2 * facts_of(fit)["force_interval_s"]
     )
     # 90 % of a normal: 1.645 sd on either side, in logarithms.
-    low, high = np.log(fit_facts(fit)["drag_coefficient_interval"])
+    low, high = np.log(facts_of(fit)["drag_coefficient_interval"])
     assert high - low == pytest.approx(2 * 1.644854 * np.sqrt(fit["covariance"].values[0, 0]))
 
 
 def test_restricted_likelihood_lowers_the_drag(fit: xr.Dataset) -> None:
-    assert (
-        fit_facts(fit)["drag_coefficient"] < fit_facts(fit)["maximum_likelihood_drag_coefficient"]
-    )
+    assert facts_of(fit)["drag_coefficient"] < facts_of(fit)["maximum_likelihood_drag_coefficient"]
 
 
 def test_innovations_are_white(fit: xr.Dataset) -> None:
     """Some 12,000 numbers: 4 sd of the mean square are 5 %, and the fit takes less than 1 %."""
-    assert fit_facts(fit)["chi_squared_per_dof"] == pytest.approx(1.0, abs=0.06)
-    assert abs(fit_facts(fit)["autocorrelation"]) < 4.0 * fit_facts(fit)["autocorrelation_std"]
-    assert fit_facts(fit)["warnings"] == []
+    assert facts_of(fit)["chi_squared_per_dof"] == pytest.approx(1.0, abs=0.06)
+    assert abs(facts_of(fit)["autocorrelation"]) < 4.0 * facts_of(fit)["autocorrelation_std"]
+    assert facts_of(fit)["warnings"] == []
 
 
 def test_the_flow_is_within_its_standard_errors(fit: xr.Dataset) -> None:
@@ -122,11 +120,11 @@ def test_a_recording_with_holes_gives_the_same_within_errors(
         holes[name].values[lost] = np.nan
     holes["theta"].values[generator.random(time.size) < 0.1] = np.nan
     found = dw.fit_motion(holes, coarse_study())
-    part, whole = (np.array([fit_facts(one)[name] for name in NAMES]) for one in (found, fit))
+    part, whole = (np.array([facts_of(one)[name] for name in NAMES]) for one in (found, fit))
     more = standard_deviations(found) ** 2 - standard_deviations(fit) ** 2
     assert (more > 0.0).all()
     assert np.abs(np.log(part / whole) / np.sqrt(more)).max() < 4.0
-    assert fit_facts(found)["samples"] == np.count_nonzero(~lost)
+    assert facts_of(found)["samples"] == np.count_nonzero(~lost)
 
 
 @pytest.mark.slow
@@ -136,7 +134,7 @@ def test_two_recordings_are_better_than_one(track: xr.Dataset, fit: xr.Dataset) 
     # Twice the data: 1 / sqrt(2), as far as the information does not vary from one to the other.
     lever = 3  # known from its prior alone
     assert np.delete(ratio, lever) == pytest.approx(np.full(4, np.sqrt(0.5)), rel=0.25)
-    assert fit_facts(both)["recordings"] == 2
+    assert facts_of(both)["recordings"] == 2
     assert np.abs(deviations(both)).max() < 4.0
 
 
@@ -146,7 +144,7 @@ def test_without_angles_the_drag_is_averaged(track: xr.Dataset) -> None:
     blind["theta"].values[:] = np.nan
     found = dw.fit_motion(blind, coarse_study())
     assert found.attrs["angle"] == "none"
-    assert "no orientation" in " ".join(fit_facts(found)["warnings"])
+    assert "no orientation" in " ".join(facts_of(found)["warnings"])
     # The mean over all orientations makes C_d up to 16 % too small (docs: what `none` costs); what
     # its sd adds to that is 4 of them, as for the others: once in 5000 if they are right.
     sd, off = standard_deviations(found), deviations(found)
@@ -154,15 +152,13 @@ def test_without_angles_the_drag_is_averaged(track: xr.Dataset) -> None:
     assert np.log(1.0 - 0.16) / sd[0] - 4.0 < off[0] < 4.0
     assert np.abs(off[1:]).max() < 4.0
     same = dw.fit_motion(track, coarse_study(), angle="none")
-    assert fit_facts(same)["drag_coefficient"] == pytest.approx(
-        fit_facts(found)["drag_coefficient"]
-    )
+    assert facts_of(same)["drag_coefficient"] == pytest.approx(facts_of(found)["drag_coefficient"])
 
 
 @pytest.mark.slow
 def test_force_std_follows_its_interval() -> None:
     other = apply_overrides(coarse_study(), {"forces.force_interval_s": 0.064})
-    found, known = fit_facts(dw.fit_motion(recording(200.0), other)), fit_facts(fitted(200.0))
+    found, known = facts_of(dw.fit_motion(recording(200.0), other)), facts_of(fitted(200.0))
     name = "force_noise_intensity_N2_s"
     assert found[name] == pytest.approx(known[name])
     assert found["force_std_N"] == pytest.approx(known["force_std_N"] / 2.0)

@@ -15,7 +15,7 @@ import driftwalk as dw
 from driftwalk.likelihood.ready import prepare
 from driftwalk.likelihood.tracker_errors.outliers import OUTLIER, outliers_in, without_outliers
 from driftwalk.schema import Track, body_track
-from driftwalk.schema.answers.fit_facts import fit_facts
+from driftwalk.schema.answers.facts import facts_of
 
 SECONDS = 300.0
 NOISE_M = 3e-4
@@ -117,13 +117,13 @@ def test_one_sample_in_twenty_may_be_wrong(size_m: float) -> None:
     found = dw.fit_motion(with_mistakes(recording(SECONDS), 0.05, size_m, 5), coarse_study())
     std = np.sqrt(np.diag(clean["covariance"].values))[:3] * (1.0, 0.5, 1.0)
     names = ("drag_coefficient", "force_std_N", "tracking_noise_m")
-    moved = [np.log(fit_facts(found)[name] / fit_facts(clean)[name]) for name in names]
+    moved = [np.log(facts_of(found)[name] / facts_of(clean)[name]) for name in names]
     assert np.abs(np.array(moved) / std).max() < 1.0
-    left_out = fit_facts(found)["mistakes"]
+    left_out = facts_of(found)["mistakes"]
     assert 0.03 * 3001 < left_out < 0.06 * 3001
-    assert fit_facts(found)["samples"] == 3001
-    assert any(f"{left_out} of 3001 samples" in text for text in fit_facts(found)["warnings"])
-    assert fit_facts(clean)["mistakes"] == 0
+    assert facts_of(found)["samples"] == 3001
+    assert any(f"{left_out} of 3001 samples" in text for text in facts_of(found)["warnings"])
+    assert facts_of(clean)["mistakes"] == 0
 
 
 @pytest.mark.slow

@@ -17,7 +17,7 @@ from driftwalk.likelihood.interval_inflation import parameter_facts
 from driftwalk.likelihood.solution import cholesky, require_noise_below_motion, solved
 from driftwalk.model import Study, apply_overrides
 from driftwalk.schema import Track, build_trajectory
-from driftwalk.schema.answers.fit_facts import fit_facts
+from driftwalk.schema.answers.facts import facts_of
 
 BLOCK = 2048
 """The check keeps the derivatives of so many samples at a time."""
@@ -68,10 +68,10 @@ def test_few_used_intervals_are_a_warning() -> None:
     spread = np.where(np.arange(400) % 8 == 0, 5e-3, 1e-6)[:, None]
     x, y = np.clip(np.cumsum(spread * generator.normal(size=(400, 2)), axis=0), -0.1, 0.1).T
     fit = dw.fit_motion(trajectory(0.1 * np.arange(400), x, y), coarse_study())
-    used, usable = fit_facts(fit)["samples_used"], fit_facts(fit)["intervals_usable"]
+    used, usable = facts_of(fit)["samples_used"], facts_of(fit)["intervals_usable"]
     assert used < 0.9 * usable
     wanted = f"the fit used {used} of {usable} intervals only"
-    assert any(wanted in text for text in fit_facts(fit)["warnings"])
+    assert any(wanted in text for text in facts_of(fit)["warnings"])
 
 
 def test_a_body_that_jumps_once_is_at_rest() -> None:
@@ -129,7 +129,7 @@ def test_an_interval_without_an_end_is_infinite() -> None:
     attrs = parameter_facts(point, np.diag([0.01, 1e6, 0.01]), coarse_study())
     assert attrs["force_std_N_interval"][1] == np.inf
     assert 0.0 <= attrs["force_std_N_interval"][0] < attrs["force_std_N"]
-    assert np.isfinite(fit_facts(fit)["force_std_N_interval"]).all()
+    assert np.isfinite(facts_of(fit)["force_std_N_interval"]).all()
 
 
 def test_a_fitted_arena_that_excludes_its_own_positions_is_an_error() -> None:

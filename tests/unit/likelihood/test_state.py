@@ -11,7 +11,7 @@ import driftwalk as dw
 from driftwalk.likelihood.ready import use_angle
 from driftwalk.model import apply_overrides
 from driftwalk.schema import body_track, build_trajectory
-from driftwalk.schema.answers.fit_facts import fit_facts
+from driftwalk.schema.answers.facts import facts_of
 
 SECONDS = 600.0
 ANGLE_NOISE = np.radians(0.5)
@@ -73,49 +73,49 @@ def deviations(fit: xr.Dataset) -> np.ndarray:
     truth = np.array([DRAG, FORCE_N, NOISE_M, ANGLE_NOISE])
     names = ("drag_coefficient", "force_std_N", "tracking_noise_m", "orientation_noise_rad")
     sd = np.sqrt(np.diag(fit["covariance"].values))[[0, 1, 2, 4]] * (1.0, 0.5, 1.0, 1.0)
-    return np.log(np.array([fit_facts(fit)[name] for name in names]) / truth) / sd
+    return np.log(np.array([facts_of(fit)[name] for name in names]) / truth) / sd
 
 
 @pytest.mark.slow
 def test_the_truth_is_within_the_errors(fit: xr.Dataset) -> None:
     """4 sd for each of four: once in 4000 runs, if the errors are right."""
     assert fit.attrs["angle"] == "state"
-    assert fit_facts(fit)["converged"] == "yes"
+    assert facts_of(fit)["converged"] == "yes"
     assert np.abs(deviations(fit)).max() < 4.0
     sd = np.sqrt(np.diag(fit["covariance"].values))
     # The turning tells of the drag: from the motion alone it is some 8 % in ten minutes.
     assert sd[0] < 0.02
     assert fit["log_parameter"].values.tolist()[3:] == ["ln_force_lever", "ln_orientation_noise"]
     for name in ("force_lever_m", "orientation_noise_rad"):
-        low, high = fit_facts(fit)[f"{name}_interval"]
-        assert low < fit_facts(fit)[name] < high
+        low, high = facts_of(fit)[f"{name}_interval"]
+        assert low < facts_of(fit)[name] < high
 
 
 @pytest.mark.slow
 def test_a_force_on_the_centre_has_no_lever(fit: xr.Dataset) -> None:
     """What is found, from its prior, is below a hundredth of the block's side."""
-    assert fit_facts(fit)["force_lever_m"] < 3e-4
+    assert facts_of(fit)["force_lever_m"] < 3e-4
     assert np.sqrt(fit["covariance"].values[3, 3]) > 0.3
 
 
 @pytest.mark.slow
 def test_turning_and_motion_agree_on_the_drag(fit: xr.Dataset) -> None:
-    assert 0.0 <= fit_facts(fit)["angle_disagreement_std"] < 3.0
-    low, high = fit_facts(fit)["drag_coefficient_angle_given_interval"]
-    assert low < fit_facts(fit)["drag_coefficient_angle_given"] < high
+    assert 0.0 <= facts_of(fit)["angle_disagreement_std"] < 3.0
+    low, high = facts_of(fit)["drag_coefficient_angle_given_interval"]
+    assert low < facts_of(fit)["drag_coefficient_angle_given"] < high
     assert np.log(high / low) > 2.0 * np.log(
-        fit_facts(fit)["drag_coefficient_interval"][1]
-        / fit_facts(fit)["drag_coefficient_interval"][0]
+        facts_of(fit)["drag_coefficient_interval"][1]
+        / facts_of(fit)["drag_coefficient_interval"][0]
     )
-    assert fit_facts(fit)["warnings"] == []
+    assert facts_of(fit)["warnings"] == []
 
 
 @pytest.mark.slow
 def test_the_errors_of_prediction_are_white(fit: xr.Dataset) -> None:
     """18,000 numbers: 4 sd of the mean square are 4 %, and the fit takes less than 1 %."""
-    assert fit_facts(fit)["chi_squared_per_dof"] == pytest.approx(1.0, abs=0.05)
-    assert abs(fit_facts(fit)["autocorrelation"]) < 4.0 * fit_facts(fit)["autocorrelation_std"]
-    assert fit_facts(fit)["autocorrelation_std"] == pytest.approx(1 / np.sqrt(18_000), rel=0.05)
+    assert facts_of(fit)["chi_squared_per_dof"] == pytest.approx(1.0, abs=0.05)
+    assert abs(facts_of(fit)["autocorrelation"]) < 4.0 * facts_of(fit)["autocorrelation_std"]
+    assert facts_of(fit)["autocorrelation_std"] == pytest.approx(1 / np.sqrt(18_000), rel=0.05)
 
 
 @pytest.mark.slow
@@ -123,7 +123,7 @@ def test_holes_and_missing_angles_leave_the_truth_within_the_errors(
     holed: xr.Dataset, holed_fit: xr.Dataset, fit: xr.Dataset
 ) -> None:
     assert np.abs(deviations(holed_fit)).max() < 4.0
-    assert fit_facts(holed_fit)["samples"] == int(np.isfinite(holed["x"].values).sum())
+    assert facts_of(holed_fit)["samples"] == int(np.isfinite(holed["x"].values).sum())
     # Less is known, of the angle's noise the most.
     ratio = np.sqrt(np.diag(holed_fit["covariance"].values) / np.diag(fit["covariance"].values))
     assert ratio[[0, 1, 2, 4]] == pytest.approx(np.full(4, 1.5), abs=0.45)
@@ -132,7 +132,7 @@ def test_holes_and_missing_angles_leave_the_truth_within_the_errors(
 @pytest.mark.slow
 def test_missing_angles_are_no_errors_of_prediction(holed_fit: xr.Dataset) -> None:
     """Some 10,000 numbers are there; counted as zeros, missing angles would make it 0.87."""
-    assert fit_facts(holed_fit)["chi_squared_per_dof"] == pytest.approx(1.0, abs=0.06)
+    assert facts_of(holed_fit)["chi_squared_per_dof"] == pytest.approx(1.0, abs=0.06)
 
 
 @pytest.mark.slow
@@ -141,7 +141,7 @@ def test_turns_of_the_recorded_angle_do_not_matter(track: xr.Dataset) -> None:
     short = track.isel(time=slice(0, 1000))
     theta = short["theta"].values[:, 0]
     other = turned(short, np.unwrap(theta) + 0.5 * np.pi + 8.0 * np.pi)
-    fits = [fit_facts(dw.fit_motion(one, coarse_study(), angle="state")) for one in (short, other)]
+    fits = [facts_of(dw.fit_motion(one, coarse_study(), angle="state")) for one in (short, other)]
     for name in ("drag_coefficient", "force_std_N", "orientation_noise_rad"):
         assert fits[1][name] == pytest.approx(fits[0][name], rel=1e-6)
 
@@ -152,8 +152,8 @@ def test_an_angle_of_the_wrong_side_is_noticed(track: xr.Dataset) -> None:
     short = track.isel(time=slice(0, 4000))
     lie = turned(short, short["theta"].values[:, 0] + np.pi / 4)
     found = dw.fit_motion(lie, coarse_study(), angle="state")
-    assert fit_facts(found)["angle_disagreement_std"] > 3.0
-    assert any("one drag law" in one for one in fit_facts(found)["warnings"])
+    assert facts_of(found)["angle_disagreement_std"] > 3.0
+    assert any("one drag law" in one for one in facts_of(found)["warnings"])
 
 
 @pytest.mark.slow
@@ -163,8 +163,8 @@ def test_an_angle_that_comes_late_shows_in_the_lever(track: xr.Dataset, fit: xr.
     late = turned(short, np.roll(short["theta"].values[:, 0], 3))
     found = dw.fit_motion(late, coarse_study(), angle="state")
     assert (
-        fit_facts(found)["force_lever_m_interval"][0]
-        > 2.0 * fit_facts(fit)["force_lever_m_interval"][1]
+        facts_of(found)["force_lever_m_interval"][0]
+        > 2.0 * facts_of(fit)["force_lever_m_interval"][1]
     )
 
 
@@ -199,4 +199,4 @@ def warnings_in(recording: xr.Dataset) -> list[str]:
     """Return the warnings of a fit that takes the camera as it is."""
     exact = apply_overrides(coarse_study(), {"fit.camera": "exact"})
     fit = dw.fit_motion(recording, exact, angle="state")
-    return list(fit_facts(fit)["warnings"])
+    return list(facts_of(fit)["warnings"])

@@ -33,7 +33,7 @@ from driftwalk.likelihood.ready import body_of, prepare, spline_of
 from driftwalk.likelihood.result import Whiteness
 from driftwalk.likelihood.warnings import precision_facts, warnings_of
 from driftwalk.schema import Track, body_track, build_trajectory
-from driftwalk.schema.answers.fit_facts import fit_facts
+from driftwalk.schema.answers.facts import facts_of
 
 SWITCHED = {"switching_times_s": [START_S + SWITCH_S]}
 
@@ -48,7 +48,7 @@ def test_both_flows_and_the_parameters_are_recovered(fit: xr.Dataset) -> None:
     """4 sd for each of three parameters: once in 5000 runs, if the errors are right."""
     truth = {"drag_coefficient": DRAG, "force_std": FORCE_N, "tracking_noise": NOISE_M}
     recordings = two_flows()
-    assert fit_facts(fit)["converged"] == "yes"
+    assert facts_of(fit)["converged"] == "yes"
     for interval, flow in enumerate(true_flows()):
         score = dw.score_fit(fit, **truth, flow=flow, recordings=recordings, interval=interval)
         for name in ("drag_coefficient", "force_std_N", "tracking_noise_m"):
@@ -67,11 +67,11 @@ def test_it_holds_every_flow_and_the_times(fit: xr.Dataset) -> None:
     assert fit["coefficient"].dims == ("flow", "component", "knot_y", "knot_x")
     assert fit["flow"].values.tolist() == ["A", "B"]
     assert fit["interval_flow"].values.tolist() == [0, 1]
-    assert fit_facts(fit)["switching_times_s"] == [START_S + SWITCH_S]
-    assert fit_facts(fit)["recordings"] == 1
+    assert facts_of(fit)["switching_times_s"] == [START_S + SWITCH_S]
+    assert facts_of(fit)["recordings"] == 1
     # All but the interval that holds the switch: one sample every 0.1 s.
-    assert fit_facts(fit)["duration_s"] == pytest.approx(2.0 * SWITCH_S - 0.1)
-    assert fit_facts(fit)["samples"] == two_flows().sizes["time"]
+    assert facts_of(fit)["duration_s"] == pytest.approx(2.0 * SWITCH_S - 0.1)
+    assert facts_of(fit)["samples"] == two_flows().sizes["time"]
 
 
 @pytest.mark.slow
@@ -406,14 +406,14 @@ def test_a_region_never_visited_is_filled_and_warned_of() -> None:
         y=0.04 * np.sin(time) + wander[1] + 3e-4 * generator.normal(size=1500),
     )
     found = dw.fit_motion(ring, coarse_study())
-    share = fit_facts(found)["visited_share"]
+    share = facts_of(found)["visited_share"]
     inside = found["flag"].values != 0
     measured = found["flag"].values == 1
     assert share == pytest.approx(measured.sum() / inside.sum())
     radius = np.hypot(*np.meshgrid(found["x"].values, found["y"].values))
     assert (found["flag"].values[inside & (radius > 0.09)] == 2).all()
     assert np.isnan(dw.fitted_flow(found)["u_standard_error"].values[~measured]).all()
-    warnings = fit_facts(found)["warnings"]
+    warnings = facts_of(found)["warnings"]
     assert any(f"over {share:.0%} of the tank only" in one for one in warnings)
 
 

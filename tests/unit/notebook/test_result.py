@@ -11,8 +11,7 @@ import pytest
 import xarray as xr
 from hypothesis import given, strategies as st
 
-from driftwalk.notebook.result import Result, as_result
-from driftwalk.schema.answers.answer import answer_lines
+from driftwalk.notebook.result import Result, answer_lines, as_result
 from driftwalk.schema.stores.netcdf import netcdf_bytes, open_netcdf
 
 
@@ -35,14 +34,13 @@ def answer(**more: object) -> xr.Dataset:
 
 def test_the_answer_comes_first() -> None:
     found = as_result(answer(explained=True))
-    assert repr(found).splitlines()[:5] == [
-        "C_d             0.393  [0.388, 0.398]",
-        "σ_F             0.55 mN  [0.54, 0.56]",
-        "tracking noise  not determined by this recording",
-        "intervals of 90 %; force redrawn every 16 ms",
-        "explains the recording: yes",
+    assert repr(found).splitlines()[:4] == [
+        "drag coefficient C_d   0.3930   90% interval 0.3880 to 0.3980",
+        "stochastic force σ_F   0.5500 mN, redrawn every 16 ms   90% interval 0.5400 to 0.5600",
+        "tracking noise         not determined by this recording",
+        "model check            the model explains this recording",
     ]
-    assert "0.388, 0.398" in found._repr_html_()
+    assert "0.3880 to 0.3980" in found._repr_html_()
 
 
 def test_what_speaks_against_the_model_is_said() -> None:
@@ -51,21 +49,23 @@ def test_what_speaks_against_the_model_is_said() -> None:
     )
     lines = answer_lines(found)
     assert lines[-3:] == [
-        "explains the recording: NO",
-        "finding: the flow <changes>",
+        "model check            THE MODEL DOES NOT EXPLAIN THIS RECORDING:",
+        "  the flow <changes>",
         "warning: few samples",
     ]
     # Text of a dataset is no markup of the page that shows it.
     assert "the flow &lt;changes&gt;" in as_result(found)._repr_html_()
     left_out = answer().assign_attrs(check_left_out="too few samples")
-    assert answer_lines(left_out)[-1] == "not checked: too few samples"
+    assert answer_lines(left_out)[-1] == "model check            too few samples"
 
 
 def test_a_parameter_without_an_interval_has_none() -> None:
     found = answer()
     found["interval"][0] = np.nan
-    assert answer_lines(found)[0] == "C_d             0.393"
-    assert answer_lines(found.drop_vars("interval"))[1] == "σ_F             0.55 mN"
+    none = "no interval without a bootstrap"
+    assert answer_lines(found)[0] == f"drag coefficient C_d   0.3930   {none}"
+    force = answer_lines(found.drop_vars("interval"))[1]
+    assert force == f"stochastic force σ_F   0.5500 mN, redrawn every 16 ms   {none}"
 
 
 @pytest.mark.parametrize("part", [["interval"], ["confidence"], []])
@@ -100,23 +100,16 @@ def test_numbers_survive_to_four_digits(value: float, low: float, high: float) -
     found["estimate"][1] = value
     found["interval"][1] = [low * value, high * value]
     line = answer_lines(found)[1]
-    shown = line.removeprefix("σ_F").replace("mN", "").replace("[", "").replace("]", "")
-    numbers = [1e-3 * float(part) for part in shown.replace(",", " ").split()]
+    shown = line.removeprefix("stochastic force σ_F")
+    for words in (" mN, redrawn every 16 ms", "90% interval", "to"):
+        shown = shown.replace(words, "")
+    numbers = [1e-3 * float(part) for part in shown.split()]
     # Four significant digits: half a unit of the fourth.
     np.testing.assert_allclose(numbers, [value, low * value, high * value], rtol=5.1e-4)
 
 
-def test_a_comparison_of_models_begins_with_the_ranking() -> None:
-    comparison = xr.Dataset(
-        {
-            "score": ("model", [0.8, 1.25]),
-            "score_std": ("model", [0.1, 0.2]),
-            "explained": ("model", [True, False]),
-        },
-        {"model": ["run_rest", "block"], "finding": ("finding", ["run_rest is the closest model"])},
-    )
-    assert answer_lines(comparison) == [
-        "run_rest  0.80 ± 0.10  explains the recording",
-        "block     1.25 ± 0.20",
-        "finding: run_rest is the closest model",
-    ]
+def test_a_part_of_a_comparison_prints_as_a_dataset() -> None:
+    values = {"score": ("model", [0.8, 1.25])}
+    comparison = xr.Dataset(values, {"model": ["run_rest", "block"]}, {"kind": "model_comparison"})
+    assert answer_lines(comparison) == []
+    assert repr(as_result(comparison)).startswith("<xarray")

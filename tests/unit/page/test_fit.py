@@ -12,7 +12,7 @@ from recovery_worlds import TRUTH, synthetic_recovery
 from synthetic_calibration import bundled_recording
 
 from driftwalk.page import fit_sections, recovery_sections
-from driftwalk.schema.answers.fit_facts import fit_facts
+from driftwalk.schema.answers.facts import facts_of
 
 
 @pytest.fixture(scope="module")
@@ -31,8 +31,8 @@ def test_the_answer_of_a_fit_with_its_uncertainty(sections: list[dict[str, Any]]
         ("tracking noise", "tracking_noise_m"),
     ):
         one = shown[label]
-        assert one["value"] == fit_facts(fit)[name]
-        assert [one["low"], one["high"]] == list(fit_facts(fit)[f"{name}_interval"])
+        assert one["value"] == facts_of(fit)[name]
+        assert [one["low"], one["high"]] == list(facts_of(fit)[f"{name}_interval"])
         assert one["confidence"] == 0.9
     text = " ".join(part["paragraphs"])
     for words in (

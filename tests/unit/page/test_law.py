@@ -10,9 +10,10 @@ import xarray as xr
 from made_up_fit import made_up_fit
 from page_reading import numbers_of, part_of
 
-from driftwalk.cli.terminal.fit_answer import print_found, print_verdict
+from driftwalk.cli.terminal.answer import print_parts
 from driftwalk.page import fit_sections
-from driftwalk.schema.answers.fit_facts import fit_facts, fit_variables
+from driftwalk.schema.answers.facts import facts_of, fit_parts
+from driftwalk.schema.answers.fit import checked_parts, fitted_parts
 
 NUMBERS = {
     "added_mass_share": 0.5,
@@ -35,9 +36,9 @@ WALL = {
 def fit_of(**words: str) -> xr.Dataset:
     """Return a fit in which everything was opened; nothing was fitted."""
     fit = made_up_fit()
-    facts = {**fit_facts(fit), **NUMBERS, **WALL, "law_settled_by": 176.0}
+    facts = {**facts_of(fit), **NUMBERS, **WALL, "law_settled_by": 176.0}
     facts |= {f"{name}_interval": [0.9 * v, 1.1 * v] for name, v in NUMBERS.items()}
-    data, coords = fit_variables(facts)
+    data, coords, _ = fit_parts(facts)
     fit = fit.drop_dims("parameter").assign(data).assign_coords(coords)
     compared = {"log_score": [1.0, 2.0], "log_score_std": [0.1, 0.0], "log_evidence": [40.0, 50.0]}
     columns: dict[str, Any] = {
@@ -53,8 +54,8 @@ def fit_of(**words: str) -> xr.Dataset:
 
 def lines_of(fit: xr.Dataset, capsys: pytest.CaptureFixture[str]) -> dict[str, str]:
     """Return the rows that the command line prints, by their label."""
-    print_found(fit)
-    print_verdict(fit, None)
+    print_parts(fitted_parts(fit))
+    print_parts(checked_parts(fit, None))
     return {line[:22].rstrip(): line[23:] for line in capsys.readouterr().out.splitlines()}
 
 

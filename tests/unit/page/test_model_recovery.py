@@ -55,7 +55,7 @@ def test_every_estimate_is_drawn_once(
 def test_a_recording_that_was_not_calibrated_is_said(
     sections: dict[str, dict[str, Any]],
 ) -> None:
-    assert "1 recording could not be calibrated: too short" in str(sections["warnings"])
+    assert "1 of 12 recordings could not be calibrated: too short" in str(sections["warnings"])
 
 
 def test_what_is_missing_is_said() -> None:

@@ -12,11 +12,11 @@ from every_kind import every_kind
 from driftwalk.calibration.refuse import require_searchable
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.motion import motion_model
-from driftwalk.schema.answers.calibration_facts import (
-    calibration_facts,
+from driftwalk.schema.answers.facts import (
     calibration_parts,
+    facts_of,
+    fitted_value,
 )
-from driftwalk.schema.answers.fit_facts import fitted_value
 from driftwalk.schema.calibration import is_block, stored_parameters
 from driftwalk.schema.stores.netcdf import open_netcdf
 
@@ -42,7 +42,7 @@ def test_a_model_with_the_block_s_parameters_is_not_the_block() -> None:
 def test_what_is_stored_is_what_is_in_memory(form: str, tmp_path: Path) -> None:
     found = every_kind(form)
     xr.testing.assert_identical(stored(found, tmp_path), found)
-    assert calibration_facts(stored(found, tmp_path)) == calibration_facts(found)
+    assert facts_of(stored(found, tmp_path)) == facts_of(found)
 
 
 def test_the_answer_has_units_and_a_verdict() -> None:
@@ -73,7 +73,7 @@ def test_the_answer_has_units_and_a_verdict() -> None:
 @pytest.mark.parametrize("form", FORMS[1:])
 def test_a_model_of_the_user_answers_under_its_own_names(form: str) -> None:
     found = every_kind(form)
-    facts = calibration_facts(found)
+    facts = facts_of(found)
     assert set(found.attrs) == {*PROVENANCE, "model", "model_source_sha256"}
     for place, one in enumerate(stored_parameters(found)):
         assert (found["parameter"].values[place], found["unit"].values[place]) == (
@@ -88,7 +88,7 @@ def test_a_model_of_the_user_answers_under_its_own_names(form: str) -> None:
 @pytest.mark.parametrize("form", FORMS)
 def test_flat_facts_and_variables_are_each_other_s_inverse(form: str) -> None:
     found = every_kind(form)
-    parts = calibration_parts(calibration_facts(found), stored_parameters(found))
+    parts = calibration_parts(facts_of(found), stored_parameters(found))
     made = xr.Dataset(parts.data, parts.coords)
     for name in made.variables:
         np.testing.assert_array_equal(made[name].values, found[name].values)

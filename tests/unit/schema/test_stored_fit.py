@@ -12,7 +12,7 @@ from fit_worlds import coarse_study, recording
 import driftwalk as dw
 from driftwalk.core.errors import InputError
 from driftwalk.schema import check_dataset
-from driftwalk.schema.answers.fit_facts import fit_facts, fit_variables, fitted_value
+from driftwalk.schema.answers.facts import facts_of, fit_parts, fitted_value
 from driftwalk.schema.stores.netcdf import open_netcdf
 
 
@@ -27,13 +27,11 @@ def stored(dataset: xr.Dataset, folder: Path) -> xr.Dataset:
     return open_netcdf(path)
 
 
-@pytest.mark.slow
 def test_what_is_stored_is_what_is_in_memory(fit: xr.Dataset, tmp_path: Path) -> None:
     xr.testing.assert_identical(stored(fit, tmp_path), fit)
-    assert fit_facts(stored(fit, tmp_path)) == fit_facts(fit)
+    assert facts_of(stored(fit, tmp_path)) == facts_of(fit)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("count", [0, 1, 2])
 def test_warnings_are_kept_however_many_there_are(
     fit: xr.Dataset, count: int, tmp_path: Path
@@ -42,11 +40,10 @@ def test_warnings_are_kept_however_many_there_are(
     told = fit.drop_vars("warning").assign_coords(warning=("warning", np.array(texts, np.str_)))
     found = stored(told, tmp_path)
     xr.testing.assert_identical(found, told)
-    assert fit_facts(found)["warnings"] == texts
+    assert facts_of(found)["warnings"] == texts
     check_dataset(found)
 
 
-@pytest.mark.slow
 def test_the_answer_has_units_and_verdicts(fit: xr.Dataset) -> None:
     assert dict(zip(fit["parameter"].values, fit["unit"].values, strict=True)) == {
         "drag_coefficient": "1",
@@ -71,7 +68,7 @@ def test_the_answer_has_units_and_verdicts(fit: xr.Dataset) -> None:
 
 
 def test_flat_facts_and_variables_are_each_other_s_inverse(fit: xr.Dataset) -> None:
-    data, coords = fit_variables(fit_facts(fit))
+    data, coords, _ = fit_parts(facts_of(fit))
     made = xr.Dataset(data, coords)
     for name in made.variables:
         np.testing.assert_array_equal(made[name].values, fit[name].values)

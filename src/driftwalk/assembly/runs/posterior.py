@@ -18,7 +18,7 @@ from driftwalk.assembly.runs.drawn_flow import RUNS_PER_FLOW
 from driftwalk.assembly.runs.plan import stream_keys
 from driftwalk.core.errors import InputError
 from driftwalk.model import declared
-from driftwalk.schema.answers.fit_facts import fitted_value
+from driftwalk.schema.answers.facts import fitted_value
 from driftwalk.schema.check import refuse_other_version
 
 if TYPE_CHECKING:

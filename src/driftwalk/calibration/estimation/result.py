@@ -19,7 +19,7 @@ from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.calibration.ranking.result import motion_warnings
 from driftwalk.calibration.ranking.verdict import verdict_of
 from driftwalk.motion import ParticleModel
-from driftwalk.schema.answers.fit_facts import BOUNDS, texts
+from driftwalk.schema.answers.facts import BOUNDS, texts
 from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:

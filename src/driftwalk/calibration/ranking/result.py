@@ -28,7 +28,7 @@ from driftwalk.calibration.ranking.verdict import VERDICT, Verdict, verdict_of
 from driftwalk.calibration.stationarity import Stationarity, stationarity_of_steps
 from driftwalk.comparison import KsReference
 from driftwalk.comparison.aspects import points_distance
-from driftwalk.schema.answers.fit_facts import texts
+from driftwalk.schema.answers.facts import texts
 from driftwalk.schema.check import build_dataset
 from driftwalk.simulation.series import series_warnings
 

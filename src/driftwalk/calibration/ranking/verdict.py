@@ -10,7 +10,7 @@ import numpy.typing as npt
 from driftwalk.calibration.held_out.checks import CHECKS
 from driftwalk.calibration.held_out.held_out_score import HeldOutScore
 from driftwalk.calibration.held_out.recorded import RecordedMotion
-from driftwalk.schema.answers.model_words import ASPECT_WORDS, CHECK_WORDS
+from driftwalk.schema.answers.model_comparison import ASPECT_WORDS, CHECK_WORDS
 
 Floats = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]

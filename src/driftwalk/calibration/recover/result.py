@@ -12,7 +12,7 @@ import numpy.typing as npt
 from driftwalk.calibration.estimation.determined import DETERMINED
 from driftwalk.calibration.recover.truth import KnownTruth
 from driftwalk.motion import MotionModel, ParticleModel
-from driftwalk.schema.answers.fit_facts import BOUNDS, texts
+from driftwalk.schema.answers.facts import BOUNDS, texts
 from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -23,9 +24,7 @@ from driftwalk.cli.options.cluster import ClusterAt, ClusterOptions, Workers
 from driftwalk.cli.options.shared import FlowFile, Json, Overwrite, RunFolder, Threads
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.options.vary import VARY_KEYS, Vary, vary_overrides
-from driftwalk.cli.terminal.answer import print_report_next, print_warnings
-from driftwalk.cli.terminal.output import print_json
-from driftwalk.cli.terminal.sensitivity_answer import print_answer, summary
+from driftwalk.cli.terminal.answer import print_prediction
 from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import SENSITIVITY_KEYS
 from driftwalk.schema.kinds.flow_series import flow_series_words
@@ -33,6 +32,7 @@ from driftwalk.schema.kinds.flow_series import flow_series_words
 if TYPE_CHECKING:
     from driftwalk.model import Study
     from driftwalk.runs import SensitivityResult
+    from driftwalk.schema.answers.parts import Answer
 
 
 @with_study_options(SENSITIVITY_KEYS, "runs", "realisations", *RUN_NAMES)
@@ -96,12 +96,26 @@ def sensitivity(
     with Workers(cluster, cluster_options).reported("sensitivity") as told:
         result = run_sensitivity(work, out, overwrite=overwrite, begun=begun, **told)
     warnings = [*source.warnings, *_warnings(source, result)]
-    if json:
-        print_json({**summary(work.study, result), "warnings": warnings})
-        return
-    print_answer(work.study, result, out)
-    print_warnings(warnings)
-    print_report_next(*([] if run is None else [run]), out)
+    print_prediction(sensitivity_of(result), out, run, warnings, json=json)
+
+
+def sensitivity_of(result: SensitivityResult) -> Answer:
+    """Return the answer of a sensitivity study."""
+    from driftwalk.assembly import disconnected_alignment
+    from driftwalk.schema.answers.sensitivity import sensitivity_answer
+
+    aligned = None
+    if result.components is not None:
+        # Without it, all classes that vary are of one kind.
+        with suppress(InputError):
+            aligned = disconnected_alignment(result.components)._asdict()
+    return sensitivity_answer(
+        result.sensitivity,
+        reference=result.reference,
+        components=result.components,
+        indices=result.indices,
+        aligned=aligned,
+    )
 
 
 def _flow_paths(study: Study, folder: Path) -> dict[str, Path]:

@@ -11,7 +11,7 @@ import typer
 from driftwalk.cli.options.flatten_options import with_options
 from driftwalk.cli.options.shared import Replace
 from driftwalk.cli.options.tracking import TrackingOptions
-from driftwalk.cli.terminal.output import print_note
+from driftwalk.cli.terminal.output import print_note, printable
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -84,22 +84,27 @@ class _Printer:
         if dropped > self._dropped and frame.time >= self._next_dropped:
             # A camera that is too fast drops some at every frame.
             self._next_dropped = frame.time + 1.0
-            print(f"{frame.time:9.2f} s  dropped  {dropped - self._dropped} ({dropped} up to now)")
+            _say(frame.time, "dropped", f"{dropped - self._dropped} ({dropped} up to now)")
             self._dropped = dropped
         if observed is None:
             return
         for event in observed.events:
             faces = zip(event.bodies, event.faces, strict=True)
             between = " - ".join(f"{body}:{face}" for body, face in faces)
-            print(f"{event.time:9.2f} s  {event.kind}  {between}  {event.outcome}")
+            _say(event.time, event.kind, between, event.outcome)
         if observed.possible != self._class:
             self._class = observed.possible
             hidden = f"  (hidden: {', '.join(observed.hidden)})" if observed.hidden else ""
-            print(f"{frame.time:9.2f} s  class  {_classes(observed)}{hidden}")
+            _say(frame.time, "class", f"{_classes(observed)}{hidden}")
         if frame.time >= self._next:
             self._next = frame.time + 1.0
             poses = "  ".join(_pose(state) for state in states) or "no block is followed yet"
-            print(f"{frame.time:9.2f} s  {poses}", flush=True)
+            _say(frame.time, poses)
+
+
+def _say(time: float, *words: str) -> None:
+    """Print what happened; a marker's name may hold what a terminal obeys."""
+    print(printable("  ".join([f"{time:9.2f} s", *words])), flush=True)
 
 
 def _classes(observed: AssemblySeen) -> str:

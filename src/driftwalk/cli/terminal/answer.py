@@ -1,57 +1,72 @@
-"""The answer of a command in rows for people: a label, a value with its unit, an interval."""
+"""The answer of a command on stdout, its warnings on stderr, and where everything is."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import sys
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from driftwalk.cli.terminal.output import print_next, print_note, printable
-from driftwalk.schema.answers.answer import NOT_DETERMINED, SYMBOLS, Estimate, estimate_of
+from driftwalk.cli.terminal.argument_names import to_options
+from driftwalk.cli.terminal.output import (
+    command_text,
+    print_json,
+    print_next,
+    print_note,
+    printable,
+    sibling,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
 
-LABEL_WIDTH: Final = 22
-SMALLEST_FIXED: Final = 1e-3
-"""Smaller numbers are printed with an exponent."""
-WORDS: Final = MappingProxyType(
-    {
-        "drag_coefficient": "drag coefficient",
-        "force_std": "stochastic force",
-        "force_noise_intensity": "noise intensity",
-    }
-)
-"""Words in front of a parameter's symbol."""
+    from driftwalk.schema.answers.parts import Answer, Part
+
+_FILES: Final = {
+    "fit": {"flow": "flow.nc"},
+    "calibration": {"figures": "figures"},
+    "model_calibration": {"figures": "figures"},
+    "model_comparison": {"comparison": "comparison.nc", "figures": "figures"},
+    "recovery": {"every recording": "recovery.nc"},
+    "model_recovery": {"every recording": "model_recovery.nc"},
+}
+"""By kind of dataset, what a run directory holds besides its answer."""
 
 
-def label_of(parameter: str) -> str:
-    """Return what a row calls a parameter.
+def print_result(found: xr.Dataset, folder: Path, *, json: bool, **more: Any) -> None:
+    """Print the answer of a run, as one JSON object or for people, and what comes next.
 
-    Examples
-    --------
-    >>> label_of("force_std"), label_of("tracking_noise")
-    ('stochastic force σ_F', 'tracking noise')
+    Parameters
+    ----------
+    found : xarray.Dataset
+        The main dataset of the run.
+    folder : Path
+        The run directory.
+    json : bool
+        Whether programs read it.
+    **more
+        What else the run made, see `answer_of`.
     """
-    words = WORDS.get(parameter, parameter.replace("_", " "))
-    return f"{words} {SYMBOLS[parameter]}" if parameter in SYMBOLS else words
+    from driftwalk.schema.answers.answer import answer_of
+
+    answer = answer_of(found, **more)
+    if answer is None:
+        raise TypeError(f"a {found.attrs.get('kind')} has no answer")
+    if json:
+        print_json(answer.facts)
+        return
+    print_parts(answer.parts)
+    print_places(found, folder, answer.warnings)
 
 
-def number_text(value: float) -> str:
-    """Return a number with four decimals, or with three digits where these would all be zeros.
+def print_parts(parts: Iterable[Part]) -> None:
+    """Print parts of an answer."""
+    from driftwalk.schema.answers.parts import lines_of
 
-    Examples
-    --------
-    >>> number_text(0.61542), number_text(0.00002)
-    ('0.6154', '2e-05')
-    """
-    return f"{value:.4f}" if value >= SMALLEST_FIXED else f"{value:.3g}"
-
-
-def ends_text(found: Estimate) -> str | None:
-    """Return "0.3881 to 0.3976", None without an interval."""
-    return None if found.ends is None else " to ".join(number_text(end) for end in found.ends)
+    for line in lines_of(parts):
+        print(printable(to_options(line)))
+    # Through a pipe the answer would wait in the buffer for what follows, such as the figures.
+    sys.stdout.flush()
 
 
 def print_row(label: str, text: object) -> None:
@@ -62,44 +77,39 @@ def print_row(label: str, text: object) -> None:
     >>> print_row("flow", "fit/flow.nc")
     flow                   fit/flow.nc
     """
-    print(f"{printable(label):{LABEL_WIDTH}} {printable(str(text))}")
+    from driftwalk.schema.answers.parts import Row
+
+    print_parts([Row(label, str(text))])
 
 
-def print_origin(found: xr.Dataset) -> None:
-    """Say that a recording was simulated, where it was."""
-    if found.attrs.get("simulated_recording") == "yes":
-        print("This recording was simulated, not measured.")
+def print_places(found: xr.Dataset, folder: Path, warnings: Iterable[str]) -> None:
+    """Print the warnings, where everything is, and the command that comes next."""
+    print_warnings(warnings)
+    kind = str(found.attrs["kind"])
+    for label, name in _FILES[kind].items():
+        print_row(label, folder / name)
+    following = _following(found, kind)
+    if not following:
+        print_report_next(folder)
+        return
+    print_row("all in one page", command_text("report", folder, "-o", "report.html"))
+    command, *words, result = following
+    print_next(command, folder, *words, "-o", sibling(folder, result))
 
 
-def print_estimates(found: xr.Dataset, *parameters: str) -> None:
-    """Print a row for each of some parameters; a force without its interval means nothing.
+def _following(found: xr.Dataset, kind: str) -> list[str]:
+    """Return the command that takes a run further, its options, and a name for its result."""
+    from driftwalk.schema.answers.parts import undetermined
+    from driftwalk.schema.calibration import is_block
 
-    Parameters
-    ----------
-    found : xarray.Dataset
-        A `fit` or a `calibration`.
-    *parameters : str
-        Their names, in the order of the rows.
-    """
-    for name in parameters:
-        one = estimate_of(found, name)
-        if one.open:
-            print_row(label_of(name), NOT_DETERMINED)
-            continue
-        text = f"{number_text(one.value)} {one.unit}".rstrip()
-        if name == "force_std":
-            text += f", redrawn every {1e3 * float(found['force_interval']):g} ms"
-        ends = ends_text(one)
-        if ends is None:
-            said = "no interval without a bootstrap"
-        else:
-            said = f"{float(found['confidence']):.0%} interval {ends}"
-        print_row(label_of(name), f"{text}   {said}")
-
-
-def print_intensity(value: float) -> None:
-    """Print σ_F²·τ [N² s], which is what a recording tells of the force."""
-    print_row(label_of("force_noise_intensity"), f"{value:.4g} N² s")
+    if kind == "fit" or (kind == "calibration" and is_block(found)):
+        # Nothing can be simulated with what is not known.
+        return [] if kind == "fit" and undetermined(found) else ["assemble", "assembly"]
+    if kind not in ("calibration", "model_calibration"):
+        return []
+    # The user names a model that is none of driftwalk's own.
+    named = ["--model", str(found.attrs["model"])] if "model_source_sha256" in found.attrs else []
+    return ["simulate", *named, "motion.nc"]
 
 
 def print_warnings(texts: Iterable[str]) -> None:
@@ -108,9 +118,17 @@ def print_warnings(texts: Iterable[str]) -> None:
         print_note(f"warning: {text}")
 
 
-def print_figures(folder: Path) -> None:
-    """Print where the figures of a run are."""
+def print_prediction(
+    answer: Answer, folder: Path, run: Path | None, warnings: Sequence[str], *, json: bool
+) -> None:
+    """Print the answer of simulated assemblies; `run` is what their parameters were taken from."""
+    if json:
+        print_json({**answer.facts, "warnings": warnings})
+        return
+    print_parts(answer.parts)
     print_row("figures", folder / "figures")
+    print_warnings(warnings)
+    print_report_next(*([] if run is None else [run]), folder)
 
 
 def print_report_next(*runs: Path) -> None:

@@ -6,18 +6,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from driftwalk.cli.terminal.answer import ends_text, label_of, number_text
-from driftwalk.cli.terminal.calibration_answer import summary as calibration_summary
-from driftwalk.cli.terminal.fit_answer import answer
 from driftwalk.cli.terminal.output import print_note
-from driftwalk.schema.answers.answer import estimate_of, reader_unit
-from driftwalk.schema.answers.fit_facts import ESTIMATES
+from driftwalk.schema.answers.calibration import calibration_answer
+from driftwalk.schema.answers.fit import fit_json
+from driftwalk.schema.answers.parts import estimates, number_text
+from driftwalk.schema.kinds.fit_numbers import PARAMETERS
 
 if TYPE_CHECKING:
     import xarray as xr
 
-ROWS: Final = ("drag_coefficient", "force_std_N", "tracking_noise_m")
-"""The estimates by their flat names."""
+ROWS: Final = ("drag_coefficient", "force_std", "tracking_noise")
 TRUTH: Final = {
     "drag_coefficient": "acting_drag_coefficient",
     **{name: name for name in ("force_std_N", "force_interval_s", "tracking_noise_m")},
@@ -73,8 +71,8 @@ def in_json(fitted: Fitted, calibration: xr.Dataset) -> dict[str, Any]:
     """Return what ``--json`` prints: the two answers and the truth."""
     return {
         "truth": demo_truth(),
-        "fit": answer(fitted.fit, fitted.check) | {"flow_error": fitted.flow_error},
-        "calibration": calibration_summary(calibration),
+        "fit": fit_json(fitted.fit, fitted.check) | {"flow_error": fitted.flow_error},
+        "calibration": calibration_answer(calibration).facts,
     }
 
 
@@ -97,7 +95,7 @@ def print_fit(fit: xr.Dataset) -> None:
 
 def print_check(fitted: Fitted) -> None:
     """Print how far the flow is off, whether the model explains the recording, and what warns."""
-    fit = answer(fitted.fit, fitted.check)
+    fit = fit_json(fitted.fit, fitted.check)
     print_row("flow past the block", "", f"{fitted.flow_error:.1%} off")
     print_row("KS distance, floor", "", _distance(fit, "ks_noise_floor"))
     print_row("model explains it", "", _word(fit["explained"]))
@@ -116,7 +114,7 @@ def print_next(page: Path) -> None:
 
 def print_calibration(calibration: xr.Dataset) -> None:
     """Print the minimum of the map next to the truth, and its warnings."""
-    search = calibration_summary(calibration)
+    search = calibration_answer(calibration).facts
     _print_estimates("KS map in the fitted flow", calibration)
     print_row("KS distance, floor", "", _distance(search))
     print_row("model explains it", "", _word(bool(calibration["explained"])))
@@ -133,11 +131,17 @@ def print_places(folder: Path, page: Path) -> None:
 def _print_estimates(method: str, found: xr.Dataset) -> None:
     truth = demo_truth()
     print_row("", "truth", method)
-    for key in ROWS:
-        name, stored = ESTIMATES[key]
-        scale, unit = reader_unit(stored)
-        label = f"{label_of(name)} [{unit}]" if unit else label_of(name)
-        print_row(label, f"{scale * truth[key]:.4g}", _estimate(found, name))
+    shown = {one.number.name: one for one in estimates(found)}
+    for name in ROWS:
+        number, text = PARAMETERS[name], "taken from the recording"
+        if name in shown:
+            value, *ends = (
+                number_text(number.factor * one)
+                for one in (shown[name].value, *(shown[name].ends or ()))
+            )
+            text = f"{value} ({' to '.join(ends)})" if ends else value
+        label = f"{number.words} [{number.reader_unit}]" if number.reader_unit else number.words
+        print_row(label, f"{number.factor * truth[number.key]:.4g}", text)
 
 
 def print_row(name: str, *cells: str) -> None:
@@ -145,14 +149,6 @@ def print_row(name: str, *cells: str) -> None:
     widths = (9, 0)
     line = "".join(f"{cell:{width}}" for cell, width in zip(cells, widths, strict=True))
     print(f"{name:27}{line}".rstrip())
-
-
-def _estimate(found: xr.Dataset, name: str) -> str:
-    if name not in found["parameter"].values:
-        return "taken from the recording"
-    one = estimate_of(found, name)
-    ends = ends_text(one)
-    return number_text(one.value) + ("" if ends is None else f" ({ends})")
 
 
 def _distance(facts: dict[str, Any], floor: str = "noise_floor") -> str:

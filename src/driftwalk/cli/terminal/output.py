@@ -78,15 +78,10 @@ def print_table(
     samples       18001
     duration [s]  1800
     """
-    lines = [list(columns)] if columns is not None else []
-    lines += [[_cell(value) for value in row] for row in rows]
-    if title is not None:
-        print(printable(title))
-    count = max((len(line) for line in lines), default=0)
-    widths = [max(len(line[i]) for line in lines if i < len(line)) for i in range(count)]
-    for line in lines:
-        cells = [cell.ljust(width) for cell, width in zip(line, widths, strict=False)]
-        print(printable("  ".join(cells).rstrip()))
+    from driftwalk.schema.answers.parts import table_lines
+
+    for line in table_lines(rows, columns or (), title or ""):
+        print(printable(line))
 
 
 def print_note(text: str) -> None:
@@ -175,9 +170,3 @@ def require_place(path: Path, *, existing: str) -> None:
     require_free(path, existing=existing)
     if not os.access(path.parent, os.W_OK):
         raise InputError(f"{path}: permission denied to write in the folder {path.parent}")
-
-
-def _cell(value: Any) -> str:
-    if value is None:
-        return ""
-    return f"{value:.6g}" if isinstance(value, float) else str(value)

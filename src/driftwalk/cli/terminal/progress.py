@@ -86,6 +86,8 @@ class ProgressReporter:
     @property
     def left(self) -> str:
         """The time left in words; empty where nobody knows, or nothing is left."""
+        from driftwalk.schema.answers.parts import duration_text
+
         return f"{duration_text(self.left_s)} left" if self.left_s else ""
 
     def __call__(self, done: int, total: int, text: str = "") -> None:
@@ -170,19 +172,3 @@ def _count(done: int, total: int) -> str:
         return f"{done} of {total}"
     share = f"{100 * done / total:.0f} %"
     return share if total == WHOLE else f"{done} of {total} ({share})"
-
-
-def duration_text(seconds: float) -> str:
-    """Return a duration in words of at most two units.
-
-    Examples
-    --------
-    >>> duration_text(3725)
-    '1 h 2 min'
-    """
-    whole = round(seconds)
-    if whole < 60:
-        return f"{whole} s"
-    if whole < 3600:
-        return f"{whole // 60} min {whole % 60} s"
-    return f"{whole // 3600} h {whole % 3600 // 60} min"

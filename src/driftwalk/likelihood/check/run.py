@@ -29,7 +29,7 @@ from driftwalk.likelihood.estimate import estimate_of
 from driftwalk.likelihood.flow_of_fit import require_fit
 from driftwalk.likelihood.ready import as_list
 from driftwalk.likelihood.solution import BREAKDOWN
-from driftwalk.schema.answers.fit_facts import texts
+from driftwalk.schema.answers.facts import texts
 from driftwalk.schema.answers.verdict import with_verdict
 from driftwalk.schema.check import build_dataset
 

@@ -23,7 +23,7 @@ from driftwalk.likelihood.flow_of_fit import fitted_flow
 from driftwalk.likelihood.intervals import fitted_intervals
 from driftwalk.likelihood.spline import Floats
 from driftwalk.schema import Track
-from driftwalk.schema.answers.fit_facts import fitted_value
+from driftwalk.schema.answers.facts import fitted_value
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -18,9 +18,9 @@ from driftwalk.likelihood.flow_of_fit import fitted_flow
 from driftwalk.likelihood.intervals import fitted_intervals
 from driftwalk.likelihood.newton import Tell
 from driftwalk.likelihood.solution import BREAKDOWN
-from driftwalk.schema.answers.answer import undetermined
-from driftwalk.schema.answers.law_words import WALL_KEYS
+from driftwalk.schema.answers.parts import undetermined
 from driftwalk.schema.check import described
+from driftwalk.schema.kinds.fit_numbers import WALL_NUMBERS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -85,7 +85,8 @@ def estimate_wall(
     unknown = undetermined(fit)
     estimate = None if unknown else estimate_of(fit, recordings, body=body)
     # An earlier estimate may have left some.
-    fit = fit.drop_vars(WALL_KEYS, errors="ignore")
+    earlier = [f"{one.name}{end}" for one in WALL_NUMBERS for end in ("", "_interval")]
+    fit = fit.drop_vars(["wall_contacts", *earlier], errors="ignore")
     fit.attrs.pop("wall_left_out", None)
     if estimate is None:
         return fit.assign_attrs(wall_left_out=_stands_on(unknown))

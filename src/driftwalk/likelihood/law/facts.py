@@ -14,7 +14,7 @@ from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.law.assumptions import USUAL_ADDED_MASS, added_mass_of, is_stated
 from driftwalk.likelihood.solution import BREAKDOWN
-from driftwalk.schema.answers.fit_facts import fitted_value
+from driftwalk.schema.answers.facts import fitted_value
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -17,14 +17,14 @@ from driftwalk.likelihood.law.assumptions import FLOATING, Assumptions
 from driftwalk.likelihood.law.score_tests import Pulses, ScoreTests, find_pulses, score_tests
 from driftwalk.likelihood.newton import FROM_NEAR, Mode, ModeSearch
 from driftwalk.likelihood.prior import Weights
-from driftwalk.schema.answers.law_words import MEMORY_SIGMAS, OPENED_SIGMAS
+from driftwalk.schema.answers.force_law import MEMORY_SIGMAS, OPENED_SIGMAS
 
 
 class SelectionPolicy(NamedTuple):
     """When a number of a departure is opened, and when it stays open.
 
     A number is asked for when its score test is beyond `OPENED_SIGMAS`, and the force's memory
-    beyond `MEMORY_SIGMAS`: see `driftwalk.schema.answers.law_words`.
+    beyond `MEMORY_SIGMAS`: see `driftwalk.schema.answers.force_law`.
     """
 
     retained_sigmas: float = 3.0

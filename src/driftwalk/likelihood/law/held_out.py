@@ -21,7 +21,7 @@ from driftwalk.likelihood.law.search import evidence_of
 from driftwalk.likelihood.newton import ModeSearch, Passed, Tell
 from driftwalk.likelihood.prior import Prior
 from driftwalk.likelihood.solution import BREAKDOWN
-from driftwalk.schema.answers.answer import undetermined
+from driftwalk.schema.answers.parts import undetermined
 from driftwalk.schema.check import described
 
 if TYPE_CHECKING:

@@ -23,7 +23,7 @@ from driftwalk.likelihood.law.forward_selection import ForwardSelection, LawResu
 from driftwalk.likelihood.law.score_tests import ScoreTests, score_tests
 from driftwalk.likelihood.newton import FROM_ANOTHER, FROM_NEAR, Mode, ModeSearch, require_mode
 from driftwalk.likelihood.prior import Prior, Weights
-from driftwalk.schema.answers.law_words import LEAST_EVIDENCE, OPENED_SIGMAS
+from driftwalk.schema.answers.force_law import LEAST_EVIDENCE, OPENED_SIGMAS
 
 
 class LawPolicy(NamedTuple):

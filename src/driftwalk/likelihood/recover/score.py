@@ -16,7 +16,7 @@ from driftwalk.likelihood.flow_of_fit import fitted_flow, require_fit
 from driftwalk.likelihood.intervals import fitted_intervals
 from driftwalk.likelihood.wall import MARGIN
 from driftwalk.schema import FLAGS, body_track
-from driftwalk.schema.answers.fit_facts import fit_facts
+from driftwalk.schema.answers.facts import facts_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -133,7 +133,7 @@ def _parameter_score(fit: xr.Dataset, name: str, truth: float) -> dict[str, Any]
         raise InputError(
             f"the true {name} is {truth!r}: a positive number is needed, errors are relative to it"
         )
-    facts = fit_facts(fit)
+    facts = facts_of(fit)
     value = float(facts[name])
     low, high = facts[f"{name}_interval"]
     reach = 2.0 * float(ndtri(0.5 + 0.5 * facts["confidence"]))

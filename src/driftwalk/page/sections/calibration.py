@@ -13,9 +13,9 @@ from driftwalk.page.parts import (
     SIMULATED,
     Section,
     attempt,
+    card,
     empty_head,
     empty_section,
-    estimate,
     figure,
     head_sections,
     is_simulated,
@@ -29,7 +29,9 @@ from driftwalk.page.sections.map import map_section, region_part
 from driftwalk.page.sections.recording import Noise, recording_sections
 from driftwalk.page.words import count, quantity, with_interval
 from driftwalk.plot.parts.labels import interval_of
-from driftwalk.schema.answers.fit_facts import sentences
+from driftwalk.schema.answers.facts import sentences
+from driftwalk.schema.answers.parts import estimates
+from driftwalk.schema.calibration import is_block
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -110,19 +112,12 @@ def calibration_summary(calibration: xr.Dataset) -> Section:
 
 def _estimates(calibration: xr.Dataset) -> list[dict[str, Any]]:
     """Return the estimates; of the block the noise intensity as well."""
-    shown, intensity = [], []
-    for one in page_parameters(calibration):
-        note = None
-        if one == FORCE:
-            note = f"redrawn every {quantity(required(calibration, 'force_interval_s'), 's')}"
-            found = value_of(calibration, "force_noise_intensity_N2_s")
-            intensity = [figure("noise intensity", found, "N²·s", symbol="σ_F²·τ")]
-        shown.append(
-            estimate(
-                calibration, one.key, label=one.label, symbol=one.symbol, unit=one.unit, note=note
-            )
-        )
-    return [*shown, *intensity]
+    require(calibration, "estimate", "parameter", "unit")
+    shown = [card(one) for one in estimates(calibration)]
+    intensity = value_of(calibration, "force_noise_intensity_N2_s")
+    if is_block(calibration):
+        shown.append(figure("noise intensity", intensity, "N² s", symbol="σ_F²·τ"))
+    return shown
 
 
 def profile_sections(calibration: xr.Dataset) -> list[Section]:

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Final
 
+from driftwalk.core.errors import InputError
 from driftwalk.page.parts import (
     SIMULATED,
     Section,
     attempt,
+    card,
     empty_head,
     empty_section,
-    estimate,
     figure,
     head_sections,
     is_simulated,
     require,
-    required,
     section,
     value_of,
 )
@@ -25,14 +25,15 @@ from driftwalk.page.sections.flow import flow_sections
 from driftwalk.page.sections.law import law_sections
 from driftwalk.page.sections.recording import Noise, recording_sections
 from driftwalk.page.words import count, percent, quantity, with_interval
-from driftwalk.plot.parts.labels import interval_of
-from driftwalk.schema.answers.answer import NOT_DETERMINED
-from driftwalk.schema.answers.calibration_facts import facts_of
-from driftwalk.schema.answers.fit_facts import is_open, sentences
-from driftwalk.schema.answers.law_words import LINEAR_DRAG_ALONE
+from driftwalk.schema.answers.facts import sentences
+from driftwalk.schema.answers.fit import model_estimates
+from driftwalk.schema.answers.force_law import LINEAR_DRAG_ALONE
+from driftwalk.schema.answers.parts import NOT_DETERMINED, Estimate, estimates
 
 if TYPE_CHECKING:
     import xarray as xr
+
+_ANSWER: Final = ("drag_coefficient", "force_std", "tracking_noise")
 
 
 def fit_sections(
@@ -92,33 +93,16 @@ def fit_sections(
 
 def fit_summary(fit: xr.Dataset, check: xr.Dataset | None = None) -> Section:
     """Return the answer of a fit in words and numbers."""
-    every = quantity(required(fit, "force_interval_s"), "s")
     paragraphs = [SIMULATED] if is_simulated(fit) else []
     paragraphs += [_what_was_done(fit), _what_was_found(fit)]
     judge = _judge(fit, check)
     paragraphs += [] if judge is None else [_verdict(judge)]
     shown = [
-        *_drag(fit),
-        estimate(
-            fit, "force_std_N", label="stochastic force", symbol="σ_F", unit="N",
-            note=f"redrawn every {every}",
-        ),
-        estimate(
-            fit, "force_noise_intensity_N2_s", label="noise intensity", symbol="σ_F²·τ",
-            unit="N²·s",
-        ),
-        estimate(fit, "tracking_noise_m", label="tracking noise", symbol="", unit="m"),
+        *map(card, model_estimates(fit)),
         figure("mean squared error of prediction", value_of(fit, "chi_squared_per_dof"),
                note="1 if the model is right"),
     ]  # fmt: skip
     return section("summary", "summary", "Method and results", paragraphs=paragraphs, numbers=shown)
-
-
-def _drag(fit: xr.Dataset) -> list[dict[str, Any]]:
-    """Return C_d; nothing where a linear law has none."""
-    if fit.attrs.get("drag_law") == "linear":
-        return []
-    return [estimate(fit, "drag_coefficient", label="drag coefficient", symbol="C_d", unit="1")]
 
 
 def _what_was_done(fit: xr.Dataset) -> str:
@@ -153,10 +137,11 @@ def _what_was_done(fit: xr.Dataset) -> str:
 
 
 def _what_was_found(fit: xr.Dataset) -> str:
-    every = quantity(required(fit, "force_interval_s"), "s")
-    drag = _value_words(fit, "drag_coefficient", "1", before="C_d = ")
-    force = _value_words(fit, "force_std_N", "N", before="σ_F = ", after=f", redrawn every {every}")
-    noise = _value_words(fit, "tracking_noise_m", "m")
+    found = {one.number.name: _value_words(one) for one in estimates(fit)}
+    lacking = [name for name in _ANSWER if name not in found]
+    if lacking:
+        raise InputError(f"the fit has no {', '.join(lacking)}")
+    drag, force, noise = (found[name] for name in _ANSWER)
     linear = fit.attrs.get("drag_law") == "linear"
     of_drag = f": {LINEAR_DRAG_ALONE}" if linear else f" is {drag}"
     return (
@@ -165,14 +150,13 @@ def _what_was_found(fit: xr.Dataset) -> str:
     )
 
 
-def _value_words(
-    fit: xr.Dataset, name: str, unit: str, *, before: str = "", after: str = ""
-) -> str:
+def _value_words(one: Estimate) -> str:
     """Return an estimate with its interval, or that the recording does not determine it."""
-    if is_open(facts_of(fit), name):
+    if one.unknown:
         return NOT_DETERMINED
-    ends, confidence = interval_of(fit, f"{name}_interval"), value_of(fit, "confidence")
-    return f"{before}{with_interval(required(fit, name), ends, unit, confidence)}{after}"
+    symbol = f"{one.number.symbol} = " if one.number.symbol else ""
+    value = with_interval(one.value, one.ends, one.number.unit, one.confidence)
+    return f"{symbol}{value}{one.after}"
 
 
 def _verdict(check: xr.Dataset) -> str:
@@ -206,8 +190,8 @@ def _warnings(fit: xr.Dataset, check: xr.Dataset | None) -> list[str]:
 
 
 def _noise(fit: xr.Dataset) -> Noise | None:
-    value = value_of(fit, "tracking_noise_m")
-    if value is None or is_open(facts_of(fit), "tracking_noise_m"):
-        return None
-    low, high = interval_of(fit, "tracking_noise_m_interval") or (None, None)
-    return Noise(value, low, high, "estimated by the fit")
+    for one in estimates(fit):
+        if one.number.name == "tracking_noise" and not one.unknown:
+            low, high = one.ends or (None, None)
+            return Noise(one.value, low, high, "estimated by the fit")
+    return None

@@ -7,19 +7,16 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from driftwalk.page.parts import Section, figure, section, value_of
-from driftwalk.page.words import percent
-from driftwalk.schema.answers.compared_laws import compared_laws
-from driftwalk.schema.answers.fit_facts import fit_facts
-from driftwalk.schema.answers.law_words import (
+from driftwalk.page.parts import Section, card, figure, section
+from driftwalk.schema.answers.facts import facts_of
+from driftwalk.schema.answers.force_law import (
     MEMORY_SIGMAS,
     OPENED_SIGMAS,
-    LawNumber,
+    compared_laws,
+    law_estimates,
     law_limits,
-    law_numbers,
     law_words,
-    wall_numbers,
-    wall_words,
+    wall_estimates,
 )
 
 if TYPE_CHECKING:
@@ -44,13 +41,12 @@ CHANCE_SIGMAS: Final = 2.0
 
 def law_sections(fit: xr.Dataset) -> list[Section]:
     """Return the sections on the force law, its rivals, and the wall."""
-    facts = fit_facts(fit)
-    confidence = value_of(fit, "confidence")
+    facts = facts_of(fit)
     made = []
     rows = law_words(facts)
     if rows:
         said = [f"{_first_upper(label)}: {words}." for label, words in rows.items()]
-        shown = [_card(number, confidence) for number in law_numbers(facts)]
+        shown = [card(one) for one in law_estimates(fit)]
         if "law_settled_by" in facts:
             shown.insert(0, _settled(facts["law_settled_by"]))
         made.append(
@@ -60,11 +56,11 @@ def law_sections(fit: xr.Dataset) -> list[Section]:
             )
         )  # fmt: skip
     made += [part for part in (_compared(fit), _tested(fit)) if part is not None]
-    lacking, walls = wall_words(facts), wall_numbers(facts)
+    lacking, walls = fit.attrs.get("wall_left_out"), wall_estimates(fit)
     if lacking is not None or walls:
         words = f"The block touched the wall in {facts['wall_contacts']} passages."
         paragraphs = [words if lacking is None else f"The wall: {lacking}."]
-        numbers = [_card(number, confidence) for number in walls]
+        numbers = [card(one) for one in walls]
         made.append(section("wall", "summary", "The wall", paragraphs=paragraphs, numbers=numbers))
     return made
 
@@ -72,17 +68,6 @@ def law_sections(fit: xr.Dataset) -> list[Section]:
 def _settled(apart: float) -> dict[str, Any]:
     note = "difference of the logarithms of the evidence; below 3 the recording cannot tell"
     return figure("evidence for this law over the other", apart, note=note)
-
-
-def _card(number: LawNumber, confidence: float | None) -> dict[str, Any]:
-    """Return a number for a summary, in the units of the command line."""
-    card = figure(number.label, number.value, number.unit or "1", note=number.note)
-    if number.stated:
-        return card | {"note": f"stated; {number.note}"}
-    if not isfinite(number.high):
-        share = "" if confidence is None else f"{percent(confidence)}: "
-        return card | {"note": f"{share}{number.low:.2g} or more; {number.note}"}
-    return card | {"low": number.low, "high": number.high, "confidence": confidence}
 
 
 def _compared(fit: xr.Dataset) -> Section | None:

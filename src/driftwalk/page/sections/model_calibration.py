@@ -21,7 +21,7 @@ from driftwalk.page.parts import (
 )
 from driftwalk.page.sections.recording import recording_sections
 from driftwalk.page.words import cell, quantity
-from driftwalk.schema.answers.model_words import ASPECT_WORDS, CHECK_WORDS
+from driftwalk.schema.answers.model_comparison import ASPECT_WORDS, CHECK_WORDS
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -19,6 +19,7 @@ from driftwalk.page.parts import (
     section,
 )
 from driftwalk.page.words import count, percent, quantity
+from driftwalk.schema.answers.recovery import model_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -54,7 +55,7 @@ def model_recovery_sections(recovery: xr.Dataset | None) -> list[Section]:
         return empty_head(
             f"{recovery['parameter'].size} parameters are more than the {MOST_PARAMETERS} of a page"
         )
-    made = head_sections(lambda: summary_section(recovery), lambda: _warnings(recovery))
+    made = head_sections(lambda: summary_section(recovery), lambda: model_warnings(recovery))
     made += attempt("errors", "Errors and intervals", lambda: errors_section(recovery))
     for index, name in enumerate(recovery["parameter"].values):
         made += attempt(
@@ -139,14 +140,3 @@ def estimates_section(recovery: xr.Dataset, index: int) -> Section:
         x=label("recording"), y=label(name.replace("_", " "), str(one["unit"].values)),
         series=drawn, marks=[mark("truth", y=float(one["truth"]))],
     )  # fmt: skip
-
-
-def _warnings(recovery: xr.Dataset) -> list[str]:
-    require(recovery, "status", "message")
-    said = []
-    for status, words in ((1, "could not be calibrated"), (2, "could not be simulated")):
-        found = recovery["status"].values == status
-        if found.any():
-            why = str(recovery["message"].values[found][0])
-            said.append(f"{count(int(found.sum()), 'recording')} {words}: {why}")
-    return said

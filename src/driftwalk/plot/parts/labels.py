@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
-from driftwalk.schema.answers.calibration_facts import facts_of
+from driftwalk.schema.answers.facts import facts_of
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -8,7 +8,7 @@ import numpy as np
 
 from driftwalk.plot.parts.labels import ratio_axis
 from driftwalk.plot.parts.style import INK
-from driftwalk.schema.answers.model_words import ASPECT_WORDS, CHECK_LABELS
+from driftwalk.schema.answers.model_comparison import ASPECT_WORDS, CHECK_LABELS
 
 if TYPE_CHECKING:
     import xarray as xr

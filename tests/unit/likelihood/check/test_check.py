@@ -13,7 +13,7 @@ import driftwalk as dw
 from driftwalk.core.errors import InputError
 from driftwalk.model import apply_overrides
 from driftwalk.schema import build_trajectory
-from driftwalk.schema.answers.fit_facts import fit_facts
+from driftwalk.schema.answers.facts import facts_of
 
 CRITERIA = {
     *("autocorrelation", "tails", "outliers", "place", "time and place", "flow strength"),
@@ -90,10 +90,10 @@ def test_what_the_fit_says_of_its_innovations_is_said_again(
 ) -> None:
     """The fit computes the mean square and the correlation of neighbours by itself."""
     mean = float(check["chi_squared_per_dof"].mean())
-    assert mean == pytest.approx(fit_facts(fit)["chi_squared_per_dof"])
+    assert mean == pytest.approx(facts_of(fit)["chi_squared_per_dof"])
     weights = check["chi_squared_per_dof"].values
     first = (check["autocorrelation"].sel(lag=1).values * weights).sum() / weights.sum()
-    assert first == pytest.approx(fit_facts(fit)["autocorrelation"], abs=1e-9)
+    assert first == pytest.approx(facts_of(fit)["autocorrelation"], abs=1e-9)
 
 
 def test_sums_by_place_and_by_time_agree(check: xr.Dataset) -> None:

@@ -21,7 +21,7 @@ from driftwalk.likelihood.interval_inflation import _log_drag_std
 from driftwalk.likelihood.law.assumptions import assumptions_of
 from driftwalk.likelihood.law.held_out import LAWS
 from driftwalk.model import Study, apply_overrides
-from driftwalk.schema.answers.fit_facts import fit_facts, fitted_value
+from driftwalk.schema.answers.facts import facts_of, fitted_value
 from driftwalk.schema.check import check_dataset
 
 SECONDS = 300.0
@@ -80,7 +80,7 @@ def test_a_stated_power_of_the_drag_is_that_of_the_fit() -> None:
 @pytest.mark.slow
 def test_the_law_of_a_floating_body_is_found(floating: xr.Dataset) -> None:
     fit = dw.fit_motion(floating, study_with())
-    facts = fit_facts(fit)
+    facts = facts_of(fit)
     assert facts["force_law"] == "floating body"
     assert facts["law_settled_by"] > 20.0
     # The added mass is the usual one, which this body has: C_d holds its uncertainty, too.

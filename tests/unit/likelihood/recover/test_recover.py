@@ -13,7 +13,7 @@ from driftwalk.likelihood.recover import one as recover_one
 from driftwalk.likelihood.recover.one import Truth, simulated_recordings
 from driftwalk.model import apply_overrides
 from driftwalk.model.recover import true_time_step_s
-from driftwalk.schema.answers.fit_facts import fit_facts
+from driftwalk.schema.answers.facts import facts_of
 
 
 @pytest.fixture(scope="module")
@@ -110,15 +110,15 @@ def test_a_setting_is_the_fit_of_its_recording(found: xr.Dataset, flow: xr.Datas
         ("force_std", "force_std_N"),
         ("tracking_noise", "tracking_noise_m"),
     ):
-        assert float(part[name]) == pytest.approx(fit_facts(fit)[key], rel=1e-9)
-        low, high = fit_facts(fit)[f"{key}_interval"]
+        assert float(part[name]) == pytest.approx(facts_of(fit)[key], rel=1e-9)
+        low, high = facts_of(fit)[f"{key}_interval"]
         assert float(part[f"{name}_low"]) == pytest.approx(low, rel=1e-9)
         assert float(part[f"{name}_high"]) == pytest.approx(high, rel=1e-9)
     assert float(part["drag_coefficient_error"]) == pytest.approx(
-        fit_facts(fit)["drag_coefficient"] / 0.4 - 1.0, rel=1e-6
+        facts_of(fit)["drag_coefficient"] / 0.4 - 1.0, rel=1e-6
     )
-    assert float(part["wall_share"]) == fit_facts(fit)["wall_share"]
-    assert float(part["samples_used"]) == fit_facts(fit)["samples_used"]
+    assert float(part["wall_share"]) == facts_of(fit)["wall_share"]
+    assert float(part["samples_used"]) == facts_of(fit)["samples_used"]
     assert float(part["fit_time"]) > 0.0
     assert 0.0 < float(part["flow_error"]) < 1.0
 
@@ -128,7 +128,7 @@ def test_the_dataset_is_whole(found: xr.Dataset) -> None:
     assert (found["status"].values == 0).all()
     assert found["force_std"].attrs["units"] == "N"
     for name, value in (("drag_coefficient", 0.4), ("force_std_N", 6e-4)):
-        assert fit_facts(found)[name] == value
+        assert facts_of(found)[name] == value
     assert dw.model.parse_study(found.attrs["study"]).recover.recordings == 2
     assert np.isfinite(found["needed_duration"].values).all()
     assert found.attrs["flow"] == "flow_true.csv"

@@ -12,7 +12,7 @@ from fit_worlds import DRAG, FORCE_N, NOISE_M, fitted, recording
 import driftwalk as dw
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood.recover.score import block_flow
-from driftwalk.schema.answers.fit_facts import fit_facts
+from driftwalk.schema.answers.facts import facts_of
 
 R, SIDE = 0.15, 0.03
 
@@ -44,13 +44,13 @@ def test_the_parameters_are_held_beside_the_truth(fit: xr.Dataset) -> None:
     sd = np.sqrt(np.diag(fit["covariance"].values))[:3] * (1.0, 0.5, 1.0)
     truths = {"drag_coefficient": DRAG, "force_std_N": FORCE_N, "tracking_noise_m": NOISE_M}
     for (name, truth), width in zip(truths.items(), sd, strict=True):
-        value = fit_facts(fit)[name]
+        value = facts_of(fit)[name]
         assert score[name] == value
         assert score[f"{name}_true"] == truth
         assert score[f"{name}_sd"] == pytest.approx(width, rel=1e-6)
         assert score[f"{name}_error"] == pytest.approx((value - truth) / truth)
         assert score[f"{name}_z"] == pytest.approx(np.log(value / truth) / width, rel=1e-6)
-        assert [score[f"{name}_low"], score[f"{name}_high"]] == fit_facts(fit)[f"{name}_interval"]
+        assert [score[f"{name}_low"], score[f"{name}_high"]] == facts_of(fit)[f"{name}_interval"]
 
 
 @pytest.mark.fast_cases(6)
@@ -63,7 +63,7 @@ def test_a_90_percent_interval_reaches_1_645_standard_deviations(
 ) -> None:
     key = {"force_std": "force_std_N", "tracking_noise": "tracking_noise_m"}.get(name, name)
     plain = scored(fit)
-    truth = fit_facts(fit)[key] * math.exp(sds * float(plain[f"{key}_sd"]))  # type: ignore[arg-type]
+    truth = facts_of(fit)[key] * math.exp(sds * float(plain[f"{key}_sd"]))  # type: ignore[arg-type]
     score = scored(fit, **{name: truth})
     assert score[f"{key}_covered"] is covered
     assert score[f"{key}_z"] == pytest.approx(-sds)

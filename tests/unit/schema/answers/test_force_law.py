@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from driftwalk.schema.answers.compared_laws import compared_laws
-from driftwalk.schema.answers.law_words import (
+from driftwalk.schema.answers.facts import fit_parts
+from driftwalk.schema.answers.force_law import (
+    compared_laws,
+    law_estimates,
     law_limits,
-    law_numbers,
     law_words,
-    wall_numbers,
-    wall_words,
+    wall_estimates,
 )
 
 STATED = "as stated; the fit tried no other"
@@ -67,34 +67,56 @@ def test_a_stated_law_is_not_called_found(facts: dict[str, Any], rows: dict[str,
     assert law_words(facts) == rows
 
 
+def fit_of(facts: dict[str, Any], **attrs: str) -> xr.Dataset:
+    data, coords, _ = fit_parts({**facts, "confidence": 0.9})
+    return xr.Dataset(data, coords, {"kind": "fit", **attrs})
+
+
+def texts(facts: dict[str, Any], **attrs: str) -> list[str]:
+    return [f"{one.label} {one.text}" for one in law_estimates(fit_of(facts, **attrs))]
+
+
 def test_numbers_are_in_the_units_of_a_reader() -> None:
     facts = {
         "orientation_offset_rad": math.radians(5.0),
         "marker_x_m": 0.003,
         "force_memory_s": 0.1,
+        "pulse_frequency_Hz": 0.099945,
     }
     ends = [0.9, 1.1]
     facts |= {f"{key}_interval": [end * facts[key] for end in ends] for key in list(facts)}
-    assert [f"{one.label} {one.text()}" for one in law_numbers(facts)] == [
-        "memory of the force 0.1 s (0.09 to 0.11)",
-        "orientation offset 5° (4.5 to 5.5)",
-        "marker off by, x 3 mm (2.7 to 3.3)",
+    facts["pulse_frequency_Hz_interval"] = [0.099935, 0.099955]
+    assert texts(facts) == [
+        "memory of the force 0.1000 s   90% interval 0.09000 to 0.1100",
+        "orientation offset 5.000°   90% interval 4.500 to 5.500",
+        "marker off by, x 3.000 mm   90% interval 2.700 to 3.300",
+        "frequency of pulses 0.099945 Hz   90% interval 0.099935 to 0.099955",
     ]
 
 
 def test_an_open_interval_and_no_interval_are_said() -> None:
     wall = {"wall_contacts": 60, "wall_restitution": 0.5, "wall_friction": 1.2}
     wall |= {"wall_restitution_interval": [0.42, 0.58], "wall_friction_interval": [0.9, np.inf]}
-    assert wall_words(wall) is None
-    assert [one.text(2) for one in wall_numbers(wall)] == [
-        "0.5 (0.42 to 0.58)",
-        "1.2 (0.9 or more)",
+    assert [one.text for one in wall_estimates(fit_of(wall))] == [
+        "0.5000   90% interval 0.4200 to 0.5800",
+        "1.200   90% interval 0.9000 or more",
     ]
-    few = {"wall_contacts": 3, "wall_left_out": "3 contacts tell too little"}
-    assert wall_words(few) == "3 contacts tell too little"
-    assert wall_words({}) is None
-    stated = {"drag_power": 1.5, "drag_power_interval": [1.5, 1.5]}
-    assert law_numbers(stated)[0].text() == "1.5, as stated"
+    assert wall_estimates(fit_of({"wall_contacts": 3})) == []
+    assert texts({"drag_power": 1.5, "drag_power_interval": [1.5, 1.5]}) == [
+        "power of the drag 1.5, as stated"
+    ]
+    endless = {"drag_power": np.inf, "drag_power_interval": [0.9, np.inf]}
+    assert texts(endless) == [
+        "power of the drag so large that it makes no difference (0.9000 or more)"
+    ]
+
+
+def test_a_linear_drag_has_no_quadratic_part() -> None:
+    facts = {"linear_drag_kg_s": 5e-3, "effective_drag_coefficient": 0.4}
+    facts |= {f"{key}_interval": [0.9 * facts[key], 1.1 * facts[key]] for key in list(facts)}
+    assert len(law_estimates(fit_of(facts))) == 2
+    (one,) = law_estimates(fit_of(facts, drag_law="linear"))
+    assert (one.label, one.number.note) == ("linear drag", "there is no other drag")
 
 
 def test_the_added_mass_that_nobody_knows_is_named() -> None:

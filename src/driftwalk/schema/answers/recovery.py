@@ -1,26 +1,25 @@
-"""Output of `driftwalk study recover`: a table for people, the same as JSON for programs."""
+"""The answers of recovery studies, of a fit and of a motion model: errors and intervals."""
 
 from __future__ import annotations
 
-from pathlib import Path
+import json
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from driftwalk.cli.terminal.answer import print_report_next, print_row, print_warnings
-from driftwalk.cli.terminal.output import print_table
-from driftwalk.cli.terminal.progress import duration_text
-from driftwalk.schema.answers.answer import symbol_of
+from driftwalk.schema.answers.parts import Answer, Part, Table, each, length_text
+from driftwalk.schema.kinds.fit_numbers import PARAMETERS
+from driftwalk.schema.parameters import flat_name
 
 if TYPE_CHECKING:
     import xarray as xr
 
-PARAMETERS: Final = ("drag_coefficient", "force_std", "tracking_noise")
-SUMMARY: Final = (
+FITTED: Final = ("drag_coefficient", "force_std", "tracking_noise")
+_SUMMARY: Final = (
     *("median_absolute_error", "absolute_error_90", "bias", "rms_error", "spread", "rms_z"),
     *("coverage", "coverage_low", "coverage_high"),
 )
-ATTRS: Final = (
+_TRUTH: Final = (
     *("drag_coefficient", "force_std_N", "force_interval_s", "tracking_noise_m", "flow"),
     *("sample_interval_s", "recordings_per_fit", "missing_share", "seed", "confidence"),
     "coverage_confidence",
@@ -29,40 +28,59 @@ NOTABLE_BIAS: Final = 0.05
 NOTABLE_STANDARD_ERRORS: Final = 3.0
 NOTABLE_EXCESS: Final = 2.0
 """In standard errors of the logarithm of an rms."""
-COLUMNS: Final = ("length", "angle", "of", "median |error|", "90 % within", "bias", "rms z")
+_COLUMNS: Final = ("length", "angle", "of", "median |error|", "90 % within", "bias", "rms z")
+_SET_UP: Final = (
+    *("duration_s", "sample_rate_Hz", "missing_share", "position_noise_m", "noise"),
+    *("confidence", "seed"),
+)
+_STATUS: Final = {1: "could not be calibrated", 2: "could not be simulated"}
+_MODEL_SUMMARY: Final = (
+    *("truth", "median_error", "determined_median_error", "determined_share", "coverage"),
+    "coverage_standard_error",
+)
 
 
-def summary(found: xr.Dataset) -> dict[str, Any]:
-    """Return what ``--json`` prints: the truth, and the summary by length and use of the angle."""
-    results = []
-    for part in _parts(found):
-        table = {
-            name: {key: float(part[key].sel(parameter=name)) for key in SUMMARY}
-            for name in PARAMETERS
-        }
-        flow = {key: float(part[key]) for key in ("median_flow_error", "flow_error_90")}
-        results.append(
-            {
-                "duration_s": float(part["duration"]),
-                "angle": str(part["angle"].values),
-                **counts(part),
-                **table,
-                **flow,
-                "median_wall_share": float(np.nanmedian(part["wall_share"].values))
-                if np.isfinite(part["wall_share"].values).any()
-                else None,
-                "median_fit_s": _median_of_fitted(part["fit_time"].values),
-            }
-        )
+def recovery_answer(found: xr.Dataset) -> Answer:
+    """Return the answer of a recovery study: errors and intervals, and how long to record."""
+    truth = found.attrs
+    parts: list[Part] = [
+        f"truth: C_d {truth['drag_coefficient']:g}, σ_F {1e3 * truth['force_std_N']:g} mN every "
+        f"{1e3 * truth['force_interval_s']:g} ms, tracking noise "
+        f"{1e3 * truth['tracking_noise_m']:.3g} mm, flow: {truth['flow']}",
+        Table(
+            [row for part in _parts(found) for row in _rows(part)],
+            [*_COLUMNS, f"{truth['confidence']:.0%} intervals that hold the truth"],
+        ),
+        *map(_needed_sentence, each(found, "angle")),
+    ]
+    warnings = _warnings(found)
+    facts = {
+        "truth": {key: truth[key] for key in _TRUTH},
+        "results": [_result(part) for part in _parts(found)],
+        "needed": [_needed(part) for part in each(found, "angle")],
+        "warnings": warnings,
+    }
+    return Answer(parts, facts, warnings)
+
+
+def _result(part: xr.Dataset) -> dict[str, Any]:
     return {
-        "truth": {key: found.attrs[key] for key in ATTRS},
-        "results": results,
-        "needed": [_needed(found.sel(angle=angle)) for angle in found["angle"].values],
-        "warnings": warnings(found),
+        "duration_s": float(part["duration"]),
+        "angle": str(part["angle"].values),
+        **_counts(part),
+        **{name: _summary(part, name) for name in FITTED},
+        **{key: float(part[key]) for key in ("median_flow_error", "flow_error_90")},
+        "median_wall_share": _median(part["wall_share"].values),
+        "median_fit_s": _median(part["fit_time"].values),
     }
 
 
-def counts(part: xr.Dataset) -> dict[str, int]:
+def _summary(part: xr.Dataset, name: str) -> dict[str, float]:
+    one = part.sel(parameter=name)
+    return {key: float(one[key]) for key in _SUMMARY}
+
+
+def _counts(part: xr.Dataset) -> dict[str, int]:
     """Return what became of the recordings of one length."""
     fitted = int((part["status"].values == 0).sum())
     used = int(part["used"].values.sum())
@@ -74,11 +92,11 @@ def counts(part: xr.Dataset) -> dict[str, int]:
     }
 
 
-def warnings(found: xr.Dataset) -> list[str]:
+def _warnings(found: xr.Dataset) -> list[str]:
     """Return what the user should know, in sentences."""
     said = []
     for part in _parts(found):
-        number = counts(part)
+        number = _counts(part)
         where = _where(part)
         if number["at_the_wall"]:
             said.append(
@@ -93,8 +111,7 @@ def warnings(found: xr.Dataset) -> list[str]:
                 f"be fitted: {texts[0]}"
             )
     longest = found.isel(duration=-1)
-    for angle in found["angle"].values:
-        part = longest.sel(angle=angle)
+    for part in each(longest, "angle"):
         said += [f"{_where(part)}: {text}" for text in _doubts(part)]
     return said
 
@@ -105,8 +122,8 @@ def _where(part: xr.Dataset) -> str:
 
 def _doubts(part: xr.Dataset) -> list[str]:
     """Return what to say of C_d where its error is not the chance that the fits state."""
-    used = counts(part)["used"]
-    value = {key: float(part[key].sel(parameter="drag_coefficient")) for key in SUMMARY}
+    used = _counts(part)["used"]
+    value = _summary(part, "drag_coefficient")
     chance = value["spread"] / np.sqrt(max(used, 1))
     said = []
     if abs(value["bias"]) > max(NOTABLE_BIAS, NOTABLE_STANDARD_ERRORS * chance):
@@ -136,49 +153,15 @@ def _excess(part: xr.Dataset, rms_error: float) -> float:
     return float(rms_error / law)
 
 
-def length_text(seconds: float) -> str:
-    """Return a duration in words, without parts that are zero.
-
-    Examples
-    --------
-    >>> length_text(1800.0), length_text(5400.0)
-    ('30 min', '1 h 30 min')
-    """
-    return duration_text(seconds).removesuffix(" 0 s").removesuffix(" 0 min")
-
-
-def print_answer(found: xr.Dataset, folder: Path) -> None:
-    """Print the table, how long to record, and where the rest is."""
-    facts = found.attrs
-    print(
-        f"truth: C_d {facts['drag_coefficient']:g}, σ_F {1e3 * facts['force_std_N']:g} mN every "
-        f"{1e3 * facts['force_interval_s']:g} ms, tracking noise "
-        f"{1e3 * facts['tracking_noise_m']:.3g} mm, flow: {facts['flow']}"
-    )
-    rows = [row for part in _parts(found) for row in _rows(part)]
-    print_table(
-        rows, columns=[*COLUMNS, f"{facts['confidence']:.0%} intervals that hold the truth"]
-    )
-    for angle in found["angle"].values:
-        print(_needed_sentence(found.sel(angle=angle)))
-    print_warnings(warnings(found))
-    print_row("every recording", folder / "recovery.nc")
-    print_report_next(folder)
-
-
 def _parts(found: xr.Dataset) -> list[xr.Dataset]:
-    return [
-        found.sel(duration=duration, angle=angle)
-        for duration in found["duration"].values
-        for angle in found["angle"].values
-    ]
+    return [part for length in each(found, "duration") for part in each(length, "angle")]
 
 
 def _rows(part: xr.Dataset) -> list[list[str]]:
-    used = counts(part)["used"]
+    used = _counts(part)["used"]
     rows = []
-    for name in PARAMETERS:
-        value = {key: float(part[key].sel(parameter=name)) for key in SUMMARY}
+    for name in FITTED:
+        value = _summary(part, name)
         covered = (
             f"{round(value['coverage'] * used)} of {used} ({value['coverage_low']:.0%} to "
             f"{value['coverage_high']:.0%})"
@@ -188,7 +171,7 @@ def _rows(part: xr.Dataset) -> list[list[str]]:
         errors = [_percent(value[key]) for key in ("median_absolute_error", "absolute_error_90")]
         rows.append(
             [
-                symbol_of(name),
+                PARAMETERS[name].symbol or PARAMETERS[name].words,
                 *errors,
                 _percent(value["bias"], sign="+"),
                 f"{value['rms_z']:.2f}",
@@ -205,7 +188,7 @@ def _percent(value: float, *, sign: str = "") -> str:
     return f"{100 * value:{sign}.1f} %" if np.isfinite(value) else "-"
 
 
-def _median_of_fitted(values: Any) -> float | None:
+def _median(values: Any) -> float | None:
     known = values[np.isfinite(values)]
     return float(np.median(known)) if known.size else None
 
@@ -245,3 +228,80 @@ def _needed_sentence(part: xr.Dataset) -> str:
         )
         text = f"{head}for C_d to {asked:.1%} (rms) record {time} ({within} {low} to {high})"
     return f"{text}: an estimate from the {_basis(part)}"
+
+
+def model_recovery_answer(found: xr.Dataset) -> Answer:
+    """Return the answer of a recovery study of a motion model."""
+    set_up = found.attrs
+    lost = float(set_up["missing_share"])
+    columns = [
+        *("parameter", "truth", "median |error|", "determined in"),
+        f"{set_up['confidence']:.0%} intervals that hold the truth",
+    ]
+    parts: list[Part] = [
+        f"{set_up['model']}: {found.sizes['recording']} recordings of "
+        f"{length_text(float(set_up['duration_s']))} at {float(set_up['sample_rate_Hz']):g} Hz"
+        f"{f', {lost:.0%} of the samples missing' if lost else ''}, tracking noise "
+        f"{1e3 * float(set_up['position_noise_m']):.3g} mm"
+        f"{', which is known' if set_up['noise'] == 'known' else ''}",
+        Table([_model_row(one) for one in each(found, "parameter")], columns),
+    ]
+    warnings = model_warnings(found)
+    facts = {
+        "model": set_up["model"],
+        "fixed": json.loads(set_up["fixed"]),
+        "recordings": found.sizes["recording"],
+        "calibrated": int((found["status"].values == 0).sum()),
+        **{key: set_up[key] for key in _SET_UP},
+        "parameters": {
+            flat_name(str(one["parameter"].values), str(one["unit"].values)): {
+                **{name: _finite(float(one[name])) for name in _MODEL_SUMMARY},
+                **_model_counts(one),
+            }
+            for one in each(found, "parameter")
+        },
+        "warnings": warnings,
+    }
+    return Answer(parts, facts, warnings)
+
+
+def model_warnings(found: xr.Dataset) -> list[str]:
+    """Return what the user should know, in sentences."""
+    said = []
+    status = found["status"].values
+    for value, words in _STATUS.items():
+        which = status == value
+        if which.any():
+            why = str(found["message"].values[which][0])
+            said.append(f"{which.sum()} of {status.size} recordings {words}: {why}")
+    return said
+
+
+def _model_row(one: xr.Dataset) -> list[str]:
+    count = _model_counts(one)
+    unit = str(one["unit"].values)
+    error = float(one["median_error"])
+    held = f"{count['covered']} of {count['intervals']}" if count["intervals"] else "no intervals"
+    return [
+        str(one["parameter"].values).replace("_", " "),
+        f"{float(one['truth']):g} {'' if unit == '1' else unit}".rstrip(),
+        f"{100.0 * error:.1f} %" if np.isfinite(error) else "-",
+        f"{count['determined']} of {count['calibrated']}",
+        held,
+    ]
+
+
+def _model_counts(one: xr.Dataset) -> dict[str, int]:
+    """Return in how many recordings a parameter is what."""
+    known = np.isfinite(one["interval"].transpose("recording", "bound").values).all(axis=1)
+    calibrated = one["status"].values == 0
+    return {
+        "calibrated": int(calibrated.sum()),
+        "determined": int((one["determined"].values.astype(bool) & calibrated).sum()),
+        "intervals": int(known.sum()),
+        "covered": round(float(one["coverage"]) * known.sum()) if known.any() else 0,
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None

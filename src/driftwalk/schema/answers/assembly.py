@@ -1,0 +1,229 @@
+"""The answer of runs of many blocks: how often each class forms, or how large assemblies get."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from driftwalk.schema.answers.parts import Answer, Part, Table, by_name, each
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+MOST_ROWS: Final = 16
+"""Classes in the table: all 12 of four blocks, and the frequent ones of more."""
+SHOWN_TIMES: Final = 4
+"""Times in the table of sizes, equally far apart, the last one the end of the runs."""
+_OVER_TIME: Final = {
+    "mean_size": "mean_size_blocks",
+    "largest_share": "largest_share",
+    "free_share": "free_share",
+}
+"""Variables over time, and their keys in JSON."""
+_SETTINGS: Final = (
+    *("confidence", "blocks", "duration_s", "seed", "latching", "hidden_face_drag", "chirality"),
+    *("drag_coefficient", "force_std_N", "force_interval_s"),
+    *("first_contact_median_s", "completion_median_s"),
+)
+
+
+def assembly_answer(
+    found: xr.Dataset,
+    *,
+    times: xr.Dataset,
+    settings: Mapping[str, Any],
+    drawn: xr.Dataset | None = None,
+    sizes: xr.Dataset | None = None,
+    sizes_drawn: xr.Dataset | None = None,
+    apart: Mapping[str, float] | None = None,
+) -> Answer:
+    """Return the answer of an assembly run; the caller knows its warnings.
+
+    Parameters
+    ----------
+    found : xarray.Dataset
+        An `outcome_distribution`.
+    times : xarray.Dataset
+        The `class_times` of the same runs.
+    settings : mapping
+        ``drag_coefficient`` and ``force_std_N`` of these runs.
+    drawn : xarray.Dataset, optional
+        The `outcome_distribution` of runs with drawn parameters.
+    sizes, sizes_drawn : xarray.Dataset, optional
+        The `assembly_sizes` of both, where nearly every run is a class of its own.
+    apart : mapping, optional
+        ``l1_distance`` of the two distributions, ``l1_noise_floor`` and ``l1_noise_floor_95``.
+    """
+    facts = {**times.attrs, **found.attrs, **settings}
+    parts: list[Part] = [
+        f"{facts['blocks']} blocks, {facts['runs']} runs of {facts['duration_s']:g} s; "
+        f"C_d = {facts['drag_coefficient']:.4g}, σ_F = {1e3 * facts['force_std_N']:.4g} mN redrawn "
+        f"every {1e3 * facts['force_interval_s']:g} ms"
+    ]
+    if sizes is None:
+        parts.append(_classes(found, drawn))
+    else:
+        parts += _sizes(found, sizes, "parameters found" if drawn is not None else "")
+        if drawn is not None and sizes_drawn is not None:
+            parts += _sizes(drawn, sizes_drawn, "parameters drawn")
+    for event in ("first_contact", "completion"):
+        median = facts[f"{event}_median_s"]
+        reached = f"median {median:.4g} s" if median == median else "not reached in half the runs"
+        parts.append(f"{event.replace('_', ' ')}: {reached}")
+    if drawn is not None:
+        parts.append(f"drawn for each run: {', '.join(_drawn(drawn))}")
+        if apart and sizes is None:
+            parts.append(
+                f"l1 distance of the two: {apart['l1_distance']:.4f}; by chance "
+                f"{apart['l1_noise_floor']:.4f} (95 %: {apart['l1_noise_floor_95']:.4f})"
+            )
+    answer = {
+        **_json(found, sizes),
+        **{key: facts[key] for key in _SETTINGS},
+        "drawn": None
+        if drawn is None
+        else {"parameters": _drawn(drawn), **_json(drawn, sizes_drawn)},
+        **(apart or {}),
+    }
+    return Answer(parts, answer, [])
+
+
+def _drawn(distribution: xr.Dataset) -> list[str]:
+    """Return what was drawn for each run."""
+    return str(distribution.attrs["drawn"]).split()
+
+
+def _json(found: xr.Dataset, sizes: xr.Dataset | None) -> dict[str, Any]:
+    facts = found.attrs
+    return {
+        "proportions": by_name(found, "class", "proportion"),
+        "intervals": by_name(
+            found, "class", lambda one: [float(one[f"interval_{end}"]) for end in ("low", "high")]
+        ),
+        "complete": facts["complete"],
+        "complete_interval": [facts["complete_low"], facts["complete_high"]],
+        "runs": facts["runs"],
+        "left_out": facts["left_out"],
+        **({} if sizes is None else {"sizes": _sizes_json(sizes)}),
+    }
+
+
+def _classes(found: xr.Dataset, drawn: xr.Dataset | None) -> Table:
+    """Return how often each class came, the frequent ones only where there are many."""
+    both = [found] if drawn is None else [found, drawn]
+    interval = f"{found.attrs['confidence']:.0%} simultaneous intervals"
+    heads = [
+        "class",
+        "share",
+        interval,
+        *(["parameters drawn", interval] if drawn is not None else []),
+    ]
+    shares = [by_name(one, "class", "proportion") for one in both]
+    counts = [by_name(one, "class", "count") for one in both]
+    names = dict.fromkeys(name for one in shares for name in one)
+    seen = [name for name in names if any(one.get(name, 0) for one in counts)]
+    most = {name: max(one.get(name, 0.0) for one in shares) for name in seen}
+    frequent = sorted(seen, key=lambda name: -most[name])[:MOST_ROWS]
+    rest = [name for name in seen if name not in frequent]
+    rows = [
+        [name, *(cell for one in both for cell in _class_cells(one, name))]
+        for name in seen
+        if name in frequent
+    ]
+    if rest:
+        sums = [sum(one.get(name, 0.0) for name in rest) for one in shares]
+        rows.append([f"{len(rest)} others", *(cell for one in sums for cell in (_share(one), ""))])
+    rows.append(["complete", *(cell for one in both for cell in _complete(one))])
+    return Table(rows, heads)
+
+
+def _class_cells(distribution: xr.Dataset, name: str) -> tuple[str, str]:
+    if name not in distribution["class"].values:
+        return "", ""
+    row = distribution.sel({"class": name})
+    return _share(row["proportion"]), _between(row["interval_low"], row["interval_high"])
+
+
+def _complete(distribution: xr.Dataset) -> tuple[str, str]:
+    facts = distribution.attrs
+    return _share(facts["complete"]), _between(facts["complete_low"], facts["complete_high"])
+
+
+def _share(value: Any) -> str:
+    return f"{float(value):.4f}"
+
+
+def _between(low: Any, high: Any) -> str:
+    return f"{_share(low)} to {_share(high)}"
+
+
+def _sizes_json(sizes: xr.Dataset) -> dict[str, Any]:
+    """Return the sizes for programs; all are means over runs."""
+    facts = sizes.attrs
+    over_time = [_with_interval(sizes, name, key) for name, key in _OVER_TIME.items()]
+    return {
+        "at_end": [
+            {
+                "from_blocks": int(row["size"]),
+                "to_blocks": int(row["size_to"]),
+                **_with_interval(row, "number", "assemblies_per_run"),
+                **_with_interval(row, "block_share", "block_share"),
+            }
+            for row in each(sizes, "size")
+        ],
+        "over_time": {
+            "time_s": sizes["time"].values,
+            **{key: value for one in over_time for key, value in one.items()},
+        },
+        "compactness": facts["compactness"],
+        "compactness_interval": [facts[f"compactness_{end}"] for end in ("low", "high")],
+        "method": facts["method"],
+    }
+
+
+def _sizes(distribution: xr.Dataset, sizes: xr.Dataset, what: str) -> list[Part]:
+    """Return the sizes at the end of the runs, and how they grew."""
+    facts = sizes.attrs
+    interval = f"{facts['confidence']:.0%} interval"
+    rows = []
+    for row in each(sizes, "size"):
+        if row["number"] > 0:
+            first, last = int(row["size"]), int(row["size_to"])
+            name = str(first) if first == last else f"{first} to {last}"
+            rows.append([name, *_size_cells(row, "number"), *_size_cells(row, "block_share")])
+    heads = ["blocks in it", "assemblies per run", interval, "share of blocks", interval]
+    times = sizes.sizes["time"] - 1
+    chosen = [sizes.isel(time=round(times * (n + 1) / SHOWN_TIMES)) for n in range(SHOWN_TIMES)]
+    course = [
+        [f"{float(one['time']):.4g}", *(c for name in _OVER_TIME for c in _size_cells(one, name))]
+        for one in chosen
+    ]
+    over_time = [head for name in ("mean size", "in largest", "free") for head in (name, interval)]
+    parts: list[Part] = [Table(rows, heads, what), Table(course, ["time [s]", *over_time])]
+    if facts["compactness_runs"]:
+        ends = _range(facts["compactness_low"], facts["compactness_high"])
+        within = f" ({interval} {ends})" if ends else ""
+        parts.append(
+            f"compactness: {facts['compactness']:.3g}{within}, least perimeter over perimeter, "
+            "1 at most"
+        )
+    share, ends = _complete(distribution)
+    return [*parts, f"complete: {share} of the runs ({interval} {ends})"]
+
+
+def _with_interval(found: xr.Dataset, name: str, key: str) -> dict[str, Any]:
+    mean, low, high = (found[f"{name}{end}"].values.tolist() for end in ("", "_low", "_high"))
+    interval = [low, high] if found[name].ndim == 0 else np.stack([low, high], axis=1).tolist()
+    return {key: mean, f"{key}_interval": interval}
+
+
+def _size_cells(found: xr.Dataset, name: str) -> tuple[str, str]:
+    value, low, high = (float(found[f"{name}{end}"]) for end in ("", "_low", "_high"))
+    return f"{value:.3g}", _range(low, high)
+
+
+def _range(low: float, high: float) -> str:
+    """Return an interval, nothing of a single run."""
+    return f"{low:.3g} to {high:.3g}" if low == low else ""

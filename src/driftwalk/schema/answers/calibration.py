@@ -1,0 +1,118 @@
+"""The answers of calibrations: on a map of one or two parameters, and by summaries of many."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from driftwalk.schema.answers.facts import facts_of, flat_variables, sentences
+from driftwalk.schema.answers.model_comparison import own_score
+from driftwalk.schema.answers.parts import (
+    Answer,
+    Row,
+    by_name,
+    each,
+    estimates,
+    intensity_row,
+    origin,
+)
+from driftwalk.schema.calibration import is_block, stored_parameters
+from driftwalk.schema.kinds.calibration import CALIBRATION
+from driftwalk.schema.parameters import flat_name
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_NOT_IN_JSON: Final = ("explained", "far_above_floor", "region_level", "position_quantum_m")
+
+
+def calibration_answer(found: xr.Dataset) -> Answer:
+    """Return the answer of a calibration."""
+    facts, parts = facts_of(found), [*origin(found), *estimates(found)]
+    if "force_noise_intensity_N2_s" in facts:
+        parts.append(intensity_row(facts["force_noise_intensity_N2_s"]))
+    if "ks_distance" in facts and "noise_floor" in facts:
+        said = f"{facts['ks_distance']:.4f} at the optimum, noise floor {facts['noise_floor']:.4f}"
+        parts.append(Row("KS distance", said))
+    if "second_half_ks_distance" in facts:
+        said = (
+            f"{facts['second_half_ks_distance']:.4f} for a calibration on the first, noise floor "
+            f"{facts['second_half_noise_floor']:.4f}"
+        )
+        parts.append(Row("second half", said))
+    if "halves_ks_distance" in facts:
+        said = (
+            f"{facts['halves_ks_distance']:.4f} apart, halves of parts drawn at random "
+            f"{facts['halves_ks_distance_expected']:.4f}"
+        )
+        parts.append(Row("its own halves", said))
+    if "explained" in facts:
+        parts.append(Row("explained", facts["explained"]))
+    warnings = sentences(found, "warning")
+    return Answer(parts, _json(found, facts, warnings), warnings)
+
+
+def _json(found: xr.Dataset, facts: dict[str, Any], warnings: list[str]) -> dict[str, Any]:
+    own, block = [one.key for one in stored_parameters(found)], is_block(found)
+    keys = [*own, *(f"{key}_interval" for key in own)]
+    keys += [key for key in flat_variables(CALIBRATION) if key not in _NOT_IN_JSON]
+    if block:
+        keys += [f"{stage}_{key}" for stage in ("first_half", "coarse") for key in own]
+        shown = {key: facts.get(key) for key in keys}
+    else:
+        shown = {key: facts[key] for key in ("model", *keys) if key in facts}
+    return {**shown, "recording": facts.get("recording_name"), "warnings": warnings}
+
+
+def model_calibration_answer(found: xr.Dataset) -> Answer:
+    """Return the answer of a calibration of many parameters."""
+    parts = [*origin(found), *estimates(found)]
+    distance = (
+        f"{float(found['score']):.2f} ± {float(found['score_std']):.2f} noise floors from blocks "
+        f"not seen, the recording's own parts {own_score(found):.2f}"
+    )
+    parts.append(Row("distance", distance))
+    if "misfit" in found:
+        said = (
+            f"misfit {float(found['misfit']):.0f}, of the model's own recordings "
+            f"{float(found['usual_misfit']):.0f} (95 % below {float(found['most_misfit']):.0f})"
+        )
+        parts.append(Row("summaries", said))
+    explained = bool(found["explained"])
+    parts.append(Row("explained", "yes" if explained else f"no: {found['verdict'].values}"))
+    warnings = sentences(found, "warning")
+    numbers = (
+        *("score", "score_std", "searched_score", "matched_score", "misfit", "usual_misfit"),
+        *("most_misfit", "interval_stretch"),
+    )
+    attributes = ("confidence", "step_interval_s", "duration_s", "position_noise_m", "seed")
+    facts = {
+        "model": found.attrs["model"],
+        "parameters": {_key(one): _parameter(one) for one in each(found, "parameter")},
+        "fixed": json.loads(found.attrs["fixed"]),
+        "estimate_from": found.attrs["estimate_from"],
+        "explained": explained,
+        "verdict": str(found["verdict"].values),
+        "held_out_distance": by_name(found, "aspect", "held_out_distance"),
+        "own_distance": by_name(found, "aspect", "own_distance"),
+        **{name: float(found[name]) for name in numbers if name in found},
+        **{key: found.attrs[key] for key in attributes},
+        "warnings": warnings,
+    }
+    return Answer(parts, facts, warnings)
+
+
+def _parameter(one: xr.Dataset) -> dict[str, Any]:
+    ends = one["interval"].values
+    return {
+        "value": float(one["estimate"]),
+        "interval": ends.tolist() if np.isfinite(ends).all() else None,
+        "determined": bool(one["determined"]),
+        "range": one["range"].values.tolist(),
+    }
+
+
+def _key(one: xr.Dataset) -> str:
+    return flat_name(str(one["parameter"].values), str(one["unit"].values))

@@ -1,0 +1,176 @@
+"""The answer of a fit: its estimates, the force law, the wall, and the check of the model."""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import TYPE_CHECKING, Any, Final
+
+from driftwalk.schema.answers.facts import facts_of, flat_variables, is_open, sentences
+from driftwalk.schema.answers.force_law import (
+    LINEAR_DRAG_ALONE,
+    compared_laws,
+    law_estimates,
+    law_words,
+    wall_estimates,
+)
+from driftwalk.schema.answers.parts import (
+    Answer,
+    Estimate,
+    Part,
+    Row,
+    Table,
+    estimates,
+    intensity_row,
+    origin,
+)
+from driftwalk.schema.kinds.fit import FIT
+from driftwalk.schema.kinds.fit_numbers import LAW_NUMBERS, PARAMETERS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+FAR_ABOVE_FLOOR: Final = 2.0
+"""KS distance over its noise floor that is called far; as in a calibration."""
+TELLING_SHARE: Final = 0.02
+"""Share of the intervals at the wall from which there may be enough contacts to estimate it."""
+_ATTRIBUTES: Final = (
+    *("angle", "force_law", "force_law_stated", "drag_law", "drag_law_stated", "wall_left_out"),
+)
+_NOT_IN_JSON: Final = frozenset(
+    {
+        *("force_lever_m", "force_lever_m_interval", "explained", "residual_cell_size_m"),
+        *("orientation_noise_rad", "orientation_noise_rad_interval"),
+        *("drag_coefficient_angle_given", "drag_coefficient_angle_given_interval"),
+        *("angle_disagreement_std", "filter_drag_coefficient", "intervals_usable", "restricted"),
+        *("roughness_weight", "size_weight", "spline_origin_m", "spline_spacing_m"),
+        *("cell_size_m", "recording_start_s"),
+    }
+)
+"""Facts for programs that read fit.nc: of the second fit, of the flow's splines, of the search."""
+
+
+def fit_answer(fit: xr.Dataset, *, check: xr.Dataset | None = None) -> Answer:
+    """Return the answer of a fit; what its `model_check` says, where it is given."""
+    parts = [*fitted_parts(fit), *checked_parts(fit, check)]
+    return Answer(parts, fit_json(fit, check), sentences(fit, "warning"))
+
+
+def fitted_parts(fit: xr.Dataset, *, hint: str = "") -> list[Part]:
+    """Return the estimates and the force law: what is known before the model is checked.
+
+    Parameters
+    ----------
+    fit : xarray.Dataset
+        A `fit`.
+    hint : str
+        How to have the wall estimated: said where there are enough contacts, and nobody asked.
+    """
+    facts, parts = facts_of(fit), origin(fit)
+    if facts.get("drag_law") == "linear":
+        parts.append(Row(PARAMETERS["drag_coefficient"].words, LINEAR_DRAG_ALONE))
+    found = model_estimates(fit)
+    parts += [one for one in found if one.number.name != "force_noise_intensity"]
+    parts += [
+        intensity_row(one.value)
+        for one in found
+        if one.number.name == "force_noise_intensity" and not one.open
+    ]
+    parts += [Row(label, words) for label, words in law_words(facts).items()]
+    parts += law_estimates(fit)
+    if "wall_share" in facts:
+        asked = "wall_contacts" in facts or "wall_left_out" in facts
+        tells = facts.get("angle") == "state" and facts["wall_share"] > TELLING_SHARE
+        said = f"{facts['wall_share']:.1%}, left out{hint if tells and not asked else ''}"
+        parts.append(Row("intervals at the wall", said))
+    if "flow" in fit.dims and "switching_times_s" in facts:
+        names = ", ".join(map(str, fit["flow"].values[fit["interval_flow"].values]))
+        times = ", ".join(f"{time:g} s" for time in facts["switching_times_s"])
+        parts.append(Row("flows", f"{names}, switched at {times}"))
+    return parts
+
+
+def model_estimates(fit: xr.Dataset) -> list[Estimate]:
+    """Return the estimates of the block and the tracking noise; no C_d where the drag is linear."""
+    linear = fit.attrs.get("drag_law") == "linear"
+    return [
+        one
+        for one in estimates(fit)
+        if one.number not in LAW_NUMBERS and not (linear and one.number.name == "drag_coefficient")
+    ]
+
+
+def checked_parts(fit: xr.Dataset, check: xr.Dataset | None) -> list[Part]:
+    """Return what was found after the estimates: compared laws, the wall, the check."""
+    parts: list[Part] = []
+    laws = compared_laws(fit)
+    if laws:
+        rows = [
+            [law.name, f"{law.loss:.4f} ± {law.std:.4f}", f"{abs(law.evidence):.1f}"]
+            if law.solved
+            else [law.name, "no solution"]
+            for law in laws
+        ]
+        columns = ["force law", "held out prediction per sample", "evidence"]
+        parts.append(Table(rows, columns, "force laws, below the best"))
+    if "wall_left_out" in fit.attrs:
+        parts.append(Row("wall", str(fit.attrs["wall_left_out"])))
+    return [*parts, *wall_estimates(fit), *_verdict(fit, check)]
+
+
+def _verdict(fit: xr.Dataset, check: xr.Dataset | None) -> list[Part]:
+    """Return whether the model explains the recording, and what speaks against it."""
+    judge = fit if check is None else check
+    if "explained" not in judge:
+        left_out = fit.attrs.get("check_left_out")
+        return [] if left_out is None else [Row("model check", str(left_out))]
+    parts: list[Part] = [Row("model check", "the model explains this recording")]
+    explained = bool(judge["explained"])
+    if not explained:
+        findings = [f"  {text}" for text in sentences(judge, "finding")]
+        parts = [Row("model check", "THE MODEL DOES NOT EXPLAIN THIS RECORDING:"), *findings]
+    if check is None:
+        return parts
+    distance, floor = (float(check.attrs[name]) for name in ("ks_distance", "ks_noise_floor"))
+    if not isfinite(distance):
+        return [*parts, Row("KS distance", f"not available: {check.attrs['ks_left_out']}")]
+    far = explained and distance > FAR_ABOVE_FLOOR * floor
+    more = ": far, but within the uncertainty of the fit" if far else ""
+    return [*parts, Row("KS distance", f"{distance:.3f}, noise floor {floor:.3f}{more}")]
+
+
+def fit_json(fit: xr.Dataset, check: xr.Dataset | None = None) -> dict[str, Any]:
+    """Return the JSON of a fit; None for what the recording does not determine."""
+    facts = facts_of(fit)
+    for one in PARAMETERS.values():
+        if is_open(facts, one.key):
+            facts[one.key] = None
+    if "drag_coefficient" in facts and facts["drag_coefficient"] is None:
+        facts["maximum_likelihood_drag_coefficient"] = None
+    numbers = [one.key for one in PARAMETERS.values()]
+    names = [*numbers, *(f"{key}_interval" for key in numbers), *flat_variables(FIT), *_ATTRIBUTES]
+    shown = {key: facts[key] for key in names if key in facts and key not in _NOT_IN_JSON}
+    if "compared_law" in fit.dims:
+        shown["compared_laws"] = _laws(fit)
+    shown |= {"recording": facts.get("source"), "warnings": facts["warnings"]}
+    if check is None:
+        left_out = fit.attrs.get("check_left_out")
+        return shown | ({} if left_out is None else {"explained": None, "check_left_out": left_out})
+    distances = {key: float(check.attrs[key]) for key in ("ks_distance", "ks_noise_floor")}
+    return {
+        **shown,
+        "explained": bool(check["explained"]),
+        "findings": sentences(check, "finding"),
+        **{key: value if isfinite(value) else None for key, value in distances.items()},
+    }
+
+
+def _laws(fit: xr.Dataset) -> dict[str, dict[str, float | None]]:
+    """Return the compared laws, by name; None where one has no solution."""
+    names = ("log_evidence", "log_score", "log_score_std")
+    columns = {name: fit[f"compared_{name}"].values.tolist() for name in names}
+    return {
+        str(law): {
+            name: values[at] if isfinite(values[at]) else None for name, values in columns.items()
+        }
+        for at, law in enumerate(fit["compared_law"].values)
+    }

@@ -1,0 +1,186 @@
+"""The force law of a fit in words and numbers, and the force laws that it has compared."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import isfinite
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+
+from driftwalk.schema.answers.parts import Estimate, estimates
+from driftwalk.schema.kinds.fit_numbers import LAW_NUMBERS, WALL_NUMBERS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+LEAST_EVIDENCE: Final = 3.0
+"""Difference of the logarithms of the evidence for two laws, below which both may be right."""
+OPENED_SIGMAS: Final = 6.0
+"""A number is opened when its score test finds it so far from the model [standard deviations],"""
+MEMORY_SIGMAS: Final = 4.0
+"""or so far for the memory of the force, of which a fit says more than its test."""
+NOT_SEARCHED: Final = "as stated; the fit tried no other"
+LINEAR_DRAG_ALONE: Final = "none, as the drag is linear"
+"""Stands where C_d would."""
+PAPER, FLOATING = "the paper's", "a floating body's"
+DRAG_LAWS: Final = MappingProxyType(
+    {
+        "quadratic": "quadratic",
+        "linear": "linear",
+        "mixed": "quadratic with a linear part",
+        "power": "a power of the speed",
+    }
+)
+"""Words for the kinds of drag."""
+
+
+def law_estimates(fit: xr.Dataset) -> list[Estimate]:
+    """Return the numbers of the law, of the flow's strength and of the camera that a fit holds."""
+    linear = fit.attrs.get("drag_law") == "linear"
+    made = []
+    for one in estimates(fit):
+        if one.number not in LAW_NUMBERS or (linear and "drag_coefficient" in one.number.name):
+            continue
+        number = one.number
+        if linear and number.name == "linear_drag":
+            number = replace(number, note="there is no other drag")
+        made.append(one._replace(number=number, role="law"))
+    return made
+
+
+def wall_estimates(fit: xr.Dataset) -> list[Estimate]:
+    """Return restitution and friction of the wall; nothing where they were not estimated."""
+    confidence = float(fit["confidence"]) if "confidence" in fit else None
+    return [
+        Estimate(one, float(fit[one.name]), (low, high), confidence, role="wall")
+        for one in WALL_NUMBERS
+        if one.name in fit
+        for low, high in [map(float, fit[f"{one.name}_interval"].values)]
+    ]
+
+
+def law_words(facts: Mapping[str, Any]) -> dict[str, str]:
+    """Return in words which law was found or stated, by the name of its row.
+
+    Parameters
+    ----------
+    facts : mapping
+        Those of `facts_of`.
+
+    Returns
+    -------
+    dict
+        "force law", and "drag law" where it was stated alone; nothing in a fit of a version that
+        knew one law.
+
+    Examples
+    --------
+    >>> law_words({"force_law": "paper"})
+    {'force law': "the paper's, as far as this recording tells"}
+    >>> law_words({"force_law": "paper", "force_law_stated": "yes"})
+    {'force law': "the paper's, as stated; the fit tried no other"}
+    """
+    if "force_law" not in facts:
+        return {}
+    paper = facts["force_law"] == "paper"
+    found, other = (PAPER, FLOATING) if paper else (FLOATING, PAPER)
+    rows = {"force law": f"{found}{_support(facts, other, paper=paper)}"}
+    drag = str(facts.get("drag_law", "quadratic"))
+    whole = paper and drag == "quadratic" and facts.get("force_law_stated") == "yes"
+    if facts.get("drag_law_stated") == "yes" and not whole:
+        rows["drag law"] = f"{DRAG_LAWS.get(drag, drag)}, {NOT_SEARCHED}"
+    return rows
+
+
+def _support(facts: Mapping[str, Any], other: str, *, paper: bool) -> str:
+    """Return by how much the recording supports the law."""
+    if facts.get("force_law_stated") == "yes":
+        return f", {NOT_SEARCHED}"
+    settled = facts.get("law_settled_by")
+    if settled is None:
+        return ", as far as this recording tells" if paper else ""
+    if settled < LEAST_EVIDENCE:
+        return f"; the recording cannot tell it from {other}"
+    return f"; {other} is less likely by e^{settled:.0f}"
+
+
+def law_limits(facts: Mapping[str, Any]) -> list[str]:
+    """Return what no recording tells of the law, a sentence each."""
+    if "force_law" not in facts:
+        return []
+    linear = facts.get("drag_law") == "linear"
+    drag = "the linear drag" if linear else "C_d"
+    said = [
+        f"No recording tells the added mass: if {drag}, σ_F and 1 + added mass / mass are "
+        "multiplied by the same number, the motion stays the same."
+    ]
+    force = facts.get("force_std_any_added_mass_interval_N")
+    if force is None:
+        return said
+    low, high = (1e3 * end for end in force)
+    reach = f"σ_F is between {low:.4g} and {high:.4g} mN"
+    if not linear:
+        low, high = facts["drag_coefficient_any_added_mass_interval"]
+        reach = f"C_d is between {low:.4g} and {high:.4g}, {reach}"
+    said.append(
+        f"The numbers are those without added mass. If the block carries the usual one, {reach}."
+    )
+    return said
+
+
+class ComparedLaw(NamedTuple):
+    """One law, against the best ones; NaN where it has no solution."""
+
+    name: str
+    loss: float
+    """Loss of the mean logarithm of the density of a held out sample, against the best law."""
+    std: float
+    """Standard error of the loss."""
+    evidence: float
+    """Logarithm of the evidence, above that of the law with the most; at most 0."""
+
+    @property
+    def solved(self) -> bool:
+        """Whether the law has a solution."""
+        return isfinite(self.loss)
+
+
+def compared_laws(fit: xr.Dataset) -> list[ComparedLaw]:
+    """Return the compared laws, the best first; none where nobody asked for them.
+
+    Parameters
+    ----------
+    fit : xarray.Dataset
+        A `fit`.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> names = ("log_evidence", "log_score", "log_score_std")
+    >>> columns = [[7.0, 9.0], [1.5, 2.0], [0.1, 0.0]]
+    >>> fit = xr.Dataset(
+    ...     {f"compared_{n}": ("compared_law", c) for n, c in zip(names, columns)},
+    ...     {"compared_law": ["paper", "floating body"]},
+    ... )
+    >>> compared_laws(fit)[1]
+    ComparedLaw(name='paper', loss=0.5, std=0.1, evidence=-2.0)
+    """
+    if "compared_law" not in fit.dims:
+        return []
+    score = fit["compared_log_score"].values
+    evidence = fit["compared_log_evidence"].values
+    std = fit["compared_log_score_std"].values
+    known = bool(np.isfinite(score).any())
+    best, most = (float(np.nanmax(one)) if known else np.nan for one in (score, evidence))
+    return [
+        ComparedLaw(
+            str(fit["compared_law"].values[k]),
+            best - float(score[k]),
+            float(std[k]),
+            float(evidence[k]) - most,
+        )
+        for k in np.argsort(-score)
+    ]

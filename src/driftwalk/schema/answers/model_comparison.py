@@ -1,0 +1,148 @@
+"""The answer of compared motion models, and words for the parts of a comparison."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from driftwalk.schema.answers.facts import sentences
+from driftwalk.schema.answers.parts import Answer, Part, Table, by_name, each
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+ASPECT_WORDS: Final = {
+    "steps": "steps",
+    "steps_3": "steps of 3 intervals",
+    "steps_9": "steps of 9 intervals",
+    "frame": "displacement in the body's frame",
+    "wall": "place near the wall",
+    "memory": "memory of the speed",
+}
+CHECK_WORDS: Final = {
+    "displacement_1": "mean squared displacement over 1 step interval",
+    "displacement_3": "mean squared displacement over 3",
+    "displacement_10": "mean squared displacement over 10",
+    "displacement_30": "mean squared displacement over 30",
+    "displacement_100": "mean squared displacement over 100",
+    "speed_time": "time over which the speed lasts",
+    "wall_share": "share of the time at the wall",
+    "rest_share": "share of the time at rest",
+}
+CHECK_LABELS: Final = {
+    "displacement_1": "msd, 1 step", "displacement_3": "msd, 3 steps",
+    "displacement_10": "msd, 10 steps", "displacement_30": "msd, 30 steps",
+    "displacement_100": "msd, 100 steps", "speed_time": "speed lasts",
+    "wall_share": "at the wall", "rest_share": "at rest",
+}  # fmt: skip
+"""Short ones, for figures."""
+
+_COLUMNS: Final = ("model", "numbers", "distance", "behind", "D of steps")
+
+
+def own_score(found: xr.Dataset) -> float:
+    """Return the distance of the recording's own parts, as the models' distances are counted.
+
+    Parameters
+    ----------
+    found : xarray.Dataset
+        A `model_comparison` or a `model_calibration`.
+
+    Returns
+    -------
+    float
+        Mean over the aspects of the distance over the floor.
+    """
+    return float((found["own_distance"] / found["floor"]).mean())
+
+
+def comparison_answer(found: xr.Dataset) -> Answer:
+    """Return the answer of a comparison: the verdict, the ranking, the reasons."""
+    findings, warnings = sentences(found, "finding"), sentences(found, "warning")
+    models = each(found, "model")
+    asked = "asked" in found
+    rows = [
+        (
+            str(one["model"].values),
+            int(one["free_numbers"]),
+            f"{float(one['score']):.2f} ± {float(one['score_std']):.2f}",
+            f"{float(one['behind']):.2f} ± {float(one['behind_std']):.2f}" if index else "",
+            f"{float(one['held_out_distance'][0]):.3f}",
+            *((_misfit(one),) if asked else ()),
+            _explained(one),
+        )
+        for index, one in enumerate(models)
+    ]
+    columns = (*_COLUMNS, *(("misfit",) if asked else ()), "explained")
+    own = by_name(found, "aspect", "own_distance")
+    apart = ", ".join(f"{ASPECT_WORDS.get(name, name)} {value:.3f}" for name, value in own.items())
+    parts: list[Part] = [
+        *(f"{text}." for text in findings[:1]),
+        Table(rows, columns, "models, the closest first"),
+        f"D of the recording's own parts: {apart}",
+        *(f"{text}." for text in findings[1:]),
+    ]
+    attributes = ("step_interval_s", "duration_s", "worlds", "seed")
+    optional = ("halves_ks_distance", "halves_p_value")
+    facts = {
+        "findings": findings,
+        "models": [_model(one) for one in models],
+        "own_distance": own,
+        "floor": by_name(found, "aspect", "floor"),
+        "checks": by_name(
+            found,
+            "check",
+            lambda one: {
+                "unit": str(one["check_unit"].values),
+                "recorded": float(one["check_recorded"]),
+            },
+        ),
+        **{key: found.attrs[key] for key in attributes},
+        **{key: found.attrs[key] for key in optional if key in found.attrs},
+        "warnings": warnings,
+    }
+    return Answer(parts, facts, warnings)
+
+
+def _misfit(one: xr.Dataset) -> str:
+    if not bool(one["asked"]):
+        return ""
+    return f"{float(one['misfit']):.0f} (own below {float(one['most_misfit']):.0f})"
+
+
+def _explained(one: xr.Dataset) -> str:
+    if bool(one["baseline"]):
+        return "a walk of steps"
+    return "yes" if bool(one["explained"]) else "no"
+
+
+def _model(one: xr.Dataset) -> dict[str, Any]:
+    """Return a model for programs."""
+    ends, summaries = one["end_score"].values, {}
+    if "asked" in one and bool(one["asked"]):
+        names = ("misfit", "usual_misfit", "most_misfit", "unlikely")
+        summaries = {"named": bool(one["named"]), **{name: float(one[name]) for name in names}}
+    known = one.isel(parameter=np.flatnonzero(np.isfinite(one["estimate"].values)))
+    return {
+        "model": str(one["model"].values),
+        "explained": bool(one["explained"]),
+        "verdict": str(one["verdict"].values),
+        "baseline": bool(one["baseline"]),
+        "numbers": int(one["free_numbers"]),
+        **{name: float(one[name]) for name in ("score", "score_std", "behind", "behind_std")},
+        **summaries,
+        "held_out_distance": by_name(one, "aspect", "held_out_distance"),
+        "checks": by_name(
+            one,
+            "check",
+            lambda of: [float(of[f"check_{part}"]) for part in ("low", "median", "high")],
+        ),
+        "estimate": by_name(
+            known,
+            "parameter",
+            lambda of: {"value": float(of["estimate"]), "unit": str(of["parameter_unit"].values)},
+        ),
+        "end_scores": ends[np.isfinite(ends)].tolist(),
+        "evaluations": int(one["evaluations"]),
+    }

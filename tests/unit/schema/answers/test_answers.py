@@ -1,0 +1,64 @@
+"""What the terminal, a notebook and ``--json`` say of a stored result of each kind."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import xarray as xr
+from small_sensitivity import small
+
+from driftwalk.cli.prediction.assemble import assembled
+from driftwalk.cli.prediction.sensitivity import sensitivity_of
+from driftwalk.cli.terminal.answer import print_parts, print_places, print_prediction
+from driftwalk.cli.terminal.output import to_json
+from driftwalk.notebook.result import answer_lines
+from driftwalk.runs import AssemblyResult, SensitivityResult
+from driftwalk.schema.answers.answer import answer_of
+from driftwalk.schema.answers.parts import Answer
+
+STORED = Path(__file__).resolve().parents[3] / "data" / "answers"
+FORMS = sorted(path.stem for path in STORED.glob("*.txt"))
+RUN = Path("run")
+
+
+def stored(name: str) -> xr.Dataset:
+    """Return a small result, without the maps and fields that no answer shows."""
+    return xr.Dataset.from_dict(json.loads((STORED / f"{name}.json").read_text()))
+
+
+def answered(form: str) -> tuple[xr.Dataset, Answer]:
+    """Return the main dataset of a run, and its answer with what else the run made."""
+    if form.startswith("assembly"):
+        found, times = stored("outcome-distribution"), stored("class-times")
+        drawn = found.assign_attrs(drawn="drag_coefficient force_std")
+        result = AssemblyResult(found, times, drawn)
+        if form == "assembly-of-many":
+            result = AssemblyResult(found, times, None, stored("assembly-sizes"))
+        return found, assembled(small(), result)
+    found = stored(form)
+    if form == "sensitivity":
+        reference = stored("outcome-distribution-of-realisations")
+        more = stored("components"), stored("sobol-indices-of-a-tank")
+        return found, sensitivity_of(SensitivityResult(reference, found, *more))
+    more = {"check": stored("model-check")} if form.endswith("in-the-state") else {}
+    answer = answer_of(found, **more)
+    assert answer is not None
+    return found, answer
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_an_answer_is_what_it_was(form: str, capsys: pytest.CaptureFixture[str]) -> None:
+    found, answer = answered(form)
+    if form.startswith(("assembly", "sensitivity")):
+        print_prediction(answer, RUN, None, answer.warnings, json=False)
+    else:
+        print_parts(answer.parts)
+        print_places(found, RUN, answer.warnings)
+    shown = capsys.readouterr()
+    notebook = "".join(f"{line}\n" for line in answer_lines(found))
+    text = f"== terminal\n{shown.out}== remarks\n{shown.err}== notebook\n{notebook}"
+    expected, _, values = (STORED / f"{form}.txt").read_text().partition("== json\n")
+    assert json.loads(to_json(answer.facts)) == json.loads(values)
+    assert text == expected
