@@ -12,8 +12,7 @@ from driftwalk.cli.options.model import ModelName, ParameterChoices, chosen_mode
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import FlowFile, Json, Overwrite, RunFolder, Threads
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal import calibration_answer, model_answer
-from driftwalk.cli.terminal.output import print_json
+from driftwalk.cli.terminal.result import print_result
 from driftwalk.core.study_keys import CALIBRATION_KEYS
 
 
@@ -57,7 +56,7 @@ def calibrate(
     """
     from driftwalk.conditions import About, jump_warnings
     from driftwalk.motion import feels_others
-    from driftwalk.runs import CalibrationWork, run_calibration
+    from driftwalk.runs import CalibrationWork, run_work
 
     chosen = chosen_model(model, parameters)
     others = feels_others(chosen)
@@ -72,10 +71,5 @@ def calibrate(
     jumps = jump_warnings(read.trajectories[0], read.body)
     begun = opening_note(read.study, given, about=about, warnings=jumps)
     with Workers(cluster, cluster_options).reported("calibrate") as told:
-        found = run_calibration(work, out, overwrite=overwrite, begun=begun, **told)
-    many = found.attrs["kind"] == "model_calibration"
-    answer = model_answer if many else calibration_answer
-    if json:
-        print_json(answer.summary(found))
-    else:
-        answer.print_answer(found, out)
+        found = run_work(work, out, overwrite=overwrite, begun=begun, **told)
+    print_result(found, out, json=json)

@@ -13,8 +13,8 @@ from driftwalk.cli.options.model import ComparedParameters, parameter_choices
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import FlowFile, Json, Overwrite, RunFolder, Threads
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal.models_answer import Ranking, print_answer, summary
-from driftwalk.cli.terminal.output import print_json
+from driftwalk.cli.terminal.models_answer import Ranking
+from driftwalk.cli.terminal.result import print_result
 from driftwalk.core.study_keys import CALIBRATION_KEYS
 
 
@@ -59,7 +59,7 @@ def compare_models(
     from driftwalk.calibration import ALL_MODELS, DEFAULT_MODELS
     from driftwalk.conditions import About, jump_warnings
     from driftwalk.motion import feels_others, models_knowing
-    from driftwalk.runs import ModelComparisonWork, run_model_comparison
+    from driftwalk.runs import ModelComparisonWork, run_work
 
     if models is None:
         named: Sequence[str] = DEFAULT_MODELS
@@ -73,16 +73,13 @@ def compare_models(
         recording, flow, given, how, bodies="all" if others else "named"
     )
     body = read.body if others else how.body
-    work = ModelComparisonWork(
-        read.trajectories[0], chosen, read.study, field, body, inputs, threads
-    )
     about: About = "block" if "block" in chosen else "tank"
     jumps = jump_warnings(read.trajectories[0], read.body)
     begun = opening_note(read.study, given, about=about, warnings=jumps)
     with Workers(cluster, cluster_options).reported("compare models") as told:
         said: dict[str, Any] = {} if json else {"finished": Ranking(told["progress"])}
-        found = run_model_comparison(work, out, overwrite=overwrite, begun=begun, **said, **told)
-    if json:
-        print_json(summary(found))
-    else:
-        print_answer(found, out)
+        work = ModelComparisonWork(
+            read.trajectories[0], chosen, read.study, field, body, inputs, threads, **said
+        )
+        found = run_work(work, out, overwrite=overwrite, begun=begun, **told)
+    print_result(found, out, json=json)

@@ -68,14 +68,11 @@ def fit(
     """
     from driftwalk.cli.terminal.fit_answer import answer, print_found, print_places, print_verdict
     from driftwalk.likelihood import fit_work
-    from driftwalk.runs import FitWork, run_fit
+    from driftwalk.runs import FitWork, run_work
 
     read = read_for_run(recordings, given, how)
     inputs = {"recording" if n == 0 else f"recording-{n + 1}": p for n, p in enumerate(recordings)}
     inputs.update({"study": given.file} if given.file is not None else {})
-    work = FitWork(
-        read.trajectories, read.study, how.body, inputs, not no_check, compare_laws, wall
-    )
     effort = fit_work(sum(one.sizes["time"] for one in read.trajectories))
     opening = opening_note(read.study, given, about="block")
 
@@ -85,11 +82,22 @@ def fit(
             print_note(to_options(f"{effort.describe()}; to take less, {effort.advice()}"))
 
     # Each part of the answer is printed as soon as it is there; JSON at the end, in one piece.
-    said: dict[str, Any] = {"fitted": partial(print_found, wall=wall), "checked": print_verdict}
-    if json:
-        said = {}
+    said: dict[str, Any] = {
+        "fitted": partial(print_found, wall=wall),
+        "checked_model": print_verdict,
+    }
+    work = FitWork(
+        recordings=read.trajectories,
+        study=read.study,
+        body=how.body,
+        inputs=inputs,
+        check=not no_check,
+        compare_laws=compare_laws,
+        wall=wall,
+        **({} if json else said),
+    )
     with reported("fit") as told:
-        found = run_fit(work, out, overwrite=overwrite, begun=begun, **said, **told)
+        found = run_work(work, out, overwrite=overwrite, begun=begun, **told)
     if json:
         print_json(answer(found.fit, found.check))
     else:

@@ -22,7 +22,8 @@ from driftwalk.cli.options.model import (
 from driftwalk.cli.options.recording import RecordingOptions
 from driftwalk.cli.options.shared import Json, Overwrite, RunFolder, quantity_option
 from driftwalk.cli.options.study import StudyOptions, option_name, with_study_options
-from driftwalk.cli.terminal.output import print_json, print_note
+from driftwalk.cli.terminal.output import print_note
+from driftwalk.cli.terminal.result import print_result
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.study_keys import RECOVER_KEYS
 
@@ -179,8 +180,7 @@ def _of_model(
     json: bool,
 ) -> None:
     from driftwalk.cli.inputs.assembly_source import load_flow_for
-    from driftwalk.cli.terminal.model_recover_answer import print_answer, summary
-    from driftwalk.runs import ModelRecoveryWork, run_model_recovery
+    from driftwalk.runs import ModelRecoveryWork, run_work
 
     recording = None
     if set_up.like is not None:
@@ -217,11 +217,8 @@ def _of_model(
     for warning in chosen.warnings:
         print_note(f"warning: {warning}")
     with workers.reported("recover") as told:
-        found = run_model_recovery(work, out, overwrite=overwrite, **told)
-    if json:
-        print_json(summary(found))
-    else:
-        print_answer(found, out)
+        found = run_work(work, out, overwrite=overwrite, **told)
+    print_result(found, out, json=json)
 
 
 def _of_block(
@@ -234,8 +231,7 @@ def _of_block(
     overwrite: bool,
     json: bool,
 ) -> None:
-    from driftwalk.cli.terminal.recover_answer import print_answer, summary
-    from driftwalk.runs import RecoveryWork, run_recovery
+    from driftwalk.runs import RecoveryWork, run_work
 
     named = given.overrides.get(RECOVER_KEYS["flow"])
     if truth.is_dir():
@@ -247,11 +243,8 @@ def _of_block(
         inputs = _files({"truth": truth, "flow": flow_file})
     work = RecoveryWork(chosen, field, inputs, threads)
     with workers.reported("recover") as told:
-        found = run_recovery(work, out, overwrite=overwrite, **told)
-    if json:
-        print_json(summary(found))
-    else:
-        print_answer(found, out)
+        found = run_work(work, out, overwrite=overwrite, **told)
+    print_result(found, out, json=json)
 
 
 def _of_run(

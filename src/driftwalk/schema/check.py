@@ -35,6 +35,29 @@ def kind_of_dataset(dataset: xr.Dataset) -> Kind:
     raise InputError(f"no kind of dataset is called '{name}': there are {', '.join(KINDS)}")
 
 
+def require_kind(dataset: xr.Dataset, kind: str, advice: str = "") -> xr.Dataset:
+    """Return a dataset of a kind, refuse any other.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Any dataset.
+    kind : str
+        What it has to be.
+    advice : str
+        How such a dataset is made, for the error.
+
+    Raises
+    ------
+    InputError
+        When its attribute ``kind`` says something else.
+    """
+    found = dataset.attrs.get("kind", "another dataset")
+    if found != kind:
+        raise InputError(f"expected a {kind}, got {found}{'; ' if advice else ''}{advice}")
+    return dataset
+
+
 def check_dataset(dataset: xr.Dataset, kind: str | None = None) -> xr.Dataset:
     """Return a dataset that holds all that its kind says, with its dimensions and units.
 

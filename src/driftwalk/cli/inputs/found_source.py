@@ -78,6 +78,8 @@ def open_run(
         raise InputError(f"{folder} and --parameters-from both give the values: leave one out")
     refuse_found(folder, given.overrides, also=[] if given.file is None else ["--study"])
     source = FoundSource(folder, read_found(folder), given)
-    if model is not None and source.found.kind in ("fit", "calibration") and source.is_block:
+    # A comparison of models holds values for the block and for others.
+    one = "model" not in source.found.found.dims
+    if model is not None and one and source.is_block:
         raise InputError(f"{folder} is about the block, and not about {model}: leave out --model")
     return source

@@ -1,0 +1,117 @@
+"""The kinds of runs that driftwalk makes."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from driftwalk.schema.runs.kind import RunKind
+
+_TERMINAL: Final = "driftwalk.cli.terminal"
+_SECTIONS: Final = "driftwalk.page.sections"
+_WATCH: Final = "driftwalk.viewer.watch"
+
+BUILT_IN: Final = (
+    RunKind(
+        name="calibration",
+        title="Calibration",
+        under_way="A calibration under way",
+        words="calibration",
+        command="calibrate",
+        file="calibration.nc",
+        work="driftwalk.runs.calibration:CalibrationWork",
+        figures="driftwalk.figures.calibration:calibration_figures",
+        page=f"{_SECTIONS}.calibration:calibration_sections",
+        live=f"{_WATCH}.calibration:RunningCalibration",
+        terminal=f"{_TERMINAL}.calibration_answer",
+        gives_model=True,
+        no_draws="no joint region to draw parameters from (`calibration.bootstrap` of 0)",
+    ),
+    RunKind(
+        name="fit",
+        title="Likelihood fit",
+        under_way="A fit under way",
+        words="fit",
+        command="fit",
+        file="fit.nc",
+        work="driftwalk.runs.fit:FitWork",
+        figures="driftwalk.runs.fit:figures_of_fit",
+        page=f"{_SECTIONS}.fit:fit_sections",
+        flow="driftwalk.likelihood:fitted_flow",
+        gives_model=True,
+        no_draws="no covariance to draw parameters from",
+    ),
+    RunKind(
+        name="assembly",
+        title="Self-assembly",
+        under_way="Self-assembly under way",
+        words="self-assembly",
+        command="assemble",
+        file="assembly.nc",
+        work="driftwalk.runs.assembly:AssemblyWork",
+        figures="driftwalk.figures.assembly:assembly_figures",
+        page=f"{_SECTIONS}.assemblies.assembly:assembly_sections",
+        live=f"{_WATCH}.assembly:RunningAssembly",
+    ),
+    RunKind(
+        name="sensitivity",
+        title="Sensitivity of self-assembly",
+        under_way="A sensitivity analysis under way",
+        words="sensitivity analysis",
+        command="sensitivity",
+        file="sensitivity.nc",
+        work="driftwalk.runs.sensitivity:SensitivityWork",
+        figures="driftwalk.figures.sensitivity:sensitivity_figures",
+        page=f"{_SECTIONS}.assemblies.sensitivity:sensitivity_sections",
+        live=f"{_WATCH}.sensitivity:RunningSensitivity",
+    ),
+    RunKind(
+        name="recovery",
+        title="Recovery study",
+        under_way="A recovery study under way",
+        words="recovery study",
+        command="study recover",
+        file="recovery.nc",
+        work="driftwalk.runs.recovery:RecoveryWork",
+        figures="driftwalk.figures.recovery:recovery_figures",
+        page=f"{_SECTIONS}.recovery:recovery_sections",
+        terminal=f"{_TERMINAL}.recover_answer",
+    ),
+    RunKind(
+        name="model_comparison",
+        title="Comparison of motion models",
+        under_way="A comparison of motion models under way",
+        words="comparison of models",
+        command="compare-models",
+        file="comparison.nc",
+        work="driftwalk.runs.model_comparison:ModelComparisonWork",
+        figures="driftwalk.figures.model_comparison:comparison_figures",
+        page=f"{_SECTIONS}.models:model_sections",
+        terminal=f"{_TERMINAL}.models_answer",
+        gives_model=True,
+    ),
+    RunKind(
+        name="model_calibration",
+        title="Calibration of a motion model",
+        under_way="A calibration under way",
+        words="calibration",
+        command="calibrate",
+        file="model_calibration.nc",
+        work="driftwalk.runs.calibration:CalibrationWork",
+        figures="driftwalk.figures.model_calibration:model_calibration_figures",
+        page=f"{_SECTIONS}.model_calibration:model_calibration_sections",
+        terminal=f"{_TERMINAL}.model_answer",
+        gives_model=True,
+    ),
+    RunKind(
+        name="model_recovery",
+        title="Recovery study of a motion model",
+        under_way="A recovery study under way",
+        words="recovery study",
+        command="study recover",
+        file="model_recovery.nc",
+        work="driftwalk.runs.model_recovery:ModelRecoveryWork",
+        figures="driftwalk.figures.model_recovery:model_recovery_figures",
+        page=f"{_SECTIONS}.model_recovery:model_recovery_sections",
+        terminal=f"{_TERMINAL}.model_recover_answer",
+    ),
+)

@@ -1,0 +1,99 @@
+"""The registry of the kinds of runs, and which kind a dataset or a run directory is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final
+
+from driftwalk.core.errors import InputError
+from driftwalk.schema.runs.built_in import BUILT_IN
+from driftwalk.schema.runs.kind import RunKind
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import xarray as xr
+
+_KINDS: Final[dict[str, RunKind]] = {kind.name: kind for kind in BUILT_IN}
+RUN_KINDS: Final[Mapping[str, RunKind]] = MappingProxyType(_KINDS)
+"""Every kind of run by its name."""
+
+
+def register(kind: RunKind) -> RunKind:
+    """Add a kind of run; every command and page knows it from then on.
+
+    Parameters
+    ----------
+    kind : RunKind
+        The kind.
+
+    Raises
+    ------
+    InputError
+        When another kind has its name or its file.
+    """
+    for other in _KINDS.values():
+        if other != kind and (other.name == kind.name or other.file == kind.file):
+            raise InputError(
+                f"the kind of run '{kind.name}' ({kind.file}) is declared already, as "
+                f"'{other.name}' ({other.file})"
+            )
+    _KINDS[kind.name] = kind
+    return kind
+
+
+def run_kind(name: str) -> RunKind:
+    """Return a kind of run by its name.
+
+    Parameters
+    ----------
+    name : str
+        The name.
+
+    Raises
+    ------
+    InputError
+        When there is none of this name.
+
+    Examples
+    --------
+    >>> run_kind("fit").file
+    'fit.nc'
+    """
+    if name not in _KINDS:
+        raise InputError(f"there is no kind of run '{name}': there are {', '.join(_KINDS)}")
+    return _KINDS[name]
+
+
+def kind_of(dataset: xr.Dataset) -> RunKind | None:
+    """Return the kind of run whose result a dataset is, None for any other dataset.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Any dataset.
+    """
+    return _KINDS.get(str(dataset.attrs.get("kind")))
+
+
+def kind_of_folder(folder: Path, specification: Mapping[str, Any]) -> RunKind | None:
+    """Return the kind of a run by its specification, else by its result file; None if unknown.
+
+    Parameters
+    ----------
+    folder : Path
+        The run directory.
+    specification : mapping
+        Everything that determines its numbers; empty where nothing says it.
+    """
+    named = specification.get("kind")
+    if isinstance(named, str) and named in _KINDS:
+        return _KINDS[named]
+    # Whatever has the name: its reader refuses a link that leads out.
+    there = (
+        kind
+        for kind in _KINDS.values()
+        if (folder / kind.file).is_symlink() or (folder / kind.file).exists()
+    )
+    return next(there, None)
