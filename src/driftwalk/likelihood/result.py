@@ -36,6 +36,7 @@ from driftwalk.likelihood.reml import Restricted
 from driftwalk.likelihood.spline import Floats, Spline
 from driftwalk.schema import FLAGS, build_flow_field
 from driftwalk.schema.answers.fit_facts import fit_variables
+from driftwalk.schema.check import require_kind
 from driftwalk.schema.earlier import current_form
 from driftwalk.schema.kinds import KINDS
 
@@ -344,10 +345,7 @@ def require_fit(dataset: xr.Dataset) -> xr.Dataset:
     InputError
         When it is no fit.
     """
-    kind = dataset.attrs.get("kind")
-    if kind != "fit":
-        raise InputError(f"not a fit: its kind is {kind!r}; fit_motion makes one")
-    return current_form(dataset)
+    return current_form(require_kind(dataset, "fit", "fit_motion makes one"))
 
 
 def fitted_flow(fit: xr.Dataset, *, interval: int | None = None) -> xr.Dataset:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from driftwalk.core.errors import InputError
+from driftwalk.schema.check import kind_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,7 +62,7 @@ def model_of(
     if kind is None or not kind.gives_model:
         raise InputError(
             "a study, a fit or a calibration is needed, got a dataset of kind "
-            f"{source.attrs.get('kind')!r}"
+            f"{kind_name(source)!r}"
         )
     found = read_found(source)
     study = found.block_study(overrides)

@@ -6,7 +6,7 @@ from html import escape
 
 import xarray as xr
 
-from driftwalk.schema.answers.answer import answer_lines
+from driftwalk.schema.runs import answer_of
 
 
 class Result(xr.Dataset):  # type: ignore[no-untyped-call]
@@ -25,10 +25,10 @@ class Result(xr.Dataset):  # type: ignore[no-untyped-call]
     __slots__ = ()
 
     def __repr__(self) -> str:
-        return "\n".join([*answer_lines(self), super().__repr__()])
+        return "\n".join([*answer_of(self), super().__repr__()])
 
     def _repr_html_(self) -> str:
-        lines = answer_lines(self)
+        lines = answer_of(self)
         head = f"<pre>{escape(chr(10).join(lines))}</pre>" if lines else ""
         return head + super()._repr_html_()
 

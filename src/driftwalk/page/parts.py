@@ -17,6 +17,7 @@ from driftwalk.plot.parts.labels import interval_of
 from driftwalk.schema.answers.answer import NOT_DETERMINED
 from driftwalk.schema.answers.calibration_facts import facts_of
 from driftwalk.schema.answers.fit_facts import is_open, sentences
+from driftwalk.schema.check import kind_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -89,7 +90,7 @@ def require(dataset: xr.Dataset, *names: str) -> None:
     """Raise `InputError` naming the variables that a dataset lacks."""
     missing = [name for name in names if name not in dataset.variables]
     if missing:
-        kind = dataset.attrs.get("kind", "dataset")
+        kind = kind_name(dataset) or "dataset"
         raise InputError(f"the {kind} holds no {', '.join(missing)}")
 
 
@@ -97,7 +98,7 @@ def required(dataset: xr.Dataset, name: str) -> Any:
     """Return a fact of a dataset, see `facts_of`, or raise `InputError` naming it."""
     facts = facts_of(dataset)
     if name not in facts:
-        raise InputError(f"the {dataset.attrs.get('kind', 'dataset')} has no '{name}'")
+        raise InputError(f"the {kind_name(dataset) or 'dataset'} has no '{name}'")
     return facts[name]
 
 

@@ -22,6 +22,7 @@ from driftwalk.page.sections.manifest import manifest_section
 from driftwalk.page.sections.recording import noise_of, recording_sections
 from driftwalk.page.sections.tracking import tracking_sections, tracking_warnings
 from driftwalk.schema import body_names
+from driftwalk.schema.check import kind_name
 from driftwalk.schema.earlier import current_form
 from driftwalk.schema.runs import RUN_KINDS, RunContents, StoredRun, kind_of, open_run_folder
 
@@ -116,7 +117,7 @@ def dataset_page(dataset: xr.Dataset) -> dict[str, Any]:
     kind = kind_of(dataset)
     if kind is None:
         raise InputError(
-            f"no page shows a dataset of kind {dataset.attrs.get('kind', '')!r}: give a recording, "
+            f"no page shows a dataset of kind {kind_name(dataset)!r}: give a recording, "
             f"or one of {', '.join(RUN_KINDS)}"
         )
     contents = RunContents({kind.file: dataset})
@@ -126,7 +127,7 @@ def dataset_page(dataset: xr.Dataset) -> dict[str, Any]:
         finished=True,
         words=None,
         created=None,
-        sections=attempt("summary", FOUND_TITLE, lambda: contents.make(kind.page)),
+        sections=attempt("summary", FOUND_TITLE, lambda: contents.make(kind, kind.page)),
     )
 
 
@@ -294,9 +295,9 @@ def _words_of_state(run: StoredRun) -> str | None:
 def _sections_of(run: StoredRun) -> list[Section]:
     if run.kind is None:
         return []
-    page = run.kind.page
+    kind = run.kind
     # What data in another form break outside of any section costs the page, and not the program.
-    return attempt("summary", FOUND_TITLE, lambda: run.make(page))
+    return attempt("summary", FOUND_TITLE, lambda: run.make(kind, kind.page))
 
 
 def _state_section(words: str) -> Section:

@@ -109,7 +109,7 @@ class Run(RunContents):
         kind = run_kind(self.kind)
         if kind.figures is not None:
             contents = RunContents({**self.datasets, **(early or {})}, self.body)
-            table = contents.make(kind.figures, lacking="its figures cannot be drawn")
+            table = contents.make(kind, kind.figures, lacking="its figures cannot be drawn")
             driftwalk.figures.write_figures(table, self.directory.folder("figures"))
         self.drawn = True
 

@@ -35,6 +35,12 @@ def kind_of_dataset(dataset: xr.Dataset) -> Kind:
     raise InputError(f"no kind of dataset is called '{name}': there are {', '.join(KINDS)}")
 
 
+def kind_name(dataset: xr.Dataset) -> str | None:
+    """Return what kind a dataset says it is, None where it says nothing."""
+    name = dataset.attrs.get("kind")
+    return name if isinstance(name, str) else None
+
+
 def require_kind(dataset: xr.Dataset, kind: str, advice: str = "") -> xr.Dataset:
     """Return a dataset of a kind, refuse any other.
 
@@ -52,9 +58,10 @@ def require_kind(dataset: xr.Dataset, kind: str, advice: str = "") -> xr.Dataset
     InputError
         When its attribute ``kind`` says something else.
     """
-    found = dataset.attrs.get("kind", "another dataset")
+    found = kind_name(dataset)
     if found != kind:
-        raise InputError(f"expected a {kind}, got {found}{'; ' if advice else ''}{advice}")
+        hint = f"; {advice}" if advice else ""
+        raise InputError(f"expected a dataset '{kind}', got {found or 'one of no kind'}{hint}")
     return dataset
 
 

@@ -310,7 +310,7 @@ def test_a_calibration_that_cannot_be_used(calibrated: Path, tmp_path: Path) -> 
         other: "no fit, calibration or comparison of models: give the directory",
         fit: "fit.nc: is not a NetCDF file",
         damaged: "cannot be read as NetCDF",
-        wrong: "expected a calibration, got flow_field",
+        wrong: "expected a dataset 'calibration', got flow_field",
     }
     for folder, words in says.items():
         line = refusal(here("assemble", folder, "-o", tmp_path / "run"))

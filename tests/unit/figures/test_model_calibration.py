@@ -58,5 +58,5 @@ def test_without_draws_there_are_no_pairs(found: xr.Dataset, tmp_path: Path) -> 
     rest = found.drop_vars(["draws", "profile_value", "profile_misfit"])
     written = write_figures(model_calibration_figures(rest), tmp_path, ("png",))
     assert [path.name for path in written] == ["quality.png"]
-    with pytest.raises(InputError, match="expected a model_calibration"):
+    with pytest.raises(InputError, match="expected a dataset 'model_calibration'"):
         model_calibration_figures(xr.Dataset())

@@ -63,5 +63,5 @@ def test_it_is_written(tmp_path: Path) -> None:
     for found in (made_up_recovery(), made_up_recovery(alone)):
         written = write_figures(model_recovery_figures(found), tmp_path)
         assert [path.name for path in written] == ["errors.png", "errors.svg"]
-    with pytest.raises(InputError, match="expected a model_recovery"):
+    with pytest.raises(InputError, match="expected a dataset 'model_recovery'"):
         plot_model_recovery(xr.Dataset())

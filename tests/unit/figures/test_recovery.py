@@ -106,7 +106,7 @@ def test_refusals(recovery: xr.Dataset) -> None:
     with pytest.raises(InputError, match="parameter must be one of"):
         plot_recovery(recovery, "mass")
     for plot in (plot_recovery, plot_flow_recovery, plot_recovery_error):
-        with pytest.raises(InputError, match="expected a recovery"):
+        with pytest.raises(InputError, match="expected a dataset 'recovery'"):
             plot(xr.Dataset())
 
 

@@ -131,5 +131,5 @@ def test_files_of_a_check_with_and_without_steps(check: xr.Dataset, tmp_path: Pa
 
 
 def test_something_else_is_refused() -> None:
-    with pytest.raises(InputError, match="not a model check"):
+    with pytest.raises(InputError, match="expected a dataset 'model_check'"):
         plot_innovations(xr.Dataset())

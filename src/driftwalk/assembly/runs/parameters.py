@@ -22,6 +22,7 @@ import numpy.typing as npt
 from driftwalk.assembly.runs.address import stream_keys
 from driftwalk.assembly.runs.posterior import draw_posterior, has_covariance
 from driftwalk.core.errors import InputError
+from driftwalk.schema.check import kind_name
 from driftwalk.schema.earlier import current_form
 
 if TYPE_CHECKING:
@@ -89,7 +90,7 @@ def draw_parameters(
     >>> draw_parameters(calibration, runs=2).drag_coefficient  # doctest: +SKIP
     array([0.3874, 0.3921])
     """
-    if calibration.attrs.get("kind") == "fit":
+    if kind_name(calibration) == "fit":
         numbers = draw_posterior(calibration, runs=runs, seed=seed, trial=trial)
         return DrawnParameters(numbers["drag_coefficient"], numbers["force_std_N"])
     region = _region_of(calibration)
@@ -116,7 +117,7 @@ def has_uncertainty(found: xr.Dataset) -> bool:
     >>> has_uncertainty(xr.Dataset(attrs={"kind": "model_comparison"}))
     False
     """
-    kind = found.attrs.get("kind")
+    kind = kind_name(found)
     return has_covariance(found) if kind == "fit" else kind == "calibration" and has_region(found)
 
 

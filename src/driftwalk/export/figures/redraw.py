@@ -49,7 +49,7 @@ def draw_run(run: Path, folder: Path, formats: Sequence[str]) -> list[Path]:
     stored = _CheckedRun(**vars(open_run_folder(run)))
     if stored.kind is None or stored.kind.figures is None:
         raise InputError(f"{run} is a run without figures")
-    table = stored.make(stored.kind.figures, lacking="its figures cannot be drawn")
+    table = stored.make(stored.kind, stored.kind.figures, lacking="its figures cannot be drawn")
     return write_figures(table, folder, formats)
 
 

@@ -30,6 +30,7 @@ from driftwalk.schema.answers.answer import NOT_DETERMINED
 from driftwalk.schema.answers.calibration_facts import facts_of
 from driftwalk.schema.answers.fit_facts import is_open, sentences
 from driftwalk.schema.answers.law_words import LINEAR_DRAG_ALONE
+from driftwalk.schema.check import kind_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -183,7 +184,7 @@ def _verdict(check: xr.Dataset) -> str:
         if explained
         else "THE MODEL DOES NOT EXPLAIN THIS RECORDING: see the warnings."
     )
-    if check.attrs.get("kind") == "fit":
+    if kind_name(check) == "fit":
         return words
     distance, floor = (value_of(check, name) for name in ("ks_distance", "ks_noise_floor"))
     if distance is None or floor is None:

@@ -4,6 +4,7 @@ from driftwalk.schema.runs.contents import RunContents, StoredRun, open_run_fold
 from driftwalk.schema.runs.kind import RunKind, load_maker
 from driftwalk.schema.runs.registry import (
     RUN_KINDS,
+    answer_of,
     kind_of,
     kind_of_folder,
     register,
@@ -15,6 +16,7 @@ __all__ = [
     "RunContents",
     "RunKind",
     "StoredRun",
+    "answer_of",
     "kind_of",
     "kind_of_folder",
     "load_maker",

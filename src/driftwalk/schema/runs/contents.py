@@ -59,13 +59,15 @@ class RunContents:
             names.append(f"recording-{len(names) + 1}.nc")
         return [found for name in names if (found := self.dataset(name)) is not None]
 
-    def make(self, maker: Maker, *, lacking: str = "") -> Any:
+    def make(self, kind: RunKind, maker: Maker, *, lacking: str = "") -> Any:
         """Call a maker with the datasets that its parameters name.
 
         Parameters
         ----------
+        kind : RunKind
+            The kind of the run.
         maker : callable or str
-            Of a `RunKind`: figures or sections.
+            One of the kind's own: its figures or its page.
         lacking : str
             What cannot be done where a dataset is missing that has no default; without it the maker
             gets None.
@@ -76,8 +78,12 @@ class RunContents:
             When such a dataset is missing.
         """
         function = load_maker(maker)
+        # Other parameters are options, of which a file of the same name is none of the run's.
+        known = {Path(kind.file).stem, *kind.datasets, "recordings", "body"}
         given: dict[str, Any] = {}
         for name, one in signature(function).parameters.items():
+            if name not in known:
+                continue
             given[name] = self._argument(name)
             if lacking and given[name] is None and one.default is Parameter.empty:
                 raise InputError(f"the run lacks {name}.nc: {lacking}")

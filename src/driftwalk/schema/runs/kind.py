@@ -15,9 +15,9 @@ Maker = str | Callable[..., Any]
 class RunKind:
     """A kind of run, declared once for every command, page and file that deals with its runs.
 
-    The makers of figures and sections name, as their parameters, the files of the run that they
+    The makers of figures and sections name, as their parameters, the datasets of the run that they
     use: ``check`` for ``check.nc``, ``recordings`` for all recordings, ``body`` for the name of the
-    body. A file that is not there is passed as None.
+    body. A dataset that is not there is None.
 
     Attributes
     ----------
@@ -33,6 +33,8 @@ class RunKind:
         The command that makes such a run.
     file : str
         The file of its result; a finished run without a specification is known by it.
+    datasets : tuple of str
+        The other datasets that it may hold, without the ending of their files.
     page : callable or str
         Returns the sections of its page.
     work : callable or str, optional
@@ -61,6 +63,7 @@ class RunKind:
     command: str
     file: str
     page: Maker
+    datasets: tuple[str, ...] = ()
     work: Maker | None = None
     figures: Maker | None = None
     live: Maker | None = None

@@ -7,8 +7,9 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.core.errors import InputError
+from driftwalk.schema.check import kind_name
 from driftwalk.schema.runs.built_in import BUILT_IN
-from driftwalk.schema.runs.kind import RunKind
+from driftwalk.schema.runs.kind import RunKind, load_maker
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -43,6 +44,17 @@ def register(kind: RunKind) -> RunKind:
     return kind
 
 
+def unregister(name: str) -> None:
+    """Take a kind of run away, as a test does with its own.
+
+    Parameters
+    ----------
+    name : str
+        The name; one that is not known changes nothing.
+    """
+    _KINDS.pop(name, None)
+
+
 def run_kind(name: str) -> RunKind:
     """Return a kind of run by its name.
 
@@ -74,7 +86,20 @@ def kind_of(dataset: xr.Dataset) -> RunKind | None:
     dataset : xarray.Dataset
         Any dataset.
     """
-    return _KINDS.get(str(dataset.attrs.get("kind")))
+    return _KINDS.get(kind_name(dataset) or "")
+
+
+def answer_of(dataset: xr.Dataset) -> list[str]:
+    """Return the answer of a dataset as lines of text, as its kind of run declares it.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Any dataset; of one that is no result of a run its parameters, where it has some.
+    """
+    kind = kind_of(dataset)
+    lines: list[str] = load_maker(RunKind.answer if kind is None else kind.answer)(dataset)
+    return lines
 
 
 def kind_of_folder(folder: Path, specification: Mapping[str, Any]) -> RunKind | None:
