@@ -34,7 +34,7 @@ def silent(done: int, total: int, text: str = "") -> None:
 
 
 class Work(Protocol):
-    """What a run computes: its settings and its inputs, and how its result comes from them."""
+    """The work of a run: its settings, its inputs, and the computation of its result."""
 
     @property
     def kind(self) -> str:
@@ -64,7 +64,7 @@ class Work(Protocol):
 
 @dataclass
 class Run(RunContents):
-    """A run under way: its directory, the datasets that it has kept, and who is told.
+    """A run under way: its directory and the datasets that it has kept.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class Run(RunContents):
         return self.directory.store(name, fingerprint=fingerprint)
 
     def course(self, parts: Mapping[str, float]) -> Course:
-        """Return the course of work of several stages, told to who asked for progress."""
+        """Return the course of work of several stages, which reports the progress."""
         return Course(self.progress, parts)
 
     def draw(self, early: Mapping[str, xr.Dataset] | None = None) -> None:

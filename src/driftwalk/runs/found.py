@@ -344,6 +344,12 @@ def flow_of_result(found: xr.Dataset) -> xr.Dataset | None:
     ----------
     found : xarray.Dataset
         Any dataset.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> flow_of_result(xr.Dataset()) is None
+    True
     """
     kind = kind_of(found)
     if kind is None or kind.flow is None:

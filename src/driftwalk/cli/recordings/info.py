@@ -89,7 +89,7 @@ def info(
     """Say what a recording, a flow field or a run directory holds, and how driftwalk reads it.
 
     Prints bodies, clock and its jitter, gaps, extent, the circle that the centres stay in, speed,
-    and the tracking noise estimated from the recording itself. Of a run directory: its answer.
+    and the tracking noise estimated from the recording itself. Prints the answer of a finished run.
     """
     from driftwalk.cli.terminal.result import print_run
     from driftwalk.core.files.run_layout import state_of
