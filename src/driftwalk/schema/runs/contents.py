@@ -92,7 +92,11 @@ class RunContents:
     def _argument(self, name: str) -> Any:
         if name == "body":
             return self.body
-        return self.recordings() if name == "recordings" else self.dataset(f"{name}.nc")
+        if name not in ("recording", "recordings"):
+            return self.dataset(f"{name}.nc")
+        # All are read for the first one too: a page then tells of one that the run did not write.
+        found = self.recordings()
+        return found if name == "recordings" else next(iter(found), None)
 
 
 @dataclass
