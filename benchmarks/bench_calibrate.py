@@ -31,7 +31,7 @@ from driftwalk.conditions import recorded_camera
 from driftwalk.core.processors import default_threads
 from driftwalk.core.seeds import world_keys
 from driftwalk.datasets import tank30_flow, tank30_recording, tank30_truth
-from driftwalk.figures import write_figures
+from driftwalk.figures import calibration_figures, write_figures
 from driftwalk.motion import BlockModel
 from driftwalk.schema import body_track
 from driftwalk.schema.answers.facts import facts_of
@@ -119,7 +119,7 @@ def main() -> None:
             threads=options.threads,
             tell=stages.tell,
             meanwhile=lambda early: write_figures(
-                early, flow=flow, trajectory=recording, folder=folder
+                calibration_figures(early, recording, flow), folder
             ),
         )
     stages.begin("end")

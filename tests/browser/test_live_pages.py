@@ -187,7 +187,12 @@ def test_the_page_follows_a_sweep_from_begin_to_end(
 
 def test_class_proportions_fill_as_runs_end(visit: Callable[..., Visit], tmp_path: Path) -> None:
     study = dw.apply_overrides(dw.Study(), {"assembly.blocks": 2, "assembly.runs": 40})
-    specification = {"study": study.to_dict(), "flow_sha256": "0", "calibration_sha256": None}
+    specification = {
+        "study": study.to_dict(),
+        "flow_sha256": "0",
+        "calibration_sha256": None,
+        "kind": "assembly",
+    }
     with RunDirectory(tmp_path / "run", specification=specification) as run:
         store, units = run.store("fixed"), grid(run=np.arange(40)).units(20)
         with served("view", run.path) as server:

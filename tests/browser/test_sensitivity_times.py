@@ -34,8 +34,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the run directory of a small sensitivity analysis, without figures."""
     folder = tmp_path_factory.mktemp("sensitivity") / "run"
     with pytest.MonkeyPatch.context() as patch:
-        for name in ("write_assembly_figures", "write_sensitivity_figures"):
-            patch.setattr(f"driftwalk.figures.{name}", lambda *folders, **datasets: [])
+        patch.setattr("driftwalk.figures.write_figures", lambda *tables, **more: [])
         done = here("sensitivity", "--flow", FLOW, *SIZE, *MAP, "--threads", "1", "-o", folder)
     assert done.code == 0, done.err
     return folder
@@ -215,7 +214,12 @@ def test_a_running_analysis_shows_the_settings_that_are_there(
     """Its server is asked for a setting; the reference is what there is of it so far."""
     study = dw.model.parse_study(found.attrs["study"])
     flow = dw.load_flow(FLOW)
-    specification = {"study": study.to_dict(), "flow_sha256": "0", "flows_sha256": {}}
+    specification = {
+        "study": study.to_dict(),
+        "flow_sha256": "0",
+        "flows_sha256": {},
+        "kind": "sensitivity",
+    }
     with RunDirectory(tmp_path / "run", specification=specification) as opened:
         store = opened.store("map")
         reference = dw.sensitivity_reference(study, flow, store=opened.store("reference"))

@@ -40,13 +40,7 @@ bootstrap = 10
 FIT = ("fit", RECORDING, "--to", "300", "--spline-spacing", "3cm", "--force-interval", "16ms")
 
 # What draws the figures and the film of a run, below the package.
-FIGURE_WRITERS = (
-    *("figures.write_figures", "figures.write_fit_figures", "figures.write_check_figures"),
-    *("figures.write_recovery_figures", "figures.write_assembly_figures"),
-    *("figures.write_sensitivity_figures", "figures.write_model_figures"),
-    *("figures.write_model_calibration_figures", "plot.write_animation"),
-    "figures.write_model_recovery_figures",
-)
+FIGURE_WRITERS = ("figures.write_figures", "plot.write_animation")
 
 # Lines for `start` and `apart`: no figures and no film, which take most of the time of a short run.
 NO_FIGURES = "import driftwalk.figures, driftwalk.plot\n" + "".join(

@@ -52,6 +52,7 @@ def write_finished_run(folder: Path) -> Path:
     specification = {
         "study": study.to_dict(),
         "body": None,
+        "kind": "calibration",
         "recording_sha256": "0" * 64,
         "flow_sha256": "0" * 64,
     }

@@ -8,7 +8,7 @@ from command_line import assert_same_bits
 from slow_orbits import TRUTH as SLOW, slow_flow, slow_recording
 
 import driftwalk as dw
-from driftwalk.figures import write_figures
+from driftwalk.figures import calibration_figures, write_figures
 from driftwalk.model import apply_overrides
 from driftwalk.schema import build_trajectory
 from driftwalk.schema.answers.facts import facts_of
@@ -193,7 +193,7 @@ def test_meanwhile_gets_all_that_figures_show(found, tmp_path):
     assert {"second_half_ks_distance", "second_half_noise_floor"} <= lacking
     assert all(name.startswith(("first_half_", "second_half_")) for name in lacking)
     early_files, files = (
-        write_figures(one, flow=flow, trajectory=recording, folder=tmp_path / name)
+        write_figures(calibration_figures(one, recording, flow), tmp_path / name)
         for one, name in ((early, "early"), (whole, "whole"))
     )
     assert len(files) == 14

@@ -56,7 +56,7 @@ def calibrate(
     """
     from driftwalk.conditions import About, jump_warnings
     from driftwalk.motion import feels_others
-    from driftwalk.runs import CalibrationWork, run_calibration
+    from driftwalk.runs import CalibrationWork, run_work
 
     chosen = chosen_model(model, parameters)
     others = feels_others(chosen)
@@ -71,5 +71,5 @@ def calibrate(
     jumps = jump_warnings(read.trajectories[0], read.body)
     begun = opening_note(read.study, given, how=how, about=about, warnings=jumps)
     with Workers(cluster, cluster_options).reported("calibrate") as told:
-        found = run_calibration(work, out, overwrite=overwrite, begun=begun, **told)
+        found = run_work(work, out, overwrite=overwrite, begun=begun, **told)
     print_result(found, out, json=json)

@@ -60,7 +60,7 @@ def compare_models(
     from driftwalk.calibration import ALL_MODELS, DEFAULT_MODELS
     from driftwalk.conditions import About, jump_warnings
     from driftwalk.motion import feels_others, models_knowing
-    from driftwalk.runs import ModelComparisonWork, run_model_comparison
+    from driftwalk.runs import ModelComparisonWork, run_work
 
     if models is None:
         named: Sequence[str] = DEFAULT_MODELS
@@ -74,15 +74,15 @@ def compare_models(
         recording, flow, given, how, bodies="all" if others else "named"
     )
     body = read.body if others else how.body
-    work = ModelComparisonWork(
-        read.trajectories[0], chosen, read.study, field, body, inputs, threads
-    )
     about: About = "block" if "block" in chosen else "tank"
     jumps = jump_warnings(read.trajectories[0], read.body)
     begun = opening_note(read.study, given, how=how, about=about, warnings=jumps)
     with Workers(cluster, cluster_options).reported("compare models") as told:
         said: dict[str, Any] = {} if json else {"finished": Ranking(told["progress"])}
-        found = run_model_comparison(work, out, overwrite=overwrite, begun=begun, **said, **told)
+        work = ModelComparisonWork(
+            read.trajectories[0], chosen, read.study, field, body, inputs, threads, **said
+        )
+        found = run_work(work, out, overwrite=overwrite, begun=begun, **told)
     print_result(found, out, json=json)
 
 

@@ -114,14 +114,14 @@ def _fit(
     tell: Callable[[xr.Dataset], None],
 ) -> tuple[xr.Dataset, xr.Dataset]:
     """Fit and check, or read a finished run; the fit is printed before it is checked."""
-    from driftwalk.runs import FitWork, run_fit
+    from driftwalk.runs import FitWork, run_work
 
     if _finished(folder, overwrite):
         tell(open_netcdf(folder / "fit.nc"))
     else:
-        work = FitWork([recording], study, None, {"recording": path})
+        work = FitWork([recording], study, None, {"recording": path}, fitted=tell)
         with reported("fit") as told:
-            run_fit(work, folder, overwrite=overwrite, fitted=tell, **told)
+            run_work(work, folder, overwrite=overwrite, **told)
     return open_netcdf(folder / "fit.nc"), open_netcdf(folder / "check.nc")
 
 
@@ -136,7 +136,7 @@ def _calibrate(
 ) -> xr.Dataset:
     """Calibrate on the fitted flow, or read what a finished run found."""
     from driftwalk.flow import load_flow
-    from driftwalk.runs import CalibrationWork, run_calibration
+    from driftwalk.runs import CalibrationWork, run_work
 
     folder, flow = out / CALIBRATION, out / FIT / "flow.nc"
     if _finished(folder, overwrite):
@@ -145,7 +145,8 @@ def _calibrate(
     inputs = {"recording": path, "flow": flow}
     work = CalibrationWork(recording, study, given, None, inputs, threads)
     with reported("calibrate") as told:
-        return run_calibration(work, folder, overwrite=overwrite, **told)
+        found: xr.Dataset = run_work(work, folder, overwrite=overwrite, **told)
+    return found
 
 
 def _write_page(out: Path, *runs: str) -> None:

@@ -67,16 +67,13 @@ def fit(
     model (check.nc), figures and manifest.json.
     """
     from driftwalk.likelihood import fit_work
-    from driftwalk.runs import FitWork, run_fit
+    from driftwalk.runs import FitWork, run_work
     from driftwalk.schema.answers.facts import sentences
     from driftwalk.schema.answers.fit import checked_parts, fitted_parts
 
     read = read_for_run(recordings, given, how)
     inputs = {"recording" if n == 0 else f"recording-{n + 1}": p for n, p in enumerate(recordings)}
     inputs.update({"study": given.file} if given.file is not None else {})
-    work = FitWork(
-        read.trajectories, read.study, how.body, inputs, not no_check, compare_laws, wall
-    )
     effort = fit_work(sum(one.sizes["time"] for one in read.trajectories))
     opening = opening_note(read.study, given, how=how, about="block")
 
@@ -89,12 +86,20 @@ def fit(
     hint = "" if wall else "; --wall estimates restitution and friction from them"
     said: dict[str, Any] = {
         "fitted": lambda fit: print_parts(fitted_parts(fit, hint=hint)),
-        "checked": lambda fit, check: print_parts(checked_parts(fit, check)),
+        "checked_model": lambda fit, check: print_parts(checked_parts(fit, check)),
     }
-    if json:
-        said = {}
+    work = FitWork(
+        recordings=read.trajectories,
+        study=read.study,
+        body=how.body,
+        inputs=inputs,
+        check=not no_check,
+        compare_laws=compare_laws,
+        wall=wall,
+        **({} if json else said),
+    )
     with reported("fit") as told:
-        found = run_fit(work, out, overwrite=overwrite, begun=begun, **said, **told)
+        found = run_work(work, out, overwrite=overwrite, begun=begun, **told)
     if json:
         print_result(found.fit, out, json=True, check=found.check)
     else:

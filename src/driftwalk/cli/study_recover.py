@@ -171,7 +171,7 @@ def _of_model(
     json: bool,
 ) -> None:
     from driftwalk.cli.inputs.assembly_source import load_flow_for
-    from driftwalk.runs import ModelRecoveryWork, run_model_recovery
+    from driftwalk.runs import ModelRecoveryWork, run_work
 
     recording = None
     if set_up.like is not None:
@@ -208,7 +208,7 @@ def _of_model(
     for warning in chosen.warnings:
         print_note(f"warning: {warning}")
     with workers.reported("recover") as told:
-        found = run_model_recovery(work, out, overwrite=overwrite, **told)
+        found = run_work(work, out, overwrite=overwrite, **told)
     print_result(found, out, json=json)
 
 
@@ -222,7 +222,7 @@ def _of_block(
     overwrite: bool,
     json: bool,
 ) -> None:
-    from driftwalk.runs import RecoveryWork, run_recovery
+    from driftwalk.runs import RecoveryWork, run_work
 
     named = given.overrides.get(RECOVER_KEYS["flow"])
     if source is not None:
@@ -235,7 +235,7 @@ def _of_block(
         inputs = _files({"truth": truth, "flow": flow_file})
     work = RecoveryWork(chosen, field, inputs, threads)
     with workers.reported("recover") as told:
-        found = run_recovery(work, out, overwrite=overwrite, **told)
+        found = run_work(work, out, overwrite=overwrite, **told)
     print_result(found, out, json=json)
 
 

@@ -10,6 +10,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.flow.arena import read_arena
 from driftwalk.schema.answers.facts import fitted_value
 from driftwalk.schema.answers.parts import undetermined
+from driftwalk.schema.check import kind_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -203,7 +204,7 @@ def estimated_study(
     for key, name in FORCE_KEYS.items():
         if f"forces.{key}" not in stated and name in unknown:
             raise InputError(
-                f"the {found.attrs['kind']} does not determine {name}: its recording tells too "
+                f"the {kind_name(found)} does not determine {name}: its recording tells too "
                 f"little of it; take its flow field alone (`flow`), and state `forces.{key}`"
             )
     return apply_overrides(

@@ -1,24 +1,32 @@
-"""The figures of a run: all of them, written into one folder."""
+"""The figures of a run: a table from their names to what draws them, and the writer of such."""
 
-from driftwalk.figures.assembly import write_assembly_figures, write_sensitivity_figures
-from driftwalk.figures.calibration import write_figures
-from driftwalk.figures.fit import plot_flow_error, write_fit_figures
-from driftwalk.figures.laws import plot_laws, write_laws_figure
-from driftwalk.figures.model_calibration import write_model_calibration_figures
-from driftwalk.figures.model_check import write_check_figures
-from driftwalk.figures.model_comparison import plot_models, write_model_figures
-from driftwalk.figures.model_recovery import (
-    plot_model_recovery,
-    write_model_recovery_figures,
-)
+from driftwalk.figures.assembly import LABELS, assembly_figures
+from driftwalk.figures.calibration import calibration_figures
+from driftwalk.figures.fit import fit_figures, plot_flow_error
+from driftwalk.figures.laws import laws_figures, plot_laws
+from driftwalk.figures.model_calibration import model_calibration_figures
+from driftwalk.figures.model_check import check_figures
+from driftwalk.figures.model_comparison import comparison_figures, plot_models
+from driftwalk.figures.model_recovery import model_recovery_figures, plot_model_recovery
 from driftwalk.figures.recovery import (
     plot_flow_recovery,
     plot_recovery,
     plot_recovery_error,
-    write_recovery_figures,
+    recovery_figures,
 )
+from driftwalk.figures.sensitivity import sensitivity_figures
+from driftwalk.figures.write import write_figures
 
 __all__ = [
+    "LABELS",
+    "assembly_figures",
+    "calibration_figures",
+    "check_figures",
+    "comparison_figures",
+    "fit_figures",
+    "laws_figures",
+    "model_calibration_figures",
+    "model_recovery_figures",
     "plot_flow_error",
     "plot_flow_recovery",
     "plot_laws",
@@ -26,14 +34,7 @@ __all__ = [
     "plot_models",
     "plot_recovery",
     "plot_recovery_error",
-    "write_assembly_figures",
-    "write_check_figures",
+    "recovery_figures",
+    "sensitivity_figures",
     "write_figures",
-    "write_fit_figures",
-    "write_laws_figure",
-    "write_model_calibration_figures",
-    "write_model_figures",
-    "write_model_recovery_figures",
-    "write_recovery_figures",
-    "write_sensitivity_figures",
 ]

@@ -1,13 +1,11 @@
-"""All figures of a calibration, written into one folder."""
+"""The figures of a calibration."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from driftwalk.figures.write import write_each
+from driftwalk.figures.write import Figures, marked_simulated
 from driftwalk.plot.distances import LEGEND_ORDER, plot_ks_map, plot_refined_map
 from driftwalk.plot.flow_field import COMPONENTS, SPEED_LABEL, plot_flow, velocity_of
 from driftwalk.plot.panels import plot_density_panels, shared_setting_text
@@ -28,60 +26,42 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-FOOTER = "simulated recording, not measured"
 # Length of the sample of the path that is drawn [s].
 EXCERPT_S = 60.0
 
 
-def write_figures(
+def calibration_figures(
     calibration: xr.Dataset,
-    *,
-    flow: xr.Dataset | None,
-    trajectory: xr.Dataset,
-    folder: str | Path,
+    recording: xr.Dataset,
+    flow: xr.Dataset | None = None,
     body: str | None = None,
-    formats: Sequence[str] = ("png", "svg"),
-) -> list[Path]:
-    """Write every figure of a calibration: the paper's 2, 5, 6, 7 and 8, and one on validation.
-
-    The same datasets give the same files, byte for byte, with one version of matplotlib.
+) -> Figures:
+    """Return every figure of a calibration: the paper's 2, 5, 6, 7 and 8, and one on validation.
 
     Parameters
     ----------
     calibration : xarray.Dataset
         What `driftwalk.calibration.calibrate` returns.
-    flow : xarray.Dataset or None
-        The `flow_field` that was used, None where the model uses none.
-    trajectory : xarray.Dataset
-        The recording.
-    folder : path-like
-        Where to write; made when absent.
+    recording : xarray.Dataset
+        The `trajectory`.
+    flow : xarray.Dataset, optional
+        The `flow_field` that was used, where the model uses one.
     body : str, optional
         Body of the recording; may be left out when there is only one.
-    formats : sequence of {"png", "svg", "pdf"}
-        File formats.
 
     Returns
     -------
-    list of pathlib.Path
-        The files: ``flow``, ``trajectory``, ``steps``, ``ks_map``, ``<parameter>_panels`` (for the
-        block ``drag_coefficient_panels`` and ``force_std_panels``) and ``validation``, each in
-        every format.
-
-    Raises
-    ------
-    InputError
-        When a format is not known, or a dataset lacks what a figure draws.
-    RunDirectoryError
-        When a figure cannot be written.
+    dict of str to callable
+        ``flow``, ``trajectory``, ``steps``, ``ks_map``, ``<parameter>_panels`` (for the block
+        ``drag_coefficient_panels`` and ``force_std_panels``) and ``validation``.
 
     Examples
     --------
-    ``write_figures(calibration, flow=flow, trajectory=recording, folder="run/figures")``
+    ``write_figures(calibration_figures(calibration, recording, flow=flow), "run/figures")``
     """
-    makers: dict[str, Callable[[], Figure]] = {
+    figures: Figures = {
         **({} if flow is None else {"flow": lambda: flow_figure(flow)}),
-        "trajectory": lambda: trajectory_figure(trajectory, body=body),
+        "trajectory": lambda: trajectory_figure(recording, body=body),
         "steps": lambda: steps_figure(calibration),
         "ks_map": lambda: ks_map_figure(calibration),
         **{
@@ -90,8 +70,7 @@ def write_figures(
         },
         "validation": lambda: validation_figure(calibration),
     }
-    footer = FOOTER if calibration.attrs.get("simulated_recording") == "yes" else ""
-    return write_each(makers, folder, formats, footer=footer)
+    return marked_simulated(figures, calibration)
 
 
 def flow_figure(flow: xr.Dataset) -> Figure:

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from driftwalk.core.errors import InputError
-from driftwalk.figures.calibration import FOOTER, trajectory_figure
-from driftwalk.figures.write import write_each
+from driftwalk.figures.calibration import trajectory_figure
+from driftwalk.figures.laws import laws_figures
+from driftwalk.figures.model_check import check_figures
+from driftwalk.figures.write import Figures, marked_simulated
 from driftwalk.plot.flow_field import plot_flow
 from driftwalk.plot.parts.arena import arena_of, draw_arena, label_position
 from driftwalk.plot.parts.labels import in_unit
@@ -83,58 +84,48 @@ def plot_flow_error(flow: xr.Dataset, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def write_fit_figures(
-    folder: str | Path,
+def fit_figures(
+    fit: xr.Dataset,
+    recording: xr.Dataset,
     *,
-    flow: xr.Dataset | Sequence[xr.Dataset],
-    trajectory: xr.Dataset,
+    flows: Sequence[xr.Dataset],
     body: str | None = None,
-    simulated: bool = False,
-    formats: Sequence[str] = ("png", "svg"),
-) -> list[Path]:
-    """Write the figures of a likelihood fit.
+    check: xr.Dataset | None = None,
+) -> Figures:
+    """Return the figures of a likelihood fit, of the laws that it compared, and of its check.
 
     Parameters
     ----------
-    folder : path-like
-        Where to write; made when absent.
-    flow : xarray.Dataset or sequence of xarray.Dataset
+    fit : xarray.Dataset
+        A `fit`.
+    recording : xarray.Dataset
+        The `trajectory`.
+    flows : sequence of xarray.Dataset
         The fitted `flow_field`; several where the pumps were switched, each with its name in the
         attribute ``flow_label`` and its times in ``intervals``.
-    trajectory : xarray.Dataset
-        The recording.
     body : str, optional
         Body of the recording; may be left out when there is only one.
-    simulated : bool, optional
-        Whether the recording was simulated, which the figures then say.
-    formats : sequence of {"png", "svg", "pdf"}
-        File formats.
+    check : xarray.Dataset, optional
+        Its `model_check`.
 
     Returns
     -------
-    list of pathlib.Path
-        The files: ``flow`` and ``trajectory`` in every format; ``flow_A`` and so on by name of
-        the flow where there are several.
-
-    Raises
-    ------
-    InputError
-        When a format is not known, or a dataset lacks what a figure draws.
-    RunDirectoryError
-        When a figure cannot be written.
+    dict of str to callable
+        ``flow`` (``flow_A`` and so on by name of the flow where there are several) and
+        ``trajectory``; with compared laws ``laws``; with a check those of `check_figures`.
 
     Examples
     --------
-    ``write_fit_figures("fit/figures", flow=flow, trajectory=recording)``
+    ``write_figures(fit_figures(fit, recording, flows=[flow]), "fit/figures")``
     """
-    import xarray as xr
-
-    flows = [flow] if isinstance(flow, xr.Dataset) else list(flow)
-    makers: dict[str, Callable[[], Figure]] = {
+    figures: Figures = {
         "_".join(["flow", *_label(one)]): partial(_flow_figure, one) for one in flows
     }
-    makers["trajectory"] = lambda: trajectory_figure(trajectory, body=body)
-    return write_each(makers, folder, formats, footer=FOOTER if simulated else "")
+    figures["trajectory"] = lambda: trajectory_figure(recording, body=body)
+    figures = marked_simulated(figures, fit)
+    if "compared_law" in fit.dims:
+        figures |= laws_figures(fit)
+    return figures if check is None else figures | check_figures(check)
 
 
 def _label(flow: xr.Dataset) -> list[str]:

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from driftwalk.core.errors import InputError
-from driftwalk.figures.write import write_each
+from driftwalk.figures.write import Figures
 from driftwalk.plot.parts.style import BLUE, MUTED, SINGLE_COLUMN_MM, new_figure
 from driftwalk.schema.answers.force_law import compared_laws
 
@@ -25,39 +23,31 @@ MOST_EVEN = 20.0
 """Largest loss, in standard errors, up to which the axis is even; beyond it is logarithmic."""
 
 
-def write_laws_figure(
-    folder: str | Path, *, fit: xr.Dataset, formats: Sequence[str] = ("png", "svg")
-) -> list[Path]:
-    """Write the figure of the laws that a fit has compared.
+def laws_figures(fit: xr.Dataset) -> Figures:
+    """Return the figure of the laws that a fit has compared.
 
     Parameters
     ----------
-    folder : path-like
-        Where to write; made when absent.
     fit : xarray.Dataset
         A `fit` whose laws were compared.
-    formats : sequence of {"png", "svg", "pdf"}
-        File formats.
 
     Returns
     -------
-    list of pathlib.Path
-        ``laws`` in every format.
+    dict of str to callable
+        ``laws``.
 
     Raises
     ------
     InputError
-        When a format is not known, or no laws were compared.
-    RunDirectoryError
-        When a figure cannot be written.
+        When no laws were compared.
 
     Examples
     --------
-    ``write_laws_figure("fit/figures", fit=fit)``
+    ``write_figures(laws_figures(fit), "fit/figures")``
     """
     if "compared_law" not in fit.dims:
         raise InputError("the fit has compared no force laws: `compare_laws` adds them")
-    return write_each({"laws": lambda: _laws_figure(fit)}, folder, formats)
+    return {"laws": lambda: _laws_figure(fit)}
 
 
 def _laws_figure(fit: xr.Dataset) -> Figure:

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from driftwalk.core.errors import InputError
-from driftwalk.figures.write import write_each
+from driftwalk.figures.write import Figures
 from driftwalk.plot.parts.model_panels import label_checks, plot_check_ratios, plot_own_aspects
 from driftwalk.plot.parts.style import (
     BLUE,
@@ -21,6 +18,7 @@ from driftwalk.plot.parts.style import (
     letter_panels,
     new_figure,
 )
+from driftwalk.schema.check import require_kind
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,45 +38,35 @@ HIGHEST_RISE: Final = 9.0
 """Top of a profile's panel: three standard deviations."""
 
 
-def write_model_calibration_figures(
-    folder: str | Path, *, calibration: xr.Dataset, formats: Sequence[str] = ("png", "svg")
-) -> list[Path]:
-    """Write the figures of a calibration of more than two parameters.
+def model_calibration_figures(model_calibration: xr.Dataset) -> Figures:
+    """Return the figures of a calibration of more than two parameters.
 
     Parameters
     ----------
-    folder : path-like
-        Where to write; made when absent.
-    calibration : xarray.Dataset
+    model_calibration : xarray.Dataset
         A `model_calibration`.
-    formats : sequence of {"png", "svg", "pdf"}
-        File formats.
 
     Returns
     -------
-    list of pathlib.Path
-        ``quality`` and, where they were found, ``pairs`` and ``profiles`` in every format.
+    dict of str to callable
+        ``quality`` and, where they were found, ``pairs`` and ``profiles``.
 
     Raises
     ------
     InputError
-        When a format is not known, or the dataset is of another kind.
-    RunDirectoryError
-        When a figure cannot be written.
+        When the dataset is of another kind.
 
     Examples
     --------
-    ``write_model_calibration_figures("run/figures", calibration=calibration)``
+    ``write_figures(model_calibration_figures(calibration), "run/figures")``
     """
-    kind = calibration.attrs.get("kind", "another dataset")
-    if kind != "model_calibration":
-        raise InputError(f"expected a model_calibration, got {kind}")
-    makers = {"quality": lambda: quality_figure(calibration)}
-    if "draws" in calibration:
-        makers["pairs"] = lambda: pairs_figure(calibration)
-    if "profile_misfit" in calibration:
-        makers["profiles"] = lambda: profiles_figure(calibration)
-    return write_each(makers, folder, formats)
+    found = require_kind(model_calibration, "model_calibration")
+    figures: Figures = {"quality": lambda: quality_figure(found)}
+    if "draws" in found:
+        figures["pairs"] = lambda: pairs_figure(found)
+    if "profile_misfit" in found:
+        figures["profiles"] = lambda: profiles_figure(found)
+    return figures
 
 
 def pairs_figure(calibration: xr.Dataset) -> Figure:

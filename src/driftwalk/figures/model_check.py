@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from driftwalk.figures.calibration import FOOTER
-from driftwalk.figures.write import write_each
+from driftwalk.figures.write import Figures, marked_simulated
 from driftwalk.plot.model_check import (
     legend_of,
     plot_innovations,
@@ -22,46 +19,32 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def write_check_figures(
-    folder: str | Path, *, check: xr.Dataset, formats: Sequence[str] = ("png", "svg")
-) -> list[Path]:
-    """Write the figures of a model check.
+def check_figures(check: xr.Dataset) -> Figures:
+    """Return the figures of a model check.
 
     Parameters
     ----------
-    folder : path-like
-        Where to write; made when absent.
     check : xarray.Dataset
         A `model_check`.
-    formats : sequence of {"png", "svg", "pdf"}
-        File formats.
 
     Returns
     -------
-    list of pathlib.Path
-        The files: ``check_innovations``, ``check_map``, ``check_time`` and, where recordings could
-        be simulated, ``check_steps``, in every format.
-
-    Raises
-    ------
-    InputError
-        When a format is not known, or the dataset is no model check.
-    RunDirectoryError
-        When a figure cannot be written.
+    dict of str to callable
+        ``check_innovations``, ``check_map``, ``check_time`` and, where recordings could be
+        simulated, ``check_steps``.
 
     Examples
     --------
-    ``write_check_figures("fit/figures", check=check)``
+    ``write_figures(check_figures(check), "fit/figures")``
     """
-    makers: dict[str, Callable[[], Figure]] = {
+    figures: Figures = {
         "check_innovations": lambda: _innovations_figure(check),
         "check_map": lambda: _map_figure(check),
         "check_time": lambda: _time_figure(check),
     }
     if "step_length_edge" in check:
-        makers["check_steps"] = lambda: _steps_figure(check)
-    footer = FOOTER if check.attrs.get("simulated_recording") == "yes" else ""
-    return write_each(makers, folder, formats, footer=footer)
+        figures["check_steps"] = lambda: _steps_figure(check)
+    return marked_simulated(figures, check)
 
 
 def _innovations_figure(check: xr.Dataset) -> Figure:

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from driftwalk.core.errors import InputError
-from driftwalk.figures.write import write_each
+from driftwalk.figures.write import Figures
 from driftwalk.plot.parts.model_panels import label_checks, plot_check_ratios, plot_own_aspects
 from driftwalk.plot.parts.style import (
     BLUE,
@@ -22,6 +19,7 @@ from driftwalk.plot.parts.style import (
     new_figure,
 )
 from driftwalk.schema.answers.model_comparison import own_score
+from driftwalk.schema.check import require_kind
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -38,38 +36,30 @@ OTHERS_MM: Final = 82.0
 MARKERS: Final = ("o", "s", "^")
 
 
-def write_model_figures(
-    folder: str | Path, *, comparison: xr.Dataset, formats: Sequence[str] = ("png", "svg")
-) -> list[Path]:
-    """Write the figures of a comparison of motion models.
+def comparison_figures(comparison: xr.Dataset) -> Figures:
+    """Return the figure of a comparison of motion models.
 
     Parameters
     ----------
-    folder : path-like
-        Where to write; made when absent.
     comparison : xarray.Dataset
         A `model_comparison`.
-    formats : sequence of {"png", "svg", "pdf"}
-        File formats.
 
     Returns
     -------
-    list of pathlib.Path
-        ``models`` in every format.
+    dict of str to callable
+        ``models``.
 
     Raises
     ------
     InputError
-        When a format is not known, or the dataset is of another kind.
-    RunDirectoryError
-        When a figure cannot be written.
+        When the dataset is of another kind.
 
     Examples
     --------
-    ``write_model_figures("compare/figures", comparison=comparison)``
+    ``write_figures(comparison_figures(comparison), "compare/figures")``
     """
-    _require_comparison(comparison)
-    return write_each({"models": lambda: _figure(comparison)}, folder, formats)
+    require_kind(comparison, "model_comparison")
+    return {"models": lambda: _figure(comparison)}
 
 
 def _figure(comparison: xr.Dataset) -> Figure:
@@ -112,7 +102,7 @@ def plot_models(comparison: xr.Dataset, ax: Axes | None = None) -> Axes:
     --------
     ``plot_models(comparison)``
     """
-    _require_comparison(comparison)
+    require_kind(comparison, "model_comparison")
     ax = axes_or_new(ax)
     shown = comparison.isel(model=slice(None, None, -1))
     place = np.arange(shown.sizes["model"])
@@ -168,10 +158,3 @@ def _first(comparison: xr.Dataset) -> list[tuple[xr.Dataset, str, str]]:
     count = min(SHOWN, comparison.sizes["model"])
     models = [comparison.isel(model=index) for index in range(count)]
     return list(zip(models, COLORS, MARKERS, strict=False))
-
-
-def _require_comparison(comparison: xr.Dataset) -> None:
-    if comparison.attrs.get("kind") != "model_comparison":
-        raise InputError(
-            f"expected a model_comparison, got {comparison.attrs.get('kind', 'another dataset')}"
-        )

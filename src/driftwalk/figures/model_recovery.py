@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.errors import InputError
-from driftwalk.figures.write import write_each
+from driftwalk.figures.write import Figures
 from driftwalk.plot.parts.style import (
     BLUE,
     DOUBLE_COLUMN_MM,
@@ -20,6 +17,7 @@ from driftwalk.plot.parts.style import (
     axes_or_new,
     new_figure,
 )
+from driftwalk.schema.check import require_kind
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -63,7 +61,7 @@ def plot_model_recovery(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:
     --------
     ``plot_model_recovery(recovery)``
     """
-    _require_recovery(recovery)
+    require_kind(recovery, "model_recovery", "recover_model makes one")
     ax = axes_or_new(ax)
     names = [str(name) for name in recovery["parameter"].values]
     count = recovery.sizes["recording"]
@@ -94,38 +92,30 @@ def plot_model_recovery(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def write_model_recovery_figures(
-    folder: str | Path, *, recovery: xr.Dataset, formats: Sequence[str] = ("png", "svg")
-) -> list[Path]:
-    """Write the figure of a recovery study of a motion model.
+def model_recovery_figures(model_recovery: xr.Dataset) -> Figures:
+    """Return the figure of a recovery study of a motion model.
 
     Parameters
     ----------
-    folder : path-like
-        Where to write; made when absent.
-    recovery : xarray.Dataset
+    model_recovery : xarray.Dataset
         A `model_recovery`.
-    formats : sequence of {"png", "svg", "pdf"}
-        File formats.
 
     Returns
     -------
-    list of pathlib.Path
-        ``errors`` in every format.
+    dict of str to callable
+        ``errors``.
 
     Raises
     ------
     InputError
-        When a format is not known, or the dataset is of another kind.
-    RunDirectoryError
-        When a figure cannot be written.
+        When the dataset is of another kind.
 
     Examples
     --------
-    ``write_model_recovery_figures("recovery/figures", recovery=recovery)``
+    ``write_figures(model_recovery_figures(recovery), "recovery/figures")``
     """
-    _require_recovery(recovery)
-    return write_each({"errors": lambda: _figure(recovery)}, folder, formats)
+    require_kind(model_recovery, "model_recovery", "recover_model makes one")
+    return {"errors": lambda: _figure(model_recovery)}
 
 
 def _figure(recovery: xr.Dataset) -> Figure:
@@ -154,9 +144,3 @@ def _limits(errors: Floats, ends: Floats) -> tuple[float, float]:
     reach = float(np.abs(both).max()) if both.size else most
     reach = 1.08 * min(reach, most) or 1.0
     return -reach, reach
-
-
-def _require_recovery(recovery: xr.Dataset) -> None:
-    kind = recovery.attrs.get("kind", "another dataset")
-    if kind != "model_recovery":
-        raise InputError(f"expected a model_recovery, got {kind}; recover_model makes one")

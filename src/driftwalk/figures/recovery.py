@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from pathlib import Path
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
-from driftwalk.figures.write import write_each
+from driftwalk.figures.write import Figures
 from driftwalk.plot.parts.style import (
     BLUE,
     DOUBLE_COLUMN_MM,
@@ -23,6 +22,7 @@ from driftwalk.plot.parts.style import (
     letter_panels,
     new_figure,
 )
+from driftwalk.schema.check import require_kind
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -75,7 +75,7 @@ def plot_recovery(
     --------
     ``plot_recovery(recovery, "force_std")``
     """
-    _require_recovery(recovery)
+    require_kind(recovery, "recovery", "recovery_study makes one")
     if parameter not in SHOWN:
         raise InputError(f"parameter must be one of {', '.join(SHOWN)}, got {parameter!r}")
     attribute, factor, label = SHOWN[parameter]
@@ -122,7 +122,7 @@ def plot_flow_recovery(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:
     --------
     ``plot_flow_recovery(recovery)``
     """
-    _require_recovery(recovery)
+    require_kind(recovery, "recovery", "recovery_study makes one")
     ax = axes_or_new(ax)
     for at, used, color, angle, part in _groups(recovery):
         error = 100.0 * part["flow_error"].values
@@ -164,7 +164,7 @@ def plot_recovery_error(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:
     --------
     ``plot_recovery_error(recovery)``
     """
-    _require_recovery(recovery)
+    require_kind(recovery, "recovery", "recovery_study makes one")
     ax = axes_or_new(ax)
     minutes = recovery["duration"].values / 60.0
     needed = recovery["needed_duration"].values / 60.0
@@ -198,42 +198,33 @@ def plot_recovery_error(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def write_recovery_figures(
-    folder: str | Path, *, recovery: xr.Dataset, formats: Sequence[str] = ("png", "svg")
-) -> list[Path]:
-    """Write the figures of a recovery study.
+def recovery_figures(recovery: xr.Dataset) -> Figures:
+    """Return the figures of a recovery study.
 
     Parameters
     ----------
-    folder : path-like
-        Where to write; made when absent.
     recovery : xarray.Dataset
         Result of `recovery_study`.
-    formats : sequence of {"png", "svg", "pdf"}
-        File formats.
 
     Returns
     -------
-    list of pathlib.Path
-        The files: ``recovery`` and ``error_by_length`` in every format.
+    dict of str to callable
+        ``recovery`` and ``error_by_length``.
 
     Raises
     ------
     InputError
-        When a format is not known, or the dataset is no recovery study.
-    RunDirectoryError
-        When a figure cannot be written.
+        When the dataset is no recovery study.
 
     Examples
     --------
-    ``write_recovery_figures("recover/figures", recovery=recovery)``
+    ``write_figures(recovery_figures(recovery), "recover/figures")``
     """
-    _require_recovery(recovery)
-    makers: dict[str, Callable[[], Figure]] = {
+    require_kind(recovery, "recovery", "recovery_study makes one")
+    return {
         "recovery": lambda: _recovery_figure(recovery),
         "error_by_length": lambda: _error_figure(recovery),
     }
-    return write_each(makers, folder, formats, footer="")
 
 
 def _recovery_figure(recovery: xr.Dataset) -> Figure:
@@ -256,14 +247,6 @@ def _error_figure(recovery: xr.Dataset) -> Figure:
     figure = new_figure(width_mm=SINGLE_COLUMN_MM, height_mm=75.0)
     plot_recovery_error(recovery, figure.add_subplot())
     return figure
-
-
-def _require_recovery(recovery: xr.Dataset) -> None:
-    if recovery.attrs.get("kind") != "recovery":
-        raise InputError(
-            f"not a recovery study: its kind is {recovery.attrs.get('kind')!r}; recovery_study "
-            "makes one"
-        )
 
 
 def _groups(

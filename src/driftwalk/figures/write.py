@@ -1,8 +1,9 @@
-"""Writing figures into a folder, each in several formats."""
+"""Writing a table of figures into a folder, each in several formats."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,7 @@ from driftwalk.figures.drawn_data import write_drawn_data
 from driftwalk.plot.parts.style import add_footer, print_style
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.figure import Figure
 
 # What would make two files of the same figure differ (the date) or says nothing of the data.
@@ -21,23 +23,52 @@ METADATA: dict[str, dict[str, Any]] = {
     "svg": {"Date": None},
     "pdf": {"CreationDate": None},
 }
+FOOTER = "simulated recording, not measured"
+Figures = dict[str, Callable[[], "Figure"]]
+"""A table of figures: by name, what draws each."""
 DATA = "csv"
 """The format that holds the numbers that a figure draws."""
 SENTENCE = {"png": "Description", "svg": "Description", "pdf": "Subject"}
 """Under which key of its metadata a file says where the numbers are."""
 
 
-def write_each(
-    makers: Mapping[str, Callable[[], Figure]],
+def write_figures(
+    figures: Mapping[str, Callable[[], Figure]],
     folder: str | Path,
-    formats: Sequence[str],
-    *,
-    footer: str = "",
+    formats: Sequence[str] = ("png", "svg"),
 ) -> list[Path]:
-    """Make every figure and write it by its name; nothing is made when a format is not known.
+    """Draw every figure of a table and write it by its name.
 
-    With ``csv`` among the formats the drawn numbers lie next to each figure, which names their file
-    and its hash in its metadata.
+    The same datasets give the same files, byte for byte, with one version of matplotlib. With
+    ``csv`` among the formats the drawn numbers lie next to each figure, which names their file and
+    its hash in its metadata.
+
+    Parameters
+    ----------
+    figures : mapping of str to callable
+        Result of one of the functions of this room, such as `calibration_figures`. A name with a
+        "/" puts the figure into a subfolder.
+    folder : path-like
+        Where to write; made when absent.
+    formats : sequence of {"png", "svg", "pdf", "csv"}
+        File formats.
+
+    Returns
+    -------
+    list of pathlib.Path
+        The files.
+
+    Raises
+    ------
+    InputError
+        When a format is not known, before anything is drawn, or a dataset lacks what a figure
+        draws.
+    RunDirectoryError
+        When a figure cannot be written.
+
+    Examples
+    --------
+    ``write_figures(calibration_figures(calibration, recording, flow=flow), "figures")``
     """
     known = (*METADATA, DATA)
     unknown = [name for name in formats if name not in known]
@@ -49,12 +80,23 @@ def write_each(
     target.mkdir(parents=True, exist_ok=True)
     written: list[Path] = []
     with print_style():
-        for name, make in makers.items():
-            figure = make()
-            if footer:
-                add_footer(figure, footer)
-            written += _save(figure, target / name, formats)
+        for name, make in figures.items():
+            (target / name).parent.mkdir(parents=True, exist_ok=True)
+            written += _save(make(), target / name, formats)
     return written
+
+
+def marked_simulated(figures: Figures, found: xr.Dataset) -> Figures:
+    """Return a table whose figures say that the recording was simulated, where it was."""
+    if found.attrs.get("simulated_recording") != "yes":
+        return figures
+
+    def marked(draw: Callable[[], Figure]) -> Figure:
+        figure = draw()
+        add_footer(figure, FOOTER)
+        return figure
+
+    return {name: partial(marked, draw) for name, draw in figures.items()}
 
 
 def _save(figure: Figure, stem: Path, formats: Sequence[str]) -> list[Path]:

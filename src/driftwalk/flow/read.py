@@ -22,6 +22,7 @@ from driftwalk.flow.readers.pivlab import is_pivlab
 from driftwalk.flow.readers.units import FieldOptions, RawField, raw_to_si
 from driftwalk.flow.rows import grid_rows
 from driftwalk.schema import FLAGS, build_flow_field, check_flow_field
+from driftwalk.schema.check import kind_name
 from driftwalk.schema.stores.contents import check_contents
 from driftwalk.schema.stores.netcdf import is_netcdf, open_netcdf
 
@@ -106,7 +107,7 @@ def load_flow(
         if not is_netcdf(source) or is_pivlab(source):
             return _from_rows(source, options, arena=arena, attrs=attrs)
         dataset = open_netcdf(source)
-        if str(dataset.attrs.get("kind")) == "flow_field" and "flag" in dataset:
+        if kind_name(dataset) == "flow_field" and "flag" in dataset:
             if arena is not None and own_flags == "refuse":
                 raise InputError("it has its own flags: leave the arena out")
             if options != FieldOptions():

@@ -12,6 +12,7 @@ from driftwalk.core.text.did_you_mean import did_you_mean
 from driftwalk.motion.protocol import MotionModel
 from driftwalk.motion.ranges import known_value
 from driftwalk.schema import Parameter
+from driftwalk.schema.check import kind_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -78,7 +79,7 @@ def estimated_values(found: xr.Dataset, model: MotionModel) -> dict[str, float]:
     >>> estimated_values(xr.Dataset({"estimate": speed}, attrs={"model": "active"}), model)
     {'speed': 0.02}
     """
-    kind = found.attrs.get("kind", "dataset")
+    kind = kind_name(found) or "dataset"
     if "estimate" not in found or "parameter" not in found["estimate"].dims:
         raise InputError(f"the {kind} has no estimate of parameters: give that of a calibration")
     estimate = found["estimate"]

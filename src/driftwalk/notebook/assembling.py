@@ -74,9 +74,8 @@ def assemble(
     4
     """
     from driftwalk.assembly import assemble as assemble_study
-    from driftwalk.runs import AssemblyWork, run_assembly
+    from driftwalk.runs import AssemblyWork, run_work
     from driftwalk.runs.folder import silent
-    from driftwalk.schema.stores.netcdf import open_netcdf
 
     given: dict[str, Any] = dict(settings)
     found = model_of(model, flow, study_overrides(keys=ASSEMBLY_KEYS, **given))
@@ -89,13 +88,13 @@ def assemble(
             executor=executor,
             progress=lambda done, total: say(done, total, "runs"),
         )
-    place = Path(folder)
-    run_assembly(
+    done = run_work(
         AssemblyWork(found.study, found.flow, found.uncertainty, {}, threads),
-        place,
+        Path(folder),
         overwrite=overwrite,
         executor=executor,
         progress=say,
         command=f"driftwalk.assemble(..., folder={str(folder)!r})",
     )
-    return open_netcdf(place / "assembly.nc")
+    made: xr.Dataset = done.assembly
+    return made

@@ -86,9 +86,8 @@ def calibrate(
     from driftwalk.model import Study
     from driftwalk.motion import BlockModel
     from driftwalk.notebook.result import as_result
-    from driftwalk.runs import CalibrationWork, result_file, run_calibration
+    from driftwalk.runs import CalibrationWork, run_work
     from driftwalk.runs.folder import silent
-    from driftwalk.schema.stores.netcdf import open_netcdf
 
     given: dict[str, Any] = dict(settings)
     if isinstance(model, Study):
@@ -115,14 +114,12 @@ def calibrate(
             tell=lambda stage, done, total: say(done, total, stage),
         )
         return as_result(found)
-    place = Path(folder)
-    work = CalibrationWork(recording, chosen, field, body, {}, threads, model)
-    run_calibration(
-        work,
-        place,
+    found = run_work(
+        CalibrationWork(recording, chosen, field, body, {}, threads, model),
+        Path(folder),
         overwrite=overwrite,
         executor=executor,
         progress=say,
         command=f"driftwalk.calibrate(..., folder={str(folder)!r})",
     )
-    return as_result(open_netcdf(place / result_file(model)))
+    return as_result(found)

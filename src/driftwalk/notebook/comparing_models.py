@@ -97,9 +97,8 @@ def compare_models(
     from driftwalk.calibration import ALL_MODELS, DEFAULT_MODELS, compare_models as compare
     from driftwalk.motion import models_knowing
     from driftwalk.notebook.result import as_result
-    from driftwalk.runs import ModelComparisonWork, run_model_comparison
+    from driftwalk.runs import ModelComparisonWork, run_work
     from driftwalk.runs.folder import silent
-    from driftwalk.schema.stores.netcdf import open_netcdf
 
     named = {"usual": DEFAULT_MODELS, "all": ALL_MODELS}
     asked = named.get(models, (models,)) if isinstance(models, str) else models
@@ -122,14 +121,12 @@ def compare_models(
             tell=say,
         )
         return as_result(found)
-    place = Path(folder)
-    work = ModelComparisonWork(recording, chosen, conditions, field, body, {}, threads)
-    run_model_comparison(
-        work,
-        place,
+    found = run_work(
+        ModelComparisonWork(recording, chosen, conditions, field, body, {}, threads),
+        Path(folder),
         overwrite=overwrite,
         executor=executor,
         progress=say,
         command=f"driftwalk.compare_models(..., folder={str(folder)!r})",
     )
-    return as_result(open_netcdf(place / "comparison.nc"))
+    return as_result(found)

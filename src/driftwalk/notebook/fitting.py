@@ -76,9 +76,8 @@ def fit(
 
     from driftwalk.likelihood import fit_motion, judge_fit
     from driftwalk.notebook.result import as_result
-    from driftwalk.runs import FitWork, run_fit
+    from driftwalk.runs import FitWork, run_work
     from driftwalk.runs.folder import silent
-    from driftwalk.schema.stores.netcdf import open_netcdf
 
     many = [recordings] if isinstance(recordings, xr.Dataset) else list(recordings)
     given: dict[str, Any] = dict(settings)
@@ -88,13 +87,11 @@ def fit(
     if folder is None:
         found = fit_motion(many, chosen, body=body, tell=progress)
         return as_result(judge_fit(found, many, body=body).fit if check else found)
-    place = Path(folder)
-    work = FitWork(many, chosen, body, {}, check=check)
-    run_fit(
-        work,
-        place,
+    done = run_work(
+        FitWork(many, chosen, body, {}, check=check),
+        Path(folder),
         overwrite=overwrite,
         progress=progress or silent,
         command=f"driftwalk.fit(..., folder={str(folder)!r})",
     )
-    return as_result(open_netcdf(place / "fit.nc"))
+    return as_result(done.fit)

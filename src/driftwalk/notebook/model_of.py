@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from driftwalk.core.errors import InputError
+from driftwalk.schema.check import kind_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,7 +47,8 @@ def model_of(
         When there is no flow, or the dataset is of another kind.
     """
     from driftwalk.model import Study, apply_overrides
-    from driftwalk.runs import RUN_KINDS, read_found
+    from driftwalk.runs import read_found
+    from driftwalk.schema.runs import kind_of
 
     if isinstance(source, Study):
         return FoundModel(apply_overrides(source, overrides), _flow(flow), None)
@@ -56,10 +58,11 @@ def model_of(
             "motion model of a name, and xarray.open_dataset opens what a run directory holds, "
             "such as fit.nc"
         )
-    kind = source.attrs.get("kind")
-    if kind not in RUN_KINDS:
+    kind = kind_of(source)
+    if kind is None or not kind.gives_model:
         raise InputError(
-            f"a study, a fit or a calibration is needed, got a dataset of kind {kind!r}"
+            "a study, a fit or a calibration is needed, got a dataset of kind "
+            f"{kind_name(source)!r}"
         )
     found = read_found(source)
     study = found.block_study(overrides)
@@ -69,9 +72,10 @@ def model_of(
 
 def flow_field_of(flow: xr.Dataset) -> xr.Dataset:
     """Return a flow field: the given one, or that of a given fit."""
-    from driftwalk.likelihood import fitted_flow
+    from driftwalk.runs import flow_of_result
 
-    return fitted_flow(flow) if flow.attrs.get("kind") == "fit" else flow
+    held = flow_of_result(flow)
+    return flow if held is None else held
 
 
 def _flow(flow: xr.Dataset | None) -> xr.Dataset:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from driftwalk.core.errors import InputError
+from driftwalk.schema.check import kind_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -80,6 +81,6 @@ def _page(result: Any) -> dict[str, Any]:
     folder = run_folder(result)
     if folder is not None:
         return report_page(folder)
-    if result.attrs.get("kind", "trajectory") == "trajectory":
+    if kind_name(result) in (None, "trajectory"):
         return recording_page(result, describe(result))
     return dataset_page(result)

@@ -6,8 +6,8 @@ from html import escape
 
 import xarray as xr
 
-from driftwalk.schema.answers.answer import answer_of
 from driftwalk.schema.answers.parts import lines_of
+from driftwalk.schema.runs import answer_of
 
 
 class Result(xr.Dataset):  # type: ignore[no-untyped-call]

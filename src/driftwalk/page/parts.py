@@ -16,6 +16,7 @@ from driftwalk.page.words import percent
 from driftwalk.plot.parts.arena import arena_of
 from driftwalk.schema.answers.facts import facts_of, sentences
 from driftwalk.schema.answers.parts import NOT_DETERMINED, Estimate
+from driftwalk.schema.check import kind_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -87,7 +88,7 @@ def require(dataset: xr.Dataset, *names: str) -> None:
     """Raise `InputError` naming the variables that a dataset lacks."""
     missing = [name for name in names if name not in dataset.variables]
     if missing:
-        kind = dataset.attrs.get("kind", "dataset")
+        kind = kind_name(dataset) or "dataset"
         raise InputError(f"the {kind} holds no {', '.join(missing)}")
 
 
@@ -95,7 +96,7 @@ def required(dataset: xr.Dataset, name: str) -> Any:
     """Return a fact of a dataset, see `facts_of`, or raise `InputError` naming it."""
     facts = facts_of(dataset)
     if name not in facts:
-        raise InputError(f"the {dataset.attrs.get('kind', 'dataset')} has no '{name}'")
+        raise InputError(f"the {kind_name(dataset) or 'dataset'} has no '{name}'")
     return facts[name]
 
 

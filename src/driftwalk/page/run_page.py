@@ -18,39 +18,18 @@ from driftwalk.page.parts import (
     section,
     warnings_section,
 )
-from driftwalk.page.sections.assemblies.assembly import assembly_sections
-from driftwalk.page.sections.assemblies.sensitivity import sensitivity_sections
-from driftwalk.page.sections.calibration import calibration_sections
-from driftwalk.page.sections.fit import fit_sections
 from driftwalk.page.sections.manifest import manifest_section
-from driftwalk.page.sections.model_calibration import many_sections
-from driftwalk.page.sections.model_recovery import model_recovery_sections
-from driftwalk.page.sections.models import model_sections
 from driftwalk.page.sections.recording import noise_of, recording_sections
-from driftwalk.page.sections.recovery import recovery_sections
 from driftwalk.page.sections.tracking import tracking_sections, tracking_warnings
-from driftwalk.page.stored_run import MAIN_FILES, Run, open_run_folder
 from driftwalk.schema import body_names
-from driftwalk.schema.check import refuse_other_version
+from driftwalk.schema.check import kind_name, refuse_other_version
+from driftwalk.schema.runs import RUN_KINDS, RunContents, StoredRun, kind_of, open_run_folder
 
 if TYPE_CHECKING:
     import xarray as xr
 
 FORMAT: Final = "driftwalk page"
 VERSION: Final = 1
-TITLES: Final = {
-    "calibration": "Calibration",
-    "fit": "Likelihood fit",
-    "assembly": "Self-assembly",
-    "sensitivity": "Sensitivity of self-assembly",
-    "recovery": "Recovery study",
-    "model_comparison": "Comparison of motion models",
-    "model_calibration": "Calibration of a motion model",
-    "model_recovery": "Recovery study of a motion model",
-    None: "Run",
-}
-
-
 _SHOWN_ONCE: Final = ("trajectory", "flow")
 """Kinds of sections that several runs have in common: what they were made of."""
 _BESIDE_CONTENT: Final = ("id", "note", "facts")
@@ -101,7 +80,7 @@ def report_page(folder: str | Path, *, tell: Callable[[str], None] = tell_nobody
     sections = _with_remarks(sections, remarks)
     sections.append(manifest_section(run.manifest))
     return _page(
-        title=TITLES[run.kind],
+        title="Run" if run.kind is None else run.kind.title,
         subtitle=run.name,
         finished=run.state == "finished",
         words=words,
@@ -134,20 +113,20 @@ def dataset_page(dataset: xr.Dataset) -> dict[str, Any]:
     ``dataset_page(fit)["title"]``
     """
     dataset = refuse_other_version(dataset)
-    kind = str(dataset.attrs.get("kind", ""))
-    if kind not in _SECTIONS_OF_ONE:
+    kind = kind_of(dataset)
+    if kind is None:
         raise InputError(
-            f"no page shows a dataset of kind {kind!r}: give a recording, or one of "
-            f"{', '.join(_SECTIONS_OF_ONE)}"
+            f"no page shows a dataset of kind {kind_name(dataset)!r}: give a recording, "
+            f"or one of {', '.join(RUN_KINDS)}"
         )
-    make = _SECTIONS_OF_ONE[kind]
+    contents = RunContents({kind.file: dataset})
     return _page(
-        title=TITLES[kind],
+        title=kind.title,
         subtitle=None,
         finished=True,
         words=None,
         created=None,
-        sections=attempt("summary", FOUND_TITLE, lambda: make(dataset)),
+        sections=attempt("summary", FOUND_TITLE, lambda: contents.make(kind, kind.page)),
     )
 
 
@@ -300,7 +279,7 @@ def _page(
     }
 
 
-def _words_of_state(run: Run) -> str | None:
+def _words_of_state(run: StoredRun) -> str | None:
     """Return what there is to say about a run that has not come to its end."""
     if run.state == "finished":
         return None
@@ -312,19 +291,19 @@ def _words_of_state(run: Run) -> str | None:
     )
 
 
-def _sections_of(run: Run) -> list[Section]:
+def _sections_of(run: StoredRun) -> list[Section]:
     if run.kind is None:
         return []
-    make = _SECTIONS[run.kind]
+    kind = run.kind
     # What data in another form break outside of any section costs the page, and not the program.
-    return attempt("summary", FOUND_TITLE, lambda: make(run))
+    return attempt("summary", FOUND_TITLE, lambda: run.make(kind, kind.page))
 
 
 def _state_section(words: str) -> Section:
     return section("state", "summary", "Not finished", paragraphs=[words], numbers=[])
 
 
-def _remarks(run: Run) -> list[str]:
+def _remarks(run: StoredRun) -> list[str]:
     """Return what a reader has to know of the files themselves."""
     from driftwalk import __version__
 
@@ -350,83 +329,3 @@ def _with_remarks(sections: list[Section], remarks: list[str]) -> list[Section]:
             part["note"] = None
             return sections
     return [warnings_section(remarks), *sections]
-
-
-def _calibration(run: Run) -> list[Section]:
-    recordings = run.recordings()
-    return calibration_sections(
-        run.dataset("calibration.nc"),
-        flow=run.dataset("flow.nc"),
-        recording=recordings[0] if recordings else None,
-        body=run.body,
-    )
-
-
-def _fit(run: Run) -> list[Section]:
-    return fit_sections(
-        run.dataset("fit.nc"),
-        recordings=run.recordings(),
-        check=run.dataset("check.nc"),
-        body=run.body,
-    )
-
-
-def _assembly(run: Run) -> list[Section]:
-    names = ("assembly", "distribution", "class_times", "path", "sizes")
-    drawn = ("assembly_drawn", "distribution_drawn", "sizes_drawn")
-    found = {name: run.dataset(f"{name}.nc") for name in (*names, *drawn)}
-    return assembly_sections(**found)
-
-
-def _sensitivity(run: Run) -> list[Section]:
-    names = ("sensitivity", "reference", "components", "sobol")
-    return sensitivity_sections(**{name: run.dataset(f"{name}.nc") for name in names})
-
-
-def _recovery(run: Run) -> list[Section]:
-    return recovery_sections(run.dataset(MAIN_FILES["recovery"]))
-
-
-def _model_recovery(run: Run) -> list[Section]:
-    return model_recovery_sections(run.dataset(MAIN_FILES["model_recovery"]))
-
-
-def _models(run: Run) -> list[Section]:
-    recordings = run.recordings()
-    return model_sections(
-        run.dataset(MAIN_FILES["model_comparison"]),
-        recording=recordings[0] if recordings else None,
-        body=run.body,
-    )
-
-
-def _many(run: Run) -> list[Section]:
-    recordings = run.recordings()
-    return many_sections(
-        run.dataset(MAIN_FILES["model_calibration"]),
-        recording=recordings[0] if recordings else None,
-        body=run.body,
-    )
-
-
-_SECTIONS: Final[dict[str, Callable[[Run], list[Section]]]] = {
-    "calibration": _calibration,
-    "fit": _fit,
-    "assembly": _assembly,
-    "sensitivity": _sensitivity,
-    "recovery": _recovery,
-    "model_comparison": _models,
-    "model_calibration": _many,
-    "model_recovery": _model_recovery,
-}
-
-_SECTIONS_OF_ONE: Final[dict[str, Callable[[xr.Dataset], list[Section]]]] = {
-    "calibration": lambda found: calibration_sections(found, flow=None, recording=None, body=None),
-    "fit": lambda found: fit_sections(found, recordings=[], check=None, body=None),
-    "assembly": lambda found: assembly_sections(assembly=found),
-    "sensitivity": lambda found: sensitivity_sections(sensitivity=found),
-    "recovery": recovery_sections,
-    "model_comparison": model_sections,
-    "model_calibration": many_sections,
-    "model_recovery": model_recovery_sections,
-}

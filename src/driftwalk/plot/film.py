@@ -17,6 +17,7 @@ from driftwalk.plot.parts.assembly_labels import PALETTE
 from driftwalk.plot.parts.film_file import FRAMES_PER_S, Frame, require_film_writer, write_frames
 from driftwalk.plot.parts.scale_bar import draw_scale_bar
 from driftwalk.plot.parts.style import INK, MUTED, new_figure, print_style
+from driftwalk.schema.check import kind_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -128,7 +129,7 @@ def _counted(
 
 
 def _scene(motion: xr.Dataset, run: int) -> _Scene:
-    kind = str(motion.attrs.get("kind", "a dataset of no kind"))
+    kind = kind_name(motion) or "a dataset of no kind"
     if kind not in ("assembly_path", "trajectory"):
         raise InputError(f"expected a dataset of kind assembly_path or trajectory, got '{kind}'")
     one, bodies = motion, "body"

@@ -21,6 +21,7 @@ from driftwalk.plot.parts.style import (
     speed_colormap,
 )
 from driftwalk.schema.answers.verdict import residuals_of
+from driftwalk.schema.check import require_kind
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -244,10 +245,7 @@ def plot_predicted_steps(
 
 
 def _require(check: xr.Dataset) -> None:
-    if check.attrs.get("kind") != "model_check":
-        raise InputError(
-            f"not a model check: its kind is {check.attrs.get('kind')!r}; check_model makes one"
-        )
+    require_kind(check, "model_check", "check_model makes one")
 
 
 def _draw_means(ax: Axes, check: xr.Dataset) -> None:

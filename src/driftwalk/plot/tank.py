@@ -12,6 +12,7 @@ from driftwalk.plot.parts.arena import CM_PER_M, arena_of, draw_arena, label_pos
 from driftwalk.plot.parts.assembly_labels import PALETTE
 from driftwalk.plot.parts.scale_bar import draw_scale_bar
 from driftwalk.plot.parts.style import DOUBLE_COLUMN_MM, INK, axes_or_new, new_figure
+from driftwalk.schema.check import kind_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -147,7 +148,7 @@ def block_corners(dataset: xr.Dataset) -> Array:
 
 def _one_run(dataset: xr.Dataset, run: int, *, kind: str = "") -> xr.Dataset:
     """Return the poses and assemblies of one run."""
-    found = str(dataset.attrs.get("kind", "a dataset of no kind"))
+    found = kind_name(dataset) or "a dataset of no kind"
     expected = [kind] if kind else ["assembly", "assembly_path"]
     if found not in expected:
         raise InputError(f"expected a dataset of kind '{' or '.join(expected)}', got '{found}'")

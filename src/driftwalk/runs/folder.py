@@ -1,17 +1,25 @@
-"""The run directory: made or continued, and finished with its manifest."""
+"""The run directory of one piece of work: made or continued, and finished with its manifest."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, Self
 
 from driftwalk.core.errors import InputError
+from driftwalk.core.run_stages import Course, tell_nobody
+from driftwalk.schema.runs import RunContents, run_kind
+from driftwalk.schema.stores.netcdf import netcdf_bytes
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from driftwalk.core.files.rundir import RunDirectory
     from driftwalk.model import Study
+    from driftwalk.sweep import Store
 
 
 class Progress(Protocol):
@@ -23,6 +31,170 @@ class Progress(Protocol):
 
 def silent(done: int, total: int, text: str = "") -> None:
     """Tell nobody how much of a run is done."""
+
+
+class Work(Protocol):
+    """The work of a run: its settings, its inputs, and the computation of its result."""
+
+    @property
+    def kind(self) -> str:
+        """Name of its `driftwalk.schema.runs.RunKind`."""
+
+    @property
+    def study(self) -> Study:
+        """The study, for the manifest."""
+
+    @property
+    def inputs(self) -> Mapping[str, Path]:
+        """The files that were read, by their role; hashed before the work begins."""
+
+    @property
+    def seeds(self) -> Mapping[str, int]:
+        """The seeds, for the manifest."""
+
+    def checked(self) -> Self:
+        """Return the work with what a check of it found; raise what forbids it."""
+
+    def specification(self) -> dict[str, Any]:
+        """Return everything that determines the numbers, as JSON holds it."""
+
+    def compute(self, run: Run) -> Any:
+        """Compute, keep the datasets in the run, and return the result."""
+
+
+@dataclass
+class Run(RunContents):
+    """A run under way: its directory and the datasets that it has kept.
+
+    Attributes
+    ----------
+    directory : RunDirectory
+        Its directory, for other files than datasets.
+    kind : str
+        Name of its kind.
+    progress : Progress
+        Takes note of how much is done.
+    executor : concurrent.futures.Executor or None
+        Computes work units elsewhere.
+    drawn : bool
+        Whether its figures are there.
+    """
+
+    directory: RunDirectory = None  # type: ignore[assignment]
+    kind: str = ""
+    progress: Progress = silent
+    executor: Executor | None = None
+    drawn: bool = False
+
+    def keep(self, name: str, dataset: xr.Dataset) -> xr.Dataset:
+        """Write a dataset and return it as one that knows its file, as if it were read from it."""
+        path = self.directory.write(name, netcdf_bytes(dataset))
+        kept = dataset.copy(deep=False)
+        kept.encoding = {**dataset.encoding, "source": str(path)}
+        self.datasets[name] = kept
+        return kept
+
+    def store(self, name: str, fingerprint: Mapping[str, Any] | None = None) -> Store:
+        """Return the store of a sweep's work units, which a continued run finds again."""
+        return self.directory.store(name, fingerprint=fingerprint)
+
+    def course(self, parts: Mapping[str, float]) -> Course:
+        """Return the course of work of several stages, which reports the progress."""
+        return Course(self.progress, parts)
+
+    def draw(self, early: Mapping[str, xr.Dataset] | None = None) -> None:
+        """Write all figures of what the run has kept, and of datasets that it has not yet."""
+        import driftwalk.figures
+
+        kind = run_kind(self.kind)
+        if kind.figures is not None:
+            contents = RunContents({**self.datasets, **(early or {})}, self.body)
+            table = contents.make(kind, kind.figures, lacking="its figures cannot be drawn")
+            driftwalk.figures.write_figures(table, self.directory.folder("figures"))
+        self.drawn = True
+
+
+def run_work(
+    work: Work,
+    folder: Path,
+    *,
+    overwrite: bool = False,
+    begun: Callable[[], None] = tell_nobody,
+    executor: Executor | None = None,
+    progress: Progress = silent,
+    command: str | Sequence[str] = "driftwalk.runs.run_work(...)",
+) -> Any:
+    """Do a piece of work in a run directory and return its result.
+
+    Writes the datasets of its kind, ``figures/`` and, last, ``manifest.json``. Killed at any moment
+    and started again it continues with the work units that are not done.
+
+    Parameters
+    ----------
+    work : Work
+        The work to do, such as a `FitWork`.
+    folder : Path
+        The run directory.
+    overwrite : bool
+        Whether a finished run there is moved aside; it is refused otherwise.
+    begun : callable, optional
+        Called when everything is checked and the work begins.
+    executor : concurrent.futures.Executor, optional
+        Computes work units elsewhere; the result does not depend on it.
+    progress : callable, optional
+        Called as ``progress(done, total, text)`` while the work goes on.
+    command : str or sequence of str, optional
+        The command line or the call, for the manifest.
+
+    Returns
+    -------
+    Any
+        What the work computed. Its datasets know the files that hold them.
+
+    Raises
+    ------
+    DriftwalkError
+        When the inputs do not allow the work; nothing is written then.
+    RunDirectoryError
+        When the directory is in use, holds another run, or cannot be written.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> work = FitWork([dw.tank30_recording()], dw.Study(), None, {})  # doctest: +SKIP
+    >>> found = run_work(work, Path("fit"))  # doctest: +SKIP
+    """
+    from driftwalk import _core
+    from driftwalk.core.files.rundir import RunDirectory
+    from driftwalk.core.provenance import manifest
+
+    run_kind(work.kind)
+    work = work.checked()
+    with RunDirectory(
+        folder,
+        specification={"kind": work.kind, **work.specification()},
+        on_existing="overwrite" if overwrite else "resume",
+    ) as directory:
+        about = manifest(
+            command=command,
+            study=work.study.to_dict(),
+            seeds=dict(work.seeds),
+            inputs=dict(work.inputs),
+            instruction_set=_core.instruction_set(),
+        )
+        begun()
+        run = Run(
+            body=getattr(work, "body", None),
+            directory=directory,
+            kind=work.kind,
+            progress=progress,
+            executor=executor,
+        )
+        result = work.compute(run)
+        if not run.drawn:
+            run.draw()
+        directory.finish(about)
+    return result
 
 
 @contextmanager
@@ -40,56 +212,3 @@ def naming_recording(inputs: Mapping[str, Path]) -> Iterator[None]:
         if "recording" not in inputs:
             raise
         raise InputError(f"{inputs['recording']}: {error}") from error
-
-
-@contextmanager
-def open_run(
-    folder: Path,
-    *,
-    specification: Mapping[str, Any],
-    study: Study,
-    seeds: Mapping[str, int],
-    inputs: Mapping[str, Path],
-    overwrite: bool,
-    command: str | Sequence[str],
-) -> Iterator[RunDirectory]:
-    """Open a run directory; when the work in it is done, write its manifest.
-
-    Parameters
-    ----------
-    folder : Path
-        The run directory.
-    specification : mapping
-        Everything that determines the numbers of the run.
-    study : Study
-        For the manifest.
-    seeds : mapping of str to int
-        For the manifest.
-    inputs : mapping of str to Path
-        The files that were read, by their role; hashed before the work begins.
-    overwrite : bool
-        Whether a finished run there is moved aside; it is refused otherwise.
-    command : str or sequence of str
-        The command line, or the function that was called, for the manifest.
-
-    Raises
-    ------
-    RunDirectoryError
-        When the directory is in use, holds another run, or cannot be written.
-    """
-    from driftwalk import _core
-    from driftwalk.core.files.rundir import RunDirectory
-    from driftwalk.core.provenance import manifest
-
-    with RunDirectory(
-        folder, specification=specification, on_existing="overwrite" if overwrite else "resume"
-    ) as run:
-        about = manifest(
-            command=command,
-            study=study.to_dict(),
-            seeds=dict(seeds),
-            inputs=dict(inputs),
-            instruction_set=_core.instruction_set(),
-        )
-        yield run
-        run.finish(about)

@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.core.errors import ConfigurationError, FormatError, InputError
 from driftwalk.core.files.run_layout import MANIFEST_FILE, faults_of, run_file, state_of
 from driftwalk.core.provenance import read_manifest
 from driftwalk.motion import MotionModel, estimated_values
 from driftwalk.schema.answers.facts import sentences
 from driftwalk.schema.calibration import is_block
-from driftwalk.schema.check import refuse_other_version
+from driftwalk.schema.check import refuse_other_version, require_kind
+from driftwalk.schema.runs import RUN_KINDS, RunKind, kind_of, load_maker
 from driftwalk.schema.stores.contents import check_contents
 from driftwalk.schema.stores.netcdf import is_netcdf, open_netcdf
 
@@ -27,23 +28,11 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 BLOCK: Final = "block"
-RUN_FILES: Final = {
-    "fit": "fit.nc",
-    "calibration": "calibration.nc",
-    "model_calibration": "model_calibration.nc",
-    "model_comparison": "comparison.nc",
-}
-RUN_KINDS: Final = tuple(RUN_FILES)
-"""Kinds of datasets that hold a model with its values."""
 FLOW_FILE: Final = "flow.nc"
 GIVE: Final = (
     "give the directory of a finished fit, calibration or comparison of models, or a flow field "
     "(`flow`)"
 )
-WORDS: Final = {
-    "model_calibration": "calibration",
-    "model_comparison": "comparison of models",
-}
 OF_THE_FLOW: Final = ("strength_", "pulse_")
 """Beginnings of the numbers of a fit that say how the flow changes: a simulation has none."""
 
@@ -67,14 +56,14 @@ class FoundRun:
     folder: Path | None
 
     @property
-    def kind(self) -> str:
-        """Kind of the dataset."""
-        return str(self.found.attrs.get("kind", "dataset"))
+    def kind(self) -> RunKind | None:
+        """The kind of run that the dataset is the result of."""
+        return kind_of(self.found)
 
     @property
     def words(self) -> str:
         """Name of the dataset in a sentence."""
-        return WORDS.get(self.kind, self.kind)
+        return "dataset" if self.kind is None else self.kind.words
 
     @property
     def name(self) -> str:
@@ -88,13 +77,15 @@ class FoundRun:
         found = self.found
         if "model" in found.dims:
             return str(found["model"].values[_best(found)])
-        other = self.kind == "calibration" and not is_block(found)
+        # A calibration of a user's own model may not name it.
+        other = "ks_distance" in found and not is_block(found)
         return str(found.attrs.get("model", "of a user" if other else BLOCK))
 
     @property
     def inputs(self) -> dict[str, Path]:
         """The files that `block_study` and `flow` read, by their role."""
-        read = {} if self.file is None else {self.kind: self.file}
+        role = "dataset" if self.kind is None else self.kind.name
+        read = {} if self.file is None else {role: self.file}
         stored = self._stored(FLOW_FILE)
         return read if stored is None else {**read, "flow": stored}
 
@@ -132,11 +123,7 @@ class FoundRun:
         """Why no parameters can be drawn from the run, None where they can."""
         if self.uncertainty is not None:
             return None
-        lack = {
-            "calibration": "no joint region to draw parameters from (`calibration.bootstrap` of 0)",
-            "fit": "no covariance to draw parameters from",
-        }
-        lacks = lack.get(self.kind, "no uncertainty of its values, as a fit or a calibration has")
+        lacks = RunKind.no_draws if self.kind is None else self.kind.no_draws
         return f"the {self.words} has {lacks}: only the parameters that it found are simulated"
 
     @property
@@ -213,17 +200,17 @@ class FoundRun:
         """
         from driftwalk.conditions import recording_flow
         from driftwalk.flow import load_flow
-        from driftwalk.likelihood import fitted_flow
 
-        if self.kind == "fit":
-            return fitted_flow(self.found)
+        held = flow_of_result(self.found)
+        if held is not None:
+            return held
         stored = self._stored(FLOW_FILE)
         if stored is not None:
             return load_flow(stored, arena=study.tank.to_arena(), own_flags="keep")
         recording = self.recording()
-        # A comparison without a given flow takes that of its recording.
+        # Without a given flow it took that of its recording, which a calibration stores.
         own = self._specification.get("flow_sha256", "given") is None
-        if self.kind == "model_comparison" and recording is not None and own:
+        if "model" in self.found.dims and recording is not None and own:
             return recording_flow(recording, study, body=self.body)
         if self.folder is None:
             raise InputError(
@@ -265,9 +252,8 @@ class FoundRun:
         if "clearance_m" in model:
             given["clearance"] = model["clearance_m"]
         # With many parameters it may come from the recording.
-        many = self._stored(RUN_FILES["model_calibration"])
-        if many is not None:
-            given |= json.loads(open_netcdf(many).attrs["fixed"])
+        if "fixed" in self.found.attrs:
+            given |= json.loads(self.found.attrs["fixed"])
         return {name: float(one) for name, one in given.items() if _is_number(one)}
 
     def values(self, model: MotionModel) -> dict[str, float]:
@@ -355,6 +341,27 @@ def read_found(source: Path | xr.Dataset, *, give: str = GIVE) -> FoundRun:
     return FoundRun(found, file, file.parent if is_run else None)
 
 
+def flow_of_result(found: xr.Dataset) -> xr.Dataset | None:
+    """Return the flow field that the result of a run holds, such as a fit; None without one.
+
+    Parameters
+    ----------
+    found : xarray.Dataset
+        Any dataset.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> flow_of_result(xr.Dataset()) is None
+    True
+    """
+    kind = kind_of(found)
+    if kind is None or kind.flow is None:
+        return None
+    flow: xr.Dataset = load_maker(kind.flow)(found)
+    return flow
+
+
 def run_folder(found: xr.Dataset) -> Path | None:
     """Return the run directory that a dataset was read from, None where it is from none.
 
@@ -385,13 +392,15 @@ def _dataset_in(folder: Path, give: str) -> tuple[xr.Dataset, Path]:
     if state == "new":
         what = "is not a run directory" if folder.exists() else "does not exist"
         raise InputError(f"{folder} {what}: {give}")
-    for kind, name in RUN_FILES.items():
-        path = run_file(folder, name)
+    for kind in RUN_KINDS.values():
+        path = run_file(folder, kind.file) if kind.gives_model else None
         if path is not None:
-            found = check_contents(open_netcdf(path), path)
-            if found.attrs.get("kind") != kind:
-                raise InputError(f"{path} is not a {kind}: its kind is {found.attrs.get('kind')!r}")
-            return found, path
+            try:
+                return require_kind(check_contents(open_netcdf(path), path), kind.name), path
+            except FormatError:
+                raise
+            except InputError as error:
+                raise InputError(f"{path}: {error}") from error
     raise InputError(
         f"{folder} holds a finished run, but no fit, calibration or comparison of models: {give}"
     )

@@ -1,29 +1,27 @@
-"""A comparison of motion models in a run directory: resumable, with its figures and manifest."""
+"""The run of a comparison of motion models."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from driftwalk.core.run_stages import tell_nobody
-from driftwalk.runs.folder import Progress, naming_recording, open_run, silent
+from driftwalk.runs.folder import naming_recording
 from driftwalk.runs.stored import dataset_hash
-from driftwalk.schema.stores.netcdf import netcdf_bytes
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
     from driftwalk.motion import MotionModel
-    from driftwalk.sweep import Store
+    from driftwalk.runs.folder import Run
 
 
 @dataclass(frozen=True)
 class ModelComparisonWork:
-    """Everything that a comparison of motion models needs.
+    """A comparison of motion models.
 
     Attributes
     ----------
@@ -41,6 +39,9 @@ class ModelComparisonWork:
         The files that were read, by their role.
     threads : int or None
         Threads; the result does not depend on them.
+    finished : callable
+        Called with each model's name, its distance, the standard error of that and the number of
+        models, as soon as it is judged.
     """
 
     recording: xr.Dataset
@@ -50,112 +51,52 @@ class ModelComparisonWork:
     body: str | None
     inputs: Mapping[str, Path]
     threads: int | None = None
+    finished: Callable[[str, float, float, int], None] = tell_nobody
 
+    kind: ClassVar = "model_comparison"
 
-def run_model_comparison(
-    work: ModelComparisonWork,
-    folder: Path,
-    *,
-    overwrite: bool = False,
-    begun: Callable[[], None] = tell_nobody,
-    executor: Executor | None = None,
-    finished: Callable[[str, float, float, int], None] = tell_nobody,
-    progress: Progress = silent,
-    command: str | Sequence[str] = "driftwalk.runs.run_model_comparison(...)",
-) -> xr.Dataset:
-    """Compare motion models in a run directory and return the comparison.
+    @property
+    def seeds(self) -> dict[str, int]:
+        """The seed of the searches."""
+        return {"calibration": self.study.calibration.seed}
 
-    Writes ``comparison.nc``, ``recording.nc``, the given flow as ``flow.nc``, ``figures/`` and,
-    last, ``manifest.json``. Killed at any moment and started again it continues with the model that
-    it was at.
+    def checked(self) -> Self:
+        """Return the work with the models of the names; refuse a recording that does not do."""
+        from driftwalk.calibration import check_models
 
-    Parameters
-    ----------
-    work : ModelComparisonWork
-        The work to do.
-    folder : Path
-        The run directory.
-    overwrite : bool
-        Whether a finished run there is moved aside; it is refused otherwise.
-    begun : callable, optional
-        Called when everything is checked and the work begins.
-    executor : concurrent.futures.Executor, optional
-        Computes work units elsewhere; the result does not depend on it.
-    finished : callable, optional
-        Called with each model's name, its distance, the standard error of that and the number of
-        models, as soon as it is judged.
-    progress : callable, optional
-        Called as ``progress(done, total, text)`` while the work goes on.
-    command : str, optional
-        The command line or the call, for the manifest.
+        with naming_recording(self.inputs):
+            models = check_models(
+                self.recording, self.models, study=self.study, flow=self.flow, body=self.body
+            )
+        return replace(self, models=models)
 
-    Returns
-    -------
-    xarray.Dataset
-        A `model_comparison`.
+    def specification(self) -> dict[str, Any]:
+        """Return what determines the numbers of the comparison, once it is checked."""
+        return {
+            "models": [one.describe() for one in self.models if not isinstance(one, str)],
+            "study": self.study.to_dict(),
+            "body": self.body,
+            "recording_sha256": dataset_hash(self.recording, ("x", "y", "theta")),
+            "flow_sha256": None if self.flow is None else dataset_hash(self.flow, ("u", "v")),
+        }
 
-    Raises
-    ------
-    InputError
-        When the recording cannot be compared; nothing is written then.
-    RunDirectoryError
-        When the directory is in use, holds another run, or cannot be written.
+    def compute(self, run: Run) -> xr.Dataset:
+        """Search and judge every model; return a `model_comparison`."""
+        from driftwalk.calibration import compare_models
 
-    Examples
-    --------
-    >>> import driftwalk as dw
-    >>> recording = dw.tank30_recording()
-    >>> work = ModelComparisonWork(recording, ["block", "inertial"], dw.Study(), None, None, {})
-    >>> found = run_model_comparison(work, Path("compare"))  # doctest: +SKIP
-    """
-    from driftwalk.calibration import check_models, compare_models
-    from driftwalk.figures import write_model_figures
-
-    with naming_recording(work.inputs):
-        models = check_models(
-            work.recording, work.models, study=work.study, flow=work.flow, body=work.body
-        )
-    with open_run(
-        folder,
-        specification=_specification(work, models),
-        study=work.study,
-        seeds={"calibration": work.study.calibration.seed},
-        inputs=work.inputs,
-        overwrite=overwrite,
-        command=command,
-    ) as run:
-        begun()
-        run.write("recording.nc", netcdf_bytes(work.recording))
-        if work.flow is not None:
-            run.write("flow.nc", netcdf_bytes(work.flow))
-
-        def stores(name: str, fingerprint: dict[str, Any]) -> Store:
-            return run.store(name, fingerprint=fingerprint)
-
+        run.keep("recording.nc", self.recording)
+        if self.flow is not None:
+            run.keep("flow.nc", self.flow)
         found = compare_models(
-            work.recording,
-            models,
-            study=work.study,
-            flow=work.flow,
-            body=work.body,
-            threads=work.threads,
-            executor=executor,
-            stores=stores,
-            tell=progress,
-            finished=finished,
+            self.recording,
+            self.models,
+            study=self.study,
+            flow=self.flow,
+            body=self.body,
+            threads=self.threads,
+            executor=run.executor,
+            stores=run.store,
+            tell=run.progress,
+            finished=self.finished,
         )
-        run.write("comparison.nc", netcdf_bytes(found))
-        write_model_figures(run.folder("figures"), comparison=found)
-    return found
-
-
-def _specification(work: ModelComparisonWork, models: Sequence[MotionModel]) -> dict[str, Any]:
-    """Return what determines the numbers of a run."""
-    return {
-        "kind": "model_comparison",
-        "models": [model.describe() for model in models],
-        "study": work.study.to_dict(),
-        "body": work.body,
-        "recording_sha256": dataset_hash(work.recording, ("x", "y", "theta")),
-        "flow_sha256": None if work.flow is None else dataset_hash(work.flow, ("u", "v")),
-    }
+        return run.keep("comparison.nc", found)

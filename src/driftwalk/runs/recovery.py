@@ -1,27 +1,25 @@
-"""A recovery study in a run directory: resumable, with its figures and manifest."""
+"""The run of a recovery study: recordings of known truth, each fitted."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from concurrent.futures import Executor
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from driftwalk.core.processors import default_threads
-from driftwalk.runs.folder import Progress, open_run, silent
 from driftwalk.runs.stored import dataset_hash
-from driftwalk.schema.stores.netcdf import netcdf_bytes
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
+    from driftwalk.runs.folder import Run
 
 
 @dataclass(frozen=True)
 class RecoveryWork:
-    """Everything that a recovery study needs.
+    """A recovery study.
 
     Attributes
     ----------
@@ -40,85 +38,38 @@ class RecoveryWork:
     inputs: Mapping[str, Path]
     threads: int | None = None
 
+    kind: ClassVar = "recovery"
 
-def run_recovery(
-    work: RecoveryWork,
-    folder: Path,
-    *,
-    overwrite: bool = False,
-    executor: Executor | None = None,
-    progress: Progress = silent,
-    command: str | Sequence[str] = "driftwalk.runs.run_recovery(...)",
-) -> xr.Dataset:
-    """Do a recovery study in a run directory.
+    @property
+    def seeds(self) -> dict[str, int]:
+        """The seed of the recordings."""
+        return {"recovery": self.study.recover.seed}
 
-    Writes ``recovery.nc``, ``figures/`` and, last, ``manifest.json``. Killed at any moment and
-    started again it continues with the recordings that are not done.
+    def checked(self) -> Self:
+        """Refuse a truth that is not whole or cannot be fitted."""
+        from driftwalk.likelihood import check_recovery
 
-    Parameters
-    ----------
-    work : RecoveryWork
-        The work to do.
-    folder : Path
-        The run directory.
-    overwrite : bool
-        Whether a finished run there is moved aside; it is refused otherwise.
-    executor : concurrent.futures.Executor, optional
-        Computes work units elsewhere; the result does not depend on it.
-    progress : callable, optional
-        Called as ``progress(done, total, text)`` while the work goes on.
-    command : str, optional
-        The command line or the call, for the manifest.
+        check_recovery(self.study, self.flow)
+        return self
 
-    Returns
-    -------
-    xarray.Dataset
-        A `recovery`.
+    def specification(self) -> dict[str, Any]:
+        """Return what determines the numbers of the study."""
+        flow = self.flow
+        return {
+            "study": self.study.to_dict(),
+            "flow_sha256": None if flow is None else dataset_hash(flow, ("u", "v")),
+        }
 
-    Raises
-    ------
-    InputError
-        When the truth is not whole or cannot be fitted; nothing is written then.
-    RunDirectoryError
-        When the directory is in use, holds another run, or cannot be written.
+    def compute(self, run: Run) -> xr.Dataset:
+        """Simulate and fit the recordings; return a `recovery`."""
+        from driftwalk.likelihood import recovery_study
 
-    Examples
-    --------
-    >>> import driftwalk as dw
-    >>> work = RecoveryWork(dw.Study(), dw.tank30_flow(), {})
-    >>> found = run_recovery(work, Path("recovery"))  # doctest: +SKIP
-    """
-    from driftwalk.figures import write_recovery_figures
-    from driftwalk.likelihood import check_recovery, recovery_study
-
-    check_recovery(work.study, work.flow)
-    with open_run(
-        folder,
-        specification=_specification(work),
-        study=work.study,
-        seeds={"recovery": work.study.recover.seed},
-        inputs=work.inputs,
-        overwrite=overwrite,
-        command=command,
-    ) as run:
         found = recovery_study(
-            work.study,
-            work.flow,
+            self.study,
+            self.flow,
             store=run.store("recordings"),
-            threads=work.threads or default_threads(),
-            executor=executor,
-            tell=lambda done, total: progress(done, total, "fits"),
+            threads=self.threads or default_threads(),
+            executor=run.executor,
+            tell=lambda done, total: run.progress(done, total, "fits"),
         )
-        run.write("recovery.nc", netcdf_bytes(found))
-        write_recovery_figures(run.folder("figures"), recovery=found)
-    return found
-
-
-def _specification(work: RecoveryWork) -> dict[str, Any]:
-    """Return what determines the numbers of a run."""
-    flow = work.flow
-    return {
-        "kind": "recovery",
-        "study": work.study.to_dict(),
-        "flow_sha256": None if flow is None else dataset_hash(flow, ("u", "v")),
-    }
+        return run.keep("recovery.nc", found)

@@ -36,6 +36,36 @@ def kind_of_dataset(dataset: xr.Dataset) -> Kind:
     raise InputError(f"no kind of dataset is called '{name}': there are {', '.join(KINDS)}")
 
 
+def kind_name(dataset: xr.Dataset) -> str | None:
+    """Return what kind a dataset says it is, None where it says nothing."""
+    name = dataset.attrs.get("kind")
+    return name if isinstance(name, str) else None
+
+
+def require_kind(dataset: xr.Dataset, kind: str, advice: str = "") -> xr.Dataset:
+    """Return a dataset of a kind, refuse any other.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Any dataset.
+    kind : str
+        What it has to be.
+    advice : str
+        How such a dataset is made, for the error.
+
+    Raises
+    ------
+    InputError
+        When its attribute ``kind`` says something else.
+    """
+    found = kind_name(dataset)
+    if found != kind:
+        hint = f"; {advice}" if advice else ""
+        raise InputError(f"expected a dataset '{kind}', got {found or 'one of no kind'}{hint}")
+    return dataset
+
+
 def check_dataset(dataset: xr.Dataset, kind: str | None = None) -> xr.Dataset:
     """Return a dataset that holds all that its kind says, with its dimensions and units.
 

@@ -315,7 +315,7 @@ def test_a_calibration_that_cannot_be_used(calibrated: Path, tmp_path: Path) -> 
         other: "no fit, calibration or comparison of models: give the directory",
         fit: "fit.nc: is not a NetCDF file",
         damaged: "cannot be read as NetCDF",
-        wrong: "is not a calibration: its kind is 'flow_field'",
+        wrong: "expected a dataset 'calibration', got flow_field",
     }
     for folder, words in says.items():
         line = refusal(here("assemble", folder, "-o", tmp_path / "run"))
@@ -350,7 +350,7 @@ def test_a_finished_run_is_kept_until_overwrite(calibrated: Path, tmp_path: Path
 SMALL = """
 import driftwalk.figures
 import driftwalk.assembly.runs.run
-driftwalk.figures.write_assembly_figures = lambda *folders, **datasets: []
+driftwalk.figures.write_figures = lambda *folders, **datasets: []
 driftwalk.assembly.runs.run.runs_per_unit = lambda _: 25
 """
 

@@ -43,11 +43,7 @@ def test_the_check_is_written_with_its_figures(fitted: tuple[Path, Done]) -> Non
 
 
 @pytest.mark.slow
-def test_people_are_told_and_the_check_can_be_left_out(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    # Those of the check would be drawn.
-    monkeypatch.setattr("driftwalk.figures.write_fit_figures", lambda *folders, **datasets: [])
+def test_people_are_told_and_the_check_can_be_left_out(tmp_path: Path) -> None:
     done = here("fit", RECORDING, *SHORT, "-o", tmp_path / "run", "--no-check")
     assert done.code == 0, done.err
     assert "model check" not in done.out

@@ -92,8 +92,7 @@ def test_fit_prints_its_answer_before_it_draws(
         drawn.append(capsys.readouterr().out)
         return []
 
-    for name in ("write_fit_figures", "write_check_figures"):
-        monkeypatch.setattr(driftwalk.figures, name, draw)
+    monkeypatch.setattr(driftwalk.figures, "write_figures", draw)
     words = ["fit", str(RECORDING), *TANK, "--to", "60s", "-o", str(tmp_path / "run")]
     assert main(words) == 0
     assert "drag coefficient" in drawn[0]

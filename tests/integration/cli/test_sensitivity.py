@@ -185,16 +185,18 @@ def test_other_axes_and_the_answer_for_people(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_figures_of_three_axes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    drawn: dict[str, Any] = {}
-
-    def keep(folder: Path, *, sensitivity: xr.Dataset, **more: Any) -> list[Path]:
-        drawn[folder.relative_to(tmp_path / "run" / "figures").as_posix()] = sensitivity
-        return []
-
-    monkeypatch.setattr("driftwalk.figures.write_sensitivity_figures", keep)
+    tables: list[dict[str, Any]] = []
+    monkeypatch.setattr(
+        "driftwalk.figures.write_figures", lambda table, folder: tables.append(table)
+    )
     words = ["--vary", "latching=collision,none", *MAP]
     done = here("sensitivity", "--flow", FLOW, *SIZE, *words, "-o", tmp_path / "run")
     assert done.code == 0, done.err
+    drawn = {
+        name.partition("/")[0]: draw.args[0]
+        for name, draw in tables[0].items()
+        if name.endswith("l1_map")
+    }
     assert list(drawn) == ["latching_collision", "latching_none"]
     assert (drawn["latching_none"]["complete"] == 0).all()
     assert drawn["latching_collision"]["l1_distance"].dims == ("drag_coefficient", "force_std")

@@ -376,7 +376,7 @@ def test_a_finished_run_that_lost_its_results(finished: Path, tmp_path: Path) ->
 
 @pytest.mark.slow
 def test_a_sweep_that_has_not_begun(tmp_path: Path) -> None:
-    specification = {"study": dw.Study().to_dict(), "body": None, "recording_sha256": "0"}
+    specification = {"study": dw.Study().to_dict(), "body": None, "kind": "calibration"}
     with (
         RunDirectory(tmp_path / "run", specification=specification),
         served("view", tmp_path / "run") as started,

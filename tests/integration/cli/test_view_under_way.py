@@ -17,8 +17,7 @@ from few_simulations import compare_after_little, simulate_little
 from driftwalk.core.files.rundir import RunDirectory
 from driftwalk.core.files.shards import ShardStore
 from driftwalk.page import report_page
-from driftwalk.page.run_page import TITLES
-from driftwalk.page.stored_run import MAIN_FILES
+from driftwalk.schema.runs import RUN_KINDS
 from driftwalk.viewer.watch.run import RunSource
 
 TANK = ("--tank", "30cm")
@@ -83,7 +82,7 @@ force_std_N = 6e-4
 
 
 def test_every_kind_of_run_is_watched() -> None:
-    assert set(RUNS) == set(MAIN_FILES)
+    assert set(RUNS) == set(RUN_KINDS)
 
 
 class Stopped(Exception):
@@ -131,7 +130,7 @@ def test_the_page_of_a_run_that_has_just_begun(
         here(*words, "-o", place / "run")
     live, report = opened_pages(place / "run")
     assert live["title"] == title
-    assert report["title"] == TITLES[kind.split()[0]]
+    assert report["title"] == RUN_KINDS[kind.split()[0]].title
 
 
 @pytest.mark.slow
@@ -167,4 +166,4 @@ def test_the_page_of_a_run_that_is_further(
     # A fit is one piece of work and keeps no units.
     assert set(seen) >= ({"manifest"} if kind == "fit" else {"unit 1", "manifest"})
     titles = {(live["title"], report["title"]) for live, report in seen.values()}
-    assert titles == {(title, TITLES[kind])}
+    assert titles == {(title, RUN_KINDS[kind].title)}

@@ -218,5 +218,5 @@ def test_what_has_no_alignment_is_said(classes: list[str], component: int, messa
 
 
 def test_alignment_wants_components() -> None:
-    with pytest.raises(InputError, match="its kind is 'sensitivity'"):
+    with pytest.raises(InputError, match="got sensitivity"):
         disconnected_alignment(sensitivity())

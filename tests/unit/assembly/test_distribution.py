@@ -183,7 +183,7 @@ def test_sampling_variance_is_unbiased() -> None:
         ([1, 2], {}, "expected an assembly dataset or counts by class name"),
         ({"O": 3}, {"confidence": 1.0}, "confidence must lie between 0 and 1"),
         ({"O": 3}, {"time": 5.0}, "plain counts have no times"),
-        (xr.Dataset(attrs={"kind": "steps"}), {}, "its kind is 'steps'"),
+        (xr.Dataset(attrs={"kind": "steps"}), {}, "got steps"),
         (xr.Dataset(attrs={"kind": "assembly"}), {}, "'outcome' is missing"),
         (assembly().drop_vars("event_time"), {"time": 1.0}, "'event_time' is missing"),
         (assembly(), {"time": -1.0}, "-1 s lies outside the runs, which last 60 s"),

@@ -242,7 +242,7 @@ def test_wrong_options_are_said(options: dict[str, Any], message: str) -> None:
     [
         (assembly(5, broken=5), "no run with an outcome"),
         (assembly(5).drop_vars("end_time"), "'end_time' is missing"),
-        (assembly(5).assign_attrs(kind="steps"), "its kind is 'steps'"),
+        (assembly(5).assign_attrs(kind="steps"), "got steps"),
     ],
 )
 def test_runs_without_times_are_said(runs: xr.Dataset, message: str) -> None:

@@ -15,8 +15,8 @@ from synthetic_assembly import (
 )
 
 from driftwalk.core.errors import InputError
-from driftwalk.figures import assembly as assembly_figures
-from driftwalk.figures.assembly import write_assembly_figures, write_sensitivity_figures
+from driftwalk.figures import assembly, sensitivity as maps, sensitivity_figures
+from driftwalk.figures.write import write_figures
 from driftwalk.plot.parts.style import print_style
 
 
@@ -28,15 +28,15 @@ def study():
 @pytest.mark.slow
 def test_every_figure_of_an_experiment_is_written(tmp_path) -> None:
     folder = tmp_path / "made" / "here"
-    written = write_assembly_figures(
-        folder,
-        distribution=distribution(),
-        beside=distribution(seed=2),
+    table = assembly.assembly_figures(
+        distribution(),
+        distribution(seed=2),
+        class_times(),
+        assembly_path(),
         labels=("fixed", "drawn"),
         realisations=realisations(),
-        times=class_times(),
-        path=assembly_path(),
     )
+    written = write_figures(table, folder)
     names = ["outcomes", "class_times", "film_strip"]
     assert [path.name for path in written] == [f"{n}.{s}" for n in names for s in ("png", "svg")]
     assert all(path.stat().st_size > 10_000 for path in written)
@@ -45,15 +45,15 @@ def test_every_figure_of_an_experiment_is_written(tmp_path) -> None:
 
 @pytest.mark.slow
 def test_only_what_is_given_is_drawn(tmp_path) -> None:
-    written = write_assembly_figures(tmp_path, distribution=distribution(), formats=["png"])
+    written = write_figures(assembly.assembly_figures(distribution()), tmp_path, ["png"])
     assert [path.name for path in written] == ["outcomes.png"]
 
 
 @pytest.mark.slow
 def test_every_figure_of_a_study_is_written_the_same_each_time(study, tmp_path) -> None:
     first, again = (
-        write_sensitivity_figures(
-            tmp_path / name, sensitivity=study, components=components(study), formats=["svg"]
+        write_figures(
+            sensitivity_figures(study, components=components(study)), tmp_path / name, ["svg"]
         )
         for name in ("one", "two")
     )
@@ -65,12 +65,12 @@ def test_every_figure_of_a_study_is_written_the_same_each_time(study, tmp_path) 
 @pytest.mark.slow
 def test_a_study_along_one_axis_is_written(tmp_path) -> None:
     data = one_axis("latching", ["none", "collision", "connector"])
-    assert len(write_sensitivity_figures(tmp_path, sensitivity=data, formats=["png"])) == 2
+    assert len(write_figures(sensitivity_figures(data), tmp_path, ["png"])) == 2
 
 
 def test_an_unknown_format_is_refused_before_anything_is_written(tmp_path) -> None:
     with pytest.raises(InputError, match="as gif: choose from png, svg, pdf"):
-        write_assembly_figures(tmp_path / "x", distribution=distribution(), formats=["gif"])
+        write_figures(assembly.assembly_figures(distribution()), tmp_path / "x", ["gif"])
     assert not (tmp_path / "x").exists()
 
 
@@ -80,19 +80,19 @@ def two_drags():
 
 
 FIGURES = {
-    "map of words": lambda: assembly_figures.l1_map_figure(two_drags()),
-    "panels of words": lambda: assembly_figures.class_panels_figure(two_drags()),
-    "outcomes": lambda: assembly_figures.outcomes_figure(distribution()),
-    "outcomes of 12": lambda: assembly_figures.outcomes_figure(distribution(4, "distinct")),
-    "outcomes of 68": lambda: assembly_figures.outcomes_figure(distribution(6)),
-    "pairs": lambda: assembly_figures.outcomes_figure(
+    "map of words": lambda: maps.l1_map_figure(two_drags()),
+    "panels of words": lambda: maps.class_panels_figure(two_drags()),
+    "outcomes": lambda: assembly.outcomes_figure(distribution()),
+    "outcomes of 12": lambda: assembly.outcomes_figure(distribution(4, "distinct")),
+    "outcomes of 68": lambda: assembly.outcomes_figure(distribution(6)),
+    "pairs": lambda: assembly.outcomes_figure(
         distribution(), beside=distribution(seed=2), realisations=realisations()
     ),
-    "class times": lambda: assembly_figures.class_times_figure(class_times()),
-    "class times of 68": lambda: assembly_figures.class_times_figure(class_times(6)),
-    "map": lambda: assembly_figures.l1_map_figure(sensitivity(points=(8, 7))),
-    "map of 68": lambda: assembly_figures.l1_map_figure(sensitivity(6, points=(5, 5))),
-    "panels": lambda: assembly_figures.class_panels_figure(sensitivity(points=(5, 5))),
+    "class times": lambda: assembly.class_times_figure(class_times()),
+    "class times of 68": lambda: assembly.class_times_figure(class_times(6)),
+    "map": lambda: maps.l1_map_figure(sensitivity(points=(8, 7))),
+    "map of 68": lambda: maps.l1_map_figure(sensitivity(6, points=(5, 5))),
+    "panels": lambda: maps.class_panels_figure(sensitivity(points=(5, 5))),
 }
 
 

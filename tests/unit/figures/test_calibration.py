@@ -13,7 +13,7 @@ import pytest
 from synthetic_calibration import bundled_flow, bundled_recording, synthetic_calibration
 
 from driftwalk.core.errors import InputError
-from driftwalk.figures import calibration as figures, write, write_figures
+from driftwalk.figures import calibration as figures, calibration_figures, write, write_figures
 from driftwalk.plot.parts.style import STYLE, print_style
 
 NAMES = [
@@ -37,7 +37,7 @@ def datasets():
 def written(datasets, tmp_path_factory) -> list[Path]:
     calibration, flow, trajectory = datasets
     folder = tmp_path_factory.mktemp("figures") / "made" / "here"
-    return write_figures(calibration, flow=flow, trajectory=trajectory, folder=folder)
+    return write_figures(calibration_figures(calibration, trajectory, flow), folder)
 
 
 @pytest.mark.slow
@@ -62,9 +62,7 @@ def test_svg_is_well_formed_and_as_wide_as_a_column(written) -> None:
 @pytest.mark.slow
 def test_the_same_datasets_give_the_same_bytes(written, datasets, tmp_path) -> None:
     calibration, flow, trajectory = datasets
-    again = write_figures(
-        calibration, flow=flow, trajectory=trajectory, folder=tmp_path, formats=["svg"]
-    )
+    again = write_figures(calibration_figures(calibration, trajectory, flow), tmp_path, ["svg"])
     first = {path.name: path.read_bytes() for path in written}
     for path in again:
         assert path.read_bytes() == first[path.name], path.name
@@ -114,7 +112,7 @@ def test_a_simulated_recording_is_named_so(
         return []
 
     monkeypatch.setattr(write, "_save", count)
-    write_figures(changed, flow=flow, trajectory=trajectory, folder=tmp_path)
+    write_figures(calibration_figures(changed, trajectory, flow), tmp_path)
     assert seen == [expected] * len(NAMES)
 
 
@@ -172,9 +170,7 @@ def test_every_text_lies_inside_its_figure(datasets) -> None:
 def test_an_unknown_format_is_refused_before_anything_is_written(datasets, tmp_path) -> None:
     calibration, flow, trajectory = datasets
     with pytest.raises(InputError, match="as gif: choose from png, svg, pdf"):
-        write_figures(
-            calibration, flow=flow, trajectory=trajectory, folder=tmp_path / "x", formats=["gif"]
-        )
+        write_figures(calibration_figures(calibration, trajectory, flow), tmp_path / "x", ["gif"])
     assert not (tmp_path / "x").exists()
 
 
@@ -195,5 +191,5 @@ def test_without_bootstrap_the_profiles_are_drawn_alone(datasets, tmp_path, monk
             np.testing.assert_array_equal(one.get_xydata(), other.get_xydata())
     made: list[str] = []
     monkeypatch.setattr(write, "_save", lambda figure, stem, formats: made.append(stem.name) or [])
-    write_figures(bare, flow=flow, trajectory=trajectory, folder=tmp_path, formats=["png"])
+    write_figures(calibration_figures(bare, trajectory, flow), tmp_path, ["png"])
     assert made == NAMES

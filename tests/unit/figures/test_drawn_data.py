@@ -10,7 +10,7 @@ import pytest
 from matplotlib.axes import Axes
 
 from driftwalk.figures.drawn_data import write_drawn_data
-from driftwalk.figures.write import write_each
+from driftwalk.figures.write import write_figures
 from driftwalk.plot.parts.style import new_figure
 
 X = np.array([0.0, 1.0, 3.0])
@@ -109,8 +109,8 @@ def test_figures_without_the_table_say_nothing_of_one(tmp_path) -> None:
         figure.add_subplot().plot(X, Y)
         return figure
 
-    write_each({"a": make}, tmp_path / "one", ["svg"])
-    write_each({"a": make}, tmp_path / "two", ["svg", "csv"])
+    write_figures({"a": make}, tmp_path / "one", ["svg"])
+    write_figures({"a": make}, tmp_path / "two", ["svg", "csv"])
     assert sorted(path.name for path in (tmp_path / "two").iterdir()) == ["a.csv", "a.svg"]
     assert "drawn numbers" not in (tmp_path / "one" / "a.svg").read_text()
     assert "drawn numbers are in a.csv" in (tmp_path / "two" / "a.svg").read_text()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from driftwalk.figures import write_laws_figure
+from driftwalk.figures import laws_figures, write_figures
 from driftwalk.figures.laws import plot_laws
 from driftwalk.plot.parts.style import new_figure
 
@@ -41,4 +41,5 @@ def test_laws_without_a_solution_are_counted(tmp_path: Path) -> None:
     fit = compared([1.0, np.nan, 0.9])
     ax = plot_laws(fit, new_figure(width_mm=120.0, height_mm=55.0).add_subplot())
     assert ax.get_title() == "not shown, without a solution: 1"
-    assert [path.name for path in write_laws_figure(tmp_path, fit=fit)] == ["laws.png", "laws.svg"]
+    written = write_figures(laws_figures(fit), tmp_path)
+    assert [path.name for path in written] == ["laws.png", "laws.svg"]

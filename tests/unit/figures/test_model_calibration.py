@@ -9,7 +9,7 @@ import xarray as xr
 from every_kind import every_kind
 
 from driftwalk.core.errors import InputError
-from driftwalk.figures import write_model_calibration_figures
+from driftwalk.figures import model_calibration_figures, write_figures
 from driftwalk.figures.model_calibration import pairs_figure, profiles_figure, quality_figure
 
 
@@ -61,7 +61,7 @@ def test_the_quality_shows_the_distances(found: xr.Dataset) -> None:
 @pytest.mark.slow
 def test_without_draws_there_are_no_pairs(found: xr.Dataset, tmp_path: Path) -> None:
     rest = found.drop_vars(["draws", "profile_value", "profile_misfit"])
-    written = write_model_calibration_figures(tmp_path, calibration=rest, formats=("png",))
+    written = write_figures(model_calibration_figures(rest), tmp_path, ("png",))
     assert [path.name for path in written] == ["quality.png"]
-    with pytest.raises(InputError, match="expected a model_calibration"):
-        write_model_calibration_figures(tmp_path, calibration=xr.Dataset())
+    with pytest.raises(InputError, match="expected a dataset 'model_calibration'"):
+        model_calibration_figures(xr.Dataset())

@@ -10,7 +10,7 @@ import xarray as xr
 from model_recovery_worlds import lost, made_up, made_up_recovery
 
 from driftwalk.core.errors import InputError
-from driftwalk.figures import plot_model_recovery, write_model_recovery_figures
+from driftwalk.figures import model_recovery_figures, plot_model_recovery, write_figures
 
 
 def test_every_error_is_drawn_in_its_row() -> None:
@@ -61,7 +61,7 @@ def test_intervals_are_drawn_between_their_ends() -> None:
 def test_it_is_written(tmp_path: Path) -> None:
     alone = lost(made_up(2), 0, 1, "too short")
     for found in (made_up_recovery(), made_up_recovery(alone)):
-        written = write_model_recovery_figures(tmp_path, recovery=found)
+        written = write_figures(model_recovery_figures(found), tmp_path)
         assert [path.name for path in written] == ["errors.png", "errors.svg"]
-    with pytest.raises(InputError, match="expected a model_recovery"):
+    with pytest.raises(InputError, match="expected a dataset 'model_recovery'"):
         plot_model_recovery(xr.Dataset())

@@ -15,7 +15,8 @@ from driftwalk.figures import (
     plot_flow_recovery,
     plot_recovery,
     plot_recovery_error,
-    write_recovery_figures,
+    recovery_figures,
+    write_figures,
 )
 from driftwalk.page import recovery_sections
 
@@ -88,7 +89,7 @@ def test_error_by_length_with_its_law(recovery: xr.Dataset) -> None:
 
 @pytest.mark.slow
 def test_files(recovery: xr.Dataset, tmp_path: Path) -> None:
-    files = write_recovery_figures(tmp_path, recovery=recovery, formats=("png",))
+    files = write_figures(recovery_figures(recovery), tmp_path, ("png",))
     assert [path.name for path in files] == ["recovery.png", "error_by_length.png"]
     assert min(path.stat().st_size for path in files) > 5000
 
@@ -100,14 +101,14 @@ def test_a_study_without_a_single_fit_is_drawn(recovery: xr.Dataset, tmp_path: P
         if nothing[name].dtype.kind == "f":
             nothing[name].values[...] = np.nan
     nothing["used"].values[...] = 0
-    assert len(write_recovery_figures(tmp_path, recovery=nothing, formats=("png",))) == 2
+    assert len(write_figures(recovery_figures(nothing), tmp_path, ("png",))) == 2
 
 
 def test_refusals(recovery: xr.Dataset) -> None:
     with pytest.raises(InputError, match="parameter must be one of"):
         plot_recovery(recovery, "mass")
     for plot in (plot_recovery, plot_flow_recovery, plot_recovery_error):
-        with pytest.raises(InputError, match="not a recovery study"):
+        with pytest.raises(InputError, match="expected a dataset 'recovery'"):
             plot(xr.Dataset())
 
 

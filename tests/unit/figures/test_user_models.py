@@ -12,7 +12,7 @@ from synthetic_calibration import bundled_recording
 from user_calibration import one_parameter, two_parameters
 
 from driftwalk.core.errors import InputError
-from driftwalk.figures import write, write_figures
+from driftwalk.figures import calibration_figures, write, write_figures
 from driftwalk.figures.calibration import panels_figure
 from driftwalk.page.sections.calibration import calibration_sections
 from driftwalk.plot import (
@@ -108,7 +108,7 @@ def test_every_figure_is_written_under_the_names_of_the_parameters(
 ):
     monkeypatch.setattr(write, "_save", laid_out)
     files = write_figures(
-        make(), flow=None, trajectory=bundled_recording(rows=200), folder=tmp_path, formats=("png",)
+        calibration_figures(make(), bundled_recording(rows=200)), tmp_path, formats=("png",)
     )
     names = [file.stem for file in files]
     assert names == ["trajectory", "steps", "ks_map", *panels, "validation"]

@@ -205,7 +205,7 @@ def test_two_bodies_are_refused_with_their_names() -> None:
 
 
 def test_a_flow_is_not_made_of_something_else() -> None:
-    with pytest.raises(InputError, match="not a fit"):
+    with pytest.raises(InputError, match="expected a dataset 'fit'"):
         dw.fitted_flow(dw.tank30_flow())
 
 

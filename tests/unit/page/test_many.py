@@ -10,7 +10,7 @@ import xarray as xr
 from every_kind import every_kind
 
 from driftwalk.page.run_page import dataset_page
-from driftwalk.page.sections.model_calibration import many_sections
+from driftwalk.page.sections.model_calibration import model_calibration_sections
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +20,7 @@ def found() -> xr.Dataset:
 
 @pytest.fixture(scope="module")
 def sections(found: xr.Dataset) -> dict[str, dict[str, Any]]:
-    return {part["id"]: part for part in many_sections(found)}
+    return {part["id"]: part for part in model_calibration_sections(found)}
 
 
 def test_the_page_has_a_title_and_every_section(found: xr.Dataset) -> None:
@@ -44,7 +44,7 @@ def test_the_values_have_a_row_for_each_parameter(
 
 def test_no_interval_is_a_dash(found: xr.Dataset) -> None:
     open_values = found.assign(interval=np.nan * found["interval"])
-    (values,) = (part for part in many_sections(open_values) if part["id"] == "values")
+    (values,) = (part for part in model_calibration_sections(open_values) if part["id"] == "values")
     assert [row[2] for row in values["rows"]] == ["–"] * 3
 
 

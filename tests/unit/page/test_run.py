@@ -35,7 +35,7 @@ from driftwalk.schema.answers.citation import (
 )
 
 HOSTILE = "<script>alert('1')</script> & \"quotes\""
-SPECIFICATION = {"study": {"seed": 1}, "recording_sha256": "0", "body": None}
+SPECIFICATION = {"study": {"seed": 1}, "body": None}
 
 
 def make_run(
@@ -130,7 +130,9 @@ def test_an_unfinished_run_shows_what_is_there(
     tmp_path: Path, datasets: dict[str, xr.Dataset]
 ) -> None:
     there = {name: datasets[name] for name in ("flow.nc", "recording.nc")}
-    page = report_page(make_run(tmp_path / "run", there, finished=False))
+    specification = {**SPECIFICATION, "kind": "calibration"}
+    run = make_run(tmp_path / "run", there, finished=False, specification=specification)
+    page = report_page(run)
     assert page["title"] == "Calibration"
     assert page["state"]["finished"] is False
     assert page["state"]["progress"] is None
@@ -146,11 +148,11 @@ def test_an_unfinished_run_shows_what_is_there(
 @pytest.mark.parametrize(
     ("specification", "title"),
     [
-        ({"recording_sha256": ""}, "Calibration"),
+        ({"kind": "calibration"}, "Calibration"),
         ({"kind": "fit"}, "Likelihood fit"),
         ({"kind": "recovery"}, "Recovery study"),
-        ({"calibration_sha256": None}, "Self-assembly"),
-        ({"flows_sha256": {}}, "Sensitivity of self-assembly"),
+        ({"kind": "assembly"}, "Self-assembly"),
+        ({"kind": "sensitivity"}, "Sensitivity of self-assembly"),
         ({"something": 1}, "Run"),
     ],
 )

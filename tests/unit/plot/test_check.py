@@ -11,7 +11,7 @@ import xarray as xr
 from matplotlib.patches import Rectangle
 
 from driftwalk.core.errors import InputError
-from driftwalk.figures import write_check_figures
+from driftwalk.figures import check_figures, write_figures
 from driftwalk.plot import (
     innovations as plot_innovations,
     predicted_steps as plot_predicted_steps,
@@ -119,17 +119,17 @@ def test_densities_in_the_units_of_a_reader(check: xr.Dataset, show: str, height
 
 @pytest.mark.slow
 def test_files_of_a_check_with_and_without_steps(check: xr.Dataset, tmp_path: Path) -> None:
-    files = write_check_figures(tmp_path, check=check, formats=("svg",))
+    files = write_figures(check_figures(check), tmp_path, ("svg",))
     names = ["check_innovations.svg", "check_map.svg", "check_time.svg", "check_steps.svg"]
     assert [path.name for path in files] == names
     bare = check.drop_vars([name for name in check.variables if "step_length" in str(name)])
     bare.attrs["ks_left_out"] = "it hardly moves"
-    files = write_check_figures(tmp_path / "bare", check=bare, formats=("svg",))
+    files = write_figures(check_figures(bare), tmp_path / "bare", ("svg",))
     assert [path.name for path in files] == names[:3]
     with pytest.raises(InputError, match="it hardly moves"):
         plot_predicted_steps(bare)
 
 
 def test_something_else_is_refused() -> None:
-    with pytest.raises(InputError, match="not a model check"):
+    with pytest.raises(InputError, match="expected a dataset 'model_check'"):
         plot_innovations(xr.Dataset())

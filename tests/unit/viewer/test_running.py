@@ -63,6 +63,7 @@ def run(tmp_path: Path) -> Iterator[RunDirectory]:
     specification = {
         "study": study.to_dict(),
         "body": None,
+        "kind": "calibration",
         "recording_sha256": "0" * 64,
         "flow_sha256": None,
     }
@@ -229,6 +230,7 @@ def test_the_map_of_a_users_model_fills_under_its_own_names(tmp_path: Path, coun
     specification = {
         "study": Study().to_dict(),
         "body": None,
+        "kind": "calibration",
         "recording_sha256": "0" * 64,
         "flow_sha256": None,
         "model": {"name": "tumble", "parameters": described},
@@ -279,7 +281,12 @@ def test_assembly_counts_the_classes_of_finished_runs(tmp_path: Path) -> None:
     row, pair, apart = [(0, 0), (1, 0), (2, 0)], [(0, 0), (1, 0), (0, 0)], [(0, 0)] * 3
     cells = [row, pair, apart, row, row, pair, apart, row]
     labels = {str(row): [0, 0, 0], str(pair): [0, 0, 2], str(apart): [0, 1, 2]}
-    specification = {"study": study.to_dict(), "flow_sha256": "0", "calibration_sha256": None}
+    specification = {
+        "study": study.to_dict(),
+        "flow_sha256": "0",
+        "calibration_sha256": None,
+        "kind": "assembly",
+    }
     with RunDirectory(tmp_path / "run", specification=specification) as opened:
         source = RunSource(opened.path)
         store = opened.store("fixed")
@@ -322,7 +329,12 @@ def test_sensitivity_fills_its_map(tmp_path: Path) -> None:
         "sensitivity.reference_realisations": 2,
     }
     study = dw.apply_overrides(Study(), chosen)
-    specification = {"study": study.to_dict(), "flow_sha256": "0", "flows_sha256": {}}
+    specification = {
+        "study": study.to_dict(),
+        "flow_sha256": "0",
+        "flows_sha256": {},
+        "kind": "sensitivity",
+    }
     with RunDirectory(tmp_path / "run", specification=specification) as opened:
         source = RunSource(opened.path)
         reference, settings = opened.store("reference"), opened.store("map")
@@ -361,7 +373,12 @@ def test_a_setting_of_a_running_sensitivity_has_its_classes_over_time(tmp_path: 
         "sensitivity.reference_realisations": 2,
     }
     study = dw.apply_overrides(Study(), chosen)
-    specification = {"study": study.to_dict(), "flow_sha256": "0", "flows_sha256": {}}
+    specification = {
+        "study": study.to_dict(),
+        "flow_sha256": "0",
+        "flows_sha256": {},
+        "kind": "sensitivity",
+    }
 
     def courses(*joined: tuple[int, int]) -> dict[str, np.ndarray]:
         """Return what a unit keeps: how many runs of ten join, and at which of the times."""

@@ -18,6 +18,7 @@ from driftwalk.assembly.lattice.polyomino import (
 )
 from driftwalk.assembly.outcomes.classes import class_name, listed_classes, listed_shapes
 from driftwalk.core.errors import InputError
+from driftwalk.schema.check import require_kind
 from driftwalk.schema.shapes import moved_to_origin
 
 if TYPE_CHECKING:
@@ -337,9 +338,7 @@ def _refuse(wrong: npt.NDArray[np.bool_], at: Integers, event: int, what: str) -
 
 
 def _checked_times(assembly: xr.Dataset, time: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    kind = assembly.attrs.get("kind")
-    if kind != "assembly":
-        raise InputError(f"an 'assembly' dataset is needed, got kind '{kind}'")
+    require_kind(assembly, "assembly", "assemble makes one")
     times = np.asarray(time, dtype=np.float64)
     last = float(assembly.attrs["duration_s"])
     wrong = ~((times >= 0) & (times <= last))

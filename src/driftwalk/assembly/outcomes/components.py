@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from driftwalk.assembly.outcomes.distribution import is_complete, sampling_variance
 from driftwalk.core.errors import InputError
-from driftwalk.schema.check import build_dataset
+from driftwalk.schema.check import build_dataset, require_kind
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -146,11 +146,7 @@ def disconnected_alignment(components: xr.Dataset, *, component: int = 1) -> Ali
     >>> round(alignment.loading_share, 12), round(abs(alignment.cosine), 12)
     (0.5, 1.0)
     """
-    if components.attrs.get("kind") != "components":
-        raise InputError(
-            f"not a components dataset: its kind is {components.attrs.get('kind')!r}; give what "
-            "principal_components made"
-        )
+    require_kind(components, "components", "principal_components makes one")
     there = [int(number) for number in components["component"].values]
     if component not in there:
         raise InputError(f"there is no component {component}: there are {len(there)}, from 1")

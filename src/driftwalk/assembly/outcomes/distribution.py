@@ -16,7 +16,7 @@ from driftwalk.assembly.lattice.events import classes_at
 from driftwalk.assembly.lattice.polyomino import shape_size
 from driftwalk.assembly.outcomes.classes import class_shapes
 from driftwalk.core.errors import InputError
-from driftwalk.schema.check import build_dataset
+from driftwalk.schema.check import build_dataset, require_kind
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -254,9 +254,7 @@ def duration(assembly: xr.Dataset) -> float:
 
 def require_assembly(dataset: xr.Dataset, *variables: str) -> None:
     """Raise `InputError` unless the dataset is an `assembly` with these variables."""
-    kind = dataset.attrs.get("kind")
-    if kind != "assembly":
-        raise InputError(f"not an assembly dataset: its kind is {kind!r}; give what assemble made")
+    require_kind(dataset, "assembly", "assemble makes one")
     missing = [name for name in (*variables, "class") if name not in dataset.variables]
     missing += [name for name in ("blocks", "duration_s") if name not in dataset.attrs]
     if missing:

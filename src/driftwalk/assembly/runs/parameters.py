@@ -22,7 +22,7 @@ import numpy.typing as npt
 from driftwalk.assembly.runs.plan import stream_keys
 from driftwalk.assembly.runs.posterior import draw_posterior, has_covariance
 from driftwalk.core.errors import InputError
-from driftwalk.schema.check import refuse_other_version
+from driftwalk.schema.check import kind_name, refuse_other_version
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -84,7 +84,7 @@ def draw_parameters(
     >>> draw_parameters(calibration, runs=2).drag_coefficient  # doctest: +SKIP
     array([0.3874, 0.3921])
     """
-    if calibration.attrs.get("kind") == "fit":
+    if kind_name(calibration) == "fit":
         numbers = draw_posterior(calibration, runs=runs, seed=seed, trial=trial)
         return DrawnParameters(numbers["drag_coefficient"], numbers["force_std_N"])
     region = _region_of(calibration)
@@ -111,7 +111,7 @@ def has_uncertainty(found: xr.Dataset) -> bool:
     >>> has_uncertainty(xr.Dataset(attrs={"kind": "model_comparison"}))
     False
     """
-    kind = found.attrs.get("kind")
+    kind = kind_name(found)
     return has_covariance(found) if kind == "fit" else kind == "calibration" and has_region(found)
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from driftwalk.core.errors import InputError
+from driftwalk.schema.check import kind_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,7 +47,7 @@ def path_recording(path: xr.Dataset, *, run: int = 0) -> xr.Dataset:
     """
     from driftwalk.schema import build_trajectory
 
-    kind = path.attrs.get("kind", "a dataset of no kind")
+    kind = kind_name(path) or "a dataset of no kind"
     if kind != "assembly_path":
         raise InputError(f"expected a dataset of kind 'assembly_path', got '{kind}'")
     runs = path["run"].values.tolist()

@@ -25,6 +25,7 @@ from driftwalk.assembly.runs.plan import (
 )
 from driftwalk.assembly.runs.posterior import draw_posterior
 from driftwalk.core.errors import InputError
+from driftwalk.schema.check import kind_name
 from driftwalk.sweep import (
     Store,
     WorkUnit,
@@ -201,7 +202,7 @@ def assemble_drawn(
     settings = plan.study.assembly
     address = {"runs": settings.runs, "seed": settings.seed, "trial": trial}
     drawn = draw_parameters(calibration, **address)
-    is_fit = calibration.attrs.get("kind") == "fit"
+    is_fit = kind_name(calibration) == "fit"
     numbers = draw_posterior(calibration, **address) if is_fit else {}
     law = {key: values for key, values in numbers.items() if key in LAW_NAMES}
     moves = flow_draws == "standard_error" and has_standard_error(flow)

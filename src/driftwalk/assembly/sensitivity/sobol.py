@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
-from driftwalk.schema.check import build_dataset
+from driftwalk.schema.check import build_dataset, require_kind
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -192,11 +192,7 @@ def sobol_indices(
 
 def _size_of(design: xr.Dataset) -> tuple[int, int]:
     """Return the numbers of inputs and of base samples."""
-    if design.attrs.get("kind") != "sobol_design":
-        raise InputError(
-            f"not a Sobol design: its kind is {design.attrs.get('kind')!r}; give what sobol_design "
-            "made"
-        )
+    require_kind(design, "sobol_design", "sobol_design makes one")
     return design.sizes["input"], int(design.attrs["samples"])
 
 

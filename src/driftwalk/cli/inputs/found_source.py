@@ -81,6 +81,8 @@ def open_run(folder: Path, given: StudyOptions, model: str | None) -> FoundSourc
     # The values of another model hold in any study; those of the block belong to its own.
     own = source.is_block and given.file is not None
     refuse_found(folder, given.overrides, also=["--study"] if own else [])
-    if model is not None and source.found.kind in ("fit", "calibration") and source.is_block:
+    # A comparison of models holds values for the block and for others.
+    one = "model" not in source.found.found.dims
+    if model is not None and one and source.is_block:
         raise InputError(f"{folder} is about the block, and not about {model}: leave out --model")
     return source

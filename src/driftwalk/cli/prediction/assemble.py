@@ -54,7 +54,7 @@ def assemble(
     shows its remaining uncertainty. Without RUN, uses the parameters of a study and a flow field
     (--flow). After a kill, the same command continues.
     """
-    from driftwalk.runs import AssemblyWork, run_assembly
+    from driftwalk.runs import AssemblyWork, run_work
 
     _check_film(film)
     if run is None:
@@ -62,10 +62,10 @@ def assemble(
     else:
         refuse_found(run, given.overrides, also=[] if given.file is None else ["--study"])
         source = source_from_run(run, flow, given)
-    work = AssemblyWork(source.study, source.flow, source.uncertainty, source.inputs, threads)
+    work = AssemblyWork(source.study, source.flow, source.uncertainty, source.inputs, threads, film)
     begun = opening_note(source.study, given, about="simulation", otherwise=str(run))
     with Workers(cluster, cluster_options).reported("assemble") as told:
-        result = run_assembly(work, out, film=film, overwrite=overwrite, begun=begun, **told)
+        result = run_work(work, out, overwrite=overwrite, begun=begun, **told)
     series = flow_series_words(result.distribution.attrs, holds="the intervals hold")
     drawn = [] if source.not_drawn is None else [source.not_drawn]
     warnings = [*source.warnings, *drawn, *series, *_left_out(result)]

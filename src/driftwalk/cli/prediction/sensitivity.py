@@ -68,7 +68,7 @@ def sensitivity(
     reference, which has the parameters of a RUN or of a study (--flow). After a kill, the same
     command continues.
     """
-    from driftwalk.runs import SensitivityWork, run_sensitivity
+    from driftwalk.runs import SensitivityWork, run_work
 
     given = given.and_also(vary_overrides(vary or []), keys=VARY_KEYS)
     if run is None:
@@ -94,7 +94,7 @@ def sensitivity(
     )
     begun = opening_note(source.study, given, about="simulation", otherwise=str(run))
     with Workers(cluster, cluster_options).reported("sensitivity") as told:
-        result = run_sensitivity(work, out, overwrite=overwrite, begun=begun, **told)
+        result = run_work(work, out, overwrite=overwrite, begun=begun, **told)
     warnings = [*source.warnings, *_warnings(source, result)]
     print_prediction(sensitivity_of(result), out, run, warnings, json=json)
 

@@ -85,11 +85,17 @@ def info(
     flow_variables: FlowVariables = None,
     json: Json = False,
 ) -> None:
-    """Say what a recording, or a flow field, holds and how driftwalk reads it.
+    """Say what a recording, a flow field or a run directory holds, and how driftwalk reads it.
 
     Prints bodies, clock and its jitter, gaps, extent, the circle that the centres stay in, speed,
-    and the tracking noise estimated from the recording itself.
+    and the tracking noise estimated from the recording itself. Prints the answer of a finished run.
     """
+    from driftwalk.cli.terminal.answer import print_run
+    from driftwalk.core.files.run_layout import state_of
+
+    if recording.is_dir() and state_of(recording) != "new":
+        print_run(recording, json=json)
+        return
     from driftwalk.cli.inputs.flow_file import describe_field, read_flow_file
     from driftwalk.cli.inputs.study_recording import words_to_fit
     from driftwalk.record import describe

@@ -15,6 +15,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.files.run_layout import MANIFEST_FILE, faults_of, state_of
 from driftwalk.core.provenance import read_manifest, refuse_other_version
 from driftwalk.schema.answers.citation import bibtex, citation, methods_used
+from driftwalk.schema.check import kind_name
 from driftwalk.schema.stores.netcdf import is_netcdf, open_netcdf
 
 
@@ -80,9 +81,10 @@ def _of_file(path: Path) -> dict[str, Any]:
 
     if not is_netcdf(path):
         raise InputError(f"{path} is neither a run directory nor a file of driftwalk")
-    attrs = open_netcdf(path).attrs
-    if attrs.get("kind") != "simulation":
-        kind = attrs.get("kind", "of no kind")
+    found = open_netcdf(path)
+    attrs = found.attrs
+    if kind_name(found) != "simulation":
+        kind = kind_name(found) or "of no kind"
         raise InputError(
             f"{path} is a dataset '{kind}': cite the run directory that it lies in, or a simulation"
         )

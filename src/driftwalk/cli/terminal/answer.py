@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import (
@@ -16,21 +16,12 @@ from driftwalk.cli.terminal.output import (
     printable,
     sibling,
 )
+from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.schema.answers.parts import Answer, Part
-
-_FILES: Final = {
-    "fit": {"flow": "flow.nc"},
-    "calibration": {"figures": "figures"},
-    "model_calibration": {"figures": "figures"},
-    "model_comparison": {"comparison": "comparison.nc", "figures": "figures"},
-    "recovery": {"every recording": "recovery.nc"},
-    "model_recovery": {"every recording": "model_recovery.nc"},
-}
-"""By kind of dataset, what a run directory holds besides its answer."""
 
 
 def print_result(found: xr.Dataset, folder: Path, *, json: bool, **more: Any) -> None:
@@ -47,16 +38,57 @@ def print_result(found: xr.Dataset, folder: Path, *, json: bool, **more: Any) ->
     **more
         What else the run made, see `answer_of`.
     """
-    from driftwalk.schema.answers.answer import answer_of
+    from driftwalk.schema.check import kind_name
+    from driftwalk.schema.runs import answer_of
 
     answer = answer_of(found, **more)
     if answer is None:
-        raise TypeError(f"a {found.attrs.get('kind')} has no answer")
+        raise InputError(f"no command prints a dataset of kind {kind_name(found)!r}")
     if json:
         print_json(answer.facts)
         return
     print_parts(answer.parts)
     print_places(found, folder, answer.warnings)
+
+
+def print_run(folder: Path, *, json: bool) -> None:
+    """Print the answer of a finished run.
+
+    Parameters
+    ----------
+    folder : Path
+        The run directory.
+    json : bool
+        Whether one JSON object is printed.
+
+    Raises
+    ------
+    InputError
+        When there is no run, or one without a result.
+    """
+    from driftwalk.schema.answers.parts import Answer
+    from driftwalk.schema.runs import answer_of, open_run_folder
+
+    run = open_run_folder(folder)
+    found = None if run.kind is None else run.dataset(run.kind.file)
+    if run.kind is None or found is None:
+        why = "; ".join(run.problems.values()) or f"its result is not there ({run.state})"
+        raise InputError(f"{folder} holds a run, but {why}")
+    check = run.dataset("check.nc")
+    reference = run.dataset("reference.nc")
+    more = {"check": check, "reference": reference}
+    given = {name: one for name, one in more.items() if one is not None}
+    answer = answer_of(found, **given) or Answer([], {}, [])
+    warnings = [*run.faults(), *answer.warnings]
+    if json:
+        finished = run.state == "finished"
+        facts = {"kind": run.kind.name, "finished": finished, **answer.facts}
+        print_json({**facts, "warnings": warnings})
+        return
+    print(f"{run.kind.title}: {printable(str(folder / run.kind.file))}")
+    print_parts(answer.parts)
+    print_warnings(warnings)
+    print_report_next(folder)
 
 
 def print_parts(parts: Iterable[Part]) -> None:
@@ -85,10 +117,13 @@ def print_row(label: str, text: object) -> None:
 def print_places(found: xr.Dataset, folder: Path, warnings: Iterable[str]) -> None:
     """Print the warnings, where everything is, and the command that comes next."""
     print_warnings(warnings)
-    kind = str(found.attrs["kind"])
-    for label, name in _FILES[kind].items():
+    from driftwalk.schema.runs import kind_of
+
+    kind = kind_of(found)
+    assert kind is not None, "the result of a run"
+    for label, name in kind.places.items():
         print_row(label, folder / name)
-    following = _following(found, kind)
+    following = _following(found, kind.name)
     if not following:
         print_report_next(folder)
         return

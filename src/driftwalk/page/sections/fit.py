@@ -29,6 +29,7 @@ from driftwalk.schema.answers.facts import sentences
 from driftwalk.schema.answers.fit import model_estimates
 from driftwalk.schema.answers.force_law import LINEAR_DRAG_ALONE
 from driftwalk.schema.answers.parts import NOT_DETERMINED, Estimate, estimates
+from driftwalk.schema.check import kind_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -167,7 +168,7 @@ def _verdict(check: xr.Dataset) -> str:
         if explained
         else "THE MODEL DOES NOT EXPLAIN THIS RECORDING: see the warnings."
     )
-    if check.attrs.get("kind") == "fit":
+    if kind_name(check) == "fit":
         return words
     distance, floor = (value_of(check, name) for name in ("ks_distance", "ks_noise_floor"))
     if distance is None or floor is None:

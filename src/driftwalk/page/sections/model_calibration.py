@@ -27,14 +27,17 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def many_sections(
-    found: xr.Dataset | None, *, recording: xr.Dataset | None = None, body: str | None = None
+def model_calibration_sections(
+    model_calibration: xr.Dataset | None,
+    *,
+    recording: xr.Dataset | None = None,
+    body: str | None = None,
 ) -> list[Section]:
     """Return the sections of a page on a calibration of many parameters.
 
     Parameters
     ----------
-    found : xarray.Dataset, optional
+    model_calibration : xarray.Dataset, optional
         A `model_calibration`; None while there is none yet.
     recording : xarray.Dataset, optional
         The recording.
@@ -48,9 +51,10 @@ def many_sections(
 
     Examples
     --------
-    >>> [part["kind"] for part in many_sections(None)]
+    >>> [part["kind"] for part in model_calibration_sections(None)]
     ['empty']
     """
+    found = model_calibration
     if found is None:
         made = empty_head("The calibration has no result yet.")
     else:

@@ -29,12 +29,12 @@ MOST_PARAMETERS: Final = 100
 """Parameters of a model that a page shows, with a chart each."""
 
 
-def model_recovery_sections(recovery: xr.Dataset | None) -> list[Section]:
+def model_recovery_sections(model_recovery: xr.Dataset | None) -> list[Section]:
     """Return the sections of a page on a recovery study of a motion model.
 
     Parameters
     ----------
-    recovery : xarray.Dataset, optional
+    model_recovery : xarray.Dataset, optional
         A `model_recovery`; None while there is none yet.
 
     Returns
@@ -47,21 +47,24 @@ def model_recovery_sections(recovery: xr.Dataset | None) -> list[Section]:
     >>> [part["kind"] for part in model_recovery_sections(None)]
     ['empty']
     """
-    if recovery is None:
+    if model_recovery is None:
         return empty_head("There are no estimates yet.")
-    if "parameter" not in recovery.variables:
+    if "parameter" not in model_recovery.variables:
         return empty_head("the recovery holds no parameter")
-    if recovery["parameter"].size > MOST_PARAMETERS:
+    if model_recovery["parameter"].size > MOST_PARAMETERS:
         return empty_head(
-            f"{recovery['parameter'].size} parameters are more than the {MOST_PARAMETERS} of a page"
+            f"{model_recovery['parameter'].size} parameters are more than the {MOST_PARAMETERS} of "
+            "a page"
         )
-    made = head_sections(lambda: summary_section(recovery), lambda: model_warnings(recovery))
-    made += attempt("errors", "Errors and intervals", lambda: errors_section(recovery))
-    for index, name in enumerate(recovery["parameter"].values):
+    made = head_sections(
+        lambda: summary_section(model_recovery), lambda: model_warnings(model_recovery)
+    )
+    made += attempt("errors", "Errors and intervals", lambda: errors_section(model_recovery))
+    for index, name in enumerate(model_recovery["parameter"].values):
         made += attempt(
             f"estimates-{index + 1}",
             f"Estimates: {name}",
-            lambda index=index: estimates_section(recovery, index),  # type: ignore[misc]
+            lambda index=index: estimates_section(model_recovery, index),  # type: ignore[misc]
         )
     return made
 

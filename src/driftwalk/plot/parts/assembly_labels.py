@@ -10,6 +10,7 @@ import numpy.typing as npt
 from driftwalk.core.errors import InputError
 from driftwalk.plot.parts.labels import DRAG_LABEL, force_interval_text, in_unit
 from driftwalk.plot.parts.style import BLUE, ORANGE
+from driftwalk.schema.check import kind_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -56,7 +57,7 @@ _WORDS: Final[dict[str, str]] = {
 
 def check_kind(dataset: xr.Dataset, kind: str, *variables: str) -> None:
     """Raise `InputError` unless the dataset is of this kind and has these variables."""
-    found = dataset.attrs.get("kind", "a dataset of no kind")
+    found = kind_name(dataset) or "a dataset of no kind"
     if found != kind:
         raise InputError(f"expected a dataset of kind '{kind}', got '{found}'")
     missing = [name for name in variables if name not in dataset.variables]

@@ -10,6 +10,7 @@ import numpy as np
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.raw import Extra, RawBody, RawRecording, ReadOptions
 from driftwalk.schema import body_names, check_trajectory
+from driftwalk.schema.check import kind_name
 from driftwalk.schema.kinds import KINDS
 from driftwalk.schema.stores.contents import check_contents
 from driftwalk.schema.stores.netcdf import MAGIC, kind_of, open_netcdf
@@ -33,7 +34,7 @@ class DriftwalkLoader:
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read every body and carry the attributes over; of a simulation one replicate."""
         dataset = check_contents(open_netcdf(path), path)
-        if dataset.attrs["kind"] == "simulation":
+        if kind_name(dataset) == "simulation":
             dataset = _replicate(dataset, options.replicate)
         try:
             check_trajectory(dataset)

@@ -13,6 +13,7 @@ from driftwalk.core.files.run_layout import MANIFEST_FILE, RECORD_FILE, state_of
 from driftwalk.core.files.shards import read_specification
 from driftwalk.core.provenance import read_manifest, refuse_other_version
 from driftwalk.core.run_stages import tell_nobody
+from driftwalk.schema.runs import RUN_KINDS, load_maker
 from driftwalk.viewer.hub import Content, Publish, Source
 from driftwalk.viewer.shell import page_frame
 from driftwalk.viewer.watch.running import NO_CELL, RunningOther
@@ -180,7 +181,7 @@ def quiet_words(duration_s: float) -> str:
 
 
 def running_view(folder: Path) -> Running:
-    """Return the view of a run under way, by what its specification holds.
+    """Return the view of a run under way, as its kind declares it.
 
     Raises
     ------
@@ -188,27 +189,16 @@ def running_view(folder: Path) -> Running:
         When that is of another version, or no specification that driftwalk writes.
     """
     specification = unfinished_specification(folder)
+    kind = RUN_KINDS.get(str(specification.get("kind")))
+    view = RunningOther if kind is None or kind.live is None else load_maker(kind.live)
     try:
-        return _view_of(folder, specification)
+        running: Running = view(folder, specification)
+        return running
     except (AttributeError, LookupError, TypeError, ValueError) as error:
         raise InputError(
             f"{folder / RECORD_FILE} does not describe the run: it has been changed "
             "or damaged; run the same command again, or move the directory away"
         ) from error
-
-
-def _view_of(folder: Path, specification: Mapping[str, Any]) -> Running:
-    from driftwalk.page.stored_run import kind_of_run
-    from driftwalk.viewer.watch.assembly import RunningAssembly
-    from driftwalk.viewer.watch.calibration import RunningCalibration
-    from driftwalk.viewer.watch.sensitivity import RunningSensitivity
-
-    views: dict[str | None, Callable[[Path, Mapping[str, Any]], Running]] = {
-        "assembly": RunningAssembly,
-        "calibration": RunningCalibration,
-        "sensitivity": RunningSensitivity,
-    }
-    return views.get(kind_of_run(specification), RunningOther)(folder, specification)
 
 
 def require_run(folder: Path) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final, Protocol
 
+from driftwalk.schema.runs import RUN_KINDS
 from driftwalk.viewer.watch.shards import RunReader
 
 Section = dict[str, Any]
@@ -41,14 +42,6 @@ NO_CELL: Final[dict[str, Any]] = dict.fromkeys(
     )
 )
 """Answer for a setting that has not been simulated."""
-UNDER_WAY: Final = {
-    "fit": "A fit under way",
-    "recovery": "A recovery study under way",
-    "model_recovery": "A recovery study under way",
-    "model_calibration": "A calibration under way",
-    "model_comparison": "A comparison of motion models under way",
-}
-"""Titles by the kind of run."""
 
 
 class RunningOther:
@@ -67,8 +60,9 @@ class RunningOther:
     def __init__(self, folder: Path, specification: Mapping[str, Any]) -> None:
         self._reader = RunReader(folder)
         self._done = 0
-        kind = specification.get("kind")
-        self.title = UNDER_WAY.get(str(kind), self.title)
+        kind = RUN_KINDS.get(str(specification.get("kind")))
+        if kind is not None:
+            self.title = kind.under_way
 
     def look(self) -> list[Section]:
         """Count what is finished."""

@@ -205,7 +205,7 @@ def test_without_orientations_the_errors_are_still_white() -> None:
 
 
 def test_what_cannot_be_checked_is_refused(fit: xr.Dataset, track: xr.Dataset) -> None:
-    with pytest.raises(InputError, match="not a fit"):
+    with pytest.raises(InputError, match="expected a dataset 'fit'"):
         dw.check_model(dw.tank30_flow(), track)
     with pytest.raises(InputError, match="with the recordings that it was fitted to"):
         dw.check_model(fit, track.isel(time=slice(0, 3000)))

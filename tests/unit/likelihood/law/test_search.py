@@ -14,7 +14,7 @@ import driftwalk as dw
 from driftwalk.conditions import estimated_study
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.study_keys import FIT_KEYS, study_overrides
-from driftwalk.figures import write_laws_figure
+from driftwalk.figures import laws_figures, write_figures
 from driftwalk.likelihood import compare_laws
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.interval_inflation import _log_drag_std
@@ -167,14 +167,13 @@ def test_laws_are_compared_by_what_was_held_out(tmp_path: Path) -> None:
     evidence = fit["compared_log_evidence"].to_series()
     assert evidence["paper"] > evidence["floating body"] + 20.0
     check_dataset(fit)
-    assert [path.name for path in write_laws_figure(tmp_path, fit=fit, formats=["png"])] == [
-        "laws.png"
-    ]
+    written = write_figures(laws_figures(fit), tmp_path, ["png"])
+    assert [path.name for path in written] == ["laws.png"]
 
 
-def test_a_fit_that_compared_nothing_has_no_figure(tmp_path: Path) -> None:
+def test_a_fit_that_compared_nothing_has_no_figure() -> None:
     with pytest.raises(InputError, match="compared no force laws"):
-        write_laws_figure(tmp_path, fit=xr.Dataset())
+        laws_figures(xr.Dataset())
 
 
 @pytest.mark.slow

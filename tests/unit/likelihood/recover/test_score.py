@@ -146,5 +146,5 @@ def test_a_truth_has_to_be_positive(fit: xr.Dataset, wrong: float) -> None:
 
 
 def test_what_is_no_fit_is_refused(track: xr.Dataset) -> None:
-    with pytest.raises(InputError, match="not a fit"):
+    with pytest.raises(InputError, match="expected a dataset 'fit'"):
         scored(track)

@@ -15,8 +15,8 @@ from driftwalk.cli.terminal.answer import print_parts, print_places, print_predi
 from driftwalk.cli.terminal.output import to_json
 from driftwalk.notebook.result import answer_lines
 from driftwalk.runs import AssemblyResult, SensitivityResult
-from driftwalk.schema.answers.answer import answer_of
 from driftwalk.schema.answers.parts import Answer
+from driftwalk.schema.runs import answer_of
 
 STORED = Path(__file__).resolve().parents[3] / "data" / "answers"
 FORMS = sorted(path.stem for path in STORED.glob("*.txt"))

@@ -1,11 +1,12 @@
-"""A run directory as a page needs it: which kind of run, how far it is, and its datasets."""
+"""The contents of a run: datasets by the names of their files, in memory or in a run directory."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from inspect import Parameter, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 from driftwalk.core.errors import DriftwalkError, FormatError, InputError
 from driftwalk.core.files.file_names import text_of_name
@@ -20,27 +21,87 @@ from driftwalk.core.files.run_layout import (
 )
 from driftwalk.core.files.shards import read_specification
 from driftwalk.core.provenance import read_manifest, refuse_other_version
+from driftwalk.schema.runs.kind import Maker, RunKind, load_maker
+from driftwalk.schema.runs.registry import RUN_KINDS, kind_of_folder
 from driftwalk.schema.stores.netcdf import open_netcdf
 
 if TYPE_CHECKING:
     import xarray as xr
 
-# The file that each kind of run makes, by which a finished one is known.
-MAIN_FILES: Final = {
-    "calibration": "calibration.nc",
-    "fit": "fit.nc",
-    "assembly": "assembly.nc",
-    "sensitivity": "sensitivity.nc",
-    "recovery": "recovery.nc",
-    "model_comparison": "comparison.nc",
-    "model_calibration": "model_calibration.nc",
-    "model_recovery": "model_recovery.nc",
-}
+
+@dataclass
+class RunContents:
+    """Datasets of a run.
+
+    Attributes
+    ----------
+    datasets : dict of str to xarray.Dataset
+        By the names of their files.
+    body : str or None
+        The body of the recording that was used, where it was named.
+    """
+
+    datasets: dict[str, xr.Dataset] = field(default_factory=dict)
+    body: str | None = None
+
+    def dataset(self, name: str) -> xr.Dataset | None:
+        """Return a dataset of the run, None when it is not there or cannot be read."""
+        return self.datasets.get(name)
+
+    def holds(self, name: str) -> bool:
+        """Return whether anything has the name, which `dataset` may refuse."""
+        return name in self.datasets
+
+    def recordings(self) -> list[xr.Dataset]:
+        """Return the recordings of the run, in their order."""
+        names = ["recording.nc"]
+        while self.holds(f"recording-{len(names) + 1}.nc"):
+            names.append(f"recording-{len(names) + 1}.nc")
+        return [found for name in names if (found := self.dataset(name)) is not None]
+
+    def make(self, kind: RunKind, maker: Maker, *, lacking: str = "") -> Any:
+        """Call a maker with the datasets that its parameters name.
+
+        Parameters
+        ----------
+        kind : RunKind
+            The kind of the run.
+        maker : callable or str
+            One of the kind's own: its figures or its page.
+        lacking : str
+            What cannot be done where a dataset is missing that has no default; without it the maker
+            gets None.
+
+        Raises
+        ------
+        InputError
+            When such a dataset is missing.
+        """
+        function = load_maker(maker)
+        # Other parameters are options, of which a file of the same name is none of the run's.
+        known = {Path(kind.file).stem, *kind.datasets, "recordings", "body"}
+        given: dict[str, Any] = {}
+        for name, one in signature(function).parameters.items():
+            if name not in known:
+                continue
+            given[name] = self._argument(name)
+            if lacking and given[name] is None and one.default is Parameter.empty:
+                raise InputError(f"the run lacks {name}.nc: {lacking}")
+        return function(**given)
+
+    def _argument(self, name: str) -> Any:
+        if name == "body":
+            return self.body
+        if name not in ("recording", "recordings"):
+            return self.dataset(f"{name}.nc")
+        # All are read for the first one too: a page then tells of one that the run did not write.
+        found = self.recordings()
+        return found if name == "recordings" else next(iter(found), None)
 
 
 @dataclass
-class Run:
-    """Contents of a run directory.
+class StoredRun(RunContents):
+    """Contents of a run directory, each read when it is asked for.
 
     Attributes
     ----------
@@ -48,8 +109,8 @@ class Run:
         The run directory.
     state : {"finished", "unfinished"}
         Whether the run has come to its end.
-    kind : str or None
-        A key of `MAIN_FILES`; None when nothing says it.
+    kind : RunKind or None
+        Its kind; None when nothing says it.
     manifest : dict
         The manifest; of an unfinished run its specification and when it was started.
     problems : dict of str to str
@@ -58,10 +119,10 @@ class Run:
         The names of those that were read.
     """
 
-    folder: Path
-    state: State
-    kind: str | None
-    manifest: dict[str, Any]
+    folder: Path = Path()
+    state: State = "new"
+    kind: RunKind | None = None
+    manifest: dict[str, Any] = field(default_factory=dict)
     problems: dict[str, str] = field(default_factory=dict)
     read: list[str] = field(default_factory=list)
 
@@ -69,12 +130,6 @@ class Run:
     def name(self) -> str:
         """Name of the folder."""
         return text_of_name(self.folder.resolve().name)
-
-    @property
-    def body(self) -> str | None:
-        """The body of the recording that was used, where it was named."""
-        found = self.specification.get("body")
-        return None if found is None else str(found)
 
     @property
     def specification(self) -> Mapping[str, Any]:
@@ -108,13 +163,6 @@ class Run:
         found = faults_of(self.folder, self.read, unread=True)
         return [one for one in found if one.partition(" ")[0] not in self.problems]
 
-    def recordings(self) -> list[xr.Dataset]:
-        """Return the recordings of the run, in their order."""
-        names = ["recording.nc"]
-        while self.holds(f"recording-{len(names) + 1}.nc"):
-            names.append(f"recording-{len(names) + 1}.nc")
-        return [found for name in names if (found := self.dataset(name)) is not None]
-
     def holds(self, name: str) -> bool:
         """Return whether anything has the name, which `dataset` may refuse."""
         try:
@@ -123,7 +171,7 @@ class Run:
             return True
 
 
-def open_run_folder(folder: Path) -> Run:
+def open_run_folder(folder: Path) -> StoredRun:
     """Look at a run directory, finished or not; nothing in it is changed.
 
     Parameters
@@ -150,40 +198,11 @@ def open_run_folder(folder: Path) -> Run:
         stored = read_specification(folder / RECORD_FILE)
         manifest = {key: stored[key] for key in ("started_utc", "specification") if key in stored}
         manifest["study"] = stored["specification"].get("study")
-    run = Run(folder, state, None, manifest)
-    run.kind = next((kind for kind, name in MAIN_FILES.items() if run.holds(name)), None)
-    if run.kind is None:
-        run.kind = kind_of_run(run.specification)
+    run = StoredRun(folder=folder, state=state, manifest=manifest)
+    body = run.specification.get("body")
+    run.body = None if body is None else str(body)
+    run.kind = kind_of_folder(folder, run.specification)
     return run
-
-
-def kind_of_run(specification: Mapping[str, Any]) -> str | None:
-    """Return the kind of a run that has no result yet.
-
-    Parameters
-    ----------
-    specification : mapping
-        Everything that determines its numbers.
-
-    Returns
-    -------
-    str or None
-        A key of `MAIN_FILES`; None when nothing says it.
-
-    Examples
-    --------
-    >>> kind_of_run({"kind": "model_comparison", "recording_sha256": "5f3a"})
-    'model_comparison'
-    """
-    if specification.get("kind") in MAIN_FILES:
-        return str(specification["kind"])
-    # Those whose specification does not name it.
-    telling = {
-        "recording_sha256": "calibration",
-        "calibration_sha256": "assembly",
-        "flows_sha256": "sensitivity",
-    }
-    return next((kind for key, kind in telling.items() if key in specification), None)
 
 
 def _no_run(folder: Path) -> str:
@@ -198,7 +217,8 @@ def _no_run(folder: Path) -> str:
             continue
     if inside:
         return f"{folder} is not a run directory, but holds some: name {' or '.join(inside)} in it"
+    *most, last = dict.fromkeys(kind.command for kind in RUN_KINDS.values())
     return (
-        f"{folder} is not a run directory: give one that calibrate, compare-models, fit, assemble, "
-        "sensitivity or study recover made, or a recording"
+        f"{folder} is not a run directory: give one that {', '.join(most)} or {last} made, or a "
+        "recording"
     )
