@@ -61,6 +61,7 @@ def test_what_is_stored_is_what_is_in_memory(form: str, tmp_path: Path) -> None:
     assert calibration_facts(stored(found, tmp_path)) == calibration_facts(found)
 
 
+@pytest.mark.slow
 def test_the_answer_has_units_and_a_verdict() -> None:
     found = every_kind("calibration")
     assert dict(zip(found["parameter"].values, found["unit"].values, strict=True)) == {
@@ -86,6 +87,7 @@ def test_the_answer_has_units_and_a_verdict() -> None:
         fitted_value(found, "viscosity")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", FORMS[1:])
 def test_a_model_of_the_user_answers_under_its_own_names(form: str) -> None:
     found = every_kind(form)
