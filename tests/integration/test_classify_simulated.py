@@ -111,6 +111,7 @@ def test_path_as_a_recording_holds_the_same_poses(
         path_recording(path.drop_attrs())
 
 
+@pytest.mark.slow
 def test_command_reads_a_simulated_path(
     simulated: tuple[xr.Dataset, xr.Dataset], tmp_path: Path
 ) -> None:

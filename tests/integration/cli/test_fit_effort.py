@@ -44,6 +44,7 @@ def test_the_memory_of_this_machine_is_asked_before_the_work() -> None:
         check_fit(long)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_figures")
 def test_much_work_is_said_before_it_begins(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch

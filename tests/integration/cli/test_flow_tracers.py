@@ -17,6 +17,7 @@ from driftwalk.schema import FLAGS
 SCALE = ("--scale", "10um", "--fps", "10")
 
 
+@pytest.mark.slow
 def test_from_a_table_of_tracks_to_a_flow_that_is_simulated_in(tmp_path: Path) -> None:
     """A synthetic table with a row for each particle and frame."""
     recording = seeded_tank(1, tracers=250, samples=8, false_links=0.01).recording

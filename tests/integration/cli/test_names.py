@@ -50,6 +50,7 @@ def test_a_name_that_is_not_utf8_is_spelled_in_a_manifest_and_on_the_page(record
     assert report_page(run)["subtitle"] == "run\\xfc"
 
 
+@pytest.mark.slow
 def test_stdout_spells_what_its_encoding_lacks(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_bytes(TRACK)
     done = apart("report", tmp_path / "a.csv", "--out", tmp_path / "Käfer.html", env=ASCII)

@@ -56,6 +56,7 @@ def test_fit_that_searches_pieces_first(shares: Shares) -> None:
     assert_forward(shares("fit", RECORDING, *TANK, *words))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("no_figures")
 def test_calibrate_assemble_and_sensitivity(shares: Shares, tmp_path: Path) -> None:
     (tmp_path / "grid.toml").write_text(GRID, encoding="utf-8")

@@ -207,6 +207,7 @@ def gappy(folder: Path, truth: xr.Dataset, tmp_path_factory: pytest.TempPathFact
     return give_times(video, times.tolist())
 
 
+@pytest.mark.slow
 def test_dropped_frames_of_a_file_are_told_as_they_come(
     folder: Path, gappy: Path, tmp_path: Path, port: int
 ) -> None:
@@ -219,6 +220,7 @@ def test_dropped_frames_of_a_file_are_told_as_they_come(
     assert counts["dropped"] == told[FRAMES - 1] == 4
 
 
+@pytest.mark.slow
 def test_watching_tells_dropped_frames(folder: Path, gappy: Path) -> None:
     done = here("watch", gappy, "--markers", folder / "m.toml", *TANK, "--bodies", "2")
     assert done.code == 0, done.err

@@ -120,6 +120,7 @@ def test_a_hidden_block_never_makes_the_class_wrong(tmp_path: Path) -> None:
     assert set(observed["hidden"].values[10:]) == {0, 1}
 
 
+@pytest.mark.slow
 def test_many_hidden_blocks_are_said_to_leave_it_unknown(tmp_path: Path) -> None:
     """Nine tags, four of which are covered after a second."""
     tags = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)

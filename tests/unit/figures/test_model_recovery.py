@@ -58,6 +58,7 @@ def test_intervals_are_drawn_between_their_ends() -> None:
     assert ends[order[0]] == pytest.approx(wanted[order[1]])
 
 
+@pytest.mark.slow
 def test_it_is_written(tmp_path: Path) -> None:
     alone = lost(made_up(2), 0, 1, "too short")
     for found in (made_up_recovery(), made_up_recovery(alone)):

@@ -40,6 +40,7 @@ def attribute(name: str, value: object) -> Alter:
     return lambda data: data.assign_attrs({name: value})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("file", "alter", "lost", "kept"),
     [

@@ -23,6 +23,7 @@ def sections(found: xr.Dataset) -> dict[str, dict[str, Any]]:
     return {part["id"]: part for part in model_calibration_sections(found)}
 
 
+@pytest.mark.slow
 def test_the_page_has_a_title_and_every_section(found: xr.Dataset) -> None:
     page = dataset_page(found)
     assert page["title"] == "Calibration of a motion model"
@@ -31,6 +32,7 @@ def test_the_page_has_a_title_and_every_section(found: xr.Dataset) -> None:
     assert list(kinds) == ["summary", "warnings", "values", "draws", "aspects", "checks"]
 
 
+@pytest.mark.slow
 def test_the_values_have_a_row_for_each_parameter(
     found: xr.Dataset, sections: dict[str, dict[str, Any]]
 ) -> None:
@@ -42,12 +44,14 @@ def test_the_values_have_a_row_for_each_parameter(
     assert all(row[2].count(" to ") == 1 for row in rows)
 
 
+@pytest.mark.slow
 def test_no_interval_is_a_dash(found: xr.Dataset) -> None:
     open_values = found.assign(interval=np.nan * found["interval"])
     (values,) = (part for part in model_calibration_sections(open_values) if part["id"] == "values")
     assert [row[2] for row in values["rows"]] == ["–"] * 3
 
 
+@pytest.mark.slow
 def test_the_draws_rise_to_one_about_the_estimate(
     found: xr.Dataset, sections: dict[str, dict[str, Any]]
 ) -> None:
@@ -55,6 +59,7 @@ def test_the_draws_rise_to_one_about_the_estimate(
     assert [one["name"] for one in drawn] == found["parameter"].values.tolist()
 
 
+@pytest.mark.slow
 def test_the_aspects_have_the_distances(
     found: xr.Dataset, sections: dict[str, dict[str, Any]]
 ) -> None:

@@ -34,6 +34,7 @@ def test_the_page_has_a_title_and_every_section(comparison: xr.Dataset) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_the_summary_says_what_was_found(
     comparison: xr.Dataset, sections: dict[str, dict[str, Any]]
 ) -> None:
@@ -42,6 +43,7 @@ def test_the_summary_says_what_was_found(
     assert sections["summary"]["numbers"][0]["value"] == float(comparison["score"][0])
 
 
+@pytest.mark.slow
 def test_the_ranking_has_a_row_for_each_model(
     comparison: xr.Dataset, sections: dict[str, dict[str, Any]]
 ) -> None:
@@ -52,6 +54,7 @@ def test_the_ranking_has_a_row_for_each_model(
     assert walks == comparison["baseline"].values.tolist()
 
 
+@pytest.mark.slow
 def test_summaries_have_a_table_of_the_models_that_were_asked(comparison: xr.Dataset) -> None:
     asked = ~comparison["baseline"].values.astype(bool)
     first = asked & (np.cumsum(asked) == 1)
@@ -77,6 +80,7 @@ def test_summaries_have_a_table_of_the_models_that_were_asked(comparison: xr.Dat
     ]
 
 
+@pytest.mark.slow
 def test_the_aspects_end_with_the_recording_itself(
     comparison: xr.Dataset, sections: dict[str, dict[str, Any]]
 ) -> None:
@@ -86,6 +90,7 @@ def test_the_aspects_end_with_the_recording_itself(
     assert rows[0][1:] == comparison["held_out_distance"].values[0].tolist()
 
 
+@pytest.mark.slow
 def test_the_values_are_those_of_each_model_alone(
     comparison: xr.Dataset, sections: dict[str, dict[str, Any]]
 ) -> None:
@@ -94,6 +99,7 @@ def test_the_values_are_those_of_each_model_alone(
     assert {row[0] for row in rows} == {"inertial", "active+wall"}
 
 
+@pytest.mark.slow
 def test_a_part_that_is_missing_costs_its_section(comparison: xr.Dataset) -> None:
     made = model_sections(comparison.drop_vars("check_recorded"))
     kinds = {part["id"]: part["kind"] for part in made}

@@ -39,6 +39,7 @@ def test_more_structs_or_cells_than_a_file_could_hold_are_refused_before_they_ar
         read_old(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("read", [read_old, dw.load, load_flow])
 def test_zeros_that_are_a_thousand_times_larger_are_refused(
     read: Callable[[Path], object], tmp_path: Path

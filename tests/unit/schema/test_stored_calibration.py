@@ -45,6 +45,7 @@ def test_what_is_stored_is_what_is_in_memory(form: str, tmp_path: Path) -> None:
     assert facts_of(stored(found, tmp_path)) == facts_of(found)
 
 
+@pytest.mark.slow
 def test_the_answer_has_units_and_a_verdict() -> None:
     found = every_kind("calibration")
     assert dict(zip(found["parameter"].values, found["unit"].values, strict=True)) == {
@@ -70,6 +71,7 @@ def test_the_answer_has_units_and_a_verdict() -> None:
         fitted_value(found, "viscosity")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", FORMS[1:])
 def test_a_model_of_the_user_answers_under_its_own_names(form: str) -> None:
     found = every_kind(form)
