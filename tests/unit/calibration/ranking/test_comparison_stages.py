@@ -29,7 +29,9 @@ def test_others_than_those_that_tie_are_asked_until_one_gives_the_summaries(
     def answer(entry: int, *_: Any, **__: Any) -> Evidence:
         return Evidence(100.0 if entry in giving else 500.0, 90.0, 140.0, 0.0)
 
-    monkeypatch.setattr(comparison_stages, "shortlist_models", lambda *_: Shortlist((3, 0, 2), tied))
+    monkeypatch.setattr(
+        comparison_stages, "shortlist_models", lambda *_: Shortlist((3, 0, 2), tied)
+    )
     monkeypatch.setattr(comparison_stages, "most_settings", lambda *_: 4)
     monkeypatch.setattr(Stages, "_matched", lambda _, number, index, point, before: answer(index))
     entry = SimpleNamespace(ranges=("a",), baseline=False)
