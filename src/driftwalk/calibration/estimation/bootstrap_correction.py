@@ -1,4 +1,4 @@
-"""How far estimates are from the truth: recordings are simulated at the draws and estimated alike.
+"""Bootstrap correction: bias and scatter of the estimates of recordings simulated at the sample.
 
 The draws take the emulator for exact, its covariance for the same everywhere, and the summaries for
 normal. Estimates of simulated recordings show what these leave out: a bias, and a scatter that is

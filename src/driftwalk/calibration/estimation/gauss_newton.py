@@ -1,4 +1,4 @@
-"""From a start to the setting of least discrepancy, box by box."""
+"""Gauss-Newton search in a trust region for the setting of least discrepancy."""
 
 from __future__ import annotations
 

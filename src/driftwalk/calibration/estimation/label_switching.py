@@ -1,4 +1,4 @@
-"""Two states of a model that could change places: one of the two orders is kept."""
+"""Label switching: two states of a model that could change places are put in order."""
 
 from __future__ import annotations
 

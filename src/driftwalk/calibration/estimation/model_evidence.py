@@ -1,4 +1,4 @@
-"""The summaries of a recording, matched with one of several models."""
+"""Model evidence: the summaries of a recording, matched with one of several models."""
 
 from __future__ import annotations
 

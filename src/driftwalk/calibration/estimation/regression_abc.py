@@ -1,4 +1,4 @@
-"""The part of the ranges in which a recording's parameters lie: from the widest box inwards.
+"""Sequential regression ABC: the part of the ranges in which a recording's parameters lie.
 
 Settings are drawn from a box and simulated, and their parameters are regressed on their summaries,
 the simulations near the recording counting most. The parameters that the regression gives the

@@ -1,4 +1,4 @@
-"""How likely the summaries of a recording are at one setting, from simulations of that setting.
+"""Synthetic likelihood of the summaries of a recording at one setting, from simulations of it.
 
 An emulator's covariance holds what its quadratic misses, and differs from box to box. Models are
 compared without one: by simulations of one setting each, all with the same number of them.

@@ -1,4 +1,4 @@
-"""Walks without an arena that every motion model has to beat: they know the steps and no more."""
+"""Resampling baselines without an arena: they know the recorded steps and no more."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The models that take part in a comparison: what each is given, and what of it is searched."""
+"""Candidates of a comparison: what each model is given, and what of it is searched."""
 
 from __future__ import annotations
 
