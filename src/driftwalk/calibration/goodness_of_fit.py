@@ -8,13 +8,13 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.calibration.grid.bootstrap_region import Bootstrap, simulated_steps
 from driftwalk.calibration.grid.grid_map import Map, MapSimulator, Progress
 from driftwalk.calibration.grid.grid_refinement import first_window, locate_minimum
 from driftwalk.calibration.problem import Problem, limits_of
 from driftwalk.comparison.statistic import distances_among
+from driftwalk.core.arrays import Bools
 from driftwalk.schema.answers.facts import is_explained
 
 FAR_ABOVE_FLOOR = 2.0
@@ -87,19 +87,6 @@ def validate_on_halves(
     with the window that locates the valley: enough for an optimum, and a small part of the main
     calibration's time. Settings of the coarse map that the triangle inequality excludes are not
     simulated again: see `could_be_best`.
-
-    Parameters
-    ----------
-    whole : Problem
-        The recording.
-    coarse : Map
-        Its coarse map.
-    first, second : Problem
-        The halves; `second` has the flow of `first`.
-    executor : concurrent.futures.Executor, optional
-        Computes the maps' work units elsewhere, with one thread each.
-    progress : callable, optional
-        Called after every work unit with the settings of its map that are done, and all of them.
     """
     halves = MapSimulator(first, "first_half", apart=False, executor=executor, progress=progress)
     map_of_half = halves.full(coarse.axes, 1, could_be_best(whole, coarse, first))
@@ -114,7 +101,7 @@ def validate_on_halves(
     return Halves(optimum.point, float(distances.mean()), float(np.median(among)))
 
 
-def could_be_best(whole: Problem, coarse: Map, part: Problem) -> npt.NDArray[np.bool_]:
+def could_be_best(whole: Problem, coarse: Map, part: Problem) -> Bools:
     """Return which settings of a coarse map could be nearest to a part of the recording.
 
     With d for the distance of the part from the whole, D of the part to a setting is within d of

@@ -34,14 +34,6 @@ def wall_warning(track: Track, study: Study) -> str | None:
     A calibration by steps simulates the contacts with the wall. Where the friction of the wall is 1
     and the study says 0, C_d comes out a third too small.
 
-    Parameters
-    ----------
-    track : Track
-        The recording.
-    study : Study
-        Tank and block. A wall with the default restitution and friction is one of which nobody said
-        anything.
-
     Examples
     --------
     >>> import driftwalk as dw
@@ -70,13 +62,6 @@ def own_flow_warning(model: MotionModel, quality: GoodnessOfFit | None) -> str |
 
     Such a flow is too slow where the block seldom was, and its inward part near the wall is half of
     the true one (docs/validation.md); C_d and sigma_F make up for that.
-
-    Parameters
-    ----------
-    model : MotionModel
-        What was calibrated. Only a block has a fit of flow and parameters together.
-    quality : Quality or None
-        How well it explains the recording; None where nobody asked.
 
     Examples
     --------

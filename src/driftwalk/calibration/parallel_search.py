@@ -1,4 +1,4 @@
-"""Models searched at the same time in threads of this process, and how far they are together.
+"""Parallel search: models searched at the same time in threads of this process.
 
 The simulations and distances of one model leave Python now and then only, so two threads in one
 model keep 1.2 processors busy, and two models with one thread each 1.8.

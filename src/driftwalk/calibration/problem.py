@@ -19,6 +19,7 @@ from driftwalk.conditions import (
     recorded_conditions,
     require_travel,
 )
+from driftwalk.core.arrays import Floats
 from driftwalk.core.seeds import world_keys
 from driftwalk.core.streams import trial_in
 from driftwalk.motion import BlockModel, Details, MotionModel, Parameter, Scores, score_worlds
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
 
     from driftwalk.model import Study
 
-Floats = npt.NDArray[np.float64]
 Axes = tuple[Floats, ...]
 """One array per parameter, in its coordinate."""
 FlowSource = Callable[[Track], "xr.Dataset | None"]
@@ -93,32 +93,7 @@ def prepare_problem(
     neighbours: Neighbours | None = None,
     threads: int | None = None,
 ) -> Problem:
-    """Make a recorded track ready for comparison.
-
-    Parameters
-    ----------
-    track : Track
-        The present samples of one body.
-    study : Study
-        Tank, observation, step interval and search.
-    flow : xarray.Dataset or None
-        A `flow_field`; None where the model needs none.
-    camera : Camera
-        See `recorded_camera`.
-    model : MotionModel, optional
-        Default: the block of the study.
-    statistic : Statistic, optional
-        Default: `StepDistance`.
-    neighbours : Neighbours, optional
-        The other bodies, on the clock of the track.
-    threads : int, optional
-        Default: all processors.
-
-    Raises
-    ------
-    InputError
-        When the track is too short to form steps, or never moves.
-    """
+    """Make a recorded track ready for comparison."""
     require_samples(track)
     chosen = StepDistance() if statistic is None else statistic
     interval = study.steps.step_interval_s
@@ -178,28 +153,7 @@ def score_settings(
     replicates: range,
     details: Details = "none",
 ) -> Scores:
-    """Simulate settings and compare each world with the recording.
-
-    Parameters
-    ----------
-    problem : Problem
-        The recording and the model.
-    settings : sequence of array_like, shape (settings,)
-        The coordinates of every setting, one array per parameter.
-    stage : str
-        Name of the stage; its random streams are its own.
-    numbers : array_like of int, shape (settings,)
-        Number of each setting within its stage: it is part of the address.
-    replicates : range
-        Which replicates of each setting.
-    details : {"none", "steps", "all"}
-        What is kept of a world; see `driftwalk.motion.score_worlds`.
-
-    Returns
-    -------
-    dict of ndarray
-        One entry per world each, replicates fastest.
-    """
+    """Simulate settings and compare each world with the recording."""
     columns = [np.atleast_1d(np.asarray(column, dtype=np.float64)) for column in settings]
     trial = trial_in(stage, np.asarray(numbers))
     keys = world_keys(

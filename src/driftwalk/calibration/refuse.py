@@ -16,13 +16,7 @@ MOST_PARAMETERS: Final = 2
 
 
 def require_samples(track: Track) -> None:
-    """Refuse a track on which no step turns.
-
-    Raises
-    ------
-    InputError
-        When it has fewer than three samples.
-    """
+    """Refuse a track on which no step turns."""
     if track.time.size < 3:
         raise InputError(
             f"the recording has {track.time.size} samples of this body; at least 3 are needed"
@@ -30,14 +24,7 @@ def require_samples(track: Track) -> None:
 
 
 def require_searchable(model: MotionModel) -> None:
-    """Refuse a model that no grid over one or two parameters can be laid over.
-
-    Raises
-    ------
-    ConfigurationError
-        When it has none or more than two parameters, a name that a calibration uses itself, or a
-        grid of more settings than anybody could simulate.
-    """
+    """Refuse a model that no grid over one or two parameters can be laid over."""
     names = [parameter.name for parameter in model.parameters]
     if not 1 <= len(names) <= MOST_PARAMETERS:
         raise ConfigurationError(

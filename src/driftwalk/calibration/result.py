@@ -16,8 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.calibration.grid.grid_map import Map
-from driftwalk.calibration.problem import Floats, Problem
+from driftwalk.calibration.problem import Problem
 from driftwalk.comparison.density import BINS
+from driftwalk.core.arrays import Floats
 from driftwalk.motion.score import broken_worlds, excerpt_samples
 from driftwalk.schema import Parameter
 from driftwalk.schema.answers.facts import calibration_parts
@@ -49,17 +50,7 @@ class CalibrationParts(NamedTuple):
 def build_calibration(
     problem: Problem, found: CalibrationParts, facts: dict[str, Any]
 ) -> xr.Dataset:
-    """Return the dataset of a calibration.
-
-    Parameters
-    ----------
-    problem : Problem
-        The recording.
-    found : Found
-        Maps, bootstrap and region; those that were not made are None.
-    facts : dict
-        The answer under flat names, see `driftwalk.schema.answers.facts`.
-    """
+    """Return the dataset of a calibration."""
     parameters = problem.parameters
     names = tuple(parameter.name for parameter in parameters)
     answer = calibration_parts(facts, parameters)

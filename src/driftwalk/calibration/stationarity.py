@@ -6,13 +6,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Final, NamedTuple
 
-import numpy as np
-import numpy.typing as npt
-
 from driftwalk.calibration.problem import Problem
 from driftwalk.comparison import block_permutation_test
-
-Floats = npt.NDArray[np.float64]
+from driftwalk.core.arrays import Floats
 
 
 class StationarityPolicy(NamedTuple):
@@ -76,18 +72,6 @@ def stationarity_of_steps(
     The steps, in their order in time, are cut into 20 parts of equal numbers. Ten of them drawn at
     random, and the other ten, differ by chance and by what lasts less than a part. The first ten
     and the last ten differ by more where the motion changes with time.
-
-    Parameters
-    ----------
-    steps : ndarray, shape (pairs, 2)
-        Step lengths [m] and turning angles [rad].
-    distance : callable
-        Distance between two such series.
-
-    Returns
-    -------
-    Steadiness or None
-        Nothing where there are fewer than 200 pairs of steps.
     """
     count = len(steps)
     if count < STATIONARITY.fewest_pairs:

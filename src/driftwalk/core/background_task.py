@@ -1,4 +1,4 @@
-"""Work of the native core in a thread of its own, while this one does something else."""
+"""A background task: work of the native core in another thread, while this one goes on."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far estimates are from the truth: recordings are simulated at the draws and estimated alike.
+"""Bootstrap correction: bias and scatter of the estimates of recordings simulated at the sample.
 
 The draws take the emulator for exact, its covariance for the same everywhere, and the summaries for
 normal. Estimates of simulated recordings show what these leave out: a bias, and a scatter that is
@@ -12,12 +12,10 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.calibration.estimation.gauss_newton import rounded
 from driftwalk.calibration.estimation.posterior import POSTERIOR, Posterior
-
-Floats = npt.NDArray[np.float64]
+from driftwalk.core.arrays import Floats
 
 
 class BootstrapEstimates(NamedTuple):
@@ -34,17 +32,7 @@ class BootstrapEstimates(NamedTuple):
 def bootstrap_estimates(
     simulate: Callable[[Floats], Floats], posterior: Posterior, count: int
 ) -> BootstrapEstimates:
-    """Simulate recordings at draws and estimate each as the recording was.
-
-    Parameters
-    ----------
-    simulate : callable
-        Settings in the unit cube (n, parameters) to summaries (n, summaries).
-    posterior : Posterior
-        The draws, and the emulator by which recordings are estimated.
-    count : int
-        Recordings.
-    """
+    """Simulate recordings at draws and estimate each as the recording was."""
     sample, emulator = posterior.sample, posterior.emulator
     every = np.linspace(0, len(sample) - 1, min(count, len(sample))).round().astype(np.int64)
     chosen = rounded(sample[every])

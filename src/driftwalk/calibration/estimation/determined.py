@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Bools, Floats
 from driftwalk.schema import Parameter
-
-Floats = npt.NDArray[np.float64]
 
 
 class DeterminedPolicy(NamedTuple):
@@ -37,22 +35,13 @@ class Determination(NamedTuple):
     """In the units of the parameters, shape (parameters, 2)."""
     half_width: Floats
     """Half the 90 % interval over the value: of a logarithmic scale, in its logarithm."""
-    determined: npt.NDArray[np.bool_]
+    determined: Bools
 
 
 def determination(
     sample: Floats, ranges: Sequence[Parameter], *, confidence: float
 ) -> Determination:
     """Return the intervals of parameters, and which of them are determined.
-
-    Parameters
-    ----------
-    sample : ndarray, shape (draws, parameters)
-        Settings in the unit cube that could have given the recording.
-    ranges : sequence of Parameter
-        The parameters with the ranges of the search.
-    confidence : float
-        Of the intervals.
 
     Examples
     --------

@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from driftwalk.core.arrays import Bools, Floats, Integers
 
 Form = Literal["slopes", "squares", "products"]
 FORMS: Final[tuple[Form, ...]] = ("slopes", "squares", "products")
@@ -65,7 +64,7 @@ class LocalEmulator:
     form: Form
     coefficients: Floats
     whitening: Floats
-    used: npt.NDArray[np.bool_]
+    used: Bools
     freedom: int
 
     @property
@@ -118,19 +117,7 @@ class LocalEmulator:
         start: Floats | None = None,
         held: tuple[int, float] | None = None,
     ) -> Solution:
-        """Return the setting that fits summaries best.
-
-        Parameters
-        ----------
-        summaries : ndarray, shape (summaries,)
-            Of a recording.
-        reach : float
-            How far outside the box it may lie, 1 is the end of the box.
-        start : ndarray, optional
-            Setting to begin at; default: the centre.
-        held : tuple of int and float, optional
-            A parameter, and the value in the unit cube at which it is held.
-        """
+        """Return the setting that fits summaries best."""
         from scipy.optimize import least_squares
 
         low = np.maximum(-reach, (0.0 - self.centre) / self.width)
@@ -176,17 +163,7 @@ class LocalEmulator:
 def fit_emulator(
     settings: Floats, summaries: Floats, *, centre: Floats, width: Floats
 ) -> LocalEmulator:
-    """Return the summaries of a model as a function of its parameters.
-
-    Parameters
-    ----------
-    settings : ndarray, shape (simulations, parameters)
-        In the unit cube.
-    summaries : ndarray, shape (simulations, summaries)
-        Of one simulated recording each.
-    centre, width : ndarray, shape (parameters,)
-        The box that the settings fill.
-    """
+    """Return the summaries of a model as a function of its parameters."""
     place = (settings - centre) / width
     form = _best_form(place, summaries)
     basis = _basis(place, form)
@@ -205,13 +182,6 @@ def fit_emulator(
 
 def shrunk_correlation(scaled: Floats, freedom: int) -> Floats:
     """Return the correlations of summaries of simulations, less a part of each.
-
-    Parameters
-    ----------
-    scaled : ndarray, shape (simulations, summaries)
-        Deviations, in standard deviations.
-    freedom : int
-        Their degrees of freedom.
 
     Examples
     --------
@@ -245,7 +215,7 @@ def _foretold(basis: Floats, summaries: Floats) -> float:
     return float(np.log(spread[used]).mean()) if used.any() else 0.0
 
 
-def _pairs(count: int) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+def _pairs(count: int) -> tuple[Integers, Integers]:
     first, second = np.triu_indices(count, 1)
     return first, second
 

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import Final, NamedTuple, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.calibration.estimation import gauss_newton, regression_abc
 from driftwalk.calibration.estimation.bootstrap_correction import (
@@ -23,8 +22,7 @@ from driftwalk.calibration.estimation.modes import Modes, find_modes
 from driftwalk.calibration.estimation.posterior import POSTERIOR, Posterior, sample_posterior
 from driftwalk.calibration.estimation.profile import Profiles, discrepancy_profiles
 from driftwalk.calibration.estimation.regression_abc import REGRESSION, Order, sequential_regression
-
-Floats = npt.NDArray[np.float64]
+from driftwalk.core.arrays import Bools, Floats
 
 Starts = Callable[[], Floats]
 
@@ -86,9 +84,9 @@ class Matched(NamedTuple):
     profiles: Profiles | None
     """How the discrepancy rises along each parameter, over the square of the factor by which the
     draws are spread; None where states of the model have changed places."""
-    ambiguous: npt.NDArray[np.bool_]
+    ambiguous: Bools
     """Parameters for which another place, which fits as well, has other values,"""
-    unsettled: npt.NDArray[np.bool_]
+    unsettled: Bools
     """and those whose draws still moved when the last simulations were made."""
     rounds: int
 
@@ -124,24 +122,7 @@ def match_summaries(
     replicates: int,
     seed: int,
 ) -> Matched:
-    """Find the setting whose summaries match those of a recording.
-
-    Parameters
-    ----------
-    objective : Summaries
-        Simulates settings and summarises them.
-    parameters : int
-        Dimensions of the unit cube.
-    starts : callable
-        Returns settings to begin at, shape (starts, parameters), the best first; called where the
-        summaries alone do not find a match.
-    order : callable
-        Puts states of the model that could change places in order.
-    replicates : int
-        Recordings of the model by which the discrepancy is judged.
-    seed : int
-        Of the settings that are simulated.
-    """
+    """Find the setting whose summaries match those of a recording."""
     recorded = objective.recorded
     optima = find_optima(objective, parameters, starts, order=order, seed=seed)
     modes = find_modes(

@@ -1,16 +1,14 @@
-"""From a start to the setting of least discrepancy, box by box."""
+"""Gauss-Newton search in a trust region for the setting of least discrepancy."""
 
 from __future__ import annotations
 
 from typing import Final, NamedTuple, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.calibration.estimation.emulator import LocalEmulator, Solution, fit_emulator
 from driftwalk.calibration.evolution.search import RESOLUTION
-
-Floats = npt.NDArray[np.float64]
+from driftwalk.core.arrays import Floats
 
 
 class GaussNewtonPolicy(NamedTuple):
@@ -88,19 +86,6 @@ def minimise_discrepancy(
     emulator that they give (Gauss and Newton's way, with derivatives from a regression). The next
     box lies about the solution, a few standard deviations wide; where the model is far from the
     recording the deviations are enlarged by the discrepancy.
-
-    Parameters
-    ----------
-    simulate : callable
-        Summaries of settings in the unit cube.
-    recorded : ndarray, shape (summaries,)
-        Of the recording.
-    start, width : ndarray, shape (parameters,)
-        The first box.
-    seed : int
-        Of the settings that are drawn.
-    give_up : float
-        Discrepancy, in summaries, that the search has to reach in three rounds, or it ends.
     """
     policy = GAUSS_NEWTON
     centre, width = start, np.clip(width, policy.narrowest, policy.widest)

@@ -1,16 +1,15 @@
-"""Two states of a model that could change places: one of the two orders is kept."""
+"""Label switching: two states of a model that could change places are put in order."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.calibration.held_out.candidates import Candidate
+from driftwalk.core.arrays import Floats
 from driftwalk.motion import ParticleModel
 
-Floats = npt.NDArray[np.float64]
 Order = Callable[[Floats], Floats]
 """Settings in the unit cube (n, parameters) to the same with their states in order."""
 

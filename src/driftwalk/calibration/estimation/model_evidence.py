@@ -1,11 +1,10 @@
-"""The summaries of a recording, matched with one of several models."""
+"""Model evidence: the summaries of a recording, matched with one of several models."""
 
 from __future__ import annotations
 
 from concurrent.futures import Executor
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.calibration.estimation import gauss_newton, regression_abc
 from driftwalk.calibration.estimation.estimate import find_optima
@@ -21,10 +20,9 @@ from driftwalk.calibration.held_out.held_out_score import even_blocks
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.calibration.ranking.evidence_ranking import EVIDENCE, Evidence
 from driftwalk.calibration.summaries.simulated import SummaryObjective
+from driftwalk.core.arrays import Floats
 from driftwalk.core.processors import one_blas_thread
 from driftwalk.sweep import Store
-
-Floats = npt.NDArray[np.float64]
 
 
 def most_settings(parameters: int, replicates: int) -> int:
@@ -50,27 +48,7 @@ def estimate_evidence(
     store: Store | None,
     tell: Tell,
 ) -> Evidence:
-    """Match the summaries of a recording with a model, and say how well that went.
-
-    Parameters
-    ----------
-    entry : Contestant
-        The model, with its ranges and conditions.
-    motion : RecordedMotion
-        The recording.
-    answer : ndarray, shape (parameters,)
-        Another setting to begin at, in the unit cube: that of the comparison.
-    seed : int
-        Of all simulations.
-    replicates : int
-        Simulated recordings by which the discrepancy is judged.
-    executor : concurrent.futures.Executor or None
-        Simulates and summarises elsewhere; linear algebra is done here.
-    store : Store or None
-        Where finished simulations are kept.
-    tell : callable
-        Called with the settings done and the largest number of them.
-    """
+    """Match the summaries of a recording with a model, and say how well that went."""
     entry = entry._replace(model=with_contact_clearance(entry.model, motion))
     parameters = len(entry.ranges)
     objective = SummaryObjective(

@@ -11,12 +11,10 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.calibration.estimation.gauss_newton import LocalOptimum
 from driftwalk.calibration.estimation.posterior import POSTERIOR, Posterior
-
-Floats = npt.NDArray[np.float64]
+from driftwalk.core.arrays import Bools, Floats
 
 
 class Modes(NamedTuple):
@@ -42,7 +40,7 @@ class Modes(NamedTuple):
         ]
         return np.concatenate(taken)
 
-    def apart(self, sample: Sequence[Floats]) -> npt.NDArray[np.bool_]:
+    def apart(self, sample: Sequence[Floats]) -> Bools:
         """Return for which parameters a place has an interval that does not meet the first's."""
         low, high = np.quantile(np.array(sample), (0.05, 0.95), axis=1)
         return np.asarray(((low > high[0]) | (high < low[0])).any(axis=0))
@@ -51,15 +49,7 @@ class Modes(NamedTuple):
 def find_modes(
     optima: Sequence[LocalOptimum], sample_about: Callable[[LocalOptimum, int], Posterior]
 ) -> Modes:
-    """Return the posteriors at the ends of searches, those alone that the recording allows.
-
-    Parameters
-    ----------
-    optima : sequence of Descended
-        Where searches have ended, the likeliest first.
-    sample_about : callable
-        Returns the posterior about an end, which has a number.
-    """
+    """Return the posteriors at the ends of searches, those alone that the recording allows."""
     found: list[Posterior] = []
     for number, optimum in enumerate(optima):
         if any(_reaches(one, optimum.solution.setting) for one in found):

@@ -12,13 +12,11 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.calibration.estimation.emulator import LocalEmulator, Solution, fit_emulator
 from driftwalk.calibration.estimation.gauss_newton import Simulate, simulations_of
 from driftwalk.calibration.estimation.region import REGION, Region, region_about
-
-Floats = npt.NDArray[np.float64]
+from driftwalk.core.arrays import Floats
 
 
 class PosteriorPolicy(NamedTuple):
@@ -73,21 +71,7 @@ class Posterior(NamedTuple):
 def sample_posterior(
     simulate: Simulate, recorded: Floats, emulator: LocalEmulator, solution: Solution, *, seed: int
 ) -> Posterior:
-    """Return settings that could have given a recording.
-
-    Parameters
-    ----------
-    simulate : callable
-        Summaries of settings in the unit cube.
-    recorded : ndarray, shape (parts, summaries)
-        Of the whole recording, then of parts of it.
-    emulator : LocalEmulator
-        About the setting of least discrepancy.
-    solution : Solved
-        That setting.
-    seed : int
-        Of the settings and of the chain.
-    """
+    """Return settings that could have given a recording."""
     count = emulator.centre.size
     half = simulations_of(count)[1] // 2
     sample = _chain(emulator, None, recorded[0], solution, seed)

@@ -9,11 +9,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.calibration.estimation.emulator import LocalEmulator, Solution
-
-Floats = npt.NDArray[np.float64]
+from driftwalk.core.arrays import Floats
 
 
 class Profiles(NamedTuple):
@@ -28,21 +26,7 @@ class Profiles(NamedTuple):
 def discrepancy_profiles(
     emulator: LocalEmulator, summaries: Floats, solution: Solution, std: Floats, *, reach: float
 ) -> Profiles:
-    """Return the profile of the discrepancy of each parameter.
-
-    Parameters
-    ----------
-    emulator : LocalEmulator
-        About the setting of least discrepancy.
-    summaries : ndarray, shape (summaries,)
-        Of the recording.
-    solution : Solved
-        The setting of least discrepancy.
-    std : ndarray, shape (parameters,)
-        Of each parameter, in parts of its range: how far a profile goes.
-    reach : float
-        How far outside the box a setting may lie, 1 is the end of the box.
-    """
+    """Return the profile of the discrepancy of each parameter."""
     points, span = 21, 3.0
     low = np.maximum(emulator.centre - reach * emulator.width, 0.0)
     high = np.minimum(emulator.centre + reach * emulator.width, 1.0)

@@ -9,11 +9,9 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.calibration.estimation.gauss_newton import rounded
-
-Floats = npt.NDArray[np.float64]
+from driftwalk.core.arrays import Floats
 
 
 class RegionPolicy(NamedTuple):
@@ -84,13 +82,7 @@ def radius_of(parameters: int) -> float:
 
 
 def region_about(sample: Floats) -> Region:
-    """Return the region of draws.
-
-    Parameters
-    ----------
-    sample : ndarray, shape (draws, parameters)
-        Settings in the unit cube.
-    """
+    """Return the region of draws."""
     parameters = sample.shape[1]
     covariance = np.atleast_2d(np.cov(sample.T))
     covariance += REGION.narrowest**2 * np.eye(parameters)

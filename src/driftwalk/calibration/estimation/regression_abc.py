@@ -1,4 +1,4 @@
-"""The part of the ranges in which a recording's parameters lie: from the widest box inwards.
+"""Sequential regression ABC: the part of the ranges in which a recording's parameters lie.
 
 Settings are drawn from a box and simulated, and their parameters are regressed on their summaries,
 the simulations near the recording counting most. The parameters that the regression gives the
@@ -12,13 +12,12 @@ from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.calibration.estimation.emulator import CONSTANT
 from driftwalk.calibration.estimation.gauss_newton import rounded
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 
-Floats = npt.NDArray[np.float64]
 Order = Callable[[Floats], Floats]
 Simulate = Callable[[Floats], Floats]
 """Settings in the unit cube (n, parameters) to summaries (n, summaries)."""
@@ -69,25 +68,6 @@ def sequential_regression(
     simulate: Simulate, recorded: Floats, parameters: int, *, order: Order, seed: int
 ) -> RegressionEstimate:
     """Return the box in which the parameters of a recording lie.
-
-    Parameters
-    ----------
-    simulate : callable
-        Summaries of simulations.
-    recorded : ndarray, shape (summaries,)
-        Summaries of the recording.
-    parameters : int
-        Dimensions of the cube.
-    order : callable
-        Puts states of the model that could change places in order: a regression on both would end
-        between them.
-    seed : int
-        Of the settings that are drawn.
-
-    Raises
-    ------
-    InputError
-        When no summary varies over the whole cube.
 
     Examples
     --------

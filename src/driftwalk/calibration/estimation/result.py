@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.calibration.estimation.determined import DETERMINED
 from driftwalk.calibration.estimation.estimate import Matched
@@ -18,6 +17,7 @@ from driftwalk.calibration.held_out.held_out_score import HELD_OUT_REPLICATES, w
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.calibration.ranking.result import motion_warnings
 from driftwalk.calibration.ranking.verdict import verdict_of
+from driftwalk.core.arrays import Floats
 from driftwalk.motion import ParticleModel
 from driftwalk.schema.answers.facts import BOUNDS, texts
 from driftwalk.schema.check import build_dataset
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
-
-Floats = npt.NDArray[np.float64]
 
 
 def build_model_calibration(

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.calibration.estimation.determined import Determination, determination
 from driftwalk.calibration.estimation.estimate import (
@@ -34,12 +33,12 @@ from driftwalk.calibration.held_out.held_out_score import (
 )
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.calibration.summaries.simulated import SummaryObjective
+from driftwalk.core.arrays import Floats
 from driftwalk.core.processors import one_blas_thread
 
 if TYPE_CHECKING:
     from driftwalk.sweep import Store
 
-Floats = npt.NDArray[np.float64]
 Tell = Callable[[str, int, int], None]
 
 SEARCH: Final = Budget(design=256, starts=3, short=20, long=30, replicates=2, retest=8)
@@ -100,31 +99,6 @@ def estimate(
     summaries counts only if it is as close in the six distances: summaries that a model cannot give
     at once pull it away from the motion. It determines parameters only if the discrepancy is not
     more than four times the usual one: values of another model are no measurement.
-
-    Parameters
-    ----------
-    entry : Contestant
-        The model, with its ranges and conditions.
-    motion : RecordedMotion
-        The recording.
-    seed : int
-        Of the search and of all simulations.
-    replicates : int
-        Recordings of the model by which the discrepancy of the summaries is judged; 0 leaves the
-        summaries out.
-    confidence : float
-        Of the intervals.
-    executor : concurrent.futures.Executor, optional
-        Computes the work units of the second stage elsewhere.
-    stores : callable
-        Where each stage keeps finished work.
-    tell : callable
-        Called with the stage, the settings done and the largest number of them.
-
-    Raises
-    ------
-    InputError
-        When the model loses its numbers wherever it is tried.
     """
     even = even_blocks(entry, motion, seed)
     require_numbers(even)

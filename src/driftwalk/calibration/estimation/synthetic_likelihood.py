@@ -1,4 +1,4 @@
-"""How likely the summaries of a recording are at one setting, from simulations of that setting.
+"""Synthetic likelihood of the summaries of a recording at one setting, from simulations of it.
 
 An emulator's covariance holds what its quadratic misses, and differs from box to box. Models are
 compared without one: by simulations of one setting each, all with the same number of them.
@@ -10,11 +10,9 @@ from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.calibration.estimation.emulator import shrunk_correlation
-
-Floats = npt.NDArray[np.float64]
+from driftwalk.core.arrays import Floats
 
 SIMULATIONS: Final = 512
 """That give mean and covariance: some four for each summary."""
@@ -35,17 +33,6 @@ def synthetic_likelihood_at(
     simulate: Callable[[Floats], Floats], recorded: Floats, setting: Floats, replicates: int
 ) -> SyntheticLikelihood:
     """Compare a recording's summaries with those of simulations of one setting.
-
-    Parameters
-    ----------
-    simulate : callable
-        Settings in the unit cube (n, parameters) to summaries (n, summaries).
-    recorded : ndarray, shape (summaries,)
-        Summaries of the recording.
-    setting : ndarray, shape (parameters,)
-        In the unit cube.
-    replicates : int
-        Simulated recordings by which a discrepancy is judged.
 
     Examples
     --------

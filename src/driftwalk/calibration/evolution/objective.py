@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.comparison.aspects import (
     Aspect,
@@ -17,6 +16,7 @@ from driftwalk.comparison.aspects import (
 )
 from driftwalk.comparison.aspects.form import WallDistance
 from driftwalk.conditions import Conditions
+from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.processors import map_in_threads
 from driftwalk.core.seeds import world_keys
 from driftwalk.core.streams import trial_in
@@ -24,8 +24,6 @@ from driftwalk.motion import MotionModel, Worlds
 from driftwalk.motion.score import broken_worlds
 from driftwalk.schema import Parameter
 from driftwalk.simulation.backend import wall_edges
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +70,7 @@ class AspectObjective:
 
     def worlds(
         self, settings: Floats, replicates: int, *, stage: str, first: int = 0
-    ) -> tuple[list[Sequence[Aspect]], npt.NDArray[np.bool_]]:
+    ) -> tuple[list[Sequence[Aspect]], Bools]:
         """Return the aspects of simulated worlds, replicates fastest, and which are broken."""
         seen = self.simulated(settings, replicates, stage=stage, first=first)
         return self.aspects(seen), broken_worlds(seen.status)

@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.schema import Parameter
 from driftwalk.schema.trajectory import Track
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

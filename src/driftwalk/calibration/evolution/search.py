@@ -13,12 +13,11 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.run_stages import tell_nobody
 from driftwalk.sweep import Store, WorkUnit, run_sweep
 
-Floats = npt.NDArray[np.float64]
 Objective = Callable[[Floats, int, int], Floats]
 """Settings in the unit cube (n, parameters), number of the first evaluation, replicates: (n,)."""
 Tell = Callable[[int, int], None]

@@ -35,9 +35,10 @@ from driftwalk.calibration.grid.surface import (
     make_smoother,
     nearest_point,
 )
-from driftwalk.calibration.problem import Axes, Floats, Problem, score_settings
+from driftwalk.calibration.problem import Axes, Problem, score_settings
 from driftwalk.comparison import Statistic, StepTable
 from driftwalk.comparison.statistic import distances_among
+from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.processors import map_in_threads
 from driftwalk.sweep import Store, WorkUnit, grid, run_sweep
 
@@ -72,7 +73,7 @@ class StoredSurface:
 
     axes: Axes
     """Axes of its lattice."""
-    retained: npt.NDArray[np.bool_]
+    retained: Bools
     """Points of the lattice where a recording's estimate may lie."""
     matrix: Floats
     """Weights of the settings in the value at each of them, (points, settings)."""
@@ -99,20 +100,7 @@ class StoredSurface:
 
 
 def build_surface(problem: Problem, refined: RefinedMap) -> StoredSurface:
-    """Simulate settings of the refined window again, to estimate recordings against them.
-
-    Parameters
-    ----------
-    problem : Problem
-        The recording and the model.
-    refined : Refined
-        The second pass of the search.
-
-    Returns
-    -------
-    StoredSurface
-        On a grid over the window, where the optimum could be.
-    """
+    """Simulate settings of the refined window again, to estimate recordings against them."""
     from scipy.ndimage import binary_dilation
 
     intervals = BOOTSTRAP.surface_intervals[len(refined.map.axes) - 1]
@@ -231,27 +219,7 @@ def run_bootstrap(
     executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> Bootstrap:
-    """Simulate recordings at the optimum and estimate each again.
-
-    Parameters
-    ----------
-    problem : Problem
-        The recording and the model.
-    optimum : Optimum
-        Where to simulate.
-    surface : StoredSurface
-        Surface to estimate against.
-    floor : float
-        Floor of the optimum.
-    count : int
-        Number of recordings, at least 2.
-    store : Store, optional
-        Where finished work units are kept.
-    executor : concurrent.futures.Executor, optional
-        Computes the work units elsewhere, with one thread each.
-    progress : callable, optional
-        Called with the number of finished recordings and the total.
-    """
+    """Simulate recordings at the optimum and estimate each again."""
     recordings, to_recording = simulated_steps(
         problem, optimum.point, stage="bootstrap", replicates=count
     )
@@ -325,26 +293,7 @@ def confidence_region(
     confidence: float,
     stretch: float = 1.0,
 ) -> Region:
-    """Return intervals and a joint region of the stated confidence.
-
-    Parameters
-    ----------
-    smoother : Smoother
-        Of the refined grid; its lattice is that of `surface`.
-    surface : ndarray
-        Smooth distances of the real recording on the lattice.
-    bootstrap : Bootstrap
-        Its excesses set the levels.
-    confidence : float
-        Such as 0.9.
-    stretch : float
-        Factor by which the levels are raised above the minimum, >= 1.
-
-    Returns
-    -------
-    Region
-        Where the region has several parts the border is that of the largest.
-    """
+    """Return intervals and a joint region of the stated confidence."""
     joint, *along = (
         float(surface.min() + max(stretch, 1.0) * value)
         for value in np.quantile(bootstrap.excess, confidence, axis=0)

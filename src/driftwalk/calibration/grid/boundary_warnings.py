@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from driftwalk.calibration.problem import Axes, Floats
+from driftwalk.calibration.problem import Axes
+from driftwalk.core.arrays import Floats
 from driftwalk.schema import Parameter
 
 Boundary = tuple[int, int]
@@ -18,15 +19,6 @@ def optimum_warnings(
     parameters: Sequence[Parameter], axes: Axes, optimum: Sequence[float]
 ) -> dict[Boundary, str]:
     """Return a warning for every end of the search at which an optimum lies.
-
-    Parameters
-    ----------
-    parameters : sequence of Parameter
-        What was searched.
-    axes : sequence of ndarray
-        Coordinates of the coarse grid, one array per parameter.
-    optimum : sequence of float
-        Coordinates of the optimum.
 
     Examples
     --------
@@ -59,24 +51,7 @@ def interval_warnings(
     steps: Sequence[float],
     known: Container[Boundary] = (),
 ) -> list[str]:
-    """Return a warning for every end of what was searched that cuts an interval off.
-
-    Parameters
-    ----------
-    parameters : sequence of Parameter
-        What was searched.
-    intervals : sequence of tuple
-        Ends of the intervals, in coordinates.
-    estimates : ndarray, shape (recording, parameter)
-        Those of the bootstrap's recordings.
-    search, window, lattice : sequence of ndarray
-        Coordinates of the coarse grid, of the refined one, and of the points at which the
-        bootstrap's recordings were estimated.
-    steps : sequence of float
-        Steps along axes of the window that have a single point.
-    known : container of tuple
-        Ends of the search that were warned of before.
-    """
+    """Return a warning for every end of what was searched that cuts an interval off."""
     found = []
     for index, parameter in enumerate(parameters):
         axis = window[index]

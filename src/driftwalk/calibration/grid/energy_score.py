@@ -18,7 +18,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.calibration.grid.grid_map import Map
 from driftwalk.calibration.grid.surface import (
@@ -28,8 +27,7 @@ from driftwalk.calibration.grid.surface import (
     make_smoother,
     nearest_point,
 )
-
-Floats = npt.NDArray[np.float64]
+from driftwalk.core.arrays import Floats
 
 
 class EnergyScore(NamedTuple):
@@ -56,15 +54,7 @@ class EnergyScore(NamedTuple):
 
 
 def smooth_energy_score(found: Map, bandwidth: Sequence[float]) -> EnergyScore:
-    """Return the smooth surface of a map.
-
-    Parameters
-    ----------
-    found : Map
-        Made with ``apart=True``.
-    bandwidth : sequence of float
-        Of the smoother, along each axis.
-    """
+    """Return the smooth surface of a map."""
     smoother = make_smoother(
         found.axes, bandwidth=bandwidth, weights=found.replicates.astype(float)
     )
@@ -86,16 +76,6 @@ def smooth_floor(smoother: Smoother, apart: Floats) -> Floats:
 
 
 def height_in_floors(smoother: Smoother, distance: Floats, apart: Floats, floor: Floats) -> Floats:
-    """Return how far S lies above its minimum, in floors, on the lattice.
-
-    Parameters
-    ----------
-    smoother : Smoother
-        Of the grid.
-    distance, apart : ndarray, shape of the grid
-        Mean distance of each setting from the recording, and between its own simulations.
-    floor : ndarray
-        Floor on the lattice.
-    """
+    """Return how far S lies above its minimum, in floors, on the lattice."""
     score = smoother.surface((distance - 0.5 * apart).ravel())
     return np.asarray((score - score.min()) / floor)

@@ -11,8 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.calibration.estimation import Stores
-from driftwalk.calibration.problem import Axes, Floats, Problem, score_settings
+from driftwalk.calibration.problem import Axes, Problem, score_settings
 from driftwalk.comparison import StepTable
+from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.processors import map_in_threads
 from driftwalk.core.run_stages import MORE
 from driftwalk.motion import Details
@@ -20,7 +21,6 @@ from driftwalk.motion.score import broken_worlds
 from driftwalk.sweep import Design, Store, WorkUnit, grid, run_sweep, settings_per_unit
 
 Progress = Callable[[int, int], None]
-Integers = npt.NDArray[np.int64]
 
 
 class Map(NamedTuple):
@@ -36,7 +36,7 @@ class Map(NamedTuple):
     """Replicates that were simulated of each setting, shape (*grid,): the first ones."""
 
     @property
-    def simulated(self) -> npt.NDArray[np.bool_]:
+    def simulated(self) -> Bools:
         """Which replicates were simulated, (*grid, replicate)."""
         return np.asarray(np.arange(self.distance.shape[-1]) < self.replicates[..., None])
 
@@ -110,7 +110,7 @@ class MapSimulator:
     executor: Executor | None = None
     progress: Progress | None = None
 
-    def full(self, axes: Axes, replicates: int, only: npt.NDArray[np.bool_] | None = None) -> Map:
+    def full(self, axes: Axes, replicates: int, only: Bools | None = None) -> Map:
         """Simulate every setting of a grid; those not in `only` count as far as can be."""
         store = self._store(self.stage, axes, {"replicates": replicates})
         design = self._design(axes)
@@ -124,7 +124,7 @@ class MapSimulator:
             distance[~only] = 1.0
         return full_map(tuple(design.axes.values()), distance, arrays)
 
-    def more(self, found: Map, chosen: npt.NDArray[np.bool_], replicates: int) -> Map:
+    def more(self, found: Map, chosen: Bools, replicates: int) -> Map:
         """Give some settings of a map more replicates, with the numbers of a map that has them."""
         cells, before = np.flatnonzero(chosen), found.distance.shape[-1]
         facts = {"replicates": replicates, "chosen": cells.tolist()}

@@ -13,12 +13,12 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.calibration.grid.energy_score import EnergyScore, smooth_energy_score
 from driftwalk.calibration.grid.grid_map import Map
 from driftwalk.calibration.grid.surface import at_settings
-from driftwalk.calibration.problem import Axes, Floats
+from driftwalk.calibration.problem import Axes
+from driftwalk.core.arrays import Bools, Floats
 
 Window = tuple[tuple[float, float], ...]
 """Both ends along each parameter, in its coordinate."""
@@ -67,7 +67,7 @@ class Maps(Protocol):
     def full(self, axes: Axes, replicates: int) -> Map:
         """Simulate every setting of a grid."""
 
-    def more(self, found: Map, chosen: npt.NDArray[np.bool_], replicates: int) -> Map:
+    def more(self, found: Map, chosen: Bools, replicates: int) -> Map:
         """Give some settings of a map more replicates."""
 
 
@@ -83,16 +83,7 @@ class RefinedMap(NamedTuple):
 
 
 def first_window(coarse: Map, margin: float) -> Window:
-    """Return the extent of the coarse cells that could hold the optimum, and one around.
-
-    Parameters
-    ----------
-    coarse : Map
-        The first pass.
-    margin : float
-        Cells connected with the minimum whose distance is within `margin` of it are covered: the
-        noise floor of the distance.
-    """
+    """Return the extent of the coarse cells that could hold the optimum, and one around."""
     from scipy.ndimage import label
 
     cell = coarse.cell_of_minimum()
@@ -105,23 +96,7 @@ def first_window(coarse: Map, margin: float) -> Window:
 
 
 def locate_minimum(maps: Maps, window: Window, limits: Window) -> RefinedMap:
-    """Close in on the valley, from a window that holds part of it.
-
-    Parameters
-    ----------
-    maps : Maps
-        Simulates.
-    window : Box
-        Where to begin.
-    limits : Box
-        Ends of the search.
-
-    Returns
-    -------
-    Refined
-        The last window: its plausible settings fill most of it and end within it, or it cannot
-        become better.
-    """
+    """Close in on the valley, from a window that holds part of it."""
     seen = set()
     for _ in range(REFINEMENT.most_windows):
         intervals = REFINEMENT.locating_intervals[len(window) - 1]
@@ -269,21 +244,7 @@ def round_step(step: float) -> float:
 def refine(
     maps: Maps, located: RefinedMap, limits: Window, steps: Sequence[float], wanted: int
 ) -> RefinedMap:
-    """Give the located window the replicates that are wanted, where the optimum could be.
-
-    Parameters
-    ----------
-    maps : Maps
-        Simulates.
-    located : Refined
-        The window; it is mapped again where its steps are too large.
-    limits : Box
-        Ends of the search.
-    steps : sequence of float
-        Steps along each axis, about, at most.
-    wanted : int
-        Replicates of the settings that could be the optimum; the others have two.
-    """
+    """Give the located window the replicates that are wanted, where the optimum could be."""
     found = located
     finer = _intervals(located, steps)
     if finer is not None:

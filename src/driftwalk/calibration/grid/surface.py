@@ -15,9 +15,8 @@ from itertools import combinations_with_replacement
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from driftwalk.core.arrays import Floats
 
 FINENESS = 4
 """Lattice points per cell of a grid along each axis."""
@@ -82,20 +81,6 @@ def make_smoother(
     axes: Sequence[Floats], *, bandwidth: Sequence[float], weights: Floats | None = None
 ) -> Smoother:
     """Prepare the surface for a grid.
-
-    Parameters
-    ----------
-    axes : sequence of ndarray
-        Axes of the grid, one per parameter, increasing, evenly spaced.
-    bandwidth : sequence of float
-        Bandwidth of the fit along each axis, in the axis's unit; at least one grid step is used.
-    weights : ndarray, shape of the grid, optional
-        Weight of each cell, such as its number of replicates; default: the same for all.
-
-    Returns
-    -------
-    Smoother
-        Its lattice spans the grid, `FINENESS` points per cell.
 
     Examples
     --------

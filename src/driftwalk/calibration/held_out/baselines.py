@@ -1,4 +1,4 @@
-"""Walks without an arena that every motion model has to beat: they know the steps and no more."""
+"""Resampling baselines without an arena: they know the recorded steps and no more."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.calibration.held_out.hidden_markov import HiddenMarkovModel
 from driftwalk.comparison.aspects import Aspect
+from driftwalk.core.arrays import Floats, Integers
 from driftwalk.motion import Worlds
 from driftwalk.motion.random import WorldRandom
 
@@ -75,7 +75,7 @@ class ResampledSteps(Baseline):
         Step interval [s].
     """
 
-    recorded: npt.NDArray[np.float64]
+    recorded: Floats
     interval: float
     name = "resampled steps"
 
@@ -121,16 +121,14 @@ class HiddenMarkovWalk(Baseline):
         return np.array([length for length, _ in drawn]), np.array([turn for _, turn in drawn])
 
 
-def runs_of(steps: Aspect, interval: float) -> list[npt.NDArray[np.float64]]:
+def runs_of(steps: Aspect, interval: float) -> list[Floats]:
     """Return the steps as runs in which each follows the one before."""
     # A step is missing between two whose times are more than 1.5 intervals apart.
     breaks = np.flatnonzero(np.diff(steps.time) > 1.5 * interval) + 1
     return [run for run in np.split(steps.points, breaks) if len(run)]
 
 
-def _chosen(
-    cumulative: npt.NDArray[np.float64], chance: npt.NDArray[np.float64]
-) -> npt.NDArray[np.int64]:
+def _chosen(cumulative: Floats, chance: Floats) -> Integers:
     """Return in which part of cumulative probabilities each number falls."""
     found = (chance[:, None] >= cumulative).sum(axis=1)
     return np.asarray(np.minimum(found, cumulative.shape[-1] - 1), dtype=np.int64)

@@ -1,4 +1,4 @@
-"""The models that take part in a comparison: what each is given, and what of it is searched."""
+"""Candidates of a comparison: what each model is given, and what of it is searched."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.calibration.evolution import recorded_ranges, wall_distance
 from driftwalk.calibration.held_out.baselines import HiddenMarkovWalk, ResampledSteps, runs_of
@@ -16,6 +15,7 @@ from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.comparison.aspects import block_of, interleaved
 from driftwalk.conditions import Conditions, unstated_warning
 from driftwalk.conditions.own_flow import flow_from_track
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.motion import (
     BlockModel,
@@ -28,7 +28,6 @@ from driftwalk.schema import Parameter, Track
 if TYPE_CHECKING:
     from driftwalk.model import Study
 
-Floats = npt.NDArray[np.float64]
 
 BLOCK: Final = "block"
 
@@ -50,13 +49,7 @@ class Candidate(NamedTuple):
 def made_models(
     models: Sequence[Chosen], motion: RecordedMotion, study: Study
 ) -> list[MotionModel]:
-    """Return the models, made of their names.
-
-    Raises
-    ------
-    ConfigurationError
-        When there is none, a name is unknown, or two models have the same name.
-    """
+    """Return the models, made of their names."""
     found = [_made(one, motion, study) for one in models]
     names = [model.name for model in found]
     if not names:
@@ -75,11 +68,6 @@ def prepare_candidates(
     Where the flow is not known, models that need one get that of the even blocks of time. Where
     none can be extracted they are left out, with a warning, and so is a model that feels other
     bodies where there are none.
-
-    Raises
-    ------
-    InputError
-        When no model is left.
     """
     found: list[Candidate] = []
     warnings: list[str] = []
@@ -155,13 +143,6 @@ def contact_distance(from_wall: Floats, noise: float) -> float:
     The nearest samples are there by the noise of the camera. Of a body that is often at the wall,
     the 1 % quantile lies two standard deviations too near; with a share s of the samples at the
     wall it is the 0.01 / s quantile of the noise about the contact.
-
-    Parameters
-    ----------
-    from_wall : ndarray, shape (samples,)
-        Recorded distances from the wall [m].
-    noise : float
-        Standard deviation of a recorded coordinate [m].
 
     Examples
     --------

@@ -9,9 +9,7 @@ import numpy.typing as npt
 
 from driftwalk.comparison.aspects import AspectPlan
 from driftwalk.comparison.aspects.form import WallDistance, resampled
-
-Floats = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
+from driftwalk.core.arrays import Bools, Floats, Integers
 
 LAGS: Final = (1, 3, 10, 30, 100)
 """Of the mean squared displacement, in step intervals."""
@@ -28,29 +26,7 @@ def motion_checks(
     depth: float,
     usual_step: float,
 ) -> Floats:
-    """Return facts of a motion, shape (checks,); NaN where it is too short for one.
-
-    Parameters
-    ----------
-    plan : AspectPlan
-        Of its time stamps.
-    x, y : array_like, shape (plan.samples,)
-        Positions [m].
-    wall : callable
-        Distance of points from the wall [m].
-    depth : float
-        Largest distance from the wall in the tank [m].
-    usual_step : float
-        Median step of the recording [m].
-
-    Returns
-    -------
-    ndarray
-        In the order of `CHECKS`: mean squared displacement over 1, 3, 10, 30 and 100 step
-        intervals [m2]; time after which the autocorrelation of the speed falls below 1/e [s];
-        share of the time at the wall, in the outer fifth; share of the time at rest, with steps
-        below a fifth of the recording's median.
-    """
+    """Return facts of a motion, shape (checks,); NaN where it is too short for one."""
     px, py = resampled(plan.short, x), resampled(plan.short, y)
     there = np.zeros(px.size - 1, dtype=bool)
     there[plan.step] = True
@@ -67,7 +43,7 @@ def motion_checks(
     return np.array(found)
 
 
-def _squared_displacement(x: Floats, y: Floats, broken: npt.NDArray[np.int64], lag: int) -> float:
+def _squared_displacement(x: Floats, y: Floats, broken: Integers, lag: int) -> float:
     """Return the mean over all stretches without a gap."""
     whole = broken[lag:] == broken[:-lag]
     if not whole.any():

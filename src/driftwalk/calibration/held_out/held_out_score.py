@@ -1,4 +1,4 @@
-"""One motion model on a recording: searched on the even blocks of time, judged on the odd ones."""
+"""Held-out score: a model searched on the even blocks of time and scored on the odd ones."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.calibration.evolution import (
     AspectObjective,
@@ -16,11 +15,11 @@ from driftwalk.calibration.evolution import (
 from driftwalk.calibration.held_out.candidates import Candidate
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.comparison.aspects import AspectReference
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.motion.batches import no_numbers
 from driftwalk.motion.score import broken_worlds
 
-Floats = npt.NDArray[np.float64]
 Tell = Callable[[int, int], None]
 
 HELD_OUT_REPLICATES: Final = 20

@@ -11,9 +11,8 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from driftwalk.core.arrays import Bools, Floats
 
 LEAST_PROBABILITY: Final = 1e-6
 NEWTON_STEPS: Final = 8
@@ -45,13 +44,6 @@ class HiddenMarkovModel(NamedTuple):
 
 def fit_hidden_markov_model(runs: Sequence[Floats], *, states: int = 3) -> HiddenMarkovModel:
     """Fit a hidden Markov walk to runs of steps that follow each other.
-
-    Parameters
-    ----------
-    runs : sequence of ndarray, shape (steps, 2)
-        Step length [m] and turning angle [rad], in their order; at least one step.
-    states : int
-        Hidden states. They begin as equal parts of the sorted step lengths.
 
     Examples
     --------
@@ -89,7 +81,7 @@ def log_densities(walk: HiddenMarkovModel, steps: Floats) -> Floats:
     return np.asarray(gamma + turn - np.log(2.0 * np.pi * i0e(walk.concentration)))
 
 
-def _side_by_side(runs: Sequence[Floats]) -> tuple[Floats, npt.NDArray[np.bool_]]:
+def _side_by_side(runs: Sequence[Floats]) -> tuple[Floats, Bools]:
     """Return runs as rows of one array, and which of its places hold a step."""
     longest = max(len(run) for run in runs)
     steps = np.ones((len(runs), longest, 2))
@@ -112,9 +104,7 @@ def _first(steps: Floats, states: int) -> HiddenMarkovModel:
     )
 
 
-def _expected(
-    walk: HiddenMarkovModel, steps: Floats, there: npt.NDArray[np.bool_]
-) -> tuple[Floats, Floats, float]:
+def _expected(walk: HiddenMarkovModel, steps: Floats, there: Bools) -> tuple[Floats, Floats, float]:
     """Return the probability of each state at each step, of each change, and the likelihood.
 
     The forward and backward passes run over all runs at once. After the end of a run nothing is
@@ -146,9 +136,7 @@ def _expected(
     return state.transpose(1, 0, 2), joint, log_likelihood
 
 
-def _most_likely(
-    steps: Floats, there: npt.NDArray[np.bool_], state: Floats, joint: Floats
-) -> HiddenMarkovModel:
+def _most_likely(steps: Floats, there: Bools, state: Floats, joint: Floats) -> HiddenMarkovModel:
     begin = state[:, 0].mean(axis=0) + LEAST_PROBABILITY
     moves = joint + LEAST_PROBABILITY
     return _of_steps(steps[there], state[there])._replace(

@@ -35,6 +35,7 @@ from driftwalk.conditions import (
     recorded_conditions,
     require_travel,
 )
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.schema import Track, body_track
 
@@ -42,8 +43,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,13 +157,7 @@ def body_motion(
     body: str | None,
     threads: int | None = None,
 ) -> RecordedMotion:
-    """Prepare a body of a recording for motion models; see `recorded_motion`.
-
-    Raises
-    ------
-    InputError
-        When it is too short, does not move, or several bodies are there and none is named.
-    """
+    """Prepare a body of a recording for motion models; see `recorded_motion`."""
     track = body_track(recording, body)
     require_samples(track)
     require_travel(track, study, of_block=False)
@@ -188,28 +181,7 @@ def recorded_motion(
     neighbours: Neighbours | None = None,
     threads: int | None = None,
 ) -> RecordedMotion:
-    """Prepare a recorded track for the comparison of motion models.
-
-    Parameters
-    ----------
-    track : Track
-        The present samples of one body.
-    study : Study
-        Tank, camera and step interval.
-    position_quantum : float
-        Resolution of the recorded positions [m].
-    flow : xarray.Dataset, optional
-        The water's velocity.
-    neighbours : Neighbours, optional
-        The other bodies, on the clock of the track.
-    threads : int, optional
-        Default: all processors.
-
-    Raises
-    ------
-    InputError
-        When the track is too short or does not move, or has too few steps in a half.
-    """
+    """Prepare a recorded track for the comparison of motion models."""
     if neighbours is not None:
         neighbours = neighbours.since(float(track.time[0]))
     track = track._replace(time=track.time - track.time[0])

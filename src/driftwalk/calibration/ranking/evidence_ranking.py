@@ -1,4 +1,4 @@
-"""Which of several models, between which distances decide nothing, the summaries speak for."""
+"""Evidence ranking: which of the models that distances leave tied the summaries speak for."""
 
 from __future__ import annotations
 

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.calibration.estimation.determined import DETERMINED
 from driftwalk.calibration.held_out.candidates import Candidate
@@ -28,6 +27,7 @@ from driftwalk.calibration.ranking.verdict import VERDICT, Verdict, verdict_of
 from driftwalk.calibration.stationarity import Stationarity, stationarity_of_steps
 from driftwalk.comparison import KsReference
 from driftwalk.comparison.aspects import points_distance
+from driftwalk.core.arrays import Floats
 from driftwalk.schema.answers.facts import texts
 from driftwalk.schema.check import build_dataset
 from driftwalk.simulation.series import series_warnings
@@ -36,8 +36,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
-
-Floats = npt.NDArray[np.float64]
 
 
 def build_comparison(

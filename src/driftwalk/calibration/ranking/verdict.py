@@ -5,15 +5,12 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.calibration.held_out.checks import CHECKS
 from driftwalk.calibration.held_out.held_out_score import HeldOutScore
 from driftwalk.calibration.held_out.recorded import RecordedMotion
+from driftwalk.core.arrays import Bools, Floats
 from driftwalk.schema.answers.model_comparison import ASPECT_WORDS, CHECK_WORDS
-
-Floats = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
 
 
 class VerdictPolicy(NamedTuple):
@@ -53,21 +50,7 @@ def verdict_of(
     clearly_behind: str | None = None,
     unlike: str | None = None,
 ) -> Verdict:
-    """Compare a model with the recording's own differences, and with facts that are not fitted.
-
-    Parameters
-    ----------
-    held_out : Judged
-        The model's distances and facts.
-    motion : RecordedMotion
-        The recording.
-    baseline : bool
-        Whether it only repeats recorded steps: then it explains nothing, however near.
-    clearly_behind : str, optional
-        A model that is closer by more than chance: so this one differs from the recording.
-    unlike : str, optional
-        How far its summaries are from those of the recording, where another model gives them.
-    """
+    """Compare a model with the recording's own differences, and with facts that are not fitted."""
     over = held_out.held / motion.own
     off = checks_off(held_out.checks, motion.recorded_checks)
     parts = [
@@ -89,15 +72,7 @@ def verdict_of(
 
 
 def checks_off(worlds: Floats, recorded: Floats) -> Bools:
-    """Return which facts of a recording are far beyond those of all worlds, shape (checks,).
-
-    Parameters
-    ----------
-    worlds : ndarray, shape (worlds, checks)
-        Facts of simulated worlds, see `motion_checks`.
-    recorded : ndarray, shape (checks,)
-        Those of the recording; NaN where it is too short for one.
-    """
+    """Return which facts of a recording are far beyond those of all worlds, shape (checks,)."""
     low, high = worlds.min(axis=0), worlds.max(axis=0)
     share = np.array([name.endswith("_share") for name in CHECKS])
     lowest = np.where(share, low - VERDICT.most_share_apart, low / VERDICT.most_ratio)

@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.calibration.estimation.determined import DETERMINED
 from driftwalk.calibration.recover.truth import KnownTruth
 from driftwalk.calibration.run import calibrate
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.schema import Parameter
 from driftwalk.schema.kinds.model_recovery import CALIBRATED_STATUS
@@ -18,7 +18,6 @@ from driftwalk.schema.kinds.model_recovery import CALIBRATED_STATUS
 if TYPE_CHECKING:
     import xarray as xr
 
-Floats = npt.NDArray[np.float64]
 Tell = Callable[[str, int, int], None]
 
 MESSAGE: Final = 400
@@ -28,14 +27,7 @@ MESSAGE: Final = 400
 def recover_one(
     truth: KnownTruth, number: int, *, threads: int | None, tell: Tell | None
 ) -> dict[str, Any]:
-    """Simulate and calibrate one recording.
-
-    Returns
-    -------
-    dict
-        ``estimate``, ``interval``, ``range``, ``determined``, ``half_width`` by parameter,
-        ``status`` and ``message``. NaN where there is no calibration.
-    """
+    """Simulate and calibrate one recording."""
     try:
         recording = truth.recording(number)
     except InputError as error:
@@ -59,16 +51,7 @@ def recover_one(
 
 
 def answer_of(found: xr.Dataset, parameters: Sequence[Parameter]) -> dict[str, Any]:
-    """Return what a calibration says of its parameters.
-
-    Parameters
-    ----------
-    found : xarray.Dataset
-        A `model_calibration`, or the `calibration` of one or two parameters. This has no draws: its
-        parameters are judged by the widths of their intervals.
-    parameters : sequence of Parameter
-        The parameters, in their order.
-    """
+    """Return what a calibration says of its parameters."""
     names = [one.name for one in parameters]
     found = found.sel(parameter=names)
     estimate = found["estimate"].values.astype(np.float64)
@@ -105,23 +88,6 @@ def interval_half_width(
     ends: Floats, value: float, parameter: Parameter, *, confidence: float
 ) -> float:
     """Return half the 90 % interval over the value, from an interval of another confidence.
-
-    Parameters
-    ----------
-    ends : ndarray, shape (2,)
-        The interval, in the unit of the parameter.
-    value : float
-        The estimate.
-    parameter : Parameter
-        The parameter with its range.
-    confidence : float
-        Of the interval; its width is scaled as that of a normal distribution.
-
-    Returns
-    -------
-    float
-        On a logarithmic scale half the width of the logarithm. Infinite where the interval reaches
-        the end of the range, NaN without an interval.
 
     Examples
     --------

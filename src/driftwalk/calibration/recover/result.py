@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.calibration.estimation.determined import DETERMINED
 from driftwalk.calibration.recover.truth import KnownTruth
+from driftwalk.core.arrays import Bools, Floats
 from driftwalk.motion import MotionModel, ParticleModel
 from driftwalk.schema.answers.facts import BOUNDS, texts
 from driftwalk.schema.check import build_dataset
@@ -19,20 +19,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-Floats = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
-
-
 def build_model_recovery(known: KnownTruth, found: Mapping[str, Any]) -> xr.Dataset:
-    """Return the dataset of a recovery study.
-
-    Parameters
-    ----------
-    known : KnownTruth
-        What the recordings were made of.
-    found : mapping of str to ndarray
-        What `recover_one` returns, with the recordings along the first dimension.
-    """
+    """Return the dataset of a recovery study."""
     parameters, study = known.model.parameters, known.study
     names = [one.name for one in parameters]
     truth = np.array([known.values[name] for name in names])
@@ -94,23 +82,6 @@ def relative_errors(
 ) -> Floats:
     """Return the errors of estimates, shape (recordings, parameters).
 
-    Parameters
-    ----------
-    estimate : ndarray, shape (recordings, parameters)
-        Estimates in the units of the parameters.
-    truth : ndarray, shape (parameters,)
-        The true values.
-    ranges : ndarray, shape (recordings, parameters, 2)
-        Ranges of the search.
-    scales : sequence of {"linear", "log"}
-        Scales of the parameters.
-
-    Returns
-    -------
-    ndarray
-        ln(estimate / truth) on a logarithmic scale. On a linear one the difference over the truth,
-        or over a twentieth of the range where the truth is smaller than that.
-
     Examples
     --------
     >>> ends = np.array([[[-5.0, 5.0]]])
@@ -135,19 +106,6 @@ def summary_by_parameter(
     error: Floats, interval: Floats, determined: Bools, truth: Floats, *, confidence: float
 ) -> dict[str, Floats]:
     """Return the summary of a study, an array by parameter each.
-
-    Parameters
-    ----------
-    error : ndarray, shape (recordings, parameters)
-        Relative errors; NaN in the row of a recording without a calibration.
-    interval : ndarray, shape (recordings, parameters, 2)
-        Intervals, NaN where there is none: these do not count for the coverage.
-    determined : ndarray, shape (recordings, parameters)
-        Whether the recording determines the parameter.
-    truth : ndarray, shape (parameters,)
-        The true values.
-    confidence : float
-        Of the intervals.
 
     Examples
     --------

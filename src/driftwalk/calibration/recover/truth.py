@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.conditions.camera import study_as_seen
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.seeds import world_keys
 from driftwalk.core.streams import RecoveryStream
@@ -21,7 +21,6 @@ from driftwalk.schema import body_track, build_trajectory
 if TYPE_CHECKING:
     import xarray as xr
 
-Floats = npt.NDArray[np.float64]
 Noise = Literal["estimated", "known"]
 
 
@@ -90,13 +89,7 @@ class KnownTruth:
         return int(world_keys(seed, trial=recording, replicate=stream)[0] >> np.uint64(1))
 
     def recording(self, number: int) -> xr.Dataset:
-        """Return what the camera records of one world, a `trajectory`.
-
-        Raises
-        ------
-        InputError
-            When the simulation gives no numbers.
-        """
+        """Return what the camera records of one world, a `trajectory`."""
         time = self.times
         settling = self.study.recover.settling_s if self.like is None else 0.0
         # A body starts at rest: the camera is switched on when its motion has settled.
@@ -152,15 +145,7 @@ def known_truth(
     body: str | None,
     noise: Noise = "estimated",
 ) -> KnownTruth:
-    """Return a truth that recordings can be made of.
-
-    Raises
-    ------
-    ConfigurationError
-        When a value is missing, is none, or belongs to no parameter.
-    InputError
-        When it is the block's, or several lengths are given.
-    """
+    """Return a truth that recordings can be made of."""
     if isinstance(model, BlockModel):
         raise InputError("the block has a recovery study of its own: see recovery_study")
     if not model.parameters:

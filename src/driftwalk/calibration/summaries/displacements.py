@@ -12,9 +12,8 @@ import numpy.typing as npt
 from driftwalk.comparison import StepPlan, apply_steps
 from driftwalk.comparison.aspects import AspectPlan
 from driftwalk.comparison.aspects.form import WallDistance, resampled
+from driftwalk.core.arrays import Bools, Floats
 
-Floats = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
 Instants = Callable[[Floats], Bools]
 """Which instants [s] count."""
 
@@ -58,21 +57,7 @@ class SummaryPlan:
 def plan_summaries(
     aspects: AspectPlan, *, wall: WallDistance, unit: float, depth: float, counts: Instants
 ) -> SummaryPlan:
-    """Decide which displacements are summarised.
-
-    Parameters
-    ----------
-    aspects : AspectPlan
-        Of the time stamps.
-    wall : callable
-        Distance of points from the wall [m].
-    unit : float
-        Median step [m].
-    depth : float
-        Largest distance from the wall [m].
-    counts : callable
-        Which instants count.
-    """
+    """Decide which displacements are summarised."""
     there = np.zeros(aspects.time.size - 1, dtype=bool)
     there[aspects.step] = True
     there &= counts(aspects.time[:-1])

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from typing import ClassVar, Final
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.calibration.evolution import AspectObjective, wall_distance
 from driftwalk.calibration.evolution.search import Tell
@@ -16,12 +15,11 @@ from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.calibration.summaries.displacements import SummaryPlan, plan_summaries
 from driftwalk.calibration.summaries.statistics import summarise
 from driftwalk.comparison.aspects import block_of
+from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.processors import map_in_threads, one_blas_thread
 from driftwalk.motion import Worlds
 from driftwalk.motion.score import broken_worlds
 from driftwalk.sweep import Store, WorkUnit, run_sweep
-
-Floats = npt.NDArray[np.float64]
 
 ALIKE: Final = 16
 """Settings in a row that are seen by one camera. So many points of a Sobol' sequence fill a box."""
@@ -74,10 +72,10 @@ class SummaryObjective:
         self._cameras = _cameras(worlds, motion.noises)
         self.done = 0
 
-        def all_of(time: Floats) -> npt.NDArray[np.bool_]:
+        def all_of(time: Floats) -> Bools:
             return np.ones(time.shape, dtype=bool)
 
-        def even(time: Floats) -> npt.NDArray[np.bool_]:
+        def even(time: Floats) -> Bools:
             return np.asarray(block_of(time, motion.duration) % 2 == 0)
 
         wall, scale = wall_distance(worlds.like), {"unit": motion.usual_step, "depth": motion.depth}
@@ -89,15 +87,7 @@ class SummaryObjective:
         self.recorded = np.array([summarise(one, *motion.track[1:3]) for one in recorded])
 
     def __call__(self, settings: Floats, *, parts: int = 1) -> Floats:
-        """Return the summaries of settings in the unit cube, shape (settings, parts, summaries).
-
-        Parameters
-        ----------
-        settings : ndarray, shape (settings, parameters)
-            In the unit cube.
-        parts : {1, 2}
-            Of the whole recording alone, or of its even blocks, too.
-        """
+        """Return the summaries of settings in the unit cube, shape (settings, parts, summaries)."""
         first = self.done
         units = [
             WorkUnit(

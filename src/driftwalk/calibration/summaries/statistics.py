@@ -16,13 +16,12 @@ import numpy.typing as npt
 
 from driftwalk.calibration.summaries.displacements import (
     SMALLEST,
-    Bools,
-    Floats,
     Series,
     SummaryPlan,
     series_of,
     turns_of,
 )
+from driftwalk.core.arrays import Bools, Floats
 
 Numbers = Iterator[float]
 
@@ -63,19 +62,6 @@ SUMMARIES: Final = SummaryPolicy()
 
 def summarise(plan: SummaryPlan, x: npt.ArrayLike, y: npt.ArrayLike) -> Floats:
     """Return the summaries of a motion, shape (summaries,).
-
-    Parameters
-    ----------
-    plan : SummaryPlan
-        From `plan_summaries`.
-    x, y : array_like, shape (samples,)
-        Positions [m] at the plan's time stamps; NaN where a sample is missing.
-
-    Returns
-    -------
-    ndarray
-        Numbers without units: logarithms of lengths over the usual step, shares, cosines and
-        correlations. All 0 where the motion has fewer than 4 steps that count.
 
     Examples
     --------

@@ -138,7 +138,7 @@ def test_none_chosen_or_none_wanted_leaves_a_map_as_it_is(problem):
 def test_replicates_of_a_setting_are_apart_as_two_recordings_are(problem):
     """Measured again from the steps of the same worlds."""
     found = run_map(problem, ([0.3], [4e-4, 8e-4]), stage="refined", replicates=4, apart=True)
-    steps = simulated_steps(problem, ([0.3, 0.3], [4e-4, 8e-4]), stage="refined", replicates=4)
+    steps, _ = simulated_steps(problem, ([0.3, 0.3], [4e-4, 8e-4]), stage="refined", replicates=4)
     matrix = problem.statistic.matrix(steps, steps)
     expected = [matrix[:2, 2:4].mean(), matrix[4:6, 6:8].mean()]
     np.testing.assert_allclose(found.apart[0], expected)
