@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -32,10 +31,6 @@ def test_what_a_declaration_names_is_there(kind) -> None:
         if maker is not None:
             assert maker.partition(":")[0].split(".")[1] in rooms, maker
             assert callable(load_maker(maker))
-    if kind.terminal:
-        answer = import_module(kind.terminal)
-        assert callable(answer.summary)
-        assert callable(answer.print_answer)
 
 
 def test_no_module_asks_a_dataset_for_its_kind() -> None:

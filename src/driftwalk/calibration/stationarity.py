@@ -15,7 +15,7 @@ class StationarityPolicy(NamedTuple):
     """The permutation test of the two halves of a recording."""
 
     parts: int = 20
-    """Parts that are permuted. What lasts less than a part counts as chance."""
+    """Parts that are permuted; a change shorter than a part counts as chance. Chosen by hand."""
     fewest_pairs: int = 200
     """Fewest pairs of steps: ten in each part. Chosen by hand."""
     permutations: int = 199
@@ -23,7 +23,7 @@ class StationarityPolicy(NamedTuple):
     level: float = 0.005
     """False-alarm rate: a steady recording is called unsteady once in 200."""
     seed: int = 20
-    """Of the permutations: the same recording gives the same p-value."""
+    """Seed of the permutations: the same recording gives the same p-value."""
 
 
 STATIONARITY: Final = StationarityPolicy()

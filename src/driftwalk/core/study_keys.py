@@ -30,7 +30,7 @@ STUDY_KEYS: Final[dict[str, str]] = {
     "flow_repeat": "flow.repeat",
     "flow_start": "flow.start",
 }
-"""From an argument's name to the key of the study that it sets; `option_of` gives its option."""
+"""From an argument's name to the key of the study that it sets."""
 
 CALIBRATION_KEYS: Final[dict[str, str]] = {
     **STUDY_KEYS,
@@ -115,17 +115,6 @@ TABLES: Final = (
     *(FLOW_KEYS, FIT_KEYS, RECOVER_KEYS),
 )
 """All of them."""
-
-
-def option_of(name: str) -> str:
-    """Return the option of the command line for a name of these tables.
-
-    Examples
-    --------
-    >>> option_of("force_std"), option_of("tank_diameter")
-    ('--force-std', '--tank')
-    """
-    return "--tank" if name == "tank_diameter" else f"--{name.replace('_', '-')}"
 
 
 def study_overrides(*, keys: Mapping[str, str] = STUDY_KEYS, **options: Any) -> dict[str, Any]:

@@ -9,7 +9,7 @@ import numpy as np
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood.intervals import fitted_intervals, switched_frames
 from driftwalk.schema import FLAGS, build_flow_field
-from driftwalk.schema.check import refuse_other_version
+from driftwalk.schema.check import refuse_other_version, require_kind
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -17,10 +17,7 @@ if TYPE_CHECKING:
 
 def require_fit(dataset: xr.Dataset) -> xr.Dataset:
     """Return a fit; refuse any other dataset, and a fit of another schema version."""
-    kind = dataset.attrs.get("kind")
-    if kind != "fit":
-        raise InputError(f"not a fit: its kind is {kind!r}; fit_motion makes one")
-    return refuse_other_version(dataset)
+    return refuse_other_version(require_kind(dataset, "fit", "fit_motion makes one"))
 
 
 def fitted_flow(fit: xr.Dataset, *, interval: int | None = None) -> xr.Dataset:

@@ -148,7 +148,7 @@ def run_work(
 
     Returns
     -------
-    Any
+    object
         What the work computed. Its datasets know the files that hold them.
 
     Raises

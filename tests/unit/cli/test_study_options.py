@@ -16,9 +16,10 @@ from driftwalk.cli.main import Command, main
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import Json
 from driftwalk.cli.options.study import StudyOptions, with_study_options
+from driftwalk.cli.terminal.argument_names import option_of
 from driftwalk.core import study_keys
 from driftwalk.core.errors import ConfigurationError
-from driftwalk.core.study_keys import FIT_KEYS, RECOVER_KEYS, STUDY_KEYS, option_of
+from driftwalk.core.study_keys import FIT_KEYS, RECOVER_KEYS, STUDY_KEYS
 from driftwalk.model import Study, declared
 from driftwalk.model.section import SMALLEST
 

@@ -29,7 +29,7 @@ class PosteriorPolicy(NamedTuple):
     size: int = 512
     """Settings of the posterior sample."""
     walkers: int = 64
-    """Of the chain: several for each of at most a dozen parameters."""
+    """Walkers of the chain: several for each of at most a dozen parameters."""
     steps: int = 600
     """Steps of each walker; the first half is left out."""
     begin: float = 0.3

@@ -27,7 +27,7 @@ class RegressionPolicy(NamedTuple):
     """Sequential regression from the whole ranges to a trust region. Chosen by hand."""
 
     simulations: int = 256
-    """Of a round: some two for each of a hundred summaries, a power of two."""
+    """Simulations of a round: some two for each of a hundred summaries, a power of two."""
     most_rounds: int = 6
     """A bound on the time."""
     wide_errors: float = 2.5

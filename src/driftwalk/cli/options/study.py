@@ -21,9 +21,9 @@ import typer
 
 from driftwalk.cli.options.flatten_options import Command, Part, spread
 from driftwalk.cli.options.shared import PANEL, StudyFile, quantity_parser
-from driftwalk.cli.terminal.argument_names import to_options
+from driftwalk.cli.terminal.argument_names import option_of, to_options
 from driftwalk.core.errors import ConfigurationError
-from driftwalk.core.study_keys import CALIBRATION_KEYS, STUDY_KEYS, option_of, study_overrides
+from driftwalk.core.study_keys import CALIBRATION_KEYS, STUDY_KEYS, study_overrides
 from driftwalk.model import Declaration, declared
 
 if TYPE_CHECKING:

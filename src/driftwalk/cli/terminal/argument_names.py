@@ -12,7 +12,19 @@ import shlex
 from collections.abc import Mapping
 from typing import Any, Final
 
-from driftwalk.core.study_keys import TABLES, option_of
+from driftwalk.core.study_keys import TABLES
+
+
+def option_of(name: str) -> str:
+    """Return the option of the command line for a name of these tables.
+
+    Examples
+    --------
+    >>> option_of("force_std"), option_of("tank_diameter")
+    ('--force-std', '--tank')
+    """
+    return "--tank" if name == "tank_diameter" else f"--{name.replace('_', '-')}"
+
 
 _SAME: Final = (
     "angle backend body cell_size cells columns flow format frame_interval header_line "
