@@ -117,6 +117,7 @@ def test_damage_is_one_line(
     assert not wrong, "\n".join(f"{kind}: {what}" for kind, what in wrong.items())
 
 
+@pytest.mark.slow
 def test_the_samples_are_valid(samples: list[Sample]) -> None:
     ends = {sample.kind: here(*sample.words) for sample in samples}
     assert {kind: done.err for kind, done in ends.items() if done.code} == {}

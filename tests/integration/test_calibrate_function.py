@@ -149,6 +149,7 @@ def test_the_block_is_a_model_among_others():
     assert dw.calibrate(recording, study=study, flow=flow).identical(as_study)
 
 
+@pytest.mark.slow
 def test_without_a_study_the_tank_is_the_arena_of_the_recording():
     radii = set()
 

@@ -7,6 +7,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+import pytest
 import xarray as xr
 from hypothesis import assume, given, settings, strategies as st
 
@@ -66,6 +67,7 @@ def assert_same_tracks(
             np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(recordings())
 def test_csv(recording: xr.Dataset) -> None:
@@ -82,6 +84,7 @@ def test_csv(recording: xr.Dataset) -> None:
     np.testing.assert_array_equal(back["time"].values, recording["time"].values)
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(recordings())
 def test_trackpy(recording: xr.Dataset) -> None:
@@ -92,6 +95,7 @@ def test_trackpy(recording: xr.Dataset) -> None:
     assert_same_tracks(back, recording, dict(zip(body_names(recording), numbers, strict=True)))
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(recordings())
 def test_movement_holds_everything(recording: xr.Dataset) -> None:
@@ -104,6 +108,7 @@ def test_movement_holds_everything(recording: xr.Dataset) -> None:
     assert json.loads(back.attrs["arena"]) == json.loads(ARENA)
 
 
+@pytest.mark.slow
 @given(
     st.floats(0.5, 500.0),
     st.lists(st.integers(1, 50), min_size=1, max_size=30),
@@ -120,6 +125,7 @@ def test_frames_of_an_even_clock_are_found_again(
     np.testing.assert_array_equal(frame_numbers(found), frames)
 
 
+@pytest.mark.slow
 @given(st.lists(st.floats(0.3, 0.7), min_size=3, max_size=20))
 def test_an_uneven_clock_has_no_rate_that_was_not_there(jitter: list[float]) -> None:
     """Times that are off by up to half a frame are no frames unless all happen to be near one."""

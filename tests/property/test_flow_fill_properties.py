@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given, settings, strategies as st
 
 from driftwalk.flow.arena import outline_of
@@ -35,6 +36,7 @@ ARENAS = st.one_of(
 )
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @given(
     arena=ARENAS,
@@ -58,6 +60,7 @@ def test_no_filled_speed_exceeds_the_largest_known_one(
     np.testing.assert_array_equal(filled[known], velocity[known])
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=30)
 @given(seed=st.integers(0, 2**32 - 1), quarter=st.integers(1, 3))
 def test_turning_tank_and_field_turns_the_filled_field(seed: int, quarter: int) -> None:

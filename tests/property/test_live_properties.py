@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
 import xarray as xr
 from hypothesis import given, settings, strategies as st
 
@@ -52,6 +53,7 @@ def whole_run(study: dw.Study, flow: xr.Dataset, seed: int, steps: int) -> dict[
     return {name: values[0] for name, values in found.items()}
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(
     blocks=st.sampled_from(sorted(DIAMETERS)),

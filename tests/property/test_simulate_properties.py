@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given, settings, strategies as st
 from single_block import (
     INERTIA,
@@ -41,6 +42,7 @@ def _outside(tank: Tank, x, y, theta) -> float:
     return max(float((corner_x * a + corner_y * b - d).max()) for a, b, d in wall_edges(tank))
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(
     tank=st.sampled_from(sorted(TANKS)),

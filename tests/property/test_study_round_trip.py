@@ -6,6 +6,7 @@ import math
 import tomllib
 from typing import Any
 
+import pytest
 from hypothesis import given, settings, strategies as st
 
 from driftwalk.core.errors import ConfigurationError
@@ -62,6 +63,7 @@ STUDIES: st.SearchStrategy[dict[str, Any]] = st.fixed_dictionaries(
 )
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @given(values=STUDIES)
 def test_study_survives_its_file(values: dict[str, Any]) -> None:
@@ -99,6 +101,7 @@ KEYS = st.sampled_from(
 )
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=300)
 @given(key=KEYS, value=VALUES)
 def test_any_value_is_taken_or_refused_in_one_sentence(key: str, value: Any) -> None:

@@ -7,6 +7,7 @@ from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
 import numpy as np
+import pytest
 from hypothesis import given, settings, strategies as st
 
 from driftwalk.record import load
@@ -23,6 +24,7 @@ def read(content: bytes) -> tuple[np.ndarray, np.ndarray, dict[str, object]]:
     return dataset["time"].to_numpy(), dataset["x"].to_numpy()[:, 0], dataset.attrs
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=40)
 @given(
     values=st.lists(NUMBERS, min_size=1, max_size=40),
@@ -41,6 +43,7 @@ def test_every_form_of_numbers_is_read_to_the_last_bit(
     np.testing.assert_array_equal(x, values)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=40)
 @given(
     start=st.datetimes(datetime(1800, 1, 1), datetime(2200, 1, 1)),

@@ -52,6 +52,7 @@ def test_the_plugin_for_webots_in_ode(law: str, tmp_path: Path) -> None:
     assert 0 < np.hypot(*(found - expected).T[:2]).max() < FARTHEST
 
 
+@pytest.mark.slow
 def test_the_plugin_for_gazebo_in_a_stand_in(tmp_path: Path) -> None:
     compiler = shutil.which("c++")
     if compiler is None:

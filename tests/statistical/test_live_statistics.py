@@ -68,6 +68,7 @@ def p_value(sampling: tuple[int, int], fresh_seed: Callable[[int], int], **chang
     return float(found["p_value"])
 
 
+@pytest.mark.slow
 @pytest.mark.false_alarm(LEVEL)
 @pytest.mark.parametrize("sampling", [CAMERA, MOTION], ids=["camera", "motion"])
 def test_a_live_block_makes_the_steps_of_simulate(

@@ -82,6 +82,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.fast_cases(15)
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize("name", [*BAD, "nowhere.csv"])
 def test_bad_recording(name: str, command: str, folder: Path) -> None:
@@ -152,6 +153,7 @@ WITH_STUDY: dict[str, list[object]] = {
 }
 
 
+@pytest.mark.fast_cases(14)
 @pytest.mark.parametrize("command", WITH_STUDY)
 @pytest.mark.parametrize("study", STUDIES)
 def test_bad_study(study: str, command: str, folder: Path) -> None:
@@ -166,6 +168,7 @@ def test_bad_study(study: str, command: str, folder: Path) -> None:
     assert contents(folder) == before
 
 
+@pytest.mark.fast_cases(7)
 @pytest.mark.parametrize(
     ("options", "says"),
     [
@@ -239,6 +242,7 @@ def writers(place: Path) -> dict[str, list[object]]:
     }
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("command", writers(Path("x")))
 def test_a_file_that_exists_is_kept_and_replaced_when_asked(command: str, folder: Path) -> None:
     words = writers(folder / "out.nc")[command]

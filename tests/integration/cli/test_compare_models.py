@@ -90,6 +90,7 @@ def test_models_are_ranked_as_they_finish(tmp_path: Path, monkeypatch: pytest.Mo
     assert "explains the recording" in answer
 
 
+@pytest.mark.slow
 def test_mistakes_are_one_line(tmp_path: Path) -> None:
     words = ("compare-models", RECORDING, "--to", "60s", "--tank", "30cm")
     out = tmp_path / "run"

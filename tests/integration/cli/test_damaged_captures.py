@@ -43,6 +43,7 @@ DAMAGES: dict[str, Callable[[str], str]] = {
 }
 
 
+@pytest.mark.fast_cases(17)
 @pytest.mark.parametrize("kind", list(TEXTS))
 @pytest.mark.parametrize("damage", list(DAMAGES))
 def test_damaged_text(tmp_path: Path, kind: str, damage: str) -> None:

@@ -82,6 +82,7 @@ def test_a_real_recording_comes_back_as_it_was(
     assert_same(back, recording, names)
 
 
+@pytest.mark.slow
 def test_a_bag_holds_the_poses_to_the_nanosecond(tmp_path: Path) -> None:
     pytest.importorskip("rosbags", reason="rosbags is not installed: pip install driftwalk[ros]")
     time = np.array([-0.5, 0.1, 0.25, 1.0 / 3.0])

@@ -17,6 +17,7 @@ from driftwalk.model import parse_study
 FRAMES = ("--fps", "10", "--scale", "1cm")
 
 
+@pytest.mark.slow
 def test_info_and_convert_of_a_pose_file(tmp_path: Path) -> None:
     path = sleap_hdf5(tmp_path / "swimmers.analysis.h5")
     assert "name the body's keypoint with --keypoint: nose, tail" in refusal(

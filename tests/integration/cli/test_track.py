@@ -62,6 +62,7 @@ def tracked(folder: Path, out: Path, *words: object):
     )
 
 
+@pytest.mark.slow
 def test_video_to_recording(folder: Path, truth: xr.Dataset, tmp_path: Path) -> None:
     out, overlay = tmp_path / "r.nc", tmp_path / "o.mp4"
     done = tracked(folder, out, "--bodies", "2", "--overlay", overlay, "--json")
@@ -101,6 +102,7 @@ def test_progress_of_a_file_that_holds_more_than_it_states() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_one_dark_object_among_brighter_ones(tmp_path: Path) -> None:
     """A larger bright thing that comes now and then is not taken for the dark one."""
     random = np.random.default_rng(0)
@@ -137,6 +139,7 @@ def test_explained_frame(folder: Path, tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_watching_tells_the_join(folder: Path) -> None:
     done = here(
         "watch", folder / "video.mkv", "--markers", folder / "m.toml", *TANK, "--bodies", "2"

@@ -144,6 +144,7 @@ def test_many_hidden_blocks_are_said_to_leave_it_unknown(tmp_path: Path) -> None
     assert not observed["possible"].values[-1].any()
 
 
+@pytest.mark.slow
 def test_watching_takes_what_it_needs(tmp_path: Path) -> None:
     words = film(tmp_path, frames=6)
     done = here("watch", *words)

@@ -143,6 +143,7 @@ def test_intervals_hold_as_often_as_stated() -> None:
     assert least <= median_holds <= most
 
 
+@pytest.mark.slow
 def test_class_proportions_are_those_of_a_plain_count() -> None:
     runs = assembly(300, broken=7)
     times = np.array([0.0, 0.7, 10.0, 33.3, 99.0, 100.0])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
+import pytest
 
 import driftwalk as dw
 from driftwalk.calibration.goodness_of_fit import could_be_best
@@ -14,6 +15,7 @@ from driftwalk.schema import Track, body_track
 from driftwalk.simulation.backend import Camera
 
 
+@pytest.mark.slow
 def test_the_best_setting_of_a_half_is_among_those_that_could_be():
     """Every setting is simulated for the half, too: the nearest ones may not be left out."""
     track = body_track(dw.tank30_recording().isel(time=slice(0, 2400)))

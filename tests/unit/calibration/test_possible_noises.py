@@ -44,6 +44,7 @@ def test_around_a_clear_estimate_the_logarithm_is_normal():
     assert logs.std() == pytest.approx(doubt, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_an_estimate_of_zero_gives_way_to_noises_that_include_the_true_one():
     """Jerks hide the noise from the estimate; none of 20 recordings may exclude the truth."""
     tracks = [jerking(seed) for seed in range(20)]

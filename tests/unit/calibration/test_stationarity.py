@@ -33,6 +33,7 @@ def walk(speed: np.ndarray, seed: int) -> Track:
     return Track(0.1 * np.arange(speed.size), x, y, heading)
 
 
+@pytest.mark.slow
 def test_a_steady_walk_gets_no_warning() -> None:
     """Each of 40 walks has p = 1/200 once in 200; two and more of them once in 60 seeds."""
     found = [stationarity_of(problem_of(walk(np.full(1000, 2e-3), seed))) for seed in range(40)]

@@ -49,6 +49,7 @@ def test_an_argument_becomes_an_option(message: str, printed: str) -> None:
     assert to_options(message) == printed
 
 
+@pytest.mark.slow
 @given(st.text(min_size=1))
 def test_any_name_of_a_column_arrives_in_the_command_that_is_advised(name: str) -> None:
     """A shell that reads the advice hands the option the column's name, whatever it holds."""

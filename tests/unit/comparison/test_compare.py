@@ -94,6 +94,7 @@ class TestCompare:
         np.testing.assert_allclose(result["step_density"].sum(axis=(1, 2)), 1.0)
         assert result["step_length_edge"].size == result["turning_angle_edge"].size == 33
 
+    @pytest.mark.slow
     def test_it_can_be_stored_and_read(self, tmp_path: Path) -> None:
         result = compare(random_walk(14), random_walk(15), permutations=19)
         result.to_netcdf(tmp_path / "comparison.nc", engine="h5netcdf")

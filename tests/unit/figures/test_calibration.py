@@ -116,6 +116,7 @@ def test_a_simulated_recording_is_named_so(
     assert seen == [expected] * len(NAMES)
 
 
+@pytest.mark.slow
 def test_both_panels_of_the_flow_share_one_scale(datasets) -> None:
     figure = figures.flow_figure(datasets[1])
     block, water = figure.axes[:2]
@@ -126,6 +127,7 @@ def test_both_panels_of_the_flow_share_one_scale(datasets) -> None:
     assert water.collections[0].get_clim()[1] == pytest.approx(100 * speed[inside].max())
 
 
+@pytest.mark.slow
 def test_an_analytic_flow_has_one_panel(datasets) -> None:
     figure = figures.flow_figure(datasets[1].drop_vars(["u_block", "v_block"]))
     assert len(figure.axes) == 2

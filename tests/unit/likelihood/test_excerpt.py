@@ -26,6 +26,7 @@ def _passes(seconds: float) -> Passes:
     return Passes(series, body_of(study, "state"), lay_spline(outline, side=0.03, spacing=0.03))
 
 
+@pytest.mark.slow
 def test_pieces_come_from_all_over_a_long_recording() -> None:
     few = pieces(_passes(0.11 * EXCERPT.worth_factor * EXCERPT.near_samples))
     assert few is not None

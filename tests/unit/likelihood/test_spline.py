@@ -68,6 +68,7 @@ def test_penalties_are_the_integrals_they_claim_to_be() -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.false_alarm(2e-5)
 def test_standard_errors_are_the_spread_of_drawn_coefficients(
     fresh_seed: Callable[[int], int],

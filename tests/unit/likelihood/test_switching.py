@@ -133,6 +133,7 @@ def prepared(**settings: object) -> tuple[Passes, Point]:
     return passes, Point(coefficients, np.log(0.4), np.log(6e-7), np.log(3e-4))
 
 
+@pytest.mark.slow
 def test_every_flow_adds_to_its_own_block() -> None:
     """The sums of two flows are those of each alone, side by side; the shared ones are added."""
     passes, point = prepared(**SWITCHED)

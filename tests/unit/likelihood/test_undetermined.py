@@ -75,6 +75,7 @@ def test_a_motion_without_random_force_has_no_numbers(
     assert answer["drag_coefficient"] is answer["tracking_noise_m"] is None
 
 
+@pytest.mark.slow
 def test_the_fit_with_the_angle_given_may_break_down_alone(monkeypatch: Any) -> None:
     study, track = coarse_study(), recording(60.0)
 

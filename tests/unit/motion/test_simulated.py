@@ -213,6 +213,7 @@ def test_gaps_and_stamps_are_the_recordings() -> None:
     np.testing.assert_array_equal(run["time"], uneven["time"] - uneven["time"][0])
 
 
+@pytest.mark.slow
 def test_the_tank_of_a_simulation_is_not_doubted(tmp_path) -> None:
     """At the wall half of the positions are outside by the noise; a smaller tank is refused."""
     fast = {**ACTIVE, "speed": 0.1}

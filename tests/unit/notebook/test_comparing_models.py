@@ -17,6 +17,7 @@ def recorded() -> xr.Dataset:
     return dw.tank30_recording().sel(time=slice(0.0, 20.0))
 
 
+@pytest.mark.slow
 def test_a_folder_gives_what_memory_gives(
     recorded: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -25,6 +25,7 @@ def through_json(encoded: dict[str, Any]) -> dict[str, Any]:
     return json.loads(json.dumps(encoded, allow_nan=False))
 
 
+@pytest.mark.slow
 @given(arrays(np.float64, SHAPES, elements=st.floats(allow_infinity=False)))
 def test_doubles_come_back_bit_for_bit(array: np.ndarray) -> None:
     encoded = through_json(encode_array(array, dtype="f8"))
@@ -55,6 +56,7 @@ def test_rounded_numbers_are_half_a_step_off_at_most(
         assert encoded["scale"] == resolution
 
 
+@pytest.mark.slow
 @given(arrays(np.int64, SHAPES, elements=st.integers(-32767, 32767)))
 def test_whole_numbers_come_back(array: np.ndarray) -> None:
     encoded = through_json(encode_array(array, dtype="i2"))

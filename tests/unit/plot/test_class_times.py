@@ -58,6 +58,7 @@ def test_of_68_classes_the_rest_is_summed() -> None:
     assert "other" in found
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize("form", ["lines", "stacked"])
 @pytest.mark.parametrize(("blocks", "chirality"), [(2, "merged"), (4, "distinct"), (6, "merged")])
 def test_labels_lie_beside_the_axes_and_apart(form, blocks, chirality) -> None:

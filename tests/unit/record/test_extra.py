@@ -38,6 +38,7 @@ def tracked(tmp_path: Path) -> Path:
     return save_trajectory(recording, tmp_path / "tracked.nc")
 
 
+@pytest.mark.slow
 def test_all_of_it_comes_back_twice(tracked: Path, tmp_path: Path) -> None:
     written = xr.load_dataset(tracked, engine="h5netcdf")
     once = load(tracked)
@@ -51,6 +52,7 @@ def test_all_of_it_comes_back_twice(tracked: Path, tmp_path: Path) -> None:
         assert json.loads(read.attrs["counts"])["samples"] == 2 * FRAMES - 3
 
 
+@pytest.mark.slow
 def test_it_follows_its_samples(tracked: Path) -> None:
     """A window and one body: the rows that are left keep their own values."""
     whole, part = load(tracked), load(tracked, body="b", start=0.5, stop=1.25)
@@ -59,6 +61,7 @@ def test_it_follows_its_samples(tracked: Path) -> None:
     np.testing.assert_array_equal(part["covariance"].values, expected)
 
 
+@pytest.mark.slow
 def test_the_description_says_how_much_is_ambiguous(tracked: Path, tmp_path: Path) -> None:
     described = describe(load(tracked))
     shares = {name: body["ambiguous_share"] for name, body in described["bodies"].items()}

@@ -95,6 +95,7 @@ def test_an_uneven_clock_needs_no_special_case(fresh_seed: Callable[[int], int])
     assert found.position_noise_m == pytest.approx(noise, rel=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.false_alarm(1e-3)
 def test_pixels_act_as_uniform_noise(fresh_seed: Callable[[int], int]) -> None:
     random = np.random.default_rng(fresh_seed(9))

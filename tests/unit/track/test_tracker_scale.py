@@ -22,6 +22,7 @@ def jerky_path() -> np.ndarray:
     return np.cumsum(step, axis=0) % 300 + random.normal(0, 0.3, (FRAMES, 2))
 
 
+@pytest.mark.fast_cases(1)
 @pytest.mark.parametrize("px_per_m", [20.0, 500.0, 1500.0, 50_000.0])
 def test_what_is_kept_does_not_depend_on_the_scale(px_per_m: float) -> None:
     """A body that starts and turns at once, alone in the picture, loses no sample at any scale."""

@@ -43,6 +43,7 @@ def errors(level: str, frames: int, **changes: object) -> tuple[np.ndarray, floa
     return np.array(rows), hits / wanted, extra
 
 
+@pytest.mark.slow
 def test_moderate_level_meets_the_stated_errors() -> None:
     rows, recall, extra = errors("moderate", 20)
     assert recall >= 0.995
@@ -63,6 +64,7 @@ def test_heavy_level_finds_what_can_be_seen() -> None:
     assert math.sqrt((seen[:, :2] ** 2).sum(axis=1).mean()) <= 0.3e-3
 
 
+@pytest.mark.slow
 def test_marker_angle_brightness_and_tilt() -> None:
     """An offset marker in half the light, before a tilted, turned camera with distortion."""
     settings = dw.video_settings(
@@ -104,6 +106,7 @@ def test_marker_angle_brightness_and_tilt() -> None:
             assert abs(math.degrees(turn)) < 0.5
 
 
+@pytest.mark.slow
 def test_rejected_candidates_have_reasons() -> None:
     settings = dw.video_settings("clean")
     _, image = next(dw.render_video(moving_blocks(1), settings))
@@ -121,6 +124,7 @@ def test_rejected_candidates_have_reasons() -> None:
     assert (drawn != image).any()
 
 
+@pytest.mark.slow
 def test_blocks_side_by_side_keep_their_own_discs() -> None:
     """Two blocks face to face: the next disc of the other colour may be the neighbour's."""
     from driftwalk.schema import build_trajectory
@@ -135,6 +139,7 @@ def test_blocks_side_by_side_keep_their_own_discs() -> None:
     assert rejected == []
 
 
+@pytest.mark.slow
 def test_a_proposal_gives_colours_size_and_spacing() -> None:
     settings = dw.video_settings("moderate")
     images = [image for _, image in dw.render_video(moving_blocks(3), settings)]
@@ -148,6 +153,7 @@ def test_a_proposal_gives_colours_size_and_spacing() -> None:
     assert proposal.picture.shape == images[0].shape
 
 
+@pytest.mark.slow
 def test_a_colour_that_never_appears_is_said_with_what_was_seen() -> None:
     settings = dw.video_settings("heavy")
     _, image = next(dw.render_video(moving_blocks(1), settings))

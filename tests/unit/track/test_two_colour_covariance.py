@@ -39,6 +39,7 @@ def scores(level: str, frames: int, seed: int) -> np.ndarray:
     return np.array(rows)
 
 
+@pytest.mark.slow
 @pytest.mark.false_alarm(1e-3)
 @pytest.mark.parametrize("level", [pytest.param("moderate", marks=pytest.mark.slow), "heavy"])
 def test_errors_have_the_spread_that_is_stated(
@@ -100,6 +101,7 @@ def test_half_a_disc_tells_the_direction() -> None:
         assert std < math.radians(2.0)
 
 
+@pytest.mark.slow
 def test_a_noisy_frame_takes_no_time_for_its_specks() -> None:
     """Discs of 9 pixels are searched at full size, where strong noise makes thousands of specks."""
     settings = dw.video_settings("heavy", px_per_m=900.0)

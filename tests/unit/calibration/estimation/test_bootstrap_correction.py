@@ -36,6 +36,7 @@ def repeated(
     return bootstrap_estimates(simulate, posterior, count)
 
 
+@pytest.mark.slow
 def test_a_right_emulator_needs_no_correction():
     """The bias of 400 has an error of 0.05 deviations, the scatter one of 4 %, draws one of 3 %."""
     found = repeated(400)
@@ -45,14 +46,17 @@ def test_a_right_emulator_needs_no_correction():
     assert (found.spread < 1.2).all()
 
 
+@pytest.mark.slow
 def test_a_scatter_that_the_draws_do_not_have_is_found():
     np.testing.assert_allclose(repeated(400, noise=2.0).spread, 2.0, rtol=0.2)
 
 
+@pytest.mark.slow
 def test_draws_are_never_made_narrower():
     assert (repeated(400, noise=0.5).spread == 1.0).all()
 
 
+@pytest.mark.slow
 def test_a_bias_is_found():
     """Summaries of the model are half a deviation more than the emulator says, or less."""
     found = repeated(400, off=(0.5 * STD, -1.0 * STD))

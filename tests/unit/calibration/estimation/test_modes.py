@@ -57,6 +57,7 @@ def share_above(steep: float) -> float:
     return float(density[at[:, 0] > 0.5].sum() / density.sum())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("steep", [0.0, 0.15])
 def test_both_places_have_their_shares(steep: float):
     """The misfits of covariances from simulations have errors of 0.1: 0.05 of a share, at most."""
@@ -70,11 +71,13 @@ def test_both_places_have_their_shares(steep: float):
     assert above == pytest.approx(share_above(steep), abs=0.12)
 
 
+@pytest.mark.slow
 def test_a_parameter_is_apart_where_its_places_are():
     modes, _ = found_from((0.71, 0.41), (0.29, 0.39))
     assert modes.apart([one.sample for one in modes.places]).tolist() == [True, False]
 
 
+@pytest.mark.slow
 def test_a_place_that_the_recording_rules_out_is_left_out():
     """A slope of 1.25 puts the other place 10 deviations off: 100 of misfit."""
     modes, sampled = found_from((0.29, 0.39), (0.71, 0.41), steep=1.25)
@@ -85,6 +88,7 @@ def test_a_place_that_the_recording_rules_out_is_left_out():
     assert not modes.apart([modes.best.sample]).any()
 
 
+@pytest.mark.slow
 def test_searches_with_one_end_are_one_place():
     modes, sampled = found_from((0.71, 0.41), (0.7, 0.4))
     assert sampled == [0]

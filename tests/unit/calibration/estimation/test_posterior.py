@@ -125,6 +125,7 @@ def cut_off(end: float, outside: float, seed: int) -> np.ndarray:
     return sample_posterior(simulate, recorded, emulator, solution, seed=seed).sample[:, 0]
 
 
+@pytest.mark.slow
 def test_draws_at_the_end_of_a_range_pile_up_there():
     """A normal law whose middle lies a deviation beyond the end: half of what is left is near it.
 
@@ -135,6 +136,7 @@ def test_draws_at_the_end_of_a_range_pile_up_there():
     assert away.mean() == pytest.approx(truncnorm(1.0, np.inf, loc=-1.0).mean(), abs=0.25)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [0.012, 0.1])
 def test_a_box_that_is_too_small_is_widened(width: float):
     """The first one ends within half a standard deviation; draws fill the last one all the same.
@@ -153,6 +155,7 @@ def test_a_box_that_is_too_small_is_widened(width: float):
     np.testing.assert_allclose(other.setting, [0.52, 0.46], atol=0.4 * STD.max())
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_draws():
     recorded = np.array([[0.5, 0.5] @ SLOPES.T] * 2)
     first, again = (sampled(recorded, 5).posterior.sample for _ in range(2))

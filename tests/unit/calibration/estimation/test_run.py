@@ -120,6 +120,7 @@ def test_without_a_bootstrap_there_is_one_stage(recording: xr.Dataset) -> None:
     np.testing.assert_array_equal(found["estimate"], found["searched_estimate"])
 
 
+@pytest.mark.slow
 def test_a_model_that_ignores_its_parameters_is_refused() -> None:
     """Without noise of the camera nothing varies at all."""
 

@@ -42,6 +42,7 @@ def test_the_lowest_point_of_a_bowl_is_found(parameters):
     np.testing.assert_allclose(found.best, np.linspace(0.2, 0.8, parameters), atol=0.02)
 
 
+@pytest.mark.slow
 def test_a_narrow_valley_is_followed():
     found = search_minimum(noisy(banana, 0.0), 2)
     assert found.score < 1e-3

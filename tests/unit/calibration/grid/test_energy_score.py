@@ -33,6 +33,7 @@ def expected_map():
     return full_map((SHIFT, SPREAD), distance[..., None], {"apart": apart})
 
 
+@pytest.mark.slow
 def test_half_the_floor_off_the_optimum_is_the_truth():
     found = smooth_energy_score(expected_map(), (0.1, 0.1))
     assert found.optimum.point == pytest.approx((0.0, TRUE_SPREAD), abs=0.03)

@@ -120,6 +120,7 @@ PLACES: dict[str, Callable[[Path, Path], None]] = {
 }
 
 
+@pytest.mark.fast_cases(43)
 @pytest.mark.skipif(os.name == "nt", reason="links need a privilege there, and pipes have no names")
 @pytest.mark.parametrize("place", PLACES)
 @pytest.mark.parametrize("entry", ENTRIES)

@@ -107,6 +107,7 @@ def test_sums_by_place_and_by_time_agree(check: xr.Dataset) -> None:
     assert (count[~known] < 10).all()
 
 
+@pytest.mark.slow
 def test_it_survives_a_file(check: xr.Dataset, tmp_path: Path) -> None:
     check.to_netcdf(tmp_path / "check.nc", engine="h5netcdf")
     with xr.open_dataset(tmp_path / "check.nc", engine="h5netcdf") as stored:

@@ -32,6 +32,7 @@ def test_the_wall_of_a_simulation_is_found() -> None:
     assert tank.wall_restitution == float(found["wall_restitution"])
 
 
+@pytest.mark.slow
 def test_a_recording_with_few_contacts_says_nothing_of_the_wall() -> None:
     earlier = fitted(60.0).assign(wall_friction=0.3, wall_restitution=0.2)
     found = estimate_wall(earlier, [recording(60.0)])
@@ -41,6 +42,7 @@ def test_a_recording_with_few_contacts_says_nothing_of_the_wall() -> None:
     assert estimated_study(found).tank.wall_friction == 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("angle", "words"), [("none", "this fit used none"), ("given", "it was an input")]
 )

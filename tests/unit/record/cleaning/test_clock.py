@@ -81,6 +81,7 @@ def test_what_may_be_milliseconds_is_said_and_not_converted(step: float, tmp_pat
     assert "clock" not in str(json.loads(named.attrs["counts"])["warnings"])
 
 
+@pytest.mark.fast_cases(2)
 @pytest.mark.parametrize(
     ("header", "columns"),
     [

@@ -117,6 +117,7 @@ def bag(folder: Path, kind: str, *, mcap: bool = False, topic: str = "/block/pos
     return write(folder / "bag", (topic, kind, messages), mcap=mcap)
 
 
+@pytest.mark.fast_cases(6)
 @pytest.mark.parametrize("mcap", [False, True])
 @pytest.mark.parametrize("kind", list(MESSAGES))
 def test_every_kind_of_message(tmp_path: Path, kind: str, mcap: bool) -> None:

@@ -75,6 +75,7 @@ def test_without_a_header_the_first_row_is_data(tmp_path: Path) -> None:
         np.testing.assert_array_equal(track.x, [1.5, -1.0])
 
 
+@pytest.mark.slow
 def test_the_sign_may_first_appear_far_into_a_large_file(tmp_path: Path) -> None:
     note = "x" * 60
     rows = [f"{index};{index % 7};{index % 5};{note}" for index in range(65_000)]
