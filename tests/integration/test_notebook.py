@@ -115,7 +115,7 @@ def test_tank_and_block_come_from_the_recording(recording: xr.Dataset) -> None:
     ("settings", "words"),
     [
         ({"tank_diameter": "50cm"}, "0.3 m, and the study says a circle of diameter 0.5 m"),
-        ({"side": 0.05}, "a block of 0.03 m, and the study says 0.05 m"),
+        ({"side": 0.05}, "a block of side 0.03 m, and the study says 0.05 m"),
         ({"tank_diametre": 0.3}, "no argument 'tank_diametre'; did you mean 'tank_diameter'"),
     ],
 )

@@ -129,7 +129,7 @@ def test_the_default_side_that_a_fitted_tank_took_is_nobodys_word(
         assert f"block of side 3 cm ({said})" in capsys.readouterr().err
         warning = unstated_warning(read.study, about="block")
         assert (warning is None) == bool(stated)
-        assert stated or "side and tank were not stated" in str(warning)
+        assert stated or "the side was not stated" in str(warning)
         assert read.study.tank.diameter_m == pytest.approx(0.3, rel=0.05)
 
 
@@ -155,5 +155,5 @@ def test_a_recording_may_state_its_block(tmp_path: Path) -> None:
     study = dw.conditions.study_for([recording])
     assert unstated_warning(study, about="block") is None
     heavy = dw.apply_overrides(dw.Study(), {"block.mass_kg": 0.02})
-    with pytest.raises(dw.InputError, match=r"block of 0.0116 kg, and the study says 0.02 kg"):
+    with pytest.raises(dw.InputError, match=r"mass 0.0116 kg, and the study says 0.02 kg"):
         dw.conditions.study_for([recording], heavy)

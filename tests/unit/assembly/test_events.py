@@ -231,5 +231,5 @@ def test_times_outside_the_runs_are_refused(assembly: xr.Dataset, time: float) -
 
 
 def test_another_kind_is_refused(assembly: xr.Dataset) -> None:
-    with pytest.raises(InputError, match="'trajectory'"):
+    with pytest.raises(InputError, match="got trajectory"):
         class_at(assembly.assign_attrs(kind="trajectory"), 0.0)

@@ -24,11 +24,12 @@ from driftwalk.cli.options.shared import Json
 from driftwalk.cli.options.study import StudyOptions, option_name, with_study_options
 from driftwalk.cli.terminal.argument_names import option_of
 from driftwalk.cli.terminal.output import print_json, print_table, to_json
-from driftwalk.cli.terminal.progress import ProgressReporter, duration_text
+from driftwalk.cli.terminal.progress import ProgressReporter
 from driftwalk.core.errors import ConfigurationError, FormatError, InputError
 from driftwalk.core.study_keys import CALIBRATION_KEYS, STUDY_KEYS, study_overrides
 from driftwalk.core.text.json_text import json_value
 from driftwalk.model import Study, load_study
+from driftwalk.schema.answers.parts import duration_text
 
 AddCommand = Callable[[Callable[..., None]], None]
 

@@ -55,7 +55,7 @@ def test_a_run_directory_points_to_the_recording_in_it(
 ) -> None:
     (tmp_path / ".run.json").write_text("{}")
     (tmp_path / "recording.nc").write_bytes(b"")
-    assert main(["info", str(tmp_path)]) == 2
+    assert main(["read", str(tmp_path), "-o", str(tmp_path / "read.nc")]) == 2
     line = capsys.readouterr().err
     assert "run directory: driftwalk report" in line
     assert str(tmp_path / "recording.nc") in line

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from driftwalk.core.background_task import aside
+from driftwalk.core.background_task import run_in_background
 
 
 def test_both_are_under_way_at_once() -> None:
@@ -18,7 +18,7 @@ def test_both_are_under_way_at_once() -> None:
         met.wait()
         return threading.get_ident()
 
-    assert aside(work, met.wait) != here
+    assert run_in_background(work, met.wait) != here
 
 
 def test_an_error_of_the_work_comes_when_the_other_is_done() -> None:
@@ -28,7 +28,7 @@ def test_an_error_of_the_work_comes_when_the_other_is_done() -> None:
         raise ValueError("of the work")
 
     with pytest.raises(ValueError, match="of the work"):
-        aside(work, lambda: done.append(1))
+        run_in_background(work, lambda: done.append(1))
     assert done == [1]
 
 
@@ -50,5 +50,5 @@ def test_work_ends_at_its_next_step_when_the_other_fails(error: type[BaseExcepti
         raise error
 
     with pytest.raises(error):
-        aside(work, meanwhile)
+        run_in_background(work, meanwhile)
     assert 1 <= len(steps) < 1000

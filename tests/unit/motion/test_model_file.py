@@ -285,7 +285,7 @@ def test_a_file_that_is_no_model_is_one_line(text, name, message):
         (
             "mine.py:MODEL",
             {"speed": (0, 1)},
-            "mine.py:MODEL is a model with ranges and",
+            "mine.py:MODEL is a model that declares its ranges",
         ),
         ("mine.py:Tumbler", {"settings": "many"}, "change them in the file"),
         ("mine.py:tumbler", {"speed": (0, 1, "km/h")}, "speed is in m/s, and its range in km/h"),

@@ -33,9 +33,9 @@ def answered(form: str) -> tuple[xr.Dataset, Answer]:
     if form.startswith("assembly"):
         found, times = stored("outcome-distribution"), stored("class-times")
         drawn = found.assign_attrs(drawn="drag_coefficient force_std")
-        result = AssemblyResult(found, times, drawn)
+        result = AssemblyResult(found, found, times, drawn)
         if form == "assembly-of-many":
-            result = AssemblyResult(found, times, None, stored("assembly-sizes"))
+            result = AssemblyResult(found, found, times, None, stored("assembly-sizes"))
         return found, assembled(small(), result)
     found = stored(form)
     if form == "sensitivity":
