@@ -27,7 +27,7 @@ from study_sets import WORLDS, Case, cases_of, keep_motion, load_motion, record
 import driftwalk as dw
 from driftwalk.core.errors import DriftwalkError
 from driftwalk.core.provenance import plain
-from driftwalk.likelihood.ready import AngleUse
+from driftwalk.likelihood.preparation import AngleUse
 from driftwalk.schema.answers.facts import facts_of
 
 ROOT: Final = Path(__file__).resolve().parents[2]

@@ -36,7 +36,7 @@ from driftwalk.assembly.recordings import classify
 from driftwalk.assembly.runs.parameters import draw_parameters, has_uncertainty
 from driftwalk.assembly.runs.path_recording import path_recording
 from driftwalk.assembly.runs.run import assemble, assemble_drawn, assembly_path, check_assembly
-from driftwalk.assembly.sensitivity.indices import check_indices, sensitivity_indices
+from driftwalk.assembly.sensitivity.outcome_indices import check_indices, sensitivity_indices
 from driftwalk.assembly.sensitivity.run import (
     check_sensitivity,
     sensitivity_map,

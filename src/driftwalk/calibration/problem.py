@@ -20,8 +20,8 @@ from driftwalk.conditions import (
     require_travel,
 )
 from driftwalk.core.arrays import Floats
+from driftwalk.core.random_streams import trial_in
 from driftwalk.core.seeds import world_keys
-from driftwalk.core.streams import trial_in
 from driftwalk.motion import BlockModel, Details, MotionModel, Parameter, Scores, score_worlds
 from driftwalk.schema import Track, body_track
 from driftwalk.simulation.backend import Camera

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.extras import require_opencv
-from driftwalk.core.streams import VideoStream
+from driftwalk.core.random_streams import VideoStream
 from driftwalk.datasets.synthetic_video_bars import Bars, marker_points, place_bars
 from driftwalk.datasets.synthetic_video_camera import image_to_world, local_scale, world_to_image
 from driftwalk.datasets.synthetic_video_light import Glare, ripples, shading

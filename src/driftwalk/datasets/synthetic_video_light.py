@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.streams import VideoStream
+from driftwalk.core.random_streams import VideoStream
 from driftwalk.datasets.synthetic_video_settings import VideoSettings
 
 Array = npt.NDArray[np.float64]

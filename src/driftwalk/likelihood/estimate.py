@@ -15,8 +15,8 @@ from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.flow_of_fit import require_fit
 from driftwalk.likelihood.law.facts import effective_logs, stored_numbers
+from driftwalk.likelihood.preparation import body_of, prepare
 from driftwalk.likelihood.prior import Weights
-from driftwalk.likelihood.ready import body_of, prepare
 from driftwalk.likelihood.spline import Spline
 from driftwalk.schema import Track
 from driftwalk.schema.answers.facts import fitted_value

@@ -26,8 +26,7 @@ from driftwalk.likelihood.law.facts import law_facts, side_slopes, stated_drag
 from driftwalk.likelihood.law.forward_selection import LawResult
 from driftwalk.likelihood.law.search import LawSearch
 from driftwalk.likelihood.newton import WORK, ModeSearch, Passed, Tell, work_of_pass
-from driftwalk.likelihood.prior import Prior
-from driftwalk.likelihood.ready import (
+from driftwalk.likelihood.preparation import (
     AngleUse,
     PreparedRecordings,
     as_list,
@@ -38,6 +37,7 @@ from driftwalk.likelihood.ready import (
     spline_of,
     usable_intervals,
 )
+from driftwalk.likelihood.prior import Prior
 from driftwalk.likelihood.reml import Restricted, restricted_drag
 from driftwalk.likelihood.result import Whiteness, build_fit, visited_shares, whiteness_of
 from driftwalk.likelihood.solution import BREAKDOWN, require_noise_below_motion, solved

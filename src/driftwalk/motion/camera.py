@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.streams import MotionStream
+from driftwalk.core.random_streams import MotionStream
 from driftwalk.motion.protocol import Keys, Worlds
 from driftwalk.motion.random import WorldRandom
 from driftwalk.schema.trajectory import wrap_angle

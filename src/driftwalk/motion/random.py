@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.random_streams import MotionStream
 from driftwalk.core.seeds import world_keys
-from driftwalk.core.streams import MotionStream
 
 Floats = npt.NDArray[np.float64]
 Keys = npt.NDArray[np.uint64]

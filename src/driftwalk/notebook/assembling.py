@@ -75,7 +75,7 @@ def assemble(
     """
     from driftwalk.assembly import assemble as assemble_study
     from driftwalk.runs import AssemblyWork, run_work
-    from driftwalk.runs.folder import silent
+    from driftwalk.runs.resumable_run import silent
 
     given: dict[str, Any] = dict(settings)
     found = model_of(model, flow, study_overrides(keys=ASSEMBLY_KEYS, **given))

@@ -87,7 +87,7 @@ def calibrate(
     from driftwalk.motion import BlockModel
     from driftwalk.notebook.result import as_result
     from driftwalk.runs import CalibrationWork, run_work
-    from driftwalk.runs.folder import silent
+    from driftwalk.runs.resumable_run import silent
 
     given: dict[str, Any] = dict(settings)
     if isinstance(model, Study):

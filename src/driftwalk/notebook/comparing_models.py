@@ -98,7 +98,7 @@ def compare_models(
     from driftwalk.motion import models_knowing
     from driftwalk.notebook.result import as_result
     from driftwalk.runs import ModelComparisonWork, run_work
-    from driftwalk.runs.folder import silent
+    from driftwalk.runs.resumable_run import silent
 
     named = {"usual": DEFAULT_MODELS, "all": ALL_MODELS}
     asked = named.get(models, (models,)) if isinstance(models, str) else models

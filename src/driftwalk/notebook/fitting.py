@@ -77,7 +77,7 @@ def fit(
     from driftwalk.likelihood import fit_motion, judge_fit
     from driftwalk.notebook.result import as_result
     from driftwalk.runs import FitWork, run_work
-    from driftwalk.runs.folder import silent
+    from driftwalk.runs.resumable_run import silent
 
     many = [recordings] if isinstance(recordings, xr.Dataset) else list(recordings)
     given: dict[str, Any] = dict(settings)

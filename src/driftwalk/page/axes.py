@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
+from driftwalk.page.number_words import quantity
 from driftwalk.page.parts import axis, require, value_of
-from driftwalk.page.words import quantity
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -12,7 +12,7 @@ import numpy as np
 from driftwalk.core.errors import DriftwalkError, InputError
 from driftwalk.core.text.json_text import json_value
 from driftwalk.page.arrays import number
-from driftwalk.page.words import percent
+from driftwalk.page.number_words import percent
 from driftwalk.plot.parts.arena import arena_of
 from driftwalk.schema.answers.facts import facts_of, sentences
 from driftwalk.schema.answers.parts import NOT_DETERMINED, Estimate

@@ -11,7 +11,6 @@ from driftwalk.core.text.argument_text import argument_text
 from driftwalk.record.circle import implied_scale
 from driftwalk.record.cleaning.clock import CLOCK
 from driftwalk.record.cleaning.extent import refuse_far
-from driftwalk.record.quantum import common_quantum
 from driftwalk.record.raw import (
     ANGLE_UNITS,
     CLOCK_UNITS,
@@ -21,6 +20,7 @@ from driftwalk.record.raw import (
     RawRecording,
     ReadOptions,
 )
+from driftwalk.record.resolution import common_quantum
 from driftwalk.record.tables.stamps import DAY, LOCAL, UTC, moment_text
 
 

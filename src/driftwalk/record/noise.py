@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.remember import remembered
+from driftwalk.core.memoize import remembered
 from driftwalk.record.raw import Array
 from driftwalk.schema import Track
 

@@ -14,7 +14,7 @@ from driftwalk.core.files.file_names import text_of_name
 from driftwalk.record.cleaning.warn import encoding_notes
 from driftwalk.record.raw import RawRecording, ReadOptions
 from driftwalk.record.registry import PLAIN, failed_format, find_loader
-from driftwalk.record.tables.memory import MemorySource, table_in_memory
+from driftwalk.record.tables.in_memory import MemorySource, table_in_memory
 from driftwalk.record.tables.rows import recording_of
 from driftwalk.record.text import DAMAGED_GZIP
 from driftwalk.schema.stores.netcdf import kind_of

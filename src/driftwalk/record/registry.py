@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Final, Protocol, runtime_checkable
 
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.record.foreign import ForeignLoaders, foreign_loaders
+from driftwalk.record.plugin_loaders import ForeignLoaders, foreign_loaders
 from driftwalk.record.raw import RawRecording, ReadOptions
 from driftwalk.record.recognise.suggest_format import nearest_table, unknown_file
 from driftwalk.record.text import read_head

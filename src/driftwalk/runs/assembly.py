@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Self
 
-from driftwalk.runs.stored import dataset_hash
+from driftwalk.runs.dataset_hash import dataset_hash
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
-    from driftwalk.runs.folder import Run
+    from driftwalk.runs.resumable_run import Run
 
 FIXED_TRIAL: Final = 0
 DRAWN_TRIAL: Final = 1

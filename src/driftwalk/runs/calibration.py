@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Self
 
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.run_stages import CALIBRATION_STAGES
-from driftwalk.runs.folder import naming_recording
-from driftwalk.runs.stored import dataset_hash
+from driftwalk.runs.dataset_hash import dataset_hash
+from driftwalk.runs.resumable_run import naming_recording
 from driftwalk.schema.parameters import unit_suffix
 from driftwalk.schema.runs import run_kind
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from driftwalk.model import Study
     from driftwalk.motion import MotionModel
-    from driftwalk.runs.folder import Run
+    from driftwalk.runs.resumable_run import Run
 
 
 @dataclass(frozen=True)

@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 from driftwalk.core.run_stages import tell_nobody
-from driftwalk.runs.stored import dataset_hash
+from driftwalk.runs.dataset_hash import dataset_hash
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.figures.write import Figures
     from driftwalk.model import Study
-    from driftwalk.runs.folder import Run
+    from driftwalk.runs.resumable_run import Run
 
 
 class Fitted(NamedTuple):

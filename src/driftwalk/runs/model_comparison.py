@@ -8,15 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from driftwalk.core.run_stages import tell_nobody
-from driftwalk.runs.folder import naming_recording
-from driftwalk.runs.stored import dataset_hash
+from driftwalk.runs.dataset_hash import dataset_hash
+from driftwalk.runs.resumable_run import naming_recording
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
     from driftwalk.motion import MotionModel
-    from driftwalk.runs.folder import Run
+    from driftwalk.runs.resumable_run import Run
 
 
 @dataclass(frozen=True)

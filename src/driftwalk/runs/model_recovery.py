@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
-from driftwalk.runs.stored import dataset_hash
+from driftwalk.runs.dataset_hash import dataset_hash
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
     from driftwalk.motion import MotionModel
-    from driftwalk.runs.folder import Run
+    from driftwalk.runs.resumable_run import Run
 
 
 @dataclass(frozen=True)

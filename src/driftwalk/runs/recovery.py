@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from driftwalk.core.processors import default_threads
-from driftwalk.runs.stored import dataset_hash
+from driftwalk.runs.dataset_hash import dataset_hash
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
-    from driftwalk.runs.folder import Run
+    from driftwalk.runs.resumable_run import Run
 
 
 @dataclass(frozen=True)

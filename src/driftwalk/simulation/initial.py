@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from driftwalk import _core
 from driftwalk.core.errors import InputError
-from driftwalk.core.streams import Purpose
+from driftwalk.core.random_streams import Purpose
 
 if TYPE_CHECKING:
     from driftwalk.model import Study, Tank

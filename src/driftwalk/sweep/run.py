@@ -16,7 +16,7 @@ import numpy.typing as npt
 from driftwalk.core.errors import ClusterError, DriftwalkError, InputError
 from driftwalk.core.files.shards import Arrays
 from driftwalk.sweep.design import WorkUnit
-from driftwalk.sweep.handout import HANDOUT, Handout, UnitFuture, handout, is_lost
+from driftwalk.sweep.scheduling import HANDOUT, Handout, UnitFuture, handout, is_lost
 from driftwalk.sweep.store import MemoryStore, Store, collect
 from driftwalk.sweep.workers import UnitFunction
 

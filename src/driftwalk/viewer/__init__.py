@@ -9,7 +9,7 @@ from driftwalk.viewer.play.model_playground import ModelPlaySource
 from driftwalk.viewer.play.playground import PlaySource
 from driftwalk.viewer.play.stream import hello_line
 from driftwalk.viewer.server import require_server, serve
-from driftwalk.viewer.watch.run import RunSource
+from driftwalk.viewer.watch.run_page import RunSource
 
 __all__ = [
     "LiveSource",

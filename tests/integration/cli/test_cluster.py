@@ -20,7 +20,7 @@ import slurm
 from command_line import FLOW, GRID, NO_FIGURES, Done, apart, end, refusal, start
 
 import driftwalk as dw
-from driftwalk.viewer.watch.run import RunSource
+from driftwalk.viewer.watch.run_page import RunSource
 
 pytestmark = pytest.mark.slow
 pytest.importorskip("distributed", reason="workers need driftwalk[cluster]")

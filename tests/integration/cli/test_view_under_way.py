@@ -18,7 +18,7 @@ from driftwalk.core.files.rundir import RunDirectory
 from driftwalk.core.files.shards import ShardStore
 from driftwalk.page import report_page
 from driftwalk.schema.runs import RUN_KINDS
-from driftwalk.viewer.watch.run import RunSource
+from driftwalk.viewer.watch.run_page import RunSource
 
 TANK = ("--tank", "30cm")
 SHORT = (RECORDING, "--to", "30s", *TANK)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.streams import Purpose
+from driftwalk.core.random_streams import Purpose
 
 Floats = npt.NDArray[np.float64]
 

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.streams import Purpose
+from driftwalk.core.random_streams import Purpose
 from driftwalk.motion.family.columns import INERTIAL, SHARED, STATE, ParticleTable
 from twin.block import flow_at, normal_pair, philox
 

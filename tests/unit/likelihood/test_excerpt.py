@@ -13,7 +13,7 @@ from driftwalk.likelihood import newton
 from driftwalk.likelihood.filter.excerpt import EXCERPT, pieces
 from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.fit import fit_motion
-from driftwalk.likelihood.ready import body_of, series_of
+from driftwalk.likelihood.preparation import body_of, series_of
 from driftwalk.likelihood.spline import lay_spline
 from driftwalk.schema import body_track
 

@@ -16,8 +16,8 @@ from driftwalk.likelihood.filter.filter_pass import Passes, Sums
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.fit import fit_motion
 from driftwalk.likelihood.newton import inverse, limited, newton_step
+from driftwalk.likelihood.preparation import body_of, series_of
 from driftwalk.likelihood.prior import Prior, Weights
-from driftwalk.likelihood.ready import body_of, series_of
 from driftwalk.likelihood.spline import lay_spline
 from driftwalk.schema import body_track
 

@@ -12,7 +12,7 @@ from fit_worlds import coarse_study, fitted, recording
 from hypothesis import given, strategies as st
 
 import driftwalk as dw
-from driftwalk.likelihood.ready import prepare
+from driftwalk.likelihood.preparation import prepare
 from driftwalk.likelihood.tracker_errors.outliers import OUTLIER, outliers_in, without_outliers
 from driftwalk.schema import Track, body_track
 from driftwalk.schema.answers.facts import facts_of

@@ -8,7 +8,7 @@ import xarray as xr
 from fit_worlds import DRAG, FORCE_N, NOISE_M, coarse_study
 
 import driftwalk as dw
-from driftwalk.likelihood.ready import use_angle
+from driftwalk.likelihood.preparation import use_angle
 from driftwalk.model import apply_overrides
 from driftwalk.schema import body_track, build_trajectory
 from driftwalk.schema.answers.facts import facts_of

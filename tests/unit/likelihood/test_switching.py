@@ -28,8 +28,8 @@ from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.intervals import Intervals, cut_track, intervals_of, switched_frames
 from driftwalk.likelihood.length import in_words, length_advice, needed_duration
+from driftwalk.likelihood.preparation import body_of, prepare, spline_of
 from driftwalk.likelihood.prior import Prior, Weights
-from driftwalk.likelihood.ready import body_of, prepare, spline_of
 from driftwalk.likelihood.result import Whiteness
 from driftwalk.likelihood.warnings import precision_facts, warnings_of
 from driftwalk.schema import Track, body_track, build_trajectory

@@ -13,7 +13,7 @@ import xarray as xr
 from finished_run import write_finished_run
 
 from driftwalk.page import report_page
-from driftwalk.viewer.watch.run import RunSource
+from driftwalk.viewer.watch.run_page import RunSource
 
 Alter = Callable[[xr.Dataset], xr.Dataset]
 OTHER_FORM = "not in the form that this version of driftwalk reads"

@@ -22,7 +22,7 @@ from driftwalk.model import Study
 from driftwalk.schema import Parameter
 from driftwalk.sweep import grid
 from driftwalk.viewer.shell import page_frame
-from driftwalk.viewer.watch.run import RunSource
+from driftwalk.viewer.watch.run_page import RunSource
 from driftwalk.viewer.watch.sensitivity import RunningSensitivity
 from driftwalk.viewer.watch.shards import StoreReader
 

@@ -9,7 +9,7 @@ from hypothesis import given, strategies as st
 
 from driftwalk.viewer.security import Gate, host_name, is_loopback, make_gate
 from driftwalk.viewer.shell import html_shell, page_frame
-from driftwalk.viewer.watch.run import file_in
+from driftwalk.viewer.watch.run_page import file_in
 
 HERE = Gate("127.0.0.1", 8765)
 THERE = Gate("0.0.0.0", 8765, token="secret")

@@ -15,8 +15,8 @@ from driftwalk.assembly.runs.cover import require_cover
 from driftwalk.assembly.runs.start import given_start, place_blocks, require_room
 from driftwalk.core.errors import InputError
 from driftwalk.core.processors import default_threads
+from driftwalk.core.random_streams import trial_in
 from driftwalk.core.seeds import world_keys
-from driftwalk.core.streams import trial_in
 from driftwalk.simulation.backend import Camera, native_model, require_steps
 from driftwalk.simulation.series import continued_flow, flow_starts
 

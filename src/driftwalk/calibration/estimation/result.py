@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from driftwalk.calibration.estimation.determined import DETERMINED
 from driftwalk.calibration.estimation.estimate import Matched
+from driftwalk.calibration.estimation.identifiability import DETERMINED
 from driftwalk.calibration.estimation.run import Estimation
 from driftwalk.calibration.held_out.candidates import Candidate
 from driftwalk.calibration.held_out.checks import CHECKS, UNITS

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import numpy as np
 
-from driftwalk.calibration.estimation.determined import Determination, determination
 from driftwalk.calibration.estimation.estimate import (
     MATCHING,
     Matched,
     match_summaries,
     most_simulations,
 )
+from driftwalk.calibration.estimation.identifiability import Determination, determination
 from driftwalk.calibration.estimation.label_switching import Order, label_order
 from driftwalk.calibration.evolution import (
     AspectObjective,

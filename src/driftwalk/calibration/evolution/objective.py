@@ -18,8 +18,8 @@ from driftwalk.comparison.aspects.form import WallDistance
 from driftwalk.conditions import Conditions
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.processors import map_in_threads
+from driftwalk.core.random_streams import trial_in
 from driftwalk.core.seeds import world_keys
-from driftwalk.core.streams import trial_in
 from driftwalk.motion import MotionModel, Worlds
 from driftwalk.motion.score import broken_worlds
 from driftwalk.schema import Parameter

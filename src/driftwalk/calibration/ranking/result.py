@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from driftwalk.calibration.estimation.determined import DETERMINED
+from driftwalk.calibration.estimation.identifiability import DETERMINED
 from driftwalk.calibration.held_out.candidates import Candidate
 from driftwalk.calibration.held_out.checks import CHECKS, UNITS
 from driftwalk.calibration.held_out.held_out_score import (

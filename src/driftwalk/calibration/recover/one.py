@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from driftwalk.calibration.estimation.determined import DETERMINED
+from driftwalk.calibration.estimation.identifiability import DETERMINED
 from driftwalk.calibration.recover.truth import KnownTruth
 from driftwalk.calibration.run import calibrate
 from driftwalk.core.arrays import Floats

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from driftwalk.calibration.estimation.determined import DETERMINED
+from driftwalk.calibration.estimation.identifiability import DETERMINED
 from driftwalk.calibration.recover.truth import KnownTruth
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.motion import MotionModel, ParticleModel

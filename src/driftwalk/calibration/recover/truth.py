@@ -12,8 +12,8 @@ import numpy as np
 from driftwalk.conditions.camera import study_as_seen
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.core.random_streams import RecoveryStream
 from driftwalk.core.seeds import world_keys
-from driftwalk.core.streams import RecoveryStream
 from driftwalk.model import Study, apply_overrides
 from driftwalk.motion import BlockModel, MotionModel, known_values, simulate_motion
 from driftwalk.schema import body_track, build_trajectory

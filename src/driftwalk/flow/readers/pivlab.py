@@ -14,7 +14,7 @@ import numpy.typing as npt
 from driftwalk.core.errors import FormatError, reason_of
 from driftwalk.flow.readers.text import masked_rows
 from driftwalk.flow.readers.units import RawField
-from driftwalk.schema.stores.heap import refuse_endless_texts
+from driftwalk.schema.stores.hdf5_texts import refuse_endless_texts
 from driftwalk.schema.stores.matlab import HDF5_BASED, OLD, matlab_variables, read_old
 from driftwalk.schema.stores.netcdf import HDF5, declared_bytes, refuse_elsewhere, refuse_huge
 

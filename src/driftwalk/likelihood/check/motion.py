@@ -15,7 +15,7 @@ import numpy as np
 
 from driftwalk import _core
 from driftwalk.core.errors import InputError
-from driftwalk.likelihood.check.worlds import Replicates
+from driftwalk.likelihood.check.posterior_predictive import Replicates
 from driftwalk.likelihood.spline import Floats
 
 BAND: Final = 0.9

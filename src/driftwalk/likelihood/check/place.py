@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.check.errors import Contrast, Innovations, Integers, Leverage, collect
-from driftwalk.likelihood.check.white import LAGS, WhitenessTests, whiteness_tests
+from driftwalk.likelihood.check.whiteness import LAGS, WhitenessTests, whiteness_tests
 from driftwalk.likelihood.estimate import Estimate
 from driftwalk.likelihood.spline import Floats
 

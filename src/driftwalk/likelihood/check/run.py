@@ -12,6 +12,11 @@ from driftwalk.core.processors import one_blas_thread
 from driftwalk.likelihood.check.errors import Innovations, innovations_of
 from driftwalk.likelihood.check.motion import FEWEST_REPLICATES, compare_motion
 from driftwalk.likelihood.check.place import residuals_of
+from driftwalk.likelihood.check.posterior_predictive import (
+    posterior_replicates,
+    problems_of,
+    replicates_at_estimate,
+)
 from driftwalk.likelihood.check.result import (
     criterion_variables,
     motion_variables,
@@ -20,14 +25,9 @@ from driftwalk.likelihood.check.result import (
 )
 from driftwalk.likelihood.check.scan import scan_of
 from driftwalk.likelihood.check.verdict import VERDICT, criteria_of, findings_of
-from driftwalk.likelihood.check.worlds import (
-    posterior_replicates,
-    problems_of,
-    replicates_at_estimate,
-)
 from driftwalk.likelihood.estimate import estimate_of
 from driftwalk.likelihood.flow_of_fit import require_fit
-from driftwalk.likelihood.ready import as_list
+from driftwalk.likelihood.preparation import as_list
 from driftwalk.likelihood.solution import BREAKDOWN
 from driftwalk.schema.answers.facts import texts
 from driftwalk.schema.answers.verdict import with_verdict

@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from driftwalk.likelihood.check.place import Layout, cell_of
-from driftwalk.likelihood.check.worlds import Path
+from driftwalk.likelihood.check.posterior_predictive import Path
 from driftwalk.likelihood.spline import Floats
 
 

@@ -12,7 +12,7 @@ from driftwalk.likelihood.check.errors import Innovations
 from driftwalk.likelihood.check.motion import MotionComparison
 from driftwalk.likelihood.check.place import Layout, LocalMeans, Residuals, Spread, Trend
 from driftwalk.likelihood.check.scan import Scan
-from driftwalk.likelihood.check.white import WhitenessTests
+from driftwalk.likelihood.check.whiteness import WhitenessTests
 from driftwalk.likelihood.spline import Floats
 
 

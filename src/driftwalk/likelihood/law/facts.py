@@ -222,8 +222,8 @@ def side_slopes(
     if study.fit.side_std_m == 0.0:
         return 0.0, 0.0
     from driftwalk.likelihood.newton import inverse
+    from driftwalk.likelihood.preparation import body_of
     from driftwalk.likelihood.prior import Prior
-    from driftwalk.likelihood.ready import body_of
     from driftwalk.model import apply_overrides
 
     # A side larger by 1 %: the derivative is a difference of two steps of the search.

@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
+from driftwalk.core.random_streams import RecoveryStream
 from driftwalk.core.seeds import world_keys
-from driftwalk.core.streams import RecoveryStream
 from driftwalk.flow import random_tank_flow
 from driftwalk.likelihood.fit import fit_motion
 from driftwalk.likelihood.recover.score import SCORED, score_fit

@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.remember import remembered
+from driftwalk.core.memoize import remembered
 from driftwalk.likelihood.angle import ORIENTED_SHARE
 from driftwalk.likelihood.spline import Floats
 from driftwalk.likelihood.tracker_errors.interval_windows import (

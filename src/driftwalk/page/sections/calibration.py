@@ -8,6 +8,7 @@ import numpy as np
 
 from driftwalk.page.arrays import number
 from driftwalk.page.chart import chart, label, mark, series
+from driftwalk.page.number_words import count, quantity, with_interval
 from driftwalk.page.parameters import FORCE, PageParameter, page_parameters
 from driftwalk.page.parts import (
     SIMULATED,
@@ -27,7 +28,6 @@ from driftwalk.page.parts import (
 from driftwalk.page.sections.flow import flow_sections
 from driftwalk.page.sections.map import map_section, region_part
 from driftwalk.page.sections.recording import Noise, recording_sections
-from driftwalk.page.words import count, quantity, with_interval
 from driftwalk.plot.parts.labels import interval_of
 from driftwalk.schema.answers.facts import sentences
 from driftwalk.schema.answers.parts import estimates

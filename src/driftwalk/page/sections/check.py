@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from driftwalk.page.arrays import encode_array, number
 from driftwalk.page.chart import chart, label, mark, series
+from driftwalk.page.number_words import percent
 from driftwalk.page.parts import (
     Section,
     arena_part,
@@ -20,7 +21,6 @@ from driftwalk.page.parts import (
     section,
     value_of,
 )
-from driftwalk.page.words import percent
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 from driftwalk.core.errors import InputError
+from driftwalk.page.number_words import count, percent, quantity, with_interval
 from driftwalk.page.parts import (
     SIMULATED,
     Section,
@@ -24,7 +25,6 @@ from driftwalk.page.sections.check import check_sections
 from driftwalk.page.sections.flow import flow_sections
 from driftwalk.page.sections.law import law_sections
 from driftwalk.page.sections.recording import Noise, recording_sections
-from driftwalk.page.words import count, percent, quantity, with_interval
 from driftwalk.schema.answers.facts import sentences
 from driftwalk.schema.answers.fit import model_estimates
 from driftwalk.schema.answers.force_law import LINEAR_DRAG_ALONE

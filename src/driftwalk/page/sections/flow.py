@@ -8,8 +8,8 @@ import numpy as np
 
 from driftwalk.core.errors import InputError
 from driftwalk.page.arrays import encode_array, plain_list
+from driftwalk.page.number_words import percent, quantity
 from driftwalk.page.parts import Section, arena_part, attempt, require, section
-from driftwalk.page.words import percent, quantity
 from driftwalk.schema import FLAGS
 
 if TYPE_CHECKING:

@@ -9,9 +9,9 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
 from driftwalk.page.arrays import encode_array, nice_step, numbers, plain_list
+from driftwalk.page.number_words import percent, quantity
 from driftwalk.page.parameters import PageParameter, page_parameters
 from driftwalk.page.parts import Section, arena_part, require, section, value_of
-from driftwalk.page.words import percent, quantity
 from driftwalk.plot.distances import CAUSES, UNKNOWN_CAUSE
 from driftwalk.schema import body_track
 

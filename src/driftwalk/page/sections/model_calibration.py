@@ -8,6 +8,7 @@ import numpy as np
 
 from driftwalk.page.arrays import number
 from driftwalk.page.chart import chart, label, series
+from driftwalk.page.number_words import cell, quantity
 from driftwalk.page.parts import (
     Section,
     attempt,
@@ -20,7 +21,6 @@ from driftwalk.page.parts import (
     stated_warnings,
 )
 from driftwalk.page.sections.recording import recording_sections
-from driftwalk.page.words import cell, quantity
 from driftwalk.schema.answers.model_comparison import ASPECT_WORDS, CHECK_WORDS
 
 if TYPE_CHECKING:

@@ -8,6 +8,7 @@ import numpy as np
 
 from driftwalk.page.arrays import number
 from driftwalk.page.chart import chart, label, mark, series
+from driftwalk.page.number_words import count, percent, quantity
 from driftwalk.page.parts import (
     Section,
     attempt,
@@ -18,7 +19,6 @@ from driftwalk.page.parts import (
     required,
     section,
 )
-from driftwalk.page.words import count, percent, quantity
 from driftwalk.schema.answers.recovery import model_warnings
 
 if TYPE_CHECKING:

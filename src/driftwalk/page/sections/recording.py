@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
 from driftwalk.page.arrays import encode_array, nice_step, number, plain_list
+from driftwalk.page.number_words import count, percent, quantity
 from driftwalk.page.parts import (
     SIMULATED,
     Section,
@@ -19,7 +20,6 @@ from driftwalk.page.parts import (
     is_simulated,
     section,
 )
-from driftwalk.page.words import count, percent, quantity
 from driftwalk.plot.path import GAP_INTERVALS
 from driftwalk.schema import Track, body_names, body_track, check_trajectory
 

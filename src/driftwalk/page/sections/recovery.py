@@ -10,6 +10,7 @@ import numpy as np
 
 from driftwalk.page.arrays import number
 from driftwalk.page.chart import chart, label, mark, series
+from driftwalk.page.number_words import count, percent, quantity
 from driftwalk.page.parts import (
     Section,
     attempt,
@@ -21,7 +22,6 @@ from driftwalk.page.parts import (
     section,
     value_of,
 )
-from driftwalk.page.words import count, percent, quantity
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from driftwalk.core.errors import FormatError
-from driftwalk.record.head import first_lines, read_header
 from driftwalk.record.raw import RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import read_table
+from driftwalk.record.text_head import first_lines, read_header
 
 _COLUMN = re.compile(r"(pt\d+_cam\d+)_X", re.IGNORECASE)
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from driftwalk.core.errors import FormatError
-from driftwalk.record.head import first_lines, read_header
 from driftwalk.record.raw import RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import read_table
+from driftwalk.record.text_head import first_lines, read_header
 
 _HEADER = re.compile(r"X1\s+Y1\s+ProbId1\b", re.ASCII)
 

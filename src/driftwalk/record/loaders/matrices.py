@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.record.head import read_header
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import read_table
+from driftwalk.record.text_head import read_header
 
 
 class MatricesLoader:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from driftwalk.record.head import first_lines
 from driftwalk.record.raw import RawRecording, ReadOptions
 from driftwalk.record.tables.rows import recording_of
 from driftwalk.record.tables.source import TextSource
+from driftwalk.record.text_head import first_lines
 
 
 class PlainLoader:

@@ -6,9 +6,9 @@ from itertools import pairwise
 from pathlib import Path
 
 from driftwalk.core.errors import FormatError
-from driftwalk.record.head import first_lines, is_numeric_row, read_header
 from driftwalk.record.raw import RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import read_table
+from driftwalk.record.text_head import first_lines, is_numeric_row, read_header
 
 NAMES = ["sync", "t", *(f"{name}{robot}" for robot in range(1, 4) for name in ("x", "y", "theta"))]
 

@@ -16,9 +16,9 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.cleaning.stacked import order_in_frame, split_bodies
-from driftwalk.record.head import first_lines
 from driftwalk.record.raw import Array, RawRecording, ReadOptions
 from driftwalk.record.text import lines_of, open_binary
+from driftwalk.record.text_head import first_lines
 
 
 class SwisTrackNmeaLoader:

@@ -13,9 +13,9 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.cleaning.stacked import order_in_frame, split_bodies
-from driftwalk.record.head import first_lines
 from driftwalk.record.raw import Array, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import Table, read_table
+from driftwalk.record.text_head import first_lines
 
 NAMES = ["frame", "time", "x (image)", "y (image)", "x (world)", "y (world)"]
 NAMES = [*NAMES, "area", "orientation", "compactness"]

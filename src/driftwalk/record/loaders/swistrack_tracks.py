@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from driftwalk.core.errors import FormatError
-from driftwalk.record.head import first_lines
 from driftwalk.record.raw import RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import Table, read_head, read_table
+from driftwalk.record.text_head import first_lines
 
 OLD = ["frame", "x (image)", "y (image)", "x (world)", "y (world)", "area", "orientation"]
 OLD = [*OLD, "compactness", "time stamp"]

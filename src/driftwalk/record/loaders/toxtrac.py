@@ -10,9 +10,9 @@ import numpy as np
 from driftwalk.core.errors import FormatError
 from driftwalk.record.cleaning.stacked import split_bodies
 from driftwalk.record.column_names import unit_of_name
-from driftwalk.record.head import first_lines, first_row, is_numeric_row
 from driftwalk.record.raw import Marks, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import read_table
+from driftwalk.record.text_head import first_lines, first_row, is_numeric_row
 
 NAMES: Final = ["frame", "arena", "track", "x", "y", "label"]
 REAL_SPACE: Final = ("Time", "Arena", "Track", "Pos. X", "Pos. Y", "Label")

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from driftwalk.record.cleaning.stacked import split_bodies
-from driftwalk.record.head import first_lines, read_header
 from driftwalk.record.raw import RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import read_table
+from driftwalk.record.text_head import first_lines, read_header
 
 
 class TracktorLoader:

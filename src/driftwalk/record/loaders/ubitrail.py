@@ -9,9 +9,9 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.cleaning.stacked import split_bodies
-from driftwalk.record.head import first_lines
 from driftwalk.record.raw import RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import read_head, read_table
+from driftwalk.record.text_head import first_lines
 
 NAMES = ["Area", "Territory", "X", "Y", "time", "L"]
 _AREAS = re.compile(

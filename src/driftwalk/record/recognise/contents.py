@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Final
 
 from driftwalk.record.bad_row import is_number, split_fields
-from driftwalk.record.head import detect_delimiter, first_lines
 from driftwalk.record.stores.hdf5 import names_in
 from driftwalk.record.stores.npz import ZIP, members
+from driftwalk.record.text_head import detect_delimiter, first_lines
 from driftwalk.schema.stores.netcdf import HDF5
 
 OTHERS: Final = {

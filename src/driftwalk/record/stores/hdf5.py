@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.raw import Array
-from driftwalk.schema.stores.heap import refuse_endless_texts
+from driftwalk.schema.stores.hdf5_texts import refuse_endless_texts
 from driftwalk.schema.stores.netcdf import HDF5, declared_bytes, refuse_elsewhere, refuse_huge
 
 if TYPE_CHECKING:

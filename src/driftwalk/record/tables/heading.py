@@ -8,8 +8,8 @@ from typing import Final, NamedTuple
 from driftwalk.core.errors import InputError
 from driftwalk.record.bad_row import is_number
 from driftwalk.record.column_names import map_columns, unit_of_name
-from driftwalk.record.head import is_numeric_row
 from driftwalk.record.raw import MISSING, ReadOptions
+from driftwalk.record.text_head import is_numeric_row
 
 
 class TablePolicy(NamedTuple):

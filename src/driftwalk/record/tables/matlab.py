@@ -13,7 +13,7 @@ from driftwalk.core.errors import FormatError
 from driftwalk.record.column_names import column_meaning
 from driftwalk.record.stores.matlab import Opaque, Struct, Value
 from driftwalk.record.tables.cells import Values
-from driftwalk.record.tables.memory import MemorySource
+from driftwalk.record.tables.in_memory import MemorySource
 
 VECTORS: Final = "variables"
 """Name of the table that the vectors of a file make."""

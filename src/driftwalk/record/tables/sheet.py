@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from driftwalk.core.errors import FormatError
-from driftwalk.record.head import is_numeric_row
 from driftwalk.record.raw import ReadOptions, TableLayout
 from driftwalk.record.tables.cells import (
     CellError,
@@ -31,6 +30,7 @@ from driftwalk.record.tables.stamps import (
     clock_of_stamps,
 )
 from driftwalk.record.text import Table
+from driftwalk.record.text_head import is_numeric_row
 
 Row = Sequence[Any]
 

@@ -9,11 +9,11 @@ from typing import Protocol
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import split_fields
-from driftwalk.record.head import detect_delimiter, read_header
 from driftwalk.record.raw import MISSING, ReadOptions, TableLayout
 from driftwalk.record.tables.heading import TABLE, header_advice, heading_of
 from driftwalk.record.tables.stamps import StampForm, stamp_form
 from driftwalk.record.text import Table, header_rows, read_table
+from driftwalk.record.text_head import detect_delimiter, read_header
 
 
 class TableSource(Protocol):

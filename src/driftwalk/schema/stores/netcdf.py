@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Final
 from driftwalk.core.errors import FormatError
 from driftwalk.core.files.bounded import MIB
 from driftwalk.schema.check import refuse_other_version
-from driftwalk.schema.stores.heap import refuse_endless_texts
+from driftwalk.schema.stores.hdf5_texts import refuse_endless_texts
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -11,7 +11,7 @@ import numpy as np
 
 from driftwalk.assembly import class_cells, outcome_distribution, world_class
 from driftwalk.simulation.backend import BROKEN
-from driftwalk.viewer.watch.running import NO_CELL, Section
+from driftwalk.viewer.watch.live_run_page import NO_CELL, Section
 from driftwalk.viewer.watch.shards import FinishedUnit, RunReader
 
 if TYPE_CHECKING:

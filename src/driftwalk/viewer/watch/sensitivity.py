@@ -24,7 +24,7 @@ from driftwalk.page.axes import ranked_axes
 from driftwalk.page.sections.assemblies.classes import cells_of
 from driftwalk.page.sections.assemblies.sensitivity_times import over_time_part
 from driftwalk.plot.parts.assembly_labels import classes_to_show
-from driftwalk.viewer.watch.running import NO_CELL, Section
+from driftwalk.viewer.watch.live_run_page import NO_CELL, Section
 from driftwalk.viewer.watch.shards import RunReader
 
 if TYPE_CHECKING:

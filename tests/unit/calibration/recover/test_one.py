@@ -7,7 +7,7 @@ import pytest
 from every_kind import DIFFUSE, TUMBLE, every_kind
 from scipy.special import ndtri
 
-from driftwalk.calibration.estimation.determined import determination
+from driftwalk.calibration.estimation.identifiability import determination
 from driftwalk.calibration.recover.one import answer_of, interval_half_width
 from driftwalk.motion import motion_model
 from driftwalk.schema import Parameter

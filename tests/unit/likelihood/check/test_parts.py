@@ -21,10 +21,10 @@ from driftwalk.likelihood.check.place import (
     spread_of,
     trend_of,
 )
+from driftwalk.likelihood.check.posterior_predictive import Replicates
 from driftwalk.likelihood.check.scan import scan_of
 from driftwalk.likelihood.check.verdict import motion_criterion
-from driftwalk.likelihood.check.white import whiteness_tests
-from driftwalk.likelihood.check.worlds import Replicates
+from driftwalk.likelihood.check.whiteness import whiteness_tests
 from driftwalk.likelihood.filter.series import Series
 from driftwalk.likelihood.spline import Spline
 

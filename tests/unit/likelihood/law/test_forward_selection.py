@@ -19,8 +19,8 @@ from driftwalk.likelihood.law.forward_selection import ForwardSelection, LawResu
 from driftwalk.likelihood.law.score_tests import ScoreTests
 from driftwalk.likelihood.law.search import LawSearch
 from driftwalk.likelihood.newton import Mode, ModeSearch, require_mode
+from driftwalk.likelihood.preparation import body_of, prepare, spline_of
 from driftwalk.likelihood.prior import Prior
-from driftwalk.likelihood.ready import body_of, prepare, spline_of
 from driftwalk.likelihood.start import first_weights
 
 PULSE = {"pulse_cosine": 0.1, "pulse_sine": 0.0, "pulse_frequency": 0.2}

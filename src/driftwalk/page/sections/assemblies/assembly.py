@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.page.chart import chart, label, mark, series
+from driftwalk.page.number_words import count, percent, quantity
 from driftwalk.page.parts import (
     Section,
     attempt,
@@ -21,7 +22,6 @@ from driftwalk.page.parts import (
 from driftwalk.page.sections.assemblies.assembly_sizes import size_numbers, size_sections
 from driftwalk.page.sections.assemblies.classes import class_times_section, classes_section
 from driftwalk.page.sections.assemblies.replay import replay_section
-from driftwalk.page.words import count, percent, quantity
 from driftwalk.plot.parts.assembly_labels import class_names
 from driftwalk.schema.shapes import short_class
 

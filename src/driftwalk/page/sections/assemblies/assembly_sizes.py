@@ -8,8 +8,8 @@ import numpy as np
 
 from driftwalk.page.arrays import number
 from driftwalk.page.chart import chart, label, series
+from driftwalk.page.number_words import percent
 from driftwalk.page.parts import Section, attempt, figure, require, value_of
-from driftwalk.page.words import percent
 
 if TYPE_CHECKING:
     import xarray as xr

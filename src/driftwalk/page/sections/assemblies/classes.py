@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.page.arrays import number, numbers
+from driftwalk.page.number_words import count, percent
 from driftwalk.page.parts import Section, require, section, value_of
-from driftwalk.page.words import count, percent
 from driftwalk.plot.parts.assembly_labels import OTHER, class_names, classes_to_show
 from driftwalk.plot.parts.polyomino_sketch import is_class, shape_cells
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from driftwalk.core.errors import InputError
 from driftwalk.page.arrays import encode_array, nice_step
+from driftwalk.page.number_words import count, quantity
 from driftwalk.page.parts import Section, arena_part, require, required, section
-from driftwalk.page.words import count, quantity
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from driftwalk.page.axes import axis_words
+from driftwalk.page.number_words import count, quantity
 from driftwalk.page.parts import (
     Section,
     attempt,
@@ -26,7 +27,6 @@ from driftwalk.page.sections.assemblies.settings import (
     times_sections,
 )
 from driftwalk.page.sections.assemblies.sobol import sobol_section
-from driftwalk.page.words import count, quantity
 
 if TYPE_CHECKING:
     import xarray as xr

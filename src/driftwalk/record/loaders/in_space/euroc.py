@@ -11,12 +11,12 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.column_names import unit_of_name
-from driftwalk.record.head import first_lines, first_row
 from driftwalk.record.raw import CLOCK_UNITS, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.space.flat import SpaceTrack, lay_flat
 from driftwalk.record.space.plane import plane_of
 from driftwalk.record.space.turns import QUATERNION, Turns
 from driftwalk.record.text import read_table
+from driftwalk.record.text_head import first_lines, first_row
 
 _START: Final = re.compile(r"#\s*timestamp\b[^,]*(,\s*p_\w*[xyz]\b[^,]*){3}")
 _PART: Final = re.compile(r"([pq])_(?:[A-Za-z]+_)*([wxyz])\s*(?:\[.*\])?")

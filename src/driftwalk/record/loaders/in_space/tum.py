@@ -10,12 +10,12 @@ from typing import Final
 
 import numpy as np
 
-from driftwalk.record.head import first_lines, is_numeric_row
 from driftwalk.record.raw import RawRecording, ReadOptions, TableLayout
 from driftwalk.record.space.flat import SpaceTrack, lay_flat
 from driftwalk.record.space.plane import plane_of
 from driftwalk.record.space.turns import QUATERNION, Turns
 from driftwalk.record.text import header_rows, read_table
+from driftwalk.record.text_head import first_lines, is_numeric_row
 
 _NAMES: Final = ["timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw"]
 _UP: Final = "z"

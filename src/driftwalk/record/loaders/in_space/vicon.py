@@ -11,7 +11,6 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
-from driftwalk.record.head import first_lines
 from driftwalk.record.raw import (
     ANGLE_UNITS,
     LENGTH_UNITS,
@@ -24,6 +23,7 @@ from driftwalk.record.space.flat import SpaceTrack, lay_flat
 from driftwalk.record.space.plane import plane_of
 from driftwalk.record.space.turns import QUATERNION, VECTOR, Turns
 from driftwalk.record.text import Table, header_rows, read_table
+from driftwalk.record.text_head import first_lines
 
 _READ: Final = ("Objects", "Segments", "Trajectories")
 _OTHERS: Final = ("Devices", "Joints", "Model Outputs")

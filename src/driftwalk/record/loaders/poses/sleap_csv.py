@@ -13,11 +13,11 @@ import numpy.typing as npt
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import split_fields
 from driftwalk.record.cleaning.stacked import split_bodies
-from driftwalk.record.head import first_lines, first_row
 from driftwalk.record.loaders.poses.sleap import USUAL
 from driftwalk.record.pose.keypoints import Point, Poses, bodies_of, choose_keypoints
 from driftwalk.record.raw import Array, Marks, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import read_table
+from driftwalk.record.text_head import first_lines, first_row
 
 
 class SleapCsvLoader:

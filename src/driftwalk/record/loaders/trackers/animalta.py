@@ -14,9 +14,9 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.cleaning.stacked import split_bodies
-from driftwalk.record.head import first_lines, read_header
 from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import read_table
+from driftwalk.record.text_head import first_lines, read_header
 
 STACKED: Final = ("Frame", "Time", "Arena", "Ind", "X", "Y")
 HALF_DIGIT_S: Final = 0.0051

@@ -19,11 +19,11 @@ from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.files.bounded import MIB, read_bounded
 from driftwalk.core.text.json_text import parse_json
 from driftwalk.record.cleaning.stacked import number_codes, split_bodies
-from driftwalk.record.head import first_row
 from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.stores.hdf5 import names_in, opened_hdf5
 from driftwalk.record.stores.plain_pickle import PickledArray, unpickle
 from driftwalk.record.text import read_table
+from driftwalk.record.text_head import first_row
 from driftwalk.schema.stores.netcdf import HDF5, file_start
 
 NPY: Final = b"\x93NUMPY"

@@ -14,9 +14,9 @@ from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
 from driftwalk.record.cleaning.stacked import number_codes, split_bodies
 from driftwalk.record.column_names import unit_of_name
-from driftwalk.record.head import first_lines
 from driftwalk.record.raw import LENGTH_UNITS, Marks, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import header_rows, read_table
+from driftwalk.record.text_head import first_lines
 
 NEEDED: Final = ("TRACK_ID", "POSITION_X", "POSITION_Y", "POSITION_T", "FRAME")
 OUTSIDE: Final = "spots outside the tracks, left out: {}"

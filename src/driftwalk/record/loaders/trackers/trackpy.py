@@ -13,11 +13,11 @@ import numpy as np
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import split_fields
 from driftwalk.record.cleaning.stacked import number_codes, split_bodies
-from driftwalk.record.head import first_lines, first_row
 from driftwalk.record.raw import Array, Marks, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.stores.hdf5 import Hdf5Contents, names_in, opened_hdf5
 from driftwalk.record.stores.pandas_frame import Frame, frame_in
 from driftwalk.record.text import read_table
+from driftwalk.record.text_head import first_lines, first_row
 from driftwalk.schema.stores.netcdf import HDF5, file_start
 
 NEEDED: Final = ("x", "y", "frame", "particle")

@@ -8,9 +8,9 @@ from typing import Final
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import split_fields
 from driftwalk.record.cleaning.stacked import split_bodies
-from driftwalk.record.head import first_lines, first_row
 from driftwalk.record.raw import Marks, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import read_table
+from driftwalk.record.text_head import first_lines, first_row
 
 NEEDED: Final = ("Frame", "Time", "TrackId", "x", "y")
 

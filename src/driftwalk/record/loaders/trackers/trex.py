@@ -18,11 +18,11 @@ import numpy.typing as npt
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.bad_row import split_fields
 from driftwalk.record.column_names import unit_of_name
-from driftwalk.record.head import first_lines, first_row
 from driftwalk.record.pose.keypoints import angle_between
 from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.stores.npz import ZIP, members, opened_npz
 from driftwalk.record.text import read_table
+from driftwalk.record.text_head import first_lines, first_row
 from driftwalk.schema.stores.netcdf import file_start
 
 CENTRES: Final = ("wcentroid", "centroid", "pcentroid", "head")

@@ -10,9 +10,9 @@ from typing import Final
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
-from driftwalk.record.head import first_lines
 from driftwalk.record.raw import RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import header_rows, read_table
+from driftwalk.record.text_head import first_lines
 
 AXES: Final = ("x", "y", "z")
 

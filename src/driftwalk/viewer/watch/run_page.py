@@ -16,11 +16,11 @@ from driftwalk.core.run_stages import tell_nobody
 from driftwalk.schema.runs import RUN_KINDS, load_maker
 from driftwalk.viewer.hub import Content, Publish, Source
 from driftwalk.viewer.shell import page_frame
-from driftwalk.viewer.watch.running import NO_CELL, RunningOther
+from driftwalk.viewer.watch.live_run_page import NO_CELL, RunningOther
 from driftwalk.viewer.watch.shards import quiet_time
 
 if TYPE_CHECKING:
-    from driftwalk.viewer.watch.running import Running
+    from driftwalk.viewer.watch.live_run_page import Running
 
 LOOK_EVERY_S: Final = 0.25
 """Time between two looks at the run directory [s]."""

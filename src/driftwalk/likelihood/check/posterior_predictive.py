@@ -15,8 +15,8 @@ from driftwalk.comparison import apply_steps, plan_steps
 from driftwalk.conditions import recorded_camera
 from driftwalk.core.errors import InputError
 from driftwalk.core.processors import map_in_threads
+from driftwalk.core.random_streams import CheckStream
 from driftwalk.core.seeds import world_keys
-from driftwalk.core.streams import CheckStream
 from driftwalk.likelihood.estimate import Estimate
 from driftwalk.likelihood.filter.series import Series
 from driftwalk.likelihood.flow_of_fit import fitted_flow

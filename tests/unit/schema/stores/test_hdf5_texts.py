@@ -14,7 +14,7 @@ from command_line import here, refusal
 from tracker_files import session
 
 from driftwalk.core.errors import FormatError
-from driftwalk.schema.stores.heap import refuse_endless_texts
+from driftwalk.schema.stores.hdf5_texts import refuse_endless_texts
 from driftwalk.schema.stores.netcdf import kind_of
 
 COLLECTION = b"GCOL\x01\x00\x00\x00"

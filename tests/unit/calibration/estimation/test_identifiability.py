@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from driftwalk.calibration.estimation.determined import DETERMINED, determination
+from driftwalk.calibration.estimation.identifiability import DETERMINED, determination
 from driftwalk.schema import Parameter
 
 LOG = Parameter("speed", "m/s", 0.01, 1.0, scale="log")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from driftwalk.core.streams import (
+from driftwalk.core.random_streams import (
     WORK,
     CheckStream,
     MotionStream,
