@@ -519,6 +519,7 @@ PAGES: dict[str, Page] = {
         ),
         instead={
             "assemble ": f"assemble {FEW_RUNS} ",
+            "sensitivity fit/": f"sensitivity fit/ {FEW_SETTINGS}",
             "fit first.csv": "fit --no-check first.csv",
             "fit recording.csv --mass": "fit --no-check first.csv --mass",
             "fit recording.csv --law": "fit --no-check first.csv --law",
