@@ -58,7 +58,7 @@ def simulate(
             "--flow",
             metavar="FILE",
             help="Flow field: NetCDF, or CSV with x, y, u, v; or the run directory that holds it. "
-            "For the block, and for a --model that has a use for it.",
+            "For the block, and for a --model that uses it.",
             callback=flow_of_run,
             show_default=False,
         ),
