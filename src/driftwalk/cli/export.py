@@ -52,7 +52,7 @@ def export(
             "--seed",
             min=0,
             metavar="N",
-            help="Seed of the stochastic force (default: that of the study).",
+            help="Seed of the stochastic force (default: the study's).",
             show_default=False,
         ),
     ] = None,
