@@ -447,7 +447,7 @@ PAGES: dict[str, Page] = {
     "docs/how-to/assemble.md": Page(
         provide=_files(_recording(300.0), _flow("flow_true.csv"), _assembled, _series),
         instead={
-            "fit recording.csv": "fit --no-check recording.csv",
+            "fit bot.nc": "fit --no-check bot.nc",
             "assemble fit/": f"assemble fit/ {FEW_RUNS}",
             "--flow series.nc": f"--flow series.nc {FEW_RUNS}",
             "runs=100)": "runs=4)",

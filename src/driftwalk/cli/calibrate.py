@@ -36,8 +36,8 @@ def calibrate(
         bool,
         typer.Option(
             "--posterior",
-            help="Write posterior.csv as well: values of a --model with more than two parameters "
-            "that could have given the recording.",
+            help="Also write posterior.csv: draws from the approximate posterior of a --model with "
+            "more than two parameters.",
         ),
     ] = False,
     threads: Threads = None,
@@ -48,11 +48,11 @@ def calibrate(
 ) -> None:
     """Find the drag coefficient and the stochastic force that explain a recording.
 
-    With --model: the unknown parameters of another motion model. One or two are searched on a grid:
-    every setting is simulated for the length of the recording, step lengths and turning angles are
-    compared, and the grid is refined around the minimum. More are found by summaries of the motion.
-    Reports how well the parameters are known and whether the model explains the motion. After a
-    kill, the same command continues.
+    With --model, finds the unknown parameters of another motion model. One or two parameters are
+    searched on a grid: driftwalk simulates every setting for the length of the recording, compares
+    step lengths and turning angles, and refines the grid around the minimum. More parameters are
+    estimated from summaries of the motion. Reports how well the parameters are known and whether
+    the model explains the motion. If you stop the run, the same command continues it.
     """
     from driftwalk.conditions import About, jump_warnings
     from driftwalk.motion import feels_others

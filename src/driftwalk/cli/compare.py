@@ -92,8 +92,8 @@ def compare(
     """Measure how far apart two motions are.
 
     Turns both into step lengths and turning angles at the same step interval. Their distance is the
-    two-sample Kolmogorov-Smirnov statistic of Fasano and Franceschini. The options on reading apply
-    to both files.
+    two-sample Kolmogorov-Smirnov statistic of Fasano and Franceschini. The options for reading
+    apply to both files.
     """
     from driftwalk.comparison import compare as compare_motions
 

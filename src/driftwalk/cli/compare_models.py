@@ -52,10 +52,10 @@ def compare_models(
 ) -> None:
     """Say which motion models explain a recording.
 
-    Searches every model on one half of the recording's blocks of time, and judges all of them on
-    the other half, together with walks that only repeat recorded steps. Summaries of the motion
-    decide between the closest models. Reports the ranking, and where a model differs from the
-    recording. After a kill, the same command continues.
+    Fits every model to one half of the recording's blocks of time, and judges all of them on the
+    other half, together with two baselines that only resample recorded steps. Summaries of the
+    motion decide between the closest models. Reports the ranking, and where a model differs from
+    the recording. If you stop the run, the same command continues it.
     """
     from driftwalk.calibration import ALL_MODELS, DEFAULT_MODELS
     from driftwalk.conditions import About, jump_warnings

@@ -52,7 +52,7 @@ def export(
             "--seed",
             min=0,
             metavar="N",
-            help="Seed of the stochastic force (default: that of the study).",
+            help="Seed of the stochastic force (default: the study's).",
             show_default=False,
         ),
     ] = None,
@@ -80,13 +80,13 @@ def export(
     ] = False,
     json: Json = False,
 ) -> int:
-    """Take a model to another simulator, motion to another program, or figures to print.
+    """Export a model for a simulator, motion for another program, or figures for print.
 
-    The folder holds all that is needed: for a simulator its files, the study, the flow field and
-    the seed. With the same seed it is the same run as driftwalk's; --verify proves that by paths
-    clear of the wall. csv, movement, trackpy, ros, mp4 and gif hold recorded or simulated motion;
-    pdf, svg and png the figures of a finished run with the numbers that they draw. A README says
-    how to use them and what they do not hold. Nothing is overwritten.
+    For a simulator, the folder holds its files, the study, the flow field and the seed. With the
+    same seed the simulator repeats driftwalk's run; --verify compares both on paths clear of the
+    wall. csv, movement, trackpy, ros, mp4 and gif hold recorded or simulated motion; pdf, svg and
+    png hold the figures of a finished run, with the numbers that they draw. A README says how to
+    use them and what they do not hold. Nothing is overwritten.
     """
     target = target_named(to)
     if verify:

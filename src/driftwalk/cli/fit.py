@@ -62,9 +62,9 @@ def fit(
     """Fit flow, drag, stochastic force and tracking noise to recordings, together.
 
     A filter predicts each position from the earlier ones; the fit chooses the parameters that make
-    its errors most likely. Gaps and uneven sampling are handled. The run directory holds the fit
-    (fit.nc), the flow (flow.nc) for every command that takes one, the recording, the check of the
-    model (check.nc), figures and manifest.json.
+    its errors most likely. The recording may have gaps and uneven sampling. The run directory holds
+    the fit (fit.nc), the flow (flow.nc) for every command that takes one, the recording, the check
+    of the model (check.nc), figures and manifest.json.
     """
     from driftwalk.likelihood import fit_work
     from driftwalk.runs import FitWork, run_work

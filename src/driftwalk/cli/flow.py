@@ -54,13 +54,13 @@ def flow(
     overwrite: Replace = False,
     json: Json = False,
 ) -> None:
-    """Take the flow field from a recording, or from a file of PIV.
+    """Extract the flow field from a recording, or read it from a PIV file.
 
     Averages the velocity of the body in each cell and corrects it for the body's inertia. Cells
     that the body never visited are filled in and flagged. Mass and side come from the study; the
-    default is the 11.6-g, 3-cm block of the paper. With --tracers the steps of many tracks are
-    averaged, without those that join two particles. A field that was measured otherwise is brought
-    to metres, with its masked nodes filled; --tank D@X,Y says where its tank is.
+    default is the 11.6-g, 3-cm block of the paper. With --tracers, averages the steps of many
+    tracks and leaves out steps that join two particles. Converts a measured field to metres and
+    fills its masked nodes; --tank D@X,Y gives the position of the tank.
     """
     from driftwalk.cli.inputs.flow_file import read_flow_file
     from driftwalk.conditions import (

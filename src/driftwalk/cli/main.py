@@ -34,7 +34,7 @@ class Command(NamedTuple):
 _GET, _FIT, _PREDICT = "Get a recording", "Fit", "Predict"
 _COMPARE, _SHARE, _SET_UP = "Compare", "Share", "Set up"
 COMMANDS: Final[dict[str, Command]] = {
-    "demo": Command(_GET, "Try driftwalk on a recording that it brings along.", "demo", "demo"),
+    "demo": Command(_GET, "Try driftwalk on its bundled recording.", "demo", "demo"),
     "read": Command(_GET, "Read a tracker's file into a recording.", "recordings.read", "read"),
     "info": Command(_GET, "Show what a file holds.", "recordings.info", "info"),
     "track": Command(_GET, "Track blocks in a video.", "recordings.track", "track"),
@@ -54,7 +54,7 @@ COMMANDS: Final[dict[str, Command]] = {
     "play": Command(
         _PREDICT, "Change parameters while a simulation runs.", "prediction.play", "play"
     ),
-    "compare": Command(_COMPARE, "Measure the distance of two motions.", "compare", "compare"),
+    "compare": Command(_COMPARE, "Measure the distance between two motions.", "compare", "compare"),
     "compare-models": Command(
         _COMPARE, "Rank motion models on a recording.", "compare_models", "compare_models"
     ),

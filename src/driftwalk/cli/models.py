@@ -26,9 +26,9 @@ def models(
 ) -> None:
     """List the motion models of bodies that move by themselves.
 
-    Without a name: all of them, and the parts that can be added. With one: its equation, its
-    source and its parameters. A model of your own, such as mine.py:tumbler, has its parameters
-    alone.
+    Without a name, lists all models and the parts that you can add. With a name, prints the
+    equation, source and parameters of that model. For a model of your own, such as mine.py:tumbler,
+    prints only the parameters.
     """
     from driftwalk.motion import MEMBERS, PARTS, motion_model
 

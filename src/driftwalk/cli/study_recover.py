@@ -100,12 +100,12 @@ def recover(
 ) -> None:
     """Simulate recordings of known truth, fit them, and report how well the fit recovers the truth.
 
-    Use it to design an experiment: what would recordings of this length, with this camera, in this
-    flow reveal? The truth is what a RUN has found, or a study file (--study) with the true values
-    and its section [recover]. With --model, or with a RUN of another model than the block:
-    recordings of that motion model, each calibrated with all parameters open but the --known ones.
-    The directory holds the result, figures and manifest.json. After a kill, the same command
-    continues.
+    Use it to design an experiment: how precise are the estimates with this length, this camera and
+    this flow? The truth is the answer of a RUN, or a study file (--study) with the true values and
+    its section [recover]. For another motion model (--model, or a RUN about one), simulates
+    recordings of that model and calibrates each, with all parameters unknown except those that you
+    state (--known). The directory holds the result, figures and manifest.json. If you stop the run,
+    the same command continues it.
     """
     workers = Workers(cluster, cluster_options)
     source = None if run is None else open_run(run, given, model)

@@ -50,7 +50,7 @@ def view(
 ) -> None:
     """Explore a run in the browser, or watch a tracker's stream.
 
-    The page of a run under way fills as results arrive. Ctrl-C ends the server.
+    The page of an unfinished run fills as results arrive. Ctrl-C ends the server.
     """
     from driftwalk.viewer import LiveSource, RunSource, require_server
 

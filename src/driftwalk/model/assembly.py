@@ -35,7 +35,7 @@ class Assembly(Section):
     )
     duration_s: Annotated[float, Quantity("s", gt=0, le=1e6)] = Field(
         default=300.0,
-        description="Length of a run; a run in which all blocks have become one ends earlier.",
+        description="Length of a run; a run ends earlier if all blocks are in one assembly.",
     )
     seed: Annotated[int, Quantity("1", ge=0, le=2**63 - 1, whole=True)] = Field(
         default=1, description="Seed of the starts, the forces and the drawn parameters."

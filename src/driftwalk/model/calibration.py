@@ -43,8 +43,8 @@ class Calibration(ForceGrid):
     )
     bootstrap: Annotated[int, Quantity("1", ge=0, le=1_000_000, whole=True)] = Field(
         default=200,
-        description="Bootstrap samples for the intervals, and simulated recordings by which the "
-        "summaries of a motion are judged; 0 leaves both out.",
+        description="Bootstrap samples for the intervals, and simulated recordings for the "
+        "goodness of fit of the summaries; 0 leaves both out.",
     )
     seed: Annotated[int, Quantity("1", ge=0, le=2**63 - 1, whole=True)] = Field(
         default=1, description="Seed of the simulations and of the bootstrap."

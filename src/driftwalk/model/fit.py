@@ -79,16 +79,16 @@ class Fit(Section):
     )
     law: Literal["auto", "paper", "quadratic", "linear", "mixed", "power"] = Field(
         default="auto",
-        title="Law of the drag.",
+        title="Drag law.",
         description=(
             'How the drag goes with the speed: "quadratic", "linear", "mixed" of both, or with a '
             '"power" that is estimated. "paper" is quadratic without pressure gradient. "auto" is '
-            "quadratic unless the recording asks for a linear part or another power."
+            "quadratic unless the recording supports a linear part or another power."
         ),
     )
     pressure_gradient: Literal["auto", "on", "off"] = Field(
         default="auto",
-        title="Push of the water's own acceleration.",
+        title="Whether the water's own acceleration pushes the block.",
         description=(
             "Whether the water's own acceleration pushes the block and its added mass, as it does "
             'a floating body. "auto" takes what the recording supports.'
@@ -100,8 +100,8 @@ class Fit(Section):
         default="auto",
         title="Added mass as a share of the block's mass.",
         description=(
-            "Added mass as a share of the block's mass; of its inertia alike. A recording tells "
-            "drag and force over the mass with what is added to it. "
+            "Added mass as a share of the block's mass; the inertia grows by the same share. A "
+            "recording determines only drag and force divided by the mass with its added mass. "
             '"auto" is 0.5 with a standard deviation of 0.2 where the acceleration of the water '
             "pushes the block, else 0."
         ),
@@ -122,7 +122,7 @@ class Fit(Section):
         title="Correlation time of the stochastic force.",
         description=(
             'Correlation time of the stochastic force, or "white" for none. "auto" estimates one '
-            "where the recording asks for it."
+            "if the recording supports it."
         ),
     )
     flow_strength: Literal["auto", "constant", "smooth"] = Field(
@@ -130,16 +130,16 @@ class Fit(Section):
         title="Strength of the flow over time.",
         description=(
             'Strength of the flow over time: "constant", or "smooth". "auto" is constant unless '
-            "the recording asks for more; pulses are looked for, too."
+            "the recording supports changes; it also searches for pulses."
         ),
     )
     camera: Literal["auto", "exact"] = Field(
         default="auto",
-        title="Mistakes of the camera that are estimated.",
+        title="Errors of the camera that are estimated.",
         description=(
             '"auto" estimates jitter of the time stamps, an offset of the orientation and of the '
-            'marker where the recording asks for it, and refuses smoothed positions; "exact" takes '
-            "what is recorded."
+            'marker if the recording supports them, and refuses smoothed positions; "exact" takes '
+            "the positions as recorded."
         ),
     )
     drag_coefficient_precision: Annotated[float | None, Quantity("1", gt=0, lt=1)] = Field(

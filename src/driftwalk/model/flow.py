@@ -41,7 +41,7 @@ class Flow(Section):
         description=(
             'How a flow that changes in time goes on after its last frame: "loop" begins again, '
             '"mirror" runs backwards and forwards in turns, "hold" stands still; with "none" '
-            "whatever lasts longer is refused."
+            "longer simulations are refused."
         ),
     )
     start: Literal["random", "first"] = Field(

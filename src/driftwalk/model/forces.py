@@ -65,19 +65,19 @@ class Forces(Section):
     )
     drag_power: Annotated[float, Quantity("1", ge=0.5, le=3.5)] = Field(
         default=2.0,
-        title="Power of the speed with which the drag goes.",
+        title="Power p of the speed in the drag law.",
         description=(
-            "Power p of the speed with which the drag of windward strips goes: its force is "
-            "(|w| / drag_speed)^(p - 2) times that of the quadratic law, |w| the speed of the "
-            "water relative to the strip."
+            "Power p of the speed in the drag of windward strips: the force is "
+            "(|w| / drag_speed)^(p - 2) times the force of the quadratic law, with |w| the speed "
+            "of the water relative to the strip."
         ),
     )
     drag_speed_m_s: Annotated[float, Quantity("m/s", gt=0, le=1e3)] = Field(
         default=0.03,
         title="Speed at which C_d holds, where the power of the drag is not 2.",
         description=(
-            "Speed of the water past a strip at which C_d is the drag coefficient, whatever the "
-            "power of the drag; for the power 2 it means nothing."
+            "Speed of the water past a strip at which C_d is the drag coefficient, with any "
+            "power of the drag; with the power 2 it has no effect."
         ),
     )
     added_mass_share: Annotated[float, Quantity("1", ge=0, le=5)] = Field(

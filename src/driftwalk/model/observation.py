@@ -31,7 +31,10 @@ class Observation(Section):
     ] = Field(
         default="estimate",
         title="Orientation noise of the tracker.",
-        description="Standard deviation of the orientation noise, likewise.",
+        description=(
+            'Standard deviation of the orientation noise of the tracker; "estimate" as for the '
+            "position."
+        ),
     )
     position_quantum_m: Annotated[
         float | Literal["recording"], Quantity("m", ge=0, le=1, words=("recording",))

@@ -95,7 +95,7 @@ class Recording(Section):
     )
     up: Literal["auto", "x", "y", "z", "-x", "-y", "-z"] = Field(
         default="auto",
-        description='Axis of a file in space that points up; "auto" uses that of its format.',
+        description='Axis that points up, if the file has three axes; "auto" uses the format\'s.',
     )
     topic: str | None = Field(
         default=None, description="Topic of a ROS bag.", examples=["/block/pose"]
@@ -116,13 +116,13 @@ class Recording(Section):
         examples=["x.csv"],
     )
     y_file: str | None = Field(
-        default=None, description="File of the y matrix, likewise.", examples=["y.csv"]
+        default=None, description="File of the y matrix.", examples=["y.csv"]
     )
     theta_file: str | None = Field(
         default=None, description="File of the orientation matrix.", examples=["theta.csv"]
     )
     keypoint: str | None = Field(
-        default=None, description="Keypoint of a pose file that is the body.", examples=["centre"]
+        default=None, description="Keypoint of a pose file to use as the body.", examples=["centre"]
     )
     heading: tuple[str, str] | None = Field(
         default=None,
@@ -134,7 +134,7 @@ class Recording(Section):
     )
     min_confidence: Annotated[float | None, Quantity("1", ge=0)] = Field(
         default=None,
-        description="Keypoints seen with less confidence are missing; unset: usual for the format.",
+        description="Smallest confidence of a keypoint; others are missing. Not set: the format's.",
         examples=[0.6],
     )
     sort: Literal["error", "sort"] = Field(

@@ -35,7 +35,7 @@ class Recover(Section):
 
     flow: Annotated[str | None, Placeholder("FILE")] = Field(
         default=None,
-        title="File of the true flow field (default: that of the study file).",
+        title="File of the true flow field (default: the study file's).",
         description=(
             'File of the true flow field, relative to the study file; "random" draws '
             "a different flow for every recording."

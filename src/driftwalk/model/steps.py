@@ -18,5 +18,7 @@ class Steps(Section):
         float | Literal["auto"], Quantity("s", gt=0, le=1e5, words=("auto",))
     ] = Field(
         default="auto",
-        description='Time between the positions of a step; "auto" uses that of the recording.',
+        description=(
+            'Time between the positions of a step; "auto" uses the interval of the recording.'
+        ),
     )

@@ -17,7 +17,7 @@ ClusterAt = Annotated[
     typer.Option(
         "--cluster",
         metavar="local:N|tcp://HOST:PORT|slurm:N",
-        help="Workers that compute: N processes here, a Dask scheduler, or N jobs of slurm (pbs, "
+        help="Workers: N processes on this machine, a Dask scheduler, or N jobs of slurm (pbs, "
         "sge, lsf, oar, moab, htcondor). Needs driftwalk[cluster].",
         show_default=False,
     ),
@@ -27,7 +27,8 @@ ClusterOptions = Annotated[
     typer.Option(
         "--cluster-option",
         metavar="NAME=VALUE",
-        help="Of the jobs, as dask-jobqueue names it: queue=short, walltime=02:00:00; repeat.",
+        help="Option passed to dask-jobqueue, such as queue=short or walltime=02:00:00; repeat for "
+        "others.",
         show_default=False,
     ),
 ]

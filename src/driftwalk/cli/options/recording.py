@@ -75,8 +75,7 @@ class RecordingOptions:
         float | None,
         _option(
             "--max-speed",
-            help="Fastest plausible speed; the fewest samples without which it is kept become "
-            "gaps.",
+            help="Fastest plausible speed; samples that need a faster one become gaps.",
             unit="m/s",
         ),
     ] = None
@@ -104,14 +103,16 @@ class RecordingOptions:
         str | None,
         _option(
             "--up",
-            help="Axis of a file in space that points up (default: as its format has it).",
+            help="Axis that points up, if the file has three axes (default: the format's).",
             metavar="x|y|z|-x|-y|-z",
         ),
     ] = None
     topic: Annotated[
         str | None,
         _option(
-            "--topic", help="Topic of a ROS bag, or several with commas.", metavar="NAME[,NAME]"
+            "--topic",
+            help="Topic of a ROS bag, or several, separated by commas.",
+            metavar="NAME[,NAME]",
         ),
     ] = None
     header_line: Annotated[
@@ -141,14 +142,14 @@ class RecordingOptions:
     )
     keypoint: Annotated[
         str | None,
-        _option("--keypoint", help="Keypoint of a pose file that is the body.", metavar="NAME"),
+        _option("--keypoint", help="Keypoint of a pose file to use as the body.", metavar="NAME"),
     ] = None
     heading: Annotated[
         str | None,
         _option(
             "--heading",
-            help="Two keypoints, or bodies that are markers of one: the angle from one to the "
-            "other.",
+            help="Two keypoints, or two bodies that are markers of one; the orientation is the "
+            "angle from the first to the second.",
             metavar="FROM,TO",
         ),
     ] = None
@@ -156,7 +157,7 @@ class RecordingOptions:
         float | None,
         _option(
             "--min-confidence",
-            help="Keypoints seen with less confidence are missing (default: that of the format).",
+            help="Smallest confidence of a keypoint; others are missing (default: the format's).",
             metavar="SHARE",
             min=0.0,
         ),

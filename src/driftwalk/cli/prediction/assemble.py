@@ -49,10 +49,10 @@ def assemble(
 ) -> None:
     """Simulate self-assembly of many blocks, and report how often each structure forms.
 
-    With the RUN of a fit or a calibration, uses its flow field and simulates twice: with the
-    parameters that it found, and with parameters drawn from what it leaves open. The difference
-    shows its remaining uncertainty. Without RUN, uses the parameters of a study and a flow field
-    (--flow). After a kill, the same command continues.
+    With the RUN of a fit or a calibration, uses the run's flow field and simulates twice: with the
+    estimated parameters, and with parameters drawn from their uncertainty. The difference shows how
+    much this uncertainty matters. Without RUN, uses the parameters of a study and a flow field
+    (--flow). If you stop the run, the same command continues it.
     """
     from driftwalk.runs import AssemblyWork, run_work
 

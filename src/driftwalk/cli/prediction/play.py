@@ -70,12 +70,12 @@ def play(
     host: Host = "127.0.0.1",
     open: Open = None,
 ) -> None:
-    """Turn the knobs of the model while the tank moves.
+    """Change the parameters of a simulated tank while it runs.
 
-    With a RUN: its model, values, study, flow field and recording. Otherwise study, flow and
-    recording default to those of the bundled example. In a tank without a flow
-    field the water moves in a random flow. With --model: bodies of that model, with a slider for
-    each of its parameters. Ctrl-C ends the server.
+    With a RUN, uses the run's model, values, study, flow field and recording. Without one, study,
+    flow and recording come from the bundled example. A tank without a flow field gets a random
+    flow. With --model, shows bodies of that model, with a slider for each parameter. Ctrl-C ends
+    the server.
     """
     from driftwalk.viewer import PlaySource, hello_line, require_server
 

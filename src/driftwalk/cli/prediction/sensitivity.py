@@ -64,9 +64,9 @@ def sensitivity(
     """Measure how much self-assembly depends on the model.
 
     Simulates self-assembly at every setting of a map over the drag coefficient and the stochastic
-    force, or over the axes that --vary names. Measures how far the outcomes lie from those of a
-    reference, which has the parameters of a RUN or of a study (--flow). After a kill, the same
-    command continues.
+    force, or over the axes that --vary names. Measures the distance between their outcomes and the
+    outcomes of a reference, which has the parameters of a RUN or of a study (--flow). If you stop
+    the run, the same command continues it.
     """
     from driftwalk.runs import SensitivityWork, run_work
 

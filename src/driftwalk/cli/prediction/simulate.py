@@ -58,7 +58,7 @@ def simulate(
             "--flow",
             metavar="FILE",
             help="Flow field: NetCDF, or CSV with x, y, u, v; or the run directory that holds it. "
-            "For the block, and for a --model that has a use for it.",
+            "For the block, and for a --model that uses it.",
             callback=flow_of_run,
             show_default=False,
         ),
@@ -92,10 +92,10 @@ def simulate(
 ) -> None:
     """Simulate the motion of the block, or of another motion model.
 
-    With a RUN: its model, with the values, the study and the flow field of the run; --parameter
-    replaces a value. With --model alone: a body that moves by itself, or a model of your own; every
-    parameter needs a --parameter. The motion starts where the recording of --like does, otherwise
-    anywhere in the tank, at rest.
+    With a RUN, simulates the run's model with its values, study and flow field. Without a RUN,
+    simulates the block, or a body that moves by itself, or a model of your own (--model); such a
+    model needs a value for every parameter (--parameter). The motion starts where a recording
+    starts (--like), otherwise at rest anywhere in the tank.
     """
     from driftwalk.core.files.atomic import write_atomic
     from driftwalk.motion import feels_others

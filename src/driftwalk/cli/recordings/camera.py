@@ -58,8 +58,9 @@ def calibrate(
 ) -> None:
     """Find the lens and the plane of the water from images of a board.
 
-    The first image defines the plane: in it, the board must lie at the height of the markers. The
-    lens needs three images or more, with the board tilted in each and in all parts of the picture.
+    The first image defines the plane: in it, the board must lie at the height of the markers. For
+    the lens, give three images or more, with the board tilted and in different parts of the
+    picture.
     """
     from driftwalk.core.files.atomic import require_target
     from driftwalk.track import Board, save_camera

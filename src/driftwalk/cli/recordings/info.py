@@ -87,8 +87,9 @@ def info(
 ) -> None:
     """Say what a recording, a flow field or a run directory holds, and how driftwalk reads it.
 
-    Prints bodies, clock and its jitter, gaps, extent, the circle that the centres stay in, speed,
-    and the tracking noise estimated from the recording itself. Prints the answer of a finished run.
+    For a recording, prints bodies, clock and its jitter, gaps, extent, the circle that contains the
+    centres, speed, and the tracking noise estimated from the recording itself. For a finished run,
+    prints its answer.
     """
     from driftwalk.cli.terminal.answer import print_run
     from driftwalk.core.files.run_layout import state_of

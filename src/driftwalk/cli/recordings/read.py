@@ -32,8 +32,8 @@ def read(
 
     The recording has positions in metres with y up, times in seconds and angles in radians. It
     keeps the tank and the block that you state here, so the other commands need no options for
-    them. With a name that ends in .csv: a plain table with the columns t_s, x_m, y_m, theta_rad and
-    body, without tank and block.
+    them. If the name ends in .csv, the file is a plain table with the columns t_s, x_m, y_m,
+    theta_rad and body, without tank and block.
     """
     from driftwalk.cli.inputs.study_recording import words_to_fit
     from driftwalk.conditions import block_attributes

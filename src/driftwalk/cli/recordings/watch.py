@@ -38,7 +38,7 @@ def watch(
     """Watch blocks assemble: poses, joins and the outcome class, as they happen.
 
     Prints a line for each join, parting or change of the class, and one line per second with the
-    poses. While a block is hidden, it names the classes that are possible.
+    poses. While a block is hidden, lists the classes that are still possible.
     """
     from driftwalk.cli.tracking.parts import build_parts
     from driftwalk.cli.tracking.run import TrackingRun

@@ -32,7 +32,7 @@ def cite(
     """Say what to cite for a run: the program, what it computed, and the methods that it used.
 
     The line "computed" names the version, the inputs with their hashes and the seeds: with it
-    somebody else gets the same numbers. Only methods that this run used are listed.
+    others can reproduce the numbers. Only methods that this run used are listed.
     """
     found = _of_file(run) if run.is_file() else _of_run(run)
     if json:

@@ -35,11 +35,10 @@ def report(
     """Write a report of runs or recordings: one HTML file that loads nothing from anywhere.
 
     Takes run directories of calibrate, compare-models, fit, assemble, sensitivity or study recover;
-    several come one after the other on one page, which shows what they have in common once.
-    The report has the answer in words with its uncertainty, recording, flow, maps to click,
-    outcomes to replay, the manifest and how to cite. It opens with a double click, without a
-    network. For a simulation it shows one replicate. The options on reading are for a
-    recording.
+    several runs share one page, which shows a common recording or flow once. The report has the
+    answer in words with its uncertainty, recording, flow, maps to click, outcomes to replay, the
+    manifest and how to cite. It opens with a double click, without a network. For a simulation it
+    shows one replicate. The options for reading apply to recordings only.
     """
     from driftwalk.page import joined_page, name_apart, write_report
 
