@@ -8,8 +8,8 @@ at the same time. Nothing is stored on the way. One run. The plain baseline besi
 map by the double reference, timed on a few worlds and extrapolated, marked "~".
 
 Checked, else the script fails: the answer is within a tenth of the parameters with which the
-recording was made. `--quick` is the small search of `driftwalk demo --quick` on five minutes, to try
-the script.
+recording was made. `--quick` tries the script: the small search of `driftwalk demo --quick`, on the
+first five minutes.
 """
 
 from __future__ import annotations
