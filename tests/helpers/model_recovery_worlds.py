@@ -9,7 +9,7 @@ import xarray as xr
 
 import driftwalk as dw
 from driftwalk.calibration.recover.result import build_model_recovery
-from driftwalk.calibration.recover.truth import known_truth
+from driftwalk.calibration.recover.truth import model_recovery
 
 VALUES = {"speed": 0.03, "rotational_diffusion": 0.5, "turn_rate": 0.3}
 
@@ -39,7 +39,7 @@ def made_up_recovery(found: dict[str, Any] | None = None) -> xr.Dataset:
     count = {"recover.recordings": len(chosen["status"]), "recover.durations_s": [600.0]}
     study = dw.apply_overrides(dw.Study(), {**count, "observation.position_noise_m": 3e-4})
     model = dw.motion_model("active")
-    known = known_truth(model, VALUES, study, flow=None, like=None, body=None)
+    known = model_recovery(model, VALUES, study, flow=None, like=None, body=None)
     return build_model_recovery(known, chosen)
 
 

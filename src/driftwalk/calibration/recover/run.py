@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from driftwalk.calibration.check import check_recording
-from driftwalk.calibration.recover.one import MESSAGE, recover_one
 from driftwalk.calibration.recover.result import build_model_recovery
-from driftwalk.calibration.recover.truth import KnownTruth, Noise, known_truth
+from driftwalk.calibration.recover.truth import ModelRecovery, Noise, model_recovery
 from driftwalk.conditions import study_in_arena
 from driftwalk.core.run_stages import CALIBRATION_STAGES, tell_nobody
 from driftwalk.motion import MotionModel
-from driftwalk.sweep import Store, WorkUnit, grid, run_sweep, threads_of_unit
+from driftwalk.sweep import Store, grid, run_sweep, threads_of_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -102,35 +100,17 @@ def recover_model(
     """
     known = _checked(model, truth, study, flow, like, body, noise)
     count = known.study.recover.recordings
-
     say = tell if tell is not None else tell_nobody
-
     # Only work of this process can say how far it is within a recording.
     within = partial(_tell_stage, say, count) if executor is None else None
-    function = _Calibrations(known, threads_of_unit(threads, executor), within)
+    method = replace(known, threads=threads_of_unit(threads, executor), within=within)
 
     def said(done: int, total: int) -> None:
         say(WHOLE * done, WHOLE * total, "recordings")
 
     units = grid(recording=np.arange(count)).units(1)
-    found = run_sweep(function, units, store=store, executor=executor, progress=said)
+    found = run_sweep(method, units, store=store, executor=executor, progress=said)
     return build_model_recovery(known, found)
-
-
-@dataclass(frozen=True)
-class _Calibrations:
-    """The function of the sweep: one recording, simulated and calibrated wherever it is sent."""
-
-    known: KnownTruth
-    threads: int | None
-    within: Callable[[int, str, int, int], None] | None
-    """Called with the recording, the stage, what is done and all of it."""
-    linear_algebra: ClassVar[bool] = True
-    """Its results depend on numpy and scipy."""
-
-    def __call__(self, unit: WorkUnit) -> dict[str, Any]:
-        tell = None if self.within is None else partial(self.within, unit.start)
-        return _packed(recover_one(self.known, unit.start, threads=self.threads, tell=tell))
 
 
 def check_model_recovery(
@@ -175,15 +155,14 @@ def _checked(
     like: xr.Dataset | None,
     body: str | None,
     noise: Noise,
-) -> KnownTruth:
+) -> ModelRecovery:
     from driftwalk.model import Study
 
     chosen = study if study is not None else Study()
     if study is None and like is not None:
         chosen = study_in_arena(chosen, like)
-    known = known_truth(model, truth, chosen, flow=flow, like=like, body=body, noise=noise)
-    # What is refused for one recording is refused for all; later ones can fail by chance.
-    check_recording(known.recording(0), known.search_study(0), flow=flow, model=model)
+    known = model_recovery(model, truth, chosen, flow=flow, like=like, body=body, noise=noise)
+    known.check()
     return known
 
 
@@ -196,9 +175,3 @@ def _tell_stage(tell: Tell, recording: int, count: int, stage: str, done: int, t
         WHOLE * count,
         f"recording {recording + 1} of {count}: {known.words}",
     )
-
-
-def _packed(found: dict[str, Any]) -> dict[str, Any]:
-    """Return arrays with one entry each."""
-    text = np.array([found.pop("message")], dtype=f"U{MESSAGE}")
-    return {**{name: np.asarray(one)[None] for name, one in found.items()}, "message": text}

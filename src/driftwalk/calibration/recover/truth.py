@@ -1,18 +1,21 @@
-"""Recordings of a motion model whose parameters are known."""
+"""Recordings of a motion model whose parameters are known, and their calibration."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
+from driftwalk.calibration.check import check_recording
+from driftwalk.calibration.recover.calibrated import calibrated_parameters
+from driftwalk.calibration.recover.study import EstimationMethod
+from driftwalk.calibration.run import calibrate
 from driftwalk.conditions.camera import study_as_seen
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import ConfigurationError, InputError
-from driftwalk.core.seeds import world_keys
 from driftwalk.core.streams import RecoveryStream
 from driftwalk.model import Study, apply_overrides
 from driftwalk.motion import BlockModel, MotionModel, known_values, simulate_motion
@@ -25,17 +28,17 @@ Noise = Literal["estimated", "known"]
 
 
 @dataclass(frozen=True)
-class KnownTruth:
-    """Everything that makes the recordings of a recovery study.
+class ModelRecovery(EstimationMethod["xr.Dataset"]):
+    """A motion model of known truth, and the calibration that estimates its parameters.
 
     Attributes
     ----------
+    study : Study
+        Tank, camera, [recover], and the search.
     model : MotionModel
         The model; its parameters are those that the study looks at.
     values : mapping of str to float
         Their true values.
-    study : Study
-        Tank, camera, [recover], and the search.
     flow : xarray.Dataset or None
         The water's velocity.
     like : xarray.Dataset or None
@@ -44,15 +47,20 @@ class KnownTruth:
         Its body, where it has several.
     noise : {"estimated", "known"}
         Whether the calibrations know the noise of the camera.
+    threads : int or None
+        Threads of each calibration; None for as many as there are processors.
+    within : callable or None
+        Called with the recording, the stage, what is done and all of it.
     """
 
     model: MotionModel
     values: Mapping[str, float]
-    study: Study
-    flow: xr.Dataset | None
-    like: xr.Dataset | None
-    body: str | None
+    flow: xr.Dataset | None = None
+    like: xr.Dataset | None = None
+    body: str | None = None
     noise: Noise = "estimated"
+    threads: int | None = None
+    within: Callable[[int, str, int, int], None] | None = None
 
     @property
     def seen(self) -> Study:
@@ -72,9 +80,7 @@ class KnownTruth:
         """Time stamps of each recording [s]; of one that is like another without its gaps."""
         if self.like is not None:
             return body_track(self.like, self.body).time
-        settings = self.study.recover
-        samples = math.floor(settings.durations_s[0] / settings.sample_interval_s + 1e-6) + 1
-        return np.asarray(np.arange(samples) * settings.sample_interval_s, np.float64)
+        return self.clock(self.study.recover.durations_s[0])
 
     @property
     def missing_share(self) -> float:
@@ -83,10 +89,37 @@ class KnownTruth:
             return self.study.recover.missing_share
         return 1.0 - self.times.size / self.like.sizes["time"]
 
-    def seed_of(self, recording: int, stream: RecoveryStream) -> int:
-        """Return the seed of a stream of random numbers of a recording."""
-        seed = self.study.recover.seed
-        return int(world_keys(seed, trial=recording, replicate=stream)[0] >> np.uint64(1))
+    def check(self) -> None:
+        """Refuse what is refused for the first recording; later ones can fail by chance."""
+        check_recording(self.recording(0), self.search_study(0), flow=self.flow, model=self.model)
+
+    def simulate(self, setting: Mapping[str, Any]) -> xr.Dataset:
+        """Return the recording of a setting."""
+        return self.recording(int(setting["recording"]))
+
+    def estimate(self, recording: xr.Dataset, setting: Mapping[str, Any]) -> dict[str, Any]:
+        """Calibrate a recording."""
+        number = int(setting["recording"])
+        found = calibrate(
+            recording,
+            self.model,
+            study=self.search_study(number),
+            flow=self.flow,
+            threads=self.threads,
+            tell=None if self.within is None else partial(self.within, number),
+        )
+        return calibrated_parameters(found, self.model.parameters)
+
+    def missing(self) -> dict[str, Any]:
+        """Return the estimates of a recording without a calibration."""
+        count = len(self.model.parameters)
+        return {
+            "estimate": np.full(count, np.nan),
+            "interval": np.full((count, 2), np.nan),
+            "range": np.full((count, 2), np.nan),
+            "determined": np.zeros(count, dtype=bool),
+            "half_width": np.full(count, np.nan),
+        }
 
     def recording(self, number: int) -> xr.Dataset:
         """Return what the camera records of one world, a `trajectory`."""
@@ -111,8 +144,7 @@ class KnownTruth:
         )
         x, y = (run[name].values[0, -time.size :, 0].astype(np.float64) for name in ("x", "y"))
         if self.like is None:
-            generator = np.random.default_rng(self.seed_of(number, RecoveryStream.GAPS))
-            lost = generator.random(time.size) < self.study.recover.missing_share
+            lost = self.missed(number, time.size)[:, 0]
             x, y = np.where(lost, np.nan, x), np.where(lost, np.nan, y)
         quantum = self.seen.observation.position_quantum_m
         attrs: dict[str, Any] = {"arena": self.study.tank.to_arena_json(), "simulated": "yes"}
@@ -135,7 +167,7 @@ class KnownTruth:
         )
 
 
-def known_truth(
+def model_recovery(
     model: MotionModel,
     truth: Mapping[str, float],
     study: Study,
@@ -144,7 +176,7 @@ def known_truth(
     like: xr.Dataset | None,
     body: str | None,
     noise: Noise = "estimated",
-) -> KnownTruth:
+) -> ModelRecovery:
     """Return a truth that recordings can be made of."""
     if isinstance(model, BlockModel):
         raise InputError("the block has a recovery study of its own: see recovery_study")
@@ -167,4 +199,4 @@ def known_truth(
         )
     if noise not in get_args(Noise):
         raise ConfigurationError(f"`noise` is one of {', '.join(get_args(Noise))}, got {noise!r}")
-    return KnownTruth(model, values, study, flow, like, body, noise)
+    return ModelRecovery(study, model, values, flow, like, body, noise)
