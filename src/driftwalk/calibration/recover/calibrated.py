@@ -1,4 +1,4 @@
-"""What a calibration says of each parameter: estimate, interval, and whether it is determined."""
+"""Estimate and interval of each parameter of a calibration, and whether it is determined."""
 
 from __future__ import annotations
 

@@ -137,7 +137,7 @@ class FitRecovery(EstimationMethod["SimulatedTracks"]):
 
 
 class SimulatedTracks(NamedTuple):
-    """What the camera records of worlds in one flow."""
+    """Tracks of the camera, all in one flow."""
 
     tracks: list[xr.Dataset]
     flow: xr.Dataset
