@@ -6,7 +6,6 @@ from driftwalk.runs.fit import Fitted, FitWork
 from driftwalk.runs.folder import Progress, Run, Work, run_work
 from driftwalk.runs.found import FoundRun, flow_of_result, read_found, run_folder
 from driftwalk.runs.model_comparison import ModelComparisonWork
-from driftwalk.runs.model_recovery import ModelRecoveryWork
 from driftwalk.runs.recovery import RecoveryWork
 from driftwalk.runs.sensitivity import SensitivityResult, SensitivityWork
 from driftwalk.schema.stores.netcdf import netcdf_bytes
@@ -19,7 +18,6 @@ __all__ = [
     "Fitted",
     "FoundRun",
     "ModelComparisonWork",
-    "ModelRecoveryWork",
     "Progress",
     "RecoveryWork",
     "Run",

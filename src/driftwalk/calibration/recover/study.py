@@ -4,19 +4,26 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor
 from dataclasses import dataclass
-from typing import Any, ClassVar, Final, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Final, Generic, TypeVar
 
 import numpy as np
 
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
+from driftwalk.core.run_stages import tell_nobody
 from driftwalk.core.seeds import world_keys
 from driftwalk.core.streams import RecoveryStream
 from driftwalk.model import Study
-from driftwalk.sweep import WorkUnit
+from driftwalk.sweep import Design, Store, WorkUnit, run_sweep
 
+if TYPE_CHECKING:
+    import xarray as xr
+
+Tell = Callable[[int, int, str], None]
+"""Called with what is done, all of it, and the work under way."""
 ESTIMATED, NOT_ESTIMATED, NOT_SIMULATED = range(3)
 """Status of a recording; one without an estimate has a message."""
 LONGEST_MESSAGE: Final = 400
@@ -35,6 +42,43 @@ class EstimationMethod(ABC, Generic[RecordingT]):
 
     linear_algebra: ClassVar[bool] = True
     """Its results depend on numpy and scipy."""
+    kind: ClassVar[str]
+    """Kind of the dataset."""
+    work: ClassVar[str]
+    """Word for the recordings that are done."""
+    parts: ClassVar[int] = 1
+    """Parts of a recording in which progress is counted."""
+
+    @abstractmethod
+    def recover(
+        self,
+        *,
+        store: Store | None = None,
+        threads: int | None = None,
+        executor: Executor | None = None,
+        tell: Tell = tell_nobody,
+    ) -> xr.Dataset:
+        """Return the dataset of the study."""
+
+    def sweep(self, store: Store | None, executor: Executor | None, tell: Tell) -> xr.Dataset:
+        """Simulate and estimate all recordings, and return the dataset of the study."""
+        self.check()
+        design = self.design()
+
+        def told(done: int, total: int) -> None:
+            tell(self.parts * done, self.parts * total, self.work)
+
+        units = design.units(1)
+        found = run_sweep(self, units, store=store, executor=executor, progress=told)
+        return self.dataset(design.unstack(found))
+
+    @abstractmethod
+    def design(self) -> Design:
+        """Return the settings of the recordings."""
+
+    @abstractmethod
+    def dataset(self, found: Mapping[str, Any]) -> xr.Dataset:
+        """Return the dataset of the study, from arrays with the dimensions of the design."""
 
     @abstractmethod
     def check(self) -> None:

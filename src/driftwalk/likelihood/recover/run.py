@@ -1,25 +1,251 @@
-"""The recovery study: how well a set-up gives back a truth that is known."""
+"""The recovery study of a fit: recordings of a block whose truth is known, each fitted."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+import time
+from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
-from contextlib import nullcontext
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.likelihood.recover.result import build_recovery
-from driftwalk.likelihood.recover.truth import FitRecovery
-from driftwalk.sweep import Store, grid, run_sweep
+from driftwalk.calibration.recover.study import ESTIMATED, EstimationMethod, Tell
+from driftwalk.calibration.recover.summary import COVERAGE_CONFIDENCE
+from driftwalk.core.errors import InputError
+from driftwalk.core.processors import one_blas_thread
+from driftwalk.core.run_stages import tell_nobody
+from driftwalk.core.streams import RecoveryStream
+from driftwalk.flow import random_tank_flow
+from driftwalk.likelihood.fit import fit_motion
+from driftwalk.likelihood.recover.check import require_flow, require_length, require_truth
+from driftwalk.likelihood.recover.score import SCORED, score_fit
+from driftwalk.likelihood.recover.summary import NEEDED_CONFIDENCE, add_summary
+from driftwalk.likelihood.refuse import LIMIT
+from driftwalk.model import Study, apply_overrides
+from driftwalk.model.recover import RANDOM, true_time_step_s
+from driftwalk.schema import build_trajectory
+from driftwalk.schema.check import described
+from driftwalk.schema.kinds import KINDS
+from driftwalk.schema.kinds.recovery import RECOVERED
+from driftwalk.simulation import simulate
+from driftwalk.sweep import Design, Store, grid
 from driftwalk.sweep.processes import single_threaded_processes
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.model import Study
 
-Tell = Callable[[int, int], None]
+PARTS: Final = ("", "_low", "_high", "_sd", "_error", "_z", "_covered")
+"""Suffixes of a score's variables for each parameter, after its name."""
+FLOW_PARTS: Final = ("flow_error", "flow_point_error", "flow_z_rms", "flow_cells")
+FACTS: Final = ("wall_share", "samples_used", "iterations", "converged", "fit_time")
+
+
+@dataclass(frozen=True)
+class FitRecovery(EstimationMethod["SimulatedTracks"]):
+    """A block of known truth, and the likelihood fit that estimates its parameters.
+
+    Attributes
+    ----------
+    study : Study
+        Block, tank, water, forces, observation and the section [recover].
+    flow : xarray.Dataset or None
+        The true flow; None draws another one for every recording.
+    """
+
+    flow: xr.Dataset | None = None
+
+    kind: ClassVar = "recovery"
+    work: ClassVar = "fits"
+
+    @property
+    def angles(self) -> tuple[str, ...]:
+        """Uses of the orientation that the study compares."""
+        return self.study.recover.angle or (self.study.fit.angle,)
+
+    @property
+    def tracking_noise(self) -> float:
+        """Standard deviation of what the camera adds to a position [m], rounding included."""
+        seen = self.study.observation
+        quantum = 0.0 if isinstance(seen.position_quantum_m, str) else seen.position_quantum_m
+        return math.hypot(float(seen.position_noise_m), quantum / math.sqrt(12.0))
+
+    def check(self) -> None:
+        """Refuse a truth that is not whole or cannot be fitted; takes almost no time."""
+        require_truth(self.study, self.angles)
+        require_length(self.study)
+        require_flow(self.study, self.flow)
+
+    def design(self) -> Design:
+        """Return the recordings, their lengths, and the uses of the angle."""
+        # Recordings vary slowest, so that finished work predicts the remaining time.
+        return grid(
+            recording=np.arange(self.study.recover.recordings),
+            duration=np.array(self.study.recover.durations_s),
+            angle=np.arange(len(self.angles)),
+        )
+
+    def recover(
+        self,
+        *,
+        store: Store | None = None,
+        threads: int | None = None,
+        executor: Executor | None = None,
+        tell: Tell = tell_nobody,
+    ) -> xr.Dataset:
+        """Fit recordings in processes of this machine, or on other workers."""
+        if executor or threads is None:
+            return self.sweep(store, executor, tell)
+        with single_threaded_processes(threads) as workers:
+            return self.sweep(store, workers, tell)
+
+    def dataset(self, found: Mapping[str, Any]) -> xr.Dataset:
+        """Return the `recovery`."""
+        import xarray as xr
+
+        study = self.study
+        dims = ("duration", "angle", "recording")
+        tables = {key: np.moveaxis(values, 0, -1) for key, values in found.items()}
+        fitted = tables["status"] == ESTIMATED
+        used = fitted & (np.where(fitted, tables["wall_share"], 1.0) <= LIMIT.most_wall_share)
+        data = {
+            **{
+                f"{name}{part}": tables[f"{one.key}{part}"]
+                for name, one in RECOVERED.items()
+                for part in PARTS
+            },
+            **{key: tables[key] for key in (*FLOW_PARTS, *FACTS, "status")},
+            "message": tables["message"].astype(object),
+            "used": used.astype(np.int8),
+        }
+        coords = {
+            "duration": ("duration", np.array(study.recover.durations_s)),
+            "angle": ("angle", np.array(self.angles, dtype=object)),
+            "recording": ("recording", np.arange(study.recover.recordings)),
+        }
+        facts = {"kind": "recovery", "schema_version": KINDS["recovery"].version, **self._attrs()}
+        dataset = xr.Dataset({key: (dims, one) for key, one in data.items()}, coords, facts)
+        return described(add_summary(dataset))
+
+    def _attrs(self) -> dict[str, Any]:
+        study = self.study
+        settings, forces = study.recover, study.forces
+        asked = settings.drag_coefficient_precision
+        return {
+            "drag_coefficient": forces.drag_coefficient,
+            "force_std_N": forces.force_std_N,
+            "force_interval_s": forces.force_interval_s,
+            "tracking_noise_m": self.tracking_noise,
+            "flow": _flow_name(study, self.flow),
+            "sample_interval_s": settings.sample_interval_s,
+            "recordings_per_fit": settings.recordings_per_fit,
+            "missing_share": settings.missing_share,
+            "seed": settings.seed,
+            "confidence": study.fit.confidence,
+            "coverage_confidence": COVERAGE_CONFIDENCE,
+            "needed_confidence": NEEDED_CONFIDENCE,
+            "most_wall_share": LIMIT.most_wall_share,
+            "drag_coefficient_precision": np.nan if asked is None else asked,
+            "study": study.to_toml(),
+        }
+
+    def flow_of(self, recording: int) -> xr.Dataset:
+        """Return the flow in which a recording is made."""
+        if self.flow is not None:
+            return self.flow
+        settings = self.study.recover
+        return random_tank_flow(
+            self.seed_of(recording, RecoveryStream.FLOW),
+            family=settings.flow_family,
+            arena=self.study.tank.to_arena(),
+            speed=settings.flow_speed_m_s,
+        )
+
+    @one_blas_thread()
+    def simulate(self, setting: Mapping[str, Any]) -> SimulatedTracks:
+        """Return what the camera records of one world, or of several that are fitted together.
+
+        A longer recording begins with the shorter one of the same number.
+        """
+        settings, recording = self.study.recover, int(setting["recording"])
+        flow = self.flow_of(recording)
+        clock = self.clock(float(setting["duration"]))
+        run = simulate(
+            _simulated_study(self.study),
+            flow,
+            sample_time=settings.settling_s + clock,
+            replicates=settings.recordings_per_fit,
+            seed=self.seed_of(recording, RecoveryStream.WORLD),
+            backend="reference",
+            threads=1,
+        )
+        if np.any(run["status"].values):
+            raise InputError("the simulation broke")
+        missed = self.missed(recording, clock.size, settings.recordings_per_fit)
+        tracks = [
+            build_trajectory(
+                clock,
+                *(
+                    np.where(lost, np.nan, run[name].values[number, :, 0].astype(np.float64))
+                    for name in ("x", "y", "theta")
+                ),
+                attrs={"source": "simulated"},
+            )
+            for number, lost in enumerate(missed.T)
+        ]
+        return SimulatedTracks(tracks, flow)
+
+    @one_blas_thread()
+    def estimate(self, recording: SimulatedTracks, setting: Mapping[str, Any]) -> dict[str, Any]:
+        """Fit the tracks, and compare the fit with the truth."""
+        study = apply_overrides(self.study, {"fit.angle": self.angles[int(setting["angle"])]})
+        began = time.perf_counter()
+        fit = fit_motion(recording.tracks, study)
+        took = time.perf_counter() - began
+        forces = self.study.forces
+        score = score_fit(
+            fit,
+            drag_coefficient=forces.drag_coefficient,
+            force_std=forces.force_std_N,
+            tracking_noise=self.tracking_noise,
+            flow=recording.flow,
+            recordings=recording.tracks,
+        )
+        facts = {name: fit[name].item() for name in ("wall_share", "samples_used", "iterations")}
+        found = {**score, **facts, "converged": bool(fit["converged"]), "fit_time": took}
+        return {name: float(found[name]) for name in self.missing()}
+
+    def missing(self) -> dict[str, Any]:
+        """Return the estimates of a recording without a fit."""
+        names = [f"{name}{part}" for name in SCORED for part in PARTS]
+        return dict.fromkeys([*names, *FLOW_PARTS, *FACTS], math.nan)
+
+
+class SimulatedTracks(NamedTuple):
+    """Tracks of the camera, all in one flow."""
+
+    tracks: list[xr.Dataset]
+    flow: xr.Dataset
+
+
+def _simulated_study(study: Study) -> Study:
+    """Return the study with a step fine enough for a truth, and a camera that has numbers."""
+    step = true_time_step_s(
+        study.simulation.time_step_s, force_interval_s=study.forces.force_interval_s
+    )
+    changes: dict[str, Any] = {"simulation.time_step_s": step}
+    if isinstance(study.observation.orientation_noise_rad, str):
+        changes["observation.orientation_noise_rad"] = 0.0
+    return apply_overrides(study, changes)
+
+
+def _flow_name(study: Study, flow: xr.Dataset | None) -> str:
+    if flow is None:
+        return f"random, {study.recover.flow_family}"
+    named = study.recover.flow
+    return str(flow.attrs.get("source", "given")) if named in (None, RANDOM) else str(named)
 
 
 def recovery_study(
@@ -29,7 +255,7 @@ def recovery_study(
     store: Store | None = None,
     threads: int | None = None,
     executor: Executor | None = None,
-    tell: Tell | None = None,
+    tell: Callable[[int, int], None] | None = None,
 ) -> xr.Dataset:
     """Simulate recordings of known truth, fit them, and measure how well the fits recover it.
 
@@ -77,44 +303,11 @@ def recovery_study(
     >>> float(found["rms_error"].sel(parameter="drag_coefficient").squeeze())  # doctest: +SKIP
     0.04
     """
-    method = FitRecovery(study, flow)
-    method.check()
-    settings = study.recover
-    # Recordings vary slowest, so that finished work predicts the remaining time.
-    design = grid(
-        recording=np.arange(settings.recordings),
-        duration=np.array(settings.durations_s),
-        angle=np.arange(len(method.angles)),
+
+    def told(done: int, total: int, _: str) -> None:
+        if tell is not None:
+            tell(done, total)
+
+    return FitRecovery(study, flow).recover(
+        store=store, threads=threads, executor=executor, tell=told
     )
-    with (
-        nullcontext(executor)
-        if executor or threads is None
-        else single_threaded_processes(threads) as workers
-    ):
-        found = run_sweep(method, design.units(1), store=store, executor=workers, progress=tell)
-    return build_recovery(method, design.unstack(found))
-
-
-def check_recovery(study: Study, flow: xr.Dataset | None = None) -> None:
-    """Raise the errors that `recovery_study` would raise; takes almost no time.
-
-    Parameters
-    ----------
-    study, flow
-        As of `recovery_study`.
-
-    Raises
-    ------
-    InputError
-        When a true value is missing, a recording is shorter than the fit needs, or the flow does
-        not cover the tank.
-
-    Examples
-    --------
-    >>> import driftwalk as dw
-    >>> dw.likelihood.check_recovery(dw.Study(), dw.tank30_flow())
-    Traceback (most recent call last):
-        ...
-    driftwalk.core.errors.InputError: the truth lacks [observation] position_noise_m: ...
-    """
-    FitRecovery(study, flow).check()

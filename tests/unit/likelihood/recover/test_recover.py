@@ -9,8 +9,8 @@ from recovery_worlds import small_study
 
 import driftwalk as dw
 from driftwalk.core.errors import ConfigurationError, InputError
-from driftwalk.likelihood.recover import truth as recovery_truth
-from driftwalk.likelihood.recover.truth import FitRecovery
+from driftwalk.likelihood import FitRecovery
+from driftwalk.likelihood.recover import run as recovery_run
 from driftwalk.model import apply_overrides
 from driftwalk.model.recover import true_time_step_s
 from driftwalk.schema.answers.facts import facts_of
@@ -162,7 +162,7 @@ def test_a_simulation_that_breaks_is_data(
         run["status"].values[-1] = 1
         return run
 
-    monkeypatch.setattr(recovery_truth, "simulate", broken)
+    monkeypatch.setattr(recovery_run, "simulate", broken)
     found = dw.recovery_study(small_study(recordings_per_fit=2), flow)
     assert (found["status"].values == 2).all()
     assert np.isnan(found["drag_coefficient"].values).all()
@@ -184,30 +184,30 @@ def test_a_simulation_that_breaks_is_data(
 def test_refusals(changes: dict, words: str, flow: xr.Dataset) -> None:
     study = apply_overrides(small_study(), changes)
     with pytest.raises(InputError, match=words):
-        dw.likelihood.check_recovery(study, flow)
+        FitRecovery(study, flow).check()
     with pytest.raises(InputError, match=words):
         dw.recovery_study(study, flow)
 
 
 def test_refusals_of_flows(flow: xr.Dataset) -> None:
     with pytest.raises(InputError, match="the flow of the water is missing"):
-        dw.likelihood.check_recovery(small_study())
+        FitRecovery(small_study()).check()
     with pytest.raises(InputError, match=r"flow\.nc .* has to be loaded"):
-        dw.likelihood.check_recovery(small_study(flow="flow.nc"))
+        FitRecovery(small_study(flow="flow.nc")).check()
     frames = flow.expand_dims(time=[0.0, 1.0])
     with pytest.raises(InputError, match="frames"):
-        dw.likelihood.check_recovery(small_study(), frames)
+        FitRecovery(small_study(), frames).check()
     with pytest.raises(InputError, match="it spans x from"):
-        dw.likelihood.check_recovery(small_study(), dw.jets_flow(diameter=0.2))
+        FitRecovery(small_study(), dw.jets_flow(diameter=0.2)).check()
     narrow = flow.assign(flag=flow["flag"].where(abs(flow["x"]) < 0.1, 0))
     with pytest.raises(InputError, match="nodes in there are flagged as outside"):
-        dw.likelihood.check_recovery(small_study(), narrow)
-    dw.likelihood.check_recovery(small_study(flow="random"))
+        FitRecovery(small_study(), narrow).check()
+    FitRecovery(small_study(flow="random")).check()
 
 
 def test_without_orientation_its_noise_is_not_asked_for(flow: xr.Dataset) -> None:
     changes = {"observation.orientation_noise_rad": "estimate", "recover.angle": ["none"]}
-    dw.likelihood.check_recovery(apply_overrides(small_study(), changes), flow)
+    FitRecovery(apply_overrides(small_study(), changes), flow).check()
 
 
 @pytest.mark.parametrize(

@@ -1,89 +1,21 @@
-"""The `recovery` dataset: the fit of every recording, errors and coverage, the length to record."""
+"""Summary of a recovery study of fits: errors, coverage, and the length to record."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.calibration.recover.study import ESTIMATED
-from driftwalk.calibration.recover.summary import COVERAGE_CONFIDENCE, Summary, summarise
+from driftwalk.calibration.recover.summary import Summary, summarise
 from driftwalk.core.arrays import Floats
-from driftwalk.likelihood.recover.truth import FACTS, FLOW_PARTS, PARTS, FitRecovery
-from driftwalk.likelihood.refuse import LIMIT
-from driftwalk.model.recover import RANDOM
-from driftwalk.schema.check import described
-from driftwalk.schema.kinds import KINDS
 from driftwalk.schema.kinds.recovery import RECOVERED
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.model import Study
-
 _ERROR: Final = ("error", "z", "covered")
 NEEDED_CONFIDENCE: Final = 0.9
 """Confidence of the interval of the time that one must record."""
-
-
-def build_recovery(method: FitRecovery, found: Mapping[str, Any]) -> xr.Dataset:
-    """Return the dataset of a recovery study, from arrays by (recording, duration, angle)."""
-    import xarray as xr
-
-    study = method.study
-    dims = ("duration", "angle", "recording")
-    tables = {key: np.moveaxis(values, 0, -1) for key, values in found.items()}
-    fitted = tables["status"] == ESTIMATED
-    used = fitted & (np.where(fitted, tables["wall_share"], 1.0) <= LIMIT.most_wall_share)
-    data = {
-        **{
-            f"{name}{part}": tables[f"{one.key}{part}"]
-            for name, one in RECOVERED.items()
-            for part in PARTS
-        },
-        **{key: tables[key] for key in (*FLOW_PARTS, *FACTS, "status")},
-        "message": tables["message"].astype(object),
-        "used": used.astype(np.int8),
-    }
-    coords = {
-        "duration": ("duration", np.array(study.recover.durations_s)),
-        "angle": ("angle", np.array(method.angles, dtype=object)),
-        "recording": ("recording", np.arange(study.recover.recordings)),
-    }
-    facts = {"kind": "recovery", "schema_version": KINDS["recovery"].version, **_attrs(method)}
-    dataset = xr.Dataset({key: (dims, one) for key, one in data.items()}, coords, facts)
-    return described(add_summary(dataset))
-
-
-def _attrs(method: FitRecovery) -> dict[str, Any]:
-    study = method.study
-    settings, forces = study.recover, study.forces
-    asked = settings.drag_coefficient_precision
-    return {
-        "drag_coefficient": forces.drag_coefficient,
-        "force_std_N": forces.force_std_N,
-        "force_interval_s": forces.force_interval_s,
-        "tracking_noise_m": method.tracking_noise,
-        "flow": _flow_name(study, method.flow),
-        "sample_interval_s": settings.sample_interval_s,
-        "recordings_per_fit": settings.recordings_per_fit,
-        "missing_share": settings.missing_share,
-        "seed": settings.seed,
-        "confidence": study.fit.confidence,
-        "coverage_confidence": COVERAGE_CONFIDENCE,
-        "needed_confidence": NEEDED_CONFIDENCE,
-        "most_wall_share": LIMIT.most_wall_share,
-        "drag_coefficient_precision": np.nan if asked is None else asked,
-        "study": study.to_toml(),
-    }
-
-
-def _flow_name(study: Study, flow: xr.Dataset | None) -> str:
-    if flow is None:
-        return f"random, {study.recover.flow_family}"
-    named = study.recover.flow
-    return str(flow.attrs.get("source", "given")) if named in (None, RANDOM) else str(named)
 
 
 class Scale(NamedTuple):
