@@ -109,6 +109,9 @@ def recover(
     The directory holds the result, figures and manifest.json. After a kill, the same command
     continues.
     """
+    from driftwalk.runs import RecoveryWork, run_work
+
+    workers = Workers(cluster, cluster_options)
     source = None if run is None else open_run(run, given, model)
     method: FitRecovery | ModelRecovery
     if model is not None or (source is not None and not source.is_block):
@@ -129,10 +132,8 @@ def recover(
             if value:
                 raise ConfigurationError(f"{name} belongs to a --model; the block has --study FILE")
         method, inputs = _of_block(given, source)
-    from driftwalk.runs import RecoveryWork, run_work
-
     work = RecoveryWork(method, inputs, threads)
-    with Workers(cluster, cluster_options).reported("recover") as told:
+    with workers.reported("recover") as told:
         found = run_work(work, out, overwrite=overwrite, **told)
     print_result(found, out, json=json)
 
@@ -148,7 +149,6 @@ def _of_model(
 ) -> tuple[ModelRecovery, dict[str, Path]]:
     """Return a motion model of known truth, and the files that were read."""
     from driftwalk.calibration import ModelRecovery
-    from driftwalk.cli.inputs.assembly_source import load_flow_for
     from driftwalk.conditions import study_for
 
     recording = None
@@ -168,25 +168,16 @@ def _of_model(
     study = timed.study() if source is None else replace(source, given=timed).study()
     if recording is not None:
         study = study_for([recording], study, body=body)
-    inputs = _files(
-        {
-            "truth": given.file,
-            "parameters": None if source is None else source.found.file,
-            "like": like,
-        }
-    )
-    named, field = study.recover.flow, None
-    if named == RANDOM:
+    if study.recover.flow == RANDOM:
         raise ConfigurationError(
             'the flow "random" is for the block: name the file of a flow field (--flow), or leave '
             "it out"
         )
-    if named is not None:
-        path = Path(named)
-        if given.file is not None and "recover.flow" not in given.overrides:
-            path = given.file.parent / named
-        field, inputs = load_flow_for(path, study), {**inputs, "flow": path}
-    return ModelRecovery(study, chosen.model, chosen.values, field, recording, body, noise), inputs
+    field, flow_file = _named_flow(study, given)
+    parameters = None if source is None else source.found.file
+    inputs = {"truth": given.file, "parameters": parameters, "like": like, "flow": flow_file}
+    method = ModelRecovery(study, chosen.model, chosen.values, field, recording, body, noise)
+    return method, _files(inputs)
 
 
 def _of_block(
@@ -195,42 +186,48 @@ def _of_block(
     """Return a block of known truth, and the files that were read."""
     from driftwalk.likelihood import FitRecovery
 
-    named = given.overrides.get(RECOVER_KEYS["flow"])
     if source is not None:
-        chosen, field, inputs = _of_run(source, named)
-        return FitRecovery(chosen, field), inputs
-    truth = given.file
-    if truth is None:
+        study, field, inputs = _of_run(source)
+        return FitRecovery(study, field), inputs
+    if given.file is None:
         raise ConfigurationError(
             "the truth is missing: give a finished run, a study file of the block (--study FILE), "
             "or a motion model with its values (--model NAME --parameter NAME=VALUE)"
         )
-    chosen = given.study()
-    _require_stated(truth)
-    field, flow_file = _flow(chosen, truth, None if named is None else Path(named))
-    return FitRecovery(chosen, field), _files({"truth": truth, "flow": flow_file})
+    study = given.study()
+    _require_stated(given.file)
+    field, flow_file = _named_flow(study, given)
+    return FitRecovery(study, field), _files({"truth": given.file, "flow": flow_file})
 
 
-def _of_run(
-    source: FoundSource, named: str | None
-) -> tuple[Study, xr.Dataset | None, dict[str, Path]]:
+def _of_run(source: FoundSource) -> tuple[Study, xr.Dataset | None, dict[str, Path]]:
     """Return the truth that a run has found: its study with its camera and options; flow, files."""
-    from driftwalk.cli.inputs.assembly_source import load_flow_for
     from driftwalk.conditions import study_as_seen
     from driftwalk.schema import body_track
 
-    found = source.found
+    found, given = source.found, source.given
     own = found.block_study()
     recording = found.recording()
     if recording is not None:
         own = study_as_seen(own, recording, body_track(recording, found.body))
-    study = source.given.over(own, base=f"the study of {source.folder}")
-    if named is None:
+    study = given.over(own, base=f"the study of {source.folder}")
+    if RECOVER_KEYS["flow"] not in given.overrides:
         return study, found.flow(own), found.inputs
-    if named == RANDOM:
-        return study, None, found.inputs
+    field, flow_file = _named_flow(study, given)
+    return study, field, {**found.inputs, **_files({"flow": flow_file})}
+
+
+def _named_flow(study: Study, given: StudyOptions) -> tuple[xr.Dataset | None, Path | None]:
+    """Return the flow field that the study names, and its file; None for random flows."""
+    from driftwalk.cli.inputs.assembly_source import load_flow_for
+
+    named = study.recover.flow
+    if named is None or named == RANDOM:
+        return None, None
     path = Path(named)
-    return study, load_flow_for(path, study), {**found.inputs, "flow": path}
+    if given.file is not None and RECOVER_KEYS["flow"] not in given.overrides:
+        path = given.file.parent / named
+    return load_flow_for(path, study), path
 
 
 def _files(roles: dict[str, Path | None]) -> dict[str, Path]:
@@ -256,14 +253,3 @@ def _require_stated(path: Path) -> None:
                 f"{path}: the truth lacks [{section}] {key}: give the true value, a "
                 "fitted one or a guess"
             )
-
-
-def _flow(study: Study, truth: Path, given: Path | None) -> tuple[xr.Dataset | None, Path | None]:
-    """Return the true flow field and its file; None where every recording has a random one."""
-    from driftwalk.cli.inputs.assembly_source import load_flow_for
-
-    named: Any = study.recover.flow
-    if given is None and named in (None, "random"):
-        return None, None
-    path = given if given is not None else truth.parent / named
-    return load_flow_for(path, study), path
