@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 Tell = Callable[[int, int, str], None]
 """Called with what is done, all of it, and the work under way."""
 ESTIMATED, NOT_ESTIMATED, NOT_SIMULATED = range(3)
-"""Status of a recording; one without an estimate has a message."""
+"""Status of a recording, as in the flags of both kinds; without an estimate it has a message."""
 LONGEST_MESSAGE: Final = 400
 
 RecordingT = TypeVar("RecordingT")
