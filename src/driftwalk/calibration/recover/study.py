@@ -13,7 +13,6 @@ import numpy as np
 
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
-from driftwalk.core.run_stages import tell_nobody
 from driftwalk.core.seeds import world_keys
 from driftwalk.core.streams import RecoveryStream
 from driftwalk.model import Study
@@ -48,17 +47,6 @@ class EstimationMethod(ABC, Generic[RecordingT]):
     """Word for the recordings that are done."""
     parts: ClassVar[int] = 1
     """Parts of a recording in which progress is counted."""
-
-    @abstractmethod
-    def recover(
-        self,
-        *,
-        store: Store | None = None,
-        threads: int | None = None,
-        executor: Executor | None = None,
-        tell: Tell = tell_nobody,
-    ) -> xr.Dataset:
-        """Return the dataset of the study."""
 
     def sweep(self, store: Store | None, executor: Executor | None, tell: Tell) -> xr.Dataset:
         """Simulate and estimate all recordings, and return the dataset of the study."""

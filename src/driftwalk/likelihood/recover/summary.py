@@ -13,7 +13,6 @@ from driftwalk.schema.kinds.recovery import RECOVERED
 if TYPE_CHECKING:
     import xarray as xr
 
-_ERROR: Final = ("error", "z", "covered")
 NEEDED_CONFIDENCE: Final = 0.9
 """Confidence of the interval of the time that one must record."""
 
@@ -60,7 +59,12 @@ def add_summary(recovery: xr.Dataset) -> xr.Dataset:
     summaries = np.array(
         [
             [
-                summarise(*(recovery[f"{name}_{part}"].values[cell][used[cell]] for part in _ERROR))
+                summarise(
+                    *(
+                        recovery[f"{name}_{part}"].values[cell][used[cell]]
+                        for part in ("error", "z", "covered")
+                    )
+                )
                 for cell in cells
             ]
             for name in RECOVERED
