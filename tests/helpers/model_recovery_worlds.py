@@ -8,8 +8,7 @@ import numpy as np
 import xarray as xr
 
 import driftwalk as dw
-from driftwalk.calibration.recover.result import build_model_recovery
-from driftwalk.calibration.recover.truth import known_truth
+from driftwalk.calibration import ModelRecovery
 
 VALUES = {"speed": 0.03, "rotational_diffusion": 0.5, "turn_rate": 0.3}
 
@@ -39,8 +38,7 @@ def made_up_recovery(found: dict[str, Any] | None = None) -> xr.Dataset:
     count = {"recover.recordings": len(chosen["status"]), "recover.durations_s": [600.0]}
     study = dw.apply_overrides(dw.Study(), {**count, "observation.position_noise_m": 3e-4})
     model = dw.motion_model("active")
-    known = known_truth(model, VALUES, study, flow=None, like=None, body=None)
-    return build_model_recovery(known, chosen)
+    return ModelRecovery(study, model, VALUES).dataset(chosen)
 
 
 def lost(found: dict[str, Any], which: int, status: int, message: str) -> dict[str, Any]:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from driftwalk.likelihood.recover.one import FACTS, FLOW_PARTS, PARTS
-from driftwalk.likelihood.recover.summary import PARAMETERS, add_summary
+from driftwalk.likelihood.recover.run import FACTS, FLOW_PARTS, PARTS
+from driftwalk.likelihood.recover.summary import add_summary
 from driftwalk.model import Study
+from driftwalk.schema.kinds.recovery import RECOVERED
 
 TRUTH = {"drag_coefficient": 0.4, "force_std_N": 6e-4, "tracking_noise_m": 3e-4}
 SD = 0.1
@@ -33,7 +34,7 @@ def synthetic_recovery(
     shape = (len(durations), len(angles), recordings)
     length = np.array(durations)[:, None, None]
     data: dict[str, tuple[tuple[str, ...], np.ndarray]] = {}
-    for name, truth in zip(PARAMETERS, TRUTH.values(), strict=True):
+    for name, truth in zip(RECOVERED, TRUTH.values(), strict=True):
         off = generator.normal(size=shape) * 3.0 / np.sqrt(length)
         value = truth * np.exp(off)
         ends = [value * np.exp(side * 1.645 * SD) for side in (-1, 1)]
@@ -62,4 +63,4 @@ def synthetic_recovery(
         **{"drag_coefficient_precision": 0.05, "sample_interval_s": 0.1, "seed": 1},
         **{"recordings_per_fit": 1, "missing_share": 0.0},
     }
-    return add_summary(xr.Dataset(data, coords=coords, attrs=attrs), precision=0.05)
+    return add_summary(xr.Dataset(data, coords=coords, attrs=attrs))

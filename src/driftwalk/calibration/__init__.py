@@ -7,7 +7,7 @@ from driftwalk.calibration.ranking.compare import (
     check_models,
     compare_models,
 )
-from driftwalk.calibration.recover import check_model_recovery, recover_model
+from driftwalk.calibration.recover.run import ModelRecovery, recover_model
 from driftwalk.calibration.refuse import MOST_PARAMETERS
 from driftwalk.calibration.run import calibrate
 
@@ -15,8 +15,8 @@ __all__ = [
     "ALL_MODELS",
     "DEFAULT_MODELS",
     "MOST_PARAMETERS",
+    "ModelRecovery",
     "calibrate",
-    "check_model_recovery",
     "check_models",
     "check_recording",
     "compare_models",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import typer
 
@@ -30,6 +30,8 @@ from driftwalk.core.study_keys import RECOVER_KEYS
 if TYPE_CHECKING:
     import xarray as xr
 
+    from driftwalk.calibration import ModelRecovery
+    from driftwalk.likelihood import FitRecovery
     from driftwalk.model import Study
 
 STATED: Final = ("forces.drag_coefficient", "forces.force_std_N")
@@ -107,158 +109,125 @@ def recover(
     state (--known). The directory holds the result, figures and manifest.json. If you stop the run,
     the same command continues it.
     """
+    from driftwalk.runs import RecoveryWork, run_work
+
     workers = Workers(cluster, cluster_options)
     source = None if run is None else open_run(run, given, model)
+    method: FitRecovery | ModelRecovery
     if model is not None or (source is not None and not source.is_block):
         _refuse(given, OF_THE_BLOCK, "about the block, which --model replaces; leave it out")
         of_model = [name for name in known or () if name != NOISE]
         chosen = partly_known_model(model, parameters, run, of_model)
-        found = None if source is None else source.found.file
-        inputs = {"truth": given.file, "parameters": found, "like": like}
         noise: Noise = "known" if NOISE in (known or ()) else "estimated"
-        set_up = _SetUp(given, source, sample_rate, like, body, _files(inputs), threads, noise)
-        _of_model(chosen, set_up, out, workers, overwrite=overwrite, json=json)
-        return
-    _refuse(given, OF_A_MODEL, "belongs to a --model; for the block it stands in --study FILE")
-    beside = {
-        "--parameter": parameters, "--known": known,
-        "--like": like, "--body": body, "--sample-rate": sample_rate,
-    }  # fmt: skip
-    for name, value in beside.items():
-        if value:
-            raise ConfigurationError(f"{name} belongs to a --model; the block has --study FILE")
-    if source is None and given.file is None:
-        raise ConfigurationError(
-            "the truth is missing: give a finished run, a study file of the block (--study FILE), "
-            "or a motion model with its values (--model NAME --parameter NAME=VALUE)"
-        )
-    _of_block(source, given, out, threads, workers, overwrite=overwrite, json=json)
-
-
-class _SetUp(NamedTuple):
-    """How the recordings of a motion model are made."""
-
-    given: StudyOptions
-    source: FoundSource | None
-    sample_rate: float | None
-    like: Path | None
-    body: str | None
-    inputs: dict[str, Path]
-    threads: int | None
-    noise: Noise
-
-    def study(self, recording: xr.Dataset | None) -> Study:
-        """Return the study, in the tank of a recording where there is one."""
-        from driftwalk.conditions import study_for
-
-        given = self.given
-        if self.sample_rate is not None:
-            if not self.sample_rate > 0.0:
-                raise ConfigurationError(f"--sample-rate {self.sample_rate:g}: give a rate above 0")
-            clock = {"recover.sample_interval_s": 1.0 / self.sample_rate}
-            given = given.and_also(clock, keys={"sample_rate": "recover.sample_interval_s"})
-        study = given.study() if self.source is None else replace(self.source, given=given).study()
-        return study if recording is None else study_for([recording], study, body=self.body)
+        method, inputs = _of_model(chosen, given, source, sample_rate, like, body, noise)
+        for warning in chosen.warnings:
+            print_note(f"warning: {warning}")
+    else:
+        _refuse(given, OF_A_MODEL, "belongs to a --model; for the block it stands in --study FILE")
+        beside = {
+            "--parameter": parameters, "--known": known,
+            "--like": like, "--body": body, "--sample-rate": sample_rate,
+        }  # fmt: skip
+        for name, value in beside.items():
+            if value:
+                raise ConfigurationError(f"{name} belongs to a --model; the block has --study FILE")
+        method, inputs = _of_block(given, source)
+    work = RecoveryWork(method, inputs, threads)
+    with workers.reported("recover") as told:
+        found = run_work(work, out, overwrite=overwrite, **told)
+    print_result(found, out, json=json)
 
 
 def _of_model(
     chosen: KnownModel,
-    set_up: _SetUp,
-    out: Path,
-    workers: Workers,
-    *,
-    overwrite: bool,
-    json: bool,
-) -> None:
-    from driftwalk.cli.inputs.assembly_source import load_flow_for
-    from driftwalk.runs import ModelRecoveryWork, run_work
+    given: StudyOptions,
+    source: FoundSource | None,
+    sample_rate: float | None,
+    like: Path | None,
+    body: str | None,
+    noise: Noise,
+) -> tuple[ModelRecovery, dict[str, Path]]:
+    """Return a motion model of known truth, and the files that were read."""
+    from driftwalk.calibration import ModelRecovery
+    from driftwalk.conditions import study_for
 
     recording = None
-    if set_up.like is not None:
-        recording = RecordingOptions(body=set_up.body).load(set_up.like)
-        _refuse(set_up.given, ("recover.durations_s",), "given by the recording of --like")
-        if set_up.sample_rate is not None:
+    if like is not None:
+        recording = RecordingOptions(body=body).load(like)
+        _refuse(given, ("recover.durations_s",), "given by the recording of --like")
+        if sample_rate is not None:
             raise ConfigurationError("--sample-rate: given by the recording of --like")
-    elif set_up.body is not None:
+    elif body is not None:
         raise ConfigurationError("--body belongs to --like")
-    study, inputs = set_up.study(recording), set_up.inputs
-    named = study.recover.flow
-    field = None
-    if named == RANDOM:
+    timed = given
+    if sample_rate is not None:
+        if not sample_rate > 0.0:
+            raise ConfigurationError(f"--sample-rate {sample_rate:g}: give a rate above 0")
+        clock = {"recover.sample_interval_s": 1.0 / sample_rate}
+        timed = given.and_also(clock, keys={"sample_rate": "recover.sample_interval_s"})
+    study = timed.study() if source is None else replace(source, given=timed).study()
+    if recording is not None:
+        study = study_for([recording], study, body=body)
+    if study.recover.flow == RANDOM:
         raise ConfigurationError(
             'the flow "random" is for the block: name the file of a flow field (--flow), or leave '
             "it out"
         )
-    if named is not None:
-        path = Path(named)
-        if set_up.given.file is not None and "recover.flow" not in set_up.given.overrides:
-            path = set_up.given.file.parent / named
-        field, inputs = load_flow_for(path, study), {**inputs, "flow": path}
-    work = ModelRecoveryWork(
-        chosen.model,
-        chosen.values,
-        study,
-        field,
-        recording,
-        set_up.body,
-        inputs,
-        set_up.threads,
-        set_up.noise,
-    )
-    for warning in chosen.warnings:
-        print_note(f"warning: {warning}")
-    with workers.reported("recover") as told:
-        found = run_work(work, out, overwrite=overwrite, **told)
-    print_result(found, out, json=json)
+    field, flow_file = _named_flow(study, given)
+    parameters = None if source is None else source.found.file
+    inputs = {"truth": given.file, "parameters": parameters, "like": like, "flow": flow_file}
+    method = ModelRecovery(study, chosen.model, chosen.values, field, recording, body, noise)
+    return method, _files(inputs)
 
 
 def _of_block(
-    source: FoundSource | None,
-    given: StudyOptions,
-    out: Path,
-    threads: int | None,
-    workers: Workers,
-    *,
-    overwrite: bool,
-    json: bool,
-) -> None:
-    from driftwalk.runs import RecoveryWork, run_work
+    given: StudyOptions, source: FoundSource | None
+) -> tuple[FitRecovery, dict[str, Path]]:
+    """Return a block of known truth, and the files that were read."""
+    from driftwalk.likelihood import FitRecovery
 
-    named = given.overrides.get(RECOVER_KEYS["flow"])
     if source is not None:
-        chosen, field, inputs = _of_run(source, named)
-    else:
-        chosen, truth = given.study(), given.file
-        assert truth is not None
-        _require_stated(truth)
-        field, flow_file = _flow(chosen, truth, None if named is None else Path(named))
-        inputs = _files({"truth": truth, "flow": flow_file})
-    work = RecoveryWork(chosen, field, inputs, threads)
-    with workers.reported("recover") as told:
-        found = run_work(work, out, overwrite=overwrite, **told)
-    print_result(found, out, json=json)
+        study, field, inputs = _of_run(source)
+        return FitRecovery(study, field), inputs
+    if given.file is None:
+        raise ConfigurationError(
+            "the truth is missing: give a finished run, a study file of the block (--study FILE), "
+            "or a motion model with its values (--model NAME --parameter NAME=VALUE)"
+        )
+    study = given.study()
+    _require_stated(given.file)
+    field, flow_file = _named_flow(study, given)
+    return FitRecovery(study, field), _files({"truth": given.file, "flow": flow_file})
 
 
-def _of_run(
-    source: FoundSource, named: str | None
-) -> tuple[Study, xr.Dataset | None, dict[str, Path]]:
+def _of_run(source: FoundSource) -> tuple[Study, xr.Dataset | None, dict[str, Path]]:
     """Return the truth that a run has found: its study with its camera and options; flow, files."""
-    from driftwalk.cli.inputs.assembly_source import load_flow_for
     from driftwalk.conditions import study_as_seen
     from driftwalk.schema import body_track
 
-    found = source.found
+    found, given = source.found, source.given
     own = found.block_study()
     recording = found.recording()
     if recording is not None:
         own = study_as_seen(own, recording, body_track(recording, found.body))
-    study = source.given.over(own, base=f"the study of {source.folder}")
-    if named is None:
+    study = given.over(own, base=f"the study of {source.folder}")
+    if RECOVER_KEYS["flow"] not in given.overrides:
         return study, found.flow(own), found.inputs
-    if named == RANDOM:
-        return study, None, found.inputs
+    field, flow_file = _named_flow(study, given)
+    return study, field, {**found.inputs, **_files({"flow": flow_file})}
+
+
+def _named_flow(study: Study, given: StudyOptions) -> tuple[xr.Dataset | None, Path | None]:
+    """Return the flow field that the study names, and its file; None for random flows."""
+    from driftwalk.cli.inputs.assembly_source import load_flow_for
+
+    named = study.recover.flow
+    if named is None or named == RANDOM:
+        return None, None
     path = Path(named)
-    return study, load_flow_for(path, study), {**found.inputs, "flow": path}
+    if given.file is not None and RECOVER_KEYS["flow"] not in given.overrides:
+        path = given.file.parent / named
+    return load_flow_for(path, study), path
 
 
 def _files(roles: dict[str, Path | None]) -> dict[str, Path]:
@@ -284,14 +253,3 @@ def _require_stated(path: Path) -> None:
                 f"{path}: the truth lacks [{section}] {key}: give the true value, a "
                 "fitted one or a guess"
             )
-
-
-def _flow(study: Study, truth: Path, given: Path | None) -> tuple[xr.Dataset | None, Path | None]:
-    """Return the true flow field and its file; None where every recording has a random one."""
-    from driftwalk.cli.inputs.assembly_source import load_flow_for
-
-    named: Any = study.recover.flow
-    if given is None and named in (None, "random"):
-        return None, None
-    path = given if given is not None else truth.parent / named
-    return load_flow_for(path, study), path

@@ -7,9 +7,10 @@ from driftwalk.figures.laws import laws_figures, plot_laws
 from driftwalk.figures.model_calibration import model_calibration_figures
 from driftwalk.figures.model_check import check_figures
 from driftwalk.figures.model_comparison import comparison_figures, plot_models
-from driftwalk.figures.model_recovery import model_recovery_figures, plot_model_recovery
 from driftwalk.figures.recovery import (
+    model_recovery_figures,
     plot_flow_recovery,
+    plot_model_recovery,
     plot_recovery,
     plot_recovery_error,
     recovery_figures,

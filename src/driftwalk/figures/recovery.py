@@ -1,4 +1,4 @@
-"""The figures of a recovery study: estimates next to the truth, and how their error falls."""
+"""The figures of recovery studies: estimates next to the truth, and how their error falls."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
 from driftwalk.figures.write import Figures
 from driftwalk.plot.parts.style import (
@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Floats = npt.NDArray[np.float64]
-
 SHOWN: Final = {
     "drag_coefficient": ("drag_coefficient", 1.0, "$C_d$"),
     "force_std": ("force_std_N", 1e3, "$\\sigma_F$ (mN)"),
@@ -42,6 +40,12 @@ COLORS: Final = (BLUE, ORANGE, "#009E73", "#CC79A7")
 LABELLED: Final = ("drag_coefficient", "force_std")
 BETWEEN_GROUPS: Final = 2.0
 SPREAD: Final = 0.5
+ROW_MM: Final = 13.0
+AROUND_MM: Final = 24.0
+ROW_SPREAD: Final = 0.7
+"""Part of a row over which its recordings stand."""
+MOST_SHOWN: Final = 2.0
+"""Intervals are drawn to this error, in either direction."""
 
 
 def plot_recovery(
@@ -251,7 +255,7 @@ def _error_figure(recovery: xr.Dataset) -> Figure:
 
 def _groups(
     recovery: xr.Dataset,
-) -> Iterator[tuple[Floats, npt.NDArray[np.bool_], str, str, xr.Dataset]]:
+) -> Iterator[tuple[Floats, Bools, str, str, xr.Dataset]]:
     """Give place, which are used, colour, name and dataset of each group of recordings."""
     angles = recovery["angle"].values
     count = recovery.sizes["recording"]
@@ -293,3 +297,115 @@ def _logarithmic(ax: Axes) -> None:
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axis.set_major_formatter(plain)
         axis.set_minor_formatter(NullFormatter())
+
+
+def plot_model_recovery(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw the errors of every parameter, with the intervals of all recordings.
+
+    A row holds the recordings of a parameter, the first one on top. Estimates of parameters that
+    their recording determines are filled circles, the others open squares.
+
+    Parameters
+    ----------
+    recovery : xarray.Dataset
+        A `model_recovery`.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure when left out.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+
+    Raises
+    ------
+    InputError
+        When the dataset is of another kind.
+
+    Examples
+    --------
+    ``plot_model_recovery(recovery)``
+    """
+    require_kind(recovery, "model_recovery", "recover_model makes one")
+    ax = axes_or_new(ax)
+    names = [str(name) for name in recovery["parameter"].values]
+    count = recovery.sizes["recording"]
+    errors, ends = _percent(recovery, "error"), _percent(recovery, "error_interval", "bound")
+    offsets = ROW_SPREAD * ((np.arange(count) + 0.5) / count - 0.5)
+    known = recovery["determined"].transpose("recording", "parameter").values.astype(bool)
+    ax.axvline(0.0, color=INK, lw=0.7, zorder=0)
+    for row in range(len(names)):
+        for kept, color, marker, face, words in (
+            (known[:, row], BLUE, "o", BLUE, "determined"),
+            (~known[:, row], ORANGE, "s", "white", "not determined"),
+        ):
+            at, value = (row + offsets)[kept], errors[kept, row]
+            low, high = ends[kept, row].T
+            # A calibration without draws has an estimate and no interval.
+            ax.hlines(at, np.fmin(low, value), np.fmax(high, value), color=color, lw=0.7)
+            ax.plot(
+                value, at, marker, ms=2.6, mfc=face, mec=color, mew=0.7, ls="",
+                label=words if row == 0 else None,
+            )  # fmt: skip
+        if row:
+            ax.axhline(row - 0.5, color=PALE, lw=0.8, zorder=0)
+    ax.set_yticks(np.arange(len(names)), [name.replace("_", " ") for name in names])
+    ax.tick_params(axis="y", length=0.0)
+    ax.set_ylim(len(names) - 0.5, -0.5)
+    ax.set_xlim(*_limits(errors, ends))
+    ax.set_xlabel("error of the estimate (%)")
+    return ax
+
+
+def model_recovery_figures(model_recovery: xr.Dataset) -> Figures:
+    """Return the figure of a recovery study of a motion model.
+
+    Parameters
+    ----------
+    model_recovery : xarray.Dataset
+        A `model_recovery`.
+
+    Returns
+    -------
+    dict of str to callable
+        ``errors``.
+
+    Raises
+    ------
+    InputError
+        When the dataset is of another kind.
+
+    Examples
+    --------
+    ``write_figures(model_recovery_figures(recovery), "recovery/figures")``
+    """
+    require_kind(model_recovery, "model_recovery", "recover_model makes one")
+    return {"errors": lambda: _model_figure(model_recovery)}
+
+
+def _model_figure(recovery: xr.Dataset) -> Figure:
+    rows = recovery.sizes["parameter"]
+    figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=ROW_MM * rows + AROUND_MM)
+    ax = plot_model_recovery(recovery, figure.add_subplot())
+    facts = recovery.attrs
+    ax.set_title(
+        f"{facts['model']}: {recovery.sizes['recording']} recordings of "
+        f"{float(facts['duration_s']):g} s, {float(facts['confidence']):.0%} intervals",
+        loc="left",
+    )
+    figure.legend(*ax.get_legend_handles_labels(), loc="outside lower right", ncols=2)
+    return figure
+
+
+def _percent(recovery: xr.Dataset, name: str, *dims: str) -> Floats:
+    return np.asarray(100.0 * recovery[name].transpose("recording", "parameter", *dims).values)
+
+
+def _limits(errors: Floats, ends: Floats) -> tuple[float, float]:
+    """Return what is shown: everything that is finite, and not far off for a few wide ones."""
+    both = np.concatenate([errors.ravel(), ends.ravel()])
+    both = both[np.isfinite(both)]
+    most = 100.0 * MOST_SHOWN
+    reach = float(np.abs(both).max()) if both.size else most
+    reach = 1.08 * min(reach, most) or 1.0
+    return -reach, reach

@@ -5,15 +5,15 @@ from driftwalk.likelihood.contacts.estimate import estimate_wall
 from driftwalk.likelihood.fit import check_fit, fit_motion
 from driftwalk.likelihood.flow_of_fit import fitted_flow
 from driftwalk.likelihood.law.held_out import compare_laws
-from driftwalk.likelihood.recover.run import check_recovery, recovery_study
+from driftwalk.likelihood.recover.run import FitRecovery, recovery_study
 from driftwalk.likelihood.recover.score import score_fit
 from driftwalk.likelihood.refuse import fit_work
 
 __all__ = [
+    "FitRecovery",
     "Judged",
     "check_fit",
     "check_model",
-    "check_recovery",
     "compare_laws",
     "estimate_wall",
     "fit_motion",

@@ -20,10 +20,9 @@ from driftwalk.page.sections.fit import fit_sections
 from driftwalk.page.sections.flow import flow_section
 from driftwalk.page.sections.manifest import manifest_section
 from driftwalk.page.sections.map import map_section
-from driftwalk.page.sections.model_recovery import model_recovery_sections
 from driftwalk.page.sections.models import model_sections
 from driftwalk.page.sections.recording import trajectory_section
-from driftwalk.page.sections.recovery import recovery_sections
+from driftwalk.page.sections.recovery import model_recovery_sections, recovery_sections
 
 __all__ = [
     "assembly_sections",

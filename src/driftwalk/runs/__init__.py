@@ -5,7 +5,6 @@ from driftwalk.runs.calibration import CalibrationWork
 from driftwalk.runs.finished_run import FoundRun, flow_of_result, read_found, run_folder
 from driftwalk.runs.fit import Fitted, FitWork
 from driftwalk.runs.model_comparison import ModelComparisonWork
-from driftwalk.runs.model_recovery import ModelRecoveryWork
 from driftwalk.runs.recovery import RecoveryWork
 from driftwalk.runs.resumable_run import Progress, Run, Work, run_work
 from driftwalk.runs.sensitivity import SensitivityResult, SensitivityWork
@@ -19,7 +18,6 @@ __all__ = [
     "Fitted",
     "FoundRun",
     "ModelComparisonWork",
-    "ModelRecoveryWork",
     "Progress",
     "RecoveryWork",
     "Run",

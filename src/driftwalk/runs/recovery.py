@@ -1,18 +1,21 @@
-"""The run of a recovery study: recordings of known truth, each fitted."""
+"""The run of a recovery study: recordings of known truth, each fitted or calibrated."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from driftwalk.core.processors import default_threads
 from driftwalk.runs.dataset_hash import dataset_hash
+from driftwalk.schema.runs import run_kind
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from driftwalk.calibration import ModelRecovery
+    from driftwalk.likelihood import FitRecovery
     from driftwalk.model import Study
     from driftwalk.runs.resumable_run import Run
 
@@ -23,22 +26,27 @@ class RecoveryWork:
 
     Attributes
     ----------
-    study : Study
-        The truth and the section [recover].
-    flow : xarray.Dataset or None
-        The true flow; None for random ones.
+    method : FitRecovery or ModelRecovery
+        The truth, and the way to estimate it.
     inputs : mapping of str to Path
         The files that were read, by their role.
     threads : int or None
-        Fits at once; None for as many as there are processors.
+        Fits at once, or threads of a calibration; None for as many as there are processors.
     """
 
-    study: Study
-    flow: xr.Dataset | None
+    method: FitRecovery | ModelRecovery
     inputs: Mapping[str, Path]
     threads: int | None = None
 
-    kind: ClassVar = "recovery"
+    @property
+    def kind(self) -> str:
+        """Name of its kind."""
+        return self.method.kind
+
+    @property
+    def study(self) -> Study:
+        """The study, with the section [recover]."""
+        return self.method.study
 
     @property
     def seeds(self) -> dict[str, int]:
@@ -46,30 +54,38 @@ class RecoveryWork:
         return {"recovery": self.study.recover.seed}
 
     def checked(self) -> Self:
-        """Refuse a truth that is not whole or cannot be fitted."""
-        from driftwalk.likelihood import check_recovery
-
-        check_recovery(self.study, self.flow)
+        """Refuse a truth that is not whole or cannot be estimated."""
+        self.method.check()
         return self
 
     def specification(self) -> dict[str, Any]:
         """Return what determines the numbers of the study."""
-        flow = self.flow
-        return {
+        from driftwalk.calibration import ModelRecovery
+
+        method, flow = self.method, self.method.flow
+        said: dict[str, Any] = {
             "study": self.study.to_dict(),
             "flow_sha256": None if flow is None else dataset_hash(flow, ("u", "v")),
         }
+        if not isinstance(method, ModelRecovery):
+            return said
+        like = method.like
+        return said | {
+            "model": method.model.describe(),
+            "truth": dict(method.truth),
+            "body": method.body,
+            "noise": method.noise,
+            "like_sha256": None if like is None else dataset_hash(like, ("x", "y", "theta")),
+        }
 
     def compute(self, run: Run) -> xr.Dataset:
-        """Simulate and fit the recordings; return a `recovery`."""
-        from driftwalk.likelihood import recovery_study
-
-        found = recovery_study(
-            self.study,
-            self.flow,
+        """Simulate and estimate the recordings; return a `recovery` or a `model_recovery`."""
+        # A worker has one thread, where none are asked for.
+        threads = self.threads or (None if run.executor else default_threads())
+        found = self.method.recover(
             store=run.store("recordings"),
-            threads=self.threads or default_threads(),
+            threads=threads,
             executor=run.executor,
-            tell=lambda done, total: run.progress(done, total, "fits"),
+            tell=run.progress,
         )
-        return run.keep("recovery.nc", found)
+        return run.keep(run_kind(self.kind).file, found)

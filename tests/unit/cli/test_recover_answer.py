@@ -41,11 +41,7 @@ def test_a_bias_is_said() -> None:
     found["drag_coefficient_z"].values[...] = off / 0.1
     found["drag_coefficient_covered"].values[...] = abs(off) < 0.1645
     names = [name for name in found if "parameter" in found[name].dims]
-    text = " ".join(
-        recovery_answer(
-            add_summary(found.drop_vars([*names, "parameter"]), precision=0.05)
-        ).warnings
-    )
+    text = " ".join(recovery_answer(add_summary(found.drop_vars([*names, "parameter"]))).warnings)
     assert "40 min, angle given: C_d is off by +3" in text
     assert "hold the truth in" in text
     assert "times what the square root of the length gives" in text

@@ -1,8 +1,9 @@
-"""A page on a recovery study: how well recordings of known truth give it back."""
+"""Pages on recovery studies: how well recordings of known truth give it back."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from itertools import product
 from typing import TYPE_CHECKING, Any, Final
 
@@ -22,16 +23,12 @@ from driftwalk.page.parts import (
     section,
     value_of,
 )
+from driftwalk.schema.answers.recovery import model_warnings
+from driftwalk.schema.kinds.recovery import RECOVERED
 
 if TYPE_CHECKING:
     import xarray as xr
 
-PARAMETERS: Final = {
-    "drag_coefficient": ("drag_coefficient", "1", "drag coefficient C_d"),
-    "force_std": ("force_std_N", "N", "stochastic force σ_F"),
-    "tracking_noise": ("tracking_noise_m", "m", "tracking noise"),
-}
-"""Attribute that holds the truth, unit and label."""
 SUMMARY: Final = {
     "median_absolute_error": "median error",
     "absolute_error_90": "90 % of errors below",
@@ -43,6 +40,9 @@ SUMMARY: Final = {
 COORDINATES: Final = ("duration", "angle", "parameter")
 MOST_WAYS: Final = 1000
 """Combinations of these, a row of the table each."""
+MODEL_SUMMARY: Final = ("median_error", "determined_share", "coverage", "coverage_standard_error")
+MOST_PARAMETERS: Final = 100
+"""Parameters of a model that a page shows, with a chart each."""
 
 
 def recovery_sections(recovery: xr.Dataset | None) -> list[Section]:
@@ -74,11 +74,10 @@ def recovery_sections(recovery: xr.Dataset | None) -> list[Section]:
     made = head_sections(lambda: recovery_summary(recovery), lambda: _warnings(recovery))
     made += attempt("errors", "Errors and intervals", lambda: errors_section(recovery))
     made += attempt("by-length", "Error by length", lambda: by_length_section(recovery))
-    for name, (_, _, words) in PARAMETERS.items():
-        id, title = f"estimates-{name.replace('_', '-')}", f"Estimates: {words}"
+    for name, one in RECOVERED.items():
         made += attempt(
-            id,
-            title,
+            f"estimates-{name.replace('_', '-')}",
+            f"Estimates: {one.words}",
             lambda name=name: estimates_section(recovery, name),  # type: ignore[misc]
         )
     made += attempt("flow-error", "Error of the flow", lambda: flow_error_section(recovery))
@@ -97,15 +96,15 @@ def recovery_summary(recovery: xr.Dataset) -> Section:
         "shows how well the fit would do if the model were right."
     )
     truth = ", ".join(
-        f"{words} = {quantity(float(required(recovery, key)), unit)}"
-        for key, unit, words in PARAMETERS.values()
+        f"{one.words} = {quantity(float(required(recovery, one.key)), one.unit)}"
+        for one in RECOVERED.values()
     )
     every = quantity(float(required(recovery, "force_interval_s")), "s")
     paragraphs = [done, f"The truth: {truth}; the force is redrawn every {every}."]
     paragraphs += _found(recovery, confidence)
     shown = [
-        figure(words, required(recovery, key), unit, note="truth")
-        for key, unit, words in PARAMETERS.values()
+        figure(one.words, required(recovery, one.key), one.unit, note="truth")
+        for one in RECOVERED.values()
     ]
     for angle in recovery["angle"].values:
         part = recovery.sel(angle=angle)
@@ -134,7 +133,7 @@ def errors_section(recovery: xr.Dataset) -> Section:
         names, recovery["duration"].values, recovery["angle"].values
     ):
         part = recovery.sel(parameter=name, duration=duration, angle=angle)
-        words = PARAMETERS[name][2] if name in PARAMETERS else name
+        words = RECOVERED[name].words if name in RECOVERED else name
         found = [number(part[key]) for key in SUMMARY]
         rows.append([words, quantity(float(duration), "s"), str(angle), *found])
     return section(
@@ -162,23 +161,34 @@ def by_length_section(recovery: xr.Dataset) -> Section:
 
 def estimates_section(recovery: xr.Dataset, name: str) -> Section:
     """Return the estimates of a parameter with their intervals next to the truth."""
-    key, unit, words = PARAMETERS[name]
-    require(recovery, name, f"{name}_low", f"{name}_high", "used")
+    parameter = RECOVERED[name]
+    ends = [f"{name}{end}" for end in ("", "_low", "_high")]
+    require(recovery, *ends, "used")
     drawn = []
-    for at, words_of, part in _groups(recovery):
-        used = part["used"].values == 1
-        for kept, more in ((used, ""), (~used, ", left out of the summary")):
-            if not kept.any():
-                continue
-            values, low, high = (
-                np.where(kept, part[f"{name}{end}"].values, np.nan) for end in ("", "_low", "_high")
-            )
-            drawn.append(series(f"{words_of}{more}", at, values, ends=(low, high), style="points"))
+    for at, words, part in _groups(recovery):
+        used, values = part["used"].values == 1, [part[end].values for end in ends]
+        drawn += [
+            (words, at, used, values),
+            (f"{words}, left out of the summary", at, ~used, values),
+        ]
+    return _estimates_chart(
+        f"estimates-{name.replace('_', '-')}", f"Estimates: {parameter.words}",
+        label(parameter.words, parameter.unit), required(recovery, parameter.key), drawn,
+    )  # fmt: skip
+
+
+def _estimates_chart(
+    id: str, title: str, y: Any, truth: float, drawn: Iterable[tuple[str, Any, Any, Any]]
+) -> Section:
+    """Return a chart of words, places, which are shown, and estimates with both ends."""
+    shown = []
+    for words, at, kept, values in drawn:
+        if kept.any():
+            value, low, high = (np.where(kept, one, np.nan) for one in values)
+            shown.append(series(words, at, value, ends=(low, high), style="points"))
     return chart(
-        f"estimates-{name.replace('_', '-')}", f"Estimates: {words}",
-        "Each point is a recording, with its interval.",
-        x=label("recording"), y=label(words, unit), series=drawn,
-        marks=[mark("truth", y=required(recovery, key))],
+        id, title, "Each point is a recording, with its interval.", x=label("recording"), y=y,
+        series=shown, marks=[mark("truth", y=truth)],
     )  # fmt: skip
 
 
@@ -242,3 +252,110 @@ def _warnings(recovery: xr.Dataset) -> list[str]:
         (left, f"{count(left, 'recording')} left out of the summary: too long at the wall"),
     )
     return [text for number_of, text in said if number_of]
+
+
+def model_recovery_sections(model_recovery: xr.Dataset | None) -> list[Section]:
+    """Return the sections of a page on a recovery study of a motion model.
+
+    Parameters
+    ----------
+    model_recovery : xarray.Dataset, optional
+        A `model_recovery`; None while there is none yet.
+
+    Returns
+    -------
+    list of dict
+        Sections; an empty one says why it cannot be shown.
+
+    Examples
+    --------
+    >>> [part["kind"] for part in model_recovery_sections(None)]
+    ['empty']
+    """
+    if model_recovery is None:
+        return empty_head("There are no estimates yet.")
+    if "parameter" not in model_recovery.variables:
+        return empty_head("the recovery holds no parameter")
+    if model_recovery["parameter"].size > MOST_PARAMETERS:
+        return empty_head(
+            f"{model_recovery['parameter'].size} parameters are more than the {MOST_PARAMETERS} of "
+            "a page"
+        )
+    made = head_sections(
+        lambda: model_summary_section(model_recovery), lambda: model_warnings(model_recovery)
+    )
+    made += attempt("errors", "Errors and intervals", lambda: model_errors_section(model_recovery))
+    for index, name in enumerate(model_recovery["parameter"].values):
+        made += attempt(
+            f"estimates-{index + 1}",
+            f"Estimates: {name}",
+            lambda index=index: model_estimates_section(model_recovery, index),  # type: ignore[misc]
+        )
+    return made
+
+
+def model_summary_section(recovery: xr.Dataset) -> Section:
+    """Return a recovery study in words and numbers."""
+    require(recovery, "determined_share", "status")
+    model, length = required(recovery, "model"), float(required(recovery, "duration_s"))
+    share = recovery["determined_share"].values
+    names = [str(name) for name in recovery["parameter"].values]
+    always = [name for name, one in zip(names, share, strict=True) if one == 1.0]
+    never = [name for name, one in zip(names, share, strict=True) if one == 0.0]
+    paragraphs = [
+        f"{count(recovery.sizes['recording'], 'recording')} of {quantity(length, 's')} were "
+        f"simulated by the model {model} with known parameters, and calibrated. All of this is "
+        "simulated: it shows how well a calibration would do if the model were right.",
+    ]
+    if always:
+        paragraphs.append(f"Every recording determines {', '.join(always)}.")
+    if never:
+        paragraphs.append(f"No recording determines {', '.join(never)}.")
+    shown = [
+        figure("length of a recording", length, "s"),
+        figure("samples per second", required(recovery, "sample_rate_Hz"), "Hz"),
+        figure("position noise", required(recovery, "position_noise_m"), "m"),
+    ]
+    return section("summary", "summary", "Method and results", paragraphs=paragraphs, numbers=shown)
+
+
+def model_errors_section(recovery: xr.Dataset) -> Section:
+    """Return the table of errors, of what is determined, and of coverage."""
+    require(recovery, "truth", "unit", "meaning", *MODEL_SUMMARY)
+    rows: list[list[Any]] = []
+    for index, name in enumerate(recovery["parameter"].values):
+        one = recovery.isel(parameter=index)
+        rows.append(
+            [
+                str(name),
+                quantity(float(one["truth"]), str(one["unit"].values)),
+                *(number(one[key]) for key in MODEL_SUMMARY),
+                str(one["meaning"].values),
+            ]
+        )
+    confidence = percent(float(required(recovery, "confidence")))
+    return section(
+        "errors", "table", "Errors and intervals",
+        "Errors are relative to the truth. A parameter is determined where its 90 % interval ends "
+        f"within 15 % of its value. {confidence} of the intervals should hold the truth, give "
+        "or take the standard error.",
+        columns=[
+            "parameter", "truth", "median error", "share determined",
+            "intervals that hold the truth", "standard error", "meaning",
+        ],
+        rows=rows,
+    )  # fmt: skip
+
+
+def model_estimates_section(recovery: xr.Dataset, index: int) -> Section:
+    """Return the estimates of a parameter with their intervals next to the truth."""
+    require(recovery, "estimate", "interval", "determined", "truth", "unit")
+    one = recovery.isel(parameter=index)
+    at = 1.0 + np.arange(recovery.sizes["recording"])
+    values = [one["estimate"].values, *one["interval"].transpose("bound", "recording").values]
+    known, name = one["determined"].values.astype(bool), str(one["parameter"].values)
+    return _estimates_chart(
+        f"estimates-{index + 1}", f"Estimates: {name}",
+        label(name.replace("_", " "), str(one["unit"].values)), float(one["truth"]),
+        [("determined", at, known, values), ("not determined", at, ~known, values)],
+    )  # fmt: skip

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.schema.answers.parts import Answer, Part, Table, each, length_text
-from driftwalk.schema.kinds.fit_numbers import PARAMETERS
+from driftwalk.schema.kinds.recovery import RECOVERED
 from driftwalk.schema.parameters import flat_name
 
 if TYPE_CHECKING:
     import xarray as xr
 
-FITTED: Final = ("drag_coefficient", "force_std", "tracking_noise")
 _SUMMARY: Final = (
     *("median_absolute_error", "absolute_error_90", "bias", "rms_error", "spread", "rms_z"),
     *("coverage", "coverage_low", "coverage_high"),
@@ -68,7 +67,7 @@ def _result(part: xr.Dataset) -> dict[str, Any]:
         "duration_s": float(part["duration"]),
         "angle": str(part["angle"].values),
         **_counts(part),
-        **{name: _summary(part, name) for name in FITTED},
+        **{name: _summary(part, name) for name in RECOVERED},
         **{key: float(part[key]) for key in ("median_flow_error", "flow_error_90")},
         "median_wall_share": _median(part["wall_share"].values),
         "median_fit_s": _median(part["fit_time"].values),
@@ -160,7 +159,7 @@ def _parts(found: xr.Dataset) -> list[xr.Dataset]:
 def _rows(part: xr.Dataset) -> list[list[str]]:
     used = _counts(part)["used"]
     rows = []
-    for name in FITTED:
+    for name in RECOVERED:
         value = _summary(part, name)
         covered = (
             f"{round(value['coverage'] * used)} of {used} ({value['coverage_low']:.0%} to "
@@ -171,7 +170,7 @@ def _rows(part: xr.Dataset) -> list[list[str]]:
         errors = [_percent(value[key]) for key in ("median_absolute_error", "absolute_error_90")]
         rows.append(
             [
-                PARAMETERS[name].symbol or PARAMETERS[name].words,
+                RECOVERED[name].symbol or RECOVERED[name].words,
                 *errors,
                 _percent(value["bias"], sign="+"),
                 f"{value['rms_z']:.2f}",

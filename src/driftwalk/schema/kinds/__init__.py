@@ -14,7 +14,6 @@ from driftwalk.schema.kinds import (
     model_calibration,
     model_check,
     model_comparison,
-    model_recovery,
     motion,
     recovery,
     sensitivity,
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _FILES: Final = (
-    motion, flow, calibration, model_calibration, model_comparison, fit, recovery, model_recovery,
+    motion, flow, calibration, model_calibration, model_comparison, fit, recovery,
     model_check, assembly, sensitivity,
 )  # fmt: skip
 

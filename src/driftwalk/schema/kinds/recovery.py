@@ -1,21 +1,20 @@
-"""The dataset of a recovery study: simulated recordings of known truth, fitted."""
+"""The datasets of recovery studies: simulated recordings of known truth, and their estimates."""
 
 from __future__ import annotations
 
 from typing import Final
 
-from driftwalk.schema.description import STUDY, Attribute, Kind, Variable
-
-RECORDING_STATUS: Final = {"fitted": 0, "not_fitted": 1, "not_simulated": 2}
-"""Status of a recording. Not fitted means that the fit refused it, with a message."""
+from driftwalk.schema.description import ARENA, SOURCE, STUDY, Attribute, Kind, Variable
+from driftwalk.schema.kinds.fit_numbers import PARAMETERS
 
 _EACH: Final = "duration angle recording"
 _ALL: Final = "parameter duration angle"
-_OF: Final = {
-    "drag_coefficient": ("1", "drag coefficient"),
-    "force_std": ("N", "standard deviation of the force"),
-    "tracking_noise": ("m", "tracking noise"),
+RECOVERED: Final = {
+    name: PARAMETERS[name] for name in ("drag_coefficient", "force_std", "tracking_noise")
 }
+"""The numbers of a fit that a recovery study compares with their truth."""
+_MISSING_SHARE: Final = Attribute("missing_share", "number", "share of the samples that is missing")
+_SEED: Final = Attribute("seed", "number", "seed of the random numbers")
 
 
 def _estimate(name: str, unit: str, words: str) -> tuple[Variable, ...]:
@@ -48,7 +47,9 @@ RECOVERY: Final = Kind(
         "parameter": "drag_coefficient, force_std, tracking_noise",
     },
     variables=(
-        *(one for name, about in _OF.items() for one in _estimate(name, *about)),
+        *_estimate("drag_coefficient", "1", "drag coefficient"),
+        *_estimate("force_std", "N", "standard deviation of the force"),
+        *_estimate("tracking_noise", "m", "tracking noise"),
         Variable(
             "flow_error", _EACH, "1", "rms error of the flow over its rms speed",
             note="averaged over the block, where it has been",
@@ -62,7 +63,8 @@ RECOVERY: Final = Kind(
         Variable("converged", _EACH, "1", "1 if the fit converged"),
         Variable("fit_time", _EACH, "s", "time that the fit took"),
         Variable(
-            "status", _EACH, None, "status of the recording", "int", flags=RECORDING_STATUS
+            "status", _EACH, None, "status of the recording", "int",
+            flags={"fitted": 0, "not_fitted": 1, "not_simulated": 2},
         ),
         Variable("message", _EACH, None, "reason why there is no fit", "text"),
         Variable(
@@ -104,8 +106,8 @@ RECOVERY: Final = Kind(
         Attribute("flow", "text", "the true flow"),
         Attribute("sample_interval_s", "number", "time between samples"),
         Attribute("recordings_per_fit", "number", "recordings that are fitted together"),
-        Attribute("missing_share", "number", "share of the samples that is missing"),
-        Attribute("seed", "number", "seed of the random numbers"),
+        _MISSING_SHARE,
+        _SEED,
         Attribute("confidence", "number", "of the fits' intervals"),
         Attribute("coverage_confidence", "number", "of the coverage's interval"),
         Attribute("needed_confidence", "number", "of the needed length's interval"),
@@ -115,4 +117,83 @@ RECOVERY: Final = Kind(
     ),
 )  # fmt: skip
 
-KINDS: Final = (RECOVERY,)
+_EACH_MODEL: Final = "recording parameter"
+_ENDS: Final = "recording parameter bound"
+_WITHOUT: Final = "NaN without a calibration"
+
+MODEL_RECOVERY: Final = Kind(
+    name="model_recovery",
+    version=1,
+    dimensions={
+        "recording": "simulated recordings",
+        "parameter": "open parameters of the model",
+        "bound": "lower and upper end",
+    },
+    variables=(
+        Variable("truth", "parameter", None, "true value of the parameter", note="in its unit"),
+        Variable("estimate", _EACH_MODEL, None, "estimate of the parameter", note=_WITHOUT),
+        Variable(
+            "interval", _ENDS, None, "interval of the parameter",
+            note="NaN where the calibration gives none",
+        ),
+        Variable(
+            "determined", _EACH_MODEL, None, "whether the recording determines the parameter",
+            "bool", note="within 15 % of its value, with 90 % confidence",
+        ),
+        Variable(
+            "half_width", _EACH_MODEL, "1", "half the 90 % interval over the value",
+            note="of its logarithm on a logarithmic scale; infinite at the end of its range",
+        ),
+        Variable(
+            "error", _EACH_MODEL, "1", "relative error of the estimate",
+            note="ln(estimate / truth) on a logarithmic scale; on a linear one over the truth, or "
+            "over a twentieth of the range where the truth is smaller",
+        ),
+        Variable(
+            "error_interval", _ENDS, "1", "ends of the interval, as errors",
+            note="it holds the truth where 0 lies between them",
+        ),
+        Variable(
+            "status", "recording", None, "what became of the recording", "int",
+            flags={"calibrated": 0, "not_calibrated": 1, "not_simulated": 2},
+        ),
+        Variable("message", "recording", None, "why there is no calibration", "text"),
+        Variable("median_error", "parameter", "1", "median of the size of the error"),
+        Variable(
+            "determined_median_error", "parameter", "1",
+            "median of the size of the error where the parameter is determined",
+        ),
+        Variable(
+            "determined_share", "parameter", "1",
+            "share of the calibrations that determine the parameter",
+        ),
+        Variable("coverage", "parameter", "1", "share of the intervals that hold the truth"),
+        Variable(
+            "coverage_standard_error", "parameter", "1", "standard error of the coverage",
+            note="binomial, of intervals that hold the truth as often as their confidence says",
+        ),
+        Variable("range", _ENDS, None, "range of the search", note=_WITHOUT),
+        Variable("unit", "parameter", None, "unit of the parameter", "text"),
+        Variable("scale", "parameter", None, "scale of the parameter: linear or log", "text"),
+        Variable("meaning", "parameter", None, "what the parameter is", "text"),
+        Variable("recording", "recording", None, "number of the recording", "int"),
+        Variable("parameter", "parameter", None, "parameter", "text"),
+        Variable("bound", "bound", None, "end of an interval", "text"),
+    ),
+    attributes=(
+        Attribute("model", "text", "name of the model"),
+        Attribute("fixed", "object", "known values of the model's other numbers, SI units"),
+        Attribute("duration_s", "number", "length of each recording"),
+        Attribute("sample_rate_Hz", "number", "samples of each recording per second"),
+        _MISSING_SHARE,
+        Attribute("position_noise_m", "number", "true noise of the recorded positions"),
+        Attribute("noise", "text", "whether the calibrations estimated it: estimated, or known"),
+        Attribute("confidence", "number", "of the intervals"),
+        _SEED,
+        ARENA,
+        SOURCE,
+        STUDY,
+    ),
+)  # fmt: skip
+
+KINDS: Final = (RECOVERY, MODEL_RECOVERY)

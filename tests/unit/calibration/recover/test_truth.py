@@ -11,7 +11,7 @@ import xarray as xr
 from self_propelled import moving
 
 import driftwalk as dw
-from driftwalk.calibration.recover.truth import KnownTruth, known_truth
+from driftwalk.calibration import ModelRecovery
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.motion import BlockModel
 
@@ -20,10 +20,10 @@ VALUES = {"speed": 0.03, "rotational_diffusion": 0.5, "turn_rate": 0.3}
 SHORT = {"recover.durations_s": [60.0]}
 
 
-def truth(like: xr.Dataset | None = None, **changes: Any) -> KnownTruth:
+def truth(like: xr.Dataset | None = None, **changes: Any) -> ModelRecovery:
     overrides = {key.replace("__", "."): value for key, value in changes.items()}
     study = dw.apply_overrides(dw.Study(), {**SHORT, **overrides})
-    return known_truth(ACTIVE, VALUES, study, flow=None, like=like, body=None)
+    return ModelRecovery(study, ACTIVE, VALUES, like=like)
 
 
 def test_a_recording_has_its_own_random_numbers() -> None:
@@ -92,14 +92,14 @@ def test_like_a_recording_it_has_its_times_start_and_noise() -> None:
 )
 def test_a_truth_that_is_none_is_refused(values: dict[str, float], message: str) -> None:
     with pytest.raises(ConfigurationError, match=message):
-        known_truth(ACTIVE, values, dw.Study(), flow=None, like=None, body=None)
+        ModelRecovery(dw.Study(), ACTIVE, values).check()
 
 
 def test_other_mistakes_are_refused() -> None:
     with pytest.raises(InputError, match=r"holds 2 lengths"):
-        truth(recover__durations_s=[60.0, 120.0])
+        truth(recover__durations_s=[60.0, 120.0]).check()
     with pytest.raises(InputError, match="recovery_study"):
-        known_truth(BlockModel(dw.Study()), {}, dw.Study(), flow=None, like=None, body=None)
+        ModelRecovery(dw.Study(), BlockModel(dw.Study()), {}).check()
     with pytest.raises(ConfigurationError, match="estimated, known"):
         dw.recover_model(ACTIVE, VALUES, noise="stated")  # type: ignore[arg-type]
     closed = dw.motion_model("active", **VALUES)
@@ -108,4 +108,4 @@ def test_other_mistakes_are_refused() -> None:
     still = {"speed": 1e-6, "rotational_diffusion": 0.5, "turn_rate": 0.0}
     study = dw.apply_overrides(dw.Study(), {"recover.durations_s": [2.0]})
     with pytest.raises(InputError, match="too short"):
-        dw.calibration.check_model_recovery(ACTIVE, still, study)
+        ModelRecovery(study, ACTIVE, still).check()

@@ -9,8 +9,8 @@ from recovery_worlds import small_study
 
 import driftwalk as dw
 from driftwalk.core.errors import ConfigurationError, InputError
-from driftwalk.likelihood.recover import one as recover_one
-from driftwalk.likelihood.recover.one import Truth, simulated_recordings
+from driftwalk.likelihood import FitRecovery
+from driftwalk.likelihood.recover import run as recovery_run
 from driftwalk.model import apply_overrides
 from driftwalk.model.recover import true_time_step_s
 from driftwalk.schema.answers.facts import facts_of
@@ -28,11 +28,8 @@ def found(flow: xr.Dataset) -> xr.Dataset:
 
 
 def recorded(recover: dict, flow: xr.Dataset, duration: float = 60.0, number: int = 0) -> list:
-    tracks = simulated_recordings(
-        Truth(small_study(**recover), flow), flow, recording=number, duration=duration
-    )
-    assert tracks is not None
-    return tracks
+    method = FitRecovery(small_study(**recover), flow)
+    return method.simulate({"recording": number, "duration": duration}).tracks
 
 
 def test_a_recording_is_what_was_asked_for(flow: xr.Dataset) -> None:
@@ -64,18 +61,17 @@ def test_the_camera_noise_is_what_the_truth_says(flow: xr.Dataset) -> None:
     study = small_study()
     noisy = recorded({}, flow)[0]
     clean_study = apply_overrides(study, {"observation.position_noise_m": 1e-12})
-    clean = simulated_recordings(Truth(clean_study, flow), flow, recording=0, duration=60.0)
-    assert clean is not None
-    off = np.concatenate([(noisy[name] - clean[0][name]).values.ravel() for name in ("x", "y")])
+    (clean,) = FitRecovery(clean_study, flow).simulate({"recording": 0, "duration": 60.0}).tracks
+    off = np.concatenate([(noisy[name] - clean[name]).values.ravel() for name in ("x", "y")])
     assert off.std() == pytest.approx(3e-4, rel=0.08)
-    assert Truth(study, flow).tracking_noise == 3e-4
+    assert FitRecovery(study, flow).tracking_noise == 3e-4
     rounded = apply_overrides(study, {"observation.position_quantum_m": "1mm"})
     expected = np.sqrt(9e-8 + 1e-6 / 12)
-    assert Truth(rounded, flow).tracking_noise == pytest.approx(expected)
+    assert FitRecovery(rounded, flow).tracking_noise == pytest.approx(expected)
 
 
 def test_recordings_are_other_worlds_and_random_flows_other_flows() -> None:
-    truth = Truth(small_study(flow="random"), None)
+    truth = FitRecovery(small_study(flow="random"), None)
     flows = [truth.flow_of(number) for number in (0, 1, 0)]
     assert flows[0].equals(flows[2])
     assert not flows[0].equals(flows[1])
@@ -166,7 +162,7 @@ def test_a_simulation_that_breaks_is_data(
         run["status"].values[-1] = 1
         return run
 
-    monkeypatch.setattr(recover_one, "simulate", broken)
+    monkeypatch.setattr(recovery_run, "simulate", broken)
     found = dw.recovery_study(small_study(recordings_per_fit=2), flow)
     assert (found["status"].values == 2).all()
     assert np.isnan(found["drag_coefficient"].values).all()
@@ -188,30 +184,30 @@ def test_a_simulation_that_breaks_is_data(
 def test_refusals(changes: dict, words: str, flow: xr.Dataset) -> None:
     study = apply_overrides(small_study(), changes)
     with pytest.raises(InputError, match=words):
-        dw.likelihood.check_recovery(study, flow)
+        FitRecovery(study, flow).check()
     with pytest.raises(InputError, match=words):
         dw.recovery_study(study, flow)
 
 
 def test_refusals_of_flows(flow: xr.Dataset) -> None:
     with pytest.raises(InputError, match="the flow of the water is missing"):
-        dw.likelihood.check_recovery(small_study())
+        FitRecovery(small_study()).check()
     with pytest.raises(InputError, match=r"flow\.nc .* has to be loaded"):
-        dw.likelihood.check_recovery(small_study(flow="flow.nc"))
+        FitRecovery(small_study(flow="flow.nc")).check()
     frames = flow.expand_dims(time=[0.0, 1.0])
     with pytest.raises(InputError, match="frames"):
-        dw.likelihood.check_recovery(small_study(), frames)
+        FitRecovery(small_study(), frames).check()
     with pytest.raises(InputError, match="it spans x from"):
-        dw.likelihood.check_recovery(small_study(), dw.jets_flow(diameter=0.2))
+        FitRecovery(small_study(), dw.jets_flow(diameter=0.2)).check()
     narrow = flow.assign(flag=flow["flag"].where(abs(flow["x"]) < 0.1, 0))
     with pytest.raises(InputError, match="nodes in there are flagged as outside"):
-        dw.likelihood.check_recovery(small_study(), narrow)
-    dw.likelihood.check_recovery(small_study(flow="random"))
+        FitRecovery(small_study(), narrow).check()
+    FitRecovery(small_study(flow="random")).check()
 
 
 def test_without_orientation_its_noise_is_not_asked_for(flow: xr.Dataset) -> None:
     changes = {"observation.orientation_noise_rad": "estimate", "recover.angle": ["none"]}
-    dw.likelihood.check_recovery(apply_overrides(small_study(), changes), flow)
+    FitRecovery(apply_overrides(small_study(), changes), flow).check()
 
 
 @pytest.mark.parametrize(

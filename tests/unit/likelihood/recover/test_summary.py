@@ -1,4 +1,4 @@
-"""The table of a recovery study, against closed forms and other programs."""
+"""The summary of a recovery study, against closed forms and other programs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import pytest
 from recovery_worlds import synthetic_recovery
 from scipy import stats
 
-from driftwalk.likelihood.recover.summary import coverage_interval, error_scale, summarise
+from driftwalk.calibration.recover.summary import coverage_interval, summarise
+from driftwalk.likelihood.recover.summary import error_scale
 
 
 def test_summary_of_four_recordings_by_hand() -> None:

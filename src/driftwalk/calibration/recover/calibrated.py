@@ -1,56 +1,21 @@
-"""One simulated recording of a recovery study: what its calibration says of each parameter."""
+"""Estimate and interval of each parameter of a calibration, and whether it is determined."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from driftwalk.calibration.estimation.identifiability import DETERMINED
-from driftwalk.calibration.recover.truth import KnownTruth
-from driftwalk.calibration.run import calibrate
 from driftwalk.core.arrays import Floats
-from driftwalk.core.errors import InputError
 from driftwalk.schema import Parameter
-from driftwalk.schema.kinds.model_recovery import CALIBRATED_STATUS
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Tell = Callable[[str, int, int], None]
 
-MESSAGE: Final = 400
-"""Letters of a message that are kept."""
-
-
-def recover_one(
-    truth: KnownTruth, number: int, *, threads: int | None, tell: Tell | None
-) -> dict[str, Any]:
-    """Simulate and calibrate one recording."""
-    try:
-        recording = truth.recording(number)
-    except InputError as error:
-        return _nothing(truth, "not_simulated", error)
-    try:
-        found = calibrate(
-            recording,
-            truth.model,
-            study=truth.search_study(number),
-            flow=truth.flow,
-            threads=threads,
-            tell=tell,
-        )
-    except InputError as error:
-        return _nothing(truth, "not_calibrated", error)
-    return {
-        **answer_of(found, truth.model.parameters),
-        "status": CALIBRATED_STATUS["calibrated"],
-        "message": "",
-    }
-
-
-def answer_of(found: xr.Dataset, parameters: Sequence[Parameter]) -> dict[str, Any]:
+def calibrated_parameters(found: xr.Dataset, parameters: Sequence[Parameter]) -> dict[str, Any]:
     """Return what a calibration says of its parameters."""
     names = [one.name for one in parameters]
     found = found.sel(parameter=names)
@@ -109,16 +74,3 @@ def interval_half_width(
         return 0.5 * factor * float(np.log(ends[1] / ends[0]))
     size = max(abs(value), DETERMINED.small_part * (parameter.high - parameter.low))
     return 0.5 * factor * float(ends[1] - ends[0]) / size
-
-
-def _nothing(truth: KnownTruth, status: str, error: InputError) -> dict[str, Any]:
-    count = len(truth.model.parameters)
-    return {
-        "estimate": np.full(count, np.nan),
-        "interval": np.full((count, 2), np.nan),
-        "range": np.full((count, 2), np.nan),
-        "determined": np.zeros(count, dtype=bool),
-        "half_width": np.full(count, np.nan),
-        "status": CALIBRATED_STATUS[status],
-        "message": str(error)[:MESSAGE],
-    }

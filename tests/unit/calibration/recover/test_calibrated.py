@@ -8,7 +8,7 @@ from every_kind import DIFFUSE, TUMBLE, every_kind
 from scipy.special import ndtri
 
 from driftwalk.calibration.estimation.identifiability import determination
-from driftwalk.calibration.recover.one import answer_of, interval_half_width
+from driftwalk.calibration.recover.calibrated import calibrated_parameters, interval_half_width
 from driftwalk.motion import motion_model
 from driftwalk.schema import Parameter
 
@@ -39,7 +39,6 @@ def test_at_the_end_of_the_range_nothing_is_determined(parameter: Parameter) -> 
     assert np.isnan(interval_half_width(missing, 0.1, parameter, confidence=0.9))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("form", "model"),
     [
@@ -50,7 +49,7 @@ def test_at_the_end_of_the_range_nothing_is_determined(parameter: Parameter) -> 
 )
 def test_the_answer_is_that_of_the_calibration(form: str, model) -> None:
     found = every_kind(form)
-    answer = answer_of(found, model.parameters)
+    answer = calibrated_parameters(found, model.parameters)
     for index, one in enumerate(model.parameters):
         stored = found.sel(parameter=one.name)
         assert answer["estimate"][index] == float(stored["estimate"])

@@ -1,0 +1,147 @@
+"""Errors of estimates of a known truth, and how often their intervals hold it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from driftwalk.calibration.estimation.identifiability import DETERMINED
+from driftwalk.core.arrays import Bools, Floats
+
+COVERAGE_CONFIDENCE: Final = 0.95
+"""Confidence of the Clopper-Pearson interval of a coverage."""
+
+
+class Summary(NamedTuple):
+    """Summary of one parameter over recordings that were made alike."""
+
+    median_absolute_error: float
+    """Median of the size of the relative error."""
+    absolute_error_90: float
+    """Size of the relative error that 90 % of the recordings stay within."""
+    bias: float
+    """Mean relative error."""
+    rms_error: float
+    """Root mean square of ln(estimate / truth): chance and bias together."""
+    spread: float
+    """Standard deviation of ln(estimate) over the recordings."""
+    rms_z: float
+    """Root mean square of the error in stated standard deviations; 1 if these are right."""
+    coverage: float
+    """Share of the intervals that hold the truth."""
+    coverage_low: float
+    """Lower end of the coverage's own interval."""
+    coverage_high: float
+    """Its upper end."""
+
+
+def summarise(error: Floats, z: Floats, covered: Floats) -> Summary:
+    """Return the summary of recordings.
+
+    Examples
+    --------
+    >>> error = np.array([-0.1, 0.2])
+    >>> found = summarise(error, error / 0.1, np.array([1.0, 0.0]))
+    >>> round(found.bias, 3), found.coverage, round(found.rms_z, 3)
+    (0.05, 0.5, 1.581)
+    """
+    if error.size == 0:
+        return Summary(*[np.nan] * len(Summary._fields))
+    low, high = coverage_interval(int(covered.sum()), covered.size)
+    return Summary(
+        median_absolute_error=float(np.median(np.abs(error))),
+        absolute_error_90=float(np.quantile(np.abs(error), 0.9)),
+        bias=float(error.mean()),
+        rms_error=float(np.sqrt(np.mean(np.log1p(error) ** 2))),
+        spread=float(np.log1p(error).std(ddof=1)) if error.size >= 2 else np.nan,
+        rms_z=float(np.sqrt(np.mean(z**2))),
+        coverage=float(covered.mean()),
+        coverage_low=low,
+        coverage_high=high,
+    )
+
+
+def coverage_interval(
+    count: int, total: int, *, confidence: float = COVERAGE_CONFIDENCE
+) -> tuple[float, float]:
+    """Return the Clopper-Pearson interval of a share.
+
+    Examples
+    --------
+    >>> low, high = coverage_interval(0, 10, confidence=0.9)
+    >>> low, round(high, 4)
+    (0.0, 0.2589)
+    """
+    from scipy.special import betaincinv
+
+    tail = 0.5 * (1.0 - confidence)
+    low = float(betaincinv(count, total - count + 1.0, tail)) if count > 0 else 0.0
+    high = float(betaincinv(count + 1.0, total - count, 1.0 - tail)) if count < total else 1.0
+    return low, high
+
+
+def relative_errors(
+    estimate: Floats, truth: Floats, ranges: Floats, scales: Sequence[str]
+) -> Floats:
+    """Return the errors of estimates, shape (recordings, parameters).
+
+    Examples
+    --------
+    >>> ends = np.array([[[-5.0, 5.0]]])
+    >>> relative_errors(np.array([[0.2]]), np.array([0.0]), ends, ["linear"]).tolist()
+    [[0.4]]
+    """
+    error = np.empty_like(estimate)
+    for index, scale in enumerate(scales):
+        found, value = estimate[:, index], float(truth[index])
+        if scale == "log":
+            with np.errstate(divide="ignore"):
+                error[:, index] = np.log(found / value)
+        else:
+            low, high = ranges[:, index].T
+            error[:, index] = (found - value) / np.maximum(
+                abs(value), DETERMINED.small_part * (high - low)
+            )
+    return error
+
+
+def summary_by_parameter(
+    error: Floats, interval: Floats, determined: Bools, truth: Floats, *, confidence: float
+) -> dict[str, Floats]:
+    """Return the summary of a study, an array by parameter each.
+
+    Examples
+    --------
+    >>> ends = np.array([[[0.9, 1.2]], [[1.1, 1.3]]])
+    >>> found = summary_by_parameter(
+    ...     np.array([[0.05], [0.2]]), ends, np.array([[True], [False]]), np.array([1.0]),
+    ...     confidence=0.9,
+    ... )
+    >>> found["coverage"].tolist(), found["determined_median_error"].tolist()
+    ([0.5], [0.05])
+    """
+    size = np.abs(error)
+    calibrated = np.isfinite(size)
+    known = np.isfinite(interval).all(axis=2)
+    held = known & (interval[..., 0] <= truth) & (truth <= interval[..., 1])
+    counted = known.sum(axis=0).astype(np.float64)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return {
+            "median_error": _medians(size, calibrated),
+            "determined_median_error": _medians(size, calibrated & determined),
+            "determined_share": (calibrated & determined).sum(axis=0) / calibrated.sum(axis=0),
+            "coverage": held.sum(axis=0) / counted,
+            "coverage_standard_error": np.where(
+                counted > 0.0, np.sqrt(confidence * (1.0 - confidence) / counted), np.nan
+            ),
+        }
+
+
+def _medians(size: Floats, counts: Bools) -> Floats:
+    """Return the median of what counts in each column, NaN where nothing does."""
+    columns = zip(size.T, counts.T, strict=True)
+    return np.array(
+        [np.median(one[retained]) if retained.any() else np.nan for one, retained in columns]
+    )
