@@ -119,7 +119,7 @@ def discrepancy_sentence(one: Evidence) -> str | None:
     Examples
     --------
     >>> discrepancy_sentence(Evidence(812.3, 101.0, 140.2, 900.0))
-    "summaries of the motion: a discrepancy of 812, that of the model's own recordings is below 140"
+    "summaries of the motion: a misfit of 812, that of the model's own recordings is below 140"
     """
     if one.usual:
         return None
