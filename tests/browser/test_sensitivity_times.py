@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -183,25 +182,6 @@ def test_it_fits_every_screen_and_theme(
         assert box["width"] >= 240
         assert drawn_share(pixels(chart)) > 0.1
     picture(page, f"sensitivity-{name}")
-
-
-def test_a_run_of_before_says_that_it_kept_none(
-    visit: Callable[..., Visit], run: Path, found: xr.Dataset, tmp_path: Path
-) -> None:
-    """The page of a file without classes over time: the rest of it is there, and the reason."""
-    older = tmp_path / "older"
-    shutil.copytree(run, older)
-    found.drop_dims(["time", "class_over_time"]).to_netcdf(
-        older / "sensitivity.nc", engine="h5netcdf"
-    )
-    path = tmp_path / "older.html"
-    dw.write_report(dw.report_page(older), path)
-    page = visit(path.as_uri()).open(path.as_uri())
-    click_cell(page, 0, 1)
-    assert page.locator(".map-setting svg.classes").count() == 1
-    below = page.locator(".setting-times")
-    assert "kept no outcome classes over time" in below.inner_text()
-    assert below.locator("svg").count() == 0
 
 
 def test_a_running_analysis_shows_the_settings_that_are_there(
