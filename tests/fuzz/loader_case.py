@@ -8,7 +8,7 @@ import shutil
 import time
 import traceback
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -153,18 +153,18 @@ def _read(case: Case) -> Verdict:
 def _use(path: Path, options: dict[str, Any], case: Case) -> None:
     """Read a file as the commands do."""
     how: RecordingOptions = options["how"]
-    tank = TANK_M if case.as_flow else None
+    if case.as_flow:
+        how = replace(how, tank=f"circle:{TANK_M}")
     field = read_flow_file(
         path,
         how,
         frame_interval=options["frame_interval"],
         variables=options["flow_variables"],
-        tank_diameter=None,
     )
     if field is not None:
         describe_field(check_dataset(field))
         return
-    recording = check_dataset(how.load(path, tank_diameter=tank))
+    recording = check_dataset(how.load(path))
     if case.describes:
         describe(recording)
     if case.as_flow:

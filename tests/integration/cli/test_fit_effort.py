@@ -49,7 +49,7 @@ def test_the_memory_of_this_machine_is_asked_before_the_work() -> None:
 def test_much_work_is_said_before_it_begins(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(refuse, "NOTABLE_S", 0.5)
+    monkeypatch.setattr(refuse, "LIMIT", refuse.LIMIT._replace(notable_s=0.5))
     done = here("fit", RECORDING, *OPTIONS, "-o", tmp_path / "run")
     assert done.code == 0, done.err
     assert "a fit of 601 samples takes about" in done.err

@@ -131,9 +131,9 @@ sys.addaudithook(hook)
 def test_killed_between_any_two_changes(
     study: Path, uninterrupted: xr.Dataset, tmp_path: Path
 ) -> None:
-    """At every 41st change: a calibration makes some hundreds, and the moments are a sample."""
+    """At every 23rd change: a calibration makes some hundred, and the moments are a sample."""
     kills = 0
-    for count in range(0, 2000, 41):
+    for count in range(0, 2000, 23):
         folder = tmp_path / f"run-{count}"
         before = PLAIN + KILL.format(count=count, folder=str(folder))
         code = apart(*words(study, folder), before=before).code

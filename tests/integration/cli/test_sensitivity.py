@@ -260,26 +260,6 @@ def test_a_finished_run_is_kept_until_overwrite(tmp_path: Path) -> None:
     assert here(*words, "--overwrite", "--seed", "2").code == 0
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures("no_figures")
-def test_an_unfinished_run_whose_units_keep_less_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Its shards have no classes over time: it cannot be continued, and the message says so."""
-    words = ["sensitivity", "--flow", FLOW, *SIZE, "--vary", "blocks=2,3", "-o", tmp_path / "run"]
-
-    def stop(*datasets: Any, **options: Any) -> None:
-        raise KeyboardInterrupt
-
-    with monkeypatch.context() as patch:
-        patch.setattr("driftwalk.runs.sensitivity.SHARD_FORM", 1)
-        patch.setattr("driftwalk.assembly.sensitivity_map", stop)
-        assert here(*words).code == 130
-    line = refusal(here(*words))
-    assert "differs in shard_form" in line
-    assert here(*words, "--overwrite").code == 0
-
-
 # One setting per unit, without figures.
 SMALL = f"""{NO_FIGURES}
 from driftwalk.assembly.sensitivity import settings

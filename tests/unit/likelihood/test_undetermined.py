@@ -51,7 +51,7 @@ def test_a_motion_without_random_force_has_no_numbers(
     table: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     leave_out_figures(monkeypatch)
-    study = ("--tank-diameter", "30cm", "--spline-spacing", "5cm", "--no-check")
+    study = ("--tank", "30cm", "--spline-spacing", "5cm", "--no-check")
     done = here("fit", table, *study, "-o", tmp_path / "run")
     assert done.code == 0, done.err
     for label in ("drag coefficient C_d", "stochastic force σ_F", "tracking noise"):
