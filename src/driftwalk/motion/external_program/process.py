@@ -106,6 +106,9 @@ class Program:
             except BrokenPipeError:
                 raise self._ended(request) from None
             if chunk == b"":
+                # A thread may not have noticed yet that the request was read to its end.
+                if complete:
+                    break
                 raise self._ended(request)
             if chunk is not None:
                 complete = complete or b"\n" in chunk
