@@ -29,6 +29,8 @@ class LinkPolicy(NamedTuple):
 
 
 LINKS: Final = LinkPolicy()
+_CHUNK: Final = 1 << 14
+"""Steps whose neighbours are looked up at once: some 40 MB."""
 
 
 class Judged(NamedTuple):
@@ -106,8 +108,8 @@ def _neighbourhood(steps: Steps) -> tuple[Array, Array]:
     left = np.arange(count)
     for searched in LINKS.searched:
         lacking = []
-        for start in range(0, left.size, 1 << 14):
-            at = left[start : start + 1 << 14]
+        for start in range(0, left.size, _CHUNK):
+            at = left[start : start + _CHUNK]
             _, near = tree.query(steps.position[at], min(searched, count))
             near = near.reshape(at.size, -1)
             other = steps.body[near] != steps.body[at][:, None]

@@ -15,7 +15,7 @@ from hypothesis import given, settings, strategies as st
 from scipy.stats import binom, t as student
 
 from driftwalk.core.errors import InputError
-from driftwalk.flow import extract_flow, flow_from_tracers, load_flow, save_flow
+from driftwalk.flow import extract_flow, false_links, flow_from_tracers, load_flow, save_flow
 from driftwalk.flow.false_links import LINKS, judge_steps
 from driftwalk.flow.track_steps import Steps, step_noise, track_steps
 from driftwalk.schema import FLAGS, build_trajectory
@@ -88,6 +88,23 @@ def test_scatter_alone_loses_two_steps_in_a_thousand(fresh_seed: Callable[[int],
     steps = Steps(number, 2 * number, 0.0 * number, 1.0 + 0.0 * number, at, velocity)
     # 0.17 %: 34 of 20,000, give or take 6.
     assert 12 <= np.count_nonzero(judge_steps(steps, noise=0.0).is_false(LINKS.threshold)) <= 60
+
+
+def test_the_neighbours_of_a_step_are_looked_up_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    import scipy.spatial
+
+    looked_up: list[int] = []
+
+    class Counting(scipy.spatial.cKDTree):
+        def query(self, x: Array, k: int) -> Any:
+            looked_up.append(len(x))
+            return super().query(x, k)
+
+    monkeypatch.setattr(scipy.spatial, "cKDTree", Counting)
+    monkeypatch.setattr(false_links, "_CHUNK", 100)
+    number, at = np.arange(450), np.random.default_rng(2).uniform(size=(450, 2))
+    judge_steps(Steps(number, 2 * number, 0.0 * number, 1.0 + 0.0 * number, at, at), noise=0.0)
+    assert looked_up == [100, 100, 100, 100, 50]
 
 
 def test_no_step_crosses_a_gap_or_goes_from_one_body_to_another() -> None:

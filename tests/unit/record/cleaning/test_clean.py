@@ -11,6 +11,7 @@ import pytest
 
 from driftwalk.core.errors import InputError
 from driftwalk.record import describe, load
+from driftwalk.record.cleaning import clean
 from driftwalk.record.cleaning.clean import clean_body
 from driftwalk.record.raw import RawBody
 from driftwalk.schema import body_track
@@ -52,6 +53,27 @@ def test_rows_without_time_and_positions_that_are_not_finite() -> None:
     np.testing.assert_array_equal(np.isfinite(cleaned.x), [True, False, False])
     np.testing.assert_array_equal(np.isfinite(cleaned.y), [True, False, False])
     assert (counts.without_time, counts.missing, counts.samples) == (1, 2, 1)
+
+
+def test_times_too_close_are_found_part_by_part(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each part is one longer than the others begin apart, so that no difference is left out."""
+    sizes: list[int] = []
+    difference = np.diff
+
+    def counted(values: np.ndarray) -> np.ndarray:
+        sizes.append(values.size)
+        return difference(values)
+
+    monkeypatch.setattr(clean, "_PART", 4)
+    monkeypatch.setattr(clean.np, "diff", counted)
+    time = np.arange(11.0)
+    clean._refuse_closest(body(time, time))
+    assert sizes == [5, 5, 3]
+    for close in range(10):
+        time = np.arange(11.0)
+        time[close + 1 :] += 1e-13 - 1.0
+        with pytest.raises(InputError, match=rf"apart, at {close} s"):
+            clean._refuse_closest(body(time, time))
 
 
 def test_a_window_in_time() -> None:
