@@ -198,7 +198,8 @@ def _parameter(given: Any) -> Parameter:
 
 
 def _fault(where: str, reason: str, line: bytes) -> ProgramFault:
-    begun = line[:320].decode("utf-8", "replace")
+    # A letter takes four bytes at most.
+    begun = line[: 4 * 80].decode("utf-8", "replace")
     shown = begun[:80] + ("…" if len(begun) > 80 else "")
     return ProgramFault(where, f"{reason}; the answer begins {shown!r}")
 

@@ -72,6 +72,7 @@ class Program:
         self._process = _start(words, folder)
         self._pipes = pipes_of(self._process)
         self._unread = b""
+        self._output_ended = False
 
     @property
     def is_own(self) -> bool:
@@ -89,6 +90,8 @@ class Program:
             When it takes longer than `timeout` [s], writes more than it may, or `stop` is set. It
             is of no use after that.
         """
+        if self._output_ended:
+            raise self._ended(request)
         end = time.monotonic() + timeout
         answer = bytearray(self._unread)
         complete = b"\n" in answer
@@ -106,6 +109,7 @@ class Program:
             except BrokenPipeError:
                 raise self._ended(request) from None
             if chunk == b"":
+                self._output_ended = True
                 # A thread may not have noticed yet that the request was read to its end.
                 if complete:
                     break

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import threading
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -49,6 +50,27 @@ write(f"{{len(line)}}\\n")
     line = b"c" * MANY + b"\n"
     assert ask(one, line) == b"a" * MANY + b"%d" % len(line)
     assert 0 < len(one.last_errors()) <= PIPES.kept_errors + 100
+    one.close()
+
+
+def test_one_that_answers_before_it_has_read_and_ends_its_output(tmp_path: Path) -> None:
+    """Its answer may count; asked again, it has ended, and another copy can be started."""
+    source = """
+import os, time
+sys.stdin.read(10)
+write('done\\n')
+sys.stdout.flush()
+os.close(1)
+time.sleep(60)
+"""
+    one = program(source, tmp_path)
+    began = time.monotonic()
+    for _ in range(2):
+        with suppress(ProgramEnded):
+            assert ask(one, b"c" * 300_000 + b"\n") == b"done"
+    with pytest.raises(ProgramEnded):
+        ask(one, b"c" * 300_000 + b"\n")
+    assert time.monotonic() - began < 15.0
     one.close()
 
 
