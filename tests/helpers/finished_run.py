@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
+from typing import Any, ClassVar
 
 import xarray as xr
 from command_line import FLOW, RECORDING
@@ -13,6 +16,7 @@ import driftwalk as dw
 from driftwalk.core.files.rundir import RunDirectory
 from driftwalk.core.provenance import manifest
 from driftwalk.model import Study
+from driftwalk.runs import Run
 
 SEARCH = {
     "calibration.drag_coefficient_min": 0.2,
@@ -68,3 +72,26 @@ def write_finished_run(folder: Path) -> Path:
         run.write("figures/map.png", b"no picture")
         run.finish(about)
     return folder
+
+
+@dataclass(frozen=True)
+class StoredWork:
+    """A run whose datasets are there already, without figures, as one that was received."""
+
+    kind: str
+    datasets: Mapping[str, xr.Dataset]
+    study: Study = field(default_factory=Study)
+
+    inputs: ClassVar[dict[str, Path]] = {}
+    seeds: ClassVar[dict[str, int]] = {}
+
+    def checked(self) -> StoredWork:
+        return self
+
+    def specification(self) -> dict[str, Any]:
+        return {}
+
+    def compute(self, run: Run) -> None:
+        for name, dataset in self.datasets.items():
+            run.keep(name, dataset)
+        run.drawn = True

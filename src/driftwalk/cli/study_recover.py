@@ -168,12 +168,17 @@ def _of_model(
     study = timed.study() if source is None else replace(source, given=timed).study()
     if recording is not None:
         study = study_for([recording], study, body=body)
-    if study.recover.flow == RANDOM:
+    flow_file: Path | None = None
+    if source is not None and given.file is None and RECOVER_KEYS["flow"] not in given.overrides:
+        # A run may be someone else's: it brings its own flow, and names no file of this machine.
+        field = source.flow_for(chosen.model, study, None)
+    elif study.recover.flow == RANDOM:
         raise ConfigurationError(
             'the flow "random" is for the block: name the file of a flow field (--flow), or leave '
             "it out"
         )
-    field, flow_file = _named_flow(study, given)
+    else:
+        field, flow_file = _named_flow(study, given)
     parameters = None if source is None else source.found.file
     inputs = {"truth": given.file, "parameters": parameters, "like": like, "flow": flow_file}
     method = ModelRecovery(study, chosen.model, chosen.values, field, recording, body, noise)

@@ -15,8 +15,11 @@ from pathlib import Path
 
 import pytest
 from command_line import FLOW, RECORDING, here, refusal
-from finished_run import write_finished_run
+from every_kind import every_kind
+from finished_run import StoredWork, write_finished_run
 
+from driftwalk.model import Study, apply_overrides
+from driftwalk.runs import run_work
 from driftwalk.schema.stores.netcdf import netcdf_bytes, open_netcdf
 from driftwalk.viewer import RunSource
 
@@ -392,3 +395,16 @@ def test_flow_files_that_the_study_of_a_run_names_are_not_read(
     said = refusal(here("sensitivity", received, *LITTLE, "-o", tmp_path / "made"))
     assert f"names flow files ({file}, flow.nc)" in said
     assert "--vary flow=" in said
+
+
+@pytest.mark.slow
+def test_the_flow_that_the_study_of_a_run_names_for_its_recovery_is_not_read(
+    tmp_path: Path,
+) -> None:
+    study = apply_overrides(Study(), {"recover.flow": "/etc/hostname"})
+    found = {"model_calibration.nc": every_kind("model_calibration")}
+    run_work(StoredWork("model_calibration", found, study), tmp_path / "run")
+    short = ("--recordings", "2", "--duration", "1s", "-o", tmp_path / "made")
+    said = refusal(here("study", "recover", tmp_path / "run", *short))
+    assert "hostname" not in said
+    assert "too short" in said or "steps" in said
