@@ -13,7 +13,7 @@ import numpy as np
 
 from driftwalk.calibration.check import check_recording
 from driftwalk.calibration.recover.calibrated import calibrated_parameters
-from driftwalk.calibration.recover.study import EstimationMethod, Tell
+from driftwalk.calibration.recover.study import BrokenSimulation, EstimationMethod, Tell
 from driftwalk.calibration.recover.summary import relative_errors, summary_by_parameter
 from driftwalk.calibration.run import calibrate
 from driftwalk.conditions import study_in_arena
@@ -205,7 +205,11 @@ class ModelRecovery(EstimationMethod["xr.Dataset"]):
 
     def simulate(self, setting: Mapping[str, Any]) -> xr.Dataset:
         """Return the recording of a setting."""
-        return self.recording(int(setting["recording"]))
+        try:
+            return self.recording(int(setting["recording"]))
+        except InputError as error:
+            # `check` has made the first one, so that this one failed by chance.
+            raise BrokenSimulation(str(error)) from error
 
     def estimate(self, recording: xr.Dataset, setting: Mapping[str, Any]) -> dict[str, Any]:
         """Calibrate a recording."""

@@ -16,6 +16,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.random_streams import RecoveryStream
 from driftwalk.core.seeds import world_keys
 from driftwalk.model import Study
+from driftwalk.schema.kinds.recovery import ESTIMATED, NOT_ESTIMATED, NOT_SIMULATED
 from driftwalk.sweep import Design, Store, WorkUnit, run_sweep
 
 if TYPE_CHECKING:
@@ -23,11 +24,13 @@ if TYPE_CHECKING:
 
 Tell = Callable[[int, int, str], None]
 """Called with what is done, all of it, and the work under way."""
-ESTIMATED, NOT_ESTIMATED, NOT_SIMULATED = range(3)
-"""Status of a recording, as in the flags of both kinds; without an estimate it has a message."""
 LONGEST_MESSAGE: Final = 400
 
 RecordingT = TypeVar("RecordingT")
+
+
+class BrokenSimulation(InputError):
+    """One recording cannot be simulated, by chance: the study goes on with the others."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +77,7 @@ class EstimationMethod(ABC, Generic[RecordingT]):
 
     @abstractmethod
     def simulate(self, setting: Mapping[str, Any]) -> RecordingT:
-        """Return what the camera records in a setting, or raise `InputError`."""
+        """Return what the camera records in a setting, or raise `BrokenSimulation`."""
 
     @abstractmethod
     def estimate(self, recording: RecordingT, setting: Mapping[str, Any]) -> dict[str, Any]:
@@ -87,18 +90,20 @@ class EstimationMethod(ABC, Generic[RecordingT]):
     def __call__(self, unit: WorkUnit) -> dict[str, Any]:
         """Simulate and estimate the recording of a work unit; each array has one entry."""
         setting = {name: values[0] for name, values in unit.settings.items()}
-        status, message = NOT_SIMULATED, ""
+        status, message = ESTIMATED, ""
         try:
             recording = self.simulate(setting)
-            status = NOT_ESTIMATED
-            found = self.estimate(recording, setting)
-            status = ESTIMATED
-        except InputError as error:
-            found, message = self.missing(), str(error)[:LONGEST_MESSAGE]
+        except BrokenSimulation as error:
+            found, status, message = self.missing(), NOT_SIMULATED, str(error)
+        else:
+            try:
+                found = self.estimate(recording, setting)
+            except InputError as error:
+                found, status, message = self.missing(), NOT_ESTIMATED, str(error)
         return {
             **{name: np.asarray(value)[None] for name, value in found.items()},
             "status": np.array([status], dtype=np.int32),
-            "message": np.array([message], dtype=f"U{LONGEST_MESSAGE}"),
+            "message": np.array([message[:LONGEST_MESSAGE]], dtype=f"U{LONGEST_MESSAGE}"),
         }
 
     def seed_of(self, recording: int, stream: RecoveryStream) -> int:

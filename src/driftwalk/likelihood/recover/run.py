@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.calibration.recover.study import ESTIMATED, EstimationMethod, Tell
+from driftwalk.calibration.recover.study import BrokenSimulation, EstimationMethod, Tell
 from driftwalk.calibration.recover.summary import COVERAGE_CONFIDENCE
-from driftwalk.core.errors import InputError
 from driftwalk.core.processors import one_blas_thread
 from driftwalk.core.random_streams import RecoveryStream
 from driftwalk.core.run_stages import tell_nobody
@@ -28,7 +27,7 @@ from driftwalk.model.recover import RANDOM, true_time_step_s
 from driftwalk.schema import build_trajectory
 from driftwalk.schema.check import described
 from driftwalk.schema.kinds import KINDS
-from driftwalk.schema.kinds.recovery import RECOVERED
+from driftwalk.schema.kinds.recovery import ESTIMATED, RECOVERED
 from driftwalk.simulation import simulate
 from driftwalk.sweep import Design, Store, grid
 from driftwalk.sweep.processes import single_threaded_processes
@@ -182,7 +181,7 @@ class FitRecovery(EstimationMethod["SimulatedTracks"]):
             threads=1,
         )
         if np.any(run["status"].values):
-            raise InputError("the simulation broke")
+            raise BrokenSimulation("the simulation broke")
         missed = self.missed(recording, clock.size, settings.recordings_per_fit)
         tracks = [
             build_trajectory(

@@ -13,6 +13,8 @@ RECOVERED: Final = {
     name: PARAMETERS[name] for name in ("drag_coefficient", "force_std", "tracking_noise")
 }
 """The numbers of a fit that a recovery study compares with their truth."""
+ESTIMATED, NOT_ESTIMATED, NOT_SIMULATED = range(3)
+"""Status of a recording, of both kinds; without an estimate it has a message."""
 _MISSING_SHARE: Final = Attribute("missing_share", "number", "share of the samples that is missing")
 _SEED: Final = Attribute("seed", "number", "seed of the random numbers")
 
@@ -64,7 +66,11 @@ RECOVERY: Final = Kind(
         Variable("fit_time", _EACH, "s", "time that the fit took"),
         Variable(
             "status", _EACH, None, "status of the recording", "int",
-            flags={"fitted": 0, "not_fitted": 1, "not_simulated": 2},
+            flags={
+                "fitted": ESTIMATED,
+                "not_fitted": NOT_ESTIMATED,
+                "not_simulated": NOT_SIMULATED,
+            },
         ),
         Variable("message", _EACH, None, "reason why there is no fit", "text"),
         Variable(
@@ -155,7 +161,11 @@ MODEL_RECOVERY: Final = Kind(
         ),
         Variable(
             "status", "recording", None, "what became of the recording", "int",
-            flags={"calibrated": 0, "not_calibrated": 1, "not_simulated": 2},
+            flags={
+                "calibrated": ESTIMATED,
+                "not_calibrated": NOT_ESTIMATED,
+                "not_simulated": NOT_SIMULATED,
+            },
         ),
         Variable("message", "recording", None, "why there is no calibration", "text"),
         Variable("median_error", "parameter", "1", "median of the size of the error"),

@@ -14,6 +14,7 @@ from driftwalk.likelihood.recover import run as recovery_run
 from driftwalk.model import apply_overrides
 from driftwalk.model.recover import true_time_step_s
 from driftwalk.schema.answers.facts import facts_of
+from driftwalk.sweep import SweepError
 
 
 @pytest.fixture(scope="module")
@@ -150,6 +151,12 @@ def test_what_cannot_be_fitted_is_data() -> None:
     assert np.isnan(found["bias"].values).all()
     assert np.isnan(found["needed_duration"].values).all()
     assert told == [(0, 2), (1, 2), (2, 2)]
+
+
+def test_a_block_for_which_there_is_no_start_is_refused(flow: xr.Dataset) -> None:
+    study = apply_overrides(small_study(durations_s=[60.0]), {"block.side_m": 0.212})
+    with pytest.raises(SweepError, match="no start pose was found"):
+        dw.recovery_study(study, flow)
 
 
 def test_a_simulation_that_breaks_is_data(
