@@ -12,7 +12,6 @@ from driftwalk.schema.runs.built_in import BUILT_IN
 
 SOURCE = Path(__file__).resolve().parents[2] / "src" / "driftwalk"
 ROOMS = {
-    "work": {"runs"},
     "figures": {"figures", "runs"},
     "page": {"page"},
     "live": {"viewer"},

@@ -109,7 +109,6 @@ TOY = register(
         words="toy",
         command="toy",
         file="toy.nc",
-        work=ToyWork,
         figures=toy_figures,
         page=toy_sections,
         live=RunningToy,

@@ -203,6 +203,14 @@ class RecordingOptions:
                     words += [name, text]
         return words
 
+    def refuse_given(self, what: str) -> None:
+        """Refuse options that have no meaning for a run directory or a simulation."""
+        given = [one.name for one in fields(self) if getattr(self, one.name) not in (None, False)]
+        words = {"start": "from", "stop": "to"}
+        if given:
+            names = ", ".join(f"--{words.get(name, name).replace('_', '-')}" for name in given)
+            raise InputError(f"{names}: for a recording; {what}")
+
     def load(self, path: Path, *, side: float | None = None) -> xr.Dataset:
         """Load the recording; a block's side [m] is for a tank that is fitted.
 

@@ -113,7 +113,7 @@ def sensitivity_of(result: SensitivityResult) -> Answer:
         result.sensitivity,
         reference=result.reference,
         components=result.components,
-        indices=result.indices,
+        sobol=result.indices,
         aligned=aligned,
     )
 

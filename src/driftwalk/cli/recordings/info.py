@@ -89,12 +89,13 @@ def info(
 
     For a recording, prints bodies, clock and its jitter, gaps, extent, the circle that contains the
     centres, speed, and the tracking noise estimated from the recording itself. For a finished run,
-    prints its answer.
+    prints its answer; `driftwalk report` shows the outcomes of self-assembly.
     """
     from driftwalk.cli.terminal.answer import print_run
     from driftwalk.core.files.run_layout import state_of
 
     if recording.is_dir() and state_of(recording) != "new":
+        how.refuse_given(f"{recording} is a directory, read as a run")
         print_run(recording, json=json)
         return
     from driftwalk.cli.inputs.flow_file import describe_field, read_flow_file

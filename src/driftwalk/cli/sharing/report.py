@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -14,7 +14,6 @@ from driftwalk.cli.options.recording import RecordingOptions, with_recording_opt
 from driftwalk.cli.options.shared import Replace
 from driftwalk.cli.terminal.answer import print_warnings
 from driftwalk.cli.terminal.output import print_note, require_place
-from driftwalk.core.errors import InputError
 
 
 @with_recording_options
@@ -64,21 +63,12 @@ def _page(path: Path, how: RecordingOptions) -> dict[str, Any]:
 
     if not path.is_file():
         if path.is_dir():
-            _refuse_reading_options(f"{path} is a directory, read as a run", how)
+            how.refuse_given(f"{path} is a directory, read as a run")
         return report_page(path, tell=lambda text: print_warnings([text]))
     trajectory = load_simulation(path, replicate=how.replicate or 0)
     if trajectory is None:
         trajectory = how.load(path)
     else:
         others = replace(how, replicate=None)
-        _refuse_reading_options(f"{path} is a simulation", others)
+        others.refuse_given(f"{path} is a simulation")
     return recording_page(trajectory, describe(trajectory))
-
-
-def _refuse_reading_options(what: str, how: RecordingOptions) -> None:
-    """Refuse options that have no meaning for a run directory or a simulation."""
-    given = [field.name for field in fields(how) if getattr(how, field.name) not in (None, False)]
-    words = {"start": "from", "stop": "to"}
-    if given:
-        names = ", ".join(f"--{words.get(name, name).replace('_', '-')}" for name in given)
-        raise InputError(f"{names}: for a recording; {what}")

@@ -67,19 +67,15 @@ def print_run(folder: Path, *, json: bool) -> None:
         When there is no run, or one without a result.
     """
     from driftwalk.schema.answers.parts import Answer
-    from driftwalk.schema.runs import answer_of, open_run_folder
+    from driftwalk.schema.runs import open_run_folder
 
     run = open_run_folder(folder)
     found = None if run.kind is None else run.dataset(run.kind.file)
     if run.kind is None or found is None:
         why = "; ".join(run.problems.values()) or f"its result is not there ({run.state})"
         raise InputError(f"{folder} holds a run, but {why}")
-    check = run.dataset("check.nc")
-    reference = run.dataset("reference.nc")
-    more = {"check": check, "reference": reference}
-    given = {name: one for name, one in more.items() if one is not None}
-    answer = answer_of(found, **given) or Answer([], {}, [])
-    warnings = [*run.faults(), *answer.warnings]
+    answer = run.answer(run.kind, found) or Answer([], {}, [])
+    warnings = [*run.problems.values(), *run.faults(), *answer.warnings]
     if json:
         finished = run.state == "finished"
         facts = {"kind": run.kind.name, "finished": finished, **answer.facts}

@@ -1,4 +1,4 @@
-"""The answer of a sensitivity study: distances to the reference, components, Sobol' indices."""
+"""The answer of a sensitivity study: distances to the reference, components, Sobol' sobol."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def sensitivity_answer(
     *,
     reference: xr.Dataset,
     components: xr.Dataset | None = None,
-    indices: xr.Dataset | None = None,
+    sobol: xr.Dataset | None = None,
     aligned: Mapping[str, float] | None = None,
 ) -> Answer:
     """Return the answer of a sensitivity study; the caller knows its warnings.
@@ -45,7 +45,7 @@ def sensitivity_answer(
         A `sensitivity`.
     reference : xarray.Dataset
         The `outcome_distribution` that it is compared with.
-    components, indices : xarray.Dataset, optional
+    components, sobol : xarray.Dataset, optional
         Its `components` and `sobol_indices`.
     aligned : mapping, optional
         How the first component is aligned with the disconnected classes.
@@ -65,8 +65,8 @@ def sensitivity_answer(
     ]
     if components is not None:
         parts.append(_variance(components, aligned))
-    if indices is not None:
-        parts += _index_table(indices)
+    if sobol is not None:
+        parts += _index_table(sobol)
     answer = {
         "settings": int(found["l1_distance"].size),
         "runs": settings["runs"],
@@ -89,7 +89,7 @@ def sensitivity_answer(
             "noise_share": components.attrs["noise_share"],
             "disconnected_alignment": aligned,
         },
-        "sobol": None if indices is None else _sobol(indices),
+        "sobol": None if sobol is None else _sobol(sobol),
     }
     return Answer(parts, answer, [])
 
@@ -134,15 +134,15 @@ def _smallest(found: xr.Dataset) -> dict[str, Any] | None:
     }
 
 
-def _sobol(indices: xr.Dataset) -> dict[str, Any]:
-    inputs = [key_of(str(name)) for name in indices["input"].values]
+def _sobol(sobol: xr.Dataset) -> dict[str, Any]:
+    inputs = [key_of(str(name)) for name in sobol["input"].values]
     width = "pure_noise_first_order_half_width"
     return {
-        "samples": indices.attrs["samples"],
-        "settings": indices.sizes["setting"],
-        width: indices.attrs[width],
+        "samples": sobol.attrs["samples"],
+        "settings": sobol.sizes["setting"],
+        width: sobol.attrs[width],
         "outputs": by_name(
-            indices,
+            sobol,
             "output",
             lambda one: {
                 "noise_share": float(one["noise_share"]),
@@ -194,8 +194,8 @@ def _variance(components: xr.Dataset, aligned: Mapping[str, float] | None) -> st
     )
 
 
-def _index_table(indices: xr.Dataset) -> list[Part]:
-    inputs = [str(name) for name in indices["input"].values]
+def _index_table(sobol: xr.Dataset) -> list[Part]:
+    inputs = [str(name) for name in sobol["input"].values]
     orders = ("first_order_corrected", "total_order_corrected")
     rows = [
         [
@@ -203,11 +203,11 @@ def _index_table(indices: xr.Dataset) -> list[Part]:
             f"{float(one['noise_share']):.1%}",
             *(f"{v:.2f}" if isfinite(v) else "" for key in orders for v in one[key].values),
         ]
-        for one in each(indices, "output")
+        for one in each(sobol, "output")
         if isfinite(one["noise_share"])
     ]
-    width = indices.attrs["pure_noise_first_order_half_width"]
+    width = sobol.attrs["pure_noise_first_order_half_width"]
     return [
-        Table(rows, ["Sobol' indices", "noise", *inputs, *(f"total {name}" for name in inputs)]),
-        f"the indices are corrected for noise; those within {width:.2f} mean nothing",
+        Table(rows, ["Sobol' sobol", "noise", *inputs, *(f"total {name}" for name in inputs)]),
+        f"the sobol are corrected for noise; those within {width:.2f} mean nothing",
     ]

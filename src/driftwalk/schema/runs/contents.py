@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Set
 from dataclasses import dataclass, field
 from inspect import Parameter, signature
 from pathlib import Path
@@ -28,6 +28,8 @@ from driftwalk.schema.stores.netcdf import open_netcdf
 if TYPE_CHECKING:
     import xarray as xr
 
+    from driftwalk.schema.answers.parts import Answer
+
 
 @dataclass
 class RunContents:
@@ -43,6 +45,11 @@ class RunContents:
 
     datasets: dict[str, xr.Dataset] = field(default_factory=dict)
     body: str | None = None
+
+    @property
+    def place(self) -> str:
+        """The run, in the sentence of an error."""
+        return "the run"
 
     def dataset(self, name: str) -> xr.Dataset | None:
         """Return a dataset of the run, None when it is not there or cannot be read."""
@@ -78,23 +85,46 @@ class RunContents:
             When such a dataset is missing.
         """
         function = load_maker(maker)
-        # Other parameters are options, of which a file of the same name is none of the run's.
         known = {Path(kind.file).stem, *kind.datasets, "recordings", "body"}
+        return function(**self._arguments(function, known, lacking))
+
+    def answer(self, kind: RunKind, found: xr.Dataset) -> Answer | None:
+        """Return the answer of a result with the run's other datasets; None of a kind without one.
+
+        Raises
+        ------
+        InputError
+            When the run lacks a dataset that the answer needs.
+        """
+        if kind.answer is None:
+            return None
+        function = load_maker(kind.answer)
+        more = self._arguments(function, {*kind.datasets}, "its answer cannot be printed")
+        answer: Answer = function(found, **more)
+        return answer
+
+    def _arguments(
+        self, function: Callable[..., Any], known: Set[str], lacking: str
+    ) -> dict[str, Any]:
+        """Return the arguments of a maker: those of its parameters that are known by name.
+
+        The others are options, of which a file of the same name is none of the run's.
+        """
         given: dict[str, Any] = {}
         for name, one in signature(function).parameters.items():
             if name not in known:
                 continue
-            given[name] = self._argument(name)
+            given[name] = self._argument(name, drawn=bool(lacking))
             if lacking and given[name] is None and one.default is Parameter.empty:
-                raise InputError(f"the run lacks {name}.nc: {lacking}")
-        return function(**given)
+                raise InputError(f"{self.place} lacks {name}.nc: {lacking}")
+        return given
 
-    def _argument(self, name: str) -> Any:
+    def _argument(self, name: str, *, drawn: bool) -> Any:
         if name == "body":
             return self.body
-        if name not in ("recording", "recordings"):
+        if name not in ("recording", "recordings") or (drawn and name == "recording"):
             return self.dataset(f"{name}.nc")
-        # All are read for the first one too: a page then tells of one that the run did not write.
+        # A page reads all for the first one too, and tells of one that the run did not write.
         found = self.recordings()
         return found if name == "recordings" else next(iter(found), None)
 
@@ -125,6 +155,11 @@ class StoredRun(RunContents):
     manifest: dict[str, Any] = field(default_factory=dict)
     problems: dict[str, str] = field(default_factory=dict)
     read: list[str] = field(default_factory=list)
+
+    @property
+    def place(self) -> str:
+        """The folder."""
+        return str(self.folder)
 
     @property
     def name(self) -> str:

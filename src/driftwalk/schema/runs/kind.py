@@ -37,8 +37,6 @@ class RunKind:
         The other datasets that it may hold, without the ending of their files.
     page : callable or str
         Returns the sections of its page.
-    work : callable or str, optional
-        Its settings and its computation, see `driftwalk.runs.Work`.
     figures : callable or str, optional
         Returns its figures, a table from their names to functions that draw them.
     live : callable or str, optional
@@ -64,7 +62,6 @@ class RunKind:
     file: str
     page: Maker
     datasets: tuple[str, ...] = ()
-    work: Maker | None = None
     figures: Maker | None = None
     live: Maker | None = None
     answer: Maker | None = None

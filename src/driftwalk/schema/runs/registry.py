@@ -99,7 +99,7 @@ def answer_of(found: xr.Dataset, **more: Any) -> Answer | None:
     found : xarray.Dataset
         The main dataset of a run.
     **more
-        What else the run made: ``check`` of a fit; ``reference``, ``components``, ``indices`` of a
+        What else the run made: ``check`` of a fit; ``reference``, ``components``, ``sobol`` of a
         sensitivity study.
 
     Examples
