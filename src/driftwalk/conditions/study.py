@@ -134,9 +134,13 @@ def study_of_block(
         if known.isdisjoint(same_fact):
             study = apply_overrides(study, {f"block.{key}": ours if is_same else own})
         elif not is_same:
+            # A depth is stated by either of two keys.
+            stated_by = next(one for one in _BLOCK_ATTRIBUTES if one in same_fact & known)
+            stated = f"{getattr(study.block, stated_by)} {_BLOCK_ATTRIBUTES[stated_by][1]}"
             raise InputError(
-                f"{_name_of(recording)}the recording is of a block of {word} {own} {unit}, and the "
-                f"study says {ours} {unit}: state the {word} once, {way}"
+                f"{_name_of(recording)}the recording is of a block of {word} "
+                f"{f'{own} {unit}'.rstrip()}, and the study says {stated.rstrip()}: state the "
+                f"{word} once, {way}"
             )
     return study
 

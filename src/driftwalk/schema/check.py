@@ -125,7 +125,8 @@ def refuse_other_version(dataset: xr.Dataset, path: Path | None = None) -> xr.Da
         return dataset
     if not isinstance(version, int | np.integer) or version != kind.version:
         raise FormatError(
-            f"is of another schema version: its {kind.name} has version {version}, and this "
+            ("" if path else f"the dataset '{kind.name}' ")
+            + f"is of another schema version: its {kind.name} has version {version}, and this "
             f"driftwalk reads {kind.version}; make it again with this driftwalk",
             path=path,
         )

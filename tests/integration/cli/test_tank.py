@@ -136,12 +136,19 @@ def test_the_default_side_that_a_fitted_tank_took_is_nobodys_word(
 @pytest.mark.parametrize(
     ("stated", "said"),
     [
-        ({}, "mass, side and tank were not stated: the defaults, 11.6 g, 3 cm and a circle of"),
+        (
+            {},
+            "mass, side and tank were not stated: the defaults, 11.6 g, 3 cm and a circle of "
+            "diameter 0.3 m, are assumed",
+        ),
         (
             {"block.side_m": 0.03, "tank.diameter_m": 0.3},
-            "mass was not stated: the default, 11.6 g",
+            "mass was not stated: the default, 11.6 g, is assumed",
         ),
-        ({"block.side_m": 0.03, "block.mass_kg": 0.0116}, "tank was not stated: the default"),
+        (
+            {"block.side_m": 0.03, "block.mass_kg": 0.0116},
+            "tank was not stated: the default, a circle of",
+        ),
     ],
 )
 def test_a_default_that_decides_a_number_is_warned_of(stated: dict[str, float], said: str) -> None:
@@ -157,3 +164,21 @@ def test_a_recording_may_state_its_block(tmp_path: Path) -> None:
     heavy = dw.apply_overrides(dw.Study(), {"block.mass_kg": 0.02})
     with pytest.raises(dw.InputError, match=r"mass 0.0116 kg, and the study says 0.02 kg"):
         dw.conditions.study_for([recording], heavy)
+
+
+@pytest.mark.parametrize(
+    ("recorded", "stated", "said"),
+    [
+        ("0.02", {"depth": "immersed"}, "depth 0.02 m, and the study says immersed: state"),
+        ("immersed", {"depth_m": 0.02}, "depth immersed, and the study says 0.02 m: state"),
+    ],
+)
+def test_a_depth_is_stated_by_either_of_two_keys(
+    recorded: str, stated: dict[str, Any], said: str
+) -> None:
+    name = "block_depth" if recorded == "immersed" else "block_depth_m"
+    value = recorded if recorded == "immersed" else float(recorded)
+    recording = dw.tank30_recording().assign_attrs({name: value})
+    study = dw.apply_overrides(dw.Study(), {f"block.{k}": v for k, v in stated.items()})
+    with pytest.raises(dw.InputError, match=said):
+        dw.conditions.study_for([recording], study)

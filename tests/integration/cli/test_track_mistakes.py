@@ -117,6 +117,9 @@ def test_a_video_without_colours_teaches_nothing_and_says_what_to_do(tmp_path: P
         image = np.full((60, 80, 3), 90 + number, np.uint8)
         assert cv2.imwrite(str(folder / f"{number}.png"), image)
     teach = ("markers", "teach", folder, "--fps", "10Hz", "--scale", "200px/m")
+    for scale in ("0", "-1mm"):
+        wrong = refusal(here(*teach[:-1], scale, "-o", tmp_path / "m.toml"))
+        assert "--scale must be above zero" in wrong
     said = refusal(here(*teach, "-o", tmp_path / "m.toml"))
     assert "seen: all is grey; take a video in brighter, even light" in said
 

@@ -10,6 +10,7 @@ from typing import Annotated, Final
 import typer
 
 from driftwalk.cli.options.shared import option, scale_option
+from driftwalk.core.errors import InputError
 
 _FINDING: Final = "How objects are found"
 _MOTION: Final = "How they move"
@@ -120,7 +121,9 @@ class TrackingOptions:
 
     @property
     def px_per_m(self) -> float | None:
-        """Scale [px/m]."""
+        """Scale [px/m]; refuses one that is not above zero."""
+        if self.scale is not None and not self.scale > 0.0:
+            raise InputError(f"--scale must be above zero, got {self.scale:g}")
         return None if self.scale is None else 1.0 / self.scale
 
     @property

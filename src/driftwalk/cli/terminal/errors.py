@@ -19,12 +19,16 @@ from driftwalk.core.errors import DriftwalkError
 EXIT_USER_ERROR = 2
 EXIT_INTERRUPTED = 130
 EXIT_BROKEN_PIPE = 141
-# What other programs call an option or a command, and what it is here.
+# What other programs, and earlier versions, call an option or a command, and what it is here.
 _SYNONYMS = {
     **dict.fromkeys(("--arena", "--tank-diameter", "--diameter"), "--tank"),
     **dict.fromkeys(("--frame-rate", "--image-rate"), "--fps"),
     **dict.fromkeys(("--metres-per-pixel", "--px-per-m", "--pixel-size"), "--scale"),
-    **dict.fromkeys(("--parameters-from", "--from-run", "--truth"), "RUN or --study"),
+    **dict.fromkeys(("--parameters-from", "--from-run"), "RUN"),
+    "--truth": "RUN or --study",
+    "--live": "ADDRESS:PORT",
+    "--least-area-px": "--min-area-px",
+    "--most-area-px": "--max-area-px",
     **dict.fromkeys(("--world", "--run"), "--replicate"),
     "convert": "driftwalk read",
 }
@@ -105,7 +109,8 @@ def _usage_message(error: BaseException) -> str:
     message = message.rstrip(".")
     option = getattr(error, "option_name", None)
     wanted = _SYNONYMS.get(option or message.partition("'")[2].rstrip("'"))
-    if wanted is not None:
+    known = {name for one in context.command.params for name in one.opts}
+    if wanted is not None and (not wanted.startswith("--") or wanted in known):
         message = f"{message.partition(' (Possible')[0]}; did you mean {wanted}?"
     return f"{message} (see '{context.command_path} --help{'' if option is None else '-all'}')"
 
