@@ -94,7 +94,7 @@ def _write_options(options: list[Any], ctx: Any, formatter: Any) -> None:
     own = [one for one in options if _group(one) != _HELP]
     shown = options
     if ALL not in ctx.meta:
-        by_name = {one.opts[0].lstrip("-"): one for one in own}
+        by_name = {_name(one): one for one in own}
         shown = [by_name[name] for name in main] or own
     groups: dict[str, list[tuple[str, str]]] = {}
     for one in shown:
@@ -123,14 +123,19 @@ def _write_commands(group: Any, formatter: Any) -> None:
         _write(formatter, heading, rows)
 
 
+def _name(option: Any) -> str:
+    """Return the long name of an option; click's own ``-h, --help`` has no fixed order."""
+    return max((str(one) for one in option.opts), key=len).lstrip("-")
+
+
 def _group(option: Any) -> str:
     group: str | None = getattr(option, "rich_help_panel", None)
-    return group or _GROUPS.get(option.opts[0].lstrip("-"), "Options")
+    return group or _GROUPS.get(_name(option), "Options")
 
 
 def _label(option: Any) -> str:
     """Return the names of an option with the placeholder of its value."""
-    names = ", ".join((*option.opts, *option.secondary_opts))
+    names = ", ".join((*sorted(option.opts, key=len, reverse=True), *option.secondary_opts))
     if option.is_flag:
         return names
     return f"{names} {option.metavar or option.name.upper()}"
