@@ -17,7 +17,7 @@ from driftwalk.core.provenance import read_manifest
 from driftwalk.export.figures.redraw import draw_run
 from driftwalk.notebook.result import as_result
 from driftwalk.page import dataset_page, report_page
-from driftwalk.runs import run_work
+from driftwalk.runs import run_folder, run_work
 from driftwalk.schema.runs import RUN_KINDS, RunKind, register, registry, run_kind
 from driftwalk.viewer import RunSource
 
@@ -140,3 +140,14 @@ def test_a_kind_is_declared_once(toy: RunKind) -> None:
     assert RUN_KINDS["toy"] is toy
     with pytest.raises(InputError, match="there is no kind of run 'joke': there are calibration"):
         run_kind("joke")
+
+
+def test_a_result_knows_its_run_from_another_folder(
+    toy: RunKind, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from toy_kind import ToyWork
+
+    monkeypatch.chdir(tmp_path)
+    found = run_work(ToyWork(1), Path("run"))
+    monkeypatch.chdir("/")
+    assert run_folder(found) == tmp_path / "run"

@@ -32,7 +32,7 @@ MAP_SHARE = 0.75
 
 def sensitivity_figures(
     sensitivity: xr.Dataset,
-    reference: xr.Dataset | None = None,
+    reference: xr.Dataset | None,
     components: xr.Dataset | None = None,
 ) -> Figures:
     """Return the figures of a sensitivity study: the paper's 9 to 11, and a panel per class.
@@ -43,7 +43,7 @@ def sensitivity_figures(
     ----------
     sensitivity : xarray.Dataset
         A `sensitivity`.
-    reference : xarray.Dataset, optional
+    reference : xarray.Dataset or None
         Its reference, an `outcome_distribution` with ``realisation_proportion``.
     components : xarray.Dataset, optional
         Its `components`.
@@ -56,7 +56,7 @@ def sensitivity_figures(
 
     Examples
     --------
-    ``write_figures(sensitivity_figures(study, components=components), "run/figures")``
+    ``write_figures(sensitivity_figures(study, reference, components), "run/figures")``
     """
     figures: Figures = {}
     if reference is not None:

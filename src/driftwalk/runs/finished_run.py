@@ -78,7 +78,7 @@ class FoundRun:
         if "model" in found.dims:
             return str(found["model"].values[_best(found)])
         # A calibration of a user's own model may not name it.
-        other = "ks_distance" in found and not is_block(found)
+        other = self.kind is not None and self.kind.name == "calibration" and not is_block(found)
         return str(found.attrs.get("model", "of a user" if other else BLOCK))
 
     @property

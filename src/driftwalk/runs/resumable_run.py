@@ -62,7 +62,7 @@ class Work(Protocol):
         """Compute, keep the datasets in the run, and return the result."""
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Run(RunContents):
     """A run under way: its directory and the datasets that it has kept.
 
@@ -80,8 +80,8 @@ class Run(RunContents):
         Whether its figures are there.
     """
 
-    directory: RunDirectory = None  # type: ignore[assignment]
-    kind: str = ""
+    directory: RunDirectory
+    kind: str
     progress: Progress = silent
     executor: Executor | None = None
     drawn: bool = False
@@ -90,7 +90,7 @@ class Run(RunContents):
         """Write a dataset and return it as one that knows its file, as if it were read from it."""
         path = self.directory.write(name, netcdf_bytes(dataset))
         kept = dataset.copy(deep=False)
-        kept.encoding = {**dataset.encoding, "source": str(path)}
+        kept.encoding = {**dataset.encoding, "source": str(path.absolute())}
         self.datasets[name] = kept
         return kept
 

@@ -52,9 +52,7 @@ def test_only_what_is_given_is_drawn(tmp_path) -> None:
 @pytest.mark.slow
 def test_every_figure_of_a_study_is_written_the_same_each_time(study, tmp_path) -> None:
     first, again = (
-        write_figures(
-            sensitivity_figures(study, components=components(study)), tmp_path / name, ["svg"]
-        )
+        write_figures(sensitivity_figures(study, None, components(study)), tmp_path / name, ["svg"])
         for name in ("one", "two")
     )
     assert [path.stem for path in first] == ["l1_map", "class_panels", "biplot", "biplot_l1"]
@@ -65,7 +63,7 @@ def test_every_figure_of_a_study_is_written_the_same_each_time(study, tmp_path) 
 @pytest.mark.slow
 def test_a_study_along_one_axis_is_written(tmp_path) -> None:
     data = one_axis("latching", ["none", "collision", "connector"])
-    assert len(write_figures(sensitivity_figures(data), tmp_path, ["png"])) == 2
+    assert len(write_figures(sensitivity_figures(data, None), tmp_path, ["png"])) == 2
 
 
 def test_an_unknown_format_is_refused_before_anything_is_written(tmp_path) -> None:
