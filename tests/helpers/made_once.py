@@ -26,7 +26,10 @@ def made_once(name: str, make: Callable[[], T]) -> T:
             made: T = pickle.loads(stored.read_bytes())
         else:
             made = make()
-            stored.write_bytes(pickle.dumps(made))
+            # A worker that is killed meanwhile leaves no half of a file.
+            partial = stored.with_suffix(".partial")
+            partial.write_bytes(pickle.dumps(made))
+            partial.replace(stored)
     return made
 
 

@@ -134,4 +134,5 @@ def test_command_reads_a_simulated_path(
     assert "there is no run 99" in refusal(here("classify", file, "--replicate", "99"))
     table = tmp_path / "table.csv"
     table.write_text("t_s,x_m,y_m,theta_rad\n0,0,0,0\n1,0,0,0\n", encoding="utf-8")
-    assert "--replicate" in refusal(here("classify", table, "--replicate", "0"))
+    line = refusal(here("classify", table, "--replicate", "0"))
+    assert "no simulation, so it has no replicates: omit --replicate" in line

@@ -47,6 +47,7 @@ def visited(recording: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
         ("first", "state", 0.05, 0.02),
         ("second", "state", 0.05, 0.02),
         ("first", "given", 0.1, 0.04),
+        ("second", "given", 0.1, 0.04),
     ],
 )
 def test_half_an_hour_of_the_bundled_recording(

@@ -126,7 +126,7 @@ CASES: dict[str, tuple[str, str, list[str], int, int]] = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
-def test_info_and_convert(
+def test_info_and_read(
     case: str, shared_data: SharedData, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder, file, options, bodies, samples = CASES[case]

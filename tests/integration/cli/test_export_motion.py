@@ -218,7 +218,7 @@ def test_fonts_of_a_pdf_are_truetype(run: Path, tmp_path: Path) -> None:
         (("{run}", "--to", "csv", "--seed", "1"), "csv has no use for --seed"),
         (("{run}", "--to", "gif", "--speed", "0"), "above zero: got 0"),
         (("{run}", "--to", "gif"), "at most 1200 s are written"),
-        (("{run}", "--to", "csv", "--replicate", "1"), "a recording of one world"),
+        (("{run}", "--to", "csv", "--replicate", "1"), "a recording, which has no replicates"),
         (("{blocks}", "--to", "csv", "--replicate", "7"), "no run 7"),
         (("{blocks}", "--to", "pdf"), "is not the directory of a finished run"),
         (("nowhere.nc", "--to", "csv"), "does not exist"),

@@ -105,7 +105,7 @@ def test_like_a_recording_and_read_again_as_its_commands_do(tmp_path: Path) -> N
     one = run.isel(replicate=1, drop=True)
     twin = dw.compare(dw.tank30_recording(), one, permutations=0)
     assert said["ks_distance"] == float(twin["ks_distance"])
-    # As a recording: info and convert read the same replicate.
+    # As a recording: info and read take the same replicate.
     info = here("info", tmp_path / "a.nc", "--replicate", "1", "--json")
     (body,) = json.loads(info.out)["bodies"].values()
     assert (body["samples"], body["gaps"]) == (18001, 0)
