@@ -13,7 +13,7 @@ import pytest
 SOURCE = Path(__file__).resolve().parents[2] / "src" / "driftwalk"
 
 GROUND = frozenset({"core", "_core", "schema"})
-# The table of the architecture page: for each folder, the others that it may import.
+# For each folder, the others that it may import; ARCHITECTURE.md shows their ranks.
 MAY_IMPORT: dict[str, frozenset[str]] = {
     "core": frozenset({"_core"}),
     "schema": frozenset({"core", "_core"}),

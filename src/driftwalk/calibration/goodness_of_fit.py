@@ -15,10 +15,7 @@ from driftwalk.calibration.grid.grid_refinement import first_window, locate_mini
 from driftwalk.calibration.problem import Problem, limits_of
 from driftwalk.comparison.statistic import distances_among
 from driftwalk.core.arrays import Bools
-from driftwalk.schema.answers.facts import is_explained
-
-FAR_ABOVE_FLOOR = 2.0
-"""A distance more than this many noise floors is called far above it."""
+from driftwalk.schema.answers.facts import FAR_ABOVE_FLOOR, is_explained
 
 
 def noise_floor_at(problem: Problem, point: Sequence[float]) -> float:

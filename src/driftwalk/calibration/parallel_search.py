@@ -70,7 +70,7 @@ class SearchProgress:
 
     Attributes
     ----------
-    cancellation : Waiting
+    cancellation : CancelOnError
         The block that waits for the searches; they end with it.
     """
 

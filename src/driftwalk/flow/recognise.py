@@ -12,7 +12,7 @@ from driftwalk.flow.readers.netcdf import holds_velocities
 from driftwalk.flow.readers.pivlab import holds_velocities as holds_pivlab, is_pivlab
 from driftwalk.flow.readers.table import is_field_table
 from driftwalk.flow.rows import grid_rows
-from driftwalk.schema.stores.netcdf import is_netcdf, kind_of, open_netcdf
+from driftwalk.schema.stores.netcdf import is_netcdf, kind_of_file, open_netcdf
 
 
 def flow_format(path: str | PathLike[str]) -> str | None:
@@ -57,7 +57,7 @@ def flow_format(path: str | PathLike[str]) -> str | None:
 
 
 def _netcdf_format(path: Path) -> str | None:
-    kind = kind_of(path)
+    kind = kind_of_file(path)
     if kind is not None:
         return "driftwalk" if kind == "flow_field" else None
     try:

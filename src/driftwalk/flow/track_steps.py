@@ -68,8 +68,9 @@ class FoundSteps:
 def track_steps(trajectory: xr.Dataset) -> FoundSteps:
     """Return the steps of all bodies of a recording.
 
-    An interval longer than `1.5` times the median one of all tracks is a gap. Where the
-    tracker says that identities could have been exchanged (``ambiguous``), there is no step.
+    An interval longer than 1.5 times the median one of all tracks is a gap, as for
+    `local_quadratic`. Where the tracker says that identities could have been exchanged
+    (``ambiguous``), there is no step.
 
     Parameters
     ----------

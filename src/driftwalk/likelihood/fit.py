@@ -118,8 +118,7 @@ def fit_motion(
     course = Course(tell or tell_nobody, _usual_parts(passes, ready.angle))
     prior = Prior(passes)
     weights = first_weights(ready.tracks, spline)
-    # The stages follow one another here, and not each in a function: the search is four calls above
-    # the kernel as it is.
+    # The stages stay in one function: they share most of their variables.
     with solved(ready.wall_share):
         passed = _work_listener(course, _usual_search(passes))
         search = ModeSearch(passes, prior, chosen.fit.iterations, passed)

@@ -17,7 +17,7 @@ from driftwalk.record.registry import PLAIN, failed_format, find_loader
 from driftwalk.record.tables.in_memory import MemorySource, table_in_memory
 from driftwalk.record.tables.rows import recording_of
 from driftwalk.record.text import DAMAGED_GZIP
-from driftwalk.schema.stores.netcdf import kind_of
+from driftwalk.schema.stores.netcdf import kind_of_file
 
 IN_MEMORY: Final = "table"
 """Format of what is no file."""
@@ -84,7 +84,7 @@ def origin_of(
     if table is not None:
         return _of_table(table, options, format=format, replicate=replicate)
     path = Path(data)
-    if replicate is not None and kind_of(path) != "simulation":
+    if replicate is not None and kind_of_file(path) != "simulation":
         raise InputError(f"{path}: no simulation, so it has no replicates: omit `replicate`")
     named = format or ("matrices" if options.y is not None else None)
     loader = find_loader(path, format=named, by_columns=bool(options.columns))

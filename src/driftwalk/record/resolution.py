@@ -62,7 +62,7 @@ def _decimal_quantum(values: Array) -> float:
     The greatest common divisor of their differences; of few values, which may have a common divisor
     by chance, the last decimal place.
     """
-    for decimals in range(9 + 1):
+    for decimals in range(10):
         scaled = values * 10.0**decimals
         whole = np.round(scaled)
         if np.abs(whole).max() > 2.0**52:

@@ -10,7 +10,7 @@ import pytest
 from driftwalk.cli.terminal.progress import ProgressReporter
 from driftwalk.core.run_stages import WHOLE
 
-# What `run_fit` told of the bundled recording, and when [s of a processor]; then its end.
+# What a fit reported of the bundled recording, and when [s of a processor]; then its end.
 RECORDED = {
     "300 s": (
         [

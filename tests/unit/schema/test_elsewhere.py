@@ -12,7 +12,7 @@ import pytest
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.stores.hdf5 import opened_hdf5
-from driftwalk.schema.stores.netcdf import kind_of, open_netcdf
+from driftwalk.schema.stores.netcdf import kind_of_file, open_netcdf
 
 
 def linked(file: h5py.File, secret: Path) -> None:
@@ -56,7 +56,7 @@ def test_another_file_is_not_read(
         open_netcdf(path)
     with pytest.raises(FormatError, match=said), opened_hdf5(path):
         pass
-    assert kind_of(path) is None
+    assert kind_of_file(path) is None
 
 
 def test_links_within_the_file_are_read(tmp_path: Path) -> None:

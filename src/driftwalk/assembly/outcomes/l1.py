@@ -359,7 +359,7 @@ def _check_proportions(values: Floats) -> None:
         raise InputError(f"a distribution is a row of proportions, got shape {values.shape}")
     if not (np.isfinite(values) & (values >= 0)).all():
         raise InputError("a distribution has a proportion that is negative or not finite")
-    # Proportions that were written with five digits still pass.
+    # Proportions that went through a file in single precision still sum to one.
     if abs(values.sum() - 1) > 1e-5:
         raise InputError(
             f"proportions must sum to 1, these sum to {values.sum():g}: divide counts by the "

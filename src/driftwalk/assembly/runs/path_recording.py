@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from driftwalk.core.errors import InputError
-from driftwalk.schema.check import kind_name
+from driftwalk.schema.check import require_kind
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -47,9 +47,7 @@ def path_recording(path: xr.Dataset, *, run: int = 0) -> xr.Dataset:
     """
     from driftwalk.schema import build_trajectory
 
-    kind = kind_name(path) or "a dataset of no kind"
-    if kind != "assembly_path":
-        raise InputError(f"expected a dataset of kind 'assembly_path', got '{kind}'")
+    require_kind(path, "assembly_path", "assembly_path makes one")
     runs = path["run"].values.tolist()
     if run not in runs:
         raise InputError(f"there is no run {run}: the path holds {', '.join(map(str, runs))}")

@@ -12,7 +12,6 @@ import numpy as np
 
 from driftwalk.calibration.estimation import Stores, Tell
 from driftwalk.calibration.goodness_of_fit import (
-    FAR_ABOVE_FLOOR,
     GoodnessOfFit,
     Halves,
     goodness_of_fit,
@@ -57,6 +56,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.run_stages import share_of_map, share_of_windows
 from driftwalk.motion.batches import no_numbers
 from driftwalk.motion.score import broken_worlds
+from driftwalk.schema.answers.facts import FAR_ABOVE_FLOOR
 
 if TYPE_CHECKING:
     import xarray as xr

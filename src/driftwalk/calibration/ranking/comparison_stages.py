@@ -91,7 +91,7 @@ class Stages:
 
     work: Searches
     replicates: int
-    """Recordings by which a discrepancy is judged; below 2 nobody is asked."""
+    """Recordings by which a discrepancy is judged; below 2 the second stage is left out."""
     stores: Stores | None
     executor: Executor | None
     """Elsewhere."""

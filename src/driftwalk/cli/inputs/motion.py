@@ -10,7 +10,7 @@ from driftwalk.cli.options.recording import RecordingOptions
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.file_names import text_of_name
 from driftwalk.schema.stores.contents import check_contents
-from driftwalk.schema.stores.netcdf import kind_of, open_netcdf
+from driftwalk.schema.stores.netcdf import kind_of_file, open_netcdf
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -75,4 +75,4 @@ def _open_simulation(path: Path) -> xr.Dataset | None:
     if not path.is_file():
         return None
     # Damaged, or no NetCDF: the loaders of recordings say what is wrong.
-    return check_contents(open_netcdf(path), path) if kind_of(path) == "simulation" else None
+    return check_contents(open_netcdf(path), path) if kind_of_file(path) == "simulation" else None

@@ -81,10 +81,10 @@ def _is_field(path: Path) -> bool:
 
 def _maybe_a_field(path: Path) -> str | None:
     """Return how a `.nc` that is no known recording may be read as a flow field, None of others."""
-    from driftwalk.schema.stores.netcdf import is_netcdf, kind_of, open_netcdf
+    from driftwalk.schema.stores.netcdf import is_netcdf, kind_of_file, open_netcdf
 
     named = path.is_file() and path.suffix.lower() == ".nc"
-    if not named or not is_netcdf(path) or kind_of(path) is not None:
+    if not named or not is_netcdf(path) or kind_of_file(path) is not None:
         return None
     try:
         names = ", ".join(list(map(str, open_netcdf(path).variables))[:12])
@@ -98,9 +98,9 @@ def _maybe_a_field(path: Path) -> str | None:
 
 def _netcdf_kind(path: Path) -> str | None:
     """Return which kind of driftwalk's own datasets a file holds, None for any other file."""
-    from driftwalk.schema.stores.netcdf import kind_of
+    from driftwalk.schema.stores.netcdf import kind_of_file
 
     if path.suffix.lower() != ".nc":
         return None
-    kind = kind_of(path)
+    kind = kind_of_file(path)
     return None if kind in ("trajectory", "simulation") else kind

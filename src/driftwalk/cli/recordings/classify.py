@@ -23,7 +23,7 @@ from driftwalk.core.files.run_layout import MANIFEST_FILE
 from driftwalk.core.study_keys import STUDY_KEYS
 from driftwalk.schema.shapes import short_class
 from driftwalk.schema.stores.contents import check_contents
-from driftwalk.schema.stores.netcdf import kind_of, open_netcdf
+from driftwalk.schema.stores.netcdf import kind_of_file, open_netcdf
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -187,7 +187,9 @@ def _simulated_path(path: Path) -> xr.Dataset | None:
     if path.suffix != ".nc" or not path.is_file():
         return None
     # Whatever else it is, the loaders say what is wrong with it.
-    return check_contents(open_netcdf(path), path) if kind_of(path) == "assembly_path" else None
+    return (
+        check_contents(open_netcdf(path), path) if kind_of_file(path) == "assembly_path" else None
+    )
 
 
 def _name(names: list[str], index: int) -> str:

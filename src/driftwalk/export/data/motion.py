@@ -11,7 +11,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.files.run_layout import MANIFEST_FILE, run_file, run_files, state_of
 from driftwalk.core.text.json_text import read_json
 from driftwalk.core.text.toml_text import parse_toml
-from driftwalk.schema.stores.netcdf import kind_of, open_netcdf
+from driftwalk.schema.stores.netcdf import kind_of_file, open_netcdf
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -36,7 +36,7 @@ class Motion:
     recording: xr.Dataset
 
 
-def find_motions(source: Path, *, world: int | None = None) -> list[Motion]:
+def find_motions(source: Path, *, replicate: int | None = None) -> list[Motion]:
     """Return every recording and every simulated world of a run directory or a file.
 
     Parameters
@@ -44,7 +44,7 @@ def find_motions(source: Path, *, world: int | None = None) -> list[Motion]:
     source : Path
         The run directory of a fit, a calibration, a comparison of models or of self-assembly; or a
         file: a simulation, the path of an assembly, or a recording that is read without options.
-    world : int, optional
+    replicate : int, optional
         Which simulated world to take alone: a replicate, or a run of blocks; default: all.
 
     Returns
@@ -63,7 +63,7 @@ def find_motions(source: Path, *, world: int | None = None) -> list[Motion]:
     'recording'
     """
     if state_of(source) == "new":
-        return _of_file(source, world)
+        return _of_file(source, replicate)
     files = [*run_files(source, "recording*.nc"), *run_files(source, "path.nc")]
     if not files:
         raise InputError(
@@ -71,45 +71,45 @@ def find_motions(source: Path, *, world: int | None = None) -> list[Motion]:
             "(path.nc); give the file of a recording or a simulation"
         )
     side = _side_of_run(source)
-    found = [motion for file in files for motion in _of_file(file, world)]
+    found = [motion for file in files for motion in _of_file(file, replicate)]
     for motion in found:
         if side is not None:
             motion.recording.attrs.setdefault("block_side_m", side)
     return found
 
 
-def _of_file(file: Path, world: int | None) -> list[Motion]:
+def _of_file(file: Path, replicate: int | None) -> list[Motion]:
     from driftwalk.record import load
 
     if not file.exists():
         raise InputError(f"{file} does not exist: give a run directory, or a file with motion")
-    kind = kind_of(file) if file.is_file() else None
+    kind = kind_of_file(file) if file.is_file() else None
     if kind in OF_WORLDS:
-        return list(_of_worlds(file, kind, world))
+        return list(_of_worlds(file, kind, replicate))
     if kind == "assembly":
         raise InputError(
             f"{file} holds only the ends of the runs: give the run directory, whose path.nc holds "
             "the whole way of some"
         )
-    if world is not None:
-        raise InputError(f"{file} is a recording of one world: name none")
+    if replicate is not None:
+        raise InputError(f"{file} is a recording, which has no replicates: leave `replicate` out")
     # A recording in the plain form that `load` makes of any file that needs no options.
     return [Motion(file.stem.partition(".")[0] or "recording", load(file))]
 
 
-def _of_worlds(file: Path, kind: str, world: int | None) -> Iterator[Motion]:
+def _of_worlds(file: Path, kind: str, replicate: int | None) -> Iterator[Motion]:
     from driftwalk.assembly import path_recording
     from driftwalk.record import load
 
     stored = open_netcdf(file)
     dimension = OF_WORLDS[kind]
     known = stored[dimension].values.tolist()
-    if world is not None and world not in known:
+    if replicate is not None and replicate not in known:
         raise InputError(
-            f"{file}: there is no {dimension} {world}: it holds {known[0]} to {known[-1]}"
+            f"{file}: there is no {dimension} {replicate}: it holds {known[0]} to {known[-1]}"
         )
     side = _side_of_simulation(stored)
-    for number in known if world is None else [world]:
+    for number in known if replicate is None else [replicate]:
         recording = (
             path_recording(stored, run=number)
             if kind == "assembly_path"

@@ -30,7 +30,7 @@ def _write_motions(format: str, source: Source, folder: Path) -> list[Path]:
     files: list[Path] = []
     pages: list[Exported] = []
     missing: dict[str, None] = {}
-    for motion in find_motions(source.path, world=source.replicate):
+    for motion in find_motions(source.path, replicate=source.replicate):
         file, *further = write(motion, folder)
         sentences = lost(format, motion)
         pages.append(Exported(file, sentences, read_again(format, motion, file)))
@@ -46,10 +46,11 @@ def _write_motions(format: str, source: Source, folder: Path) -> list[Path]:
 def _write_films(ending: str, source: Source, folder: Path) -> list[Path]:
     from driftwalk.plot import write_animation
 
-    motions = find_motions(source.path, world=source.replicate)
+    motions = find_motions(source.path, replicate=source.replicate)
     if len(motions) > 1:
         source.tell(
-            f"the film shows {motions[0].name}, the first of {len(motions)}: name a world to see it"
+            f"the film shows {motions[0].name}, the first of {len(motions)}: name another "
+            "with `replicate`"
         )
     file = write_animation(
         motions[0].recording,

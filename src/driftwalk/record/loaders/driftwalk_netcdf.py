@@ -13,7 +13,7 @@ from driftwalk.schema import body_names, check_trajectory
 from driftwalk.schema.check import kind_name
 from driftwalk.schema.kinds import KINDS
 from driftwalk.schema.stores.contents import check_contents
-from driftwalk.schema.stores.netcdf import MAGIC, kind_of, open_netcdf
+from driftwalk.schema.stores.netcdf import MAGIC, kind_of_file, open_netcdf
 from driftwalk.schema.trajectory import POSE
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ class DriftwalkLoader:
 
     def sniff(self, head: bytes, path: Path) -> float:
         """Recognise the attribute ``kind``."""
-        known = head.startswith(MAGIC) and kind_of(path) in ("trajectory", "simulation")
+        known = head.startswith(MAGIC) and kind_of_file(path) in ("trajectory", "simulation")
         return 1.0 if known else 0.0
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:

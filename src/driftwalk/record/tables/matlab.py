@@ -222,7 +222,8 @@ def _body_name(element: dict[str, Value]) -> str:
 
 
 def _refuse_wide(count: int, what: str, path: Path) -> None:
-    if count > 20_000:
+    most = 20_000
+    if count > most:
         raise FormatError(
-            f"{what} has {count} columns, more than the 20000 that are read", path=path
+            f"{what} has {count} columns, more than the {most} that are read", path=path
         )

@@ -50,6 +50,10 @@ class AnswerParts(NamedTuple):
     """Those that have no place in a variable."""
 
 
+FAR_ABOVE_FLOOR: Final = 2.0
+"""A KS distance of more noise floors than this is called far above the floor. Chosen by hand."""
+
+
 def facts_of(dataset: xr.Dataset) -> dict[str, Any]:
     """Return what a dataset says under flat names, in Python's own types.
 

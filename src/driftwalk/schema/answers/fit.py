@@ -5,7 +5,13 @@ from __future__ import annotations
 from math import isfinite
 from typing import TYPE_CHECKING, Any, Final
 
-from driftwalk.schema.answers.facts import facts_of, flat_variables, is_open, sentences
+from driftwalk.schema.answers.facts import (
+    FAR_ABOVE_FLOOR,
+    facts_of,
+    flat_variables,
+    is_open,
+    sentences,
+)
 from driftwalk.schema.answers.force_law import (
     LINEAR_DRAG_ALONE,
     compared_laws,
@@ -29,8 +35,6 @@ from driftwalk.schema.kinds.fit_numbers import LAW_NUMBERS, PARAMETERS
 if TYPE_CHECKING:
     import xarray as xr
 
-FAR_ABOVE_FLOOR: Final = 2.0
-"""KS distance over its noise floor that is called far; as in a calibration."""
 TELLING_SHARE: Final = 0.02
 """Share of the intervals at the wall from which there may be enough contacts to estimate it."""
 _ATTRIBUTES: Final = (

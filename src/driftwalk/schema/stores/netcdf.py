@@ -121,7 +121,7 @@ def _attribute_of_hdf5(path: Path, name: str) -> Any:
         return None
 
 
-def kind_of(path: Path) -> str | None:
+def kind_of_file(path: Path) -> str | None:
     """Return which kind of driftwalk's own datasets a file holds, None for any other file."""
     return text_attribute(path, "kind")
 

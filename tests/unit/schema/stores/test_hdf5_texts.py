@@ -15,7 +15,7 @@ from tracker_files import session
 
 from driftwalk.core.errors import FormatError
 from driftwalk.schema.stores.hdf5_texts import refuse_endless_texts
-from driftwalk.schema.stores.netcdf import kind_of
+from driftwalk.schema.stores.netcdf import kind_of_file
 
 COLLECTION = b"GCOL\x01\x00\x00\x00"
 
@@ -72,7 +72,7 @@ def test_damaged_texts_are_refused_unread(
         refuse_endless_texts(path)
     begin = time.process_time()
     if not userblock:
-        assert kind_of(path) is None
+        assert kind_of_file(path) is None
         said = refusal(here("info", path, "--scale", "0.001"))
         assert DAMAGES[damage] in said
     assert time.process_time() - begin < 1.0
@@ -81,7 +81,7 @@ def test_damaged_texts_are_refused_unread(
 def test_whole_texts_are_read(tmp_path: Path) -> None:
     path = tmp_path / "trajectories.h5"
     labelled(path)
-    assert kind_of(path) == "a kind of its own"
+    assert kind_of_file(path) == "a kind of its own"
     assert here("info", path, "--scale", "0.001").code == 0
 
 
