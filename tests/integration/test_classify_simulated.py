@@ -107,7 +107,7 @@ def test_path_as_a_recording_holds_the_same_poses(
         assert recording.attrs["sample_rate_Hz"] == pytest.approx(1 / INTERVAL)
     with pytest.raises(InputError, match="there is no run 20: the path holds 0, 1"):
         path_recording(path, run=RUNS)
-    with pytest.raises(InputError, match="expected a dataset of kind 'assembly_path'"):
+    with pytest.raises(InputError, match="expected a dataset 'assembly_path', got one of no kind"):
         path_recording(path.drop_attrs())
 
 

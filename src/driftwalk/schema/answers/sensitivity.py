@@ -1,4 +1,4 @@
-"""The answer of a sensitivity study: distances to the reference, components, Sobol' sobol."""
+"""The answer of a sensitivity study: distances to the reference, components, Sobol' indices."""
 
 from __future__ import annotations
 
@@ -208,6 +208,6 @@ def _index_table(sobol: xr.Dataset) -> list[Part]:
     ]
     width = sobol.attrs["pure_noise_first_order_half_width"]
     return [
-        Table(rows, ["Sobol' sobol", "noise", *inputs, *(f"total {name}" for name in inputs)]),
-        f"the sobol are corrected for noise; those within {width:.2f} mean nothing",
+        Table(rows, ["Sobol' indices", "noise", *inputs, *(f"total {name}" for name in inputs)]),
+        f"the indices are corrected for noise; those within {width:.2f} mean nothing",
     ]
