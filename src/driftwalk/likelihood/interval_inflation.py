@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
+from driftwalk.core.arrays import Floats
 from driftwalk.likelihood.filter.parameters import Point
-from driftwalk.likelihood.law.facts import inertia_facts, inertia_of, number_facts
+from driftwalk.likelihood.law.force_law import inertia_facts, inertia_of, number_facts
 from driftwalk.likelihood.newton import Mode, known_numbers_variance
 from driftwalk.likelihood.prior import PRIOR
 from driftwalk.likelihood.reml import Restricted
-from driftwalk.likelihood.spline import Floats
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
@@ -116,7 +116,7 @@ def parameter_facts(
     normal = float(ndtri(0.5 + 0.5 * confidence))
     reach = normal * np.sqrt(np.diag(covariance))
     reach_of_drag = normal * _log_drag_std(point, covariance)
-    heavier = inertia_of(study, floating=point.number("water_acceleration") != 0.0)
+    heavier = inertia_of(study, point)
     side = normal * study.fit.side_std_m / study.block.side_m
     of_drag, of_force = (
         math.hypot(one, normal * heavier.log_std, side * slope)

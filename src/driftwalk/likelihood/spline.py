@@ -12,12 +12,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
+
+from driftwalk.core.arrays import Floats
 
 if TYPE_CHECKING:
     from driftwalk.flow.arena import Outline
 
-Floats = npt.NDArray[np.float64]
 
 DEGREE = 3
 

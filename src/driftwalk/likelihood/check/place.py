@@ -12,15 +12,12 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.flow.arena import outline_of
-from driftwalk.likelihood.check.errors import Contrast, Innovations, Integers, Leverage, collect
+from driftwalk.likelihood.check.errors import Contrast, Innovations, Leverage, collect
 from driftwalk.likelihood.check.whiteness import LAGS, WhitenessTests, whiteness_tests
-from driftwalk.likelihood.estimate import Estimate
-from driftwalk.likelihood.spline import Floats
-
-Flags = npt.NDArray[np.bool_]
+from driftwalk.likelihood.preparation import Estimate
 
 
 class GroupPolicy(NamedTuple):
@@ -77,10 +74,18 @@ class Layout:
         """Return the flow that a part is in."""
         return self.sources[int(self.series[part])][1] if self.sources else 0
 
-    @property
-    def recordings(self) -> int:
-        """Number of recordings."""
-        return len({self.recording(part) for part in range(self.parts)})
+    def place_of(self, cell: int) -> str:
+        """Return "x = 0.060 m, y = -0.100 m"."""
+        row, column = divmod(cell, self.x.size)
+        return f"x = {self.x[column]:.3f} m, y = {self.y[row]:.3f} m"
+
+    def time_of(self, part: int, last: int | None = None) -> str:
+        """Return "between 600 s and 1200 s", from the start of a part to its or another's end."""
+        end = self.end[part if last is None else last]
+        found = f"between {self.start[part]:.0f} s and {end:.0f} s"
+        if len({self.recording(one) for one in range(self.parts)}) > 1:
+            found += f" of recording {self.recording(part) + 1}"
+        return found
 
     @property
     def cells(self) -> int:
@@ -118,11 +123,8 @@ def lay_out(
         end += edges[1:].tolist()
     speeds = np.concatenate([one.speed[one.used] for one in errors])
     speeds = speeds[np.isfinite(speeds)]
-    edges = (
-        np.quantile(speeds, np.linspace(0.0, 1.0, GROUP.speed_bins + 1))
-        if speeds.size
-        else np.zeros(0)
-    )
+    shares = np.linspace(0.0, 1.0, GROUP.speed_bins + 1)
+    edges = np.quantile(speeds, shares) if speeds.size else np.zeros(0)
     return Layout(
         axes[0],
         axes[1],
@@ -232,7 +234,7 @@ class Trend(NamedTuple):
     """Its standard deviation."""
     chi_squared: float
     dof: int
-    visible: Flags
+    visible: Bools
     """Whether most of a change in a group could be seen: the fit may have absorbed it."""
 
 

@@ -14,9 +14,9 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from driftwalk.core.arrays import Floats
 from driftwalk.likelihood.check.place import Layout, cell_of
 from driftwalk.likelihood.check.posterior_predictive import Path
-from driftwalk.likelihood.spline import Floats
 
 
 class ScanPolicy(NamedTuple):

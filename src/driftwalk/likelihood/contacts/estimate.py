@@ -9,15 +9,18 @@ import numpy as np
 
 from driftwalk.conditions import estimated_study
 from driftwalk.core.run_stages import tell_nobody
-from driftwalk.likelihood.contacts.lattice import search_walls
-from driftwalk.likelihood.contacts.parabola import answer, is_undetermined
-from driftwalk.likelihood.contacts.particles import Part, WallLikelihood
-from driftwalk.likelihood.contacts.passages import Passages, passages_of, thinned
-from driftwalk.likelihood.estimate import Estimate, estimate_of
-from driftwalk.likelihood.flow_of_fit import fitted_flow
-from driftwalk.likelihood.intervals import fitted_intervals
+from driftwalk.likelihood.contacts.particles import (
+    Part,
+    Passages,
+    WallLikelihood,
+    passages_of,
+    thinned,
+)
+from driftwalk.likelihood.contacts.wall_search import answer, is_undetermined, search_walls
+from driftwalk.likelihood.flow_intervals import fitted_flow, fitted_intervals
 from driftwalk.likelihood.newton import Tell
-from driftwalk.likelihood.solution import BREAKDOWN
+from driftwalk.likelihood.preparation import Estimate, estimate_of
+from driftwalk.likelihood.refuse import BREAKDOWN
 from driftwalk.schema.answers.parts import undetermined
 from driftwalk.schema.check import described
 from driftwalk.schema.kinds.fit_numbers import WALL_NUMBERS
@@ -88,21 +91,44 @@ def estimate_wall(
     earlier = [f"{one.name}{end}" for one in WALL_NUMBERS for end in ("", "_interval")]
     fit = fit.drop_vars(["wall_contacts", *earlier], errors="ignore")
     fit.attrs.pop("wall_left_out", None)
+
+    def left_out(why: str) -> xr.Dataset:
+        return fit.assign_attrs(wall_left_out=why)
+
     if estimate is None:
-        return fit.assign_attrs(wall_left_out=_stands_on(unknown))
+        return left_out(
+            f"the estimate of the wall needs {' and '.join(unknown)}, which this recording does "
+            "not determine"
+        )
+    if fit.attrs["angle"] == "given":
+        return left_out(
+            "the estimate of the wall needs the orientation in the state of the fit, and here it "
+            'was an input: fit with `angle="state"`'
+        )
     if fit.attrs["angle"] != "state":
-        return fit.assign_attrs(wall_left_out=_no_orientation(fit.attrs["angle"]))
+        return left_out(
+            "the estimate of the wall needs the orientation of the block, and this fit used none: "
+            'record it, or read the column that holds it (`columns`), and fit with `angle="state"`'
+        )
     found = [passages_of(estimate, one) for one in estimate.passes.series]
     count = sum(len(one.x) for one in found)
     fit = described(fit.assign(wall_contacts=((), np.int64(count))))
     if count < CONTACT.fewest:
-        return fit.assign_attrs(wall_left_out=_too_few(count))
+        return left_out(
+            f"the estimate of the wall needs {CONTACT.fewest} contacts with it, and {count} can be "
+            "followed: record for longer, at an even rate, or where the flow drives the block to "
+            "the wall"
+        )
     try:
         data = _answer(fit, estimate, found, seed=seed, tell=tell or tell_nobody)
     except BREAKDOWN as error:
-        return fit.assign_attrs(wall_left_out=f"the estimate of the wall failed: {error}")
+        return left_out(f"the estimate of the wall failed: {error}")
     if is_undetermined(data):
-        return fit.assign_attrs(wall_left_out=_all_alike(count))
+        return left_out(
+            f"the block passed along the wall {count} times, which does not tell one wall from "
+            "another: the block hardly touched it, or moved as none would make it move; check the "
+            "size of the tank (`tank`) and the side of the block (`side`)"
+        )
     return described(fit.assign(data))
 
 
@@ -124,42 +150,3 @@ def _answer(
     likelihood = WallLikelihood(estimated_study(fit), estimate.point, parts, seed)
     walls = search_walls(likelihood.log_likelihood, tell)
     return answer(walls, float(fit["confidence"]))
-
-
-def _stands_on(unknown: Sequence[str]) -> str:
-    """Return why a fit without its numbers says nothing of the wall."""
-    return (
-        f"the estimate of the wall needs {' and '.join(unknown)}, which this recording does not "
-        "determine"
-    )
-
-
-def _no_orientation(angle: str) -> str:
-    """Return why a fit without the orientation in its state says nothing of the wall."""
-    if angle == "given":
-        return (
-            "the estimate of the wall needs the orientation in the state of the fit, and here it "
-            'was an input: fit with `angle="state"`'
-        )
-    return (
-        "the estimate of the wall needs the orientation of the block, and this fit used none: "
-        'record it, or read the column that holds it (`columns`), and fit with `angle="state"`'
-    )
-
-
-def _too_few(count: int) -> str:
-    """Return why so few contacts say nothing of the wall."""
-    return (
-        f"the estimate of the wall needs {CONTACT.fewest} contacts with it, and {count} can be "
-        "followed: record for longer, at an even rate, or where the flow drives the block to the "
-        "wall"
-    )
-
-
-def _all_alike(count: int) -> str:
-    """Return why enough contacts say nothing of the wall."""
-    return (
-        f"the block passed along the wall {count} times, which does not tell one wall from "
-        "another: the block hardly touched it, or moved as none would make it move; check the "
-        "size of the tank (`tank`) and the side of the block (`side`)"
-    )

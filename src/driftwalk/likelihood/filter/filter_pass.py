@@ -21,25 +21,25 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from driftwalk import _core
-from driftwalk.likelihood.filter.departures import STRENGTHS
+from driftwalk.core.arrays import Bools, Floats
 from driftwalk.likelihood.filter.difference_pairs import (
     Pair,
     difference_of,
+    factor,
+    forward,
     noise_derivatives,
     used_of,
 )
-from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.filter.parameters import STRENGTHS, Point
 from driftwalk.likelihood.filter.series import (
     FILTER,
     Body,
-    Flags,
     Series,
     corrected,
     cosine_of,
     strength_of,
 )
-from driftwalk.likelihood.filter.small_matrices import factor, forward
-from driftwalk.likelihood.spline import Floats, Spline
+from driftwalk.likelihood.spline import Spline
 
 Place = tuple[slice, slice]
 
@@ -172,7 +172,7 @@ class Passes:
                 ).sum()
         return Sums(deviance, score, information, int(used.sum()))
 
-    def innovations(self, point: Point) -> list[tuple[Floats, Flags]]:
+    def innovations(self, point: Point) -> list[tuple[Floats, Bools]]:
         """Return each recording's whitened innovations, shape (n, D), and which were used.
 
         D is 3 with the angle in the state, else 2. The innovation of a missing angle is 0.

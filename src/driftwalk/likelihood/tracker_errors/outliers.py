@@ -16,8 +16,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.likelihood.filter.series import Flags
-from driftwalk.likelihood.spline import Floats
+from driftwalk.core.arrays import Bools, Floats
 from driftwalk.schema import Track
 
 
@@ -40,7 +39,7 @@ class OutlierPolicy(NamedTuple):
 OUTLIER: Final = OutlierPolicy()
 
 
-def outliers_in(track: Track) -> Flags:
+def outliers_in(track: Track) -> Bools:
     """Return which samples of a track are mistakes of the tracker, shape (n,).
 
     Examples

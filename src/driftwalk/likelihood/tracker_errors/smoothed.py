@@ -18,8 +18,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
-from driftwalk.likelihood.spline import Floats
 from driftwalk.schema import Track
 
 

@@ -1,15 +1,76 @@
-"""Quadratic fit to the log likelihood of the walls: restitution and friction with intervals."""
+"""Grid search for the wall, and the parabola through its log likelihood."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from itertools import product
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.likelihood.contacts.lattice import LATTICE, Wall
-from driftwalk.likelihood.spline import Floats
+from driftwalk.core.arrays import Floats
+from driftwalk.likelihood.newton import Tell
+
+
+class LatticePolicy(NamedTuple):
+    """The lattices of walls, in restitution and hold: mu / (1 + mu) for the friction mu."""
+
+    restitutions: tuple[float, ...] = (0.0, 0.5, 1.0)
+    """Restitutions of the coarse lattice. Chosen by hand, as what follows."""
+    holds: tuple[float, ...] = (0.0, 0.1, 0.25, 0.45, 0.65)
+    """Holds of the coarse lattice. From a friction of about 1 on every contact sticks, and more of
+    it changes nothing."""
+    most_hold: float = 0.8
+    """Largest hold that is tried."""
+    finer: tuple[tuple[float, float], ...] = ((0.25, 0.12), (0.15, 0.05))
+    """Half the widths of the finer lattices, in restitution and hold."""
+    fine: int = 5
+    """Places of a finer lattice along each axis."""
+
+
+LATTICE: Final = LatticePolicy()
+
+
+class Wall(NamedTuple):
+    """A wall that was tried."""
+
+    restitution: float
+    hold: float
+    log_likelihood: float
+
+
+def search_walls(log_likelihood: Callable[[float, float], float], tell: Tell) -> list[Wall]:
+    """Try the walls of a coarse lattice, then of finer ones around the best of them."""
+    count = len(LATTICE.restitutions) * len(LATTICE.holds) + LATTICE.fine**2 * len(LATTICE.finer)
+    walls: dict[tuple[float, float], Wall] = {}
+    done = 0
+
+    def look(restitutions: Floats, holds: Floats) -> None:
+        nonlocal done
+        for restitution, hold in product(restitutions.tolist(), holds.tolist()):
+            tell(done, count, "wall")
+            # The same place of two lattices may differ in its last digits.
+            place = (round(restitution, 9), round(hold, 9))
+            if place not in walls:
+                found = log_likelihood(restitution, hold / (1.0 - hold))
+                walls[place] = Wall(restitution, hold, found)
+            done += 1
+
+    look(np.array(LATTICE.restitutions), np.array(LATTICE.holds))
+    for wide, high in LATTICE.finer:
+        best = max(walls.values(), key=lambda wall: wall.log_likelihood)
+        look(
+            _around(best.restitution, wide, most=1.0),
+            _around(best.hold, high, most=LATTICE.most_hold),
+        )
+    tell(count, count, "wall")
+    return list(walls.values())
+
+
+def _around(best: float, reach: float, *, most: float) -> Floats:
+    """Return the places of a finer lattice along one axis."""
+    return np.linspace(max(best - reach, 0.0), min(best + reach, most), LATTICE.fine)
 
 
 class ParabolaPolicy(NamedTuple):
@@ -62,8 +123,10 @@ def answer(walls: Sequence[Wall], confidence: float) -> dict[str, Any]:
     own = variance * np.linalg.pinv(terms.T @ (weight[:, None] * terms))
     covariance = inverse + slopes @ own @ slopes.T
     reach = float(ndtri(0.5 + 0.5 * confidence)) * np.sqrt(np.diag(covariance))
-    restitution = np.clip([best[0], best[0] - reach[0], best[0] + reach[0]], 0.0, 1.0)
-    friction = _friction(np.clip([best[1], best[1] - reach[1], best[1] + reach[1]], 0.0, 1.0))
+    restitution, hold = np.clip([best, best - reach, best + reach], 0.0, 1.0).T
+    # From the largest hold on every contact sticks.
+    with np.errstate(divide="ignore"):
+        friction = np.where(hold < LATTICE.most_hold, hold / (1.0 - hold), np.inf)
     return {
         "wall_restitution": ((), restitution[0]),
         "wall_restitution_interval": ("bound", restitution[1:]),
@@ -74,10 +137,8 @@ def answer(walls: Sequence[Wall], confidence: float) -> dict[str, Any]:
 
 def is_undetermined(found: Mapping[str, Any]) -> bool:
     """Return whether the intervals of an answer hold every wall."""
-    restitution, friction = (
-        found[f"wall_{name}_interval"][1].tolist() for name in ("restitution", "friction")
-    )
-    return bool(restitution == [0.0, 1.0] and friction == [0.0, math.inf])
+    ends = [found[f"wall_{name}_interval"][1].tolist() for name in ("restitution", "friction")]
+    return bool(ends == [[0.0, 1.0], [0.0, math.inf]])
 
 
 _CURVATURES: Final = (
@@ -86,9 +147,3 @@ _CURVATURES: Final = (
     np.array([[0.0, 0.0], [0.0, -2.0]]),
 )
 """Derivatives of the curvature by the parabola's last three numbers."""
-
-
-def _friction(hold: Floats) -> Floats:
-    """Return the friction of a hold; from the largest hold on it only sticks."""
-    with np.errstate(divide="ignore"):
-        return np.where(hold < LATTICE.most_hold, hold / (1.0 - hold), np.inf)

@@ -1,29 +1,96 @@
-"""The force law and the departures from the model in a fit: facts and variables."""
+"""The force law: what a study assumes of it, and what a fit states of it."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
-from driftwalk.likelihood.filter.departures import DRAG_SHAPES, STRENGTHS
-from driftwalk.likelihood.filter.filter_pass import Passes
-from driftwalk.likelihood.filter.parameters import Point
-from driftwalk.likelihood.law.assumptions import USUAL_ADDED_MASS, added_mass_of, is_stated
-from driftwalk.likelihood.solution import BREAKDOWN
+from driftwalk.likelihood.filter.parameters import DRAG_SHAPES, DRAGS, STRENGTHS, Point
+from driftwalk.likelihood.filter.series import body_of
+from driftwalk.likelihood.newton import Mode, ModeSearch, inverse
+from driftwalk.likelihood.refuse import BREAKDOWN
 from driftwalk.schema.answers.facts import fitted_value
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.likelihood.law.assumptions import Assumptions
     from driftwalk.likelihood.law.forward_selection import LawResult
     from driftwalk.likelihood.reml import Restricted
-    from driftwalk.likelihood.spline import Floats
     from driftwalk.model import Study
+
+
+FLOATING: Final[Mapping[str, float]] = {"water_acceleration": 1.0, "water_spin": 1.0}
+"""Numbers of a body that floats: it displaces its own mass of water."""
+USUAL_ADDED_MASS: Final = (0.5, 0.2)
+"""Added mass of a floating body as a share of its mass, and its standard deviation, where the
+user states none: 0.3 to 1 is possible (docs/explanation/likelihood.md)."""
+CAMERA: Final = ("time_variance", "angle_offset", "marker_x", "marker_y")
+
+
+@dataclass(frozen=True)
+class Assumptions:
+    """Numbers that are known before the fit, and those that are left to it."""
+
+    pressure_gradient: str
+    """"on", "off" or "auto"."""
+    opened: Mapping[str, float]
+    """Numbers that are estimated in any case, with their first values."""
+    fixed: Mapping[str, float]
+    """Numbers that are known and differ from the model."""
+    tried: tuple[str, ...]
+    """Numbers that are opened where the recording asks for it."""
+    pulses: bool
+    """Whether pulses of the flow are looked for."""
+
+
+def assumptions_of(study: Study, angle: str, *, recordings: int, flows: int) -> Assumptions:
+    """Return what a study leaves to the fit.
+
+    Where [fit] says "auto", a key of [forces] states the law if it differs from its default.
+    """
+    fit = study.fit
+    opened, fixed, tried = _drag_of(study)
+    if fit.force_memory_s == "auto" and is_stated(study, "force_memory_s"):
+        fixed["force_memory"] = study.forces.force_memory_s
+    elif fit.force_memory_s == "auto":
+        tried.append("force_memory")
+    elif fit.force_memory_s != "white":
+        fixed["force_memory"] = fit.force_memory_s
+    if fit.camera == "auto":
+        tried += [name for name in CAMERA if angle == "state" or name == "time_variance"]
+    alone = recordings == 1 and flows == 1
+    if fit.flow_strength == "smooth":
+        opened.update(dict.fromkeys(STRENGTHS, 0.0))
+    elif fit.flow_strength == "auto" and alone:
+        tried += STRENGTHS
+    pulses = fit.flow_strength != "constant" and alone
+    gradient = "off" if fit.law == "paper" else fit.pressure_gradient
+    if gradient == "auto" and is_stated(study, "pressure_gradient"):
+        gradient = "on"
+    return Assumptions(gradient, opened, fixed, tuple(tried), pulses)
+
+
+def _drag_of(study: Study) -> tuple[dict[str, float], dict[str, float], list[str]]:
+    """Return the numbers of the drag that are opened, known and tried."""
+    law = study.fit.law
+    if law == "auto" and is_stated(study, "drag_power"):
+        return {}, {"drag_power": study.forces.drag_power}, []
+    if law == "auto":
+        return {}, {}, [*DRAG_SHAPES]
+    drag = DRAGS["quadratic" if law == "paper" else law]
+    return dict(drag.opened), dict(drag.fixed), []
+
+
+def is_stated(study: Study, key: str) -> bool:
+    """Return whether [forces] states another law. A new study file holds every key as it is."""
+    return not study.forces.is_default(key)
+
 
 PLAIN: Final = {
     "drag_power": "drag_power",
@@ -53,32 +120,38 @@ class Inertia(NamedTuple):
         return 1.0 + self.added
 
 
-def inertia_of(study: Study, *, floating: bool) -> Inertia:
-    """Return the inertia with its uncertainty, from what a study states."""
-    added, std = added_mass_of(study, floating=floating)
-    mass = study.fit.mass_std_kg / study.block.mass_kg
-    stated = (
-        study.fit.added_mass_share != "auto"
-        or study.fit.law == "paper"
-        or is_stated(study, "added_mass_share")
-    )
+def inertia_of(study: Study, point: Point) -> Inertia:
+    """Return the inertia with its uncertainty, from what a study states, under the law found."""
+    fit = study.fit
+    in_forces = is_stated(study, "added_mass_share")
+    if fit.added_mass_share != "auto":
+        added, std = fit.added_mass_share, fit.added_mass_share_std
+    elif in_forces:
+        added, std = study.forces.added_mass_share, fit.added_mass_share_std
+    elif fit.law == "paper" or point.number("water_acceleration") == 0.0:
+        added, std = 0.0, 0.0
+    else:
+        added, std = USUAL_ADDED_MASS
+    stated = fit.added_mass_share != "auto" or fit.law == "paper" or in_forces
+    mass = fit.mass_std_kg / study.block.mass_kg
     return Inertia(added, std, stated, math.hypot(std / (1.0 + added), mass))
 
 
 def stated_drag(point: Point, study: Study) -> float:
     """Return C_d of the quadratic part of the drag, with the added mass."""
-    inertia = inertia_of(study, floating=point.number("water_acceleration") != 0.0)
-    return inertia.share * (1.0 - point.number("linear_share")) * math.exp(point.log_drag)
+    return (
+        inertia_of(study, point).share
+        * (1.0 - point.number("linear_share"))
+        * math.exp(point.log_drag)
+    )
 
 
 def inertia_facts(inertia: Inertia, facts: dict[str, Any], normal: float) -> dict[str, Any]:
     """Return the added mass, or how far C_d and the force reach where nothing is known of it."""
     if inertia.added or inertia.added_std or inertia.stated:
         low, high = (inertia.added + sign * normal * inertia.added_std for sign in (-1, 1))
-        return {
-            "added_mass_share": inertia.added,
-            "added_mass_share_interval": [max(low, 0.0), high],
-        }
+        ends = [max(low, 0.0), high]
+        return {"added_mass_share": inertia.added, "added_mass_share_interval": ends}
     usual, std = USUAL_ADDED_MASS
     most = 1.0 + usual + normal * std
     return {
@@ -110,7 +183,12 @@ def number_facts(point: Point, reach: Floats, study: Study) -> dict[str, Any]:
     if share:
         # It goes with C_d of the filter, too.
         width = math.hypot(widths.get("linear_share", 0.0), share * float(reach[0]))
-        state("linear_drag_kg_s", share, width, _linear_drag(point, study))
+        # Of the whole block for a share of 1, K b of all strips: four faces, b a quarter of the
+        # speed at which linear and quadratic drag are compared, a side a second.
+        side = study.block.side_m
+        area = side * study.wetted_depth_m
+        drag = 0.5 * study.water.density_kg_m3 * math.exp(point.log_drag) * area * side
+        state("linear_drag_kg_s", share, width, drag * inertia_of(study, point).share)
     if "strength_1" in widths:
         # From the beginning of the recording to its end the odd cosines change their signs.
         odd = STRENGTHS[::2]
@@ -122,37 +200,25 @@ def number_facts(point: Point, reach: Floats, study: Study) -> dict[str, Any]:
     return facts
 
 
-def _linear_drag(point: Point, study: Study) -> float:
-    """Return the linear drag of the whole block [kg/s] for a linear share of 1."""
-    block, floating = study.block, point.number("water_acceleration") != 0.0
-    area = block.side_m * study.wetted_depth_m
-    # K b of all strips: four faces, b a quarter of the speed.
-    speed = block.side_m
-    drag = 0.5 * study.water.density_kg_m3 * math.exp(point.log_drag) * area * speed
-    return drag * inertia_of(study, floating=floating).share
-
-
 def law_facts(law: LawResult, assumptions: Assumptions) -> dict[str, Any]:
     """Return the law, whether it was stated, and by how much the recording supports it."""
+    point = law.mode.point
     searched = bool(set(DRAG_SHAPES) & set(assumptions.tried))
+    if "drag_power" in {**point.opened, **point.fixed}:
+        drag = "power"
+    elif "linear_share" in point.opened:
+        drag = "mixed"
+    else:
+        drag = "linear" if point.number("linear_share") == 1.0 else "quadratic"
     facts: dict[str, Any] = {
         "force_law": "floating body" if law.floating else "paper",
         "force_law_stated": "no" if assumptions.pressure_gradient == "auto" else "yes",
-        "drag_law": _drag_law(law.mode.point),
+        "drag_law": drag,
         "drag_law_stated": "no" if searched else "yes",
     }
     if math.isfinite(law.settled_by):
         facts["law_settled_by"] = law.settled_by
     return facts
-
-
-def _drag_law(point: Point) -> str:
-    """Return how the drag goes with the speed, in one word."""
-    if "drag_power" in point.opened or "drag_power" in point.fixed:
-        return "power"
-    if "linear_share" in point.opened:
-        return "mixed"
-    return "linear" if point.number("linear_share") == 1.0 else "quadratic"
 
 
 def number_variables(point: Point, law: LawResult) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -181,38 +247,25 @@ def effective_logs(fit: xr.Dataset, study: Study) -> tuple[float, float]:
     prefix = "effective_" if "effective_force_std" in known else ""
     force = fitted_value(fit, f"{prefix}force_std")
     intensity = force**2 * float(fit["force_interval"]) / study.block.mass_kg**2
-    drag = (
-        float(fit["filter_drag_coefficient"])
-        if "filter_drag_coefficient" in fit
-        else fitted_value(fit, "drag_coefficient")
-    )
+    drag = float(fit["filter_drag_coefficient"])
     if not (drag > 0.0 and intensity > 0.0):
         raise InputError("the fit does not determine C_d and σ_F: nothing can stand on it")
     return math.log(drag), math.log(intensity)
 
 
-class Numbers(NamedTuple):
-    """Numbers of departures, as a point takes them."""
-
-    opened: dict[str, float]
-    fixed: dict[str, float]
-
-
-def stored_numbers(fit: xr.Dataset) -> Numbers:
-    """Return the numbers of a stored fit."""
-    found = Numbers({}, {})
-    if "number" not in fit.coords:
-        return found
-    rows = zip(
-        fit["number"].values, fit["number_value"].values, fit["number_opened"].values, strict=True
-    )
-    for name, value, opened in rows:
-        (found.opened if opened else found.fixed)[str(name)] = float(value)
-    return found
+def stored_numbers(fit: xr.Dataset) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the opened numbers of a stored fit, and those that it took for known."""
+    opened: dict[str, float] = {}
+    fixed: dict[str, float] = {}
+    if "number" in fit.coords:
+        columns = (fit[name].values for name in ("number", "number_value", "number_opened"))
+        for name, value, is_opened in zip(*columns, strict=True):
+            (opened if is_opened else fixed)[str(name)] = float(value)
+    return opened, fixed
 
 
 def side_slopes(
-    passes: Passes, law: LawResult, restricted: Restricted, study: Study
+    search: ModeSearch, mode: Mode, restricted: Restricted, study: Study
 ) -> tuple[float, float]:
     """Return the derivatives of ln C_d and ln σ_F by the logarithm of the block's side.
 
@@ -221,22 +274,19 @@ def side_slopes(
     """
     if study.fit.side_std_m == 0.0:
         return 0.0, 0.0
-    from driftwalk.likelihood.newton import inverse
-    from driftwalk.likelihood.preparation import body_of
-    from driftwalk.likelihood.prior import Prior
     from driftwalk.model import apply_overrides
 
+    passes, point = search.passes, restricted.point
     # A side larger by 1 %: the derivative is a difference of two steps of the search.
     larger = apply_overrides(study, {"block.side_m": (1.0 + 0.01) * study.block.side_m})
-    prior = Prior(passes)
     changed = replace(passes, body=body_of(larger, passes.body.orientation))
     steps = []
     try:
         for one in (passes, changed):
-            sums = prior.add(one.sums(restricted.point), restricted.point, law.mode.weights)
+            sums = search.prior.add(one.sums(point), point, mode.weights)
             steps.append(inverse(sums.information) @ sums.score)
     except BREAKDOWN:
         return math.inf, math.inf
-    drag = restricted.point.coefficients.size
+    drag = point.coefficients.size
     slope = (steps[1] - steps[0])[drag : drag + 2] / math.log1p(0.01)
     return float(slope[0]), 0.5 * float(slope[1])
