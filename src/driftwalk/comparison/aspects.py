@@ -180,12 +180,10 @@ def form_aspects(
     ['steps', 'steps_3', 'steps_9', 'frame', 'memory']
     """
     x, y = np.asarray(x), np.asarray(y)
-    names = ["steps"]
-    plans = [plan.short]
-    for factor, longer in zip(ASPECT_POLICY.longer, plan.longer, strict=False):
-        names.append(f"steps_{factor}")
-        plans.append(longer)
-    found = [_steps(name, one, x, y) for name, one in zip(names, plans, strict=True)]
+    # The recording may be too short for the longest steps.
+    names = [f"steps_{factor}" for factor in ASPECT_POLICY.longer]
+    plans = {"steps": plan.short, **dict(zip(names, plan.longer, strict=False))}
+    found = [_steps(name, one, x, y) for name, one in plans.items()]
     px, py = (resampled(plan.short, values) for values in (x, y))
     dx, dy = np.diff(px), np.diff(py)
     length = np.hypot(dx, dy)
@@ -194,10 +192,8 @@ def form_aspects(
         at = plan.step
         middle = 0.5 * (px[at] + px[at + 1]), 0.5 * (py[at] + py[at + 1])
         found.append(_aspect("wall", wall(*middle), length[at], plan.time[at]))
-    later = plan.later
-    found.append(
-        _aspect("memory", length[later], length[later + ASPECT_POLICY.later], plan.time[later])
-    )
+    now, later = length[plan.later], length[plan.later + ASPECT_POLICY.later]
+    found.append(_aspect("memory", now, later, plan.time[plan.later]))
     return tuple(found)
 
 
@@ -330,11 +326,8 @@ def aspect_reference(
     random = np.random.default_rng(seed)
     halves = [random.permutation(BLOCKS) < BLOCKS // 2 for _ in range(HALVINGS)]
     floor = [_between_halves(one, duration, halves, over=np.sqrt(2.0)) for one in kept]
-    return AspectReference(
-        tuple(one.name for one in kept),
-        np.array(floor),
-        tuple(KsReference(one.points) for one in kept),
-    )
+    references = tuple(KsReference(one.points) for one in kept)
+    return AspectReference(tuple(one.name for one in kept), np.array(floor), references)
 
 
 def block_of(time: npt.ArrayLike, duration: float) -> Integers:
@@ -351,11 +344,11 @@ def block_of(time: npt.ArrayLike, duration: float) -> Integers:
 
 def interleaved(aspects: Sequence[Aspect], *, duration: float) -> tuple[list[Aspect], list[Aspect]]:
     """Return the aspects in the even and in the odd blocks of a recording."""
-    odd = [block_of(one.time, duration) % 2 == 1 for one in aspects]
-    return (
-        [one.within(~chosen) for one, chosen in zip(aspects, odd, strict=True)],
-        [one.within(chosen) for one, chosen in zip(aspects, odd, strict=True)],
+    even, odd = (
+        [one.within(block_of(one.time, duration) % 2 == which) for one in aspects]
+        for which in (0, 1)
     )
+    return even, odd
 
 
 def points_distance(reference: KsReference, points: Floats) -> float:

@@ -131,25 +131,6 @@ def _points(walk: xr.Dataset) -> Points:
     return np.column_stack([walk["step_length"].values, walk["turning_angle"].values])
 
 
-def _numbers(result: KsComparison, test: PermutationTest | None) -> dict[str, Any]:
-    """Return the scalar variables."""
-    place = result.place
-    return {
-        "ks_distance": ((), result.distance),
-        "ks_distance_a": ((), result.distance_a),
-        "ks_distance_b": ((), result.distance_b),
-        "score": ((), 1.0 - result.distance),
-        "ks_step_length": ((), place.x),
-        "ks_turning_angle": ((), place.y),
-        "ks_quadrant": ((), np.int8(place.quadrant)),
-        "tied_fraction": ((), result.tied_fraction),
-        "p_value": ((), test.p_value if test else np.nan),
-        "noise_floor": ((), test.noise_floor if test else np.nan),
-        "block_length": ((), test.block_length if test else 0),
-        "autocorrelation_time": ((), test.autocorrelation_time if test else np.nan),
-    }
-
-
 def _dataset(
     walks: list[xr.Dataset],
     result: KsComparison,
@@ -164,30 +145,36 @@ def _dataset(
         joint_density(length, angle, step_length_edge=length_edge, turning_angle_edge=angle_edge)
         for length, angle in zip(lengths, angles, strict=True)
     ]
-    by_motion: dict[str, Any] = {
-        name: ("motion", [walk.attrs[name] for walk in walks])
-        for name in ("pairs", "zero_length", "gaps")
+    place = result.place
+    data: dict[str, Any] = {
+        "ks_distance": ((), result.distance),
+        "ks_distance_a": ((), result.distance_a),
+        "ks_distance_b": ((), result.distance_b),
+        "score": ((), 1.0 - result.distance),
+        "ks_step_length": ((), place.x),
+        "ks_turning_angle": ((), place.y),
+        "ks_quadrant": ((), np.int8(place.quadrant)),
+        "tied_fraction": ((), result.tied_fraction),
+        "p_value": ((), test.p_value if test else np.nan),
+        "noise_floor": ((), test.noise_floor if test else np.nan),
+        "block_length": ((), test.block_length if test else 0),
+        "autocorrelation_time": ((), test.autocorrelation_time if test else np.nan),
     }
-    by_motion["mode"] = ("motion", np.array([walk.attrs["mode"] for walk in walks], dtype=object))
-    by_motion |= {
+    for name in ("pairs", "zero_length", "gaps"):
+        data[name] = ("motion", [walk.attrs[name] for walk in walks])
+    data |= {
+        "mode": ("motion", np.array([walk.attrs["mode"] for walk in walks], dtype=object)),
         "mean_step_length": ("motion", [length.mean() for length in lengths]),
         "median_step_length": ("motion", [np.median(length) for length in lengths]),
         "std_turning_angle": ("motion", [angle.std() for angle in angles]),
-        "step_density": (
-            ("motion", "density_step_length", "density_turning_angle"),
-            np.stack(density),
-        ),
+        "step_density": (("motion", "density_step_length", "density_turning_angle"), density),
     }
-    return build_dataset(
-        "comparison",
-        {**_numbers(result, test), **by_motion},
-        {
-            "motion": ("motion", np.array(["a", "b"], dtype=object)),
-            "step_length_edge": ("step_length_edge", length_edge),
-            "turning_angle_edge": ("turning_angle_edge", angle_edge),
-        },
-        attrs,
-    )
+    coords = {
+        "motion": ("motion", np.array(["a", "b"], dtype=object)),
+        "step_length_edge": ("step_length_edge", length_edge),
+        "turning_angle_edge": ("turning_angle_edge", angle_edge),
+    }
+    return build_dataset("comparison", data, coords, attrs)
 
 
 def compare_replicates(

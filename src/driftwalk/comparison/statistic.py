@@ -36,11 +36,7 @@ class StepTable(NamedTuple):
 
     def rows(self, chosen: slice) -> StepTable:
         """Return some of the rows."""
-        return StepTable(
-            np.ascontiguousarray(self.length[chosen]),
-            np.ascontiguousarray(self.angle[chosen]),
-            np.ascontiguousarray(self.pairs[chosen]),
-        )
+        return StepTable(*(np.ascontiguousarray(column[chosen]) for column in self))
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,9 +256,8 @@ def step_table(
     pairs = np.zeros(len(x), dtype=np.int64)
     for world in range(len(x)):
         found = apply_steps(plan, x[world], y[world])
-        pairs[world] = found.step_length.size
-        length[world, : pairs[world]] = found.step_length
-        angle[world, : pairs[world]] = found.turning_angle
+        count = pairs[world] = found.step_length.size
+        length[world, :count], angle[world, :count] = found.step_length, found.turning_angle
     return StepTable(length, angle, pairs)
 
 

@@ -262,15 +262,10 @@ def recorded_conditions(
 def sample_times(track: Track, study: Study) -> Floats:
     """Return the time stamps of a world [s]: the recording's, from its first sample on.
 
-    Without its gaps, where the study leaves them out.
+    Without its gaps, where the study leaves them out: even stamps at the median interval.
     """
     time = track.time - track.time[0]
-    return _without_gaps(time) if study.observation.gaps == "none" else time
-
-
-def _without_gaps(time: Floats) -> Floats:
-    """Return even time stamps [s] over the same span, at the median interval of the given ones."""
-    if time.size < 2:
+    if study.observation.gaps != "none" or time.size < 2:
         return time
     interval = float(np.median(np.diff(time)))
     count = int(np.floor(time[-1] / interval + 1e-6)) + 1

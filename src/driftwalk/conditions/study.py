@@ -55,13 +55,7 @@ def study_in_arena(study: Study, recording: xr.Dataset) -> Study:
     arena = recording.attrs.get("arena")
     if arena is None:
         return study
-    wall = study.tank
-    tank = Tank.from_arena(
-        arena,
-        wall_restitution=wall.wall_restitution,
-        wall_friction=wall.wall_friction,
-        bounce_speed_m_s=wall.bounce_speed_m_s,
-    )
+    tank = Tank.from_arena(arena)
     given = {f"tank.{key}": getattr(tank, key) for key in OUTLINE if getattr(tank, key) is not None}
     return apply_overrides(study, given)
 
@@ -103,11 +97,8 @@ def require_inside(study: Study, recording: xr.Dataset, body: str | None) -> Non
         return
     x_min, y_min, x_max, y_max = outline.bounds
     stated = study.observation.position_noise_m
-    reach = noise_reach(
-        track,
-        None if isinstance(stated, str) else stated,
-        size=min(x_max - x_min, y_max - y_min),
-    )
+    noise = None if isinstance(stated, str) else stated
+    reach = noise_reach(track, noise, size=min(x_max - x_min, y_max - y_min))
     share = np.mean(beyond > reach)
     if share > MOST_OUTSIDE:
         raise InputError(
@@ -313,15 +304,14 @@ def estimated_study(
                 f"the {kind_name(found)} does not determine {name}: its recording tells too "
                 f"little of it; take its flow field alone (`flow`), and state `forces.{key}`"
             )
-    return apply_overrides(
-        parse_study(found.attrs["study"], source=source),
-        {
-            **{f"forces.{key}": fitted_value(found, name) for key, name in FORCE_KEYS.items()},
-            **fitted_law(found),
-            **_fitted_wall(found),
-            **stated,
-        },
-    )
+    estimates = {f"forces.{key}": fitted_value(found, name) for key, name in FORCE_KEYS.items()}
+    estimates |= fitted_law(found)
+    if "wall_friction" in found:
+        estimates["tank.wall_restitution"] = float(found["wall_restitution"])
+        # With a friction of 10, every contact with the wall sticks.
+        estimates["tank.wall_friction"] = min(float(found["wall_friction"]), 10.0)
+    study = parse_study(found.attrs["study"], source=source)
+    return apply_overrides(study, {**estimates, **stated})
 
 
 def fitted_law(found: xr.Dataset) -> dict[str, Any]:
@@ -346,17 +336,6 @@ def fitted_law(found: xr.Dataset) -> dict[str, Any]:
         if name in known:
             law[f"forces.{key}"] = max(fitted_value(found, name), 0.0)
     return law
-
-
-def _fitted_wall(found: xr.Dataset) -> dict[str, Any]:
-    """Return the keys of [tank] that say what wall a fit has found."""
-    if "wall_friction" not in found:
-        return {}
-    return {
-        "tank.wall_restitution": float(found["wall_restitution"]),
-        # With a friction of 10, every contact with the wall sticks.
-        "tank.wall_friction": min(float(found["wall_friction"]), 10.0),
-    }
 
 
 def unstated_warning(study: Study, *, about: About) -> str | None:

@@ -111,9 +111,8 @@ def restricted_drag(search: ModeSearch, mode: Mode, *, intensity: bool = True) -
     add_profile(start.log_drag - REML.span * sd)
     # Two points give the slope of the determinant and with it a first guess of the minimum.
     guess, _ = _minimum(found)
-    guess = float(
-        np.clip(guess, start.log_drag - 2 * REML.span * sd, start.log_drag + REML.span * sd)
-    )
+    ends = start.log_drag - 2 * REML.span * sd, start.log_drag + REML.span * sd
+    guess = float(np.clip(guess, *ends))
     if abs(guess - start.log_drag) > REML.near * sd:
         add_profile(guess)
         add_profile(guess - REML.span * sd)
@@ -143,10 +142,8 @@ def _with_restricted_intensity(
     The other noises go along the ridge of the likelihood; their own slopes, and the slope of
     the lever, are too small to matter.
     """
-    at = np.array([one.log_drag for one in found])
-    order = np.argsort(at)
-    values = np.array([one.half_log_determinant for one in found])
-    here = float(np.interp(point.log_drag, at[order], values[order]))
+    at, values = zip(*((one.log_drag, one.half_log_determinant) for one in found), strict=True)
+    here = float(np.interp(point.log_drag, at, values))
     more = replace(point, log_intensity=point.log_intensity + REML.intensity_step)
     moved = replace(mode, point=more)
     there = profile_at(search, moved, point.log_drag, point.coefficients.ravel())

@@ -213,6 +213,8 @@ class Passes:
         # mass and the angle of the faces only.
         x, y, theta = corrected(series, point)
         share = point.number("linear_share")
+        plain = ("water_acceleration", "water_spin", "drag_power", "force_memory")
+        numbers = {name: point.number(name) for name in plain}
         return _core.InnovationsFilter(
             series.time,
             x,
@@ -220,34 +222,22 @@ class Passes:
             theta,
             series.omega,
             series.excluded,
-            side=body.side,
-            mass=body.mass,
-            depth=body.depth,
-            strips=body.strips,
-            water_density=body.water_density,
-            origin_x=spline.origin_x,
-            origin_y=spline.origin_y,
-            spacing=spline.spacing,
-            columns=spline.columns,
-            rows=spline.rows,
+            **vars(body),
+            **vars(spline),
             coefficients=np.ascontiguousarray(point.coefficients),
             drag_coefficient=math.exp(point.log_drag),
             noise_intensity=math.exp(point.log_intensity),
             position_noise=math.exp(point.log_noise),
             largest_step=FILTER.largest_step_s,
             longest_gap=FILTER.longest_gap_s,
-            orientation=body.orientation,
             sensitivities=sensitivities,
             strength=strength_of(series, point),
             quadratic=1.0 - share,
-            # Linear drag acts on all four faces, windward or not: a quarter on each.
-            linear=0.25 * share * body.linear_speed,
-            water_acceleration=point.number("water_acceleration"),
-            water_spin=point.number("water_spin"),
-            drag_power=point.number("drag_power"),
-            drag_speed=body.drag_speed,
+            # Linear drag acts on all four faces, windward or not: a quarter on each. At a speed of
+            # one side of the block a second it is as strong as the quadratic one in its place.
+            linear=0.25 * share * body.side,
             time_noise=math.sqrt(point.number("time_variance")),
-            force_memory=point.number("force_memory"),
+            **numbers,
             **pose,
         )
 

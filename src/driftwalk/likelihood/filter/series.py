@@ -85,15 +85,13 @@ class Series:
 
 @dataclass(frozen=True)
 class Body:
-    """The block and the water."""
+    """The block and the water, as arguments of the native filter."""
 
     side: float
     mass: float
     depth: float
     strips: int
     water_density: float
-    linear_speed: float
-    """Speed [m/s] at which linear drag is as strong as the quadratic one in its place."""
     drag_speed: float
     """Speed [m/s] at which C_d holds, whatever the power of the drag."""
     orientation: str
@@ -323,8 +321,6 @@ def body_of(study: Study, used_angle: str) -> Body:
         depth=study.wetted_depth_m,
         strips=study.block.strips_per_face,
         water_density=study.water.density_kg_m3,
-        # Linear and quadratic drag are compared at a speed of one side of the block a second.
-        linear_speed=study.block.side_m,
         drag_speed=study.forces.drag_speed_m_s,
         orientation=used_angle,
     )

@@ -83,13 +83,10 @@ def patterns_of(lengths: Floats, stamped: float) -> list[Pattern]:
         return other
 
     found += [Pattern(DROPS[0], at, longer(at, 1.0), None) for at in range(WIDTH - 1)]
-    found += [
-        Pattern(kind, MIDDLE, longer(MIDDLE, missing), None)
-        for missing, kind in enumerate(DROPS[1:], start=2)
-    ]
-    found += [
-        Pattern(CONTROL, MIDDLE, longer(MIDDLE, length - 1.0), None) for length in CONTROL_LENGTHS
-    ]
+    # The number of a class of dropped frames is that of the frames.
+    others = [(kind, float(kind)) for kind in DROPS[1:]]
+    others += [(CONTROL, length - 1.0) for length in CONTROL_LENGTHS]
+    found += [Pattern(kind, MIDDLE, longer(MIDDLE, by), None) for kind, by in others]
     number = np.arange(WIDTH)
     time = np.concatenate([[0.0], np.cumsum(plain)])
     found += [Pattern(WRONG, at, plain, (number == at).astype(np.float64)) for at in range(WIDTH)]
@@ -264,15 +261,14 @@ def find_dropped_frames(track: Track, clock: Floats) -> DroppedFrames:
         starts = _windows(lengths)
         if starts.size < DROPPED.fewest_windows:
             return nothing
-        axes = _axes(track, _time_of(lengths, interval))
+        axes = _axes(track, interval * np.concatenate([[0.0], np.cumsum(lengths)]))
         likelihood = log_likelihoods(axes, starts, lengths, stamped, dt=interval)
         rates, value = _rates(likelihood)
         # The evidence comes from the first round: later ones have fitted the lengths to the track.
         if number == 0:
             evidence = value - _rates(likelihood, without=DROPS)[1]
-            if evidence < DROPPED.evidence or not _are_dropped_frames(
-                rates, DROPPED.most_control_before
-            ):
+            seem = _are_dropped_frames(rates, DROPPED.most_control_before)
+            if evidence < DROPPED.evidence or not seem:
                 return nothing._replace(evidence=evidence)
         share = _posterior(likelihood, rates)
         some = share.sum(axis=1)
@@ -333,11 +329,6 @@ def _windows(lengths: Floats) -> npt.NDArray[np.intp]:
     return np.flatnonzero(total[WIDTH - 1 :] - total[: 1 - WIDTH] <= DROPPED.longest_span)
 
 
-def _time_of(lengths: Floats, interval: float) -> Floats:
-    time: Floats = interval * np.concatenate([[0.0], np.cumsum(lengths)])
-    return time
-
-
 def _axes(track: Track, time: Floats) -> list[Axis]:
     """Return x and y, and the orientation where most samples have one."""
     unknown = np.full(time.size, np.nan)
@@ -360,9 +351,8 @@ def _alike(track: Track) -> list[Axis]:
     axes = []
     for values in (track.x, track.y):
         steps = np.abs(np.diff(values))
-        usual = math.sqrt(
-            float((np.minimum(steps, np.quantile(steps, DROPPED.fast_quantile)) ** 2).mean())
-        )
+        slow = np.minimum(steps, np.quantile(steps, DROPPED.fast_quantile))
+        usual = math.sqrt(float((slow**2).mean()))
         # Neither is exactly zero: a covariance has to be one.
         least = max(1e-2 * usual, 1e-12)
         std = max(np.nan_to_num(noise.position_noise_m), least)

@@ -86,10 +86,8 @@ def _off_the_line(track: Track) -> Floats:
     off = np.full((2, time.size), math.nan)
     for row, axis in zip(off, (track.x, track.y), strict=True):
         row[1:-1] = axis[1:-1] - (axis[:-2] + share * (axis[2:] - axis[:-2]))
-    apart = np.maximum(interval[:-1], interval[1:]) > OUTLIER.longest_gap * float(
-        np.median(interval)
-    )
-    off[:, 1:-1][:, apart] = math.nan
+    longest = OUTLIER.longest_gap * float(np.median(interval))
+    off[:, 1:-1][:, np.maximum(interval[:-1], interval[1:]) > longest] = math.nan
     return off
 
 
@@ -98,5 +96,4 @@ def without_outliers(track: Track) -> Track:
     wrong = outliers_in(track)
     if not wrong.any():
         return track
-    retained = ~wrong
-    return Track(track.time[retained], track.x[retained], track.y[retained], track.theta[retained])
+    return Track(*(column[~wrong] for column in track))

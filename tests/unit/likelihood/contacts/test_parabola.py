@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from driftwalk.likelihood.contacts.wall_search import Wall, answer, is_undetermined
+from driftwalk.likelihood.contacts.estimate import Wall, answer, is_undetermined
 
 
 def test_a_parabola_gives_its_top_and_its_width() -> None:
