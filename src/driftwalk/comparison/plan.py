@@ -218,15 +218,8 @@ def apply_steps(plan: StepPlan, x: npt.ArrayLike, y: npt.ArrayLike) -> AppliedSt
             f"the step plan was made for {plan.samples} samples, got x {x_m.shape} and y "
             f"{y_m.shape}"
         )
-    return AppliedSteps(
-        *_core.apply_step_plan(
-            plan.left,
-            plan.weight,
-            plan.triple,
-            np.ascontiguousarray(x_m, dtype=kind),
-            np.ascontiguousarray(y_m, dtype=kind),
-        )
-    )
+    positions = (np.ascontiguousarray(axis, dtype=kind) for axis in (x_m, y_m))
+    return AppliedSteps(*_core.apply_step_plan(plan.left, plan.weight, plan.triple, *positions))
 
 
 def usual_interval(time: Floats) -> float:
@@ -352,9 +345,15 @@ def steps(
             f"none of the {plan.pairs} step pairs has a direction: the body does not move at a "
             f"step_interval of {plan.step_interval:.6g} s: name {_advice(track, plan)}"
         )
-    sentences = _warnings(track, plan, applied)
-    for sentence in sentences:
-        warnings.warn(sentence, ComparisonWarning, stacklevel=2)
+    sentences = []
+    zero = applied.zero_length / plan.pairs
+    if zero > _CHOICE.zero_fraction:
+        sentences.append(
+            f"{100 * zero:.0f} % of the step pairs hold a step of zero length, which has no "
+            f"direction, and were left out: the body rests, or {_advice(track, plan)} is needed "
+            "for the file's resolution"
+        )
+        warnings.warn(sentences[0], ComparisonWarning, stacklevel=2)
     return build_steps(
         applied.step_length,
         applied.turning_angle,
@@ -373,32 +372,16 @@ def steps(
     )
 
 
-def _warnings(track: Track, plan: StepPlan, applied: AppliedSteps) -> list[str]:
-    zero = applied.zero_length / plan.pairs
-    if zero <= _CHOICE.zero_fraction:
-        return []
-    return [
-        f"{100 * zero:.0f} % of the step pairs hold a step of zero length, which has no direction, "
-        f"and were left out: the body rests, or {_advice(track, plan)} is needed for the file's "
-        "resolution"
-    ]
-
-
 def _advice(track: Track, plan: StepPlan) -> str:
-    longer = _longer_interval(track, plan.step_interval)
-    return f"a step_interval of {longer:.6g} s or more" if longer else "a longer step_interval"
-
-
-def _longer_interval(track: Track, step_interval: float) -> float | None:
-    """Return the first doubling of the interval at which few steps have zero length."""
+    """Return what to ask for: the first doubling at which few steps have zero length."""
     factor = 2
     while factor <= _CHOICE.longest_suggestion:
         try:
-            plan = plan_steps(track.time, step_interval=factor * step_interval)
+            longer = plan_steps(track.time, step_interval=factor * plan.step_interval)
         except InputError:
-            return None
-        applied = apply_steps(plan, track.x, track.y)
-        if applied.zero_length <= _CHOICE.zero_fraction * plan.pairs:
-            return float(np.round(plan.step_interval, 9))
+            break
+        applied = apply_steps(longer, track.x, track.y)
+        if applied.zero_length <= _CHOICE.zero_fraction * longer.pairs:
+            return f"a step_interval of {np.round(longer.step_interval, 9):.6g} s or more"
         factor *= 2
-    return None
+    return "a longer step_interval"

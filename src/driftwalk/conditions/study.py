@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 
+from driftwalk.conditions.refuse import prefix_of
 from driftwalk.core.errors import InputError
 from driftwalk.flow.arena import outline_of, read_arena
 from driftwalk.record import noise_reach
@@ -181,9 +182,9 @@ def study_for(
     fitted = False
     for recording in recordings:
         # A circle that is fitted to the positions states no tank: another recording has another.
-        if not (fitted and _is_fitted(recording)):
+        if not (fitted and is_fitted(recording)):
             chosen = _with_tank(chosen, recording, is_stated=tank)
-        fitted = fitted or _is_fitted(recording)
+        fitted = fitted or is_fitted(recording)
         chosen = study_of_block(chosen, recording, stated=block)
         tank = tank or "arena" in recording.attrs
         block |= {key for key, (name, *_) in _BLOCK_ATTRIBUTES.items() if name in recording.attrs}
@@ -231,7 +232,7 @@ def study_of_block(
             stated_by = next(one for one in _BLOCK_ATTRIBUTES if one in same_fact & known)
             stated = f"{getattr(study.block, stated_by)} {_BLOCK_ATTRIBUTES[stated_by][1]}"
             raise InputError(
-                f"{_name_of(recording)}the recording is of a block of {word} "
+                f"{prefix_of(recording)}the recording is of a block of {word} "
                 f"{f'{own} {unit}'.rstrip()}, and the study says {stated.rstrip()}: state the "
                 f"{word} once, {way}"
             )
@@ -425,21 +426,17 @@ def _with_tank(study: Study, recording: xr.Dataset, *, is_stated: bool) -> Study
     own = study_in_arena(study, recording)
     if is_stated and _outline(own) != _outline(study):
         raise InputError(
-            f"{_name_of(recording)}the recording is in a {own.tank.describe()}, and the study says "
-            f"a {study.tank.describe()}: state the tank once, `tank` when the recording is loaded"
+            f"{prefix_of(recording)}the recording is in a {own.tank.describe()}, and the study "
+            f"says a {study.tank.describe()}: state the tank once, `tank` when the recording is "
+            "loaded"
         )
     return own
 
 
-def _is_fitted(recording: xr.Dataset) -> bool:
+def is_fitted(recording: xr.Dataset) -> bool:
     """Return whether the arena is the circle that was fitted to the positions."""
     return "radius_is" in read_arena(str(recording.attrs.get("arena_found", "{}")))
 
 
 def _outline(study: Study) -> tuple[Any, ...]:
     return tuple(getattr(study.tank, key) for key in OUTLINE)
-
-
-def _name_of(recording: xr.Dataset) -> str:
-    name = recording.attrs.get("source", "")
-    return f"{name}: " if name else ""

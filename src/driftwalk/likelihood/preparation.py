@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from driftwalk.conditions import require_travel
-from driftwalk.conditions.study import fitted_law
+from driftwalk.conditions.refuse import prefix_of
+from driftwalk.conditions.study import fitted_law, is_fitted
 from driftwalk.core.errors import InputError
 from driftwalk.core.text.argument_text import argument_text
 from driftwalk.core.text.json_text import parse_json
@@ -129,7 +130,7 @@ class PreparedRecordings:
             "jumps_removed": sum(_jumps_removed(one, self.body) for one in many),
             "dropped_frames": sum(one.frames for one in self.dropped),
             "dropped_places": "; ".join(
-                _name_of(recording) + places_of(one)
+                prefix_of(recording) + places_of(one)
                 for recording, one in zip(many, self.dropped, strict=True)
                 if one.frames
             ),
@@ -155,7 +156,7 @@ def prepare(
     raws: list[Track] = []
     mistakes, dropped = 0, list[DroppedFrames]()
     for index, recording in enumerate(many):
-        seen, where = body_track(recording, body), _name_of(recording)
+        seen, where = body_track(recording, body), prefix_of(recording)
         track = without_outliers(seen)
         mistakes += seen.time.size - track.time.size
         require_length(track, study, where=where)
@@ -175,8 +176,9 @@ def prepare(
     used_angle = use_angle(many, tracks, study.fit.angle if angle is None else angle)
     series = series_of(parts, study, used_angle, places)
     # A tank that was fitted to the positions touches them: say so before the wall share does.
-    if _is_fitted_arena(many[0], study):
-        require_own_arena(series, study, where=_name_of(many[0]))
+    arena = read_arena(str(many[0].attrs.get("arena", "{}")))
+    if is_fitted(many[0]) and arena.get("diameter_m") == study.tank.diameter_m:
+        require_own_arena(series, study, where=prefix_of(many[0]))
     require_usable(series, study)
     # Each flow has its own coefficients, so each needs enough intervals.
     for flow in range(0 if intervals.steady else len(intervals.labels)):
@@ -184,17 +186,10 @@ def prepare(
         require_usable(in_flow, study, where=f"{intervals.describe_flow(flow)}: ")
     if study.fit.camera == "auto":
         for raw, recording in zip(raws, many, strict=True):
-            require_raw(raw, where=_name_of(recording))
+            require_raw(raw, where=prefix_of(recording))
     return PreparedRecordings(
-        *(many, study, body, tracks, parts, places),
-        *(intervals, series, used_angle, dropped, mistakes),
+        many, study, body, tracks, parts, places, intervals, series, used_angle, dropped, mistakes
     )
-
-
-def _name_of(recording: xr.Dataset) -> str:
-    """Return what a message on a recording begins with."""
-    name = recording.attrs.get("source", "")
-    return f"{name}: " if name else ""
 
 
 def _jumps_removed(recording: xr.Dataset, body: str | None) -> int:
@@ -207,23 +202,19 @@ def _jumps_removed(recording: xr.Dataset, body: str | None) -> int:
     return number if isinstance(number, int) else 0
 
 
-def _is_fitted_arena(recording: xr.Dataset, study: Study) -> bool:
-    """Whether the tank is the circle that was fitted to the positions (``arena="fit"``)."""
-    arena, found = (
-        read_arena(str(recording.attrs.get(key, "{}"))) for key in ("arena", "arena_found")
-    )
-    # Where the size is given and only the centre is fitted, no radius is found.
-    return "radius_is" in found and arena.get("diameter_m") == study.tank.diameter_m
-
-
 def use_angle(many: Sequence[xr.Dataset], tracks: Sequence[Track], wanted: str) -> str:
     """Return how orientations are used: "state", "given" or "none"."""
     if wanted not in ("auto", "state", "given", "none"):
         raise InputError(f"angle must be 'auto', 'state', 'given' or 'none', got {wanted!r}")
-    shares = [_oriented_share(track) for track in tracks]
+    shares = []
+    for track in tracks:
+        known = np.isfinite(track.theta)
+        # A tracker that only fills its column has no orientation.
+        filled = not known.any() or np.ptp(track.theta[known]) == 0.0
+        shares.append(0.0 if filled else float(known.mean()))
     seen = min(shares)
     if wanted in ("state", "given") and seen == 0.0:
-        where = _name_of(many[shares.index(seen)])
+        where = prefix_of(many[shares.index(seen)])
         raise InputError(
             f"{where}the recording has no orientations, or the same in every row: leave out "
             f"{argument_text('angle', wanted)}, or read the column that holds them"
@@ -231,14 +222,6 @@ def use_angle(many: Sequence[xr.Dataset], tracks: Sequence[Track], wanted: str) 
     if wanted == "auto":
         return "state" if seen >= ORIENTED_SHARE else "none"
     return wanted
-
-
-def _oriented_share(track: Track) -> float:
-    """Return the share of samples with an orientation; 0 where a tracker only fills its column."""
-    seen = np.isfinite(track.theta)
-    if not seen.any() or np.ptp(track.theta[seen]) == 0.0:
-        return 0.0
-    return float(seen.mean())
 
 
 def spline_of(study: Study) -> Spline:
@@ -280,10 +263,9 @@ def estimate_of(fit: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str 
     noise = math.log(fitted_value(fit, "tracking_noise"))
     point = Point(coefficients, *effective_logs(fit, study), noise, opened=opened, fixed=fixed)
     if ready.angle == "state":
-        point = replace(
-            point,
-            log_lever=math.log(fitted_value(fit, "force_lever")),
-            log_angle_noise=math.log(fitted_value(fit, "orientation_noise")),
+        lever, turning = (
+            math.log(fitted_value(fit, name)) for name in ("force_lever", "orientation_noise")
         )
+        point = replace(point, log_lever=lever, log_angle_noise=turning)
     weights = Weights(float(fit["roughness_weight"]), float(fit["size_weight"]))
     return Estimate(study, replace(ready.passes, spline=spline), point, weights, ready.parts)

@@ -202,12 +202,18 @@ class FitRecovery(EstimationMethod["SimulatedTracks"]):
         study = self.study
         settings, forces = study.recover, study.forces
         asked = settings.drag_coefficient_precision
+        if self.flow is None:
+            flow = f"random, {settings.flow_family}"
+        elif settings.flow in (None, RANDOM):
+            flow = str(self.flow.attrs.get("source", "given"))
+        else:
+            flow = str(settings.flow)
         return {
             "drag_coefficient": forces.drag_coefficient,
             "force_std_N": forces.force_std_N,
             "force_interval_s": forces.force_interval_s,
             "tracking_noise_m": self.tracking_noise,
-            "flow": _flow_name(study, self.flow),
+            "flow": flow,
             "sample_interval_s": settings.sample_interval_s,
             "recordings_per_fit": settings.recordings_per_fit,
             "missing_share": settings.missing_share,
@@ -299,13 +305,6 @@ class SimulatedTracks(NamedTuple):
 
     tracks: list[xr.Dataset]
     flow: xr.Dataset
-
-
-def _flow_name(study: Study, flow: xr.Dataset | None) -> str:
-    if flow is None:
-        return f"random, {study.recover.flow_family}"
-    named = study.recover.flow
-    return str(flow.attrs.get("source", "given")) if named in (None, RANDOM) else str(named)
 
 
 def recovery_study(

@@ -138,11 +138,8 @@ class Work(NamedTuple):
 
     def advice(self) -> str:
         """Return how to take fewer samples."""
-        every = max(
-            math.ceil(self.memory / LIMIT.notable_bytes),
-            math.ceil(self.seconds / LIMIT.notable_s),
-            2,
-        )
+        excess = max(self.memory / LIMIT.notable_bytes, self.seconds / LIMIT.notable_s)
+        every = max(math.ceil(excess), 2)
         return (
             "fit a part of the time (`start`, `stop` of `load`), or fewer samples a second, such "
             f"as one row in {every} of the file"

@@ -223,11 +223,8 @@ def collect(
     sums = Sums(0.0, np.zeros(len(data)), data, 0)
     full = prior.add(sums, estimate.point, estimate.weights).information
     spread = solve_triangular(np.linalg.cholesky(full), np.eye(len(full)), lower=True).T
-    return Leverage(
-        spread,
-        float(((data @ spread) * spread).sum()),
-        _autocovariance(spread, errors, retained, lags),
-    )
+    parameters = float(((data @ spread) * spread).sum())
+    return Leverage(spread, parameters, _autocovariance(spread, errors, retained, lags))
 
 
 def _parts(estimate: Estimate, errors: Sequence[Innovations]) -> Iterator[_Part]:

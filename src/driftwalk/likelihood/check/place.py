@@ -155,13 +155,8 @@ def groups_of(layout: Layout, errors: Sequence[Innovations]) -> list[Groups]:
         part = parts[0] + np.searchsorted(layout.start[parts][1:], one.series.time, side="right")
         speed = np.searchsorted(layout.speed[1:-1], np.nan_to_num(one.speed), side="right")
         known = one.used & np.isfinite(one.speed) & (layout.speed.size > 1)
-        found.append(
-            Groups(
-                np.where(one.used, cell_of(layout, x, y), -1),
-                np.where(one.used, part, -1),
-                np.where(known, speed, -1),
-            )
-        )
+        cell = np.where(one.used, cell_of(layout, x, y), -1)
+        found.append(Groups(cell, np.where(one.used, part, -1), np.where(known, speed, -1)))
     return found
 
 
@@ -172,32 +167,6 @@ def cell_of(layout: Layout, x: Floats, y: Floats) -> Integers:
         share = np.floor((values - axis[0]) / layout.size + 0.5)
         found.append(np.clip(share.astype(np.int64), 0, axis.size - 1))
     return np.asarray(found[1] * layout.x.size + found[0])
-
-
-class Contrasts(NamedTuple):
-    """Sums of the pass with derivatives."""
-
-    place: Contrast
-    """By part of the recording, cell and component, in that order."""
-    strength: Contrast
-    """By part of the recording, weighted with what a stronger flow would do."""
-    drag: Contrast
-    """By range of speed, weighted with what a stronger drag would do."""
-
-
-def contrasts_of(layout: Layout, groups: Sequence[Groups], components: int) -> Contrasts:
-    """Return the empty sums."""
-    place, part, speed = [], [], []
-    for one in groups:
-        both = np.where(one.cell >= 0, one.part * layout.cells + one.cell, -1)[:, None]
-        place.append(np.where(both >= 0, both * components + np.arange(components), -1))
-        part.append(np.repeat(one.part[:, None], components, axis=1))
-        speed.append(np.repeat(one.speed[:, None], components, axis=1))
-    return Contrasts(
-        Contrast(place, layout.parts * layout.cells * components),
-        Contrast(part, layout.parts, by="flow"),
-        Contrast(speed, max(layout.speed.size - 1, 1), by="drag"),
-    )
 
 
 class LocalMeans(NamedTuple):
@@ -315,12 +284,22 @@ def residuals_of(estimate: Estimate, errors: Sequence[Innovations]) -> Residuals
     layout = lay_out(errors, bounds, side=study.block.side_m)
     groups = groups_of(layout, errors)
     components = errors[0].components
-    sums = contrasts_of(layout, groups, components)
-    leverage = collect(estimate, errors, sums, lags=LAGS)
+    at_place, at_time, at_speed = [], [], []
+    for one in groups:
+        both = np.where(one.cell >= 0, one.part * layout.cells + one.cell, -1)[:, None]
+        at_place.append(np.where(both >= 0, both * components + np.arange(components), -1))
+        at_time.append(np.repeat(one.part[:, None], components, axis=1))
+        at_speed.append(np.repeat(one.speed[:, None], components, axis=1))
+    # By part of the recording, cell and component, in that order.
+    place = Contrast(at_place, layout.parts * layout.cells * components)
+    # Weighted with what a stronger flow would do, and with what a stronger drag would do.
+    strength = Contrast(at_time, layout.parts, by="flow")
+    drag = Contrast(at_speed, max(layout.speed.size - 1, 1), by="drag")
+    leverage = collect(estimate, errors, [place, strength, drag], lags=LAGS)
     covariance = leverage.covariance
     shape = (layout.parts, layout.cells, components)
-    score, power = sums.place.score.reshape(shape), sums.place.power.reshape(shape)[:, :, 0]
-    slope = sums.place.slope.reshape(*shape, -1)
+    score, power = place.score.reshape(shape), place.power.reshape(shape)[:, :, 0]
+    slope = place.slope.reshape(*shape, -1)
     by_part = (layout.parts * layout.cells, components)
     return Residuals(
         layout=layout,
@@ -330,8 +309,8 @@ def residuals_of(estimate: Estimate, errors: Sequence[Innovations]) -> Residuals
         part=local_scores(
             score.reshape(by_part), power.ravel(), slope.reshape(*by_part, -1), covariance
         ),
-        strength=trend_of(sums.strength, covariance),
-        drag=trend_of(sums.drag, covariance),
+        strength=trend_of(strength, covariance),
+        drag=trend_of(drag, covariance),
         noise_by_part=spread_of(errors, [one.part for one in groups], layout.parts),
         noise_by_place=spread_of(errors, [one.cell for one in groups], layout.cells),
     )

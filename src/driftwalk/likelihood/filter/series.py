@@ -149,11 +149,6 @@ class Angle(NamedTuple):
     """Where orientations are near enough in time to tell."""
 
 
-def no_angle(count: int) -> Angle:
-    """Return the substitute for the orientation of a track that has none."""
-    return Angle(np.zeros(count), np.zeros(count), np.ones(count, dtype=bool))
-
-
 def smooth_angle(time: Floats, theta: Floats) -> Angle:
     """Fit a parabola to the five orientations nearest in time to each sample.
 
@@ -280,7 +275,8 @@ def series_of(
         if not found or found[-1].recording != recording:
             first = float(track.time[0])
         time = track.time - first
-        smooth = no_angle(time.size)
+        # Without orientations the filter gets zeros, and none of them is unknown.
+        smooth = Angle(np.zeros(time.size), np.zeros(time.size), np.ones(time.size, dtype=bool))
         corners = None
         if used_angle != "none":
             smooth = smooth_angle(time, track.theta)
