@@ -8,14 +8,15 @@ the 5 % level. Whole blocks, long against that memory, are exchanged instead.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
-from driftwalk.comparison.ks import Points, Ties, checked_points
-from driftwalk.core.arrays import Floats, Integers
+from driftwalk.comparison.ks import Ties, checked_points
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 
 
@@ -209,23 +210,27 @@ def block_permutation_test(
     if seed < 0:
         raise InputError(f"seed must not be negative, got {seed}")
     memory = max(steps_memory_time(first), steps_memory_time(second))
-    length = (
-        math.ceil(_PERMUTATION.block_times * memory) if block_length is None else int(block_length)
-    )
+    usual = math.ceil(_PERMUTATION.block_times * memory)
+    length = usual if block_length is None else int(block_length)
     if length < 1:
         raise InputError(f"block_length must be at least 1, got {block_length}")
     blocks_a, blocks_b = first.shape[0] // length, second.shape[0] // length
-    if (
-        math.comb(blocks_a + blocks_b, blocks_a) < _PERMUTATION.fewest_arrangements
-        or not blocks_a * blocks_b
-    ):
+    arrangements = math.comb(blocks_a + blocks_b, blocks_a) if blocks_a and blocks_b else 0
+    if arrangements < _PERMUTATION.fewest_arrangements:
         raise InputError(
             f"the series of {first.shape[0]} and {second.shape[0]} points hold only {blocks_a} and "
             f"{blocks_b} blocks of {length}, too few for a permutation test: record longer, or "
             "name a shorter block_length"
         )
     pooled = np.concatenate([first[: blocks_a * length], second[: blocks_b * length]])
-    statistic = _permuted(pooled, length, blocks_a, blocks_b, permutations, seed, ties)
+    block_of = np.repeat(np.arange(blocks_a + blocks_b, dtype=np.int32), length)
+    # D1 + D2 in integer units: of the series as they are, then of every permutation.
+    statistic = np.concatenate(
+        [
+            _core.ks_permutations(pooled, blocks_a * length, block_of, labels, ties == "limits")
+            for labels in _labels(blocks_a, blocks_b, permutations, seed)
+        ]
+    )
     unit = 2.0 * (blocks_a * length) * (blocks_b * length)
     reached = int((statistic[1:] >= statistic[0]).sum())
     return PermutationTest(
@@ -241,28 +246,14 @@ def block_permutation_test(
     )
 
 
-def _permuted(
-    pooled: Points,
-    length: int,
-    blocks_a: int,
-    blocks_b: int,
-    permutations: int,
-    seed: int,
-    ties: Ties,
-) -> Integers:
-    """Return D1 + D2 in integer units: of the series as they are, then of every permutation."""
-    blocks = blocks_a + blocks_b
+def _labels(
+    blocks_a: int, blocks_b: int, permutations: int, seed: int
+) -> Iterator[npt.NDArray[np.uint8]]:
+    """Yield the series of each block, one row as they are and one for every permutation."""
     as_they_are = np.r_[np.zeros(blocks_a, np.uint8), np.ones(blocks_b, np.uint8)]
-    block_of = np.repeat(np.arange(blocks, dtype=np.int32), length)
+    yield as_they_are[None, :]
     rng = np.random.default_rng(seed)
-    rows = max(1, _PERMUTATION.labels_at_once // blocks)
-    parts = [as_they_are[None, :]]
-    statistic: list[Integers] = []
+    rows = max(1, _PERMUTATION.labels_at_once // as_they_are.size)
     for begin in range(0, permutations, rows):
         count = min(rows, permutations - begin)
-        parts.append(rng.permuted(np.tile(as_they_are, (count, 1)), axis=1))
-        labels = np.concatenate(parts)
-        n1 = blocks_a * length
-        statistic.append(_core.ks_permutations(pooled, n1, block_of, labels, ties == "limits"))
-        parts = []
-    return np.concatenate(statistic)
+        yield rng.permuted(np.tile(as_they_are, (count, 1)), axis=1)

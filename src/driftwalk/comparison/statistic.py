@@ -22,6 +22,7 @@ from driftwalk.core.processors import map_in_threads
 from driftwalk.schema.trajectory import Track
 
 FEWEST_PAIRS: Final = 30
+"""Pairs of steps without which a distance means little. Chosen by hand."""
 
 
 class StepTable(NamedTuple):
@@ -36,7 +37,8 @@ class StepTable(NamedTuple):
 
     def rows(self, chosen: slice) -> StepTable:
         """Return some of the rows."""
-        return StepTable(*(np.ascontiguousarray(column[chosen]) for column in self))
+        length, angle = (np.ascontiguousarray(one[chosen]) for one in (self.length, self.angle))
+        return StepTable(length, angle, np.ascontiguousarray(self.pairs[chosen]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,6 +264,7 @@ def step_table(
 
 
 BINS = 32
+"""Bins of each axis of a density. Chosen by hand."""
 
 
 def step_length_edges(*step_length: npt.ArrayLike, bins: int = BINS) -> Floats:

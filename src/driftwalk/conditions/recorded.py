@@ -264,7 +264,7 @@ def sample_times(track: Track, study: Study) -> Floats:
 
     Without its gaps, where the study leaves them out: even stamps at the median interval.
     """
-    time = track.time - track.time[0]
+    time: Floats = track.time - track.time[0]
     if study.observation.gaps != "none" or time.size < 2:
         return time
     interval = float(np.median(np.diff(time)))

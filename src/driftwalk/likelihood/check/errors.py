@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -22,10 +22,6 @@ from driftwalk.likelihood.filter.series import Series
 from driftwalk.likelihood.preparation import Estimate
 from driftwalk.likelihood.prior import Prior
 from driftwalk.likelihood.spline import DEGREE, Spline, basis
-
-if TYPE_CHECKING:
-    pass
-
 
 SAMPLES_AT_ONCE: Final = 2048
 """Rows of derivatives that are held at a time: some 20 MB."""

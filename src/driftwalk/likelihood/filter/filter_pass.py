@@ -205,16 +205,15 @@ class Passes:
     def kernel(self, series: Series, point: Point, *, sensitivities: bool = False) -> Any:
         """Return the native filter, before the first sample of a series."""
         body, spline = self.body, self.spline
-        pose: dict[str, float] = {}
+        plain = ("water_acceleration", "water_spin", "drag_power", "force_memory")
+        numbers: dict[str, Any] = {name: point.number(name) for name in plain}
         if point.log_lever is not None and point.log_angle_noise is not None:
-            pose["force_lever"] = math.exp(point.log_lever)
-            pose["angle_noise"] = math.exp(point.log_angle_noise)
+            numbers["force_lever"] = math.exp(point.log_lever)
+            numbers["angle_noise"] = math.exp(point.log_angle_noise)
         # Offsets of marker and angle move the data and not the model: the core knows the centre of
         # mass and the angle of the faces only.
         x, y, theta = corrected(series, point)
         share = point.number("linear_share")
-        plain = ("water_acceleration", "water_spin", "drag_power", "force_memory")
-        numbers = {name: point.number(name) for name in plain}
         return _core.InnovationsFilter(
             series.time,
             x,
@@ -238,7 +237,6 @@ class Passes:
             linear=0.25 * share * body.side,
             time_noise=math.sqrt(point.number("time_variance")),
             **numbers,
-            **pose,
         )
 
 
