@@ -14,9 +14,10 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.processors import default_threads
 from driftwalk.core.smoothing import local_quadratic
 from driftwalk.flow import extract_flow
+from driftwalk.flow.arena import outline_of
 from driftwalk.schema import Track, body_names, body_track, build_trajectory
 from driftwalk.simulation import simulate
-from driftwalk.simulation.backend import Camera, wall_edges
+from driftwalk.simulation.backend import Camera
 from driftwalk.simulation.initial import Start
 from driftwalk.simulation.series import continued_flow
 
@@ -89,19 +90,14 @@ def neighbours_of(recording: xr.Dataset, body: str | None, tank: Tank) -> Neighb
     names = body_names(recording)
     if body is None or len(names) < 2 or recording.attrs.get("bodies_apart") == "yes":
         return None
+    outline = outline_of(tank.to_arena())
     tracks = [body_track(recording, name) for name in names if name != body]
-    inside = tuple(one for one in tracks if one.time.size > 1 and _mostly_inside(one, tank))
+    inside = tuple(
+        one
+        for one in tracks
+        if one.time.size > 1 and np.mean(outline.depth(one.x, one.y) >= 0.0) > 0.5
+    )
     return Neighbours(inside) if inside else None
-
-
-def _mostly_inside(track: Track, tank: Tank) -> bool:
-    if tank.radius_m is not None:
-        beyond = np.hypot(track.x, track.y) - tank.radius_m
-    else:
-        edges = wall_edges(tank)
-        across = edges[:, :2] @ np.stack([track.x, track.y]) - edges[:, 2, None]
-        beyond = across.max(axis=0)
-    return bool(np.mean(beyond <= 0.0) > 0.5)
 
 
 def _within_samples(time: Floats, wanted: Floats) -> Bools:

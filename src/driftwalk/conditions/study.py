@@ -183,7 +183,15 @@ def study_for(
     for recording in recordings:
         # A circle that is fitted to the positions states no tank: another recording has another.
         if not (fitted and is_fitted(recording)):
-            chosen = _with_tank(chosen, recording, is_stated=tank)
+            own = study_in_arena(chosen, recording)
+            same = all(getattr(own.tank, key) == getattr(chosen.tank, key) for key in OUTLINE)
+            if tank and not same:
+                raise InputError(
+                    f"{prefix_of(recording)}the recording is in a {own.tank.describe()}, and the "
+                    f"study says a {chosen.tank.describe()}: state the tank once, `tank` when the "
+                    "recording is loaded"
+                )
+            chosen = own
         fitted = fitted or is_fitted(recording)
         chosen = study_of_block(chosen, recording, stated=block)
         tank = tank or "arena" in recording.attrs
@@ -421,22 +429,6 @@ def _listed(words: Sequence[str]) -> str:
     return f"{', '.join(first)} and {last}" if first else last
 
 
-def _with_tank(study: Study, recording: xr.Dataset, *, is_stated: bool) -> Study:
-    """Return the study in the tank of a recording; refuse one that is not the stated tank."""
-    own = study_in_arena(study, recording)
-    if is_stated and _outline(own) != _outline(study):
-        raise InputError(
-            f"{prefix_of(recording)}the recording is in a {own.tank.describe()}, and the study "
-            f"says a {study.tank.describe()}: state the tank once, `tank` when the recording is "
-            "loaded"
-        )
-    return own
-
-
 def is_fitted(recording: xr.Dataset) -> bool:
     """Return whether the arena is the circle that was fitted to the positions."""
     return "radius_is" in read_arena(str(recording.attrs.get("arena_found", "{}")))
-
-
-def _outline(study: Study) -> tuple[Any, ...]:
-    return tuple(getattr(study.tank, key) for key in OUTLINE)

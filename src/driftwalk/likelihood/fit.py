@@ -18,7 +18,7 @@ from driftwalk.likelihood.interval_inflation import (
     parameter_facts,
     with_mended_frames,
 )
-from driftwalk.likelihood.law.force_law import assumptions_of, law_facts, side_slopes, stated_drag
+from driftwalk.likelihood.law.force_law import assumptions_of, side_slopes, stated_drag
 from driftwalk.likelihood.law.forward_selection import LawResult
 from driftwalk.likelihood.law.search import LawSearch
 from driftwalk.likelihood.newton import WORK, Mode, ModeSearch, Passed, Tell, pieces, work_of_pass
@@ -28,10 +28,11 @@ from driftwalk.likelihood.preparation import (
     as_list,
     prepare,
 )
-from driftwalk.likelihood.prior import Prior, first_point, first_weights
+from driftwalk.likelihood.prior import Prior
 from driftwalk.likelihood.refuse import BREAKDOWN, require_noise_below_motion, solved
 from driftwalk.likelihood.reml import Restricted, restricted_drag
-from driftwalk.likelihood.result import build_fit, visited_shares, whiteness_of
+from driftwalk.likelihood.result import build_fit, law_facts, visited_shares, whiteness_of
+from driftwalk.likelihood.start import first_point, first_weights
 from driftwalk.likelihood.warnings import precision_facts, warnings_of
 from driftwalk.schema.answers.facts import texts
 from driftwalk.schema.check import described

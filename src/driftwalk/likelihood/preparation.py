@@ -119,7 +119,7 @@ class PreparedRecordings:
 
     @property
     def facts(self) -> dict[str, Any]:
-        """What stands in a fit of its recordings."""
+        """Facts of a fit on its recordings."""
         many = self.recordings
         return {
             "wall_share": self.wall_share,

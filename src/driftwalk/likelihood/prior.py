@@ -1,33 +1,27 @@
-"""The prior, and the starting values of the search: both from what is known before the fit.
+"""The prior: smoothness of the flow, and weak normal priors of ln C_d, lever and angle noise.
 
 Prior of the flow's coefficients: ``exp(-(lam_r c' R c + lam_s c' S c) / 2)`` per component, R and S
 the roughness and the size of `driftwalk.likelihood.spline.penalties`; with several flows the
 weights are the same for all. The two weights follow from the data: each step sets a weight to the
 degrees of freedom that the data have taken from its prior, over ``c' R c`` or ``c' S c`` (MacKay's
-fixed point of the evidence). ln C_d, lever and angle noise have weak normal priors.
+fixed point of the evidence).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.conditions import recorded_camera, typical_speed
-from driftwalk.conditions.recorded import flow_from_track
 from driftwalk.core.arrays import Floats
-from driftwalk.core.errors import InputError
 from driftwalk.likelihood.filter.filter_pass import Passes, Sums
 from driftwalk.likelihood.filter.parameters import NUMBERS, Point
-from driftwalk.likelihood.spline import Spline, penalties
-from driftwalk.schema import FLAGS, Track
+from driftwalk.likelihood.spline import penalties
 
 if TYPE_CHECKING:
-    from driftwalk.likelihood.preparation import PreparedRecordings
-    from driftwalk.model import Study
+    pass
 
 
 class PriorPolicy(NamedTuple):
@@ -122,74 +116,3 @@ class Prior:
             wanted = old * (prior - posterior) / max(value, 1e-300)
             new.append(float(np.clip(wanted, old / MOST_FACTOR, old * MOST_FACTOR)))
         return Weights(*new)
-
-
-def first_point(ready: PreparedRecordings, spline: Spline) -> Point:
-    """Return the first values: C_d = 0.5, the flow of Eq. 4, the noise of `driftwalk info`."""
-    study, tracks = ready.study, ready.tracks
-    cameras = [recorded_camera(track, study, position_quantum=0.0) for track in tracks]
-    steps = np.concatenate([np.hypot(np.diff(track.x), np.diff(track.y)) for track in tracks])
-    # A noise of a thousandth of the step between samples at least.
-    least = max(1e-3 * float(np.median(steps[steps > 0.0])), 1e-9)
-    # The first q is a tenth of U^3 / a, speed U and side a: rather too large than too small, as a
-    # small one makes the filter lose the track.
-    unrest = 0.1 * typical_speed(tracks) ** 3 / study.block.side_m
-    if ready.intervals.steady:
-        coefficients = _flow_coefficients(tracks[0], study, spline)
-    else:
-        # Each flow begins with the longest stretch that was recorded in it.
-        longest: dict[int, Track] = {}
-        for (flow, _), part in zip(ready.places, ready.parts, strict=True):
-            if flow not in longest or part.time.size > longest[flow].time.size:
-                longest[flow] = part
-        flows = range(len(ready.intervals.labels))
-        coefficients = np.stack([_flow_coefficients(longest[k], study, spline) for k in flows])
-    point = Point(
-        coefficients,
-        log_drag=math.log(PRIOR.drag),
-        log_intensity=math.log(unrest),
-        log_noise=_log_noise([camera.position_noise for camera in cameras], least),
-    )
-    if ready.angle != "state":
-        return point
-    # The angle that a noise of the position at a corner would make.
-    least_angle = least / study.block.side_m
-    return replace(
-        point,
-        log_lever=math.log(PRIOR.lever * study.block.side_m),
-        log_angle_noise=_log_noise([camera.orientation_noise for camera in cameras], least_angle),
-    )
-
-
-def _log_noise(estimates: Sequence[float], least: float) -> float:
-    """Return the logarithm of the mean of the estimates there are, and of the least if none."""
-    seen = [value for value in estimates if math.isfinite(value)]
-    return math.log(max(float(np.mean(seen)) if seen else least, least))
-
-
-def first_weights(tracks: Sequence[Track], spline: Spline) -> Weights:
-    """Return weights for a flow of the body's speed that changes over one or two knots."""
-    power = typical_speed(tracks) ** 2 * spline.spacing**2
-    return Weights(roughness=10.0 * spline.spacing**4 / power, size=0.02 / power)
-
-
-def _flow_coefficients(track: Track, study: Study, spline: Spline) -> Floats:
-    """Return a smooth spline through the flow field of Eq. 4; still water where there is none."""
-    try:
-        field = flow_from_track(track, study)
-    except InputError:
-        return np.zeros((2, spline.rows, spline.columns))
-    along_x, along_y = spline.design(field["x"].values, field["y"].values)
-    weight = (field["flag"].values == FLAGS["measured"]).astype(np.float64)
-    # Products of the bases over a node, for all pairs of coefficients of a direction.
-    pairs_x = np.einsum("xi,xk->xik", along_x, along_x)
-    pairs_y = np.einsum("yj,yl->yjl", along_y, along_y)
-    normal = np.einsum("yx,yjl,xik->jilk", weight, pairs_y, pairs_x, optimize=True)
-    normal = normal.reshape(spline.size, spline.size)
-    roughness, size = penalties(spline)
-    share = float(np.trace(normal)) / float(np.trace(roughness))
-    # Little smoothing: the roughness has a thousandth of the weight of the data.
-    normal += 1e-3 * share * (roughness + 1e-3 * size / spline.spacing**4)
-    right = [(along_y.T @ (weight * field[name].values) @ along_x).ravel() for name in ("u", "v")]
-    found = np.linalg.solve(normal, np.stack(right, axis=1)).T
-    return np.ascontiguousarray(found.reshape(2, spline.rows, spline.columns))

@@ -21,9 +21,10 @@ import numpy.typing as npt
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.flow.arena import Outline, outline_of
 from driftwalk.flow.grid import Grid, make_grid
+from driftwalk.likelihood.filter.parameters import DRAG_SHAPES, Point
 from driftwalk.likelihood.filter.series import Series
 from driftwalk.likelihood.interval_inflation import open_where_undetermined, parameter_covariance
-from driftwalk.likelihood.law.force_law import number_variables
+from driftwalk.likelihood.law.force_law import Assumptions
 from driftwalk.likelihood.law.forward_selection import LawResult
 from driftwalk.likelihood.preparation import PreparedRecordings, spline_of
 from driftwalk.likelihood.reml import Restricted
@@ -169,6 +170,47 @@ def build_fit(
         "study": study.to_toml(),
     }
     return xr.Dataset(data | found | numbers, coords | names_found | names_of, attrs)
+
+
+def law_facts(law: LawResult, assumptions: Assumptions) -> dict[str, Any]:
+    """Return the law, whether it was stated, and by how much the recording supports it."""
+    point = law.mode.point
+    searched = bool(set(DRAG_SHAPES) & set(assumptions.tried))
+    if "drag_power" in {**point.opened, **point.fixed}:
+        drag = "power"
+    elif "linear_share" in point.opened:
+        drag = "mixed"
+    else:
+        drag = "linear" if point.number("linear_share") == 1.0 else "quadratic"
+    facts: dict[str, Any] = {
+        "force_law": "floating body" if law.floating else "paper",
+        "force_law_stated": "no" if assumptions.pressure_gradient == "auto" else "yes",
+        "drag_law": drag,
+        "drag_law_stated": "no" if searched else "yes",
+    }
+    if math.isfinite(law.settled_by):
+        facts["law_settled_by"] = law.settled_by
+    return facts
+
+
+def number_variables(point: Point, law: LawResult) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return variables and coordinates with the numbers of the law, and what was tested."""
+    values = {**point.fixed, **point.opened}
+    data: dict[str, Any] = {
+        "number_value": ("number", np.array(list(values.values()), dtype=np.float64)),
+        "number_opened": ("number", np.array([name in point.opened for name in values], bool)),
+        "filter_drag_coefficient": ((), np.float64(math.exp(point.log_drag))),
+        "law_log_evidence": ("law", np.array(list(law.evidence.values()), dtype=np.float64)),
+    }
+    coords: dict[str, Any] = {
+        "number": ("number", np.array(list(values), dtype=np.str_)),
+        "law": ("law", np.array(list(law.evidence), dtype=np.str_)),
+    }
+    if law.tests is not None:
+        data["departure_estimate"] = ("departure", law.tests.estimate)
+        data["departure_std"] = ("departure", law.tests.std)
+        coords["departure"] = ("departure", np.array(law.tests.names, dtype=np.str_))
+    return data, coords
 
 
 def _stacked(flows: list[dict[str, Any]]) -> dict[str, Any]:

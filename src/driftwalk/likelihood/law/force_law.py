@@ -7,8 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-import numpy as np
-
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood.filter.parameters import DRAG_SHAPES, DRAGS, STRENGTHS, Point
@@ -20,7 +18,6 @@ from driftwalk.schema.answers.facts import fitted_value
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.likelihood.law.forward_selection import LawResult
     from driftwalk.likelihood.reml import Restricted
     from driftwalk.model import Study
 
@@ -56,7 +53,7 @@ def assumptions_of(study: Study, angle: str, *, recordings: int, flows: int) -> 
     """
     fit = study.fit
     opened, fixed, tried = _drag_of(study)
-    if fit.force_memory_s == "auto" and is_stated(study, "force_memory_s"):
+    if fit.force_memory_s == "auto" and _states_other(study, "force_memory_s"):
         fixed["force_memory"] = study.forces.force_memory_s
     elif fit.force_memory_s == "auto":
         tried.append("force_memory")
@@ -71,7 +68,7 @@ def assumptions_of(study: Study, angle: str, *, recordings: int, flows: int) -> 
         tried += STRENGTHS
     pulses = fit.flow_strength != "constant" and alone
     gradient = "off" if fit.law == "paper" else fit.pressure_gradient
-    if gradient == "auto" and is_stated(study, "pressure_gradient"):
+    if gradient == "auto" and _states_other(study, "pressure_gradient"):
         gradient = "on"
     return Assumptions(gradient, opened, fixed, tuple(tried), pulses)
 
@@ -79,7 +76,7 @@ def assumptions_of(study: Study, angle: str, *, recordings: int, flows: int) -> 
 def _drag_of(study: Study) -> tuple[dict[str, float], dict[str, float], list[str]]:
     """Return the numbers of the drag that are opened, known and tried."""
     law = study.fit.law
-    if law == "auto" and is_stated(study, "drag_power"):
+    if law == "auto" and _states_other(study, "drag_power"):
         return {}, {"drag_power": study.forces.drag_power}, []
     if law == "auto":
         return {}, {}, [*DRAG_SHAPES]
@@ -87,7 +84,7 @@ def _drag_of(study: Study) -> tuple[dict[str, float], dict[str, float], list[str
     return dict(drag.opened), dict(drag.fixed), []
 
 
-def is_stated(study: Study, key: str) -> bool:
+def _states_other(study: Study, key: str) -> bool:
     """Return whether [forces] states another law. A new study file holds every key as it is."""
     return not study.forces.is_default(key)
 
@@ -123,7 +120,7 @@ class Inertia(NamedTuple):
 def inertia_of(study: Study, point: Point) -> Inertia:
     """Return the inertia with its uncertainty, from what a study states, under the law found."""
     fit = study.fit
-    in_forces = is_stated(study, "added_mass_share")
+    in_forces = _states_other(study, "added_mass_share")
     if fit.added_mass_share != "auto":
         added, std = fit.added_mass_share, fit.added_mass_share_std
     elif in_forces:
@@ -198,47 +195,6 @@ def number_facts(point: Point, reach: Floats, study: Study) -> dict[str, Any]:
         size = math.hypot(point.opened["pulse_cosine"], point.opened["pulse_sine"])
         state("pulse_amplitude", size, max(widths["pulse_cosine"], widths["pulse_sine"]))
     return facts
-
-
-def law_facts(law: LawResult, assumptions: Assumptions) -> dict[str, Any]:
-    """Return the law, whether it was stated, and by how much the recording supports it."""
-    point = law.mode.point
-    searched = bool(set(DRAG_SHAPES) & set(assumptions.tried))
-    if "drag_power" in {**point.opened, **point.fixed}:
-        drag = "power"
-    elif "linear_share" in point.opened:
-        drag = "mixed"
-    else:
-        drag = "linear" if point.number("linear_share") == 1.0 else "quadratic"
-    facts: dict[str, Any] = {
-        "force_law": "floating body" if law.floating else "paper",
-        "force_law_stated": "no" if assumptions.pressure_gradient == "auto" else "yes",
-        "drag_law": drag,
-        "drag_law_stated": "no" if searched else "yes",
-    }
-    if math.isfinite(law.settled_by):
-        facts["law_settled_by"] = law.settled_by
-    return facts
-
-
-def number_variables(point: Point, law: LawResult) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return variables and coordinates with the numbers of the law, and what was tested."""
-    values = {**point.fixed, **point.opened}
-    data: dict[str, Any] = {
-        "number_value": ("number", np.array(list(values.values()), dtype=np.float64)),
-        "number_opened": ("number", np.array([name in point.opened for name in values], bool)),
-        "filter_drag_coefficient": ((), np.float64(math.exp(point.log_drag))),
-        "law_log_evidence": ("law", np.array(list(law.evidence.values()), dtype=np.float64)),
-    }
-    coords: dict[str, Any] = {
-        "number": ("number", np.array(list(values), dtype=np.str_)),
-        "law": ("law", np.array(list(law.evidence), dtype=np.str_)),
-    }
-    if law.tests is not None:
-        data["departure_estimate"] = ("departure", law.tests.estimate)
-        data["departure_std"] = ("departure", law.tests.std)
-        coords["departure"] = ("departure", np.array(law.tests.names, dtype=np.str_))
-    return data, coords
 
 
 def effective_logs(fit: xr.Dataset, study: Study) -> tuple[float, float]:

@@ -17,7 +17,8 @@ from driftwalk.likelihood.law.score_tests import ScoreTests
 from driftwalk.likelihood.law.search import LawSearch
 from driftwalk.likelihood.newton import Mode, ModeSearch, require_mode
 from driftwalk.likelihood.preparation import prepare
-from driftwalk.likelihood.prior import Prior, first_point, first_weights
+from driftwalk.likelihood.prior import Prior
+from driftwalk.likelihood.start import first_point, first_weights
 
 PULSE = {"pulse_cosine": 0.1, "pulse_sine": 0.0, "pulse_frequency": 0.2}
 
