@@ -29,7 +29,7 @@ from driftwalk.calibration.held_out.checks import CHECKS
 from driftwalk.calibration.held_out.held_out_score import HELD_OUT_REPLICATES, even_blocks
 from driftwalk.calibration.held_out.recorded import RecordedMotion, body_motion
 from driftwalk.calibration.ranking.verdict import checks_off
-from driftwalk.comparison.aspects.form import resampled
+from driftwalk.comparison.aspects import resampled
 from driftwalk.conditions import read_recordings
 from driftwalk.model import Study, load_study
 

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from driftwalk.calibration.grid.grid_map import Map
 from driftwalk.calibration.problem import Problem
-from driftwalk.comparison.density import BINS
+from driftwalk.comparison.statistic import BINS
 from driftwalk.core.arrays import Floats
 from driftwalk.motion.score import broken_worlds, excerpt_samples
 from driftwalk.schema import Parameter

@@ -221,7 +221,7 @@ def _flow_source(study: Study, model: MotionModel, flow: xr.Dataset | None) -> F
     """Return what gives the flow for a track: the given field, or one extracted from the track."""
     if flow is not None or not model.needs_flow:
         return lambda track: flow  # noqa: ARG005
-    from driftwalk.conditions.own_flow import flow_from_track
+    from driftwalk.conditions.recorded import flow_from_track
 
     return lambda track: flow_from_track(track, study)
 

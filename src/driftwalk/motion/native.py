@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from driftwalk import _core
 from driftwalk.comparison import StepReference
-from driftwalk.comparison.density import BINS
+from driftwalk.comparison.statistic import BINS
 from driftwalk.conditions.recorded import Conditions
 from driftwalk.motion.protocol import Details, Floats, Keys, Scores
 from driftwalk.motion.score import excerpt_samples

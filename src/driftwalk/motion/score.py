@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.comparison import Statistic, StepDistance, StepReference, StepTable, step_table
-from driftwalk.comparison.density import BINS
+from driftwalk.comparison.statistic import BINS
 from driftwalk.conditions.recorded import Conditions
 from driftwalk.motion.protocol import Details, Keys, MotionModel, Scores, ScoresItself, Values
 from driftwalk.simulation.backend import BROKEN

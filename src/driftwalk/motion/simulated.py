@@ -10,8 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.conditions.camera import study_as_seen
-from driftwalk.conditions.neighbours import neighbours_of
-from driftwalk.conditions.recorded import Conditions, recorded_conditions
+from driftwalk.conditions.recorded import Conditions, neighbours_of, recorded_conditions
 from driftwalk.core.errors import InputError
 from driftwalk.core.processors import default_threads
 from driftwalk.core.seeds import world_keys

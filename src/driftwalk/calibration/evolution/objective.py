@@ -12,9 +12,9 @@ from driftwalk.comparison.aspects import (
     Aspect,
     AspectPlan,
     AspectReference,
+    WallDistance,
     form_aspects,
 )
-from driftwalk.comparison.aspects.form import WallDistance
 from driftwalk.conditions import Conditions
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.processors import map_in_threads

@@ -14,7 +14,7 @@ from driftwalk.calibration.held_out.hidden_markov import fit_hidden_markov_model
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.comparison.aspects import block_of, interleaved
 from driftwalk.conditions import Conditions, unstated_warning
-from driftwalk.conditions.own_flow import flow_from_track
+from driftwalk.conditions.recorded import flow_from_track
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.motion import (

@@ -7,8 +7,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.comparison.aspects import AspectPlan
-from driftwalk.comparison.aspects.form import WallDistance, resampled
+from driftwalk.comparison.aspects import AspectPlan, WallDistance, resampled
 from driftwalk.core.arrays import Bools, Floats, Integers
 
 LAGS: Final = (1, 3, 10, 30, 100)

@@ -10,8 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.comparison import StepPlan, apply_steps
-from driftwalk.comparison.aspects import AspectPlan
-from driftwalk.comparison.aspects.form import WallDistance, resampled
+from driftwalk.comparison.aspects import AspectPlan, WallDistance, resampled
 from driftwalk.core.arrays import Bools, Floats
 
 Instants = Callable[[Floats], Bools]

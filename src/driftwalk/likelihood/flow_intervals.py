@@ -1,15 +1,16 @@
-"""The intervals of a recording between the switching times of the pumps, each with its flow."""
+"""The flows of a fit: one for each interval between the switching times of the pumps."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from driftwalk.core.errors import InputError
-from driftwalk.schema import Track
+from driftwalk.schema import FLAGS, Track, build_flow_field
+from driftwalk.schema.check import refuse_other_version, require_kind
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -75,7 +76,9 @@ def intervals_of(study: Study) -> Intervals:
     ('A', 'B', 'C')
     """
     times = study.fit.switching_times_s or ()
-    names = study.fit.flow_labels or tuple(_letter(index) for index in range(len(times) + 1))
+    # A, B, ..., Z, A1, B1, ...
+    letters = [f"{chr(ord('A') + k % 26)}{k // 26 or ''}" for k in range(len(times) + 1)]
+    names = study.fit.flow_labels or tuple(letters)
     labels = tuple(dict.fromkeys(names))
     return Intervals(tuple(times), tuple(labels.index(name) for name in names), labels)
 
@@ -84,20 +87,9 @@ def fitted_intervals(fit: xr.Dataset) -> Intervals:
     """Return the intervals of a fit."""
     if "flow" not in fit.dims:
         return Intervals((), (0,), ("A",))
-    times = fit["switching_time"].values
-    flows = fit["interval_flow"].values
-    labels = fit["flow"].values
     return Intervals(
-        tuple(float(time) for time in times),
-        tuple(int(flow) for flow in flows),
-        tuple(str(label) for label in labels),
+        *(tuple(fit[name].values.tolist()) for name in ("switching_time", "interval_flow", "flow"))
     )
-
-
-def _letter(index: int) -> str:
-    """Return A, B, ..., Z, A1, B1, ..."""
-    turn, place = divmod(index, 26)
-    return chr(ord("A") + place) + (str(turn) if turn else "")
 
 
 def cut_track(track: Track, intervals: Intervals, *, fewest: int, where: str) -> list[Track]:
@@ -146,3 +138,74 @@ def switched_frames(
     return np.array(time), {
         name: np.stack([values[one] for one in flow]) for name, values in fields.items()
     }
+
+
+def require_fit(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a fit; refuse any other dataset, and a fit of another schema version."""
+    return refuse_other_version(require_kind(dataset, "fit", "fit_motion makes one"))
+
+
+def fitted_flow(fit: xr.Dataset, *, interval: int | None = None) -> xr.Dataset:
+    """Return the flow of a fit as a flow field, for everything that takes one.
+
+    Parameters
+    ----------
+    fit : xarray.Dataset
+        Result of `fit_motion`.
+    interval : int, optional
+        With switching times: the interval, counted from 0, whose steady flow is wanted. Without
+        it the flow that changes is returned: its frames are a microsecond before and after each
+        switch, as fields are linear in time between frames; times count from the first sample of
+        the first recording, as those of a simulation do.
+
+    Returns
+    -------
+    xarray.Dataset
+        A `flow_field`. Nodes that the block has been over are *measured*, the others of the tank
+        *filled*: there the spline is continued smoothly. Standard errors stand at measured nodes
+        (those of all nodes are in the fit); they are correlated over about the distance of knots.
+
+    Raises
+    ------
+    InputError
+        When the dataset is no fit, or has no such interval.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> flow = dw.fitted_flow(dw.fit_motion(dw.tank30_recording()))  # doctest: +SKIP
+    """
+    fit = require_fit(fit)
+    intervals = fitted_intervals(fit)
+    if interval is not None and not 0 <= interval < len(intervals.flows):
+        raise InputError(
+            f"no interval {interval}: the fit has {len(intervals.flows)}, counted from 0"
+        )
+    attrs: dict[str, Any] = {
+        "method": "bicubic spline, fitted with drag and noise by the innovations' likelihood",
+        "cell_size_m": float(fit["cell_size"]),
+        **{key: fit.attrs[key] for key in ("arena", "source")},
+    }
+    x, y = fit["x"].values, fit["y"].values
+    if intervals.steady:
+        return build_flow_field(x, y, attrs=attrs, **_field_variables(fit))
+    fields = [_field_variables(fit.isel(flow=index)) for index in range(fit.sizes["flow"])]
+    if interval is not None:
+        flow = intervals.flows[interval]
+        attrs["flow_label"] = intervals.labels[flow]
+        attrs["intervals"] = ", ".join(intervals.describe(one) for one in intervals.of_flow(flow))
+        return build_flow_field(x, y, attrs=attrs, **fields[flow])
+    attrs["repeat"] = "hold"  # before the first switch and after the last the flow is steady
+    by_name = {name: [one[name] for one in fields] for name in fields[0]}
+    time, frames = switched_frames(intervals, by_name, first=float(fit["recording_start"]))
+    return build_flow_field(x, y, time=time, attrs=attrs, **frames)
+
+
+def _field_variables(fit: xr.Dataset) -> dict[str, Any]:
+    """Return the variables of a flow field: standard errors at measured nodes only."""
+    measured = fit["flag"].values == FLAGS["measured"]
+    errors = {
+        name: np.where(measured, fit[name].values, np.nan)
+        for name in ("u_standard_error", "v_standard_error")
+    }
+    return {**{name: fit[name].values for name in ("u", "v", "flag", "count")}, **errors}

@@ -13,18 +13,18 @@ import numpy as np
 
 from driftwalk.calibration.recover.study import BrokenSimulation, EstimationMethod, Tell
 from driftwalk.calibration.recover.summary import COVERAGE_CONFIDENCE
+from driftwalk.core.errors import InputError
 from driftwalk.core.processors import one_blas_thread
 from driftwalk.core.random_streams import RecoveryStream
 from driftwalk.core.run_stages import tell_nobody
 from driftwalk.flow import random_tank_flow
+from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.fit import fit_motion
-from driftwalk.likelihood.recover.check import require_flow, require_length, require_truth
-from driftwalk.likelihood.recover.score import SCORED, score_fit
-from driftwalk.likelihood.recover.summary import NEEDED_CONFIDENCE, add_summary
 from driftwalk.likelihood.refuse import LIMIT
+from driftwalk.likelihood.score import NEEDED_CONFIDENCE, SCORED, add_summary, score_fit
 from driftwalk.model import Study, apply_overrides
 from driftwalk.model.recover import RANDOM, true_time_step_s
-from driftwalk.schema import build_trajectory
+from driftwalk.schema import FLAGS, build_trajectory, check_flow_field
 from driftwalk.schema.check import described
 from driftwalk.schema.kinds import KINDS
 from driftwalk.schema.kinds.recovery import ESTIMATED, RECOVERED
@@ -34,6 +34,80 @@ from driftwalk.sweep.processes import single_threaded_processes
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+def require_truth(study: Study, angles: tuple[str, ...]) -> None:
+    """Refuse a truth that lacks a number."""
+    seen, forces = study.observation, study.forces
+    positive: dict[str, Any] = {
+        "[forces] drag_coefficient": forces.drag_coefficient,
+        "[forces] force_std_N": forces.force_std_N,
+        "[observation] position_noise_m": seen.position_noise_m,
+    }
+    for key, value in positive.items():
+        if isinstance(value, str) or not value > 0.0:
+            raise InputError(
+                f"the truth lacks {key}: a number above 0 is needed for the "
+                f"simulation and the comparison with the fit, got {value!r}"
+            )
+    if isinstance(seen.orientation_noise_rad, str) and set(angles) != {"none"}:
+        raise InputError(
+            "the truth lacks [observation] orientation_noise_rad: a number is needed where the "
+            f"fit uses the orientation, got {seen.orientation_noise_rad!r}"
+        )
+
+
+def require_length(study: Study) -> None:
+    """Refuse recordings that are shorter than the fit needs."""
+    settings = study.recover
+    shortest = min(settings.durations_s)
+    samples = math.floor(shortest / settings.sample_interval_s + 1e-6) + 1
+    # Five standard deviations: chance shall not stop a study half-way.
+    retained = 1.0 - settings.missing_share
+    expected = samples * retained - 5.0 * math.sqrt(samples * retained * settings.missing_share)
+    if expected < LIMIT.fewest_samples:
+        raise InputError(
+            f"[recover] durations_s: {shortest:g} s at a sample every "
+            f"{settings.sample_interval_s:g} s, {settings.missing_share:.0%} of them missing, are "
+            f"about {samples * retained:.0f} positions; the fit needs {LIMIT.fewest_samples} at "
+            "least, and some minutes to be of use"
+        )
+
+
+def require_flow(study: Study, flow: xr.Dataset | None) -> None:
+    """Refuse a flow that is missing, has frames, or does not cover the tank."""
+    if flow is None:
+        named = study.recover.flow
+        if named == RANDOM:
+            return
+        raise InputError(
+            "the flow of the water is missing: name the file of a flow field "
+            '([recover] flow), or flow = "random"'
+            if named is None
+            else f"the flow {named} ([recover] flow) has to be loaded and passed as an argument"
+        )
+    check_flow_field(flow)
+    if "time" in flow.dims:
+        raise InputError("the true flow has frames: a recovery study needs a steady one")
+    outline, tank = outline_of(study.tank.to_arena()), study.tank.describe()
+    low_x, low_y, high_x, high_y = outline.bounds
+    x, y = flow["x"].values, flow["y"].values
+    cell = float(x[1] - x[0]), float(y[1] - y[0])
+    for nodes, size, low, high in ((x, cell[0], low_x, high_x), (y, cell[1], low_y, high_y)):
+        if nodes[0] - size > low + 1e-9 or nodes[-1] + size < high - 1e-9:
+            raise InputError(
+                f"the flow field does not cover the tank, a {tank}: it spans x from {x[0]:.4g} to "
+                f"{x[-1]:.4g} m, y from {y[0]:.4g} to {y[-1]:.4g} m; give the field of this tank, "
+                "or the tank of this field ([tank])"
+            )
+    depth = outline.depth(*(part.ravel() for part in np.meshgrid(x, y)))
+    inner = (depth > math.hypot(*cell)).reshape(y.size, x.size)
+    lacking = int(np.count_nonzero(inner & (flow["flag"].values == FLAGS["outside"])))
+    if lacking:
+        raise InputError(
+            f"the flow field does not cover the tank, a {tank}: {lacking} of its nodes in there "
+            "are flagged as outside of the tank that it was made for; give the field of this tank"
+        )
 
 
 PARTS: Final = ("", "_low", "_high", "_sd", "_error", "_z", "_covered")
@@ -109,16 +183,12 @@ class FitRecovery(EstimationMethod["SimulatedTracks"]):
         tables = {key: np.moveaxis(values, 0, -1) for key, values in found.items()}
         fitted = tables["status"] == ESTIMATED
         used = fitted & (np.where(fitted, tables["wall_share"], 1.0) <= LIMIT.most_wall_share)
-        data = {
-            **{
-                f"{name}{part}": tables[f"{one.key}{part}"]
-                for name, one in RECOVERED.items()
-                for part in PARTS
-            },
-            **{key: tables[key] for key in (*FLOW_PARTS, *FACTS, "status")},
-            "message": tables["message"].astype(object),
-            "used": used.astype(np.int8),
+        columns = {
+            f"{name}{part}": f"{one.key}{part}" for name, one in RECOVERED.items() for part in PARTS
         }
+        columns |= {key: key for key in (*FLOW_PARTS, *FACTS, "status")}
+        data = {name: tables[key] for name, key in columns.items()}
+        data |= {"message": tables["message"].astype(object), "used": used.astype(np.int8)}
         coords = {
             "duration": ("duration", np.array(study.recover.durations_s)),
             "angle": ("angle", np.array(self.angles, dtype=object)),
@@ -132,12 +202,18 @@ class FitRecovery(EstimationMethod["SimulatedTracks"]):
         study = self.study
         settings, forces = study.recover, study.forces
         asked = settings.drag_coefficient_precision
+        if self.flow is None:
+            flow = f"random, {settings.flow_family}"
+        elif settings.flow in (None, RANDOM):
+            flow = str(self.flow.attrs.get("source", "given"))
+        else:
+            flow = str(settings.flow)
         return {
             "drag_coefficient": forces.drag_coefficient,
             "force_std_N": forces.force_std_N,
             "force_interval_s": forces.force_interval_s,
             "tracking_noise_m": self.tracking_noise,
-            "flow": _flow_name(study, self.flow),
+            "flow": flow,
             "sample_interval_s": settings.sample_interval_s,
             "recordings_per_fit": settings.recordings_per_fit,
             "missing_share": settings.missing_share,
@@ -169,10 +245,18 @@ class FitRecovery(EstimationMethod["SimulatedTracks"]):
         A longer recording begins with the shorter one of the same number.
         """
         settings, recording = self.study.recover, int(setting["recording"])
+        # A step fine enough for a truth, and a camera that has numbers.
+        step = true_time_step_s(
+            self.study.simulation.time_step_s, force_interval_s=self.study.forces.force_interval_s
+        )
+        changes: dict[str, Any] = {"simulation.time_step_s": step}
+        if isinstance(self.study.observation.orientation_noise_rad, str):
+            changes["observation.orientation_noise_rad"] = 0.0
+        study = apply_overrides(self.study, changes)
         flow = self.flow_of(recording)
         clock = self.clock(float(setting["duration"]))
         run = simulate(
-            _simulated_study(self.study),
+            study,
             flow,
             sample_time=settings.settling_s + clock,
             replicates=settings.recordings_per_fit,
@@ -183,17 +267,11 @@ class FitRecovery(EstimationMethod["SimulatedTracks"]):
         if np.any(run["status"].values):
             raise BrokenSimulation("the simulation broke")
         missed = self.missed(recording, clock.size, settings.recordings_per_fit)
-        tracks = [
-            build_trajectory(
-                clock,
-                *(
-                    np.where(lost, np.nan, run[name].values[number, :, 0].astype(np.float64))
-                    for name in ("x", "y", "theta")
-                ),
-                attrs={"source": "simulated"},
-            )
-            for number, lost in enumerate(missed.T)
-        ]
+        tracks = []
+        for number, lost in enumerate(missed.T):
+            values = (run[name].values[number, :, 0] for name in ("x", "y", "theta"))
+            pose = (np.where(lost, np.nan, one.astype(np.float64)) for one in values)
+            tracks.append(build_trajectory(clock, *pose, attrs={"source": "simulated"}))
         return SimulatedTracks(tracks, flow)
 
     @one_blas_thread()
@@ -227,24 +305,6 @@ class SimulatedTracks(NamedTuple):
 
     tracks: list[xr.Dataset]
     flow: xr.Dataset
-
-
-def _simulated_study(study: Study) -> Study:
-    """Return the study with a step fine enough for a truth, and a camera that has numbers."""
-    step = true_time_step_s(
-        study.simulation.time_step_s, force_interval_s=study.forces.force_interval_s
-    )
-    changes: dict[str, Any] = {"simulation.time_step_s": step}
-    if isinstance(study.observation.orientation_noise_rad, str):
-        changes["observation.orientation_noise_rad"] = 0.0
-    return apply_overrides(study, changes)
-
-
-def _flow_name(study: Study, flow: xr.Dataset | None) -> str:
-    if flow is None:
-        return f"random, {study.recover.flow_family}"
-    named = study.recover.flow
-    return str(flow.attrs.get("source", "given")) if named in (None, RANDOM) else str(named)
 
 
 def recovery_study(

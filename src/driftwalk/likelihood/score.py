@@ -1,27 +1,29 @@
-"""How far a likelihood fit is from a truth that is known, and whether its intervals say so."""
+"""How far fits are from a truth that is known: errors, coverage, and the length to record."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.calibration.recover.summary import Summary, summarise
+from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
 from driftwalk.flow import bilinear
 from driftwalk.flow.arena import outline_of
-from driftwalk.likelihood.flow_of_fit import fitted_flow, require_fit
-from driftwalk.likelihood.intervals import fitted_intervals
-from driftwalk.likelihood.wall import MARGIN
+from driftwalk.likelihood.filter.series import MARGIN
+from driftwalk.likelihood.flow_intervals import fitted_flow, fitted_intervals, require_fit
+from driftwalk.likelihood.preparation import as_list
 from driftwalk.schema import FLAGS, body_track
 from driftwalk.schema.answers.facts import facts_of
+from driftwalk.schema.kinds.recovery import RECOVERED
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Floats = npt.NDArray[np.float64]
 
 SCORED: Final = ("drag_coefficient", "force_std_N", "tracking_noise_m")
 """The parameters that are scored, as the attributes of a fit name them."""
@@ -89,6 +91,8 @@ def score_fit(
     >>> round(score["drag_coefficient_error"], 2)  # doctest: +SKIP
     -0.03
     """
+    from driftwalk.model import parse_study
+
     fit = require_fit(fit)
     if "flow" in fit.dims and interval is None:
         raise InputError(
@@ -102,8 +106,12 @@ def score_fit(
     score: dict[str, Any] = {}
     for name, value in truth.items():
         score.update(_parameter_score(fit, name, value))
-    cells = _visited_cells(estimated, fit, recordings, interval=interval or 0)
-    return {**score, **_flow_score(estimated, flow, cells, side=_side(fit))}
+    side = parse_study(fit.attrs["study"], source="the study of the fit").block.side_m
+    if recordings is None:
+        cells = _surrounded(estimated, radius=0.5 * side)
+    else:
+        cells = _visited_cells(estimated, fit, as_list(recordings), interval or 0, side)
+    return {**score, **_flow_score(estimated, flow, cells, side=side)}
 
 
 def block_flow(flow: xr.Dataset, x: npt.ArrayLike, y: npt.ArrayLike, *, side: float) -> Floats:
@@ -150,37 +158,22 @@ def _parameter_score(fit: xr.Dataset, name: str, truth: float) -> dict[str, Any]
     }
 
 
-def _side(fit: xr.Dataset) -> float:
-    from driftwalk.model import parse_study
-
-    return parse_study(fit.attrs["study"], source="the study of the fit").block.side_m
-
-
 def _visited_cells(
-    flow: xr.Dataset,
-    fit: xr.Dataset,
-    recordings: xr.Dataset | Sequence[xr.Dataset] | None,
-    *,
-    interval: int,
-) -> npt.NDArray[np.bool_]:
+    flow: xr.Dataset, fit: xr.Dataset, recordings: list[xr.Dataset], interval: int, side: float
+) -> Bools:
     """Return the cells around the nodes of a fitted flow in which the block has been."""
-    import xarray as xr
-
-    if recordings is None:
-        return _surrounded(flow, radius=0.5 * _side(fit))
-    many = [recordings] if isinstance(recordings, xr.Dataset) else list(recordings)
     outline = outline_of(fit.attrs["arena"])
-    reach = _side(fit) / math.sqrt(2.0) + MARGIN
+    reach = side / math.sqrt(2.0) + MARGIN
     intervals = fitted_intervals(fit)
     flows = np.array(intervals.flows)
+    edges = [_edges(flow[axis].values) for axis in ("y", "x")]
     count = np.zeros(flow["flag"].shape)
-    for one in many:
+    for one in recordings:
         track = body_track(one)
         known = np.isfinite(track.x) & np.isfinite(track.y)
         known &= flows[intervals.index_of(track.time)] == flows[interval]
         x, y = track.x[known], track.y[known]
         free = outline.depth(x, y) > reach
-        edges = tuple(_edges(flow[axis].values) for axis in ("y", "x"))
         count += np.histogram2d(y[free], x[free], bins=edges)[0]
     return np.asarray(count >= 3)
 
@@ -190,7 +183,7 @@ def _edges(nodes: Floats) -> Floats:
     return np.append(nodes - 0.5 * spacing, nodes[-1] + 0.5 * spacing)
 
 
-def _surrounded(flow: xr.Dataset, *, radius: float) -> npt.NDArray[np.bool_]:
+def _surrounded(flow: xr.Dataset, *, radius: float) -> Bools:
     """Return the measured nodes whose neighbours within a radius are all measured too."""
     from scipy.ndimage import binary_erosion
 
@@ -202,7 +195,7 @@ def _surrounded(flow: xr.Dataset, *, radius: float) -> npt.NDArray[np.bool_]:
 
 
 def _flow_score(
-    estimated: xr.Dataset, truth: xr.Dataset, cells: npt.NDArray[np.bool_], *, side: float
+    estimated: xr.Dataset, truth: xr.Dataset, cells: Bools, *, side: float
 ) -> dict[str, Any]:
     rows, columns = np.nonzero(cells)
     if rows.size == 0:
@@ -225,3 +218,76 @@ def _flow_score(
 def _relative(found: Floats, truth: Floats) -> float:
     """Return the rms of the error over the rms of the truth."""
     return math.sqrt(float(((found - truth) ** 2).sum() / (truth**2).sum()))
+
+
+NEEDED_CONFIDENCE: Final = 0.9
+"""Confidence of the interval of the time that one must record."""
+
+
+class Scale(NamedTuple):
+    """How the error of C_d falls with the length T of a recording: scale / sqrt(T)."""
+
+    value: float
+    """Root mean square of ln(estimate / truth), times sqrt(T) [s^0.5]."""
+    low: float
+    high: float
+
+    def needed(self, precision: float) -> tuple[float, float, float]:
+        """Return the length [s] at which the error is `precision`, and its interval."""
+        time, low, high = ((part / precision) ** 2 for part in self)
+        return time, low, high
+
+
+def error_scale(duration: Floats, rms_error: Floats, count: Floats) -> Scale:
+    """Fit error = scale / sqrt(T) to the lengths of a study, in logarithms.
+
+    Examples
+    --------
+    >>> round(error_scale(np.array([100.0]), np.array([0.2]), np.array([20])).value, 12)
+    2.0
+    """
+    from scipy.special import chdtri
+
+    enough = count >= 2  # one recording has no spread
+    if not enough.any():
+        return Scale(np.nan, np.nan, np.nan)
+    logs = np.log(rms_error[enough]) + 0.5 * np.log(duration[enough])
+    value = float(np.exp(np.average(logs, weights=count[enough])))
+    tail, freedom = 0.5 * (1.0 - NEEDED_CONFIDENCE), float(count.max())
+    # n rms^2 / sigma^2 is chi-squared with n degrees of freedom.
+    low, high = (value * float(np.sqrt(freedom / chdtri(freedom, p))) for p in (tail, 1.0 - tail))
+    return Scale(value, low, high)
+
+
+def add_summary(recovery: xr.Dataset) -> xr.Dataset:
+    """Return the dataset of a study with its summary by duration and use of the angle."""
+    used = recovery["used"].values == 1
+    cells = list(np.ndindex(used.shape[:2]))
+    rows = []
+    for name in RECOVERED:
+        columns = [recovery[f"{name}_{part}"].values for part in ("error", "z", "covered")]
+        rows += [summarise(*(one[cell][used[cell]] for one in columns)) for cell in cells]
+    summaries = np.array(rows).reshape(len(RECOVERED), *used.shape[:2], -1)
+    flow = np.full((*used.shape[:2], 2), np.nan)
+    for cell in cells:
+        errors = recovery["flow_error"].values[cell][used[cell]]
+        errors = errors[np.isfinite(errors)]
+        if errors.size:
+            flow[cell] = np.median(errors), np.quantile(errors, 0.9)
+    rms, count = summaries[0, ..., Summary._fields.index("rms_error")], used.sum(axis=-1)
+    duration = recovery["duration"].values
+    scales = [error_scale(duration, *one) for one in zip(rms.T, count.T, strict=True)]
+    # NaN where no precision is asked.
+    needed = [scale.needed(recovery.attrs["drag_coefficient_precision"]) for scale in scales]
+    by_angle = {"drag_coefficient_error_scale": np.array(scales), "needed_duration": needed}
+    summary: dict[str, Any] = {
+        name: (("parameter", "duration", "angle"), summaries[..., index])
+        for index, name in enumerate(Summary._fields)
+    }
+    for index, name in enumerate(("median_flow_error", "flow_error_90")):
+        summary[name] = (("duration", "angle"), flow[..., index])
+    for name, values in by_angle.items():
+        for column, end in enumerate(("", "_low", "_high")):
+            summary[f"{name}{end}"] = (("angle",), np.array(values)[:, column])
+    names = np.array(list(RECOVERED), dtype=object)
+    return recovery.assign(summary).assign_coords(parameter=names)
