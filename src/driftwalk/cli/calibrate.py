@@ -7,15 +7,16 @@ from typing import Annotated
 import typer
 
 from driftwalk.cli.inputs.study_recording import opening_note, read_with_flow
-from driftwalk.cli.options.cluster import ClusterAt, ClusterOptions, Workers
 from driftwalk.cli.options.model import ModelName, ParameterChoices, chosen_model
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import FlowFile, Json, Overwrite, RunFolder, Threads
+from driftwalk.cli.options.run import RunOptions, with_run_options
+from driftwalk.cli.options.shared import FlowFile
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.answer import print_result
 from driftwalk.core.study_keys import CALIBRATION_KEYS
 
 
+@with_run_options
 @with_recording_options
 @with_study_options(
     CALIBRATION_KEYS,
@@ -26,7 +27,6 @@ from driftwalk.core.study_keys import CALIBRATION_KEYS
 )
 def calibrate(
     recording: RecordingFile,
-    out: RunFolder,
     given: StudyOptions,
     how: RecordingOptions,
     model: ModelName = None,
@@ -40,11 +40,8 @@ def calibrate(
             "more than two parameters.",
         ),
     ] = False,
-    threads: Threads = None,
-    cluster: ClusterAt = None,
-    cluster_options: ClusterOptions = None,
-    overwrite: Overwrite = False,
-    json: Json = False,
+    *,
+    options: RunOptions,
 ) -> None:
     """Find the drag coefficient and the stochastic force that explain a recording.
 
@@ -56,7 +53,7 @@ def calibrate(
     """
     from driftwalk.conditions import About, jump_warnings
     from driftwalk.motion import feels_others
-    from driftwalk.runs import CalibrationWork, run_work
+    from driftwalk.runs import CalibrationWork
 
     chosen = chosen_model(model, parameters)
     others = feels_others(chosen)
@@ -65,11 +62,10 @@ def calibrate(
     )
     body = read.body if others else how.body
     work = CalibrationWork(
-        read.trajectories[0], read.study, field, body, inputs, threads, chosen, posterior
+        read.trajectories[0], read.study, field, body, inputs, options.threads, chosen, posterior
     )
     about: About = "block" if model is None else "tank"
     jumps = jump_warnings(read.trajectories[0], read.body)
     begun = opening_note(read.study, given, how=how, about=about, warnings=jumps)
-    with Workers(cluster, cluster_options).reported("calibrate") as told:
-        found = run_work(work, out, overwrite=overwrite, begun=begun, **told)
-    print_result(found, out, json=json)
+    found = options.run(work, "calibrate", begun=begun)
+    print_result(found, options.out, json=options.json)

@@ -12,7 +12,7 @@ import typer
 
 from driftwalk.cli.inputs.motion import load_motion
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import Json, Replace
+from driftwalk.cli.options.shared import Json, Replace, option
 from driftwalk.cli.options.study import study_option
 from driftwalk.cli.terminal.output import (
     print_json,
@@ -60,8 +60,7 @@ def compare(
     ],
     how: RecordingOptions,
     body_b: Annotated[
-        str | None,
-        typer.Option("--body-b", help="Body in B (default: same as A).", show_default=False),
+        str | None, typer.Option("--body-b", help="Body in B (default: same as A).")
     ] = None,
     step_interval: Annotated[Any, study_option("step_interval")] = None,
     ties: Annotated[
@@ -72,19 +71,11 @@ def compare(
         ),
     ] = "strict",
     permutations: Annotated[
-        int,
-        typer.Option(
-            "--permutations", min=0, metavar="N", help="Permutations of the test; 0 for no test."
-        ),
+        int, option("--permutations N", help="Permutations of the test; 0 for no test.", min=0)
     ] = 999,
-    seed: Annotated[
-        int, typer.Option("--seed", min=0, metavar="N", help="Seed of the permutations.")
-    ] = 1,
+    seed: Annotated[int, option("--seed N", help="Seed of the permutations.", min=0)] = 1,
     out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out", "-o", metavar="FILE.nc", help="File for the comparison.", show_default=False
-        ),
+        Path | None, option("--out", "-o FILE.nc", help="File for the comparison.")
     ] = None,
     overwrite: Replace = False,
     json: Json = False,

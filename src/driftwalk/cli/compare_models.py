@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Any
 
-import typer
-
 from driftwalk.cli.inputs.study_recording import opening_note, read_with_flow
-from driftwalk.cli.options.cluster import ClusterAt, ClusterOptions, Workers
 from driftwalk.cli.options.model import ComparedParameters, parameter_choices
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import FlowFile, Json, Overwrite, RunFolder, Threads
+from driftwalk.cli.options.run import RunOptions, with_run_options
+from driftwalk.cli.options.shared import FlowFile, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.answer import print_result
 from driftwalk.cli.terminal.output import printable
@@ -19,6 +17,7 @@ from driftwalk.cli.terminal.progress import ProgressReporter
 from driftwalk.core.study_keys import CALIBRATION_KEYS
 
 
+@with_run_options
 @with_recording_options
 @with_study_options(
     CALIBRATION_KEYS,
@@ -29,26 +28,20 @@ from driftwalk.core.study_keys import CALIBRATION_KEYS
 )
 def compare_models(
     recording: RecordingFile,
-    out: RunFolder,
     given: StudyOptions,
     how: RecordingOptions,
     models: Annotated[
         str | None,
-        typer.Option(
-            "--models",
-            metavar="NAMES",
+        option(
+            "--models NAMES",
             help="Models, separated by commas, such as block,run_tumble+wall; or all. Default: the "
             "block and the family with an interaction with the wall.",
-            show_default=False,
         ),
     ] = None,
     parameters: ComparedParameters = None,
     flow: FlowFile = None,
-    threads: Threads = None,
-    cluster: ClusterAt = None,
-    cluster_options: ClusterOptions = None,
-    overwrite: Overwrite = False,
-    json: Json = False,
+    *,
+    options: RunOptions,
 ) -> None:
     """Say which motion models explain a recording.
 
@@ -77,13 +70,13 @@ def compare_models(
     about: About = "block" if "block" in chosen else "tank"
     jumps = jump_warnings(read.trajectories[0], read.body)
     begun = opening_note(read.study, given, how=how, about=about, warnings=jumps)
-    with Workers(cluster, cluster_options).reported("compare models") as told:
-        said: dict[str, Any] = {} if json else {"finished": Ranking(told["progress"])}
+    with options.reported("compare models") as told:
+        said: dict[str, Any] = {} if options.json else {"finished": Ranking(told["progress"])}
         work = ModelComparisonWork(
-            read.trajectories[0], chosen, read.study, field, body, inputs, threads, **said
+            read.trajectories[0], chosen, read.study, field, body, inputs, options.threads, **said
         )
-        found = run_work(work, out, overwrite=overwrite, begun=begun, **told)
-    print_result(found, out, json=json)
+        found = run_work(work, options.out, overwrite=options.overwrite, begun=begun, **told)
+    print_result(found, options.out, json=options.json)
 
 
 class Ranking:

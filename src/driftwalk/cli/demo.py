@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from driftwalk.cli.options.shared import Json, Overwrite, Threads
+from driftwalk.cli.options.shared import Json, Overwrite, Threads, option
 from driftwalk.cli.terminal.demo_answer import (
     Fitted,
     in_json,
@@ -47,9 +47,7 @@ PAGE = "report.html"
 
 
 def demo(
-    out: Annotated[
-        Path, typer.Option("--out", "-o", metavar="DIR", help="Directory of both runs.")
-    ] = Path("demo"),
+    out: Annotated[Path, option("--out", "-o DIR", help="Directory of both runs.")] = Path("demo"),
     quick: Annotated[
         bool, typer.Option("--quick", help="Search only a small part; takes seconds, not minutes.")
     ] = False,

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from driftwalk.cli.options.shared import Json
+from driftwalk.cli.options.shared import Json, option
 from driftwalk.cli.terminal.answer import print_row
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import print_json, print_note
@@ -34,46 +34,27 @@ def export(
             help="; ".join(f"{target.name}: {target.gives}" for target in TARGETS.values()) + ".",
         ),
     ],
-    out: Annotated[
-        Path, typer.Option("--out", "-o", metavar="DIR", help="New or empty folder to write.")
-    ],
+    out: Annotated[Path, option("--out", "-o DIR", help="New or empty folder to write.")],
     flow: Annotated[
         Path | None,
-        typer.Option(
-            "--flow",
-            metavar="FILE",
-            help="Flow field of a study file, or another one for a run.",
-            show_default=False,
-        ),
+        option("--flow FILE", help="Flow field of a study file, or another one for a run."),
     ] = None,
     seed: Annotated[
         int | None,
-        typer.Option(
-            "--seed",
-            min=0,
-            metavar="N",
-            help="Seed of the stochastic force (default: the study's).",
-            show_default=False,
-        ),
+        option("--seed N", help="Seed of the stochastic force (default: the study's).", min=0),
     ] = None,
     replicate: Annotated[
         int | None,
-        typer.Option(
-            "--replicate",
-            min=0,
-            metavar="N",
+        option(
+            "--replicate N",
             help="Replicate of a simulation to take, counted from 0 (default: all; of a film the "
             "first).",
-            show_default=False,
+            min=0,
         ),
     ] = None,
     speed: Annotated[
         float | None,
-        typer.Option(
-            "--speed",
-            help="How much faster than real time a film is (default: 1).",
-            show_default=False,
-        ),
+        typer.Option("--speed", help="How much faster than real time a film is (default: 1)."),
     ] = None,
     verify: Annotated[
         bool, typer.Option("--verify", help="Run what was written, and compare it with driftwalk.")

@@ -9,7 +9,7 @@ import typer
 
 from driftwalk.cli.inputs.study_recording import opening_note, read_for_run
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import Json, Overwrite
+from driftwalk.cli.options.shared import Json, Overwrite, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.answer import print_parts, print_places, print_result
 from driftwalk.cli.terminal.argument_names import to_options
@@ -36,7 +36,7 @@ RecordingFiles = Annotated[
 )
 def fit(
     recordings: RecordingFiles,
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Run directory to make.")],
+    out: Annotated[Path, option("--out", "-o DIR", help="Run directory to make.")],
     given: StudyOptions,
     how: RecordingOptions,
     no_check: Annotated[

@@ -10,7 +10,7 @@ import typer
 
 from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import FlowVariables, FrameInterval, Json, Replace
+from driftwalk.cli.options.shared import FlowVariables, FrameInterval, Json, Replace, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.answer import print_warnings
 from driftwalk.cli.terminal.argument_names import to_options
@@ -37,10 +37,7 @@ NOISE: Final = FLOW_KEYS["position_noise"]
 )
 def flow(
     recording: RecordingFile,
-    out: Annotated[
-        Path,
-        typer.Option("--out", "-o", metavar="FILE", help="File to write; ends in .nc or .csv."),
-    ],
+    out: Annotated[Path, option("--out", "-o FILE", help="File to write; ends in .nc or .csv.")],
     given: StudyOptions,
     how: RecordingOptions,
     frame_interval: FrameInterval = None,

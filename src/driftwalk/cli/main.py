@@ -144,7 +144,7 @@ def driftwalk(
     version: Annotated[  # noqa: ARG001
         bool,
         typer.Option(
-            "--version", is_eager=True, callback=_print_version, help="Print the version."
+            "--version", help="Print the version.", is_eager=True, callback=_print_version
         ),
     ] = False,
 ) -> None:

@@ -16,11 +16,7 @@ if TYPE_CHECKING:
 def models(
     name: Annotated[
         str | None,
-        typer.Argument(
-            metavar="[NAME]",
-            help="A model with its parts, such as run_rest+wall.",
-            show_default=False,
-        ),
+        typer.Argument(metavar="[NAME]", help="A model with its parts, such as run_rest+wall."),
     ] = None,
     json: Json = False,
 ) -> None:

@@ -28,8 +28,7 @@ def study(ctx: typer.Context) -> None:
 @study_app.command(cls=HelpCommand)
 def new(
     path: Annotated[
-        Path | None,
-        typer.Argument(metavar="[FILE]", help="File to write (default: -, stdout)."),
+        Path | None, typer.Argument(metavar="[FILE]", help="File to write (default: -, stdout).")
     ] = None,
     full: Annotated[
         bool, typer.Option("--full", help="List every parameter with its unit and meaning.")

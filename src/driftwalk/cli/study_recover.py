@@ -7,11 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
-import typer
-
-from driftwalk.cli.inputs.assembly_source import RUN_HELP
 from driftwalk.cli.inputs.found_source import FoundSource, open_run
-from driftwalk.cli.options.cluster import ClusterAt, ClusterOptions, Workers
+from driftwalk.cli.options.flatten_options import with_options
 from driftwalk.cli.options.model import (
     KnownModel,
     KnownParameters,
@@ -20,7 +17,8 @@ from driftwalk.cli.options.model import (
     partly_known_model,
 )
 from driftwalk.cli.options.recording import RecordingOptions
-from driftwalk.cli.options.shared import Json, Overwrite, RunFolder, quantity_option
+from driftwalk.cli.options.run import RunOptions
+from driftwalk.cli.options.shared import BodyOfLike, Run, option, quantity_option
 from driftwalk.cli.options.study import StudyOptions, option_name, with_study_options
 from driftwalk.cli.terminal.answer import print_result
 from driftwalk.cli.terminal.output import print_note
@@ -53,52 +51,42 @@ NOISE: Final = "position_noise"
 Noise = Literal["estimated", "known"]
 
 
+# What --threads counts depends on the model here: it has a text of its own.
+@with_options(RunOptions, "out", "cluster", "cluster_options", "overwrite", "json")
 @with_study_options(
     RECOVER_KEYS,
     *("flow", "recordings", "duration", "precision", "seed"),
     *("tank_diameter", "position_noise", "step_interval", "bootstrap"),
 )
 def recover(
-    out: RunFolder,
     given: StudyOptions,
-    run: Annotated[
-        Path | None, typer.Argument(metavar="RUN", help=RUN_HELP, show_default=False)
-    ] = None,
+    run: Run = None,
     model: ModelName = None,
     parameters: ParameterValues = None,
     known: KnownParameters = None,
     like: Annotated[
         Path | None,
-        typer.Option(
-            "--like",
-            metavar="RECORDING",
+        option(
+            "--like RECORDING",
             help="Recording that gives start, time stamps, gaps and camera, with --model.",
-            show_default=False,
         ),
     ] = None,
-    body: Annotated[
-        str | None,
-        typer.Option("--body", metavar="NAME", help="Body of --like.", show_default=False),
-    ] = None,
+    body: BodyOfLike = None,
     sample_rate: Annotated[
         Any,
         quantity_option("--sample-rate", "Hz", "Samples per second, with --model (default: 10)."),
     ] = None,
     threads: Annotated[
         int | None,
-        typer.Option(
-            "--threads",
-            min=1,
-            metavar="N",
+        option(
+            "--threads N",
             help="Recordings to fit at the same time; threads of a calibration with --model "
             "(default: one per core).",
-            show_default=False,
+            min=1,
         ),
     ] = None,
-    cluster: ClusterAt = None,
-    cluster_options: ClusterOptions = None,
-    overwrite: Overwrite = False,
-    json: Json = False,
+    *,
+    options: RunOptions,
 ) -> None:
     """Simulate recordings of known truth, fit them, and report how well the fit recovers the truth.
 
@@ -109,9 +97,8 @@ def recover(
     state (--known). The directory holds the result, figures and manifest.json. If you stop the run,
     the same command continues it.
     """
-    from driftwalk.runs import RecoveryWork, run_work
+    from driftwalk.runs import RecoveryWork
 
-    workers = Workers(cluster, cluster_options)
     source = None if run is None else open_run(run, given, model)
     method: FitRecovery | ModelRecovery
     if model is not None or (source is not None and not source.is_block):
@@ -132,10 +119,8 @@ def recover(
             if value:
                 raise ConfigurationError(f"{name} belongs to a --model; the block has --study FILE")
         method, inputs = _of_block(given, source)
-    work = RecoveryWork(method, inputs, threads)
-    with workers.reported("recover") as told:
-        found = run_work(work, out, overwrite=overwrite, **told)
-    print_result(found, out, json=json)
+    found = options.run(RecoveryWork(method, inputs, threads), "recover")
+    print_result(found, options.out, json=options.json)
 
 
 def _of_model(

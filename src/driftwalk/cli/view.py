@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from driftwalk.cli.options.shared import option
 from driftwalk.cli.terminal.answer import print_warnings
 from driftwalk.cli.terminal.output import print_note
 from driftwalk.core.errors import InputError
@@ -19,19 +20,11 @@ if TYPE_CHECKING:
 Port = Annotated[int, typer.Option("--port", help="Port to serve on; 0 for a free port.")]
 Host = Annotated[
     str,
-    typer.Option(
-        "--host",
-        metavar="ADDRESS",
-        help="Address to serve on; other machines need the printed token.",
-    ),
+    option("--host ADDRESS", help="Address to serve on; other machines need the printed token."),
 ]
 Open = Annotated[
     bool | None,
-    typer.Option(
-        "--open/--no-open",
-        help="Open the browser (default: only on a terminal).",
-        show_default=False,
-    ),
+    typer.Option("--open/--no-open", help="Open the browser (default: only on a terminal)."),
 ]
 LAST_PORT = 65535
 

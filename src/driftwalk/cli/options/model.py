@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
 
-import typer
-
+from driftwalk.cli.options.shared import option
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.text.did_you_mean import did_you_mean
 
@@ -19,61 +18,49 @@ GIVE_VALUES: Final = "give the directory of a finished calibration"
 
 ModelName = Annotated[
     str | None,
-    typer.Option(
-        "--model",
-        metavar="MODEL",
+    option(
+        "--model MODEL",
         help="Motion model: a name of driftwalk models, mine.py:NAME, or command:PROGRAM. Default: "
         "the block in stirred water.",
-        show_default=False,
     ),
 ]
 ParameterChoices = Annotated[
     list[str] | None,
-    typer.Option(
-        "--parameter",
-        metavar="NAME=VALUE|LOW,HIGH",
+    option(
+        "--parameter NAME=VALUE|LOW,HIGH",
         help="Known value, or range of the search, of a parameter of --model; repeat for others.",
-        show_default=False,
     ),
 ]
 ComparedParameters = Annotated[
     list[str] | None,
-    typer.Option(
-        "--parameter",
-        metavar="NAME=VALUE|LOW,HIGH",
+    option(
+        "--parameter NAME=VALUE|LOW,HIGH",
         help="Known value, or range of the search, of a parameter of each of the --models that has "
         "it; repeat for others.",
-        show_default=False,
     ),
 ]
 
 ParameterValues = Annotated[
     list[str] | None,
-    typer.Option(
-        "--parameter",
-        metavar="NAME=VALUE",
+    option(
+        "--parameter NAME=VALUE",
         help="Value of a parameter of --model, in its SI unit; repeat for others.",
-        show_default=False,
     ),
 ]
 PlayedParameters = Annotated[
     list[str] | None,
-    typer.Option(
-        "--parameter",
-        metavar="NAME=VALUE|LOW,HIGH",
+    option(
+        "--parameter NAME=VALUE|LOW,HIGH",
         help="Value to begin with, or range of the slider, of a parameter of --model; repeat for "
         "others.",
-        show_default=False,
     ),
 ]
 KnownParameters = Annotated[
     list[str] | None,
-    typer.Option(
-        "--known",
-        metavar="NAME",
+    option(
+        "--known NAME",
         help="Parameter of --model, or position_noise, that the calibrations know; repeat for "
         "others.",
-        show_default=False,
     ),
 ]
 

@@ -6,20 +6,16 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Annotated, Any, Final, NamedTuple
 
-import typer
-
-from driftwalk.cli.options.shared import PANEL
+from driftwalk.cli.options.shared import PANEL, option
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.units import parse_quantity
 
 Vary = Annotated[
     list[str] | None,
-    typer.Option(
-        "--vary",
-        metavar="NAME=VALUES",
+    option(
+        "--vary NAME=VALUES",
         help="Values to compare: blocks=2,3,4 or drag-coefficient=0:1.5:0.05. Repeatable.",
-        rich_help_panel=PANEL,
-        show_default=False,
+        panel=PANEL,
     ),
 ]
 

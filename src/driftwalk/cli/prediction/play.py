@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from driftwalk.cli.inputs.assembly_source import RUN_HELP
 from driftwalk.cli.inputs.found_source import FoundSource, open_run
 from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.model import (
@@ -17,7 +16,7 @@ from driftwalk.cli.options.model import (
     PlayedParameters,
     playable_model,
 )
-from driftwalk.cli.options.shared import FlowFile
+from driftwalk.cli.options.shared import FlowFile, Run, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.answer import print_warnings
 from driftwalk.cli.terminal.output import print_note
@@ -38,32 +37,19 @@ BLOCKS = 4
 @with_study_options(ASSEMBLY_KEYS, "tank_diameter", "blocks", "seed", "flow_repeat")
 def play(
     given: StudyOptions,
-    run: Annotated[
-        Path | None, typer.Argument(metavar="RUN", help=RUN_HELP, show_default=False)
-    ] = None,
+    run: Run = None,
     flow: FlowFile = None,
     model: ModelName = None,
     parameters: PlayedParameters = None,
     recording: Annotated[
-        Path | None,
-        typer.Option(
-            "--recording",
-            metavar="FILE",
-            help="Recording to compare the steps with.",
-            show_default=False,
-        ),
+        Path | None, option("--recording FILE", help="Recording to compare the steps with.")
     ] = None,
-    body: Annotated[
-        str | None,
-        typer.Option("--body", help="Body of the recording.", show_default=False),
-    ] = None,
+    body: Annotated[str | None, typer.Option("--body", help="Body of the recording.")] = None,
     live: Annotated[
         int | None,
-        typer.Option(
-            "--live",
-            metavar="PORT",
+        option(
+            "--live PORT",
             help="Port that publishes the tank as a tracker's stream; 0 for a free port.",
-            show_default=False,
         ),
     ] = None,
     port: Port = 8765,

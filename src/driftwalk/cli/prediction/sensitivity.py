@@ -8,10 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
-import typer
 
 from driftwalk.cli.inputs.assembly_source import (
-    RUN_HELP,
     RUN_NAMES,
     Source,
     load_flow_for,
@@ -20,8 +18,8 @@ from driftwalk.cli.inputs.assembly_source import (
     source_from_run,
 )
 from driftwalk.cli.inputs.study_recording import opening_note
-from driftwalk.cli.options.cluster import ClusterAt, ClusterOptions, Workers
-from driftwalk.cli.options.shared import FlowFile, Json, Overwrite, RunFolder, Threads
+from driftwalk.cli.options.run import RunOptions, with_run_options
+from driftwalk.cli.options.shared import FlowFile, Run, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.options.vary import VARY_KEYS, Vary, vary_overrides
 from driftwalk.cli.terminal.answer import print_prediction
@@ -35,31 +33,19 @@ if TYPE_CHECKING:
     from driftwalk.schema.answers.parts import Answer
 
 
+@with_run_options
 @with_study_options(SENSITIVITY_KEYS, "runs", "realisations", *RUN_NAMES)
 def sensitivity(
-    out: RunFolder,
     given: StudyOptions,
-    run: Annotated[
-        Path | None,
-        typer.Argument(metavar="RUN", help=RUN_HELP, show_default=False),
-    ] = None,
+    run: Run = None,
     flow: FlowFile = None,
     vary: Vary = None,
     sobol: Annotated[
         int | None,
-        typer.Option(
-            "--sobol",
-            min=8,
-            metavar="N",
-            help="Base samples for Sobol' indices, a power of two.",
-            show_default=False,
-        ),
+        option("--sobol N", min=8, help="Base samples for Sobol' indices, a power of two."),
     ] = None,
-    threads: Threads = None,
-    cluster: ClusterAt = None,
-    cluster_options: ClusterOptions = None,
-    overwrite: Overwrite = False,
-    json: Json = False,
+    *,
+    options: RunOptions,
 ) -> None:
     """Measure how much self-assembly depends on the model.
 
@@ -68,7 +54,7 @@ def sensitivity(
     outcomes of a reference, which has the parameters of a RUN or of a study (--flow). If you stop
     the run, the same command continues it.
     """
-    from driftwalk.runs import SensitivityWork, run_work
+    from driftwalk.runs import SensitivityWork
 
     given = given.and_also(vary_overrides(vary or []), keys=VARY_KEYS)
     if run is None:
@@ -90,13 +76,12 @@ def sensitivity(
         flows={name: load_flow_for(path, source.study) for name, path in paths.items()},
         samples=sobol,
         inputs={**source.inputs, **{f"flow {name}": path for name, path in paths.items()}},
-        threads=threads,
+        threads=options.threads,
     )
     begun = opening_note(source.study, given, about="simulation", otherwise=str(run))
-    with Workers(cluster, cluster_options).reported("sensitivity") as told:
-        result = run_work(work, out, overwrite=overwrite, begun=begun, **told)
+    result = options.run(work, "sensitivity", begun=begun)
     warnings = [*source.warnings, *_warnings(source, result)]
-    print_prediction(sensitivity_of(result), out, run, warnings, json=json)
+    print_prediction(sensitivity_of(result), options.out, run, warnings, json=options.json)
 
 
 def sensitivity_of(result: SensitivityResult) -> Answer:

@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
-import typer
 
-from driftwalk.cli.inputs.assembly_source import RUN_HELP, load_flow_for
+from driftwalk.cli.inputs.assembly_source import load_flow_for
 from driftwalk.cli.inputs.found_source import FoundSource, open_run
 from driftwalk.cli.inputs.study_recording import opening_note
 from driftwalk.cli.options.model import (
@@ -18,7 +17,7 @@ from driftwalk.cli.options.model import (
     known_model,
 )
 from driftwalk.cli.options.recording import RecordingOptions
-from driftwalk.cli.options.shared import Json, Replace, flow_of_run
+from driftwalk.cli.options.shared import BodyOfLike, Json, Replace, Run, flow_of_run, option
 from driftwalk.cli.options.study import StudyOptions, option_name, with_study_options
 from driftwalk.cli.terminal.answer import print_report_next, print_warnings
 from driftwalk.cli.terminal.output import print_json, print_next, print_note, require_place
@@ -47,43 +46,33 @@ OF_THE_BLOCK: Final = (
     *("position_noise", "orientation_noise", "replicates", "seed", "flow_repeat", "flow_start"),
 )
 def simulate(
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.nc", help="File to write.")],
+    out: Annotated[Path, option("--out", "-o FILE.nc", help="File to write.")],
     given: StudyOptions,
-    run: Annotated[
-        Path | None, typer.Argument(metavar="RUN", help=RUN_HELP, show_default=False)
-    ] = None,
+    run: Run = None,
     flow: Annotated[
         Path | None,
-        typer.Option(
-            "--flow",
-            metavar="FILE",
+        option(
+            "--flow FILE",
             help="Flow field: NetCDF, or CSV with x, y, u, v; or the run directory that holds it. "
             "For the block, and for a --model that uses it.",
             callback=flow_of_run,
-            show_default=False,
         ),
     ] = None,
     model: ModelName = None,
     parameters: ParameterValues = None,
     like: Annotated[
         Path | None,
-        typer.Option(
-            "--like",
-            metavar="RECORDING",
+        option(
+            "--like RECORDING",
             help="Recording that gives start, time stamps and gaps (driftwalk's "
             "NetCDF or plain CSV).",
-            show_default=False,
         ),
     ] = None,
-    body: Annotated[
-        str | None,
-        typer.Option("--body", metavar="NAME", help="Body of --like.", show_default=False),
-    ] = None,
+    body: BodyOfLike = None,
     backend: Annotated[
         str,
-        typer.Option(
-            "--backend",
-            metavar="cpu|reference",
+        option(
+            "--backend cpu|reference",
             help="Backend: cpu for single, reference for double precision.",
         ),
     ] = "cpu",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 import typer
 
 from driftwalk.cli.main import paragraphs
-from driftwalk.cli.options.shared import Json, Replace, quantity_option
+from driftwalk.cli.options.shared import Json, Replace, option, quantity_option
 from driftwalk.cli.terminal.help import HelpCommand, HelpGroup
 from driftwalk.cli.terminal.output import print_json, print_next, print_note, print_table
 from driftwalk.core.errors import FormatError, InputError
@@ -30,12 +30,9 @@ def calibrate(
             help="Images of the board; in the first, the board lies at the height of the markers.",
         ),
     ],
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.toml", help="File to write.")],
+    out: Annotated[Path, option("--out", "-o FILE.toml", help="File to write.")],
     squares: Annotated[
-        str,
-        typer.Option(
-            "--squares", metavar="COLUMNSxROWS", help="Squares of the board, such as 9x7."
-        ),
+        str, option("--squares COLUMNSxROWS", help="Squares of the board, such as 9x7.")
     ],
     square: Annotated[float, quantity_option("--square", "m", "Side of a square.")],
     board: Annotated[
@@ -45,7 +42,7 @@ def calibrate(
         float | None, quantity_option("--tag", "m", "Side of a ChArUco board's tags.")
     ] = None,
     dictionary: Annotated[
-        str, typer.Option("--dictionary", metavar="DICT", help="Dictionary of these tags.")
+        str, option("--dictionary DICT", help="Dictionary of these tags.")
     ] = "DICT_4X4_50",
     no_lens: Annotated[
         bool,

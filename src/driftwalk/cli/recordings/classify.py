@@ -9,7 +9,7 @@ import typer
 
 from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import Json, Replace, quantity_option
+from driftwalk.cli.options.shared import Json, Replace, option, quantity_option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import (
     print_json,
@@ -80,12 +80,7 @@ def classify(
         float | None,
         _tolerance("--hold", "s", "Time for which an unseen block keeps its joins (default: 1s)."),
     ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out", "-o", metavar="FILE.nc", help="File for the result.", show_default=False
-        ),
-    ] = None,
+    out: Annotated[Path | None, option("--out", "-o FILE.nc", help="File for the result.")] = None,
     overwrite: Replace = False,
     json: Json = False,
 ) -> None:

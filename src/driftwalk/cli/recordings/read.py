@@ -6,10 +6,8 @@ import json as json_module
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import Json, Replace
+from driftwalk.cli.options.shared import Json, Replace, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_json, print_next, print_note, sibling
 from driftwalk.core.study_keys import STUDY_KEYS
@@ -19,10 +17,7 @@ from driftwalk.core.study_keys import STUDY_KEYS
 @with_study_options(STUDY_KEYS, "side", "mass", "depth", file="none")
 def read(
     recording: RecordingFile,
-    out: Annotated[
-        Path,
-        typer.Option("--out", "-o", metavar="FILE", help="File to write; ends in .nc or .csv."),
-    ],
+    out: Annotated[Path, option("--out", "-o FILE", help="File to write; ends in .nc or .csv.")],
     how: RecordingOptions,
     given: StudyOptions,
     overwrite: Replace = False,

@@ -5,10 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
 from driftwalk.cli.options.flatten_options import with_options
-from driftwalk.cli.options.shared import Json, Replace
+from driftwalk.cli.options.shared import Json, Replace, option
 from driftwalk.cli.options.tracking import TrackingOptions
 from driftwalk.cli.terminal.output import print_json, print_next, print_note, print_table, sibling
 from driftwalk.core.errors import InputError
@@ -21,23 +19,15 @@ def track(
     options: TrackingOptions,
     out: Annotated[
         Path | None,
-        typer.Option(
-            "--out",
-            "-o",
-            metavar="FILE.nc",
-            help="Recording to write; needed without --explain.",
-            show_default=False,
-        ),
+        option("--out", "-o FILE.nc", help="Recording to write; needed without --explain."),
     ] = None,
     explain: Annotated[
         int | None,
-        typer.Option(
-            "--explain",
-            metavar="FRAME",
-            min=0,
+        option(
+            "--explain FRAME",
             help="Write a PNG of this frame that shows each candidate and why it was "
             "rejected, then exit.",
-            show_default=False,
+            min=0,
         ),
     ] = None,
     overwrite: Replace = False,

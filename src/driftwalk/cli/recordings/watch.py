@@ -6,10 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from driftwalk.cli.options.flatten_options import with_options
-from driftwalk.cli.options.shared import Replace
+from driftwalk.cli.options.shared import Replace, option
 from driftwalk.cli.options.tracking import TrackingOptions
 from driftwalk.cli.terminal.output import print_note, printable
 from driftwalk.core.errors import InputError
@@ -28,10 +26,7 @@ _MOST_CLASSES = 6
 def watch(
     options: TrackingOptions,
     out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out", "-o", metavar="FILE.nc", help="Recording to write as well.", show_default=False
-        ),
+        Path | None, option("--out", "-o FILE.nc", help="Recording to write as well.")
     ] = None,
     overwrite: Replace = False,
 ) -> None:
