@@ -6,13 +6,13 @@ from typing import Annotated
 
 import typer
 
-from driftwalk.cli.inputs.study_recording import opening_note, read_with_flow
+from driftwalk.cli.inputs.recordings import opening_note, read_with_flow
 from driftwalk.cli.options.model import ModelName, ParameterChoices, chosen_model
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.run import RunOptions, with_run_options
 from driftwalk.cli.options.shared import FlowFile
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal.answer import print_result
+from driftwalk.cli.terminal.output import print_result
 from driftwalk.core.study_keys import CALIBRATION_KEYS
 
 

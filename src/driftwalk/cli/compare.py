@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from driftwalk.cli.inputs.motion import load_motion
+from driftwalk.cli.inputs.recordings import load_motion
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import Json, Replace, option
 from driftwalk.cli.options.study import study_option

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Any
 
-from driftwalk.cli.inputs.study_recording import opening_note, read_with_flow
+from driftwalk.cli.inputs.recordings import opening_note, read_with_flow
 from driftwalk.cli.options.model import ComparedParameters, parameter_choices
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.run import RunOptions, with_run_options
 from driftwalk.cli.options.shared import FlowFile, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal.answer import print_result
-from driftwalk.cli.terminal.output import printable
+from driftwalk.cli.terminal.output import print_result, printable
 from driftwalk.cli.terminal.progress import ProgressReporter
 from driftwalk.core.study_keys import CALIBRATION_KEYS
 

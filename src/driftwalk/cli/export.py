@@ -9,9 +9,8 @@ from typing import Annotated
 import typer
 
 from driftwalk.cli.options.shared import Json, option
-from driftwalk.cli.terminal.answer import print_row
 from driftwalk.cli.terminal.argument_names import to_options
-from driftwalk.cli.terminal.output import print_json, print_note
+from driftwalk.cli.terminal.output import print_json, print_note, print_row
 from driftwalk.cli.terminal.progress import ProgressReporter
 from driftwalk.core.errors import InputError
 from driftwalk.export import TARGETS, Source, Verification, export_run, target_named

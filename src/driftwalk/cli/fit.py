@@ -7,13 +7,12 @@ from typing import Annotated, Any
 
 import typer
 
-from driftwalk.cli.inputs.study_recording import opening_note, read_for_run
+from driftwalk.cli.inputs.recordings import opening_note, read_for_run
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import Json, Overwrite, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal.answer import print_parts, print_places, print_result
 from driftwalk.cli.terminal.argument_names import to_options
-from driftwalk.cli.terminal.output import print_note
+from driftwalk.cli.terminal.output import print_note, print_parts, print_places, print_result
 from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.study_keys import FIT_KEYS
 

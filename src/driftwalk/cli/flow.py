@@ -12,9 +12,14 @@ from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import FlowVariables, FrameInterval, Json, Replace, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal.answer import print_warnings
 from driftwalk.cli.terminal.argument_names import to_options
-from driftwalk.cli.terminal.output import print_json, print_next, print_note, sibling
+from driftwalk.cli.terminal.output import (
+    print_json,
+    print_next,
+    print_note,
+    print_warnings,
+    sibling,
+)
 from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import FLOW_KEYS
 

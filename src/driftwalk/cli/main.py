@@ -42,18 +42,14 @@ COMMANDS: Final[dict[str, Command]] = {
     "fit": Command(_FIT, "Fit flow, drag, force and noise by likelihood.", "fit", "fit"),
     "calibrate": Command(_FIT, "Fit any motion model by simulation.", "calibrate", "calibrate"),
     "flow": Command(_FIT, "Extract the flow field alone.", "flow", "flow"),
-    "simulate": Command(
-        _PREDICT, "Simulate the motion of one body.", "prediction.simulate", "simulate"
-    ),
+    "simulate": Command(_PREDICT, "Simulate the motion of one body.", "simulate", "simulate"),
     "assemble": Command(
-        _PREDICT, "Simulate the self-assembly of many blocks.", "prediction.assemble", "assemble"
+        _PREDICT, "Simulate the self-assembly of many blocks.", "assemble", "assemble"
     ),
     "sensitivity": Command(
-        _PREDICT, "Vary the model and see what assembles.", "prediction.sensitivity", "sensitivity"
+        _PREDICT, "Vary the model and see what assembles.", "sensitivity", "sensitivity"
     ),
-    "play": Command(
-        _PREDICT, "Change parameters while a simulation runs.", "prediction.play", "play"
-    ),
+    "play": Command(_PREDICT, "Change parameters while a simulation runs.", "play", "play"),
     "compare": Command(_COMPARE, "Measure the distance between two motions.", "compare", "compare"),
     "compare-models": Command(
         _COMPARE, "Rank motion models on a recording.", "compare_models", "compare_models"
@@ -63,9 +59,9 @@ COMMANDS: Final[dict[str, Command]] = {
         _COMPARE, "Count what the blocks assembled into.", "recordings.classify", "classify"
     ),
     "view": Command(_SHARE, "Explore a run in the browser.", "view", "view"),
-    "report": Command(_SHARE, "Write a run as one HTML file.", "sharing.report", "report"),
+    "report": Command(_SHARE, "Write a run as one HTML file.", "report", "report"),
     "export": Command(_SHARE, "Write a run for another program.", "export", "export"),
-    "cite": Command(_SHARE, "Print what to cite for a run.", "sharing.cite", "cite"),
+    "cite": Command(_SHARE, "Print what to cite for a run.", "cite", "cite"),
     "study": Command(_SET_UP, "Write study files and plan experiments.", "study", "study_app"),
     "camera": Command(_SET_UP, "Calibrate the camera.", "recordings.camera", "camera_app"),
     "markers": Command(_SET_UP, "Describe the markers.", "recordings.markers", "markers_app"),

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from driftwalk.cli.options.shared import option
-from driftwalk.cli.terminal.answer import print_warnings
-from driftwalk.cli.terminal.output import print_note
+from driftwalk.cli.terminal.output import print_note, print_warnings
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:

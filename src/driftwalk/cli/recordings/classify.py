@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from driftwalk.cli.inputs.other_files import explained
+from driftwalk.cli.inputs.recordings import open_kind
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import Json, Replace, option, quantity_option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
@@ -22,8 +23,6 @@ from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.files.run_layout import MANIFEST_FILE
 from driftwalk.core.study_keys import STUDY_KEYS
 from driftwalk.schema.shapes import short_class
-from driftwalk.schema.stores.contents import check_contents
-from driftwalk.schema.stores.netcdf import kind_of_file, open_netcdf
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -159,7 +158,7 @@ def _load(path: Path, how: RecordingOptions, given: StudyOptions) -> tuple[xr.Da
     from driftwalk.conditions import load_with_study
     from driftwalk.model import Block
 
-    simulated = _simulated_path(path)
+    simulated = open_kind(path, "assembly_path")
     if simulated is not None:
         chosen = int(simulated["run"][0]) if how.replicate is None else how.replicate
         return path_recording(simulated, run=chosen), float(simulated.attrs["block_side_m"]), False
@@ -175,16 +174,6 @@ def _load(path: Path, how: RecordingOptions, given: StudyOptions) -> tuple[xr.Da
     resolved = given.study()
     with explained():
         return load_with_study(path, resolved, how.arguments()), resolved.block.side_m, False
-
-
-def _simulated_path(path: Path) -> xr.Dataset | None:
-    """Return the dataset of a file that `driftwalk assemble` wrote; None for a recording."""
-    if path.suffix != ".nc" or not path.is_file():
-        return None
-    # Whatever else it is, the loaders say what is wrong with it.
-    return (
-        check_contents(open_netcdf(path), path) if kind_of_file(path) == "assembly_path" else None
-    )
 
 
 def _name(names: list[str], index: int) -> str:

@@ -91,7 +91,7 @@ def info(
     centres, speed, and the tracking noise estimated from the recording itself. For a finished run,
     prints its answer; `driftwalk report` shows the outcomes of self-assembly.
     """
-    from driftwalk.cli.terminal.answer import print_run
+    from driftwalk.cli.terminal.output import print_run
     from driftwalk.core.files.run_layout import state_of
 
     if recording.is_dir() and state_of(recording) != "new":
@@ -99,7 +99,7 @@ def info(
         print_run(recording, json=json)
         return
     from driftwalk.cli.inputs.flow_file import describe_field, read_flow_file
-    from driftwalk.cli.inputs.study_recording import words_to_fit
+    from driftwalk.cli.inputs.recordings import words_to_fit
     from driftwalk.record import describe
 
     field = read_flow_file(

@@ -30,7 +30,7 @@ def read(
     them. If the name ends in .csv, the file is a plain table with the columns t_s, x_m, y_m,
     theta_rad and body, without tank and block.
     """
-    from driftwalk.cli.inputs.study_recording import words_to_fit
+    from driftwalk.cli.inputs.recordings import words_to_fit
     from driftwalk.conditions import block_attributes
     from driftwalk.record import save_trajectory
 

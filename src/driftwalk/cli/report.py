@@ -9,11 +9,10 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from driftwalk.cli.inputs.motion import load_simulation
+from driftwalk.cli.inputs.recordings import load_simulation
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import Replace, option
-from driftwalk.cli.terminal.answer import print_warnings
-from driftwalk.cli.terminal.output import print_note, require_place
+from driftwalk.cli.terminal.output import print_note, print_warnings, require_place
 
 
 @with_recording_options

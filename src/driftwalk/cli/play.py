@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from driftwalk.cli.inputs.found_source import FoundSource, open_run
+from driftwalk.cli.inputs.model_source import FoundSource, open_run
 from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.model import (
     KnownModel,
@@ -18,8 +18,7 @@ from driftwalk.cli.options.model import (
 )
 from driftwalk.cli.options.shared import FlowFile, Run, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal.answer import print_warnings
-from driftwalk.cli.terminal.output import print_note
+from driftwalk.cli.terminal.output import print_note, print_warnings
 from driftwalk.cli.view import Host, Open, Port, show
 from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import ASSEMBLY_KEYS

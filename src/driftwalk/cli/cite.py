@@ -9,8 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from driftwalk.cli.options.shared import Json
-from driftwalk.cli.terminal.answer import print_warnings
-from driftwalk.cli.terminal.output import print_json, printable
+from driftwalk.cli.terminal.output import print_json, print_warnings, printable
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.run_layout import MANIFEST_FILE, faults_of, state_of
 from driftwalk.core.provenance import read_manifest, refuse_other_version

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
 
-from driftwalk.cli.inputs.assembly_source import load_flow_for
-from driftwalk.cli.inputs.found_source import FoundSource, open_run
-from driftwalk.cli.inputs.study_recording import opening_note
+from driftwalk.cli.inputs.model_source import FoundSource, load_flow_for, open_run
+from driftwalk.cli.inputs.recordings import opening_note
 from driftwalk.cli.options.model import (
     KnownModel,
     ModelName,
@@ -19,8 +18,14 @@ from driftwalk.cli.options.model import (
 from driftwalk.cli.options.recording import RecordingOptions
 from driftwalk.cli.options.shared import BodyOfLike, Json, Replace, Run, flow_of_run, option
 from driftwalk.cli.options.study import StudyOptions, option_name, with_study_options
-from driftwalk.cli.terminal.answer import print_report_next, print_warnings
-from driftwalk.cli.terminal.output import print_json, print_next, print_note, require_place
+from driftwalk.cli.terminal.output import (
+    print_json,
+    print_next,
+    print_note,
+    print_report_next,
+    print_warnings,
+    require_place,
+)
 from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import STUDY_KEYS
 from driftwalk.core.text.json_text import parse_json

@@ -1,16 +1,19 @@
-"""The recordings of a run: read as the study file says, with the options of the command over it."""
+"""Recordings and motions that a command names, read as the study file and the options say."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from driftwalk.cli.inputs.assembly_source import load_flow_for
+from driftwalk.cli.inputs.model_source import load_flow_for
 from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.recording import RecordingOptions
 from driftwalk.cli.options.study import TANK, StudyOptions, option_name
 from driftwalk.cli.terminal.output import print_note
+from driftwalk.core.errors import InputError
+from driftwalk.core.files.file_names import text_of_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -214,3 +217,68 @@ def opening_note(
             print_note(f"warning: {warning}")
 
     return say
+
+
+def load_motion(path: Path, how: RecordingOptions) -> xr.Dataset:
+    """Load a `trajectory` from a recording, or from a file that `driftwalk simulate` wrote.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    how : RecordingOptions
+        How to read a recording, and which replicate of a simulation; a simulation says all else of
+        itself.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read, has no such replicate, or the body never moves.
+    """
+    from driftwalk.conditions import require_motion
+
+    simulated = load_simulation(path, replicate=how.replicate or 0)
+    if simulated is not None:
+        return simulated
+    # The replicate is that of the other motion.
+    recording = replace(how, replicate=None).load(path)
+    require_motion(recording, body=how.body, where=path)
+    return recording
+
+
+def load_simulation(path: Path, *, replicate: int = 0) -> xr.Dataset | None:
+    """Load a `trajectory` from a file that `driftwalk simulate` wrote; None of any other file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    replicate : int
+        Which replicate, counted from 0.
+
+    Raises
+    ------
+    InputError
+        When it has no such replicate.
+    """
+    simulation = open_kind(path, "simulation")
+    if simulation is None:
+        return None
+    count = simulation.sizes["replicate"]
+    if not 0 <= replicate < count:
+        raise InputError(
+            f"{path}: no replicate {replicate}; it has {count}, counted from 0 (--replicate)"
+        )
+    chosen = simulation[["x", "y", "theta"]].isel(replicate=replicate, drop=True)
+    return chosen.assign_attrs(kind="trajectory", source=text_of_name(path.name), simulated="yes")
+
+
+def open_kind(path: Path, kind: str) -> xr.Dataset | None:
+    """Return the dataset of this kind that a file of driftwalk holds, None of any other file."""
+    from driftwalk.schema.stores.contents import check_contents
+    from driftwalk.schema.stores.netcdf import kind_of_file, open_netcdf
+
+    # Damaged, or no NetCDF: the loaders of recordings say what is wrong.
+    if not path.is_file() or kind_of_file(path) != kind:
+        return None
+    return check_contents(open_netcdf(path), path)

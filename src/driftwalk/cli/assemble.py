@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-from driftwalk.cli.inputs.assembly_source import (
+from driftwalk.cli.inputs.model_source import (
     RUN_NAMES,
     refuse_found,
     source_from_flow,
     source_from_run,
 )
-from driftwalk.cli.inputs.study_recording import opening_note
+from driftwalk.cli.inputs.recordings import opening_note
 from driftwalk.cli.options.run import RunOptions, with_run_options
 from driftwalk.cli.options.shared import FlowFile, Run, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal.answer import print_prediction
+from driftwalk.cli.terminal.output import print_prediction
 from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import ASSEMBLY_KEYS
 from driftwalk.schema.kinds.flow_series import flow_series_words
