@@ -17,8 +17,8 @@ from driftwalk.cli.options.study import study_option
 from driftwalk.cli.terminal.output import (
     print_json,
     print_next,
-    print_note,
     print_table,
+    print_warnings,
     require_place,
     save_dataset,
 )
@@ -111,8 +111,7 @@ def compare(
         print_json({"a": a, "b": b, **summary})
         return
     _print(summary)
-    for warning in summary["warnings"]:
-        print_note(f"warning: {warning}")
+    print_warnings(summary["warnings"])
     print_next("report", b, "-o", "report.html")
 
 

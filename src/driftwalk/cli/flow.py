@@ -12,7 +12,6 @@ from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import FlowVariables, FrameInterval, Json, Replace, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import (
     print_json,
     print_next,
@@ -116,7 +115,7 @@ def flow(
         print_next("simulate", "--flow", out, "-o", "motion.nc")
         return
     warning = unstated_warning(study_for([trajectory], resolved), about="block")
-    print_warnings([] if warning is None else [warning])
+    print_warnings([warning])
     run = sibling(out.with_suffix(""), "run")
     words = [*how.words(), *given.words("side", "mass", "depth")]
     print_next("calibrate", recording, *words, "--flow", out, "-o", run)
@@ -186,8 +185,7 @@ def _report_file(field: xr.Dataset, out: Path, *, json: bool) -> None:
     if json:
         print_json({"out": out, **facts})
         return
-    for warning in facts["warnings"]:
-        print_note(f"warning: {to_options(warning)}")
+    print_warnings(facts["warnings"])
     print_note(
         f"wrote {out}: {facts['columns']} x {facts['rows']} nodes from a file, "
         f"{100 * facts['measured_share']:.0f} % of them measured, the rest filled or outside"

@@ -125,8 +125,7 @@ def _of_model(
         field = found.flow_for(known.model, chosen, flow)
     elif flow is not None or known.model.needs_flow:
         field = _flow(flow, chosen, bundled=False)
-    for warning in known.warnings:
-        print_note(f"warning: {warning}")
+    print_warnings(known.warnings)
     return ModelPlaySource(
         known.model,
         known.values,

@@ -175,8 +175,7 @@ def _say_what(
     otherwise = "recording" if source is None else str(source.folder)
     opening_note(study, given, about=about, otherwise=otherwise)()
     warning = unstated_warning(study, about=about)
-    if warning is not None:
-        print_note(f"warning: {warning}")
+    print_warnings([warning])
 
 
 def _of_model(
@@ -202,8 +201,7 @@ def _of_model(
         known.model, known.values, chosen, flow=field, like=recording, body=body
     )
     _say_what(chosen, given, source, about="tank")
-    for warning in known.warnings:
-        print_note(f"warning: {warning}")
+    print_warnings(known.warnings)
     return result
 
 

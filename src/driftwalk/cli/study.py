@@ -29,6 +29,7 @@ from driftwalk.cli.terminal.output import (
     print_next,
     print_note,
     print_result,
+    print_warnings,
     require_place,
 )
 from driftwalk.core.errors import ConfigurationError
@@ -169,8 +170,7 @@ def recover(
         chosen = partly_known_model(model, parameters, run, of_model)
         noise: Noise = "known" if NOISE in (known or ()) else "estimated"
         method, inputs = _of_model(chosen, given, source, sample_rate, like, body, noise)
-        for warning in chosen.warnings:
-            print_note(f"warning: {warning}")
+        print_warnings(chosen.warnings)
     else:
         _refuse(given, OF_A_MODEL, "belongs to a --model; for the block it stands in --study FILE")
         beside = {

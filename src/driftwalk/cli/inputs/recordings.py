@@ -11,7 +11,7 @@ from driftwalk.cli.inputs.model_source import load_flow_for
 from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.recording import RecordingOptions
 from driftwalk.cli.options.study import TANK, StudyOptions, option_name
-from driftwalk.cli.terminal.output import print_note
+from driftwalk.cli.terminal.output import print_note, print_warnings
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.file_names import text_of_name
 
@@ -213,8 +213,7 @@ def opening_note(
 
     def say() -> None:
         print_note(line)
-        for warning in warnings:
-            print_note(f"warning: {warning}")
+        print_warnings(warnings)
 
     return say
 

@@ -17,6 +17,7 @@ from driftwalk.cli.terminal.output import (
     print_next,
     print_note,
     print_table,
+    print_warnings,
     save_dataset,
 )
 from driftwalk.core.errors import ConfigurationError, InputError
@@ -117,8 +118,7 @@ def classify(
         print_json({"poses": poses, **summary})
         return
     _print(summary)
-    for warning in summary["warnings"]:
-        print_note(f"warning: {warning}")
+    print_warnings(summary["warnings"])
     if is_default:
         print_note(f"the side of the blocks is the default, {100 * block_side:g} cm (--side)")
     # A file of a run is shown with its run.

@@ -9,7 +9,13 @@ from typing import Annotated
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import Json, Replace, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal.output import print_json, print_next, print_note, sibling
+from driftwalk.cli.terminal.output import (
+    print_json,
+    print_next,
+    print_note,
+    print_warnings,
+    sibling,
+)
 from driftwalk.core.study_keys import STUDY_KEYS
 
 
@@ -57,8 +63,7 @@ def read(
             }
         )
         return
-    for warning in warnings:
-        print_note(f"warning: {warning}")
+    print_warnings(warnings)
     bodies = trajectory.sizes["body"]
     print_note(
         f"wrote {out}: {counts['samples']} samples of {bodies} bod{'y' if bodies == 1 else 'ies'}; "

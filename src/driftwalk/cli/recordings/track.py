@@ -8,7 +8,14 @@ from typing import Annotated, Any
 from driftwalk.cli.options.flatten_options import with_options
 from driftwalk.cli.options.shared import Json, Replace, option
 from driftwalk.cli.options.tracking import TrackingOptions
-from driftwalk.cli.terminal.output import print_json, print_next, print_note, print_table, sibling
+from driftwalk.cli.terminal.output import (
+    print_json,
+    print_next,
+    print_note,
+    print_table,
+    print_warnings,
+    sibling,
+)
 from driftwalk.core.errors import InputError
 
 _SHOWN = {"duplicates": "doubled"}
@@ -78,8 +85,7 @@ def _print(found: dict[str, Any]) -> None:
     if found["frames_per_s"] is not None:
         print()
         print_table([["frames tracked per second", found["frames_per_s"]]])
-    if found["interrupted"] is not None:
-        print_note(f"warning: {found['interrupted']}")
+    print_warnings([found["interrupted"]])
 
 
 def _explain(options: TrackingOptions, number: int, out: Path | None, existing: str) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from driftwalk.cli.options.flatten_options import with_options
 from driftwalk.cli.options.shared import Replace, option
 from driftwalk.cli.options.tracking import TrackingOptions
-from driftwalk.cli.terminal.output import print_note, printable
+from driftwalk.cli.terminal.output import print_note, print_warnings, printable
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -57,8 +57,7 @@ def watch(
         run.recording()  # Says that nothing was tracked, and what was there instead.
     if run.saved:
         print_note(f"wrote {out}")
-    if run.interrupted is not None:
-        print_note(f"warning: {run.interrupted}")
+    print_warnings([run.interrupted])
 
 
 class _Printer:

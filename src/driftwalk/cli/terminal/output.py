@@ -293,9 +293,9 @@ def _following(found: xr.Dataset, kind: str) -> list[str]:
     return ["simulate", *named, "motion.nc"]
 
 
-def print_warnings(texts: Iterable[str]) -> None:
-    """Print warnings on stderr."""
-    for text in texts:
+def print_warnings(texts: Iterable[str | None]) -> None:
+    """Print warnings on stderr; None stands for no warning."""
+    for text in filter(None, texts):
         print_note(f"warning: {text}")
 
 
