@@ -32,7 +32,7 @@ def teach(
 
     A picture with the same name and the suffix .png shows the detections: look at it.
     """
-    from driftwalk.cli.tracking.parts import find_camera
+    from driftwalk.cli.recordings.tracking_parts import find_camera
     from driftwalk.core.files.atomic import require_free, require_target
     from driftwalk.track import propose_markers, sample_images, save_markers, save_picture
 

@@ -35,8 +35,8 @@ def watch(
     Prints a line for each join, parting or change of the class, and one line per second with the
     poses. While a block is hidden, lists the classes that are still possible.
     """
-    from driftwalk.cli.tracking.parts import build_parts
-    from driftwalk.cli.tracking.run import TrackingRun
+    from driftwalk.cli.recordings.track import TrackingRun
+    from driftwalk.cli.recordings.tracking_parts import build_parts
     from driftwalk.core.files.atomic import require_free, require_target
 
     existing = "replace" if overwrite else "error"
