@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
 from driftwalk.cli.inputs.recordings import opening_note, read_with_flow
 from driftwalk.cli.options.model import ModelName, ParameterChoices, chosen_model
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.run import RunOptions, with_run_options
-from driftwalk.cli.options.shared import FlowFile
+from driftwalk.cli.options.shared import FlowFile, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_result
 from driftwalk.core.study_keys import CALIBRATION_KEYS
@@ -34,7 +32,7 @@ def calibrate(
     flow: FlowFile = None,
     posterior: Annotated[
         bool,
-        typer.Option(
+        option(
             "--posterior",
             help="Also write posterior.csv: draws from the approximate posterior of a --model with "
             "more than two parameters.",

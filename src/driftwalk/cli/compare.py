@@ -8,11 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import typer
-
 from driftwalk.cli.inputs.recordings import load_motion
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import Json, Replace, option
+from driftwalk.cli.options.shared import Json, Replace, argument, option
 from driftwalk.cli.options.study import study_option
 from driftwalk.cli.terminal.output import (
     print_json,
@@ -52,20 +50,16 @@ _BY_MOTION = {
 
 @with_recording_options
 def compare(
-    a: Annotated[
-        Path, typer.Argument(metavar="A", help="Recording, or output of driftwalk simulate.")
-    ],
-    b: Annotated[
-        Path, typer.Argument(metavar="B", help="Recording, or output of driftwalk simulate.")
-    ],
+    a: Annotated[Path, argument("A", "Recording, or output of driftwalk simulate.")],
+    b: Annotated[Path, argument("B", "Recording, or output of driftwalk simulate.")],
     how: RecordingOptions,
     body_b: Annotated[
-        str | None, typer.Option("--body-b", help="Body in B (default: same as A).")
+        str | None, option("--body-b", help="Body in B (default: same as A).")
     ] = None,
     step_interval: Annotated[Any, study_option("step_interval")] = None,
     ties: Annotated[
         Literal["strict", "limits"],
-        typer.Option(
+        option(
             "--ties",
             help="Treatment of points that tie with an origin: in no quadrant, or in each.",
         ),

@@ -8,8 +8,6 @@ from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
-import typer
-
 from driftwalk.cli.options.shared import Json, Overwrite, Threads, option
 from driftwalk.cli.terminal.output import print_json, print_note
 from driftwalk.cli.terminal.progress import reported
@@ -46,7 +44,7 @@ PAGE = "report.html"
 def demo(
     out: Annotated[Path, option("--out", "-o DIR", help="Directory of both runs.")] = Path("demo"),
     quick: Annotated[
-        bool, typer.Option("--quick", help="Search only a small part; takes seconds, not minutes.")
+        bool, option("--quick", help="Search only a small part; takes seconds, not minutes.")
     ] = False,
     threads: Threads = None,
     overwrite: Overwrite = False,

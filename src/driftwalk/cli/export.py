@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from driftwalk.cli.options.shared import Json, option
+from driftwalk.cli.options.shared import Json, argument, option
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import print_json, print_note, print_row
 from driftwalk.cli.terminal.progress import ProgressReporter
@@ -19,9 +19,9 @@ from driftwalk.export import TARGETS, Source, Verification, export_run, target_n
 def export(
     run: Annotated[
         Path,
-        typer.Argument(
-            metavar="RUN",
-            help="Run directory, or a study file with --flow; for tables, bags and films also a "
+        argument(
+            "RUN",
+            "Run directory, or a study file with --flow; for tables, bags and films also a "
             "recording or a simulation.",
         ),
     ],
@@ -53,10 +53,10 @@ def export(
     ] = None,
     speed: Annotated[
         float | None,
-        typer.Option("--speed", help="How much faster than real time a film is (default: 1)."),
+        option("--speed", help="How much faster than real time a film is (default: 1)."),
     ] = None,
     verify: Annotated[
-        bool, typer.Option("--verify", help="Run what was written, and compare it with driftwalk.")
+        bool, option("--verify", help="Run what was written, and compare it with driftwalk.")
     ] = False,
     json: Json = False,
 ) -> int:

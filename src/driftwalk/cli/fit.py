@@ -5,11 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
 from driftwalk.cli.inputs.recordings import opening_note, read_for_run
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import Json, Overwrite, option
+from driftwalk.cli.options.shared import Json, Overwrite, argument, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import print_note, print_parts, print_places, print_result
@@ -18,10 +16,7 @@ from driftwalk.core.study_keys import FIT_KEYS
 
 RecordingFiles = Annotated[
     list[Path],
-    typer.Argument(
-        metavar="RECORDING...",
-        help="Recordings of one block in one tank, read with the same options.",
-    ),
+    argument("RECORDING...", "Recordings of one block in one tank, read with the same options."),
 ]
 
 
@@ -39,21 +34,18 @@ def fit(
     given: StudyOptions,
     how: RecordingOptions,
     no_check: Annotated[
-        bool,
-        typer.Option("--no-check", help="Skip the check whether the model explains the recording."),
+        bool, option("--no-check", help="Skip the check whether the model explains the recording.")
     ] = False,
     compare_laws: Annotated[
         bool,
-        typer.Option(
+        option(
             "--compare-laws",
             help="Compare force laws by evidence and held out prediction (takes some eight fits).",
         ),
     ] = False,
     wall: Annotated[
         bool,
-        typer.Option(
-            "--wall", help="Estimate restitution and friction of the wall from the contacts."
-        ),
+        option("--wall", help="Estimate restitution and friction of the wall from the contacts."),
     ] = False,
     overwrite: Overwrite = False,
     json: Json = False,

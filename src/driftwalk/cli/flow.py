@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
-import typer
-
 from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import FlowVariables, FrameInterval, Json, Replace, option
@@ -48,7 +46,7 @@ def flow(
     flow_variables: FlowVariables = None,
     tracers: Annotated[
         bool,
-        typer.Option(
+        option(
             "--tracers", help="The bodies are passive tracers: their tracks make one flow (PTV)."
         ),
     ] = False,

@@ -6,8 +6,6 @@ import contextlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from driftwalk.cli.inputs.model_source import FoundSource, open_run
 from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.model import (
@@ -43,7 +41,7 @@ def play(
     recording: Annotated[
         Path | None, option("--recording FILE", help="Recording to compare the steps with.")
     ] = None,
-    body: Annotated[str | None, typer.Option("--body", help="Body of the recording.")] = None,
+    body: Annotated[str | None, option("--body", help="Body of the recording.")] = None,
     live: Annotated[
         int | None,
         option(

@@ -7,11 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import typer
-
 from driftwalk.cli.inputs.recordings import load_simulation
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import Replace, option
+from driftwalk.cli.options.shared import Replace, argument, option
 from driftwalk.cli.terminal.output import print_note, print_warnings, require_place
 
 
@@ -19,9 +17,7 @@ from driftwalk.cli.terminal.output import print_note, print_warnings, require_pl
 def report(
     runs: Annotated[
         list[Path],
-        typer.Argument(
-            metavar="RUN...", help="Run directories, finished or not, recordings, or simulations."
-        ),
+        argument("RUN...", "Run directories, finished or not, recordings, or simulations."),
     ],
     how: RecordingOptions,
     out: Annotated[Path, option("--out", "-o FILE", help="HTML file to write.")] = Path(

@@ -21,7 +21,15 @@ from driftwalk.cli.options.model import (
 )
 from driftwalk.cli.options.recording import RecordingOptions
 from driftwalk.cli.options.run import RunOptions
-from driftwalk.cli.options.shared import BodyOfLike, Json, Replace, Run, option, quantity_option
+from driftwalk.cli.options.shared import (
+    BodyOfLike,
+    Json,
+    Replace,
+    Run,
+    argument,
+    option,
+    quantity_option,
+)
 from driftwalk.cli.options.study import StudyOptions, option_name, with_study_options
 from driftwalk.cli.terminal.help import HelpCommand, HelpGroup
 from driftwalk.cli.terminal.output import (
@@ -57,11 +65,9 @@ def study(ctx: typer.Context) -> None:
 
 @study_app.command(cls=HelpCommand)
 def new(
-    path: Annotated[
-        Path | None, typer.Argument(metavar="[FILE]", help="File to write (default: -, stdout).")
-    ] = None,
+    path: Annotated[Path | None, argument("[FILE]", "File to write (default: -, stdout).")] = None,
     full: Annotated[
-        bool, typer.Option("--full", help="List every parameter with its unit and meaning.")
+        bool, option("--full", help="List every parameter with its unit and meaning.")
     ] = False,
     overwrite: Replace = False,
 ) -> None:
@@ -80,9 +86,7 @@ def new(
 
 
 @study_app.command(cls=HelpCommand)
-def check(
-    path: Annotated[Path, typer.Argument(metavar="FILE", help="Study file.")], json: Json = False
-) -> None:
+def check(path: Annotated[Path, argument("FILE", "Study file.")], json: Json = False) -> None:
     """Read a study file and print all parameters that follow from it."""
     from driftwalk.model import load_study
 

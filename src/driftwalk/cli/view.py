@@ -7,23 +7,20 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from driftwalk.cli.options.shared import option
+from driftwalk.cli.options.shared import argument, option
 from driftwalk.cli.terminal.output import print_note, print_warnings
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
     from driftwalk.viewer import Source
 
-Port = Annotated[int, typer.Option("--port", help="Port to serve on; 0 for a free port.")]
+Port = Annotated[int, option("--port", help="Port to serve on; 0 for a free port.")]
 Host = Annotated[
     str,
     option("--host ADDRESS", help="Address to serve on; other machines need the printed token."),
 ]
 Open = Annotated[
-    bool | None,
-    typer.Option("--open/--no-open", help="Open the browser (default: only on a terminal)."),
+    bool | None, option("--open/--no-open", help="Open the browser (default: only on a terminal).")
 ]
 LAST_PORT = 65535
 
@@ -31,10 +28,7 @@ LAST_PORT = 65535
 def view(
     source: Annotated[
         str,
-        typer.Argument(
-            metavar="RUN|ADDRESS:PORT",
-            help="Run directory, finished or not; or the address of a stream.",
-        ),
+        argument("RUN|ADDRESS:PORT", "Run directory, finished or not; or the address of a stream."),
     ],
     port: Port = 8765,
     host: Host = "127.0.0.1",

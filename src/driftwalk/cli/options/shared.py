@@ -62,6 +62,11 @@ def option(
     )
 
 
+def argument(placeholder: str, help: str) -> Any:
+    """Return the declaration of an argument."""
+    return typer.Argument(metavar=placeholder, help=help)
+
+
 def quantity_option(name: str, unit: str, help: str, *, panel: str = PANEL) -> Any:
     """Return the declaration of an option that takes a quantity."""
     return option(name, help=help, panel=panel, unit=unit)
@@ -102,10 +107,9 @@ def flow_of_run(path: Path | None) -> Path | None:
 
 Run = Annotated[
     Path | None,
-    typer.Argument(
-        metavar="RUN",
-        help="Run directory of a finished fit, calibration or comparison of models, or its "
-        "dataset.",
+    argument(
+        "RUN",
+        "Run directory of a finished fit, calibration or comparison of models, or its dataset.",
     ),
 ]
 StudyFile = Annotated[
@@ -141,12 +145,12 @@ FlowVariables = Annotated[
         show_default=False,
     ),
 ]
-Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")]
+Json = Annotated[bool, option("--json", help="Print the result as JSON on stdout.")]
 Threads = Annotated[
     int | None, option("--threads N", min=1, help="Worker threads (default: all cores).")
 ]
 BodyOfLike = Annotated[str | None, option("--body NAME", help="Body of --like.")]
 Overwrite = Annotated[
-    bool, typer.Option("--overwrite", help="Move a finished run aside and start a new one.")
+    bool, option("--overwrite", help="Move a finished run aside and start a new one.")
 ]
-Replace = Annotated[bool, typer.Option("--overwrite", help="Replace a file that exists.")]
+Replace = Annotated[bool, option("--overwrite", help="Replace a file that exists.")]

@@ -7,9 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Final
 
-import typer
-
-from driftwalk.cli.options.shared import option, scale_option
+from driftwalk.cli.options.shared import argument, option, scale_option
 from driftwalk.core.errors import InputError
 
 _FINDING: Final = "How objects are found"
@@ -26,10 +24,7 @@ _sent = partial(option, panel=_LIVE)
 class TrackingOptions:
     """How to track; the fields are the arguments and options of the commands that do."""
 
-    source: Annotated[
-        str,
-        typer.Argument(metavar="VIDEO|FOLDER|camera:N", help="Video, folder of images, or camera."),
-    ]
+    source: Annotated[str, argument("VIDEO|FOLDER|camera:N", "Video, folder of images, or camera.")]
     markers: Annotated[
         str,
         _found(

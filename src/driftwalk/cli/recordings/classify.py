@@ -5,12 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import typer
-
 from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.inputs.recordings import open_kind
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import Json, Replace, option, quantity_option
+from driftwalk.cli.options.shared import Json, Replace, argument, option, quantity_option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import (
     print_json,
@@ -40,15 +38,12 @@ def _tolerance(name: str, unit: str, help: str) -> Any:
 @with_recording_options
 @with_study_options(STUDY_KEYS, "side")
 def classify(
-    poses: Annotated[
-        Path,
-        typer.Argument(metavar="POSES", help="Recording of all blocks with their orientations."),
-    ],
+    poses: Annotated[Path, argument("POSES", "Recording of all blocks with their orientations.")],
     given: StudyOptions,
     how: RecordingOptions,
     chirality: Annotated[
         Literal["merged", "distinct"],
-        typer.Option("--chirality", help="Mirror images as one shape or two."),
+        option("--chirality", help="Mirror images as one shape or two."),
     ] = "merged",
     join_distance: Annotated[
         float | None,
