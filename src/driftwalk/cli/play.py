@@ -6,7 +6,7 @@ import contextlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from driftwalk.cli.inputs.model_source import FoundSource, open_run
+from driftwalk.cli.inputs.model_source import ModelSource, flow_of_block, open_source
 from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.model import (
     KnownModel,
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
+    from driftwalk.runs import FoundRun
     from driftwalk.viewer import Source
 
 FLOW_SEED = 1
@@ -63,46 +64,42 @@ def play(
     from driftwalk.viewer import PlaySource, hello_line, require_server
 
     require_server()
-    found = None if run is None else open_run(run, given, model)
-    if model is not None or (found is not None and not found.is_block):
+    source = open_source(run, given, model)
+    if not source.is_block:
         if live is not None:
             raise InputError("--live publishes a tank of blocks: leave it out with another model")
         known = playable_model(model, parameters, run)
-        shown = _of_model(known, given, found, flow, recording, body)
+        shown = _of_model(known, source, flow, recording, body)
         show(shown, host=host, port=port, open=open)
         return
     if parameters:
         raise InputError("--parameter belongs to a --model")
+    found = source.found
     bundled = not given.states_tank and flow is None and found is None
     if found is not None:
-        chosen, field = found.block(flow)
+        chosen = source.study()
+        field = flow_of_block(found, chosen, flow)
         beside, body = _of_run(found, recording, chosen, body)
-        print_warnings(found.found.warnings)
+        print_warnings(found.warnings)
     else:
         chosen = given.over(_bundled(), base="the bundled example") if bundled else given.study()
         field = _flow(flow, chosen, bundled=bundled)
         beside = _recording(recording, chosen, body, bundled=bundled)
-    source = PlaySource(
-        chosen,
-        field,
-        recording=beside,
-        body=body,
-        seed=chosen.assembly.seed,
-    )
+    seed = chosen.assembly.seed
+    tank = PlaySource(chosen, field, recording=beside, body=body, seed=seed)
     with contextlib.ExitStack() as open_things:
         if live is not None:
             from driftwalk.track import LiveServer
 
-            server = open_things.enter_context(LiveServer(live, hello=hello_line(source.tank)))
-            source.stream_to(server)
+            server = open_things.enter_context(LiveServer(live, hello=hello_line(tank.tank)))
+            tank.stream_to(server)
             print_note(f"the tank as a tracker's stream on {server.host}, port {server.port}")
-        show(source, host=host, port=port, open=open)
+        show(tank, host=host, port=port, open=open)
 
 
 def _of_model(
     known: KnownModel,
-    given: StudyOptions,
-    found: FoundSource | None,
+    source: ModelSource,
     flow: Path | None,
     recording: Path | None,
     body: str | None,
@@ -111,18 +108,18 @@ def _of_model(
     from driftwalk.conditions import study_for
     from driftwalk.viewer import ModelPlaySource
 
-    _refuse_blocks(given)
-    chosen, beside = given.study() if found is None else found.study(), None
+    if "assembly.blocks" in source.given.overrides:
+        raise InputError("--blocks: the page of a --model has a slider for its bodies")
+    chosen, found, beside = source.study(), source.found, None
     if found is not None:
         beside, body = _of_run(found, recording, chosen, body)
     elif recording is not None:
-        beside = _recording(recording, chosen, body, bundled=not given.states_tank)
+        beside = _recording(recording, chosen, body, bundled=not source.given.states_tank)
         chosen = study_for([] if beside is None else [beside], chosen, body=body)
-    field = None
-    if found is not None:
-        field = found.flow_for(known.model, chosen, flow)
-    elif flow is not None or known.model.needs_flow:
-        field = _flow(flow, chosen, bundled=False)
+    if found is None and (flow is not None or known.model.needs_flow):
+        field: xr.Dataset | None = _flow(flow, chosen, bundled=False)
+    else:
+        field = source.flow_for(known.model, chosen, flow)
     print_warnings(known.warnings)
     return ModelPlaySource(
         known.model,
@@ -136,17 +133,12 @@ def _of_model(
 
 
 def _of_run(
-    found: FoundSource, path: Path | None, study: Study, body: str | None
+    found: FoundRun, path: Path | None, study: Study, body: str | None
 ) -> tuple[xr.Dataset | None, str | None]:
     """Return the recording to compare with, a given one or that of the run, and its body."""
     if path is not None:
         return _recording(path, study, body, bundled=False), body
-    return found.found.recording(), body or found.found.body
-
-
-def _refuse_blocks(given: StudyOptions) -> None:
-    if "assembly.blocks" in given.overrides:
-        raise InputError("--blocks: the page of a --model has a slider for its bodies")
+    return found.recording(), body or found.body
 
 
 def _bundled() -> Study:

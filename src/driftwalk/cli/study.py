@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import typer
 
-from driftwalk.cli.inputs.model_source import FoundSource, open_run
+from driftwalk.cli.inputs.model_source import ModelSource, load_flow_for, open_source
 from driftwalk.cli.main import paragraphs
 from driftwalk.cli.options.flatten_options import with_options
 from driftwalk.cli.options.model import (
@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from driftwalk.calibration import ModelRecovery
     from driftwalk.likelihood import FitRecovery
     from driftwalk.model import Study
+    from driftwalk.runs import FoundRun
 
 
 ALL_PARAMETERS = "\n# All parameters, with their units and meanings: driftwalk study new --full\n"
@@ -166,14 +167,14 @@ def recover(
     """
     from driftwalk.runs import RecoveryWork
 
-    source = None if run is None else open_run(run, given, model)
+    source = open_source(run, given, model)
     method: FitRecovery | ModelRecovery
-    if model is not None or (source is not None and not source.is_block):
+    if not source.is_block:
         _refuse(given, OF_THE_BLOCK, "about the block, which --model replaces; leave it out")
         of_model = [name for name in known or () if name != NOISE]
         chosen = partly_known_model(model, parameters, run, of_model)
         noise: Noise = "known" if NOISE in (known or ()) else "estimated"
-        method, inputs = _of_model(chosen, given, source, sample_rate, like, body, noise)
+        method, inputs = _of_model(chosen, source, sample_rate, like, body, noise)
         print_warnings(chosen.warnings)
     else:
         _refuse(given, OF_A_MODEL, "belongs to a --model; for the block it stands in --study FILE")
@@ -184,15 +185,14 @@ def recover(
         for name, value in beside.items():
             if value:
                 raise ConfigurationError(f"{name} belongs to a --model; the block has --study FILE")
-        method, inputs = _of_block(given, source)
+        method, inputs = _of_block(source)
     found = options.run(RecoveryWork(method, inputs, threads), "recover")
     print_result(found, options.out, json=options.json)
 
 
 def _of_model(
     chosen: KnownModel,
-    given: StudyOptions,
-    source: FoundSource | None,
+    source: ModelSource,
     sample_rate: float | None,
     like: Path | None,
     body: str | None,
@@ -202,7 +202,7 @@ def _of_model(
     from driftwalk.calibration import ModelRecovery
     from driftwalk.conditions import study_for
 
-    recording = None
+    given, recording = source.given, None
     if like is not None:
         recording = RecordingOptions(body=body).load(like)
         _refuse(given, ("recover.durations_s",), "given by the recording of --like")
@@ -210,17 +210,18 @@ def _of_model(
             raise ConfigurationError("--sample-rate: given by the recording of --like")
     elif body is not None:
         raise ConfigurationError("--body belongs to --like")
-    timed = given
     if sample_rate is not None:
         if not sample_rate > 0.0:
             raise ConfigurationError(f"--sample-rate {sample_rate:g}: give a rate above 0")
         clock = {"recover.sample_interval_s": 1.0 / sample_rate}
-        timed = given.and_also(clock, keys={"sample_rate": "recover.sample_interval_s"})
-    study = timed.study() if source is None else replace(source, given=timed).study()
+        keys = {"sample_rate": "recover.sample_interval_s"}
+        source = replace(source, given=given.and_also(clock, keys=keys))
+    study = source.study()
     if recording is not None:
         study = study_for([recording], study, body=body)
     flow_file: Path | None = None
-    if source is not None and given.file is None and RECOVER_KEYS["flow"] not in given.overrides:
+    found = source.found
+    if found is not None and given.file is None and RECOVER_KEYS["flow"] not in given.overrides:
         # A run may be someone else's: it brings its own flow, and names no file of this machine.
         field = source.flow_for(chosen.model, study, None)
     elif study.recover.flow == RANDOM:
@@ -230,20 +231,19 @@ def _of_model(
         )
     else:
         field, flow_file = _named_flow(study, given)
-    parameters = None if source is None else source.found.file
+    parameters = None if found is None else found.file
     inputs = {"truth": given.file, "parameters": parameters, "like": like, "flow": flow_file}
     method = ModelRecovery(study, chosen.model, chosen.values, field, recording, body, noise)
     return method, _files(inputs)
 
 
-def _of_block(
-    given: StudyOptions, source: FoundSource | None
-) -> tuple[FitRecovery, dict[str, Path]]:
+def _of_block(source: ModelSource) -> tuple[FitRecovery, dict[str, Path]]:
     """Return a block of known truth, and the files that were read."""
     from driftwalk.likelihood import FitRecovery
 
-    if source is not None:
-        study, field, inputs = _of_run(source)
+    given = source.given
+    if source.found is not None:
+        study, field, inputs = _of_run(source.found, source)
         return FitRecovery(study, field), inputs
     if given.file is None:
         raise ConfigurationError(
@@ -256,13 +256,14 @@ def _of_block(
     return FitRecovery(study, field), _files({"truth": given.file, "flow": flow_file})
 
 
-def _of_run(source: FoundSource) -> tuple[Study, xr.Dataset | None, dict[str, Path]]:
+def _of_run(
+    found: FoundRun, source: ModelSource
+) -> tuple[Study, xr.Dataset | None, dict[str, Path]]:
     """Return the truth that a run has found: its study with its camera and options; flow, files."""
     from driftwalk.conditions import study_as_seen
     from driftwalk.schema import body_track
 
-    found, given = source.found, source.given
-    own = found.block_study()
+    given, own = source.given, found.block_study()
     recording = found.recording()
     if recording is not None:
         own = study_as_seen(own, recording, body_track(recording, found.body))
@@ -275,8 +276,6 @@ def _of_run(source: FoundSource) -> tuple[Study, xr.Dataset | None, dict[str, Pa
 
 def _named_flow(study: Study, given: StudyOptions) -> tuple[xr.Dataset | None, Path | None]:
     """Return the flow field that the study names, and its file; None for random flows."""
-    from driftwalk.cli.inputs.model_source import load_flow_for
-
     named = study.recover.flow
     if named is None or named == RANDOM:
         return None, None

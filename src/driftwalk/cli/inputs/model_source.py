@@ -197,33 +197,43 @@ def _with_sections(study: Study, path: Path, folder: Path) -> Study:
 
 
 @dataclass(frozen=True)
-class FoundSource:
-    """A run, with the options of the command over its study.
+class ModelSource:
+    """What simulate, play and study recover are about: the model of a run, or another one.
 
     Attributes
     ----------
-    folder : Path
-        The run directory.
-    found : FoundRun
-        What it has found.
     given : StudyOptions
-        The options.
+        The options and the study file.
+    named : str or None
+        The motion model that is named.
+    folder : Path or None
+        The run directory.
+    found : FoundRun or None
+        What the run has found.
     """
 
-    folder: Path
-    found: FoundRun
     given: StudyOptions
+    named: str | None
+    folder: Path | None
+    found: FoundRun | None
 
     @property
     def is_block(self) -> bool:
-        """Whether the run is about the block in stirred water."""
+        """Whether the model is the block in stirred water."""
+        return self.named is None and (self.found is None or self.found_block)
+
+    @property
+    def found_block(self) -> bool:
+        """Whether there is a run, and it is about the block."""
         from driftwalk.motion import BlockModel
 
-        return self.found.model == BlockModel.name
+        return self.found is not None and self.found.model == BlockModel.name
 
     def study(self) -> Study:
-        """Return the study of the run, with the options over it."""
-        if self.is_block:
+        """Return the study of the run, where it has one, with the options over it."""
+        if self.found is None:
+            return self.given.study()
+        if self.found_block:
             own = self.found.block_study()
         elif self.given.file is not None or not self.found.has_study:
             return self.given.study()
@@ -231,36 +241,36 @@ class FoundSource:
             own = self.found.study()
         return self.given.over(own, base=f"the study of {self.folder}")
 
-    def block(self, flow: Path | None) -> tuple[Study, xr.Dataset]:
-        """Return study and flow of the block; a given flow field goes over that of the run."""
-        chosen = self.study()
-        if flow is not None:
-            return chosen, load_flow_for(flow, chosen)
-        return chosen, self.found.flow(self.found.block_study())
-
     def flow_for(self, model: MotionModel, study: Study, flow: Path | None) -> xr.Dataset | None:
-        """Return the flow for a motion model, None where it has no use for any."""
+        """Return the flow for a model: a given one, that of the run if it is used, or None."""
         if flow is not None:
             return load_flow_for(flow, study)
-        return self.found.flow(study) if model.needs_flow else None
+        return self.found.flow(study) if self.found is not None and model.needs_flow else None
 
 
-def open_run(folder: Path, given: StudyOptions, model: str | None) -> FoundSource:
-    """Return a run that the user has named as the model.
+def flow_of_block(found: FoundRun, study: Study, flow: Path | None) -> xr.Dataset:
+    """Return the flow for the block that a run has found: a given one, or that of the run."""
+    return found.flow(found.block_study()) if flow is None else load_flow_for(flow, study)
+
+
+def open_source(folder: Path | None, given: StudyOptions, model: str | None) -> ModelSource:
+    """Return what the user has named as the model: a run, a motion model, or both.
 
     Raises
     ------
     InputError
-        When it cannot be used, or an option contradicts it.
+        When the run cannot be used, or an option contradicts it.
     """
     from driftwalk.runs import read_found
 
-    source = FoundSource(folder, read_found(folder), given)
+    if folder is None:
+        return ModelSource(given, model, None, None)
+    found = read_found(folder)
+    source = ModelSource(given, model, folder, found)
     # The values of another model hold in any study; those of the block belong to its own.
-    own = source.is_block and given.file is not None
+    own = source.found_block and given.file is not None
     refuse_found(folder, given.overrides, also=["--study"] if own else [])
     # A comparison of models holds values for the block and for others.
-    one = "model" not in source.found.found.dims
-    if model is not None and one and source.is_block:
+    if model is not None and "model" not in found.found.dims and source.found_block:
         raise InputError(f"{folder} is about the block, and not about {model}: leave out --model")
     return source
