@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -22,6 +21,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
+    from driftwalk.runs import Work
 
 
 # A coarser search that still finds the optimum: for a quick look and for tests.
@@ -58,20 +58,30 @@ def demo(
     DIR/report.html shows both.
     """
     from driftwalk.datasets import tank30_recording
+    from driftwalk.flow import load_flow
+    from driftwalk.runs import CalibrationWork, FitWork
 
     _require_own(out)
     recording, study = tank30_recording(), demo_study(quick=quick)
+    tell = tell_nobody if json else print_fit
+    fit, flow = out / FIT, out / FIT / "flow.nc"
     folder = files("driftwalk.datasets") / "tank30_ode_a"
     with as_file(folder / "recording.csv") as path:
-        tell = tell_nobody if json else print_fit
-        fitted = Fitted(
-            *_fit(recording, study, path, out / FIT, overwrite=overwrite, tell=tell), recording
-        )
+        inputs = {"recording": path}
+        # The fit is printed before it is checked.
+        work = FitWork([recording], study, None, inputs, fitted=tell)
+        if not _run(work, fit, overwrite=overwrite):
+            tell(open_netcdf(fit / "fit.nc"))
+        fitted = Fitted(open_netcdf(fit / "fit.nc"), open_netcdf(fit / "check.nc"), recording)
         _write_page(out, FIT)
         if not json:
             print_check(fitted)
             print_next(out / PAGE)
-        calibration = _calibrate(recording, study, path, out, overwrite=overwrite, threads=threads)
+        field = load_flow(flow, arena=study.tank.to_arena(), own_flags="keep")
+        inputs = {**inputs, "flow": flow}
+        search = CalibrationWork(recording, study, field, None, inputs, threads)
+        _run(search, out / CALIBRATION, overwrite=overwrite)
+    calibration = open_netcdf(out / CALIBRATION / "calibration.nc")
     _write_page(out, FIT, CALIBRATION)
     if json:
         print_json(in_json(fitted, calibration))
@@ -97,49 +107,19 @@ def demo_study(*, quick: bool) -> Study:
     return apply_overrides(Study(), {**known, **(QUICK if quick else {})})
 
 
-def _fit(
-    recording: xr.Dataset,
-    study: Study,
-    path: Path,
-    folder: Path,
-    *,
-    overwrite: bool,
-    tell: Callable[[xr.Dataset], None],
-) -> tuple[xr.Dataset, xr.Dataset]:
-    """Fit and check, or read a finished run; the fit is printed before it is checked."""
-    from driftwalk.runs import FitWork, run_work
+def _run(work: Work, folder: Path, *, overwrite: bool) -> bool:
+    """Do a piece of work, unless its run is there and finished; return whether it was done."""
+    from driftwalk.core.files.run_layout import state_of
+    from driftwalk.runs import run_work
 
-    if _finished(folder, overwrite):
-        tell(open_netcdf(folder / "fit.nc"))
-    else:
-        work = FitWork([recording], study, None, {"recording": path}, fitted=tell)
-        with reported("fit") as told:
-            run_work(work, folder, overwrite=overwrite, **told)
-    return open_netcdf(folder / "fit.nc"), open_netcdf(folder / "check.nc")
-
-
-def _calibrate(
-    recording: xr.Dataset,
-    study: Study,
-    path: Path,
-    out: Path,
-    *,
-    overwrite: bool,
-    threads: int | None,
-) -> xr.Dataset:
-    """Calibrate on the fitted flow, or read what a finished run found."""
-    from driftwalk.flow import load_flow
-    from driftwalk.runs import CalibrationWork, run_work
-
-    folder, flow = out / CALIBRATION, out / FIT / "flow.nc"
-    if _finished(folder, overwrite):
-        return open_netcdf(folder / "calibration.nc")
-    given = load_flow(flow, arena=study.tank.to_arena(), own_flags="keep")
-    inputs = {"recording": path, "flow": flow}
-    work = CalibrationWork(recording, study, given, None, inputs, threads)
-    with reported("calibrate") as told:
-        found: xr.Dataset = run_work(work, folder, overwrite=overwrite, **told)
-    return found
+    if not overwrite and folder.is_dir() and state_of(folder) == "finished":
+        print_note(
+            f"{folder} holds a finished run (--overwrite starts a new one); these are its results"
+        )
+        return False
+    with reported(folder.name) as told:
+        run_work(work, folder, overwrite=overwrite, **told)
+    return True
 
 
 def _write_page(out: Path, *runs: str) -> None:
@@ -164,17 +144,6 @@ def _require_own(out: Path) -> None:
             "or a new directory"
         )
     refuse_leading_out(out)
-
-
-def _finished(folder: Path, overwrite: bool) -> bool:
-    from driftwalk.core.files.run_layout import state_of
-
-    if overwrite or not folder.is_dir() or state_of(folder) != "finished":
-        return False
-    print_note(
-        f"{folder} holds a finished run (--overwrite starts a new one); these are its results"
-    )
-    return True
 
 
 ROWS: Final = ("drag_coefficient", "force_std", "tracking_noise")

@@ -72,6 +72,14 @@ class KnownModel(NamedTuple):
     values: dict[str, float]
     warnings: list[str]
 
+    def made_with(self, name: str | None, options: dict[str, Any]) -> MotionModel:
+        """Return the model made again, with values or ranges for parameters that it then has."""
+        from driftwalk.motion import motion_model
+
+        clearance = getattr(self.model, "clearance", 0.0)
+        kept = {"clearance": clearance} if clearance else {}
+        return motion_model(name or self.model.name, **{**kept, **options})
+
 
 def known_model(name: str | None, choices: Sequence[str] | None, place: Path | None) -> KnownModel:
     """Return a motion model and the values of its parameters: those of a run, others over them.
@@ -139,13 +147,7 @@ def playable_model(
     known = known_model(name, values, place)
     if not ranges:
         return known
-    name = name or known.model.name
-    from driftwalk.motion import is_family_name, motion_model
-
-    clearance = getattr(known.model, "clearance", 0.0)
-    options: dict[str, Any] = {"clearance": clearance} if is_family_name(name) else {}
-    options |= parameter_choices(ranges)
-    return known._replace(model=motion_model(name, **options))
+    return known._replace(model=known.made_with(name, parameter_choices(ranges)))
 
 
 def partly_known_model(
@@ -160,7 +162,7 @@ def partly_known_model(
     ConfigurationError
         As `known_model`, and when a known parameter is none of the model's or has no value.
     """
-    from driftwalk.motion import known_values, motion_model
+    from driftwalk.motion import known_values
 
     found = known_model(name, choices, place)
     if not known:
@@ -172,11 +174,9 @@ def partly_known_model(
             f"--known {strangers[0]}: the model {found.model.name} has {', '.join(values)}"
             f"{did_you_mean(strangers[0], values)}"
         )
-    clearance = getattr(found.model, "clearance", 0.0)
-    options: dict[str, Any] = {"clearance": clearance} if clearance else {}
-    options |= {one: values[one] for one in known}
+    model = found.made_with(name, {one: values[one] for one in known})
     left = {one: value for one, value in values.items() if one not in known}
-    return KnownModel(motion_model(name or found.model.name, **options), left, found.warnings)
+    return KnownModel(model, left, found.warnings)
 
 
 def chosen_model(name: str | None, choices: Sequence[str] | None) -> MotionModel | None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.inputs.recordings import open_kind
+from driftwalk.cli.options.flatten_options import with_options
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import Json, Replace, argument, option, quantity_option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
@@ -35,46 +37,54 @@ def _tolerance(name: str, unit: str, help: str) -> Any:
     return quantity_option(name, unit, help, panel=_PANEL)
 
 
+@dataclass(frozen=True)
+class JoinCriteria:
+    """When faces join and part; the fields are the options."""
+
+    join_distance: Annotated[
+        float | None,
+        _tolerance(
+            "--join-distance", "m", "Distance of face centres that join (default: side / 10)."
+        ),
+    ] = None
+    join_angle: Annotated[
+        float | None,
+        _tolerance("--join-angle", "rad", "Angle between faces that join (default: 10deg)."),
+    ] = None
+    release_distance: Annotated[
+        float | None,
+        _tolerance(
+            "--release-distance", "m", "Distance that parts them (default: twice that to join)."
+        ),
+    ] = None
+    release_angle: Annotated[
+        float | None,
+        _tolerance(
+            "--release-angle", "rad", "Angle that parts them (default: twice that to join)."
+        ),
+    ] = None
+    min_duration: Annotated[
+        float | None,
+        _tolerance("--min-duration", "s", "Shortest join or parting that counts (default: 0.5s)."),
+    ] = None
+    hold: Annotated[
+        float | None,
+        _tolerance("--hold", "s", "Time for which an unseen block keeps its joins (default: 1s)."),
+    ] = None
+
+
+@with_options(JoinCriteria)
 @with_recording_options
 @with_study_options(STUDY_KEYS, "side")
 def classify(
     poses: Annotated[Path, argument("POSES", "Recording of all blocks with their orientations.")],
     given: StudyOptions,
     how: RecordingOptions,
+    criteria: JoinCriteria,
     chirality: Annotated[
         Literal["merged", "distinct"],
         option("--chirality", help="Mirror images as one shape or two."),
     ] = "merged",
-    join_distance: Annotated[
-        float | None,
-        _tolerance(
-            "--join-distance", "m", "Distance of face centres that join (default: side / 10)."
-        ),
-    ] = None,
-    join_angle: Annotated[
-        float | None,
-        _tolerance("--join-angle", "rad", "Angle between faces that join (default: 10deg)."),
-    ] = None,
-    release_distance: Annotated[
-        float | None,
-        _tolerance(
-            "--release-distance", "m", "Distance that parts them (default: twice that to join)."
-        ),
-    ] = None,
-    release_angle: Annotated[
-        float | None,
-        _tolerance(
-            "--release-angle", "rad", "Angle that parts them (default: twice that to join)."
-        ),
-    ] = None,
-    min_duration: Annotated[
-        float | None,
-        _tolerance("--min-duration", "s", "Shortest join or parting that counts (default: 0.5s)."),
-    ] = None,
-    hold: Annotated[
-        float | None,
-        _tolerance("--hold", "s", "Time for which an unseen block keeps its joins (default: 1s)."),
-    ] = None,
     out: Annotated[Path | None, option("--out", "-o FILE.nc", help="File for the result.")] = None,
     overwrite: Replace = False,
     json: Json = False,
@@ -91,15 +101,7 @@ def classify(
     if out is not None:
         require_target(out, existing="replace" if overwrite else "error", endings=(".nc",))
     recording, block_side, is_default = _load(poses, how, given)
-    tolerances = {
-        "join_distance": join_distance,
-        "join_angle": join_angle,
-        "release_distance": release_distance,
-        "release_angle": release_angle,
-        "min_duration": min_duration,
-        "hold": hold,
-    }
-    stated: dict[str, Any] = {key: value for key, value in tolerances.items() if value is not None}
+    stated = {name: value for name, value in vars(criteria).items() if value is not None}
     try:
         found = classify_recording(recording, side=block_side, chirality=chirality, **stated)
     except ConfigurationError:
