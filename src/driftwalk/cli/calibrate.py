@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from driftwalk.cli.inputs.recordings import opening_note, read_with_flow
+from driftwalk.cli.inputs.recordings import read_for_models
 from driftwalk.cli.options.model import ModelName, ParameterChoices, chosen_model
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.run import RunOptions, with_run_options
@@ -49,21 +49,11 @@ def calibrate(
     estimated from summaries of the motion. Reports how well the parameters are known and whether
     the model explains the motion. If you stop the run, the same command continues it.
     """
-    from driftwalk.conditions import About, jump_warnings
-    from driftwalk.motion import feels_others
     from driftwalk.runs import CalibrationWork
 
     chosen = chosen_model(model, parameters)
-    others = feels_others(chosen)
-    read, field, inputs = read_with_flow(
-        recording, flow, given, how, bodies="all" if others else "named"
-    )
-    body = read.body if others else how.body
-    work = CalibrationWork(
-        read.trajectories[0], read.study, field, body, inputs, options.threads, chosen, posterior
-    )
-    about: About = "block" if model is None else "tank"
-    jumps = jump_warnings(read.trajectories[0], read.body)
-    begun = opening_note(read.study, given, how=how, about=about, warnings=jumps)
+    models = ["block" if chosen is None else chosen]
+    read, begun = read_for_models(recording, flow, given, how, models)
+    work = CalibrationWork(**read, threads=options.threads, model=chosen, posterior=posterior)
     found = options.run(work, "calibrate", begun=begun)
     print_result(found, options.out, json=options.json)

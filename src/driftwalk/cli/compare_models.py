@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Annotated
 
-from driftwalk.cli.inputs.recordings import opening_note, read_with_flow
+from driftwalk.cli.inputs.recordings import read_for_models
 from driftwalk.cli.options.model import ComparedParameters, parameter_choices
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.run import RunOptions, with_run_options
@@ -50,8 +50,7 @@ def compare_models(
     the recording. If you stop the run, the same command continues it.
     """
     from driftwalk.calibration import ALL_MODELS, DEFAULT_MODELS
-    from driftwalk.conditions import About, jump_warnings
-    from driftwalk.motion import feels_others, models_knowing
+    from driftwalk.motion import models_knowing
     from driftwalk.runs import ModelComparisonWork, run_work
 
     if models is None:
@@ -61,19 +60,11 @@ def compare_models(
     else:
         named = [name for name in map(str.strip, models.split(",")) if name]
     chosen = models_knowing(named, parameter_choices(parameters))
-    others = any(map(feels_others, chosen))
-    read, field, inputs = read_with_flow(
-        recording, flow, given, how, bodies="all" if others else "named"
-    )
-    body = read.body if others else how.body
-    about: About = "block" if "block" in chosen else "tank"
-    jumps = jump_warnings(read.trajectories[0], read.body)
-    begun = opening_note(read.study, given, how=how, about=about, warnings=jumps)
+    read, begun = read_for_models(recording, flow, given, how, chosen)
     with options.reported("compare models") as told:
-        said: dict[str, Any] = {} if options.json else {"finished": Ranking(told["progress"])}
-        work = ModelComparisonWork(
-            read.trajectories[0], chosen, read.study, field, body, inputs, options.threads, **said
-        )
+        if not options.json:
+            read["finished"] = Ranking(told["progress"])
+        work = ModelComparisonWork(**read, models=chosen, threads=options.threads)
         found = run_work(work, options.out, overwrite=options.overwrite, begun=begun, **told)
     print_result(found, options.out, json=options.json)
 

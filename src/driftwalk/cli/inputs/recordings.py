@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.cli.inputs.model_source import load_flow_for
 from driftwalk.cli.inputs.other_files import explained
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from driftwalk.conditions import About, ReadRecordings
     from driftwalk.conditions.reading import Bodies
     from driftwalk.model import Study
+    from driftwalk.motion import MotionModel
 
 
 FIT_TANK: Final = 0.5
@@ -66,50 +67,40 @@ def read_for_run(
         )
 
 
-class ReadForModel(NamedTuple):
-    """A recording and a flow, for a run that simulates motion models."""
-
-    read: ReadRecordings
-    flow: xr.Dataset | None
-    """The given flow field."""
-    inputs: dict[str, Path]
-    """The files that were read, by their role."""
-
-
-def read_with_flow(
-    recording: Path,
+def read_for_models(
+    path: Path,
     flow: Path | None,
     given: StudyOptions,
     how: RecordingOptions,
-    *,
-    bodies: Bodies = "named",
-) -> ReadForModel:
-    """Read one recording, and the flow field where one is given.
+    models: Sequence[str | MotionModel],
+) -> tuple[dict[str, Any], Callable[[], None]]:
+    """Read one recording, and the flow field where one is given, for a run that simulates models.
 
-    Parameters
-    ----------
-    recording : Path
-        The recording.
-    flow : Path or None
-        The flow field.
-    given : StudyOptions
-        The study.
-    how : RecordingOptions
-        How to read the recording.
-    bodies : {"named", "all"}
-        As in `read_for_run`.
+    Returns what the run's work is made of, by its keywords; and what says, when the run begins,
+    which body and tank it takes. All bodies are kept where a model feels the others.
 
     Raises
     ------
     InputError
         As `read_for_run`, and when the flow field cannot be read.
     """
-    read = read_for_run([recording], given, how, bodies=bodies)
-    inputs = {"recording": recording, "flow": flow, "study": given.file}
-    field = None if flow is None else load_flow_for(flow, read.study)
-    return ReadForModel(
-        read, field, {role: path for role, path in inputs.items() if path is not None}
-    )
+    from driftwalk.conditions import jump_warnings
+    from driftwalk.motion import feels_others
+
+    others = any(map(feels_others, models))
+    read = read_for_run([path], given, how, bodies="all" if others else "named")
+    recording, study = read.trajectories[0], read.study
+    inputs = {"recording": path, "flow": flow, "study": given.file}
+    about: About = "block" if "block" in models else "tank"
+    jumps = jump_warnings(recording, read.body)
+    work = {
+        "recording": recording,
+        "study": study,
+        "flow": None if flow is None else load_flow_for(flow, study),
+        "body": read.body if others else how.body,
+        "inputs": {role: path for role, path in inputs.items() if path is not None},
+    }
+    return work, opening_note(study, given, how=how, about=about, warnings=jumps)
 
 
 def words_to_fit(trajectory: xr.Dataset, described: Mapping[str, Any] | None = None) -> list[str]:
