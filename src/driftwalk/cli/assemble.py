@@ -79,10 +79,7 @@ def assembled(study: Study, result: AssemblyResult) -> Answer:
     return assembly_answer(
         result.distribution,
         times=result.times,
-        settings={
-            "drag_coefficient": forces.drag_coefficient,
-            "force_std_N": forces.force_std_N,
-        },
+        settings={"drag_coefficient": forces.drag_coefficient, "force_std_N": forces.force_std_N},
         drawn=result.drawn,
         sizes=result.sizes,
         sizes_drawn=result.sizes_drawn,

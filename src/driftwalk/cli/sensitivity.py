@@ -149,10 +149,7 @@ def _warnings(source: Source, result: SensitivityResult) -> list[str]:
     axes = [str(name) for name in found["l1_distance"].dims]
     left_out = int(found["left_out"].sum()) + int(result.reference.attrs["left_out"])
     said: Sequence[tuple[bool, str]] = (
-        (
-            left_out > 0,
-            f"{left_out} runs broke down and are left out; use a smaller time step",
-        ),
+        (left_out > 0, f"{left_out} runs broke down and are left out; use a smaller time step"),
         (
             "tank_diameter" in axes
             and float(found["tank_diameter"].min()) < min(source.study.tank.extent_m),

@@ -29,11 +29,7 @@ FIT_TANK: Final = 0.5
 
 
 def read_for_run(
-    paths: Sequence[Path],
-    given: StudyOptions,
-    how: RecordingOptions,
-    *,
-    bodies: Bodies = "named",
+    paths: Sequence[Path], given: StudyOptions, how: RecordingOptions, *, bodies: Bodies = "named"
 ) -> ReadRecordings:
     """Read the recordings of a fit or a calibration, and make its study.
 

@@ -19,10 +19,7 @@ class Part(NamedTuple):
 
 
 def spread(
-    function: Command,
-    kind: type,
-    parts: Mapping[str, Part],
-    make: Callable[[dict[str, Any]], Any],
+    function: Command, kind: type, parts: Mapping[str, Part], make: Callable[[dict[str, Any]], Any]
 ) -> Command:
     """Return a command with options in the place of its parameter of a type.
 
