@@ -31,7 +31,7 @@ def assemble(
     given: StudyOptions,
     run: Run = None,
     flow: FlowFile = None,
-    film: Annotated[str, option("--film gif|mp4|none", help="Film of the first run.")] = "gif",
+    film: Annotated[str, option("--film gif|mp4|none", "Film of the first run.")] = "gif",
     *,
     options: RunOptions,
 ) -> None:

@@ -34,7 +34,7 @@ def calibrate(
         bool,
         option(
             "--posterior",
-            help="Also write posterior.csv: draws from the approximate posterior of a --model with "
+            "Also write posterior.csv: draws from the approximate posterior of a --model with "
             "more than two parameters.",
         ),
     ] = False,

@@ -19,7 +19,7 @@ from driftwalk.schema.stores.netcdf import is_netcdf, open_netcdf
 def cite(
     run: Annotated[Path, argument("RUN", "Directory of a finished run, or a simulation (.nc).")],
     bibtex_entries: Annotated[
-        bool, option("--bibtex", help="Print the program and the paper for BibTeX.")
+        bool, option("--bibtex", "Print the program and the paper for BibTeX.")
     ] = False,
     json: Json = False,
 ) -> None:

@@ -53,24 +53,19 @@ def compare(
     a: Annotated[Path, argument("A", "Recording, or output of driftwalk simulate.")],
     b: Annotated[Path, argument("B", "Recording, or output of driftwalk simulate.")],
     how: RecordingOptions,
-    body_b: Annotated[
-        str | None, option("--body-b", help="Body in B (default: same as A).")
-    ] = None,
+    body_b: Annotated[str | None, option("--body-b", "Body in B (default: same as A).")] = None,
     step_interval: Annotated[Any, study_option("step_interval")] = None,
     ties: Annotated[
         Literal["strict", "limits"],
         option(
-            "--ties",
-            help="Treatment of points that tie with an origin: in no quadrant, or in each.",
+            "--ties", "Treatment of points that tie with an origin: in no quadrant, or in each."
         ),
     ] = "strict",
     permutations: Annotated[
-        int, option("--permutations N", help="Permutations of the test; 0 for no test.", min=0)
+        int, option("--permutations N", "Permutations of the test; 0 for no test.", min=0)
     ] = 999,
-    seed: Annotated[int, option("--seed N", help="Seed of the permutations.", min=0)] = 1,
-    out: Annotated[
-        Path | None, option("--out", "-o FILE.nc", help="File for the comparison.")
-    ] = None,
+    seed: Annotated[int, option("--seed N", "Seed of the permutations.", min=0)] = 1,
+    out: Annotated[Path | None, option("--out -o FILE.nc", "File for the comparison.")] = None,
     overwrite: Replace = False,
     json: Json = False,
 ) -> None:

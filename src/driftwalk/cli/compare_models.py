@@ -33,7 +33,7 @@ def compare_models(
         str | None,
         option(
             "--models NAMES",
-            help="Models, separated by commas, such as block,run_tumble+wall; or all. Default: the "
+            "Models, separated by commas, such as block,run_tumble+wall; or all. Default: the "
             "block and the family with an interaction with the wall.",
         ),
     ] = None,

@@ -42,9 +42,9 @@ PAGE = "report.html"
 
 
 def demo(
-    out: Annotated[Path, option("--out", "-o DIR", help="Directory of both runs.")] = Path("demo"),
+    out: Annotated[Path, option("--out -o DIR", "Directory of both runs.")] = Path("demo"),
     quick: Annotated[
-        bool, option("--quick", help="Search only a small part; takes seconds, not minutes.")
+        bool, option("--quick", "Search only a small part; takes seconds, not minutes.")
     ] = False,
     threads: Threads = None,
     overwrite: Overwrite = False,

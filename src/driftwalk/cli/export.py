@@ -33,30 +33,28 @@ def export(
             help="; ".join(f"{target.name}: {target.gives}" for target in TARGETS.values()) + ".",
         ),
     ],
-    out: Annotated[Path, option("--out", "-o DIR", help="New or empty folder to write.")],
+    out: Annotated[Path, option("--out -o DIR", "New or empty folder to write.")],
     flow: Annotated[
-        Path | None,
-        option("--flow FILE", help="Flow field of a study file, or another one for a run."),
+        Path | None, option("--flow FILE", "Flow field of a study file, or another one for a run.")
     ] = None,
     seed: Annotated[
         int | None,
-        option("--seed N", help="Seed of the stochastic force (default: the study's).", min=0),
+        option("--seed N", "Seed of the stochastic force (default: the study's).", min=0),
     ] = None,
     replicate: Annotated[
         int | None,
         option(
             "--replicate N",
-            help="Replicate of a simulation to take, counted from 0 (default: all; of a film the "
+            "Replicate of a simulation to take, counted from 0 (default: all; of a film the "
             "first).",
             min=0,
         ),
     ] = None,
     speed: Annotated[
-        float | None,
-        option("--speed", help="How much faster than real time a film is (default: 1)."),
+        float | None, option("--speed", "How much faster than real time a film is (default: 1).")
     ] = None,
     verify: Annotated[
-        bool, option("--verify", help="Run what was written, and compare it with driftwalk.")
+        bool, option("--verify", "Run what was written, and compare it with driftwalk.")
     ] = False,
     json: Json = False,
 ) -> int:

@@ -30,22 +30,21 @@ RecordingFiles = Annotated[
 )
 def fit(
     recordings: RecordingFiles,
-    out: Annotated[Path, option("--out", "-o DIR", help="Run directory to make.")],
+    out: Annotated[Path, option("--out -o DIR", "Run directory to make.")],
     given: StudyOptions,
     how: RecordingOptions,
     no_check: Annotated[
-        bool, option("--no-check", help="Skip the check whether the model explains the recording.")
+        bool, option("--no-check", "Skip the check whether the model explains the recording.")
     ] = False,
     compare_laws: Annotated[
         bool,
         option(
             "--compare-laws",
-            help="Compare force laws by evidence and held out prediction (takes some eight fits).",
+            "Compare force laws by evidence and held out prediction (takes some eight fits).",
         ),
     ] = False,
     wall: Annotated[
-        bool,
-        option("--wall", help="Estimate restitution and friction of the wall from the contacts."),
+        bool, option("--wall", "Estimate restitution and friction of the wall from the contacts.")
     ] = False,
     overwrite: Overwrite = False,
     json: Json = False,

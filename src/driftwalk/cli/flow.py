@@ -39,16 +39,14 @@ NOISE: Final = FLOW_KEYS["position_noise"]
 )
 def flow(
     recording: RecordingFile,
-    out: Annotated[Path, option("--out", "-o FILE", help="File to write; ends in .nc or .csv.")],
+    out: Annotated[Path, option("--out -o FILE", "File to write; ends in .nc or .csv.")],
     given: StudyOptions,
     how: RecordingOptions,
     frame_interval: FrameInterval = None,
     flow_variables: FlowVariables = None,
     tracers: Annotated[
         bool,
-        option(
-            "--tracers", help="The bodies are passive tracers: their tracks make one flow (PTV)."
-        ),
+        option("--tracers", "The bodies are passive tracers: their tracks make one flow (PTV)."),
     ] = False,
     overwrite: Replace = False,
     json: Json = False,

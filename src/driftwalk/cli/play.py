@@ -35,14 +35,13 @@ def play(
     model: ModelName = None,
     parameters: PlayedParameters = None,
     recording: Annotated[
-        Path | None, option("--recording FILE", help="Recording to compare the steps with.")
+        Path | None, option("--recording FILE", "Recording to compare the steps with.")
     ] = None,
-    body: Annotated[str | None, option("--body", help="Body of the recording.")] = None,
+    body: Annotated[str | None, option("--body", "Body of the recording.")] = None,
     live: Annotated[
         int | None,
         option(
-            "--live PORT",
-            help="Port that publishes the tank as a tracker's stream; 0 for a free port.",
+            "--live PORT", "Port that publishes the tank as a tracker's stream; 0 for a free port."
         ),
     ] = None,
     port: Port = 8765,

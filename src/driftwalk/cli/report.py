@@ -20,9 +20,7 @@ def report(
         argument("RUN...", "Run directories, finished or not, recordings, or simulations."),
     ],
     how: RecordingOptions,
-    out: Annotated[Path, option("--out", "-o FILE", help="HTML file to write.")] = Path(
-        "report.html"
-    ),
+    out: Annotated[Path, option("--out -o FILE", "HTML file to write.")] = Path("report.html"),
     overwrite: Replace = False,
 ) -> None:
     """Write a report of runs or recordings: one HTML file that loads nothing from anywhere.

@@ -38,7 +38,7 @@ Vary = Annotated[
     list[str] | None,
     option(
         "--vary NAME=VALUES",
-        help="Values to compare: blocks=2,3,4 or drag-coefficient=0:1.5:0.05. Repeatable.",
+        "Values to compare: blocks=2,3,4 or drag-coefficient=0:1.5:0.05. Repeatable.",
         panel=PANEL,
     ),
 ]
@@ -76,8 +76,7 @@ def sensitivity(
     flow: FlowFile = None,
     vary: Vary = None,
     sobol: Annotated[
-        int | None,
-        option("--sobol N", min=8, help="Base samples for Sobol' indices, a power of two."),
+        int | None, option("--sobol N", "Base samples for Sobol' indices, a power of two.", min=8)
     ] = None,
     *,
     options: RunOptions,

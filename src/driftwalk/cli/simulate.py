@@ -46,14 +46,14 @@ OF_THE_BLOCK: Final = (
     *("position_noise", "orientation_noise", "replicates", "seed", "flow_repeat", "flow_start"),
 )
 def simulate(
-    out: Annotated[Path, option("--out", "-o FILE.nc", help="File to write.")],
+    out: Annotated[Path, option("--out -o FILE.nc", "File to write.")],
     given: StudyOptions,
     run: Run = None,
     flow: Annotated[
         Path | None,
         option(
             "--flow FILE",
-            help="Flow field: NetCDF, or CSV with x, y, u, v; or the run directory that holds it. "
+            "Flow field: NetCDF, or CSV with x, y, u, v; or the run directory that holds it. "
             "For the block, and for a --model that uses it.",
             callback=flow_of_run,
         ),
@@ -64,16 +64,14 @@ def simulate(
         Path | None,
         option(
             "--like RECORDING",
-            help="Recording that gives start, time stamps and gaps (driftwalk's "
-            "NetCDF or plain CSV).",
+            "Recording that gives start, time stamps and gaps (driftwalk's NetCDF or plain CSV).",
         ),
     ] = None,
     body: BodyOfLike = None,
     backend: Annotated[
         str,
         option(
-            "--backend cpu|reference",
-            help="Backend: cpu for single, reference for double precision.",
+            "--backend cpu|reference", "Backend: cpu for single, reference for double precision."
         ),
     ] = "cpu",
     overwrite: Replace = False,

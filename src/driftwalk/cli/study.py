@@ -68,7 +68,7 @@ def study(ctx: typer.Context) -> None:
 def new(
     path: Annotated[Path | None, argument("[FILE]", "File to write (default: -, stdout).")] = None,
     full: Annotated[
-        bool, option("--full", help="List every parameter with its unit and meaning.")
+        bool, option("--full", "List every parameter with its unit and meaning.")
     ] = False,
     overwrite: Replace = False,
 ) -> None:
@@ -136,7 +136,7 @@ def recover(
         Path | None,
         option(
             "--like RECORDING",
-            help="Recording that gives start, time stamps, gaps and camera, with --model.",
+            "Recording that gives start, time stamps, gaps and camera, with --model.",
         ),
     ] = None,
     body: BodyOfLike = None,
@@ -148,7 +148,7 @@ def recover(
         int | None,
         option(
             "--threads N",
-            help="Recordings to fit at the same time; threads of a calibration with --model "
+            "Recordings to fit at the same time; threads of a calibration with --model "
             "(default: one per core).",
             min=1,
         ),

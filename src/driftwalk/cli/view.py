@@ -14,13 +14,12 @@ from driftwalk.core.errors import InputError
 if TYPE_CHECKING:
     from driftwalk.viewer import Source
 
-Port = Annotated[int, option("--port", help="Port to serve on; 0 for a free port.")]
+Port = Annotated[int, option("--port", "Port to serve on; 0 for a free port.")]
 Host = Annotated[
-    str,
-    option("--host ADDRESS", help="Address to serve on; other machines need the printed token."),
+    str, option("--host ADDRESS", "Address to serve on; other machines need the printed token.")
 ]
 Open = Annotated[
-    bool | None, option("--open/--no-open", help="Open the browser (default: only on a terminal).")
+    bool | None, option("--open/--no-open", "Open the browser (default: only on a terminal).")
 ]
 LAST_PORT = 65535
 

@@ -20,7 +20,7 @@ ModelName = Annotated[
     str | None,
     option(
         "--model MODEL",
-        help="Motion model: a name of driftwalk models, mine.py:NAME, or command:PROGRAM. Default: "
+        "Motion model: a name of driftwalk models, mine.py:NAME, or command:PROGRAM. Default: "
         "the block in stirred water.",
     ),
 ]
@@ -28,14 +28,14 @@ ParameterChoices = Annotated[
     list[str] | None,
     option(
         "--parameter NAME=VALUE|LOW,HIGH",
-        help="Known value, or range of the search, of a parameter of --model; repeat for others.",
+        "Known value, or range of the search, of a parameter of --model; repeat for others.",
     ),
 ]
 ComparedParameters = Annotated[
     list[str] | None,
     option(
         "--parameter NAME=VALUE|LOW,HIGH",
-        help="Known value, or range of the search, of a parameter of each of the --models that has "
+        "Known value, or range of the search, of a parameter of each of the --models that has "
         "it; repeat for others.",
     ),
 ]
@@ -44,14 +44,14 @@ ParameterValues = Annotated[
     list[str] | None,
     option(
         "--parameter NAME=VALUE",
-        help="Value of a parameter of --model, in its SI unit; repeat for others.",
+        "Value of a parameter of --model, in its SI unit; repeat for others.",
     ),
 ]
 PlayedParameters = Annotated[
     list[str] | None,
     option(
         "--parameter NAME=VALUE|LOW,HIGH",
-        help="Value to begin with, or range of the slider, of a parameter of --model; repeat for "
+        "Value to begin with, or range of the slider, of a parameter of --model; repeat for "
         "others.",
     ),
 ]
@@ -59,8 +59,7 @@ KnownParameters = Annotated[
     list[str] | None,
     option(
         "--known NAME",
-        help="Parameter of --model, or position_noise, that the calibrations know; repeat for "
-        "others.",
+        "Parameter of --model, or position_noise, that the calibrations know; repeat for others.",
     ),
 ]
 

@@ -19,13 +19,13 @@ from driftwalk.core.errors import ConfigurationError
 class RunOptions:
     """Where a run is kept and who computes it; the fields are the options."""
 
-    out: Annotated[Path, option("--out", "-o DIR", help="Run directory to make or continue.")]
+    out: Annotated[Path, option("--out -o DIR", "Run directory to make or continue.")]
     threads: Threads = None
     cluster: Annotated[
         str | None,
         option(
             "--cluster local:N|tcp://HOST:PORT|slurm:N",
-            help="Workers: N processes on this machine, a Dask scheduler, or N jobs of slurm (pbs, "
+            "Workers: N processes on this machine, a Dask scheduler, or N jobs of slurm (pbs, "
             "sge, lsf, oar, moab, htcondor). Needs driftwalk[cluster].",
         ),
     ] = None
@@ -33,7 +33,7 @@ class RunOptions:
         list[str] | None,
         option(
             "--cluster-option NAME=VALUE",
-            help="Option passed to dask-jobqueue, such as queue=short or walltime=02:00:00; repeat "
+            "Option passed to dask-jobqueue, such as queue=short or walltime=02:00:00; repeat "
             "for others.",
         ),
     ] = None

@@ -44,13 +44,19 @@ def quantity_parser(unit: str, *words: str) -> Callable[[str], Any]:
 
 
 def option(
-    *names: str, help: str, panel: str | None = None, metavar: str = "", unit: str = "", **more: Any
+    names: str,
+    help: str,
+    *,
+    panel: str | None = None,
+    metavar: str = "",
+    unit: str = "",
+    **more: Any,
 ) -> Any:
     """Return the declaration of an option; with a unit, of one that takes a quantity.
 
-    The placeholder of its value may stand behind its names, as in the help: ``"--like RECORDING"``.
+    The names stand with the placeholder of the value as in the help: ``"--out -o FILE"``.
     """
-    words = " ".join(names).split()
+    words = names.split()
     placeholders = [word for word in words if not word.startswith("-")]
     return typer.Option(
         *(word for word in words if word.startswith("-")),
@@ -114,7 +120,7 @@ Run = Annotated[
 ]
 StudyFile = Annotated[
     Path | None,
-    option("--study FILE", help="Study file with the parameters (see: driftwalk study new)."),
+    option("--study FILE", "Study file with the parameters (see: driftwalk study new)."),
 ]
 FlowFile = Annotated[
     Path | None,
@@ -145,12 +151,10 @@ FlowVariables = Annotated[
         show_default=False,
     ),
 ]
-Json = Annotated[bool, option("--json", help="Print the result as JSON on stdout.")]
+Json = Annotated[bool, option("--json", "Print the result as JSON on stdout.")]
 Threads = Annotated[
-    int | None, option("--threads N", min=1, help="Worker threads (default: all cores).")
+    int | None, option("--threads N", "Worker threads (default: all cores).", min=1)
 ]
-BodyOfLike = Annotated[str | None, option("--body NAME", help="Body of --like.")]
-Overwrite = Annotated[
-    bool, option("--overwrite", help="Move a finished run aside and start a new one.")
-]
-Replace = Annotated[bool, option("--overwrite", help="Replace a file that exists.")]
+BodyOfLike = Annotated[str | None, option("--body NAME", "Body of --like.")]
+Overwrite = Annotated[bool, option("--overwrite", "Move a finished run aside and start a new one.")]
+Replace = Annotated[bool, option("--overwrite", "Replace a file that exists.")]

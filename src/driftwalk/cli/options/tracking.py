@@ -29,40 +29,37 @@ class TrackingOptions:
         str,
         _found(
             "--markers FILE|aruco:DICT|blob",
-            help="Two-colour markers, coded tags, or single dark or bright objects.",
+            "Two-colour markers, coded tags, or single dark or bright objects.",
         ),
     ]
     camera: Annotated[
         Path | None,
-        _found("--camera FILE.toml", help="Lens and scale (from driftwalk camera calibrate)."),
+        _found("--camera FILE.toml", "Lens and scale (from driftwalk camera calibrate)."),
     ] = None
     tank: Annotated[
         float | None,
-        _found("--tank", help="Inner diameter of the tank, whose rim gives the scale.", unit="m"),
+        _found("--tank", "Inner diameter of the tank, whose rim gives the scale.", unit="m"),
     ] = None
     scale: Annotated[float | None, scale_option(_FINDING)] = None
     polarity: Annotated[
         str | None,
-        _found(
-            "--polarity dark|bright|both", help="Objects for --markers blob (default: detected)."
-        ),
+        _found("--polarity dark|bright|both", "Objects for --markers blob (default: detected)."),
     ] = None
     min_area_px: Annotated[
-        float | None, _found("--min-area-px <px2>", help="Smallest area for --markers blob.")
+        float | None, _found("--min-area-px <px2>", "Smallest area for --markers blob.")
     ] = None
     max_area_px: Annotated[
-        float | None, _found("--max-area-px <px2>", help="Largest area for --markers blob.")
+        float | None, _found("--max-area-px <px2>", "Largest area for --markers blob.")
     ] = None
     fps: Annotated[
-        float | None,
-        _found("--fps", help="Frames per second of a folder without times.csv.", unit="Hz"),
+        float | None, _found("--fps", "Frames per second of a folder without times.csv.", unit="Hz")
     ] = None
-    bodies: Annotated[int | None, _moving("--bodies N", help="Largest number of bodies.")] = None
+    bodies: Annotated[int | None, _moving("--bodies N", "Largest number of bodies.")] = None
     max_speed: Annotated[
         float | None,
         _moving(
             "--max-speed",
-            help="Fastest plausible speed; a faster jump starts a new track (default: tank width "
+            "Fastest plausible speed; a faster jump starts a new track (default: tank width "
             "in 1 s).",
             unit="m/s",
         ),
@@ -71,31 +68,28 @@ class TrackingOptions:
         float | None,
         _moving(
             "--lost-after",
-            help="End a track after this long without a detection (default: 1s).",
+            "End a track after this long without a detection (default: 1s).",
             unit="s",
         ),
     ] = None
     side: Annotated[
         float | None,
-        _moving("--side", help="Side of a block, to report which blocks are joined.", unit="m"),
+        _moving("--side", "Side of a block, to report which blocks are joined.", unit="m"),
     ] = None
     live: Annotated[
-        int | None, _sent("--live PORT", help="Port that sends JSON lines to TCP clients.")
+        int | None, _sent("--live PORT", "Port that sends JSON lines to TCP clients.")
     ] = None
     live_nmea: Annotated[
-        int | None,
-        _sent("--live-nmea PORT", help="Port that sends SwisTrack's NMEA to TCP clients."),
+        int | None, _sent("--live-nmea PORT", "Port that sends SwisTrack's NMEA to TCP clients.")
     ] = None
     live_host: Annotated[
         str,
         _sent(
-            "--live-host ADDRESS",
-            help="Address to listen on (default: loopback).",
-            show_default=False,
+            "--live-host ADDRESS", "Address to listen on (default: loopback).", show_default=False
         ),
     ] = "127.0.0.1"
     overlay: Annotated[
-        Path | None, option("--overlay OUT.mp4", help="Video to write, with the bodies drawn in.")
+        Path | None, option("--overlay OUT.mp4", "Video to write, with the bodies drawn in.")
     ] = None
 
     @property

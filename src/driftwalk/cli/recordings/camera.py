@@ -30,25 +30,21 @@ def calibrate(
             "Images of the board; in the first, the board lies at the height of the markers.",
         ),
     ],
-    out: Annotated[Path, option("--out", "-o FILE.toml", help="File to write.")],
-    squares: Annotated[
-        str, option("--squares COLUMNSxROWS", help="Squares of the board, such as 9x7.")
-    ],
+    out: Annotated[Path, option("--out -o FILE.toml", "File to write.")],
+    squares: Annotated[str, option("--squares COLUMNSxROWS", "Squares of the board, such as 9x7.")],
     square: Annotated[float, quantity_option("--square", "m", "Side of a square.")],
     board: Annotated[
-        Literal["chessboard", "charuco"], option("--board", help="Kind of the board.")
+        Literal["chessboard", "charuco"], option("--board", "Kind of the board.")
     ] = "chessboard",
     tag: Annotated[
         float | None, quantity_option("--tag", "m", "Side of a ChArUco board's tags.")
     ] = None,
     dictionary: Annotated[
-        str, option("--dictionary DICT", help="Dictionary of these tags.")
+        str, option("--dictionary DICT", "Dictionary of these tags.")
     ] = "DICT_4X4_50",
     no_lens: Annotated[
         bool,
-        option(
-            "--no-lens", help="Find only the plane; one image is enough, and lines stay straight."
-        ),
+        option("--no-lens", "Find only the plane; one image is enough, and lines stay straight."),
     ] = False,
     overwrite: Replace = False,
     json: Json = False,

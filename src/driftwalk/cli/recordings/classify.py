@@ -82,10 +82,9 @@ def classify(
     how: RecordingOptions,
     criteria: JoinCriteria,
     chirality: Annotated[
-        Literal["merged", "distinct"],
-        option("--chirality", help="Mirror images as one shape or two."),
+        Literal["merged", "distinct"], option("--chirality", "Mirror images as one shape or two.")
     ] = "merged",
-    out: Annotated[Path | None, option("--out", "-o FILE.nc", help="File for the result.")] = None,
+    out: Annotated[Path | None, option("--out -o FILE.nc", "File for the result.")] = None,
     overwrite: Replace = False,
     json: Json = False,
 ) -> None:

@@ -25,7 +25,7 @@ markers_app = typer.Typer(add_completion=False, cls=HelpGroup)
 @with_options(TrackingOptions, "source", "camera", "tank", "scale", "fps", "side")
 def teach(
     options: TrackingOptions,
-    out: Annotated[Path, option("--out", "-o FILE.toml", help="File to write.")],
+    out: Annotated[Path, option("--out -o FILE.toml", "File to write.")],
     overwrite: Replace = False,
 ) -> None:
     """Propose the two colours and the size of the markers from a few frames.

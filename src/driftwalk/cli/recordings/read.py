@@ -23,7 +23,7 @@ from driftwalk.core.study_keys import STUDY_KEYS
 @with_study_options(STUDY_KEYS, "side", "mass", "depth", file="none")
 def read(
     recording: RecordingFile,
-    out: Annotated[Path, option("--out", "-o FILE", help="File to write; ends in .nc or .csv.")],
+    out: Annotated[Path, option("--out -o FILE", "File to write; ends in .nc or .csv.")],
     how: RecordingOptions,
     given: StudyOptions,
     overwrite: Replace = False,

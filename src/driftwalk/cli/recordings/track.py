@@ -43,14 +43,13 @@ _SHOWN = {"duplicates": "doubled"}
 def track(
     options: TrackingOptions,
     out: Annotated[
-        Path | None,
-        option("--out", "-o FILE.nc", help="Recording to write; needed without --explain."),
+        Path | None, option("--out -o FILE.nc", "Recording to write; needed without --explain.")
     ] = None,
     explain: Annotated[
         int | None,
         option(
             "--explain FRAME",
-            help="Write a PNG of this frame that shows each candidate and why it was "
+            "Write a PNG of this frame that shows each candidate and why it was "
             "rejected, then exit.",
             min=0,
         ),

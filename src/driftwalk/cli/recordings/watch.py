@@ -25,9 +25,7 @@ _MOST_CLASSES = 6
 )
 def watch(
     options: TrackingOptions,
-    out: Annotated[
-        Path | None, option("--out", "-o FILE.nc", help="Recording to write as well.")
-    ] = None,
+    out: Annotated[Path | None, option("--out -o FILE.nc", "Recording to write as well.")] = None,
     overwrite: Replace = False,
 ) -> None:
     """Watch blocks assemble: poses, joins and the outcome class, as they happen.
