@@ -8,12 +8,7 @@ from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, wit
 from driftwalk.cli.options.shared import FlowVariables, FrameInterval, Json
 from driftwalk.cli.options.study import Side
 from driftwalk.cli.terminal.argument_names import to_options
-from driftwalk.cli.terminal.output import (
-    print_json,
-    print_next,
-    print_table,
-    print_warnings,
-)
+from driftwalk.cli.terminal.output import print_json, print_next, print_table, print_warnings
 
 SIDE_BY_SIDE = 5
 """Bodies shown as columns; more are shown as rows, with fewer numbers."""
