@@ -6,8 +6,6 @@ import sys
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from driftwalk.cli.options.shared import Json, argument, option
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import print_json, print_note, print_row
@@ -27,10 +25,9 @@ def export(
     ],
     to: Annotated[
         str,
-        typer.Option(
-            "--to",
-            metavar="|".join(TARGETS),
-            help="; ".join(f"{target.name}: {target.gives}" for target in TARGETS.values()) + ".",
+        option(
+            f"--to {'|'.join(TARGETS)}",
+            "; ".join(f"{target.name}: {target.gives}" for target in TARGETS.values()) + ".",
         ),
     ],
     out: Annotated[Path, option("--out -o DIR", "New or empty folder to write.")],

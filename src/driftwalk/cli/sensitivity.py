@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from driftwalk.cli.terminal.output import print_prediction
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.study_keys import SENSITIVITY_KEYS
 from driftwalk.core.units import parse_quantity
+from driftwalk.model import declared
 from driftwalk.schema.kinds.flow_series import flow_series_words
 
 if TYPE_CHECKING:
@@ -44,27 +45,18 @@ Vary = Annotated[
 ]
 
 
-class Axis(NamedTuple):
-    """An input that can be varied."""
-
-    key: str
-    """Key of the study that holds the list of its values."""
-    unit: str
-    """Unit of a number, empty for words."""
-    whole: bool = False
-
-
-AXES: Final[dict[str, Axis]] = {
-    "tank": Axis("sensitivity.tank_diameter_m", "m"),
-    "blocks": Axis("sensitivity.blocks", "1", whole=True),
-    "flow": Axis("sensitivity.flow", ""),
-    "latching": Axis("sensitivity.latching", ""),
-    "hidden-face-drag": Axis("sensitivity.hidden_face_drag", ""),
-    "drag-coefficient": Axis("sensitivity.drag_coefficient", "1"),
-    "force-std": Axis("sensitivity.force_std_N", "N"),
+AXES: Final = {
+    "tank": "sensitivity.tank_diameter_m",
+    "blocks": "sensitivity.blocks",
+    "flow": "sensitivity.flow",
+    "latching": "sensitivity.latching",
+    "hidden-face-drag": "sensitivity.hidden_face_drag",
+    "drag-coefficient": "sensitivity.drag_coefficient",
+    "force-std": "sensitivity.force_std_N",
 }
+"""From an input that can be varied to the key of the study that holds the list of its values."""
 MOST_VALUES: Final = 1_000_000
-VARY_KEYS: Final = {f"vary {name}": axis.key for name, axis in AXES.items()}
+VARY_KEYS: Final = {f"vary {name}": key for name, key in AXES.items()}
 """From what an error calls the option to the key that it sets."""
 
 
@@ -192,37 +184,38 @@ def vary_overrides(given: Sequence[str]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for text in given:
         name, sign, values = text.partition("=")
-        axis = AXES.get(name.strip().replace("_", "-"))
-        if axis is None or not sign:
+        key = AXES.get(name.strip().replace("_", "-"))
+        if key is None or not sign:
             raise InputError(
                 f"--vary {text}: expected NAME=VALUES with a name out of {', '.join(AXES)}"
             )
-        if axis.key in found:
+        if key in found:
             raise InputError(f"--vary {text}: {name} is varied twice; name all values at once")
         words = [word.strip() for word in values.split(",")]
         if not all(words):
             raise InputError(f"--vary {text}: a value is missing after '{name}='")
         try:
-            found[axis.key] = [value for word in words for value in _values(word, axis)]
+            found[key] = [value for word in words for value in _values(word, key)]
         except ConfigurationError as error:
             raise InputError(f"--vary {text}: {error}") from error
     return found
 
 
-def _values(word: str, axis: Axis) -> Iterator[Any]:
+def _values(word: str, key: str) -> Iterator[Any]:
     """Return the values of one word: itself, a number, or the numbers of a range."""
-    if not axis.unit:
+    quantity = declared(key).quantity
+    if quantity is None:
         yield word
         return
     parts = word.split(":")
-    numbers = [parse_quantity(part, axis.unit) for part in parts]
+    numbers = [parse_quantity(part, quantity.unit) for part in parts]
     if len(numbers) == 3:
-        numbers = _range(*numbers, parts=parts, unit=axis.unit)
+        numbers = _range(*numbers, parts=parts, unit=quantity.unit)
     elif len(numbers) != 1:
         raise ConfigurationError(f"expected a number or FROM:TO:STEP, got '{word}'")
     for number in numbers:
         # The study refuses a part of a block.
-        yield int(number) if axis.whole and number.is_integer() else number
+        yield int(number) if quantity.whole and number.is_integer() else number
 
 
 def _range(
