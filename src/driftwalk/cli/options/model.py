@@ -73,11 +73,12 @@ class KnownModel(NamedTuple):
 
     def made_with(self, name: str | None, options: dict[str, Any]) -> MotionModel:
         """Return the model made again, with values or ranges for parameters that it then has."""
-        from driftwalk.motion import motion_model
+        from driftwalk.motion import is_family_name, motion_model
 
+        name = name or self.model.name
         clearance = getattr(self.model, "clearance", 0.0)
-        kept = {"clearance": clearance} if clearance else {}
-        return motion_model(name or self.model.name, **{**kept, **options})
+        kept = {"clearance": clearance} if clearance and is_family_name(name) else {}
+        return motion_model(name, **{**kept, **options})
 
 
 def known_model(name: str | None, choices: Sequence[str] | None, place: Path | None) -> KnownModel:
