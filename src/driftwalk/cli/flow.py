@@ -10,6 +10,7 @@ from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.shared import FlowVariables, FrameInterval, Json, Replace, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
+from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import (
     print_json,
     print_next,
@@ -181,7 +182,8 @@ def _report_file(field: xr.Dataset, out: Path, *, json: bool) -> None:
     if json:
         print_json({"out": out, **facts})
         return
-    print_warnings(facts["warnings"])
+    for warning in facts["warnings"]:
+        print_note(f"warning: {to_options(warning)}")
     print_note(
         f"wrote {out}: {facts['columns']} x {facts['rows']} nodes from a file, "
         f"{100 * facts['measured_share']:.0f} % of them measured, the rest filled or outside"

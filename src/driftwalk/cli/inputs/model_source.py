@@ -198,7 +198,7 @@ def _with_sections(study: Study, path: Path, folder: Path) -> Study:
 
 @dataclass(frozen=True)
 class ModelSource:
-    """What simulate, play and study recover are about: the model of a run, or another one.
+    """The model that simulate, play and study recover take: found by a run, or named.
 
     Attributes
     ----------

@@ -45,23 +45,12 @@ _CIRCLE_ROWS: list[tuple[str, str, float]] = [
     ("circle of centres: radius [cm]", "radius_m", 100),
     ("  rim visited [%]", "sectors_visited_share", 100),
 ]
-_FIELD_ROWS: list[tuple[str, str, float]] = [
-    ("file", "source", 1),
-    ("method", "method", 1),
-    ("flow field", "nodes", 1),
-    ("frames", "frames", 1),
-    ("x from [cm]", "x_min_m", 100),
-    ("x to [cm]", "x_max_m", 100),
-    ("y from [cm]", "y_min_m", 100),
-    ("y to [cm]", "y_max_m", 100),
-    ("measured nodes [%]", "measured_share", 100),
-    ("speed, mean [cm/s]", "speed_mean_m_s", 100),
-    ("speed, largest [cm/s]", "speed_max_m_s", 100),
+_OF_A_RECORDING: list[tuple[str, str, float]] = [
     ("tracks", "tracks_used", 1),
     ("samples", "samples_used", 1),
     ("standard error, median [cm/s]", "standard_error_median_m_s", 100),
 ]
-"""Rows of a flow field; the last three are of one that was taken from a recording."""
+"""Rows of a flow field that was taken from a recording."""
 _TRACKED = ["ambiguous_share"]
 _BRIEF = [
     *("samples", "duration_s", "rate_Hz", "gaps", "speed_mean_m_s", "position_noise_m"),
@@ -148,10 +137,29 @@ def _print_field(described: dict[str, Any], *, json: bool) -> None:
     if json:
         print_json(described)
         return
-    shown = {**described, "nodes": f"{described['columns']} x {described['rows']} nodes"}
-    rows = [[label, _scaled(shown[key], by)] for label, key, by in _FIELD_ROWS if key in shown]
-    print_table(rows)
-    print_warnings(described["warnings"])
+    print_table(
+        [
+            ["file", described["source"] or "-"],
+            ["method", described["method"] or "-"],
+            ["flow field", f"{described['columns']} x {described['rows']} nodes"],
+            ["frames", described["frames"]],
+            *(
+                [f"{axis} {word} [cm]", 100 * described[f"{axis}_{side}_m"]]
+                for axis in ("x", "y")
+                for word, side in (("from", "min"), ("to", "max"))
+            ),
+            ["measured nodes [%]", 100 * described["measured_share"]],
+            ["speed, mean [cm/s]", 100 * described["speed_mean_m_s"]],
+            ["speed, largest [cm/s]", 100 * described["speed_max_m_s"]],
+            *(
+                [label, factor * described[key]]
+                for label, key, factor in _OF_A_RECORDING
+                if key in described
+            ),
+        ]
+    )
+    for warning in described["warnings"]:
+        print_note(f"warning: {to_options(warning)}")
 
 
 def _print_file(described: dict[str, Any]) -> None:

@@ -294,7 +294,7 @@ def _following(found: xr.Dataset, kind: str) -> list[str]:
 
 
 def print_warnings(texts: Iterable[str | None]) -> None:
-    """Print warnings on stderr; None stands for no warning."""
+    """Print warnings on stderr, and skip each None."""
     for text in filter(None, texts):
         print_note(f"warning: {text}")
 
