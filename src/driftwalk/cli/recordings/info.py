@@ -158,8 +158,7 @@ def _print_field(described: dict[str, Any], *, json: bool) -> None:
             ),
         ]
     )
-    for warning in described["warnings"]:
-        print_note(f"warning: {to_options(warning)}")
+    print_warnings(described["warnings"])
 
 
 def _print_file(described: dict[str, Any]) -> None:
