@@ -107,7 +107,7 @@ def test_a_report_is_made_quickly_and_always_the_same(run: Path, tmp_path: Path)
     # Processor time: what else the machine does is not counted.
     begin = time.process_time()
     report_of(run, tmp_path / "a.html")
-    assert time.process_time() - begin < 10.0
+    assert time.process_time() - begin < 30.0
     report_of(run, tmp_path / "b.html")
     assert (tmp_path / "a.html").read_bytes() == (tmp_path / "b.html").read_bytes()
 
