@@ -4,12 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-from driftwalk.cli.inputs.model_source import (
-    RUN_NAMES,
-    refuse_found,
-    source_from_flow,
-    source_from_run,
-)
+from driftwalk.cli.inputs.model_source import RUN_NAMES, assembly_source
 from driftwalk.cli.inputs.recordings import opening_note
 from driftwalk.cli.options.run import RunOptions, with_run_options
 from driftwalk.cli.options.shared import FlowFile, Run, option
@@ -45,11 +40,8 @@ def assemble(
     from driftwalk.runs import AssemblyWork
 
     _check_film(film)
-    if run is None:
-        source = source_from_flow(given, flow)
-    else:
-        refuse_found(run, given.overrides, also=[] if given.file is None else ["--study"])
-        source = source_from_run(run, flow, given)
+    refused = [] if given.file is None else ["--study"]
+    source = assembly_source(run, flow, given, refused=refused)
     work = AssemblyWork(
         source.study, source.flow, source.uncertainty, source.inputs, options.threads, film
     )

@@ -10,14 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
 
-from driftwalk.cli.inputs.model_source import (
-    RUN_NAMES,
-    Source,
-    load_flow_for,
-    refuse_found,
-    source_from_flow,
-    source_from_run,
-)
+from driftwalk.cli.inputs.model_source import RUN_NAMES, Source, assembly_source, load_flow_for
 from driftwalk.cli.inputs.recordings import opening_note
 from driftwalk.cli.options.run import RunOptions, with_run_options
 from driftwalk.cli.options.shared import PANEL, FlowFile, Run, option
@@ -83,11 +76,7 @@ def sensitivity(
     from driftwalk.runs import SensitivityWork
 
     given = given.and_also(vary_overrides(vary or []), keys=VARY_KEYS)
-    if run is None:
-        source = source_from_flow(given, flow)
-    else:
-        refuse_found(run, given.overrides)
-        source = source_from_run(run, flow, given)
+    source = assembly_source(run, flow, given)
     named = VARY_KEYS["vary flow"] in given.overrides
     if run is not None and not named and given.file is None and source.study.sensitivity.flow:
         # A run may be someone else's: it does not say which files of this machine are read.

@@ -65,21 +65,25 @@ class Source:
     not_drawn: str | None = None
 
 
-def source_from_flow(given: StudyOptions, flow_file: Path | None) -> Source:
-    """Return the model of a study, in a flow field from a file.
-
-    Parameters
-    ----------
-    given : StudyOptions
-        The study.
-    flow_file : Path or None
-        The flow field.
+def assembly_source(
+    run: Path | None, flow_file: Path | None, given: StudyOptions, *, refused: Sequence[str] = ()
+) -> Source:
+    """Return the model of a run, or of a study in a flow field.
 
     Raises
     ------
     InputError
-        When there is no flow field, or a file or option is wrong.
+        When a run is given with an option for what it has found, or with one that is `refused`;
+        when there is no flow field, or a file or option is wrong.
     """
+    if run is None:
+        return _source_from_flow(given, flow_file)
+    refuse_found(run, given.overrides, also=refused)
+    return _source_from_run(run, flow_file, given)
+
+
+def _source_from_flow(given: StudyOptions, flow_file: Path | None) -> Source:
+    """Return the model of a study, in a flow field from a file."""
     from driftwalk.conditions import unstated_warning
 
     if flow_file is None:
@@ -124,24 +128,11 @@ def refuse_found(folder: Path, overrides: Mapping[str, Any], *, also: Sequence[s
         )
 
 
-def source_from_run(folder: Path, flow_file: Path | None, given: StudyOptions) -> Source:
-    """Return the model of the block that a run has found, in its flow field.
+def _source_from_run(folder: Path, flow_file: Path | None, given: StudyOptions) -> Source:
+    """Return the model of the block that a run has found, in its flow field or another one.
 
-    Parameters
-    ----------
-    folder : Path
-        The run directory of a fit, a calibration or a comparison of models.
-    flow_file : Path or None
-        Another flow field.
-    given : StudyOptions
-        The options, and a study file whose sections [assembly] and [sensitivity] take the place of
-        the run's, and which may say how a flow series is met; the model is the run's.
-
-    Raises
-    ------
-    InputError
-        When the run cannot be used, the study file says another model, or a file or option is
-        wrong.
+    The sections [assembly] and [sensitivity] of a study file take the place of the run's, and it
+    may say how a flow series is met; the model is the run's.
     """
     from driftwalk.runs import read_found
 
