@@ -6,21 +6,12 @@ import contextlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from driftwalk.cli.inputs.assembly_source import RUN_HELP
-from driftwalk.cli.inputs.found_source import FoundSource, open_run
+from driftwalk.cli.inputs.model_source import ModelSource, flow_of_block, open_source
 from driftwalk.cli.inputs.other_files import explained
-from driftwalk.cli.options.model import (
-    KnownModel,
-    ModelName,
-    PlayedParameters,
-    playable_model,
-)
-from driftwalk.cli.options.shared import FlowFile
+from driftwalk.cli.options.model import KnownModel, ModelName, PlayedParameters, playable_model
+from driftwalk.cli.options.shared import FlowFile, Run, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal.answer import print_warnings
-from driftwalk.cli.terminal.output import print_note
+from driftwalk.cli.terminal.output import print_note, print_warnings
 from driftwalk.cli.view import Host, Open, Port, show
 from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import ASSEMBLY_KEYS
@@ -29,6 +20,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
+    from driftwalk.runs import FoundRun
     from driftwalk.viewer import Source
 
 FLOW_SEED = 1
@@ -38,32 +30,18 @@ BLOCKS = 4
 @with_study_options(ASSEMBLY_KEYS, "tank_diameter", "blocks", "seed", "flow_repeat")
 def play(
     given: StudyOptions,
-    run: Annotated[
-        Path | None, typer.Argument(metavar="RUN", help=RUN_HELP, show_default=False)
-    ] = None,
+    run: Run = None,
     flow: FlowFile = None,
     model: ModelName = None,
     parameters: PlayedParameters = None,
     recording: Annotated[
-        Path | None,
-        typer.Option(
-            "--recording",
-            metavar="FILE",
-            help="Recording to compare the steps with.",
-            show_default=False,
-        ),
+        Path | None, option("--recording FILE", "Recording to compare the steps with.")
     ] = None,
-    body: Annotated[
-        str | None,
-        typer.Option("--body", help="Body of the recording.", show_default=False),
-    ] = None,
+    body: Annotated[str | None, option("--body", "Body of the recording.")] = None,
     live: Annotated[
         int | None,
-        typer.Option(
-            "--live",
-            metavar="PORT",
-            help="Port that publishes the tank as a tracker's stream; 0 for a free port.",
-            show_default=False,
+        option(
+            "--live PORT", "Port that publishes the tank as a tracker's stream; 0 for a free port."
         ),
     ] = None,
     port: Port = 8765,
@@ -80,46 +58,42 @@ def play(
     from driftwalk.viewer import PlaySource, hello_line, require_server
 
     require_server()
-    found = None if run is None else open_run(run, given, model)
-    if model is not None or (found is not None and not found.is_block):
+    source = open_source(run, given, model)
+    if not source.is_block:
         if live is not None:
             raise InputError("--live publishes a tank of blocks: leave it out with another model")
         known = playable_model(model, parameters, run)
-        shown = _of_model(known, given, found, flow, recording, body)
+        shown = _of_model(known, source, flow, recording, body)
         show(shown, host=host, port=port, open=open)
         return
     if parameters:
         raise InputError("--parameter belongs to a --model")
+    found = source.found
     bundled = not given.states_tank and flow is None and found is None
     if found is not None:
-        chosen, field = found.block(flow)
+        chosen = source.study()
+        field = flow_of_block(found, chosen, flow)
         beside, body = _of_run(found, recording, chosen, body)
-        print_warnings(found.found.warnings)
+        print_warnings(found.warnings)
     else:
         chosen = given.over(_bundled(), base="the bundled example") if bundled else given.study()
         field = _flow(flow, chosen, bundled=bundled)
         beside = _recording(recording, chosen, body, bundled=bundled)
-    source = PlaySource(
-        chosen,
-        field,
-        recording=beside,
-        body=body,
-        seed=chosen.assembly.seed,
-    )
+    seed = chosen.assembly.seed
+    tank = PlaySource(chosen, field, recording=beside, body=body, seed=seed)
     with contextlib.ExitStack() as open_things:
         if live is not None:
             from driftwalk.track import LiveServer
 
-            server = open_things.enter_context(LiveServer(live, hello=hello_line(source.tank)))
-            source.stream_to(server)
+            server = open_things.enter_context(LiveServer(live, hello=hello_line(tank.tank)))
+            tank.stream_to(server)
             print_note(f"the tank as a tracker's stream on {server.host}, port {server.port}")
-        show(source, host=host, port=port, open=open)
+        show(tank, host=host, port=port, open=open)
 
 
 def _of_model(
     known: KnownModel,
-    given: StudyOptions,
-    found: FoundSource | None,
+    source: ModelSource,
     flow: Path | None,
     recording: Path | None,
     body: str | None,
@@ -128,20 +102,19 @@ def _of_model(
     from driftwalk.conditions import study_for
     from driftwalk.viewer import ModelPlaySource
 
-    _refuse_blocks(given)
-    chosen, beside = given.study() if found is None else found.study(), None
+    if "assembly.blocks" in source.given.overrides:
+        raise InputError("--blocks: the page of a --model has a slider for its bodies")
+    chosen, found, beside = source.study(), source.found, None
     if found is not None:
         beside, body = _of_run(found, recording, chosen, body)
     elif recording is not None:
-        beside = _recording(recording, chosen, body, bundled=not given.states_tank)
+        beside = _recording(recording, chosen, body, bundled=not source.given.states_tank)
         chosen = study_for([] if beside is None else [beside], chosen, body=body)
-    field = None
-    if found is not None:
-        field = found.flow_for(known.model, chosen, flow)
-    elif flow is not None or known.model.needs_flow:
-        field = _flow(flow, chosen, bundled=False)
-    for warning in known.warnings:
-        print_note(f"warning: {warning}")
+    if found is None and (flow is not None or known.model.needs_flow):
+        field: xr.Dataset | None = _flow(flow, chosen, bundled=False)
+    else:
+        field = source.flow_for(known.model, chosen, flow)
+    print_warnings(known.warnings)
     return ModelPlaySource(
         known.model,
         known.values,
@@ -154,17 +127,12 @@ def _of_model(
 
 
 def _of_run(
-    found: FoundSource, path: Path | None, study: Study, body: str | None
+    found: FoundRun, path: Path | None, study: Study, body: str | None
 ) -> tuple[xr.Dataset | None, str | None]:
     """Return the recording to compare with, a given one or that of the run, and its body."""
     if path is not None:
         return _recording(path, study, body, bundled=False), body
-    return found.found.recording(), body or found.found.body
-
-
-def _refuse_blocks(given: StudyOptions) -> None:
-    if "assembly.blocks" in given.overrides:
-        raise InputError("--blocks: the page of a --model has a slider for its bodies")
+    return found.recording(), body or found.body
 
 
 def _bundled() -> Study:

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.cli.options.tracking import TrackingOptions
 from driftwalk.cli.terminal.output import print_note
-from driftwalk.cli.tracking.parts import TrackingParts
 from driftwalk.core.files.file_names import text_of_name
 
 if TYPE_CHECKING:
+    from driftwalk.cli.recordings.tracking_parts import TrackingParts
     from driftwalk.track import AssemblySeen, Camera, Frame, LiveServer, SeenEvent, TrackState
 
 VERSION: Final = 1

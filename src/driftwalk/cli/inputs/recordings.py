@@ -1,16 +1,19 @@
-"""The recordings of a run: read as the study file says, with the options of the command over it."""
+"""Recordings and motions that a command names, read as the study file and the options say."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
-from driftwalk.cli.inputs.assembly_source import load_flow_for
+from driftwalk.cli.inputs.model_source import load_flow_for
 from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.recording import RecordingOptions
 from driftwalk.cli.options.study import TANK, StudyOptions, option_name
-from driftwalk.cli.terminal.output import print_note
+from driftwalk.cli.terminal.output import print_note, print_warnings
+from driftwalk.core.errors import InputError
+from driftwalk.core.files.file_names import text_of_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -18,6 +21,7 @@ if TYPE_CHECKING:
     from driftwalk.conditions import About, ReadRecordings
     from driftwalk.conditions.reading import Bodies
     from driftwalk.model import Study
+    from driftwalk.motion import MotionModel
 
 
 FIT_TANK: Final = 0.5
@@ -25,11 +29,7 @@ FIT_TANK: Final = 0.5
 
 
 def read_for_run(
-    paths: Sequence[Path],
-    given: StudyOptions,
-    how: RecordingOptions,
-    *,
-    bodies: Bodies = "named",
+    paths: Sequence[Path], given: StudyOptions, how: RecordingOptions, *, bodies: Bodies = "named"
 ) -> ReadRecordings:
     """Read the recordings of a fit or a calibration, and make its study.
 
@@ -63,50 +63,40 @@ def read_for_run(
         )
 
 
-class ReadForModel(NamedTuple):
-    """A recording and a flow, for a run that simulates motion models."""
-
-    read: ReadRecordings
-    flow: xr.Dataset | None
-    """The given flow field."""
-    inputs: dict[str, Path]
-    """The files that were read, by their role."""
-
-
-def read_with_flow(
-    recording: Path,
+def read_for_models(
+    path: Path,
     flow: Path | None,
     given: StudyOptions,
     how: RecordingOptions,
-    *,
-    bodies: Bodies = "named",
-) -> ReadForModel:
-    """Read one recording, and the flow field where one is given.
+    models: Sequence[str | MotionModel],
+) -> tuple[dict[str, Any], Callable[[], None]]:
+    """Read one recording, and the flow field where one is given, for a run that simulates models.
 
-    Parameters
-    ----------
-    recording : Path
-        The recording.
-    flow : Path or None
-        The flow field.
-    given : StudyOptions
-        The study.
-    how : RecordingOptions
-        How to read the recording.
-    bodies : {"named", "all"}
-        As in `read_for_run`.
+    Returns what the run's work is made of, by its keywords; and what says, when the run begins,
+    which body and tank it takes. All bodies are kept where a model feels the others.
 
     Raises
     ------
     InputError
         As `read_for_run`, and when the flow field cannot be read.
     """
-    read = read_for_run([recording], given, how, bodies=bodies)
-    inputs = {"recording": recording, "flow": flow, "study": given.file}
-    field = None if flow is None else load_flow_for(flow, read.study)
-    return ReadForModel(
-        read, field, {role: path for role, path in inputs.items() if path is not None}
-    )
+    from driftwalk.conditions import jump_warnings
+    from driftwalk.motion import feels_others
+
+    others = any(map(feels_others, models))
+    read = read_for_run([path], given, how, bodies="all" if others else "named")
+    recording, study = read.trajectories[0], read.study
+    inputs = {"recording": path, "flow": flow, "study": given.file}
+    about: About = "block" if "block" in models else "tank"
+    jumps = jump_warnings(recording, read.body)
+    work = {
+        "recording": recording,
+        "study": study,
+        "flow": None if flow is None else load_flow_for(flow, study),
+        "body": read.body if others else how.body,
+        "inputs": {role: path for role, path in inputs.items() if path is not None},
+    }
+    return work, opening_note(study, given, how=how, about=about, warnings=jumps)
 
 
 def words_to_fit(trajectory: xr.Dataset, described: Mapping[str, Any] | None = None) -> list[str]:
@@ -210,7 +200,71 @@ def opening_note(
 
     def say() -> None:
         print_note(line)
-        for warning in warnings:
-            print_note(f"warning: {warning}")
+        print_warnings(warnings)
 
     return say
+
+
+def load_motion(path: Path, how: RecordingOptions) -> xr.Dataset:
+    """Load a `trajectory` from a recording, or from a file that `driftwalk simulate` wrote.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    how : RecordingOptions
+        How to read a recording, and which replicate of a simulation; a simulation says all else of
+        itself.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read, has no such replicate, or the body never moves.
+    """
+    from driftwalk.conditions import require_motion
+
+    simulated = load_simulation(path, replicate=how.replicate or 0)
+    if simulated is not None:
+        return simulated
+    # The replicate is that of the other motion.
+    recording = replace(how, replicate=None).load(path)
+    require_motion(recording, body=how.body, where=path)
+    return recording
+
+
+def load_simulation(path: Path, *, replicate: int = 0) -> xr.Dataset | None:
+    """Load a `trajectory` from a file that `driftwalk simulate` wrote; None of any other file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    replicate : int
+        Which replicate, counted from 0.
+
+    Raises
+    ------
+    InputError
+        When it has no such replicate.
+    """
+    simulation = open_kind(path, "simulation")
+    if simulation is None:
+        return None
+    count = simulation.sizes["replicate"]
+    if not 0 <= replicate < count:
+        raise InputError(
+            f"{path}: no replicate {replicate}; it has {count}, counted from 0 (--replicate)"
+        )
+    chosen = simulation[["x", "y", "theta"]].isel(replicate=replicate, drop=True)
+    return chosen.assign_attrs(kind="trajectory", source=text_of_name(path.name), simulated="yes")
+
+
+def open_kind(path: Path, kind: str) -> xr.Dataset | None:
+    """Return the dataset of this kind that a file of driftwalk holds, None of any other file."""
+    from driftwalk.schema.stores.contents import check_contents
+    from driftwalk.schema.stores.netcdf import kind_of_file, open_netcdf
+
+    # Damaged, or no NetCDF: the loaders of recordings say what is wrong.
+    if not path.is_file() or kind_of_file(path) != kind:
+        return None
+    return check_contents(open_netcdf(path), path)

@@ -6,11 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path, PurePath
 from typing import Annotated, Any
 
-import typer
-
-from driftwalk.cli.options.shared import Json
-from driftwalk.cli.terminal.answer import print_warnings
-from driftwalk.cli.terminal.output import print_json, printable
+from driftwalk.cli.options.shared import Json, argument, option
+from driftwalk.cli.terminal.output import print_json, print_warnings, printable
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.run_layout import MANIFEST_FILE, faults_of, state_of
 from driftwalk.core.provenance import read_manifest, refuse_other_version
@@ -20,12 +17,9 @@ from driftwalk.schema.stores.netcdf import is_netcdf, open_netcdf
 
 
 def cite(
-    run: Annotated[
-        Path,
-        typer.Argument(metavar="RUN", help="Directory of a finished run, or a simulation (.nc)."),
-    ],
+    run: Annotated[Path, argument("RUN", "Directory of a finished run, or a simulation (.nc).")],
     bibtex_entries: Annotated[
-        bool, typer.Option("--bibtex", help="Print the program and the paper for BibTeX.")
+        bool, option("--bibtex", "Print the program and the paper for BibTeX.")
     ] = False,
     json: Json = False,
 ) -> None:

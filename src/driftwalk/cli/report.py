@@ -7,28 +7,20 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import typer
-
-from driftwalk.cli.inputs.motion import load_simulation
+from driftwalk.cli.inputs.recordings import load_simulation
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import Replace
-from driftwalk.cli.terminal.answer import print_warnings
-from driftwalk.cli.terminal.output import print_note, require_place
+from driftwalk.cli.options.shared import Replace, argument, option
+from driftwalk.cli.terminal.output import print_note, print_warnings, require_place
 
 
 @with_recording_options
 def report(
     runs: Annotated[
         list[Path],
-        typer.Argument(
-            metavar="RUN...",
-            help="Run directories, finished or not, recordings, or simulations.",
-        ),
+        argument("RUN...", "Run directories, finished or not, recordings, or simulations."),
     ],
     how: RecordingOptions,
-    out: Annotated[
-        Path, typer.Option("--out", "-o", metavar="FILE", help="HTML file to write.")
-    ] = Path("report.html"),
+    out: Annotated[Path, option("--out -o FILE", "HTML file to write.")] = Path("report.html"),
     overwrite: Replace = False,
 ) -> None:
     """Write a report of runs or recordings: one HTML file that loads nothing from anywhere.

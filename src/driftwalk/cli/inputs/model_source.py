@@ -1,4 +1,4 @@
-"""Where a command on self-assembly takes its model from: a calibration, or a study and a flow."""
+"""Where a command takes its model from: a finished run, or a study and a flow field."""
 
 from __future__ import annotations
 
@@ -16,17 +16,13 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
+    from driftwalk.motion import MotionModel
+    from driftwalk.runs import FoundRun
 
-FOUND_BY_A_RUN: Final = (
-    "forces.drag_coefficient",
-    "forces.force_std_N",
-    "forces.force_interval_s",
-)
-SEARCHED: Final = FOUND_BY_A_RUN[:2]
+
+SEARCHED: Final = ("forces.drag_coefficient", "forces.force_std_N")
 """Parameters that a run finds: a study file may hold any value for them."""
-RUN_HELP: Final = (
-    "Run directory of a finished fit, calibration or comparison of models, or its dataset."
-)
+FOUND_BY_A_RUN: Final = (*SEARCHED, "forces.force_interval_s")
 CONNECTOR: Final = ("assembly.connector_distance_m", "assembly.connector_axis_rad")
 """Parameters of the latching rule "connector" alone."""
 RUN_NAMES: Final = (
@@ -69,21 +65,25 @@ class Source:
     not_drawn: str | None = None
 
 
-def source_from_flow(given: StudyOptions, flow_file: Path | None) -> Source:
-    """Return the model of a study, in a flow field from a file.
-
-    Parameters
-    ----------
-    given : StudyOptions
-        The study.
-    flow_file : Path or None
-        The flow field.
+def assembly_source(
+    run: Path | None, flow_file: Path | None, given: StudyOptions, *, refused: Sequence[str] = ()
+) -> Source:
+    """Return the model of a run, or of a study in a flow field.
 
     Raises
     ------
     InputError
-        When there is no flow field, or a file or option is wrong.
+        When a run is given with an option for what it has found, or with one that is `refused`;
+        when there is no flow field, or a file or option is wrong.
     """
+    if run is None:
+        return _source_from_flow(given, flow_file)
+    refuse_found(run, given.overrides, also=refused)
+    return _source_from_run(run, flow_file, given)
+
+
+def _source_from_flow(given: StudyOptions, flow_file: Path | None) -> Source:
+    """Return the model of a study, in a flow field from a file."""
     from driftwalk.conditions import unstated_warning
 
     if flow_file is None:
@@ -128,24 +128,11 @@ def refuse_found(folder: Path, overrides: Mapping[str, Any], *, also: Sequence[s
         )
 
 
-def source_from_run(folder: Path, flow_file: Path | None, given: StudyOptions) -> Source:
-    """Return the model of the block that a run has found, in its flow field.
+def _source_from_run(folder: Path, flow_file: Path | None, given: StudyOptions) -> Source:
+    """Return the model of the block that a run has found, in its flow field or another one.
 
-    Parameters
-    ----------
-    folder : Path
-        The run directory of a fit, a calibration or a comparison of models.
-    flow_file : Path or None
-        Another flow field.
-    given : StudyOptions
-        The options, and a study file whose sections [assembly] and [sensitivity] take the place of
-        the run's, and which may say how a flow series is met; the model is the run's.
-
-    Raises
-    ------
-    InputError
-        When the run cannot be used, the study file says another model, or a file or option is
-        wrong.
+    The sections [assembly] and [sensitivity] of a study file take the place of the run's, and it
+    may say how a flow series is met; the model is the run's.
     """
     from driftwalk.runs import read_found
 
@@ -198,3 +185,83 @@ def _with_sections(study: Study, path: Path, folder: Path) -> Study:
             "flow": study.flow.model_copy(update=flow),
         }
     )
+
+
+@dataclass(frozen=True)
+class ModelSource:
+    """The model that simulate, play and study recover take: found by a run, or named.
+
+    Attributes
+    ----------
+    given : StudyOptions
+        The options and the study file.
+    named : str or None
+        The motion model that is named.
+    folder : Path or None
+        The run directory.
+    found : FoundRun or None
+        What the run has found.
+    """
+
+    given: StudyOptions
+    named: str | None
+    folder: Path | None
+    found: FoundRun | None
+
+    @property
+    def is_block(self) -> bool:
+        """Whether the model is the block in stirred water."""
+        return self.named is None and (self.found is None or self.found_block)
+
+    @property
+    def found_block(self) -> bool:
+        """Whether there is a run, and it is about the block."""
+        from driftwalk.motion import BlockModel
+
+        return self.found is not None and self.found.model == BlockModel.name
+
+    def study(self) -> Study:
+        """Return the study of the run, where it has one, with the options over it."""
+        if self.found is None:
+            return self.given.study()
+        if self.found_block:
+            own = self.found.block_study()
+        elif self.given.file is not None or not self.found.has_study:
+            return self.given.study()
+        else:
+            own = self.found.study()
+        return self.given.over(own, base=f"the study of {self.folder}")
+
+    def flow_for(self, model: MotionModel, study: Study, flow: Path | None) -> xr.Dataset | None:
+        """Return the flow for a model: a given one, that of the run if it is used, or None."""
+        if flow is not None:
+            return load_flow_for(flow, study)
+        return self.found.flow(study) if self.found is not None and model.needs_flow else None
+
+
+def flow_of_block(found: FoundRun, study: Study, flow: Path | None) -> xr.Dataset:
+    """Return the flow for the block that a run has found: a given one, or that of the run."""
+    return found.flow(found.block_study()) if flow is None else load_flow_for(flow, study)
+
+
+def open_source(folder: Path | None, given: StudyOptions, model: str | None) -> ModelSource:
+    """Return what the user has named as the model: a run, a motion model, or both.
+
+    Raises
+    ------
+    InputError
+        When the run cannot be used, or an option contradicts it.
+    """
+    from driftwalk.runs import read_found
+
+    if folder is None:
+        return ModelSource(given, model, None, None)
+    found = read_found(folder)
+    source = ModelSource(given, model, folder, found)
+    # The values of another model hold in any study; those of the block belong to its own.
+    own = source.found_block and given.file is not None
+    refuse_found(folder, given.overrides, also=["--study"] if own else [])
+    # A comparison of models holds values for the block and for others.
+    if model is not None and "model" not in found.found.dims and source.found_block:
+        raise InputError(f"{folder} is about the block, and not about {model}: leave out --model")
+    return source

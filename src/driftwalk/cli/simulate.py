@@ -6,22 +6,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import numpy as np
-import typer
 
-from driftwalk.cli.inputs.assembly_source import RUN_HELP, load_flow_for
-from driftwalk.cli.inputs.found_source import FoundSource, open_run
-from driftwalk.cli.inputs.study_recording import opening_note
-from driftwalk.cli.options.model import (
-    KnownModel,
-    ModelName,
-    ParameterValues,
-    known_model,
-)
+from driftwalk.cli.inputs.model_source import ModelSource, flow_of_block, open_source
+from driftwalk.cli.inputs.recordings import opening_note
+from driftwalk.cli.options.model import KnownModel, ModelName, ParameterValues, known_model
 from driftwalk.cli.options.recording import RecordingOptions
-from driftwalk.cli.options.shared import Json, Replace, flow_of_run
+from driftwalk.cli.options.shared import BodyOfLike, Json, Replace, Run, flow_of_run, option
 from driftwalk.cli.options.study import StudyOptions, option_name, with_study_options
-from driftwalk.cli.terminal.answer import print_report_next, print_warnings
-from driftwalk.cli.terminal.output import print_json, print_next, print_note, require_place
+from driftwalk.cli.terminal.output import (
+    print_json,
+    print_next,
+    print_note,
+    print_report_next,
+    print_warnings,
+    require_place,
+)
 from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import STUDY_KEYS
 from driftwalk.core.text.json_text import parse_json
@@ -47,44 +46,32 @@ OF_THE_BLOCK: Final = (
     *("position_noise", "orientation_noise", "replicates", "seed", "flow_repeat", "flow_start"),
 )
 def simulate(
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.nc", help="File to write.")],
+    out: Annotated[Path, option("--out -o FILE.nc", "File to write.")],
     given: StudyOptions,
-    run: Annotated[
-        Path | None, typer.Argument(metavar="RUN", help=RUN_HELP, show_default=False)
-    ] = None,
+    run: Run = None,
     flow: Annotated[
         Path | None,
-        typer.Option(
-            "--flow",
-            metavar="FILE",
-            help="Flow field: NetCDF, or CSV with x, y, u, v; or the run directory that holds it. "
+        option(
+            "--flow FILE",
+            "Flow field: NetCDF, or CSV with x, y, u, v; or the run directory that holds it. "
             "For the block, and for a --model that uses it.",
             callback=flow_of_run,
-            show_default=False,
         ),
     ] = None,
     model: ModelName = None,
     parameters: ParameterValues = None,
     like: Annotated[
         Path | None,
-        typer.Option(
-            "--like",
-            metavar="RECORDING",
-            help="Recording that gives start, time stamps and gaps (driftwalk's "
-            "NetCDF or plain CSV).",
-            show_default=False,
+        option(
+            "--like RECORDING",
+            "Recording that gives start, time stamps and gaps (driftwalk's NetCDF or plain CSV).",
         ),
     ] = None,
-    body: Annotated[
-        str | None,
-        typer.Option("--body", metavar="NAME", help="Body of --like.", show_default=False),
-    ] = None,
+    body: BodyOfLike = None,
     backend: Annotated[
         str,
-        typer.Option(
-            "--backend",
-            metavar="cpu|reference",
-            help="Backend: cpu for single, reference for double precision.",
+        option(
+            "--backend cpu|reference", "Backend: cpu for single, reference for double precision."
         ),
     ] = "cpu",
     overwrite: Replace = False,
@@ -109,16 +96,16 @@ def simulate(
     others = feels_others(model)
     kept = None if others else body
     recording = None if like is None else RecordingOptions(body=kept).load(like)
-    source = None if run is None else open_run(run, given, model)
-    if model is not None or (source is not None and not source.is_block):
+    source = open_source(run, given, model)
+    if not source.is_block:
         if backend != "cpu":
             raise InputError("--backend is for the block: leave it out with another model")
         known = known_model(model, parameters, run)
-        result = _of_model(known, given, source, flow, recording, body)
+        result = _of_model(known, source, flow, recording, body)
     elif parameters:
         raise InputError("--parameter belongs to a --model")
     else:
-        result = _of_block(given, source, flow, recording, body, backend=backend)
+        result = _of_block(source, flow, recording, body, backend=backend)
     write_atomic(out, netcdf_bytes(result))
     facts = summary(result)
     if json:
@@ -139,8 +126,7 @@ def simulate(
 
 
 def _of_block(
-    given: StudyOptions,
-    source: FoundSource | None,
+    source: ModelSource,
     flow: Path | None,
     recording: xr.Dataset | None,
     body: str | None,
@@ -151,15 +137,16 @@ def _of_block(
     from driftwalk.flow import load_flow
     from driftwalk.simulation import simulate as run
 
-    if source is not None:
-        chosen, field = source.block(flow)
+    chosen, found = source.study(), source.found
+    if found is not None:
+        field = flow_of_block(found, chosen, flow)
     elif flow is None:
         raise InputError(
             "the flow of the water is missing: give a flow field (--flow), or the run directory of "
             "a fit or a calibration"
         )
     else:
-        chosen, field = given.study(), load_flow(flow)
+        field = load_flow(flow)
     if recording is not None:
         chosen = study_for([recording], chosen, body=body)
     if recording is None:
@@ -167,28 +154,23 @@ def _of_block(
     else:
         result = simulate_like(chosen, field, recording)
     # What was refused needs no such words.
-    print_warnings([] if source is None else source.found.warnings)
-    _say_what(chosen, given, source, about="simulation")
+    print_warnings([] if found is None else found.warnings)
+    _say_what(chosen, source, about="simulation")
     return result
 
 
-def _say_what(
-    study: Study, given: StudyOptions, source: FoundSource | None, *, about: About
-) -> None:
+def _say_what(study: Study, source: ModelSource, *, about: About) -> None:
     """Say which body and tank are simulated, and warn of those that were not stated."""
     from driftwalk.conditions import unstated_warning
 
-    otherwise = "recording" if source is None else str(source.folder)
-    opening_note(study, given, about=about, otherwise=otherwise)()
-    warning = unstated_warning(study, about=about)
-    if warning is not None:
-        print_note(f"warning: {warning}")
+    otherwise = "recording" if source.folder is None else str(source.folder)
+    opening_note(study, source.given, about=about, otherwise=otherwise)()
+    print_warnings([unstated_warning(study, about=about)])
 
 
 def _of_model(
     known: KnownModel,
-    given: StudyOptions,
-    source: FoundSource | None,
+    source: ModelSource,
     flow: Path | None,
     recording: xr.Dataset | None,
     body: str | None,
@@ -196,20 +178,16 @@ def _of_model(
     from driftwalk.conditions import study_for
     from driftwalk.motion import simulate_motion
 
-    _refuse_block(given)
-    chosen = given.study() if source is None else source.study()
+    _refuse_block(source.given)
+    chosen = source.study()
     if recording is not None:
         chosen = study_for([recording], chosen, body=body)
-    if source is not None:
-        field = source.flow_for(known.model, chosen, flow)
-    else:
-        field = None if flow is None else load_flow_for(flow, chosen)
+    field = source.flow_for(known.model, chosen, flow)
     result = simulate_motion(
         known.model, known.values, chosen, flow=field, like=recording, body=body
     )
-    _say_what(chosen, given, source, about="tank")
-    for warning in known.warnings:
-        print_note(f"warning: {warning}")
+    _say_what(chosen, source, about="tank")
+    print_warnings(known.warnings)
     return result
 
 

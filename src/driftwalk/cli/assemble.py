@@ -2,23 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from driftwalk.cli.inputs.assembly_source import (
-    RUN_HELP,
-    RUN_NAMES,
-    refuse_found,
-    source_from_flow,
-    source_from_run,
-)
-from driftwalk.cli.inputs.study_recording import opening_note
-from driftwalk.cli.options.cluster import ClusterAt, ClusterOptions, Workers
-from driftwalk.cli.options.shared import FlowFile, Json, Overwrite, RunFolder, Threads
+from driftwalk.cli.inputs.model_source import RUN_NAMES, assembly_source
+from driftwalk.cli.inputs.recordings import opening_note
+from driftwalk.cli.options.run import RunOptions, with_run_options
+from driftwalk.cli.options.shared import FlowFile, Run, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal.answer import print_prediction
+from driftwalk.cli.terminal.output import print_prediction
 from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import ASSEMBLY_KEYS
 from driftwalk.schema.kinds.flow_series import flow_series_words
@@ -29,23 +20,15 @@ if TYPE_CHECKING:
     from driftwalk.schema.answers.parts import Answer
 
 
+@with_run_options
 @with_study_options(ASSEMBLY_KEYS, "runs", *RUN_NAMES)
 def assemble(
-    out: RunFolder,
     given: StudyOptions,
-    run: Annotated[
-        Path | None,
-        typer.Argument(metavar="RUN", help=RUN_HELP, show_default=False),
-    ] = None,
+    run: Run = None,
     flow: FlowFile = None,
-    film: Annotated[
-        str, typer.Option("--film", metavar="gif|mp4|none", help="Film of the first run.")
-    ] = "gif",
-    threads: Threads = None,
-    cluster: ClusterAt = None,
-    cluster_options: ClusterOptions = None,
-    overwrite: Overwrite = False,
-    json: Json = False,
+    film: Annotated[str, option("--film gif|mp4|none", "Film of the first run.")] = "gif",
+    *,
+    options: RunOptions,
 ) -> None:
     """Simulate self-assembly of many blocks, and report how often each structure forms.
 
@@ -54,22 +37,20 @@ def assemble(
     much this uncertainty matters. Without RUN, uses the parameters of a study and a flow field
     (--flow). If you stop the run, the same command continues it.
     """
-    from driftwalk.runs import AssemblyWork, run_work
+    from driftwalk.runs import AssemblyWork
 
     _check_film(film)
-    if run is None:
-        source = source_from_flow(given, flow)
-    else:
-        refuse_found(run, given.overrides, also=[] if given.file is None else ["--study"])
-        source = source_from_run(run, flow, given)
-    work = AssemblyWork(source.study, source.flow, source.uncertainty, source.inputs, threads, film)
+    refused = [] if given.file is None else ["--study"]
+    source = assembly_source(run, flow, given, refused=refused)
+    work = AssemblyWork(
+        source.study, source.flow, source.uncertainty, source.inputs, options.threads, film
+    )
     begun = opening_note(source.study, given, about="simulation", otherwise=str(run))
-    with Workers(cluster, cluster_options).reported("assemble") as told:
-        result = run_work(work, out, overwrite=overwrite, begun=begun, **told)
+    result = options.run(work, "assemble", begun=begun)
     series = flow_series_words(result.distribution.attrs, holds="the intervals hold")
     drawn = [] if source.not_drawn is None else [source.not_drawn]
     warnings = [*source.warnings, *drawn, *series, *_left_out(result)]
-    print_prediction(assembled(work.study, result), out, run, warnings, json=json)
+    print_prediction(assembled(work.study, result), options.out, run, warnings, json=options.json)
 
 
 def _check_film(film: str) -> None:
@@ -90,10 +71,7 @@ def assembled(study: Study, result: AssemblyResult) -> Answer:
     return assembly_answer(
         result.distribution,
         times=result.times,
-        settings={
-            "drag_coefficient": forces.drag_coefficient,
-            "force_std_N": forces.force_std_N,
-        },
+        settings={"drag_coefficient": forces.drag_coefficient, "force_std_N": forces.force_std_N},
         drawn=result.drawn,
         sizes=result.sizes,
         sizes_drawn=result.sizes_drawn,
