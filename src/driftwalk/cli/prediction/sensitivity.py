@@ -27,7 +27,7 @@ from driftwalk.cli.options.vary import VARY_KEYS, Vary, vary_overrides
 from driftwalk.cli.terminal.answer import print_prediction
 from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import SENSITIVITY_KEYS
-from driftwalk.schema.kinds.flow_series import flow_series_words
+from driftwalk.schema.kinds.flow import flow_series_words
 
 if TYPE_CHECKING:
     from driftwalk.model import Study

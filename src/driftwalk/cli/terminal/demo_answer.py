@@ -10,7 +10,7 @@ from driftwalk.cli.terminal.output import print_note
 from driftwalk.schema.answers.calibration import calibration_answer
 from driftwalk.schema.answers.fit import fit_json
 from driftwalk.schema.answers.parts import estimates, number_text
-from driftwalk.schema.kinds.fit_numbers import PARAMETERS
+from driftwalk.schema.kinds.fit import PARAMETERS
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -20,7 +20,7 @@ from driftwalk.likelihood.newton import Tell
 from driftwalk.likelihood.solution import BREAKDOWN
 from driftwalk.schema.answers.parts import undetermined
 from driftwalk.schema.check import described
-from driftwalk.schema.kinds.fit_numbers import WALL_NUMBERS
+from driftwalk.schema.kinds.fit import WALL_NUMBERS
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -29,8 +29,7 @@ from driftwalk.schema.answers.parts import (
     intensity_row,
     origin,
 )
-from driftwalk.schema.kinds.fit import FIT
-from driftwalk.schema.kinds.fit_numbers import LAW_NUMBERS, PARAMETERS
+from driftwalk.schema.kinds.fit import FIT, LAW_NUMBERS, PARAMETERS
 
 if TYPE_CHECKING:
     import xarray as xr
