@@ -17,10 +17,21 @@ import numpy.typing as npt
 from driftwalk.core.errors import InputError
 from driftwalk.core.extras import require_opencv
 from driftwalk.core.random_streams import VideoStream
-from driftwalk.datasets.synthetic_video_bars import Bars, marker_points, place_bars
-from driftwalk.datasets.synthetic_video_camera import image_to_world, local_scale, world_to_image
-from driftwalk.datasets.synthetic_video_light import Glare, ripples, shading
-from driftwalk.datasets.synthetic_video_settings import Colour, VideoSettings
+from driftwalk.datasets.synthetic_video_light import (
+    Bars,
+    Glare,
+    marker_points,
+    place_bars,
+    ripples,
+    shading,
+)
+from driftwalk.datasets.synthetic_video_settings import (
+    Colour,
+    VideoSettings,
+    image_to_world,
+    local_scale,
+    world_to_image,
+)
 
 if TYPE_CHECKING:
     import xarray as xr

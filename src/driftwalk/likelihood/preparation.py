@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 
 from driftwalk.conditions import require_travel
-from driftwalk.core.errors import InputError
-from driftwalk.core.text.argument_text import argument_text
+from driftwalk.core.errors import InputError, argument_text
 from driftwalk.core.text.json_text import parse_json
 from driftwalk.flow.arena import Outline, outline_of, read_arena
 from driftwalk.likelihood.angle import ORIENTED_SHARE, no_angle, smooth_angle

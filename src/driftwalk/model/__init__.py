@@ -19,8 +19,7 @@ from driftwalk.model.study_file.template import (
     short_study_template,
     study_template,
 )
-from driftwalk.model.tank import FieldOfView, Tank
-from driftwalk.model.water import Water
+from driftwalk.model.tank import FieldOfView, Tank, Water
 
 __all__ = [
     "Assembly",

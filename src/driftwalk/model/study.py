@@ -25,9 +25,8 @@ from driftwalk.model.section import Section
 from driftwalk.model.sensitivity import Sensitivity
 from driftwalk.model.simulation import Pose, Simulation, resolve_time_step
 from driftwalk.model.steps import Steps
-from driftwalk.model.study_file.toml import write_toml
-from driftwalk.model.tank import Tank
-from driftwalk.model.water import Water
+from driftwalk.model.study_file.template import write_toml
+from driftwalk.model.tank import Tank, Water
 
 
 class Study(Section):

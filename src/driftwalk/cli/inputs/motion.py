@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from driftwalk.cli.options.recording import RecordingOptions
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.file_names import text_of_name
-from driftwalk.schema.stores.contents import check_contents
+from driftwalk.schema.check import check_contents
 from driftwalk.schema.stores.netcdf import kind_of_file, open_netcdf
 
 if TYPE_CHECKING:

@@ -21,8 +21,8 @@ from driftwalk.cli.terminal.output import (
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.files.run_layout import MANIFEST_FILE
 from driftwalk.core.study_keys import STUDY_KEYS
+from driftwalk.schema.check import check_contents
 from driftwalk.schema.shapes import short_class
-from driftwalk.schema.stores.contents import check_contents
 from driftwalk.schema.stores.netcdf import kind_of_file, open_netcdf
 
 if TYPE_CHECKING:

@@ -9,8 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.files.atomic import atomic_path, require_free
-from driftwalk.export.data.clock import frame_numbers
-from driftwalk.export.data.motion import Motion
+from driftwalk.export.data.motion import Motion, frame_numbers
 from driftwalk.schema import body_names
 
 if TYPE_CHECKING:
