@@ -5,8 +5,10 @@ from __future__ import annotations
 import os
 import secrets
 import shutil
+from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.atomic import PARTIAL, rename, storage_error
@@ -14,79 +16,41 @@ from driftwalk.core.files.run_layout import faults_of
 from driftwalk.core.text.did_you_mean import did_you_mean
 from driftwalk.export.data.targets import DATA_TARGETS
 from driftwalk.export.figures.targets import FIGURE_TARGETS
-from driftwalk.export.target import Source, Target, Verification
+from driftwalk.export.target import Source, Target
 
 
-# A target's module is imported when it is used: help answers at once.
-def _write_mujoco(source: Source, folder: Path) -> list[Path]:
-    from driftwalk.export.simulators.mujoco import write_mujoco
+def _simulator(place: str) -> Callable[..., Any]:
+    """Return a function of `driftwalk.export.simulators`, imported when it is called."""
+    module, _, name = place.partition(":")
 
-    return write_mujoco(source, folder)
+    # Help answers at once: a simulator's module is imported when it is used.
+    def call(*arguments: Any) -> Any:
+        return getattr(import_module(f"driftwalk.export.simulators.{module}"), name)(*arguments)
 
-
-def _verify_mujoco(folder: Path) -> Verification:
-    from driftwalk.export.simulators.mujoco import verify_mujoco
-
-    return verify_mujoco(folder)
-
-
-def _require_mujoco() -> None:
-    from driftwalk.export.simulators.mujoco import require_mujoco
-
-    require_mujoco()
-
-
-def _write_webots(source: Source, folder: Path) -> list[Path]:
-    from driftwalk.export.simulators.webots import write_webots
-
-    return write_webots(source, folder)
-
-
-def _verify_webots(folder: Path) -> Verification:
-    from driftwalk.export.simulators.webots import verify_webots
-
-    return verify_webots(folder)
-
-
-def _write_gazebo(source: Source, folder: Path) -> list[Path]:
-    from driftwalk.export.simulators.gazebo import write_gazebo
-
-    return write_gazebo(source, folder)
-
-
-def _verify_gazebo(folder: Path) -> Verification:
-    from driftwalk.export.simulators.gazebo import verify_gazebo
-
-    return verify_gazebo(folder)
-
-
-def _require_compiler() -> None:
-    from driftwalk.export.simulators.compiled import compiler
-
-    compiler()
+    return call
 
 
 _SIMULATORS: Final = (
     Target(
         name="mujoco",
         gives="the tank as MJCF, the water as a Python module, and verify.py",
-        write=_write_mujoco,
-        verify=_verify_mujoco,
-        require=_require_mujoco,
+        write=_simulator("mujoco:write_mujoco"),
+        verify=_simulator("mujoco:verify_mujoco"),
+        require=_simulator("mujoco:require_mujoco"),
     ),
     Target(
         name="webots",
         gives="a world, a PROTO and a physics plugin in C",
-        write=_write_webots,
-        verify=_verify_webots,
-        require=_require_compiler,
+        write=_simulator("webots:write_webots"),
+        verify=_simulator("webots:verify_webots"),
+        require=_simulator("compiled:compiler"),
     ),
     Target(
         name="gazebo",
         gives="a world and a system plugin in C++",
-        write=_write_gazebo,
-        verify=_verify_gazebo,
-        require=_require_compiler,
+        write=_simulator("gazebo:write_gazebo"),
+        verify=_simulator("gazebo:verify_gazebo"),
+        require=_simulator("compiled:compiler"),
     ),
 )
 _ALL: Final = (*_SIMULATORS, *DATA_TARGETS, *FIGURE_TARGETS)

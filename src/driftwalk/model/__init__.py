@@ -8,13 +8,12 @@ from driftwalk.model.fit import Fit
 from driftwalk.model.flow import Flow
 from driftwalk.model.forces import Forces
 from driftwalk.model.observation import Observation
-from driftwalk.model.recording import Columns, Recording
+from driftwalk.model.recording import Columns, Recording, Steps
 from driftwalk.model.recover import Recover
 from driftwalk.model.sensitivity import Sensitivity
 from driftwalk.model.simulation import Pose, Simulation
-from driftwalk.model.steps import Steps
 from driftwalk.model.study import Study, apply_overrides, load_study, parse_study
-from driftwalk.model.study_file.template import (
+from driftwalk.model.study_template import (
     parameter_table,
     short_study_template,
     study_template,

@@ -11,6 +11,7 @@ from driftwalk.model.section import (
     Placeholder,
     Quantity,
     Section,
+    description_of,
     is_list,
     item_quantity_of,
     quantity_of,
@@ -76,7 +77,7 @@ def declared(key: str) -> Declaration:
     number = next((one.key for one in field.metadata if isinstance(one, OrNumber)), field_name)
     placeholders = [one.text for one in field.metadata if isinstance(one, Placeholder)]
     return Declaration(
-        meaning=field.title or _END_OF_SENTENCE.split(field.description or "")[0],
+        meaning=field.title or _END_OF_SENTENCE.split(description_of(section, field_name))[0],
         quantity=quantity_of(section, number) or item_quantity_of(section, field_name),
         words=words_of(section, field_name),
         is_list=is_list(section, field_name),

@@ -6,9 +6,14 @@ declaration checks the value, writes the commented template and makes the refere
 
 from __future__ import annotations
 
+import ast
 import inspect
-from collections.abc import Iterable, Iterator
+import json
+import sys
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
 from typing import Any, ClassVar, Final, get_args
 
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError
@@ -166,6 +171,37 @@ class _SectionError(ConfigurationError):
     """An error whose message names its section already."""
 
 
+def description_of(section: type[Section], key: str) -> str:
+    """Return the text below a field in the source of its class, in one line.
+
+    Only help and templates need it. pydantic could read it, but for every section at import.
+    """
+    found = section.model_fields[key].description
+    owners = (kind for kind in section.__mro__ if key in vars(kind).get("__annotations__", {}))
+    owner = next(owners, section)
+    return found or _texts_of(owner.__module__).get((owner.__name__, key), "")
+
+
+@lru_cache
+def _texts_of(module: str) -> dict[tuple[str, str], str]:
+    """Return the texts below the fields of a module's classes, by class and field."""
+    try:
+        tree = ast.parse(inspect.getsource(sys.modules[module]))
+    except OSError:  # a program that was frozen without its source
+        return {}
+    return {
+        (kind.name, field.target.id): " ".join(text.value.value.split())
+        for kind in tree.body
+        if isinstance(kind, ast.ClassDef)
+        for field, text in pairwise(kind.body)
+        if isinstance(field, ast.AnnAssign)
+        and isinstance(field.target, ast.Name)
+        and isinstance(text, ast.Expr)
+        and isinstance(text.value, ast.Constant)
+        and isinstance(text.value.value, str)
+    }
+
+
 def quoted(words: Iterable[str]) -> str:
     """Return words in quotes, joined for a sentence."""
     return " or ".join(f'"{word}"' for word in words)
@@ -246,3 +282,33 @@ def _unknown_key(section: type[Section], key: str) -> str:
     if section.section_name:
         return f"[{section.section_name}] unknown key '{key}'{hint}"
     return f"unknown section or key '{key}'{hint}"
+
+
+def write_toml(sections: Mapping[str, Section]) -> str:
+    """Return named sections as TOML without comments and without the keys that are not set."""
+    parts = []
+    for name, section in sections.items():
+        lines = [f"{key} = {toml_text(value)}" for key, value in _set_values(section)]
+        parts.append("\n".join([f"[{name}]", *lines]))
+    return "\n\n".join(parts) + "\n"
+
+
+def toml_text(value: Any) -> str:
+    """Return a value as TOML; its strings are JSON's, but for the delete character."""
+    if isinstance(value, Section):
+        inner = ", ".join(f"{key} = {toml_text(item)}" for key, item in _set_values(value))
+        return f"{{ {inner} }}" if inner else "{}"
+    if isinstance(value, (tuple, list)):
+        return "[" + ", ".join(toml_text(item) for item in value) + "]"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return repr(value)
+
+
+def _set_values(section: Section) -> Iterator[tuple[str, Any]]:
+    for key in type(section).model_fields:
+        value = getattr(section, key)
+        if value is not None:
+            yield key, value

@@ -19,13 +19,11 @@ from driftwalk.model.fit import Fit
 from driftwalk.model.flow import Flow
 from driftwalk.model.forces import Forces
 from driftwalk.model.observation import Observation
-from driftwalk.model.recording import Recording
+from driftwalk.model.recording import Recording, Steps
 from driftwalk.model.recover import Recover
-from driftwalk.model.section import Section
+from driftwalk.model.section import Section, write_toml
 from driftwalk.model.sensitivity import Sensitivity
 from driftwalk.model.simulation import Pose, Simulation, resolve_time_step
-from driftwalk.model.steps import Steps
-from driftwalk.model.study_file.template import write_toml
 from driftwalk.model.tank import Tank, Water
 
 
@@ -46,38 +44,34 @@ class Study(Section):
     0.008
     """
 
-    block: Block = Field(default_factory=Block, description="The floating block.")
-    tank: Tank = Field(default_factory=Tank, description="The tank and its wall.")
-    water: Water = Field(default_factory=Water, description="The liquid.")
-    forces: Forces = Field(default_factory=Forces, description="Drag and stochastic force.")
-    simulation: Simulation = Field(
-        default_factory=Simulation, description="Settings of a simulation."
-    )
-    observation: Observation = Field(
-        default_factory=Observation, description="Effects of the camera on the poses."
-    )
-    recording: Recording = Field(default_factory=Recording, description="Reading of the recording.")
-    flow: Flow = Field(
-        default_factory=Flow, description="Extraction of the flow field from the recording."
-    )
-    steps: Steps = Field(default_factory=Steps, description="Formation of steps.")
-    calibration: Calibration = Field(
-        default_factory=Calibration, description="Search of a calibration."
-    )
-    fit: Fit = Field(
-        default_factory=Fit,
-        description="Joint fit of flow, drag, force and tracking noise.",
-    )
-    recover: Recover = Field(
-        default_factory=Recover,
-        description="Recordings of known truth that a recovery study simulates and fits.",
-    )
-    assembly: Assembly = Field(
-        default_factory=Assembly, description="Rules of self-assembly, and the number of runs."
-    )
-    sensitivity: Sensitivity = Field(
-        default_factory=Sensitivity, description="Axes and size of a sensitivity analysis."
-    )
+    block: Block = Field(default_factory=Block)
+    """The floating block."""
+    tank: Tank = Field(default_factory=Tank)
+    """The tank and its wall."""
+    water: Water = Field(default_factory=Water)
+    """The liquid."""
+    forces: Forces = Field(default_factory=Forces)
+    """Drag and stochastic force."""
+    simulation: Simulation = Field(default_factory=Simulation)
+    """Settings of a simulation."""
+    observation: Observation = Field(default_factory=Observation)
+    """Effects of the camera on the poses."""
+    recording: Recording = Field(default_factory=Recording)
+    """Reading of the recording."""
+    flow: Flow = Field(default_factory=Flow)
+    """Extraction of the flow field from the recording."""
+    steps: Steps = Field(default_factory=Steps)
+    """Formation of steps."""
+    calibration: Calibration = Field(default_factory=Calibration)
+    """Search of a calibration."""
+    fit: Fit = Field(default_factory=Fit)
+    """Joint fit of flow, drag, force and tracking noise."""
+    recover: Recover = Field(default_factory=Recover)
+    """Recordings of known truth that a recovery study simulates and fits."""
+    assembly: Assembly = Field(default_factory=Assembly)
+    """Rules of self-assembly, and the number of runs."""
+    sensitivity: Sensitivity = Field(default_factory=Sensitivity)
+    """Axes and size of a sensitivity analysis."""
 
     @model_validator(mode="after")
     def _time_step_divides(self) -> Self:

@@ -22,8 +22,8 @@ from driftwalk.motion.family.columns import (
 )
 from driftwalk.motion.family.members import Member
 from driftwalk.motion.family.parts import Part
-from driftwalk.motion.native import scored
 from driftwalk.motion.protocol import Details, Floats, Keys, Scores, Values, Worlds
+from driftwalk.motion.score import scored
 from driftwalk.schema import Parameter
 from driftwalk.simulation.backend import native_scene
 from driftwalk.simulation.initial import world_orientations

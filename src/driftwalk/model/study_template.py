@@ -2,52 +2,22 @@
 
 from __future__ import annotations
 
-import json
 import textwrap
-from collections.abc import Iterator, Mapping
-from typing import Any, Final
+from collections.abc import Iterator
+from typing import Final
 
 from driftwalk.model.section import (
     Quantity,
     Section,
+    description_of,
     is_list,
     item_quantity_of,
     quantity_of,
     quoted,
+    toml_text,
     words_of,
 )
 from driftwalk.model.study import Study
-
-
-def write_toml(sections: Mapping[str, Section]) -> str:
-    """Return named sections as TOML without comments and without the keys that are not set."""
-    parts = []
-    for name, section in sections.items():
-        lines = [f"{key} = {toml_text(value)}" for key, value in _set_values(section)]
-        parts.append("\n".join([f"[{name}]", *lines]))
-    return "\n\n".join(parts) + "\n"
-
-
-def toml_text(value: Any) -> str:
-    """Return a value as TOML; its strings are JSON's, but for the delete character."""
-    if isinstance(value, Section):
-        inner = ", ".join(f"{key} = {toml_text(item)}" for key, item in _set_values(value))
-        return f"{{ {inner} }}" if inner else "{}"
-    if isinstance(value, (tuple, list)):
-        return "[" + ", ".join(toml_text(item) for item in value) + "]"
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    return repr(value)
-
-
-def _set_values(section: Section) -> Iterator[tuple[str, Any]]:
-    for key in type(section).model_fields:
-        value = getattr(section, key)
-        if value is not None:
-            yield key, value
-
 
 _HEAD = """\
 # Study file of driftwalk. Every parameter is here with its default; a line that starts with
@@ -82,8 +52,8 @@ def study_template(study: Study | None = None) -> str:
     """
     chosen = study if study is not None else Study()
     parts = [_HEAD]
-    for name, field in Study.model_fields.items():
-        lines = [*_comment(field.description or ""), f"[{name}]"]
+    for name in Study.model_fields:
+        lines = [*_comment(description_of(Study, name)), f"[{name}]"]
         section = getattr(chosen, name)
         for key in type(section).model_fields:
             lines += _commented_parameter(section, key)
@@ -106,8 +76,7 @@ def short_study_template() -> str:
         section = getattr(Study(), name)
         lines = [f"# [{name}]"]
         for key in keys:
-            note = type(section).model_fields[key].description or ""
-            meaning, *_ = note.partition(". ")
+            meaning, *_ = description_of(type(section), key).partition(". ")
             lines += [*_comment(meaning.rstrip(".") + "."), f"# {key} = {_value(section, key)}"]
         parts.append("\n".join(lines) + "\n")
     return "\n".join(parts)
@@ -134,11 +103,12 @@ def parameter_table(name: str) -> str:
     """
     section = getattr(Study(), name)
     rows = ["| key | default | values | meaning |", "|---|---|---|---|"]
-    for key, field in type(section).model_fields.items():
+    for key in type(section).model_fields:
         value = getattr(section, key)
         default = f"`{toml_text(value)}`" if value is not None else "not set"
         accepted = _accepted(type(section), key).replace("|", "\\|")
-        rows.append(f"| `{key}` | {default} | {accepted} | {field.description} |")
+        meaning = description_of(type(section), key)
+        rows.append(f"| `{key}` | {default} | {accepted} | {meaning} |")
     return "\n".join(rows)
 
 
@@ -146,7 +116,7 @@ def _commented_parameter(section: Section, key: str) -> Iterator[str]:
     kind = type(section)
     value = getattr(section, key)
     accepted = _accepted(kind, key)
-    description = kind.model_fields[key].description or ""
+    description = description_of(kind, key)
     yield ""
     yield from _comment(f"{description} [{accepted}]" if accepted else description)
     yield f"{key} = {toml_text(value)}" if value is not None else f"# {key} = {_example(kind, key)}"
