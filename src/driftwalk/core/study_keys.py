@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any, Final
 
@@ -9,100 +10,70 @@ from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.text.did_you_mean import did_you_mean
 from driftwalk.core.units import Uncertain, split_uncertain
 
-STUDY_KEYS: Final[dict[str, str]] = {
+_UNIT: Final = re.compile("_(m|kg|s|N|Hz|rad)$")
+
+
+def _of(section: str, *keys: str) -> dict[str, str]:
+    """Return keys of a section by the names of their arguments: without the unit."""
+    return {_UNIT.sub("", key): f"{section}.{key}" for key in keys}
+
+
+STUDY_KEYS: Final = {
     "tank_diameter": "tank.diameter_m",
-    "wall_friction": "tank.wall_friction",
-    "wall_restitution": "tank.wall_restitution",
-    "side": "block.side_m",
-    "mass": "block.mass_kg",
-    "depth": "block.depth",
-    "drag_coefficient": "forces.drag_coefficient",
-    "force_std": "forces.force_std_N",
-    "force_interval": "forces.force_interval_s",
-    "time_step": "simulation.time_step_s",
-    "duration": "simulation.duration_s",
-    "sample_rate": "simulation.sample_rate_Hz",
-    "seed": "simulation.seed",
-    "replicates": "simulation.replicates",
-    "step_interval": "steps.step_interval_s",
-    "position_noise": "observation.position_noise_m",
-    "orientation_noise": "observation.orientation_noise_rad",
+    **_of("tank", "wall_friction", "wall_restitution"),
+    **_of("block", "side_m", "mass_kg", "depth"),
+    **_of("forces", "drag_coefficient", "force_std_N", "force_interval_s"),
+    **_of("simulation", "time_step_s", "duration_s", "sample_rate_Hz", "seed", "replicates"),
+    **_of("steps", "step_interval_s"),
+    **_of("observation", "position_noise_m", "orientation_noise_rad"),
     "flow_repeat": "flow.repeat",
     "flow_start": "flow.start",
 }
 """From an argument's name to the key of the study that it sets."""
 
-CALIBRATION_KEYS: Final[dict[str, str]] = {
+CALIBRATION_KEYS: Final = {
     **STUDY_KEYS,
-    "seed": "calibration.seed",
-    "replicates": "calibration.replicates",
-    "bootstrap": "calibration.bootstrap",
-    "confidence": "calibration.confidence",
+    **_of("calibration", "seed", "replicates", "bootstrap", "confidence"),
 }
 """The same for a calibration, where seed and replicates are those of its simulations."""
 
-ASSEMBLY_KEYS: Final[dict[str, str]] = {
+ASSEMBLY_KEYS: Final = {
     **STUDY_KEYS,
-    "blocks": "assembly.blocks",
-    "runs": "assembly.runs",
-    "duration": "assembly.duration_s",
-    "seed": "assembly.seed",
-    "latching": "assembly.latching",
-    "connector_distance": "assembly.connector_distance_m",
-    "connector_axis": "assembly.connector_axis_rad",
-    "hidden_face_drag": "assembly.hidden_face_drag",
-    "chirality": "assembly.chirality",
-    "block_restitution": "assembly.block_restitution",
-    "block_friction": "assembly.block_friction",
-    "confidence": "assembly.confidence",
+    **_of("assembly", "blocks", "runs", "duration_s", "seed", "latching"),
+    **_of("assembly", "connector_distance_m", "connector_axis_rad", "hidden_face_drag"),
+    **_of("assembly", "chirality", "block_restitution", "block_friction", "confidence"),
 }
 """The same for self-assembly, where seed, duration and confidence are those of its runs."""
 
-SENSITIVITY_KEYS: Final[dict[str, str]] = {
+SENSITIVITY_KEYS: Final = {
     **ASSEMBLY_KEYS,
-    "runs": "sensitivity.runs",
+    **_of("sensitivity", "runs", "seed"),
     "realisations": "sensitivity.reference_realisations",
-    "seed": "sensitivity.seed",
 }
 """The same for a sensitivity analysis, where runs are those of a setting."""
 
-FLOW_KEYS: Final[dict[str, str]] = {
+FLOW_KEYS: Final = {
     **STUDY_KEYS,
-    "cells": "flow.cells",
-    "cell_size": "flow.cell_size_m",
+    **_of("flow", "cells", "cell_size_m", "flow_drag_coefficient", "min_count", "inertia"),
     "window": "flow.smoothing_window_s",
-    "flow_drag_coefficient": "flow.flow_drag_coefficient",
-    "min_count": "flow.min_count",
-    "inertia": "flow.inertia",
 }
 """The same for the extraction of a flow field."""
 
-FIT_KEYS: Final[dict[str, str]] = {
+FIT_KEYS: Final = {
     **STUDY_KEYS,
-    "angle": "fit.angle",
-    "spline_spacing": "fit.spline_spacing_m",
-    "confidence": "fit.confidence",
-    "switching_times": "fit.switching_times_s",
-    "flow_labels": "fit.flow_labels",
+    **_of("fit", "angle", "spline_spacing_m", "confidence", "switching_times_s", "flow_labels"),
+    **_of("fit", "law", "pressure_gradient", "mass_std_kg", "side_std_m", "force_memory_s"),
+    **_of("fit", "flow_strength", "camera"),
     "precision": "fit.drag_coefficient_precision",
-    "law": "fit.law",
-    "pressure_gradient": "fit.pressure_gradient",
     "added_mass": "fit.added_mass_share",
     "added_mass_std": "fit.added_mass_share_std",
-    "mass_std": "fit.mass_std_kg",
-    "side_std": "fit.side_std_m",
-    "force_memory": "fit.force_memory_s",
-    "flow_strength": "fit.flow_strength",
-    "camera": "fit.camera",
 }
 """The same for a likelihood fit."""
 
-RECOVER_KEYS: Final[dict[str, str]] = {
-    "recordings": "recover.recordings",
+RECOVER_KEYS: Final = {
+    **_of("recover", "recordings", "flow", "seed"),
     "duration": "recover.durations_s",
-    "flow": "recover.flow",
     "precision": "recover.drag_coefficient_precision",
-    "seed": "recover.seed",
     "tank_diameter": "tank.diameter_m",
     "position_noise": "observation.position_noise_m",
     "step_interval": "steps.step_interval_s",

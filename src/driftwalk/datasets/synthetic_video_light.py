@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Bools, Floats, Singles
 from driftwalk.core.random_streams import VideoStream
 from driftwalk.datasets.synthetic_video_settings import VideoSettings
-
-Array = npt.NDArray[np.float64]
-Grid = npt.NDArray[np.float32]
 
 _WAVES = 48
 _COARSE = 4
@@ -38,17 +35,17 @@ class Glare:
         self._cut = float(norm.isf(settings.glare_share)) if settings.glare_share > 0 else np.inf
         self._shape = (settings.height_px, settings.width_px)
 
-    def height(self, pixels: Array, time: float) -> Array:
+    def height(self, pixels: Floats, time: float) -> Floats:
         """Return the field minus its cut at pixels, shape (..., 2): above zero is glare."""
         waves = np.cos(
             pixels[..., 0, None] * self._kx
             + pixels[..., 1, None] * self._ky
             + (self._phase + self._rate * time)
         )
-        value: Array = waves.sum(axis=-1) * np.sqrt(2.0 / _WAVES) - self._cut
+        value: Floats = waves.sum(axis=-1) * np.sqrt(2.0 / _WAVES) - self._cut
         return value
 
-    def opacity(self, time: float) -> Grid:
+    def opacity(self, time: float) -> Singles:
         """Return how much of each pixel is white, shape (rows, columns)."""
         import cv2
 
@@ -65,7 +62,7 @@ class Glare:
         return np.asarray(1.0 / (1.0 + np.exp(-field / _GLARE_EDGE)), dtype=np.float32)
 
 
-def shading(settings: VideoSettings) -> Grid:
+def shading(settings: VideoSettings) -> Singles:
     """Return the factor of the light at each pixel, shape (rows, columns)."""
     column, row = np.meshgrid(np.arange(settings.width_px), np.arange(settings.height_px))
     middle = settings.middle_px
@@ -74,7 +71,7 @@ def shading(settings: VideoSettings) -> Grid:
     return np.asarray(1.0 - settings.shading * along / np.abs(along).max(), dtype=np.float32)
 
 
-def ripples(settings: VideoSettings, world: Grid, time: float) -> Grid:
+def ripples(settings: VideoSettings, world: Singles, time: float) -> Singles:
     """Return the factor of the water's brightness at world points [m], shape (rows, columns, 2)."""
     number = 2 * np.pi / settings.ripple_length_m
     first = np.sin(number * (0.8 * world[..., 0] + 0.6 * world[..., 1]) - _RIPPLE_RATE * time)
@@ -82,7 +79,6 @@ def ripples(settings: VideoSettings, world: Grid, time: float) -> Grid:
     return np.asarray(1.0 + settings.ripple * (first + second) / 2, dtype=np.float32)
 
 
-Array = npt.NDArray[np.float64]
 _OFFSETS = 512
 
 
@@ -100,25 +96,27 @@ class Bars:
         Size of a bar [m].
     """
 
-    offset: Array
-    angle: Array
+    offset: Floats
+    angle: Floats
     width: float
     length: float
 
-    def hides(self, frame: int, body: int, points: Array) -> npt.NDArray[np.bool_]:
+    def hides(self, frame: int, body: int, points: Floats) -> Bools:
         """Return which points of the marker's own frame [m], shape (..., 2), the bar covers."""
         return self.depth(frame, body, points) > 0.0
 
-    def depth(self, frame: int, body: int, points: Array) -> Array:
+    def depth(self, frame: int, body: int, points: Floats) -> Floats:
         """Return how deep points of the marker's own frame lie in the bar [m], shape (...)."""
         offset, angle = self.offset[frame, body], self.angle[frame, body]
         across = points[..., 0] * np.cos(angle) + points[..., 1] * np.sin(angle) - offset
         along = -points[..., 0] * np.sin(angle) + points[..., 1] * np.cos(angle)
-        inside: Array = np.minimum(self.width / 2 - np.abs(across), self.length / 2 - np.abs(along))
+        inside: Floats = np.minimum(
+            self.width / 2 - np.abs(across), self.length / 2 - np.abs(along)
+        )
         return inside
 
 
-def place_bars(settings: VideoSettings, time: Array, bodies: int) -> Bars:
+def place_bars(settings: VideoSettings, time: Floats, bodies: int) -> Bars:
     """Draw when a bar lies over each block and how it lies."""
     shape = (time.size, bodies)
     offset, angle = np.full(shape, np.nan), np.zeros(shape)
@@ -135,7 +133,7 @@ def place_bars(settings: VideoSettings, time: Array, bodies: int) -> Bars:
     return Bars(offset, angle, width, length=1.5 * settings.block_side_m)
 
 
-def marker_points(settings: VideoSettings) -> Array:
+def marker_points(settings: VideoSettings) -> Floats:
     """Return points spread evenly over both discs, in the marker's frame [m], shape (n, 2)."""
     line = (np.arange(40) + 0.5) / 20.0 - 1.0
     u, v = (part.ravel() for part in np.meshgrid(line, line))
@@ -145,7 +143,7 @@ def marker_points(settings: VideoSettings) -> Array:
 
 
 def _spells(
-    settings: VideoSettings, time: Array, generator: np.random.Generator
+    settings: VideoSettings, time: Floats, generator: np.random.Generator
 ) -> list[tuple[int, int]]:
     """Return first and past-the-last frame of each stretch with a bar."""
     share, mean = settings.bar_time_share, settings.bar_mean_s
@@ -160,7 +158,7 @@ def _spells(
     return spells
 
 
-def _offset(points: Array, angle: float, width: float, share: float) -> float:
+def _offset(points: Floats, angle: float, width: float, share: float) -> float:
     """Return where a bar that is pushed in from outside first hides the stated share."""
     across = points[:, 0] * np.cos(angle) + points[:, 1] * np.sin(angle)
     offsets = np.linspace(across.max() + width / 2, 0.0, _OFFSETS)

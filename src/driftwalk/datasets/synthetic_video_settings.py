@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.text.did_you_mean import did_you_mean
 
@@ -211,11 +211,10 @@ def video_settings(level: str = "moderate", **changes: Any) -> VideoSettings:
     return VideoSettings(**{**VIDEO_LEVELS[level], **changes})
 
 
-Array = npt.NDArray[np.float64]
 _NEWTON_STEPS = 8
 
 
-def world_to_image(settings: VideoSettings, points: Array) -> Array:
+def world_to_image(settings: VideoSettings, points: Floats) -> Floats:
     """Return world points [m], shape (..., 2), as (column, row) [px]."""
     cos, sin = np.cos(settings.rotation_rad), np.sin(settings.rotation_rad)
     x = cos * points[..., 0] - sin * points[..., 1]
@@ -225,11 +224,11 @@ def world_to_image(settings: VideoSettings, points: Array) -> Array:
     centre = np.asarray(settings.centre_px) if settings.centre_px is not None else middle
     ray = np.stack([x, -y], axis=-1) * (settings.px_per_m / depth)[..., None] + centre - middle
     square = (ray**2).sum(axis=-1, keepdims=True) / settings.width_px**2
-    bent: Array = middle + ray * (1.0 + settings.lens_k1 * square + settings.lens_k2 * square**2)
+    bent: Floats = middle + ray * (1.0 + settings.lens_k1 * square + settings.lens_k2 * square**2)
     return bent
 
 
-def image_to_world(settings: VideoSettings, pixels: Array) -> Array:
+def image_to_world(settings: VideoSettings, pixels: Floats) -> Floats:
     """Return pixels (column, row), shape (..., 2), as world points [m]."""
     middle = np.asarray(settings.middle_px)
     centre = np.asarray(settings.centre_px) if settings.centre_px is not None else middle
@@ -250,7 +249,7 @@ def image_to_world(settings: VideoSettings, pixels: Array) -> Array:
     return np.stack([cos * x + sin * y, -sin * x + cos * y], axis=-1)
 
 
-def local_scale(settings: VideoSettings, point: Array) -> float:
+def local_scale(settings: VideoSettings, point: Floats) -> float:
     """Return the scale [px/m] around a world point: the root of how areas grow."""
     step = 0.5 / settings.px_per_m
     ends = np.array([[step, 0.0], [-step, 0.0], [0.0, step], [0.0, -step]]) + point

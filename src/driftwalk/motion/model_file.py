@@ -15,19 +15,12 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.conditions.recorded import Conditions
+from driftwalk.core.arrays import Keys
 from driftwalk.core.errors import ConfigurationError, DriftwalkError, InputError
 from driftwalk.core.extras import show_dask
 from driftwalk.core.text.did_you_mean import did_you_mean
 from driftwalk.motion.function import Settings, function_model
-from driftwalk.motion.protocol import (
-    Details,
-    Keys,
-    MotionModel,
-    Scores,
-    ScoresItself,
-    Values,
-    Worlds,
-)
+from driftwalk.motion.protocol import Details, MotionModel, Scores, ScoresItself, Values, Worlds
 from driftwalk.motion.ranges import Range
 from driftwalk.schema import Parameter
 

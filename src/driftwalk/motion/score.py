@@ -9,15 +9,8 @@ from driftwalk import _core
 from driftwalk.comparison import Statistic, StepDistance, StepReference, StepTable, step_table
 from driftwalk.comparison.density import BINS
 from driftwalk.conditions.recorded import Conditions
-from driftwalk.motion.protocol import (
-    Details,
-    Floats,
-    Keys,
-    MotionModel,
-    Scores,
-    ScoresItself,
-    Values,
-)
+from driftwalk.core.arrays import Bools, Floats, Keys, Singles
+from driftwalk.motion.protocol import Details, MotionModel, Scores, ScoresItself, Values
 from driftwalk.simulation.backend import BROKEN
 
 
@@ -104,7 +97,7 @@ def score_worlds(
     return scores
 
 
-def broken_worlds(status: npt.NDArray[np.uint32]) -> npt.NDArray[np.bool_]:
+def broken_worlds(status: npt.NDArray[np.uint32]) -> Bools:
     """Return which worlds lost their numbers: they have no distance."""
     return np.asarray((status & BROKEN) != 0)
 
@@ -114,7 +107,7 @@ def excerpt_samples(like: Conditions) -> int:
     return int(np.searchsorted(like.sample_time, 30.0, side="right"))
 
 
-def step_densities(reference: StepReference, table: StepTable) -> npt.NDArray[np.float32]:
+def step_densities(reference: StepReference, table: StepTable) -> Singles:
     """Return the share of each world's steps in every bin, (worlds, 32 lengths, 32 angles).
 
     The last bin of the lengths holds all longer steps, the outer bins of the angles all beyond.

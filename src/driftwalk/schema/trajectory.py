@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.schema.check import build_dataset
 
@@ -30,13 +31,13 @@ POSE: Final = ("x", "y", "theta")
 class Track(NamedTuple):
     """The samples of one body that are present, shapes (n,), in time order."""
 
-    time: npt.NDArray[np.float64]
+    time: Floats
     """Time [s]."""
-    x: npt.NDArray[np.float64]
+    x: Floats
     """Position x [m]."""
-    y: npt.NDArray[np.float64]
+    y: Floats
     """Position y [m]."""
-    theta: npt.NDArray[np.float64]
+    theta: Floats
     """Orientation [rad]; all NaN when the recording has none."""
 
     @property
@@ -111,9 +112,9 @@ def build_trajectory(
     return check_trajectory(dataset)
 
 
-def wrap_angle(theta: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+def wrap_angle(theta: Floats) -> Floats:
     """Wrap angles [rad] into (-pi, pi]."""
-    wrapped: npt.NDArray[np.float64] = np.pi - theta
+    wrapped: Floats = np.pi - theta
     # In place: a long recording is not to be held four times.
     np.mod(wrapped, 2.0 * np.pi, out=wrapped)
     np.subtract(np.pi, wrapped, out=wrapped)
@@ -177,7 +178,7 @@ def body_track(dataset: xr.Dataset, body: str | None = None) -> Track:
     return Track(time[present], x[present], y[present], theta[present])
 
 
-def _columns(values: npt.ArrayLike) -> npt.NDArray[np.float64]:
+def _columns(values: npt.ArrayLike) -> Floats:
     array = np.asarray(values, dtype=np.float64)
     return array[:, None] if array.ndim == 1 else array
 

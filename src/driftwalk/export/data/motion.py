@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.run_layout import MANIFEST_FILE, run_file, run_files, state_of
 from driftwalk.core.text.json_text import read_json
@@ -185,7 +185,7 @@ def frame_rate(recording: xr.Dataset) -> float | None:
     return None
 
 
-def frame_numbers(recording: xr.Dataset) -> npt.NDArray[np.int64]:
+def frame_numbers(recording: xr.Dataset) -> Integers:
     """Return the number of the frame of each time, from 0; of an uneven clock that of the row.
 
     Parameters
@@ -203,11 +203,11 @@ def frame_numbers(recording: xr.Dataset) -> npt.NDArray[np.int64]:
     rate = frame_rate(recording)
     if rate is None:
         return np.arange(time.size, dtype=np.int64)
-    numbers: npt.NDArray[np.int64] = np.rint((time - time[0]) * rate).astype(np.int64)
+    numbers: Integers = np.rint((time - time[0]) * rate).astype(np.int64)
     return numbers
 
 
-def _is_even(time: npt.NDArray[np.float64], rate: float) -> bool:
+def _is_even(time: Floats, rate: float) -> bool:
     """Whether every time lies at a frame of its own."""
     if not (np.isfinite(rate) and rate > 0.0):
         return False

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 import numpy as np
 
 from driftwalk.conditions.recorded import Conditions
+from driftwalk.core.arrays import Keys
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.files.file_names import text_of_name
 from driftwalk.core.provenance import file_sha256
@@ -40,7 +41,7 @@ from driftwalk.motion.external_program.process import (
     Request,
     close_programs,
 )
-from driftwalk.motion.protocol import Keys, Values, Worlds
+from driftwalk.motion.protocol import Values, Worlds
 from driftwalk.motion.ranges import Given, with_given
 
 if TYPE_CHECKING:
