@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -230,11 +231,13 @@ def _check_variable(dataset: xr.Dataset, variable: Variable, kind: Kind) -> None
         )
 
 
-_JSON: Final[dict[str, type[Any]]] = {"object": dict, "list": list}
-
-
 def check_contents(dataset: xr.Dataset, path: Path) -> xr.Dataset:
     """Return a dataset that holds what its kind needs; one of no kind of driftwalk's as it is.
+
+    For the readers that need all of it. A page makes do with what there is, section by section; a
+    recording, a flow field or a calibration that work goes on with has no such way out. Files that
+    other programs write in this form hold less than `check_dataset` asks for: here only what a
+    reader relies on is needed, and the rest has to be what its name says where it is there.
 
     Raises
     ------
@@ -246,59 +249,51 @@ def check_contents(dataset: xr.Dataset, path: Path) -> xr.Dataset:
     if kind is None:
         return dataset
     refuse_other_version(dataset, path)
-    attributes = {one.name: one for one in kind.attributes}
-    for needed in kind.read.split():
-        if needed not in dataset.variables:
-            raise FormatError(
-                f"is damaged: its {kind.name} lacks the variable '{needed}'", path=path
-            )
-    for variable in kind.variables:
-        if variable.name in dataset.variables:
-            _check_variable(dataset, variable, path)
-    for needed in kind.read_attributes.split():
-        if needed not in dataset.attrs:
-            raise FormatError(
-                f"is damaged: its {kind.name} lacks the attribute '{needed}'", path=path
-            )
-    for key, value in dataset.attrs.items():
-        if key in attributes:
-            _check_attribute(attributes[str(key)], value, path)
+    for fault in _faults(dataset, kind):
+        raise FormatError(f"is damaged: {fault}", path=path)
     return dataset
 
 
-def _check_variable(dataset: xr.Dataset, variable: Variable, path: Path) -> None:
-    held = dataset.variables[variable.name]
+def _faults(dataset: xr.Dataset, kind: Kind) -> Iterator[str]:
+    """Yield what is missing, or is not what its name says."""
+    for name in kind.read.split():
+        if name not in dataset.variables:
+            yield f"its {kind.name} lacks the variable '{name}'"
+    for variable in kind.variables:
+        if variable.name in dataset.variables:
+            yield from _variable_faults(dataset.variables[variable.name], variable)
+    for name in kind.read_attributes.split():
+        if name not in dataset.attrs:
+            yield f"its {kind.name} lacks the attribute '{name}'"
+    for attribute in kind.attributes:
+        if attribute.name in dataset.attrs:
+            yield from _attribute_faults(dataset.attrs[attribute.name], attribute)
+
+
+def _variable_faults(held: xr.Variable, variable: Variable) -> Iterator[str]:
     dims = tuple(str(dim) for dim in held.dims)
     if not variable.lies_on(dims):
         expected = ", ".join(variable.fixed_dims)
-        raise FormatError(
-            f"is damaged: '{variable.name}' lies on ({', '.join(dims)}), expected ({expected})",
-            path=path,
-        )
+        yield f"'{variable.name}' lies on ({', '.join(dims)}), expected ({expected})"
     if variable.holds == "text":
         if not all(isinstance(value, str) for value in held.values.flat):
-            raise FormatError(f"is damaged: '{variable.name}' holds no text", path=path)
+            yield f"'{variable.name}' holds no text"
     elif held.dtype.kind not in "fiub":
-        raise FormatError(f"is damaged: '{variable.name}' holds no numbers", path=path)
+        yield f"'{variable.name}' holds no numbers"
 
 
-def _check_attribute(attribute: Attribute, value: Any, path: Path) -> None:
-    name = attribute.name
-    if attribute.says == "number":
+def _attribute_faults(value: Any, attribute: Attribute) -> Iterator[str]:
+    name, says = f"its attribute '{attribute.name}'", attribute.says
+    if says == "number":
         if not isinstance(value, (int, float, np.number)):
-            raise FormatError(f"is damaged: its attribute '{name}' is not a number", path=path)
-    elif attribute.says != "numbers" and not isinstance(value, str):
-        raise FormatError(f"is damaged: its attribute '{name}' is not text", path=path)
-    if attribute.says in _JSON and value:
-        _check_json(name, value, path, holds=attribute.says)
-
-
-def _check_json(name: str, text: str, path: Path, *, holds: str) -> None:
-    try:
-        found = parse_json(text)
-    except FormatError as error:
-        raise FormatError(
-            f"is damaged: its attribute '{name}' is not JSON ({error})", path=path
-        ) from error
-    if not isinstance(found, _JSON[holds]):
-        raise FormatError(f"is damaged: its attribute '{name}' holds no JSON {holds}", path=path)
+            yield f"{name} is not a number"
+    elif says != "numbers" and not isinstance(value, str):
+        yield f"{name} is not text"
+    elif says in ("object", "list") and value:
+        try:
+            found = parse_json(value)
+        except FormatError as error:
+            yield f"{name} is not JSON ({error})"
+        else:
+            if not isinstance(found, dict if says == "object" else list):
+                yield f"{name} holds no JSON {says}"
