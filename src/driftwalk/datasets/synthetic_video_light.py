@@ -1,4 +1,4 @@
-"""The light of a synthetic video: shading, reflections, ripples."""
+"""The disturbances of a synthetic video: shading, reflections, ripples, bars over the markers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Contents of a synthetic video and its disturbances; three levels of disturbance are fixed here.
+"""Contents, camera and disturbances of a synthetic video, with three fixed levels of disturbance.
 
 The levels stand apart from every tracker: they were fixed before one was written.
 """

@@ -80,7 +80,7 @@ def target_named(name: str) -> Target:
 
 
 def export_run(source: Source, target: Target, folder: Path) -> list[Path]:
-    """Write an export into a folder, and return its files.
+    """Write an export into a folder, whole or not at all, and return its files.
 
     Parameters
     ----------

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar, Final, Literal
 
-from pydantic import Field
-
 from driftwalk.model.section import Quantity, Section
 
 MOST_BLOCKS: Final = 256
@@ -35,9 +33,12 @@ class Assembly(Section):
     """Length of a run; a run ends earlier if all blocks are in one assembly."""
     seed: Annotated[int, Quantity("1", ge=0, le=2**63 - 1, whole=True)] = 1
     """Seed of the starts, the forces and the drawn parameters."""
-    latching: Latching = Field(default="collision", title="Rule by which two blocks latch.")
-    """Latching rule: "collision", whenever two blocks touch (the paper); "connector", when two
-    faces are within the tolerances of a connector; "none", never: hard bodies."""
+    latching: Latching = "collision"
+    """Rule by which two blocks latch.
+
+    Latching rule: "collision", whenever two blocks touch (the paper); "connector", when two faces
+    are within the tolerances of a connector; "none", never: hard bodies.
+    """
     connector_distance_m: Annotated[float, Quantity("m", ge=0, le=10)] = 0.010
     """Largest distance between the centres of two faces at which connectors latch."""
     connector_axis_rad: Annotated[float, Quantity("rad", ge=0, le=3.15)] = 0.2
@@ -46,14 +47,21 @@ class Assembly(Section):
     """Largest rotation of two connectors against each other about their axis. Blocks float upright,
     so this rotation is always 0 and the condition is always met; the key only completes the
     description of a connector."""
-    hidden_face_drag: HiddenFaceDrag = Field(default="none", title="Drag on faces that are joined.")
-    """Drag on faces that are joined to another block: "none", or "full" as on a free face."""
-    chirality: Chirality = Field(default="merged", title="Mirror images as one class or two.")
-    """Treatment of mirror images: "merged" into one class (the paper), or "distinct"."""
-    block_restitution: Annotated[float, Quantity("1", ge=0, le=1)] = Field(
-        default=0.5, title="Restitution between blocks, 0 to 1."
-    )
-    """Restitution of an impact between two blocks that do not latch."""
+    hidden_face_drag: HiddenFaceDrag = "none"
+    """Drag on faces that are joined.
+
+    Drag on faces that are joined to another block: "none", or "full" as on a free face.
+    """
+    chirality: Chirality = "merged"
+    """Mirror images as one class or two.
+
+    Treatment of mirror images: "merged" into one class (the paper), or "distinct".
+    """
+    block_restitution: Annotated[float, Quantity("1", ge=0, le=1)] = 0.5
+    """Restitution between blocks, 0 to 1.
+
+    Restitution of an impact between two blocks that do not latch.
+    """
     block_friction: Annotated[float, Quantity("1", ge=0, le=100)] = 0.0
     """Coulomb friction between two blocks; 0 for wet faces."""
     confidence: Annotated[float, Quantity("1", gt=0, lt=1)] = 0.9

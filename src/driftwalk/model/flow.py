@@ -26,19 +26,21 @@ class Flow(Section):
     """Drag coefficient C_x of the inertia correction (Eq. 4)."""
     min_count: Annotated[int, Quantity("1", ge=1, le=1_000_000, whole=True)] = 1
     """Smallest number of samples in a measured cell."""
-    inertia: Literal["corrected", "none"] = Field(
-        default="corrected",
-        title="Correction for the body's inertia.",
-        description='"corrected" adds the inertia term of Eq. 4; "none" leaves it out.',
-    )
-    repeat: Literal["none", "loop", "mirror", "hold"] = Field(
-        default="none", title="How a flow series goes on after its last frame."
-    )
-    """How a flow that changes in time goes on after its last frame: "loop" begins again, "mirror"
-    runs backwards and forwards in turns, "hold" stands still; with "none" longer simulations are
-    refused."""
-    start: Literal["random", "first"] = Field(
-        default="random", title="Where in a flow series a run begins."
-    )
-    """Moment of a flow that changes in time at which a run begins: "random", one for each run, or
-    "first", the first frame for all. With a recording its clock is kept."""
+    inertia: Literal["corrected", "none"] = "corrected"
+    """Correction for the body's inertia.
+
+    "corrected" adds the inertia term of Eq. 4; "none" leaves it out.
+    """
+    repeat: Literal["none", "loop", "mirror", "hold"] = "none"
+    """How a flow series goes on after its last frame.
+
+    How a flow that changes in time goes on after its last frame: "loop" begins again, "mirror" runs
+    backwards and forwards in turns, "hold" stands still; with "none" longer simulations are
+    refused.
+    """
+    start: Literal["random", "first"] = "random"
+    """Where in a flow series a run begins.
+
+    Moment of a flow that changes in time at which a run begins: "random", one for each run, or
+    "first", the first frame for all. With a recording its clock is kept.
+    """

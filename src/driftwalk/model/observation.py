@@ -17,14 +17,19 @@ class Observation(Section):
 
     position_noise_m: Annotated[
         float | Literal["estimate"], Quantity("m", ge=0, le=1, words=("estimate",))
-    ] = Field(default="estimate", title="Position noise of the tracker.")
-    """Standard deviation of the position noise of the tracker, per axis; "estimate" takes it from
-    the recording; without a recording there is no noise."""
+    ] = "estimate"
+    """Position noise of the tracker.
+
+    Standard deviation of the position noise of the tracker, per axis; "estimate" takes it from the
+    recording; without a recording there is no noise.
+    """
     orientation_noise_rad: Annotated[
         float | Literal["estimate"], Quantity("rad", ge=0, le=3.2, words=("estimate",))
-    ] = Field(default="estimate", title="Orientation noise of the tracker.")
-    """Standard deviation of the orientation noise of the tracker; "estimate" as for the
-    position."""
+    ] = "estimate"
+    """Orientation noise of the tracker.
+
+    Standard deviation of the orientation noise of the tracker; "estimate" as for the position.
+    """
     position_quantum_m: Annotated[
         float | Literal["recording"], Quantity("m", ge=0, le=1, words=("recording",))
     ] = "recording"

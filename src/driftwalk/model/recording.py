@@ -1,4 +1,4 @@
-"""How a recording is read, so that a study file is complete for the file it belongs to."""
+"""How a recording is read, so that a study file is complete for its file; how steps are formed."""
 
 from __future__ import annotations
 

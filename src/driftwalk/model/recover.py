@@ -33,13 +33,12 @@ class Recover(Section):
 
     section_name: ClassVar[str] = "recover"
 
-    flow: Annotated[str | None, Placeholder("FILE")] = Field(
-        default=None,
-        title="File of the true flow field (default: the study file's).",
-        examples=["fit/flow.nc"],
-    )
-    """File of the true flow field, relative to the study file; "random" draws a different flow for
-    every recording."""
+    flow: Annotated[str | None, Placeholder("FILE")] = Field(default=None, examples=["fit/flow.nc"])
+    """File of the true flow field (default: the study file's).
+
+    File of the true flow field, relative to the study file; "random" draws a different flow for
+    every recording.
+    """
     flow_family: Literal["swirl", "eddies"] = "swirl"
     """Family of random flows: "swirl" with jets and a sink, in which a block goes round on regular
     orbits, or "eddies"."""
@@ -62,9 +61,12 @@ class Recover(Section):
     angle: tuple[str, ...] | None = Field(default=None, examples=['["given", "none"]'])
     """Uses of the orientation to compare, as in [fit] angle; if not set, the one in [fit]."""
     drag_coefficient_precision: Annotated[float | None, Quantity("1", gt=0, lt=1)] = Field(
-        default=None, title="Wanted relative error of C_d (rms).", examples=[0.05]
+        default=None, examples=[0.05]
     )
-    """Wanted relative error of C_d, root mean square: the study says how long to record for it."""
+    """Wanted relative error of C_d (rms).
+
+    Wanted relative error of C_d, root mean square: the study says how long to record for it.
+    """
     seed: Annotated[int, Quantity("1", ge=0, le=2**63 - 1, whole=True)] = 1
     """Seed of the flows, starts, forces, camera and gaps."""
 

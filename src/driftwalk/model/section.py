@@ -1,7 +1,9 @@
 """Base of every section of a study: declared quantities and readable errors.
 
 A field is declared once: type, unit, range, default and meaning stand together, and the same
-declaration checks the value, writes the commented template and makes the reference page.
+declaration checks the value, writes the commented template and makes the reference page. The text
+below a field is its description; where it has two paragraphs, the first one says in a sentence what
+the help of its option says.
 """
 
 from __future__ import annotations
@@ -9,6 +11,7 @@ from __future__ import annotations
 import ast
 import inspect
 import json
+import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -171,15 +174,31 @@ class _SectionError(ConfigurationError):
     """An error whose message names its section already."""
 
 
-def description_of(section: type[Section], key: str) -> str:
-    """Return the text below a field in the source of its class, in one line.
+# A sentence may begin with a word in quotes; "Eq. 4" is no end of one.
+_END_OF_SENTENCE: Final = re.compile(r'(?<=\.) (?=[A-Z"])')
 
-    Only help and templates need it. pydantic could read it, but for every section at import.
+
+def description_of(section: type[Section], key: str) -> str:
+    """Return the description of a field: the last paragraph of the text below it."""
+    return _paragraphs(section, key)[-1]
+
+
+def meaning_of(section: type[Section], key: str) -> str:
+    """Return the description of a field in one sentence: its first paragraph, or sentence."""
+    first, *more = _paragraphs(section, key)
+    return first if more else _END_OF_SENTENCE.split(first)[0]
+
+
+def _paragraphs(section: type[Section], key: str) -> list[str]:
+    """Return the paragraphs below a field in the source of its class, each in one line.
+
+    Only help and templates need them. pydantic could read them, but for every section at import.
     """
-    found = section.model_fields[key].description
+    stated = section.model_fields[key].description
     owners = (kind for kind in section.__mro__ if key in vars(kind).get("__annotations__", {}))
     owner = next(owners, section)
-    return found or _texts_of(owner.__module__).get((owner.__name__, key), "")
+    text = stated or _texts_of(owner.__module__).get((owner.__name__, key), "")
+    return [" ".join(part.split()) for part in text.split("\n\n")]
 
 
 @lru_cache
@@ -190,7 +209,7 @@ def _texts_of(module: str) -> dict[tuple[str, str], str]:
     except OSError:  # a program that was frozen without its source
         return {}
     return {
-        (kind.name, field.target.id): " ".join(text.value.value.split())
+        (kind.name, field.target.id): text.value.value
         for kind in tree.body
         if isinstance(kind, ast.ClassDef)
         for field, text in pairwise(kind.body)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, field_validator
+from pydantic import field_validator
 
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.model.section import Quantity, Section
@@ -31,9 +31,12 @@ class Simulation(Section):
 
     time_step_s: Annotated[
         float | Literal["auto"], Quantity("s", gt=0, le=0.1, words=("auto",))
-    ] = Field(default="auto", title="Time step; divides the force interval.")
-    """Time step of the integrator; "auto" is the largest whole divisor of force_interval_s up to 10
-    ms. A step that does not divide the interval is an error."""
+    ] = "auto"
+    """Time step; divides the force interval.
+
+    Time step of the integrator; "auto" is the largest whole divisor of force_interval_s up to 10
+    ms. A step that does not divide the interval is an error.
+    """
     duration_s: Annotated[float, Quantity("s", gt=0, le=1e7)] = 1800.0
     """Length of a simulated trajectory."""
     sample_rate_Hz: Annotated[float, Quantity("Hz", gt=0, le=1e5)] = 10.0

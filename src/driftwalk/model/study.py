@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
@@ -21,7 +22,18 @@ from driftwalk.model.forces import Forces
 from driftwalk.model.observation import Observation
 from driftwalk.model.recording import Recording, Steps
 from driftwalk.model.recover import Recover
-from driftwalk.model.section import Section, write_toml
+from driftwalk.model.section import (
+    OrNumber,
+    Placeholder,
+    Quantity,
+    Section,
+    is_list,
+    item_quantity_of,
+    meaning_of,
+    quantity_of,
+    words_of,
+    write_toml,
+)
 from driftwalk.model.sensitivity import Sensitivity
 from driftwalk.model.simulation import Pose, Simulation, resolve_time_step
 from driftwalk.model.tank import Tank, Water
@@ -263,3 +275,75 @@ def _known_section(section: str, name: str) -> str:
             f"{did_you_mean(section, Study.model_fields)}"
         )
     return section
+
+
+@dataclass(frozen=True)
+class Declaration:
+    """Unit, bounds, words and meaning of one key of a study.
+
+    Attributes
+    ----------
+    meaning : str
+        In one sentence.
+    quantity : Quantity or None
+        The number that it takes, or that an item of its list is; None for a text.
+    words : tuple of str
+        The words that it takes, alone or instead of a number.
+    is_list : bool
+        Whether it takes a list.
+    placeholder : str
+        Shown in the help in place of a text, empty where nothing is declared.
+    """
+
+    meaning: str
+    quantity: Quantity | None
+    words: tuple[str, ...]
+    is_list: bool
+    placeholder: str
+
+
+def declared(key: str) -> Declaration:
+    """Return the declaration of a key.
+
+    Parameters
+    ----------
+    key : str
+        Such as ``"tank.diameter_m"``. A word that may be given as a number under another key
+        (``"block.depth"``) has the quantity of that key.
+
+    Raises
+    ------
+    ConfigurationError
+        When a study has no such key.
+
+    Examples
+    --------
+    >>> declared("simulation.time_step_s").words, declared("simulation.time_step_s").quantity.unit
+    (('auto',), 's')
+    >>> declared("block.depth").words, declared("block.depth").quantity.unit
+    (('immersed', 'archimedes'), 'm')
+    """
+    name, _, field_name = key.partition(".")
+    section = _sections().get(name)
+    if section is None or field_name not in section.model_fields:
+        raise ConfigurationError(f"a study has no key '{key}'")
+    field = section.model_fields[field_name]
+    number = next((one.key for one in field.metadata if isinstance(one, OrNumber)), field_name)
+    placeholders = [one.text for one in field.metadata if isinstance(one, Placeholder)]
+    return Declaration(
+        meaning=meaning_of(section, field_name),
+        quantity=quantity_of(section, number) or item_quantity_of(section, field_name),
+        words=words_of(section, field_name),
+        is_list=is_list(section, field_name),
+        placeholder="".join(placeholders),
+    )
+
+
+def _sections() -> dict[str, type[Section]]:
+    """Return the sections of a study by their names, without making one."""
+    kinds = {name: field.annotation for name, field in Study.model_fields.items()}
+    return {
+        name: kind
+        for name, kind in kinds.items()
+        if isinstance(kind, type) and issubclass(kind, Section)
+    }

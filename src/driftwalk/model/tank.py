@@ -1,4 +1,4 @@
-"""The tank: a circle, a rectangle or a convex polygon, and its wall."""
+"""The tank (a circle, a rectangle or a convex polygon), its wall, and the water."""
 
 from __future__ import annotations
 
@@ -32,10 +32,11 @@ class Outline(Section):
 
     shape: Literal["circle", "rectangle", "polygon"] = "circle"
     """Shape; each shape has its own keys."""
-    diameter_m: Annotated[float | None, Quantity("m", gt=0, le=1e3)] = Field(
-        default=None, title="Diameter of a circular tank."
-    )
-    """Diameter of a circle (0.3 m when it is not given)."""
+    diameter_m: Annotated[float | None, Quantity("m", gt=0, le=1e3)] = None
+    """Diameter of a circular tank.
+
+    Diameter of a circle (0.3 m when it is not given).
+    """
     width_m: Annotated[float | None, Quantity("m", gt=0, le=1e3)] = Field(
         default=None, examples=[0.4]
     )
@@ -187,10 +188,11 @@ class Tank(Outline):
 
     section_name: ClassVar[str] = "tank"
 
-    wall_restitution: Annotated[float, Quantity("1", ge=0, le=1)] = Field(
-        default=0.5, title="Restitution of the wall, 0 to 1."
-    )
-    """Restitution e of an impact on the wall."""
+    wall_restitution: Annotated[float, Quantity("1", ge=0, le=1)] = 0.5
+    """Restitution of the wall, 0 to 1.
+
+    Restitution e of an impact on the wall.
+    """
     wall_friction: Annotated[float, Quantity("1", ge=0, le=100)] = 0.0
     """Coulomb friction of the wall; 0 for a wet wall."""
     bounce_speed_m_s: Annotated[float, Quantity("m/s", ge=0, le=1e3)] = 0.01

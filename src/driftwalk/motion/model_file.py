@@ -1,4 +1,4 @@
-"""A motion model in a Python file of the user's: "mine.py:tumbler"."""
+"""A motion model in a Python file of the user's, "mine.py:tumbler"; loading such a file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The values at which a motion model is simulated: given by name, or found by a calibration."""
+"""Known values of motion models: given by name, or found by a calibration."""
 
 from __future__ import annotations
 

@@ -1,8 +1,11 @@
-"""The parameters of a motion model, and of a stored calibration: names, units, ranges, scales.
+"""The parameters of a motion model and of a stored calibration: names, units, ranges, scales.
 
 Grids, surfaces and regions are computed in the *coordinate* of a parameter: its value on a linear
 scale, the decimal logarithm of its value on a logarithmic one. On a linear scale the two are the
 same bits.
+
+The parameters of a stored calibration are the dimensions of its map, with the units and labels of
+their coordinates; without a map they are the block's.
 """
 
 from __future__ import annotations

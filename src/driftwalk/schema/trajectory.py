@@ -1,14 +1,9 @@
-"""The `trajectory` dataset: poses of one or more bodies over time.
+"""The `trajectory` dataset, poses of one or more bodies over time, and the `steps` cut from it.
 
-Dimensions ``(time, body)``; coordinates ``time`` [s] (strictly increasing) and ``body`` (names).
-Variables ``x``, ``y`` [m] and ``theta`` [rad, in (-pi, pi], NaN when unknown], float64. A missing
-sample is NaN in ``x`` and ``y``: gaps are real and are never filled. Bodies with clocks of their
-own share the union of their time stamps, each with NaN where it has no sample.
-
-``attrs`` describes the set-up: ``kind`` = "trajectory", ``schema_version``,
-``source`` (file name), ``format`` (loader), ``sample_rate_Hz``, ``arena`` (JSON text, see
-`driftwalk.model.tank`), ``position_quantum_m`` (resolution of the file, 0 when unknown),
-``y_axis`` (what the loader did), ``counts`` (JSON text: what cleaning found).
+A missing sample is NaN in ``x`` and ``y``: gaps are real and are never filled. Bodies with clocks
+of their own share the union of their time stamps, each with NaN where it has no sample. A turning
+angle is the signed angle from the step before to this one (the paper's step angle).
+`driftwalk.schema.kinds.motion` lists the variables and attributes of both.
 """
 
 from __future__ import annotations

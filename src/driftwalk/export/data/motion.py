@@ -1,4 +1,4 @@
-"""The motion in a run or a file: recordings, simulated worlds, and blocks that assemble."""
+"""The motion in a run or a file: recordings, simulated worlds, blocks that assemble; its clock."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from typing import Final
 
-from driftwalk.schema import Parameter
+from driftwalk.schema.parameters import Parameter, Scale
 
 _ROW: Final = re.compile(r"(\w+) \[(.+?)\] (\S+) to (\S+)( log)?: (.+)")
 
@@ -17,7 +17,7 @@ def _declared(text: str) -> Iterator[Parameter]:
         match = _ROW.fullmatch(" ".join(row.split()))
         assert match is not None, row
         name, unit, low, high, log, meaning = match.groups()
-        scale = "log" if log else "linear"
+        scale: Scale = "log" if log else "linear"
         yield Parameter(name, unit, float(low), float(high), scale=scale, meaning=meaning)
 
 

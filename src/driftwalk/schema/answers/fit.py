@@ -1,4 +1,8 @@
-"""The answer of a fit: its estimates, the force law, the wall, and the check of the model."""
+"""The answer of a fit: its estimates, the force law, the wall, and the check of the model.
+
+A `model_check` holds everything that was checked; the fit keeps the verdict, the p values and the
+map of residuals, so that one dataset answers whether its numbers may be used.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The dataset of the water's velocity, and the facts of what was simulated in it."""
+"""The dataset of the water's velocity, and what a result says of a flow that changes in time."""
 
 from __future__ import annotations
 

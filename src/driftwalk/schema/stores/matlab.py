@@ -140,6 +140,10 @@ _TAG: Final = 8
 def refuse_unknown_elements(path: Path) -> None:
     """Refuse a file of MATLAB's old format with an element of an unknown type.
 
+    A variable is a nest of elements, and each begins with the number of its type. scipy looks the
+    number up unchecked: of a type that does not exist scipy 1.17 ends the process by a segmentation
+    fault, which no error handler catches.
+
     Parameters
     ----------
     path : Path
