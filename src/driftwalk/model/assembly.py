@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar, Final, Literal
 
-from driftwalk.model.section import Quantity, Section
+from driftwalk.model.section import Quantity, Section, Seed
 
 MOST_BLOCKS: Final = 256
 """The most that the native core takes."""
@@ -31,7 +31,7 @@ class Assembly(Section):
     """Simulated runs, each with its own start and random numbers."""
     duration_s: Annotated[float, Quantity("s", gt=0, le=1e6)] = 300.0
     """Length of a run; a run ends earlier if all blocks are in one assembly."""
-    seed: Annotated[int, Quantity("1", ge=0, le=2**63 - 1, whole=True)] = 1
+    seed: Seed = 1
     """Seed of the starts, the forces and the drawn parameters."""
     latching: Latching = "collision"
     """Rule by which two blocks latch.

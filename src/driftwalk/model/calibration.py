@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.grid import MOST_SETTINGS, check_axis, grid_values
 from driftwalk.model.forces import DragCoefficient, ForceStd
-from driftwalk.model.section import Quantity, Section
+from driftwalk.model.section import Quantity, Section, Seed
 
 DragCoefficientStep = Annotated[float, Quantity("1", gt=0, le=100)]
 ForceStdStep = Annotated[float, Quantity("N", gt=0, le=10)]
@@ -86,7 +86,7 @@ class Calibration(ForceGrid):
     bootstrap: Annotated[int, Quantity("1", ge=0, le=1_000_000, whole=True)] = 200
     """Bootstrap samples for the intervals, and simulated recordings for the goodness of fit of the
     summaries; 0 leaves both out."""
-    seed: Annotated[int, Quantity("1", ge=0, le=2**63 - 1, whole=True)] = 1
+    seed: Seed = 1
     """Seed of the simulations and of the bootstrap."""
     confidence: Annotated[float, Quantity("1", gt=0, lt=1)] = 0.9
     """Confidence of the intervals and of the region."""

@@ -10,7 +10,7 @@ from pydantic import Field, field_validator
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.text.did_you_mean import did_you_mean
 from driftwalk.model.fit import Fit
-from driftwalk.model.section import Placeholder, Quantity, Section, quoted, words_of
+from driftwalk.model.section import Placeholder, Quantity, Section, Seed, quoted, words_of
 
 LARGEST_STEP_S: Final = 0.0025
 """Largest time step of a simulation that is taken for the truth: its error is then far below what
@@ -67,7 +67,7 @@ class Recover(Section):
 
     Wanted relative error of C_d, root mean square: the study says how long to record for it.
     """
-    seed: Annotated[int, Quantity("1", ge=0, le=2**63 - 1, whole=True)] = 1
+    seed: Seed = 1
     """Seed of the flows, starts, forces, camera and gaps."""
 
     @field_validator("durations_s")

@@ -17,7 +17,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
-from typing import Any, ClassVar, Final, get_args
+from typing import Annotated, Any, ClassVar, Final, get_args
 
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError
 from pydantic_core import CoreSchema, ErrorDetails, core_schema
@@ -115,6 +115,9 @@ class Quantity:
         if isinstance(value, bool) or not isinstance(value, int):
             raise ConfigurationError(f"expected a whole number, got {value!r}")
         return value
+
+
+Seed = Annotated[int, Quantity("1", ge=0, le=2**63 - 1, whole=True)]
 
 
 @dataclass(frozen=True)

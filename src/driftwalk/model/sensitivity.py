@@ -12,7 +12,7 @@ from driftwalk.core.grid import MOST_SETTINGS
 from driftwalk.model.assembly import MOST_BLOCKS, HiddenFaceDrag, Latching
 from driftwalk.model.calibration import ForceGrid
 from driftwalk.model.forces import DragCoefficient, ForceStd
-from driftwalk.model.section import Quantity
+from driftwalk.model.section import Quantity, Seed
 
 AXES: Final[dict[str, str]] = {
     "tank_diameter": "tank_diameter_m",
@@ -51,7 +51,7 @@ class Sensitivity(ForceGrid):
     """Simulated runs per setting, and per realisation of the reference."""
     reference_realisations: Annotated[int, Quantity("1", ge=2, le=100_000, whole=True)] = 10
     """Number of realisations of the reference, which is their mean."""
-    seed: Annotated[int, Quantity("1", ge=0, le=2**63 - 1, whole=True)] = 1
+    seed: Seed = 1
     """Seed of the random numbers."""
     tank_diameter_m: tuple[Annotated[float, Quantity("m", gt=0, le=1e3)], ...] | None = Field(
         default=None, examples=["[0.25, 0.3]"]

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import field_validator
 
 from driftwalk.core.errors import ConfigurationError
-from driftwalk.model.section import Quantity, Section
+from driftwalk.model.section import Quantity, Section, Seed
 
 
 class Pose(Section):
@@ -43,7 +43,7 @@ class Simulation(Section):
     """Sampling rate of a simulation without a recording's time stamps."""
     replicates: Annotated[int, Quantity("1", ge=1, le=10_000_000, whole=True)] = 1
     """Trajectories with the same parameters and different random numbers."""
-    seed: Annotated[int, Quantity("1", ge=0, le=2**63 - 1, whole=True)] = 1
+    seed: Seed = 1
     """Seed of the random numbers; the same seed gives the same bits."""
     start: Literal["random"] | Pose = "random"
     """First pose: "random", anywhere in the tank, or a pose such as { x_m = 0.0, y_m = 0.0,
