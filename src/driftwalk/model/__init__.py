@@ -19,12 +19,12 @@ from driftwalk.model.study import (
     load_study,
     parse_study,
 )
-from driftwalk.model.study_template import (
+from driftwalk.model.tank import FieldOfView, Tank, Water
+from driftwalk.model.template import (
     parameter_table,
     short_study_template,
     study_template,
 )
-from driftwalk.model.tank import FieldOfView, Tank, Water
 
 __all__ = [
     "Assembly",

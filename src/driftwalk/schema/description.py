@@ -213,7 +213,7 @@ COMMON: Final = {
         Attribute("seed", "number", "seed of the random numbers"),
     )
 }
-"""Attributes of many kinds: in their texts the name alone stands for them."""
+"""Attributes of many kinds, by the name under which their texts list them."""
 
 _HEAD: Final = re.compile(r"(dimensions|variables|attributes)(?: \((.+)\))?:")
 _VARIABLE: Final = re.compile(
