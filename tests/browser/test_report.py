@@ -18,7 +18,7 @@ from browser.all_kinds import every_kind, page_of, with_texts
 from browser.conftest import PHONE, Visit
 from browser.pictures import assert_same_path, drawn_share, path_points, pixels
 from driftwalk.page import map_section
-from driftwalk.schema.calibration import BLOCK
+from driftwalk.schema.parameters import BLOCK
 
 pytestmark = pytest.mark.browser
 

@@ -12,7 +12,7 @@ from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_prediction
 from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import ASSEMBLY_KEYS
-from driftwalk.schema.kinds.flow_series import flow_series_words
+from driftwalk.schema.kinds.flow import flow_series_words
 
 if TYPE_CHECKING:
     from driftwalk.model import Study

@@ -14,7 +14,7 @@ from driftwalk.core.run_stages import tell_nobody
 from driftwalk.schema.answers.calibration import calibration_answer
 from driftwalk.schema.answers.fit import fit_json
 from driftwalk.schema.answers.parts import estimates, number_text
-from driftwalk.schema.kinds.fit_numbers import PARAMETERS
+from driftwalk.schema.kinds.fit import PARAMETERS
 from driftwalk.schema.stores.netcdf import open_netcdf
 
 if TYPE_CHECKING:

@@ -171,7 +171,7 @@ def _flow(path: Path | None, study: Study, *, bundled: bool) -> xr.Dataset:
 
 def _series_words(field: xr.Dataset, study: Study) -> list[str]:
     """Return how a flow that changes in time goes on after its last frame."""
-    from driftwalk.schema.kinds.flow_series import flow_series_words
+    from driftwalk.schema.kinds.flow import flow_series_words
 
     stated = study.flow.repeat
     repeat = stated if stated != "none" else field.attrs.get("repeat", "none")

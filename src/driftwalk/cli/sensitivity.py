@@ -20,7 +20,7 @@ from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.study_keys import SENSITIVITY_KEYS
 from driftwalk.core.units import parse_quantity
 from driftwalk.model import declared
-from driftwalk.schema.kinds.flow_series import flow_series_words
+from driftwalk.schema.kinds.flow import flow_series_words
 
 if TYPE_CHECKING:
     from driftwalk.model import Study

@@ -20,8 +20,7 @@ from driftwalk.comparison.ks import ComparisonWarning
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
 from driftwalk.schema import body_track
-from driftwalk.schema.steps import build_steps
-from driftwalk.schema.trajectory import Track
+from driftwalk.schema.trajectory import Track, build_steps
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -12,8 +12,7 @@ import numpy as np
 from driftwalk.conditions import require_travel
 from driftwalk.conditions.refuse import prefix_of
 from driftwalk.conditions.study import fitted_law, is_fitted
-from driftwalk.core.errors import InputError
-from driftwalk.core.text.argument_text import argument_text
+from driftwalk.core.errors import InputError, argument_text
 from driftwalk.core.text.json_text import parse_json
 from driftwalk.flow.arena import outline_of, read_arena
 from driftwalk.likelihood.filter.filter_pass import Passes

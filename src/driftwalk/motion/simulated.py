@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from driftwalk.conditions.camera import study_as_seen
 from driftwalk.conditions.recorded import Conditions, neighbours_of, recorded_conditions
+from driftwalk.core.arrays import Floats, Keys
 from driftwalk.core.errors import InputError
 from driftwalk.core.processors import default_threads
 from driftwalk.core.seeds import world_keys
@@ -19,7 +20,7 @@ from driftwalk.motion.block import BlockModel
 from driftwalk.motion.external_program.program import ProgramModel
 from driftwalk.motion.family import ParticleModel
 from driftwalk.motion.family.particle import time_step_of
-from driftwalk.motion.protocol import Keys, MotionModel, Worlds
+from driftwalk.motion.protocol import MotionModel, Worlds
 from driftwalk.motion.values import known_values
 from driftwalk.schema import body_track
 from driftwalk.schema.check import build_dataset
@@ -154,7 +155,7 @@ def _check_flow(model: MotionModel, flow: xr.Dataset | None) -> None:
 def _conditions(
     model: MotionModel,
     study: Study,
-    times: npt.NDArray[np.float64],
+    times: Floats,
     start: Start | None,
     flow: xr.Dataset | None,
     keys: Keys,

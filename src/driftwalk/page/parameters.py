@@ -8,7 +8,7 @@ from driftwalk.page.chart import label as chart_label
 from driftwalk.page.parts import axis
 from driftwalk.plot.parts.labels import force_interval_text
 from driftwalk.schema.answers.facts import facts_of
-from driftwalk.schema.calibration import BLOCK, is_block, stored_parameters
+from driftwalk.schema.parameters import BLOCK, is_block, stored_parameters
 
 if TYPE_CHECKING:
     import xarray as xr

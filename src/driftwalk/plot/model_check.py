@@ -20,7 +20,7 @@ from driftwalk.plot.parts.style import (
     axes_or_new,
     speed_colormap,
 )
-from driftwalk.schema.answers.verdict import residuals_of
+from driftwalk.schema.answers.fit import residuals_of
 from driftwalk.schema.check import require_kind
 
 if TYPE_CHECKING:

@@ -6,8 +6,7 @@ import re
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-from driftwalk.core.errors import InputError
-from driftwalk.core.text.argument_text import argument_text
+from driftwalk.core.errors import InputError, argument_text
 
 _ROOTS: dict[str, str] = {
     **dict.fromkeys(("t", "time", "timestamp", "datetime", "seconds"), "t"),

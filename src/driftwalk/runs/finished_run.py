@@ -16,10 +16,9 @@ from driftwalk.core.files.run_layout import MANIFEST_FILE, faults_of, run_file, 
 from driftwalk.core.provenance import read_manifest
 from driftwalk.motion import MotionModel, estimated_values
 from driftwalk.schema.answers.facts import sentences
-from driftwalk.schema.calibration import is_block
-from driftwalk.schema.check import refuse_other_version, require_kind
+from driftwalk.schema.check import check_contents, refuse_other_version, require_kind
+from driftwalk.schema.parameters import is_block
 from driftwalk.schema.runs import RUN_KINDS, RunKind, kind_of, load_maker
-from driftwalk.schema.stores.contents import check_contents
 from driftwalk.schema.stores.netcdf import is_netcdf, open_netcdf
 
 if TYPE_CHECKING:

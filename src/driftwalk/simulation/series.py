@@ -11,7 +11,7 @@ import numpy.typing as npt
 from driftwalk import _core
 from driftwalk.core.errors import InputError
 from driftwalk.core.random_streams import Purpose
-from driftwalk.schema.kinds.flow_series import flow_series_words
+from driftwalk.schema.kinds.flow import flow_series_words
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -23,7 +23,7 @@ from driftwalk.plot import (
 )
 from driftwalk.plot.panels import shared_setting_text
 from driftwalk.plot.parts.style import new_figure
-from driftwalk.schema.calibration import stored_parameters
+from driftwalk.schema.parameters import stored_parameters
 
 BLOCK_WORDS = re.compile("drag|force|C_d|σ_F|mN", re.IGNORECASE)
 

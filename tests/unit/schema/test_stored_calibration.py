@@ -17,7 +17,7 @@ from driftwalk.schema.answers.facts import (
     facts_of,
     fitted_value,
 )
-from driftwalk.schema.calibration import is_block, stored_parameters
+from driftwalk.schema.parameters import is_block, stored_parameters
 from driftwalk.schema.stores.netcdf import open_netcdf
 
 FORMS = ("calibration", "calibration of one parameter", "calibration of two parameters")

@@ -18,7 +18,7 @@ from driftwalk.assembly.sensitivity.times import map_courses, reference_courses
 from driftwalk.core.errors import InputError
 from driftwalk.core.text.json_text import parse_json
 from driftwalk.schema.check import build_dataset, described
-from driftwalk.schema.kinds.flow_series import FLOW_SERIES
+from driftwalk.schema.kinds.flow import FLOW_SERIES
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -261,7 +261,7 @@ def load_simulation(path: Path, *, replicate: int = 0) -> xr.Dataset | None:
 
 def open_kind(path: Path, kind: str) -> xr.Dataset | None:
     """Return the dataset of this kind that a file of driftwalk holds, None of any other file."""
-    from driftwalk.schema.stores.contents import check_contents
+    from driftwalk.schema.check import check_contents
     from driftwalk.schema.stores.netcdf import kind_of_file, open_netcdf
 
     # Damaged, or no NetCDF: the loaders of recordings say what is wrong.

@@ -281,7 +281,7 @@ def print_places(found: xr.Dataset, folder: Path, warnings: Iterable[str]) -> No
 def _following(found: xr.Dataset, kind: str) -> list[str]:
     """Return the command that takes a run further, its options, and a name for its result."""
     from driftwalk.schema.answers.parts import undetermined
-    from driftwalk.schema.calibration import is_block
+    from driftwalk.schema.parameters import is_block
 
     if kind == "fit" or (kind == "calibration" and is_block(found)):
         # Nothing can be simulated with what is not known.

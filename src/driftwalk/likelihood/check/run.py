@@ -32,7 +32,7 @@ from driftwalk.likelihood.flow_intervals import require_fit
 from driftwalk.likelihood.preparation import as_list, estimate_of
 from driftwalk.likelihood.refuse import BREAKDOWN
 from driftwalk.schema.answers.facts import texts
-from driftwalk.schema.answers.verdict import with_verdict
+from driftwalk.schema.answers.fit import with_verdict
 from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:

@@ -25,7 +25,7 @@ from driftwalk.likelihood.preparation import Estimate, estimate_of
 from driftwalk.likelihood.refuse import BREAKDOWN
 from driftwalk.schema.answers.parts import undetermined
 from driftwalk.schema.check import described
-from driftwalk.schema.kinds.fit_numbers import WALL_NUMBERS
+from driftwalk.schema.kinds.fit import WALL_NUMBERS
 
 if TYPE_CHECKING:
     import xarray as xr

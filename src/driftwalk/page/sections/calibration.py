@@ -31,7 +31,7 @@ from driftwalk.page.sections.recording import Noise, recording_sections
 from driftwalk.plot.parts.labels import interval_of
 from driftwalk.schema.answers.facts import sentences
 from driftwalk.schema.answers.parts import estimates
-from driftwalk.schema.calibration import is_block
+from driftwalk.schema.parameters import is_block
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -18,7 +18,7 @@ from driftwalk.plot.parts.labels import (
     number_fact,
     required_fact,
 )
-from driftwalk.schema.calibration import StoredParameter, is_block, stored_parameters
+from driftwalk.schema.parameters import StoredParameter, is_block, stored_parameters
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -6,8 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from driftwalk.core.errors import FormatError, InputError
-from driftwalk.core.text.argument_text import argument_text
+from driftwalk.core.errors import FormatError, InputError, argument_text
 from driftwalk.record.cleaning.stacked import split_bodies
 from driftwalk.record.column_names import ColumnMap, map_columns, unit_of_name
 from driftwalk.record.convert_units import scale_wanted

@@ -9,14 +9,15 @@ from typing import Final
 from driftwalk.model.section import (
     Quantity,
     Section,
+    description_of,
     is_list,
     item_quantity_of,
     quantity_of,
     quoted,
+    toml_text,
     words_of,
 )
 from driftwalk.model.study import Study
-from driftwalk.model.study_file.toml import toml_text
 
 _HEAD = """\
 # Study file of driftwalk. Every parameter is here with its default; a line that starts with
@@ -51,8 +52,8 @@ def study_template(study: Study | None = None) -> str:
     """
     chosen = study if study is not None else Study()
     parts = [_HEAD]
-    for name, field in Study.model_fields.items():
-        lines = [*_comment(field.description or ""), f"[{name}]"]
+    for name in Study.model_fields:
+        lines = [*_comment(description_of(Study, name)), f"[{name}]"]
         section = getattr(chosen, name)
         for key in type(section).model_fields:
             lines += _commented_parameter(section, key)
@@ -75,8 +76,7 @@ def short_study_template() -> str:
         section = getattr(Study(), name)
         lines = [f"# [{name}]"]
         for key in keys:
-            note = type(section).model_fields[key].description or ""
-            meaning, *_ = note.partition(". ")
+            meaning, *_ = description_of(type(section), key).partition(". ")
             lines += [*_comment(meaning.rstrip(".") + "."), f"# {key} = {_value(section, key)}"]
         parts.append("\n".join(lines) + "\n")
     return "\n".join(parts)
@@ -103,11 +103,12 @@ def parameter_table(name: str) -> str:
     """
     section = getattr(Study(), name)
     rows = ["| key | default | values | meaning |", "|---|---|---|---|"]
-    for key, field in type(section).model_fields.items():
+    for key in type(section).model_fields:
         value = getattr(section, key)
         default = f"`{toml_text(value)}`" if value is not None else "not set"
         accepted = _accepted(type(section), key).replace("|", "\\|")
-        rows.append(f"| `{key}` | {default} | {accepted} | {field.description} |")
+        meaning = description_of(type(section), key)
+        rows.append(f"| `{key}` | {default} | {accepted} | {meaning} |")
     return "\n".join(rows)
 
 
@@ -115,7 +116,7 @@ def _commented_parameter(section: Section, key: str) -> Iterator[str]:
     kind = type(section)
     value = getattr(section, key)
     accepted = _accepted(kind, key)
-    description = kind.model_fields[key].description or ""
+    description = description_of(kind, key)
     yield ""
     yield from _comment(f"{description} [{accepted}]" if accepted else description)
     yield f"{key} = {toml_text(value)}" if value is not None else f"# {key} = {_example(kind, key)}"

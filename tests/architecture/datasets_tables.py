@@ -1,7 +1,7 @@
 """The tables of the page docs/reference/datasets.md, made from the schemas.
 
-``python -m driftwalk.schema.page docs/reference/datasets.md`` writes them again; the rest of the
-page stays.
+``python tests/architecture/datasets_tables.py docs/reference/datasets.md`` writes them again; the
+rest of the page stays.
 """
 
 from __future__ import annotations
