@@ -9,19 +9,20 @@ border is left out. So draws follow the valley whatever its shape, and widen wit
 the model does not quite explain the recording. The bootstrap's optima would do neither: they lie on
 a lattice, about the optimum, as if the model were true.
 
-A draw from a fit is one of its Gaussian posterior, `driftwalk.assembly.runs.posterior`.
+A draw from a fit is one of its Gaussian posterior, `driftwalk.assembly.runs.parameters`.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.runs.plan import stream_keys
-from driftwalk.assembly.runs.posterior import draw_posterior, has_covariance
 from driftwalk.core.errors import InputError
+from driftwalk.model import declared
+from driftwalk.schema.answers.facts import fitted_value
 from driftwalk.schema.check import kind_name, refuse_other_version
 
 if TYPE_CHECKING:
@@ -192,3 +193,195 @@ def _inside(border: Floats, point: Floats) -> Bools:
     width = np.where(here[:, 0] == there[:, 0], 1.0, there[:, 0] - here[:, 0])
     above = here[:, 1] + (x - here[:, 0]) / width * (there[:, 1] - here[:, 1]) > y
     return np.asarray((spans & above).sum(axis=1) % 2 == 1)
+
+
+Floats = npt.NDArray[np.float64]
+
+PARAMETERS: Final = ("ln_drag_coefficient", "ln_noise_intensity")
+LINEAR_SHARE: Final = "linear_share"
+PLAIN: Final = {"drag_power": "drag_power", "force_memory": "force_memory_s"}
+"""Numbers of a law that [forces] holds as they are, by the fit's name for them."""
+LAW_NUMBERS: Final = (LINEAR_SHARE, *PLAIN)
+
+
+def has_covariance(fit: xr.Dataset) -> bool:
+    """Return whether a fit states the covariance of its parameters."""
+    return "covariance" in fit and bool(np.isfinite(fit["covariance"].values).all())
+
+
+def law_of(fit: xr.Dataset) -> tuple[str, ...]:
+    """Return the keys of [forces] for the numbers of a fit's law that are uncertain.
+
+    Parameters
+    ----------
+    fit : xarray.Dataset
+        A `fit`.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> fit = xr.Dataset(coords={"parameter": ["linear_drag"], "log_parameter": ["force_memory"]})
+    >>> law_of(fit)
+    ('linear_drag_kg_s', 'force_memory_s')
+    """
+    opened = {str(name) for name in fit["log_parameter"].values}
+    # A linear drag goes with C_d, even if its share of the drag is known.
+    linear = "linear_drag" in fit["parameter"].values
+    plain = tuple(key for name, key in PLAIN.items() if name in opened)
+    return (*(("linear_drag_kg_s",) if linear else ()), *plain)
+
+
+def draw_posterior(fit: xr.Dataset, *, runs: int, seed: int, trial: int) -> dict[str, Floats]:
+    """Return C_d, sigma_F and the other numbers of the law of each run, by their keys in [forces].
+
+    A law has to be prepared for the core, as a flow has: where it has numbers of its own, 25 runs
+    share a draw.
+
+    Parameters
+    ----------
+    fit : xarray.Dataset
+        A `fit`.
+    runs : int
+        How many runs.
+    seed, trial : int
+        Address of the draws, as in `draw_parameters`.
+
+    Raises
+    ------
+    InputError
+        When the fit states no covariance.
+
+    Examples
+    --------
+    >>> draw_posterior(fit, runs=2, seed=1, trial=1)["drag_coefficient"]  # doctest: +SKIP
+    array([0.3874, 0.3921])
+    """
+    fit = refuse_other_version(fit)
+    if not has_covariance(fit):
+        raise InputError("the fit has no covariance to draw parameters from: fit again")
+    names = [str(name) for name in fit["log_parameter"].values]
+    chosen = [name for name in (*PARAMETERS, *LAW_NUMBERS) if name in names]
+    rows = [names.index(name) for name in chosen]
+    covariance = fit["covariance"].values[np.ix_(rows, rows)]
+    try:
+        root = np.linalg.cholesky(covariance)
+    except np.linalg.LinAlgError:
+        raise InputError("the covariance of the fit is not one: fit again") from None
+    shared = RUNS_PER_FLOW if law_of(fit) else 1
+    index = np.arange(-(-runs // shared))
+    keys = stream_keys("parameters", seed=seed, trial=trial, index=index)
+    normal = np.stack([_normal(key, len(rows)) for key in keys])
+    # Sums of products in one order: a product of matrices depends on the processor.
+    change = dict(zip(chosen, (root[:, None, :] * normal[None]).sum(axis=2), strict=True))
+    with np.errstate(over="ignore"):
+        by_drag = np.exp(change["ln_drag_coefficient"])
+        by_force = np.exp(0.5 * change["ln_noise_intensity"])
+    quadratic, linear = np.ones(keys.size), np.ones(keys.size)
+    if LINEAR_SHARE in change:
+        share = _number(fit, LINEAR_SHARE)
+        # With a smaller share of quadratic drag, nothing is known of its C_d.
+        quadratic -= change[LINEAR_SHARE] / max(1.0 - share, 1e-6)
+        linear += change[LINEAR_SHARE] / share
+    drawn = {
+        "drag_coefficient": fitted_value(fit, "drag_coefficient") * by_drag * quadratic,
+        "force_std_N": fitted_value(fit, "force_std") * by_force,
+    }
+    for key in law_of(fit):
+        if key == "linear_drag_kg_s":
+            drawn[key] = fitted_value(fit, "linear_drag") * by_drag * linear
+    for name, key in PLAIN.items():
+        if name in change:
+            drawn[key] = _number(fit, name) + change[name]
+    return {key: np.repeat(_within(key, values), shared)[:runs] for key, values in drawn.items()}
+
+
+def _within(key: str, values: Floats) -> Floats:
+    """Return values within what [forces] takes: draws of a fit may lie beyond it."""
+    quantity = declared(f"forces.{key}").quantity
+    return values if quantity is None else np.clip(values, quantity.ge, quantity.le)
+
+
+def _normal(key: np.uint64, count: int) -> Floats:
+    return np.random.Generator(np.random.Philox(key=int(key))).standard_normal(count)
+
+
+def _number(fit: xr.Dataset, name: str) -> float:
+    """Return a number of the law as the fit's filter takes it."""
+    return float(fit["number_value"].values[fit["number"].values.tolist().index(name)])
+
+
+Floats = npt.NDArray[np.float64]
+
+RUNS_PER_FLOW: Final = 25
+"""Runs that share a drawn flow: each drawn one has to be prepared for the core."""
+COMPONENTS: Final = ("u", "v")
+
+
+def has_standard_error(flow: xr.Dataset) -> bool:
+    """Return whether a flow field states a standard error at any of its nodes."""
+    return all(
+        name in flow and bool(np.isfinite(flow[name].values).any())
+        for name in (f"{part}_standard_error" for part in COMPONENTS)
+    )
+
+
+def draw_flow(
+    flow: xr.Dataset, *, seed: int, trial: int, draw: int, correlated_over: float | None = None
+) -> xr.Dataset:
+    """Return a flow field whose measured nodes differ from the given one by chance.
+
+    To each velocity component of each node a normal number times its standard error is added,
+    independently of the other nodes, or smooth over a length that is given. Nodes without a
+    standard error (filled ones, and those that the body visited once) stay as they are. The bias of
+    the estimate (Eq. 4) is not drawn, nor is what the calibrated parameters have absorbed of the
+    flow's error.
+
+    Parameters
+    ----------
+    flow : xarray.Dataset
+        A `flow_field` with ``u_standard_error`` and ``v_standard_error``.
+    seed, trial, draw : int
+        Address of the random numbers.
+    correlated_over : float, optional
+        Distance of the knots of the bicubic spline that the flow was fitted with [m]: the numbers
+        of nodes are one of its splines, the same at every time.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> still = dw.uniform_flow(0.0, 0.0)
+    >>> error = 0.0 * still["u"] + 1e-3
+    >>> still = still.assign(u_standard_error=error, v_standard_error=error)
+    >>> round(float(draw_flow(still, seed=1, trial=0, draw=0)["u"].std()), 4)
+    0.001
+    """
+    key = stream_keys("flow", seed=seed, trial=trial, index=draw)[0]
+    generator = np.random.Generator(np.random.Philox(key=int(key)))
+    changed = {}
+    for name in COMPONENTS:
+        error = np.nan_to_num(flow[f"{name}_standard_error"].values, nan=0.0)
+        if correlated_over is None:
+            number = generator.standard_normal(error.shape)
+        else:
+            number = _smooth(flow, correlated_over, generator)
+        changed[name] = flow[name].copy(data=flow[name].values + error * number)
+    return flow.assign(changed)
+
+
+def _smooth(flow: xr.Dataset, distance: float, generator: np.random.Generator) -> Floats:
+    """Return a normal number at each node, (y, x), of variance 1 and smooth over a distance."""
+    down, along = (_weights(flow[axis].values, distance) for axis in ("y", "x"))
+    knots = generator.standard_normal((down.shape[1], along.shape[1]))
+    spread = np.sqrt((down**2).sum(axis=1)[:, None] * (along**2).sum(axis=1))
+    # No product of matrices: its last digits would depend on the processor.
+    rows = (down[:, :, None] * knots).sum(axis=1)
+    return np.asarray((rows[:, None, :] * along).sum(axis=2) / spread)
+
+
+def _weights(axis: Floats, distance: float) -> Floats:
+    """Return the cubic B-splines of evenly spaced knots at positions, (position, knot)."""
+    place = (axis - axis[0]) / distance
+    away = np.abs(place[:, None] - np.arange(-1.0, np.ceil(place[-1]) + 2.0))
+    inner = 2.0 / 3.0 - away**2 + 0.5 * away**3
+    outer = np.maximum(2.0 - away, 0.0) ** 3 / 6.0
+    return np.asarray(np.where(away < 1.0, inner, outer))

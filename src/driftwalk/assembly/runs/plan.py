@@ -11,8 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
-from driftwalk.assembly.runs.cover import require_cover
-from driftwalk.assembly.runs.start import given_start, place_blocks, require_room
+from driftwalk.assembly.runs.start import given_start, place_blocks, require_cover, require_room
 from driftwalk.core.errors import InputError
 from driftwalk.core.processors import default_threads
 from driftwalk.core.random_streams import trial_in

@@ -12,8 +12,13 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.runs.dataset import LAW_NAMES, build_assembly, build_path
-from driftwalk.assembly.runs.drawn_flow import RUNS_PER_FLOW, draw_flow, has_standard_error
-from driftwalk.assembly.runs.parameters import draw_parameters
+from driftwalk.assembly.runs.parameters import (
+    RUNS_PER_FLOW,
+    draw_flow,
+    draw_parameters,
+    draw_posterior,
+    has_standard_error,
+)
 from driftwalk.assembly.runs.plan import (
     Arrays,
     Backend,
@@ -23,7 +28,6 @@ from driftwalk.assembly.runs.plan import (
     simulate_rows,
     start_poses,
 )
-from driftwalk.assembly.runs.posterior import draw_posterior
 from driftwalk.core.errors import InputError
 from driftwalk.schema.check import kind_name
 from driftwalk.sweep import (

@@ -12,7 +12,7 @@ from driftwalk.assembly.outcomes.classes import listed_classes, sort_classes
 from driftwalk.assembly.outcomes.distribution import is_complete, outcome_distribution
 from driftwalk.assembly.outcomes.l1 import l1_in_floors, l1_noise_floor, pairwise_l1
 from driftwalk.assembly.runs.dataset import assembly_attrs
-from driftwalk.assembly.sensitivity.axes import Axes
+from driftwalk.assembly.sensitivity.run import Axes
 from driftwalk.assembly.sensitivity.settings import Outcomes, Settings
 from driftwalk.assembly.sensitivity.times import map_courses, reference_courses
 from driftwalk.core.errors import InputError

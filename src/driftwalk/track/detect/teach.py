@@ -12,8 +12,12 @@ import numpy as np
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.extras import require_opencv
-from driftwalk.track.detect.chroma import ChromaTables
-from driftwalk.track.detect.markers import MarkerColour, TwoColourMarker, hue_difference
+from driftwalk.track.detect.markers import (
+    ChromaTables,
+    MarkerColour,
+    TwoColourMarker,
+    hue_difference,
+)
 from driftwalk.track.detect.two_colour.discs import Disc, find_regions
 from driftwalk.track.types import Array, Image, PixelToWorld
 

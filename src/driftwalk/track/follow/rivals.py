@@ -16,7 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.track.follow.gate import Measured, Predicted, edge_costs
+from driftwalk.track.follow.kalman import Measured, Predicted, edge_costs
 from driftwalk.track.follow.marks import Marks
 from driftwalk.track.follow.settings import TrackerSettings
 from driftwalk.track.follow.tracks import Rival, Track

@@ -17,14 +17,26 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
 from driftwalk.track.follow.assign import assign
-from driftwalk.track.follow.gate import Measured, Predicted, edge_costs
-from driftwalk.track.follow.kalman import predict, start_state, update
+from driftwalk.track.follow.kalman import (
+    Measured,
+    Predicted,
+    edge_costs,
+    predict,
+    start_state,
+    update,
+)
 from driftwalk.track.follow.marks import Marks
 from driftwalk.track.follow.naming import Naming
 from driftwalk.track.follow.rivals import Rivals
 from driftwalk.track.follow.settings import TrackerSettings
-from driftwalk.track.follow.tracks import Rival, Track, TrackState, measured_of, stacked
-from driftwalk.track.recorded import recording_of
+from driftwalk.track.follow.tracks import (
+    Rival,
+    Track,
+    TrackState,
+    measured_of,
+    recording_of,
+    stacked,
+)
 from driftwalk.track.types import Detection
 
 if TYPE_CHECKING:

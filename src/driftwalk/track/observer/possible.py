@@ -12,8 +12,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
 
 from driftwalk.assembly import class_name, outcome_classes
+from driftwalk.assembly.lattice.join_history import STEPS
 from driftwalk.assembly.lattice.polyomino import Chirality, name_of
-from driftwalk.assembly.lattice.world import STEPS
 from driftwalk.assembly.outcomes.classes import MOST_BLOCKS
 from driftwalk.schema.shapes import Cell, moved_to_origin
 

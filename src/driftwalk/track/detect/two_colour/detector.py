@@ -8,11 +8,16 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from driftwalk.core.extras import require_opencv
-from driftwalk.track.detect.chroma import ChromaTables
-from driftwalk.track.detect.markers import TwoColourMarker
-from driftwalk.track.detect.two_colour.discs import Disc, find_regions, join_pieces, sort_out
+from driftwalk.track.detect.markers import ChromaTables, TwoColourMarker
+from driftwalk.track.detect.two_colour.discs import (
+    Disc,
+    Pair,
+    find_regions,
+    join_pieces,
+    pair_discs,
+    sort_out,
+)
 from driftwalk.track.detect.two_colour.outline import outlined_centres
-from driftwalk.track.detect.two_colour.pairs import Pair, pair_discs
 from driftwalk.track.detect.two_colour.pose import CENTRES, Measured, weighted_centres
 from driftwalk.track.types import Array, Detection, Image, PixelToWorld, Rejected
 

@@ -13,7 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.track.detect.chroma import Weights
+from driftwalk.track.detect.markers import Weights
 from driftwalk.track.detect.two_colour.pose import Measured
 from driftwalk.track.types import Array
 
