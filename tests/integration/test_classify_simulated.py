@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 from command_line import here, refusal
 
-from driftwalk.assembly.lattice.events import class_at
+from driftwalk.assembly.outcomes.distribution import class_at
 from driftwalk.assembly.recordings import classify
 from driftwalk.assembly.runs.dataset import path_recording
 from driftwalk.assembly.runs.run import assemble, assembly_path

@@ -1,6 +1,6 @@
 """Self-assembly of many blocks: outcomes, their uncertainty, and their dependence on the model."""
 
-from driftwalk.assembly.lattice.events import ReplayedEvents, class_at, replay_events
+from driftwalk.assembly.lattice.events import ReplayedEvents, replay_events
 from driftwalk.assembly.lattice.polyomino import polyomino_cells, polyomino_name, polyominoes
 from driftwalk.assembly.live_world import LiveEvent, LiveTank
 from driftwalk.assembly.outcomes.classes import (
@@ -18,6 +18,7 @@ from driftwalk.assembly.outcomes.components import (
     principal_components,
 )
 from driftwalk.assembly.outcomes.distribution import (
+    class_at,
     outcome_distribution,
     proportion_interval,
     sampling_variance,

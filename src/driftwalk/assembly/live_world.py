@@ -11,11 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
+from driftwalk.assembly.lattice.join_history import LatticeWorld
 from driftwalk.assembly.lattice.joined_faces import ROUNDING
-from driftwalk.assembly.lattice.live import Lattice
 from driftwalk.assembly.runs.dataset import times_of
 from driftwalk.assembly.runs.plan import MOST_STEPS, make_plan, start_poses
 from driftwalk.assembly.runs.start import require_room
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.simulation.backend import BROKEN
 
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
 
     from driftwalk.model import Study
     from driftwalk.model.assembly import HiddenFaceDrag, Latching
-
-Floats = npt.NDArray[np.float64]
 
 
 class LiveEvent(NamedTuple):
@@ -49,7 +48,7 @@ class _Moment:
 
     @cached_property
     def outcome(self) -> str:
-        return Lattice.of(self.state).outcome(self._chirality)
+        return LatticeWorld.of(self.state).outcome(self._chirality)
 
 
 class _Wishes(NamedTuple):
@@ -389,14 +388,10 @@ class LiveTank:
     def _step(self, steps: int) -> None:
         """Take time steps and note what has joined in them."""
         study = self._active.study
-        lattice = Lattice.of(self._world.state())
+        lattice = LatticeWorld.of(self._world.state())
         found = self._world.advance(steps)
-        for step, blocks, faces in zip(found["step"], found["block"], found["face"], strict=True):
-            lattice = lattice.joined(blocks, faces)
-            self._events.append(
-                LiveEvent(
-                    float(times_of(step, time_step=study.time_step_s)),
-                    (int(blocks[0]), int(blocks[1])),
-                    lattice.outcome(study.assembly.chirality),
-                )
-            )
+        times = times_of(found["step"], time_step=study.time_step_s).tolist()
+        pairs, faces = (map(tuple, found[name].tolist()) for name in ("block", "face"))
+        for time, blocks, joined in zip(times, pairs, faces, strict=True):
+            lattice.join(blocks, joined)
+            self._events.append(LiveEvent(time, blocks, lattice.outcome(study.assembly.chirality)))

@@ -12,8 +12,6 @@ import numpy.typing as npt
 from driftwalk.assembly.lattice.join_history import Event, JoinHistory
 from driftwalk.assembly.lattice.joined_faces import (
     ROUNDING,
-    Booleans,
-    Floats,
     JoinRules,
     Poses,
     find_joins,
@@ -21,6 +19,7 @@ from driftwalk.assembly.lattice.joined_faces import (
 )
 from driftwalk.assembly.lattice.polyomino import Chirality, require_chirality
 from driftwalk.assembly.outcomes.classes import listed_classes, listed_shapes
+from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
 from driftwalk.schema import body_names, check_trajectory
 from driftwalk.schema.check import build_dataset
@@ -172,12 +171,12 @@ def _usual_hold(time: Floats) -> float:
     return max(JOIN_POLICY.hold_s, JOIN_POLICY.frames_held * usual)
 
 
-def _unknown_blocks(poses: Poses, hold: float) -> Booleans:
+def _unknown_blocks(poses: Poses, hold: float) -> Bools:
     """Return where a block was last seen too long ago, (time, block)."""
     sample = np.arange(poses.time.size)[:, None]
     last = np.maximum.accumulate(np.where(poses.seen, sample, -1), axis=0)
     age = poses.time[:, None] - poses.time[last]
-    unknown: Booleans = (last < 0) | (age > hold * (1.0 + ROUNDING))
+    unknown: Bools = (last < 0) | (age > hold * (1.0 + ROUNDING))
     return unknown
 
 
@@ -195,7 +194,7 @@ def _dataset(
 ) -> xr.Dataset:
     classes, shapes = _listed(history, poses.x.shape[1])
     known = ~_unknown_blocks(poses, rules.hold)
-    sound: Booleans = np.logical_and.reduce(known, axis=1)
+    sound: Bools = np.logical_and.reduce(known, axis=1)
     outcome = np.where(sound, _places(history.outcome, classes), UNKNOWN).astype(np.int32)
     assembly = np.where(known, history.assembly, UNKNOWN).astype(np.int32)
     # A sample holds until the next one, if that comes in time.

@@ -1,14 +1,15 @@
-"""Join history of a recorded world: its states and events."""
+"""Join history of a recorded world: its states and events, and the lattice of its assemblies."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Final, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from driftwalk.assembly.lattice.joined_faces import Join
-from driftwalk.assembly.lattice.polyomino import Chirality, name_of
+from driftwalk.assembly.lattice.polyomino import STEPS, Chirality, name_of
 from driftwalk.assembly.outcomes.classes import class_name
 from driftwalk.schema.shapes import Cell, moved_to_origin
 
@@ -61,8 +62,7 @@ class JoinHistory:
             self._tell_apart(sample, before, world)
             self.dropped.update(world.dropped)
             self.assembly[sample:following] = world.partition.labels
-            outcome = world.outcome(world.partition, chirality)
-            self.outcome += [outcome] * (following - sample)
+            self.outcome += [world.outcome(chirality)] * (following - sample)
 
     def _tell_apart(self, sample: int, before: LatticeWorld, after: LatticeWorld) -> None:
         """Add the events that lead from one world to the next."""
@@ -85,7 +85,7 @@ class JoinHistory:
         parts = Partition(common.labels)
         events = []
         for join in gone:
-            outcome = world.outcome(parts, self.chirality)
+            outcome = world.outcome(self.chirality, parts)
             if parts.unite(join.blocks):
                 events.append(Event(sample, join.blocks, join.faces, outcome))
         return events[::-1]
@@ -107,14 +107,10 @@ class JoinHistory:
                 sample,
                 (join.blocks[first], join.blocks[second]),
                 (join.faces[first], join.faces[second]),
-                world.outcome(parts, self.chirality),
+                world.outcome(self.chirality, parts),
                 (labels[first], labels[second]),
                 (shapes[first], shapes[second], became),
             )
-
-
-# From a cell to its neighbour at each face.
-STEPS: Final = ((1, 0), (0, 1), (-1, 0), (0, -1))
 
 
 class Partition:
@@ -163,24 +159,36 @@ class LatticeWorld:
         self.dropped: list[Join] = []
         # The tightest joins first: they are the most certain.
         for join in sorted(joins, key=lambda one: (one.looseness, one.blocks, one.start)):
-            (self.accepted if self._put(join) else self.dropped).append(join)
+            fits = self.join(join.blocks, join.faces)
+            (self.accepted if fits else self.dropped).append(join)
+
+    @classmethod
+    def of(cls, state: dict[str, npt.NDArray[Any]]) -> LatticeWorld:
+        """Return the lattice of a world of the native core."""
+        labels = state["assembly"].tolist()
+        world = cls(len(labels))
+        world.partition, world.quarter = Partition(labels), state["quarter"].tolist()
+        world.cell = [(x, y) for x, y in state["cell"].tolist()]
+        return world
 
     def shape(self, members: Sequence[int], chirality: Chirality) -> str:
         """Name the shape of some blocks of one assembly."""
         return name_of(moved_to_origin(tuple(self.cell[block] for block in members)), chirality)
 
-    def outcome(self, partition: Partition, chirality: Chirality) -> str:
-        """Name the outcome class of the blocks, parted as said."""
-        labels = set(partition.labels)
-        return class_name(self.shape(partition.members(label), chirality) for label in labels)
+    def outcome(self, chirality: Chirality, parts: Partition | None = None) -> str:
+        """Name the outcome class of the blocks, parted as they are or as said."""
+        members: dict[int, list[int]] = {}
+        for block, label in enumerate((parts or self.partition).labels):
+            members.setdefault(label, []).append(block)
+        return class_name(self.shape(blocks, chirality) for blocks in members.values())
 
-    def _put(self, join: Join) -> bool:
-        """Put a join in; False when it contradicts those that are in."""
-        moving = self.partition.moves(join.blocks)
-        stays, moves = join.blocks[1 - moving], join.blocks[moving]
-        outward = (join.faces[1 - moving] + self.quarter[stays]) % 4
+    def join(self, blocks: tuple[int, int], faces: tuple[int, int]) -> bool:
+        """Join two faces; False when that contradicts the joins that there are."""
+        moving = self.partition.moves(blocks)
+        stays, moves = blocks[1 - moving], blocks[moving]
+        outward = (faces[1 - moving] + self.quarter[stays]) % 4
         place = _sum(self.cell[stays], STEPS[outward])
-        turn = (outward + 2 - join.faces[moving] - self.quarter[moves]) % 4
+        turn = (outward + 2 - faces[moving] - self.quarter[moves]) % 4
         label, other = (self.partition.labels[block] for block in (stays, moves))
         if label == other:
             return place == self.cell[moves] and turn == 0
@@ -195,7 +203,7 @@ class LatticeWorld:
         for block, cell in zip(moved, cells, strict=True):
             self.cell[block] = cell
             self.quarter[block] = (self.quarter[block] + turn) % 4
-        return self.partition.unite(join.blocks)
+        return self.partition.unite(blocks)
 
 
 def _sum(one: Cell, other: Cell) -> Cell:

@@ -14,13 +14,9 @@ from itertools import combinations
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import ConfigurationError
-
-Floats = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
-Booleans = npt.NDArray[np.bool_]
 
 QUARTER: Final = math.pi / 2
 # Time stamps are decimal numbers: 0.8 - 0.3 must count as half a second.
@@ -83,7 +79,7 @@ class Poses(NamedTuple):
     theta: Floats
 
     @property
-    def seen(self) -> Booleans:
+    def seen(self) -> Bools:
         """Where the pose of a block is known."""
         return np.isfinite(self.x) & np.isfinite(self.y) & np.isfinite(self.theta)
 
@@ -134,7 +130,7 @@ class PairPoses(NamedTuple):
 
 
 def _joins_of_pair(
-    poses: Poses, blocks: tuple[int, int], both: Booleans, rules: JoinRules
+    poses: Poses, blocks: tuple[int, int], both: Bools, rules: JoinRules
 ) -> list[Join]:
     at = np.flatnonzero(both)
     i, j = blocks

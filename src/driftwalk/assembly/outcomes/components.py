@@ -14,13 +14,13 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.outcomes.distribution import is_complete, sampling_variance
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.schema.check import build_dataset, require_kind
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Floats = npt.NDArray[np.float64]
 
 # Singular values below this part of the largest are rounding.
 RANK_TOLERANCE = 1e-9

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
 
     Distribution: TypeAlias = xr.Dataset | xr.DataArray | Mapping[str, float] | npt.ArrayLike
 
-Floats = npt.NDArray[np.float64]
 
 ENTRIES_AT_ONCE = 1 << 22
 

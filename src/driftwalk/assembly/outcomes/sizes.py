@@ -15,12 +15,12 @@ from driftwalk.assembly.lattice.polyomino import shape_size
 from driftwalk.assembly.outcomes.classes import MOST_BLOCKS
 from driftwalk.assembly.outcomes.distribution import (
     NOT_COPIED,
-    Integers,
     check_confidence,
     duration,
     require_assembly,
 )
 from driftwalk.assembly.outcomes.survival import checked_times
+from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.schema.check import build_dataset
 from driftwalk.schema.shapes import cells_of_shape
@@ -28,7 +28,6 @@ from driftwalk.schema.shapes import cells_of_shape
 if TYPE_CHECKING:
     import xarray as xr
 
-Floats = npt.NDArray[np.float64]
 
 METHOD: Final = "Student's t over runs, each interval on its own"
 

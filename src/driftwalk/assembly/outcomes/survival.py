@@ -13,7 +13,6 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.outcomes.distribution import (
-    Integers,
     all_single,
     check_times,
     class_names,
@@ -21,13 +20,13 @@ from driftwalk.assembly.outcomes.distribution import (
     proportion_interval,
     require_assembly,
 )
+from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Floats = npt.NDArray[np.float64]
 
 EVENTS = ("first_contact", "completion")
 

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.lattice.events import ReplayedEvents, replay_events
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.schema.check import build_dataset, require_kind
 from driftwalk.schema.trajectory import POSE
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     from driftwalk.assembly.runs.plan import Plan
 
 Arrays = dict[str, npt.NDArray[Any]]
-Floats = npt.NDArray[np.float64]
 
 LAW_NAMES: Final = {
     "linear_drag_kg_s": "linear_drag",

@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.runs.plan import stream_keys
+from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
 from driftwalk.model import declared
 from driftwalk.schema.answers.facts import fitted_value
@@ -27,9 +28,6 @@ from driftwalk.schema.check import kind_name, refuse_other_version
 
 if TYPE_CHECKING:
     import xarray as xr
-
-Floats = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
 
 
 class DrawnParameters(NamedTuple):
@@ -195,8 +193,6 @@ def _inside(border: Floats, point: Floats) -> Bools:
     return np.asarray((spans & above).sum(axis=1) % 2 == 1)
 
 
-Floats = npt.NDArray[np.float64]
-
 PARAMETERS: Final = ("ln_drag_coefficient", "ln_noise_intensity")
 LINEAR_SHARE: Final = "linear_share"
 PLAIN: Final = {"drag_power": "drag_power", "force_memory": "force_memory_s"}
@@ -309,8 +305,6 @@ def _number(fit: xr.Dataset, name: str) -> float:
     """Return a number of the law as the fit's filter takes it."""
     return float(fit["number_value"].values[fit["number"].values.tolist().index(name)])
 
-
-Floats = npt.NDArray[np.float64]
 
 RUNS_PER_FLOW: Final = 25
 """Runs that share a drawn flow: each drawn one has to be prepared for the core."""

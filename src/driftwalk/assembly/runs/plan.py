@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from driftwalk import _core
 from driftwalk.assembly.runs.start import given_start, place_blocks, require_cover, require_room
+from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.core.processors import default_threads
 from driftwalk.core.random_streams import trial_in
@@ -26,8 +27,7 @@ if TYPE_CHECKING:
 
 Backend = Literal["cpu", "reference"]
 Arrays = dict[str, npt.NDArray[Any]]
-Floats = npt.NDArray[np.float64]
-Indices = npt.NDArray[np.int64]
+Indices = Integers
 
 MOST_STEPS: Final = 2**31 - 1
 

@@ -22,12 +22,12 @@ from driftwalk.assembly.runs.parameters import (
 from driftwalk.assembly.runs.plan import (
     Arrays,
     Backend,
-    Floats,
     Plan,
     make_plan,
     simulate_rows,
     start_poses,
 )
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.schema.check import kind_name
 from driftwalk.sweep import (

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.schema import FLAGS, check_flow_field
 from driftwalk.simulation.backend import wall_edges
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
 
     from driftwalk.model import Study, Tank
 
-Floats = npt.NDArray[np.float64]
 
 TOUCHING_M = 1e-9
 """Depth up to which blocks and walls may touch at the start [m]."""
@@ -156,9 +156,6 @@ def overlap_depth(first: Floats, second: Floats, *, side: float) -> Floats:
     apart = second[:, :2] - first[:, :2]
     reached = np.abs(np.cos(along) * apart[:, 0] + np.sin(along) * apart[:, 1])
     return np.asarray((reach - reached).min(axis=0))
-
-
-Floats = npt.NDArray[np.float64]
 
 
 def require_cover(flow: xr.Dataset, tank: Tank) -> None:

@@ -12,9 +12,9 @@ from driftwalk.assembly.outcomes.classes import listed_classes, sort_classes
 from driftwalk.assembly.outcomes.distribution import is_complete, outcome_distribution
 from driftwalk.assembly.outcomes.l1 import l1_in_floors, l1_noise_floor, pairwise_l1
 from driftwalk.assembly.runs.dataset import assembly_attrs
-from driftwalk.assembly.sensitivity.run import Axes
-from driftwalk.assembly.sensitivity.settings import Outcomes, Settings
+from driftwalk.assembly.sensitivity.settings import Axes, Outcomes, Settings
 from driftwalk.assembly.sensitivity.times import map_courses, reference_courses
+from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.core.text.json_text import parse_json
 from driftwalk.schema.check import build_dataset, described
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 
     from driftwalk.assembly.runs.plan import Plan
 
-Floats = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 NOT_COMMON: Final[dict[str, tuple[str, ...]]] = {
     "tank_diameter": ("arena",),

@@ -18,9 +18,9 @@ import numpy.typing as npt
 from driftwalk.assembly.outcomes.classes import listed_classes
 from driftwalk.assembly.outcomes.distribution import is_complete, sampling_variance
 from driftwalk.assembly.sensitivity.dataset import count_table
-from driftwalk.assembly.sensitivity.run import KEYS
 from driftwalk.assembly.sensitivity.settings import (
     FIRST_TRIALS,
+    KEYS,
     Outcomes,
     Progress,
     Settings,
@@ -28,6 +28,7 @@ from driftwalk.assembly.sensitivity.settings import (
     simulate_settings,
     world_plan,
 )
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.schema.check import build_dataset, described, require_kind
 from driftwalk.schema.kinds import KINDS
@@ -39,7 +40,6 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
     from driftwalk.sweep import Store
 
-Floats = npt.NDArray[np.float64]
 
 MEASURES = (
     "first_order",

@@ -13,14 +13,13 @@ from driftwalk.assembly.outcomes.classes import class_name, sort_classes
 from driftwalk.assembly.outcomes.survival import class_counts
 from driftwalk.assembly.runs.dataset import DECIMALS, times_of
 from driftwalk.assembly.runs.plan import Plan, whole_steps
+from driftwalk.core.arrays import Floats, Integers
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
 
-Floats = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 Courses = dict[str, Integers]
 """By class, the number of runs that are in it at each of the times; classes that occur."""
 

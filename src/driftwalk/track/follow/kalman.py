@@ -1,4 +1,4 @@
-"""Constant-velocity Kalman filter on (x, y, theta), many bodies side by side.
+"""Constant-velocity Kalman filter on (x, y, theta) with its gate, many bodies side by side.
 
 The state is (x, y, theta, vx, vy, omega); arrays have the bodies in front, (n, 6) and (n, 6, 6).
 Velocities wander as white acceleration, so uncertainty grows with the time that has passed and not
@@ -9,28 +9,15 @@ stays in (-pi, pi].
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Bools, Floats
 from driftwalk.schema.trajectory import wrap_angle
-from driftwalk.track.follow.settings import TrackerSettings
-
-Floats = npt.NDArray[np.float64]
+from driftwalk.track.follow.settings import Motion, TrackerSettings
 
 STATES = 6
-
-
-@dataclass(frozen=True)
-class Motion:
-    """How fast velocities wander: spectral densities of the white accelerations."""
-
-    acceleration_density: float
-    """Of both directions [m^2/s^3]."""
-    angular_acceleration_density: float
-    """Of the turning [rad^2/s^3]."""
 
 
 def start_state(
@@ -127,10 +114,6 @@ def update(
     return after, spread
 
 
-Floats = npt.NDArray[np.float64]
-Booleans = npt.NDArray[np.bool_]
-
-
 class Predicted(NamedTuple):
     """Where tracks are expected, and where they were last seen."""
 
@@ -142,7 +125,7 @@ class Predicted(NamedTuple):
     """Positions last measured [m], shape (n, 2)."""
     unseen_for: Floats
     """Time since then [s], shape (n,)."""
-    missed: Booleans
+    missed: Bools
     """Whether they were not seen in the frame before this one, shape (n,)."""
 
 

@@ -14,14 +14,12 @@ from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats, Integers
 from driftwalk.track.follow.kalman import Measured, Predicted, edge_costs
 from driftwalk.track.follow.marks import Marks
 from driftwalk.track.follow.settings import TrackerSettings
 from driftwalk.track.follow.tracks import Rival, Track
-
-Floats = npt.NDArray[np.float64]
 
 
 class Rivals:
@@ -72,7 +70,7 @@ class Rivals:
     def settle(
         self,
         tracks: Sequence[Track],
-        detection: npt.NDArray[np.int64],
+        detection: Integers,
         own: Floats,
         rival: Floats,
         frame: int,

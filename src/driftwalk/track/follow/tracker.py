@@ -13,8 +13,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.track.follow.assign import assign
 from driftwalk.track.follow.kalman import (
@@ -43,8 +43,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 __all__ = ["TrackState", "Tracker"]
-
-Floats = npt.NDArray[np.float64]
 
 
 class Tracker:

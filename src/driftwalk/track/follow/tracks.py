@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.schema.check import described
 from driftwalk.track.follow.kalman import Measured
@@ -19,7 +19,6 @@ from driftwalk.track.types import Detection
 if TYPE_CHECKING:
     import xarray as xr
 
-Floats = npt.NDArray[np.float64]
 
 COVARIANCE: Final = ("xx", "xy", "yy", "xtheta", "ytheta", "thetatheta")
 """The parts of the covariance of a measurement, in the order in which they are kept."""
@@ -67,7 +66,7 @@ class Samples:
         return self._count
 
     @property
-    def frames(self) -> npt.NDArray[np.int64]:
+    def frames(self) -> Integers:
         """Their frames, shape (n,)."""
         return self._frames[: self._count]
 
@@ -192,9 +191,6 @@ def measured_of(found: Sequence[Detection]) -> Measured:
         pose[place] = one.x, one.y, one.theta
         covariance[place] = one.covariance
     return Measured(pose, covariance + _LEAST_VARIANCE)
-
-
-Floats = npt.NDArray[np.float64]
 
 
 def recording_of(

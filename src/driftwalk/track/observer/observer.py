@@ -13,7 +13,6 @@ from itertools import combinations
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.assembly import classify
 from driftwalk.assembly.lattice.join_history import Event, JoinHistory, LatticeWorld
@@ -27,7 +26,6 @@ from driftwalk.track.observer.possible import Lattice, possible_classes
 if TYPE_CHECKING:
     import xarray as xr
 
-Floats = npt.NDArray[np.float64]
 Pose = tuple[float, float, float]
 UNKNOWN: Final = ""
 
