@@ -120,7 +120,7 @@ class LiveTank:
         # Never held while the world advances. Where both are held, this one is taken second.
         self._wishes_lock = Lock()
         self._wishes = _Wishes(plan.study, 1.0)
-        self._model = plan.model(plan.flow)
+        self._model = plan.model()
         self.restart(start=start)
 
     def restart(self, *, seed: int | None = None, start: npt.ArrayLike | None = None) -> None:
@@ -146,19 +146,14 @@ class LiveTank:
                 index=np.arange(1),
                 ends=False,
             )
-            rules, forces = plan.study.assembly, plan.study.forces
+            forces = plan.study.forces
             self._world = _core.LiveWorld(
                 self._model,
                 start=np.ascontiguousarray(start_poses(plan, start)[0]),
                 key=int(plan.keys[0]),
                 drag_coefficient=forces.drag_coefficient,
                 force_std=forces.force_std_N,
-                latching=rules.latching,
-                connector_distance=rules.connector_distance_m,
-                connector_axis=rules.connector_axis_rad,
-                hidden_face_drag=rules.hidden_face_drag,
-                block_restitution=rules.block_restitution,
-                block_friction=rules.block_friction,
+                **plan.rules(),
                 flow_start=0.0 if plan.flow_start is None else float(plan.flow_start[0]),
             )
             self._wishes = self._active = _Wishes(plan.study, self._wishes.flow_scale)

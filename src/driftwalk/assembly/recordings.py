@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.lattice.join_history import Event, JoinHistory
 from driftwalk.assembly.lattice.joined_faces import (
+    JOIN_ANGLE,
+    JOIN_POLICY,
     ROUNDING,
     JoinRules,
     Poses,
@@ -28,25 +30,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-class JoinPolicy(NamedTuple):
-    """When blocks of a recording are joined, unless stated otherwise."""
-
-    join_distance: float = 0.1
-    """Distance of faces that are joined, in sides; chosen by hand."""
-    looser: float = 2.0
-    """Tolerances to let go, in units of those to join; chosen by hand."""
-    min_duration_s: float = 0.5
-    """Shortest duration that counts [s]; chosen by hand."""
-    hold_s: float = 1.0
-    """Time for which a block that is not seen keeps its joins [s]; chosen by hand."""
-    frames_held: float = 3.0
-    """The same in frames, where they are so rare that it is longer; chosen by hand."""
-
-
-JOIN_POLICY: Final = JoinPolicy()
-
-JOIN_ANGLE: Final = math.radians(10.0)
-"""Default angle between faces that are joined [rad]."""
 UNKNOWN: Final = -1
 
 
@@ -123,17 +106,9 @@ def classify(
     """
     require_chirality(chirality)
     poses = _checked_poses(recording)
-    join_distance = JOIN_POLICY.join_distance * side if join_distance is None else join_distance
-    rules = JoinRules(
-        side=side,
-        join_distance=join_distance,
-        join_angle=join_angle,
-        release_distance=JOIN_POLICY.looser * join_distance
-        if release_distance is None
-        else release_distance,
-        release_angle=JOIN_POLICY.looser * join_angle if release_angle is None else release_angle,
-        min_duration=min_duration,
-        hold=_usual_hold(poses.time) if hold is None else hold,
+    hold = _usual_hold(poses.time) if hold is None else hold
+    rules = JoinRules.completed(
+        side, join_distance, join_angle, release_distance, release_angle, min_duration, hold
     )
     history = JoinHistory(poses.x.shape, find_joins(poses, rules), chirality=chirality)
     return _dataset(recording, poses, rules, history)
@@ -192,7 +167,8 @@ def _shares(outcome: npt.NDArray[np.int32], lasts: Floats, classes: int) -> Floa
 def _dataset(
     recording: xr.Dataset, poses: Poses, rules: JoinRules, history: JoinHistory
 ) -> xr.Dataset:
-    classes, shapes = _listed(history, poses.x.shape[1])
+    joined, blocks = history.joined, poses.x.shape[1]
+    classes, shapes = _listed(history, blocks)
     known = ~_unknown_blocks(poses, rules.hold)
     sound: Bools = np.logical_and.reduce(known, axis=1)
     outcome = np.where(sound, _places(history.outcome, classes), UNKNOWN).astype(np.int32)
@@ -204,9 +180,13 @@ def _dataset(
         "outcome": ("time", outcome),
         "assembly": (("time", "body"), assembly),
         "proportion": ("class", _shares(outcome, lasts, len(classes))),
-        **_event_variables("event", history.joined, poses.time, classes),
+        **_event_variables("event", joined, poses.time, classes),
         **_event_variables("split", history.split, poses.time, classes),
-        **_assembly_variables(history.joined, shapes),
+        "event_assembly": (("event", "side"), _padded([one.assemblies for one in joined], 2)),
+        "event_shape": (
+            ("event", "part"),
+            _padded([_places(one.shapes, shapes) for one in joined], 3),
+        ),
     }
     return build_dataset(
         "classification",
@@ -217,8 +197,22 @@ def _dataset(
             "class": ("class", np.array(classes, dtype=object)),
             "shape": ("shape", np.array(shapes, dtype=object)),
         },
-        _attributes(recording, poses, rules, history)
-        | {"unknown_samples": int((~sound).sum()), "known_s": float(lasts.sum())},
+        {
+            **{key: recording.attrs[key] for key in ("source", "arena") if key in recording.attrs},
+            "blocks": blocks,
+            "chirality": history.chirality,
+            "block_side_m": rules.side,
+            "join_distance_m": rules.join_distance,
+            "join_angle_rad": rules.join_angle,
+            "release_distance_m": rules.release_distance,
+            "release_angle_rad": rules.release_angle,
+            "min_duration_s": rules.min_duration,
+            "hold_s": rules.hold,
+            "dropped_joins": len(history.dropped),
+            "closest_m": smallest_distance(poses),
+            "unknown_samples": int((~sound).sum()),
+            "known_s": float(lasts.sum()),
+        },
     )
 
 
@@ -253,35 +247,6 @@ def _event_variables(
     }
 
 
-def _assembly_variables(events: list[Event], shapes: Sequence[str]) -> dict[str, Any]:
-    """Return which assemblies joined, and their shapes."""
-    rows = [_places(event.shapes, shapes) for event in events]
-    return {
-        "event_assembly": (("event", "side"), _padded([event.assemblies for event in events], 2)),
-        "event_shape": (("event", "part"), _padded(rows, 3)),
-    }
-
-
 def _padded(rows: Sequence[Sequence[int]], width: int) -> npt.NDArray[np.int32]:
     """Return rows of whole numbers, one of -1 where there is none."""
     return np.array(rows or [(UNKNOWN,) * width], dtype=np.int32)
-
-
-def _attributes(
-    recording: xr.Dataset, poses: Poses, rules: JoinRules, history: JoinHistory
-) -> dict[str, Any]:
-    kept = ("source", "arena")
-    return {
-        **{name: recording.attrs[name] for name in kept if name in recording.attrs},
-        "blocks": poses.x.shape[1],
-        "chirality": history.chirality,
-        "block_side_m": rules.side,
-        "join_distance_m": rules.join_distance,
-        "join_angle_rad": rules.join_angle,
-        "release_distance_m": rules.release_distance,
-        "release_angle_rad": rules.release_angle,
-        "min_duration_s": rules.min_duration,
-        "hold_s": rules.hold,
-        "dropped_joins": len(history.dropped),
-        "closest_m": smallest_distance(poses),
-    }

@@ -23,6 +23,27 @@ QUARTER: Final = math.pi / 2
 ROUNDING: Final = 1e-9
 
 
+class JoinPolicy(NamedTuple):
+    """When blocks of a recording are joined, unless stated otherwise."""
+
+    join_distance: float = 0.1
+    """Distance of faces that are joined, in sides; chosen by hand."""
+    looser: float = 2.0
+    """Tolerances to let go, in units of those to join; chosen by hand."""
+    min_duration_s: float = 0.5
+    """Shortest duration that counts [s]; chosen by hand."""
+    hold_s: float = 1.0
+    """Time for which a block that is not seen keeps its joins [s]; chosen by hand."""
+    frames_held: float = 3.0
+    """The same in frames, where they are so rare that it is longer; chosen by hand."""
+
+
+JOIN_POLICY: Final = JoinPolicy()
+
+JOIN_ANGLE: Final = math.radians(10.0)
+"""Default angle between faces that are joined [rad]."""
+
+
 @dataclass(frozen=True)
 class JoinRules:
     """Criteria of a join: lengths [m], angles [rad], times [s]."""
@@ -52,6 +73,28 @@ class JoinRules:
                 f"join_angle {math.degrees(self.join_angle):g} deg and release_angle "
                 f"{math.degrees(self.release_angle):g} deg must come in this order, below 45 deg"
             )
+
+    @classmethod
+    def completed(
+        cls,
+        side: float,
+        join_distance: float | None,
+        join_angle: float,
+        release_distance: float | None,
+        release_angle: float | None,
+        min_duration: float,
+        hold: float,
+    ) -> JoinRules:
+        """Return criteria of which some are left out: those of `JOIN_POLICY` stand in for them."""
+        if join_distance is None:
+            join_distance = JOIN_POLICY.join_distance * side
+        if release_distance is None:
+            release_distance = JOIN_POLICY.looser * join_distance
+        if release_angle is None:
+            release_angle = JOIN_POLICY.looser * join_angle
+        return cls(
+            side, join_distance, join_angle, release_distance, release_angle, min_duration, hold
+        )
 
 
 class Join(NamedTuple):

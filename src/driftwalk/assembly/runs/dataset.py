@@ -16,6 +16,7 @@ import numpy.typing as npt
 from driftwalk.assembly.lattice.events import ReplayedEvents, replay_events
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
+from driftwalk.core.files.shards import Arrays
 from driftwalk.schema.check import build_dataset, require_kind
 from driftwalk.schema.trajectory import POSE
 from driftwalk.simulation.backend import BROKEN
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 
     from driftwalk.assembly.runs.plan import Plan
 
-Arrays = dict[str, npt.NDArray[Any]]
 
 LAW_NAMES: Final = {
     "linear_drag_kg_s": "linear_drag",
@@ -51,22 +51,41 @@ def build_assembly(plan: Plan, arrays: Arrays, *, attrs: dict[str, Any]) -> xr.D
         Further attributes.
     """
     study = plan.study
-    replayed = replay_events(
-        *(arrays[f"event_{name}"] for name in ("count", "block", "face")),
-        **{name: arrays[name] for name in ("cell", "quarter", "assembly")},
-        chirality=study.assembly.chirality,
-    )
+    replayed = replay_of(plan, arrays)
     broken = (arrays["status"].astype(np.int64) & BROKEN) != 0
     outcome = np.where(broken, np.int32(-1), replayed.outcome)
-    step = study.time_step_s
-    data: dict[str, Any] = {
-        **_events(arrays, replayed, step),
-        **_times(arrays, step),
-        **_poses(arrays),
-        **_parameters(plan),
-        "outcome": ("run", outcome),
-        "status": ("run", arrays["status"].astype(np.int32)),
+    by_event, by_side, by_block = ("run", "event"), ("run", "event", "side"), ("run", "block")
+    whole = {
+        name: values.astype(np.int32)
+        for name, values in arrays.items()
+        if values.dtype.kind in "iu"
     }
+    ends = {name: times_of(step, time_step=study.time_step_s) for name, step in whole.items()}
+    complete = times_of(completion_step(arrays), time_step=study.time_step_s)
+    data: dict[str, Any] = {
+        "event_count": ("run", whole["event_count"]),
+        "event_time": (by_event, ends["event_step"]),
+        "event_block": (by_side, whole["event_block"]),
+        "event_face": (by_side, whole["event_face"]),
+        "event_assembly": (by_side, replayed.event_assembly),
+        "event_shape": ((*by_event, "part"), replayed.event_shape),
+        "event_class": (by_event, replayed.event_class),
+        "first_contact_time": ("run", ends["first_contact_step"]),
+        "completion_time": ("run", complete),
+        "end_time": ("run", ends["end_step"]),
+        **_poses(arrays["pose"], by_block),
+        "cell": ((*by_block, "axis"), whole["cell"]),
+        "quarter": (by_block, whole["quarter"]),
+        "assembly": (by_block, whole["assembly"]),
+        "drag_coefficient": ("run", plan.drag_coefficient),
+        "force_std": ("run", plan.force_std),
+    }
+    if plan.flow_draw is not None:
+        data["flow_draw"] = ("run", plan.flow_draw.astype(np.int32))
+    if plan.flow_start is not None:
+        data["flow_start"] = ("run", plan.flow_start)
+    data |= {LAW_NAMES[key]: ("run", values) for key, values in plan.law.items()}
+    data |= {"outcome": ("run", outcome), "status": ("run", whole["status"])}
     return build_dataset(
         "assembly",
         data,
@@ -77,6 +96,15 @@ def build_assembly(plan: Plan, arrays: Arrays, *, attrs: dict[str, Any]) -> xr.D
             "shape": ("shape", np.array(replayed.shapes, dtype=object)),
         },
         {**assembly_attrs(plan), **attrs},
+    )
+
+
+def replay_of(plan: Plan, arrays: Arrays) -> ReplayedEvents:
+    """Return what the events of runs of the native core did on the lattice."""
+    return replay_events(
+        *(arrays[f"event_{name}"] for name in ("count", "block", "face")),
+        **{name: arrays[name] for name in ("cell", "quarter", "assembly")},
+        chirality=plan.study.assembly.chirality,
     )
 
 
@@ -95,13 +123,10 @@ def build_path(plan: Plan, samples: Arrays, *, every: int) -> xr.Dataset:
     dims = ("run", "time", "block")
     pose, step = samples["sample_pose"], plan.study.time_step_s
     time = times_of(np.arange(pose.shape[1]) * every, time_step=step)
-    data: dict[str, Any] = {
-        name: (dims, np.ascontiguousarray(pose[..., part])) for part, name in enumerate(POSE)
-    }
-    data["assembly"] = (dims, samples["sample_assembly"].astype(np.int32))
+    assembly = samples["sample_assembly"].astype(np.int32)
     return build_dataset(
         "assembly_path",
-        data,
+        {**_poses(pose, dims), "assembly": (dims, assembly)},
         {
             "run": ("run", plan.index),
             "time": ("time", time),
@@ -170,51 +195,9 @@ def times_of(step: npt.NDArray[Any], *, time_step: float) -> Floats:
     return np.where(step < 0, np.nan, np.round(step * time_step, DECIMALS))
 
 
-def _events(arrays: Arrays, replayed: ReplayedEvents, step: float) -> dict[str, Any]:
-    sides = ("run", "event", "side")
-    return {
-        "event_count": ("run", arrays["event_count"].astype(np.int32)),
-        "event_time": (("run", "event"), times_of(arrays["event_step"], time_step=step)),
-        "event_block": (sides, arrays["event_block"].astype(np.int32)),
-        "event_face": (sides, arrays["event_face"].astype(np.int32)),
-        "event_assembly": (sides, replayed.event_assembly),
-        "event_shape": (("run", "event", "part"), replayed.event_shape),
-        "event_class": (("run", "event"), replayed.event_class),
-    }
-
-
-def _times(arrays: Arrays, step: float) -> dict[str, Any]:
-    known = {
-        "first_contact_time": arrays["first_contact_step"],
-        "completion_time": completion_step(arrays),
-        "end_time": arrays["end_step"],
-    }
-    return {name: ("run", times_of(steps, time_step=step)) for name, steps in known.items()}
-
-
-def _poses(arrays: Arrays) -> dict[str, Any]:
-    dims = ("run", "block")
-    return {
-        **{
-            name: (dims, np.ascontiguousarray(arrays["pose"][..., part]))
-            for part, name in enumerate(POSE)
-        },
-        "cell": ((*dims, "axis"), arrays["cell"].astype(np.int32)),
-        "quarter": (dims, arrays["quarter"].astype(np.int32)),
-        "assembly": (dims, arrays["assembly"].astype(np.int32)),
-    }
-
-
-def _parameters(plan: Plan) -> dict[str, Any]:
-    known: dict[str, Any] = {
-        "drag_coefficient": ("run", plan.drag_coefficient),
-        "force_std": ("run", plan.force_std),
-    }
-    if plan.flow_draw is not None:
-        known["flow_draw"] = ("run", plan.flow_draw.astype(np.int32))
-    if plan.flow_start is not None:
-        known["flow_start"] = ("run", plan.flow_start)
-    return known | {LAW_NAMES[key]: ("run", values) for key, values in plan.law.items()}
+def _poses(pose: Floats, dims: tuple[str, ...]) -> dict[str, Any]:
+    """Return poses as variables: x, y, theta."""
+    return {name: (dims, np.ascontiguousarray(pose[..., i])) for i, name in enumerate(POSE)}
 
 
 def path_recording(path: xr.Dataset, *, run: int = 0) -> xr.Dataset:

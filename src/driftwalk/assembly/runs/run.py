@@ -20,7 +20,6 @@ from driftwalk.assembly.runs.parameters import (
     has_standard_error,
 )
 from driftwalk.assembly.runs.plan import (
-    Arrays,
     Backend,
     Plan,
     make_plan,
@@ -29,6 +28,7 @@ from driftwalk.assembly.runs.plan import (
 )
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
+from driftwalk.core.files.shards import Arrays
 from driftwalk.schema.check import kind_name
 from driftwalk.sweep import (
     Store,
@@ -292,18 +292,12 @@ def assembly_path(
     if not sample_interval > 0:
         raise InputError(f"sample_interval must be above 0 s, got {sample_interval}")
     every = min(max(round(sample_interval / plan.study.time_step_s), 1), plan.steps)
-    found = simulate_rows(
-        plan, start_poses(plan, start), slice(None), plan.flow, sample_every=every
-    )
+    found = simulate_rows(plan, start_poses(plan, start), sample_every=every)
     return build_path(plan, found, every=every)
 
 
 def check_assembly(
-    study: Study,
-    flow: xr.Dataset,
-    *,
-    trial: int = 0,
-    threads: int | None = None,
+    study: Study, flow: xr.Dataset, *, trial: int = 0, threads: int | None = None
 ) -> None:
     """Raise the errors that `assemble` would raise, before any run is simulated.
 
@@ -357,7 +351,7 @@ class _Runs:
 
     def __call__(self, unit: WorkUnit) -> Arrays:
         parts = [
-            simulate_rows(plan, self.poses, rows, plan.flow)
+            simulate_rows(plan, self.poses, rows)
             for rows, plan in _by_draw(self.plan, unit.start, unit.stop)
         ]
         return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
@@ -388,12 +382,11 @@ def _drawn(plan: Plan, row: int) -> Plan:
     law = {f"forces.{key}": float(values[row]) for key, values in plan.law.items()}
     study, flow = apply_overrides(plan.study, law) if law else plan.study, plan.flow
     if plan.flow_draw is not None:
-        draw, seed = int(plan.flow_draw[row]), plan.study.assembly.seed
         flow = draw_flow(
             plan.flow,
-            seed=seed,
+            seed=plan.study.assembly.seed,
             trial=plan.trial,
-            draw=draw,
+            draw=int(plan.flow_draw[row]),
             correlated_over=plan.flow_correlated_over,
         )
     return replace(plan, study=study, flow=flow)

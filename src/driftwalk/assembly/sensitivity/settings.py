@@ -19,14 +19,13 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.lattice.events import replay_events
-from driftwalk.assembly.runs.dataset import completion_step, times_of
-from driftwalk.assembly.runs.plan import Arrays, Plan, make_plan, simulate_rows, stream_keys
+from driftwalk.assembly.runs.dataset import completion_step, replay_of, times_of
+from driftwalk.assembly.runs.plan import Plan, make_plan, simulate_rows, stream_keys
 from driftwalk.assembly.runs.start import place_blocks
 from driftwalk.assembly.sensitivity.times import Courses, added, courses_of, courses_to_text
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import ConfigurationError, DriftwalkError, InputError
-from driftwalk.core.files.shards import Unit, UnitT
+from driftwalk.core.files.shards import Arrays, Unit, UnitT
 from driftwalk.simulation.backend import BROKEN
 from driftwalk.simulation.series import flow_starts
 from driftwalk.sweep import (
@@ -180,7 +179,7 @@ def place_first(settings: Settings) -> None:
     for world, plan in enumerate(settings.worlds):
         first = int(settings.trial[np.flatnonzero(settings.world == world)[0]])
         keys = _keys(plan, first, range(plan.index.size))
-        place_blocks(plan.study, plan.model(plan.flow), keys, threads=plan.threads)
+        place_blocks(plan.study, plan.model(), keys, threads=plan.threads)
 
 
 class _Tally:
@@ -258,7 +257,7 @@ def _simulate(
     classes : tuple of str
         Names of the classes, into which these are indices.
     """
-    model = plan.model(plan.flow)
+    model = plan.model()
     keys = [_keys(plan, int(settings.trial[piece.setting]), piece.runs) for piece in pieces]
     start = [place_blocks(plan.study, model, own, threads=plan.threads) for own in keys]
     length = [len(piece.runs) for piece in pieces]
@@ -272,12 +271,8 @@ def _simulate(
         drag_coefficient=np.repeat(settings.drag_coefficient[chosen], length),
         force_std=np.repeat(settings.force_std[chosen], length),
     )
-    found = simulate_rows(filled, np.concatenate(start), slice(None), plan.flow)
-    replayed = replay_events(
-        *(found[f"event_{name}"] for name in ("count", "block", "face")),
-        **{name: found[name] for name in ("cell", "quarter", "assembly")},
-        chirality=plan.study.assembly.chirality,
-    )
+    found = simulate_rows(filled, np.concatenate(start))
+    replayed = replay_of(plan, found)
     made = {"event_class": replayed.event_class, "outcome": replayed.outcome}
     return found | made, replayed.classes
 

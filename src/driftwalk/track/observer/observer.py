@@ -16,9 +16,16 @@ import numpy as np
 
 from driftwalk.assembly import classify
 from driftwalk.assembly.lattice.join_history import Event, JoinHistory, LatticeWorld
-from driftwalk.assembly.lattice.joined_faces import QUARTER, ROUNDING, Join, JoinRules, PairPoses
+from driftwalk.assembly.lattice.joined_faces import (
+    JOIN_ANGLE,
+    JOIN_POLICY,
+    QUARTER,
+    ROUNDING,
+    Join,
+    JoinRules,
+    PairPoses,
+)
 from driftwalk.assembly.lattice.polyomino import Chirality, require_chirality
-from driftwalk.assembly.recordings import JOIN_ANGLE, JOIN_POLICY
 from driftwalk.core.errors import InputError
 from driftwalk.schema.check import described
 from driftwalk.track.observer.possible import Lattice, possible_classes
@@ -108,19 +115,8 @@ class AssemblyObserver:
         names = [f"unseen {i}" for i in range(bodies)] if isinstance(bodies, int) else list(bodies)
         if not names:
             raise InputError("there is no block to observe")
-        distance = JOIN_POLICY.join_distance * side if join_distance is None else join_distance
-        self.rules = JoinRules(
-            side=side,
-            join_distance=distance,
-            join_angle=join_angle,
-            release_distance=JOIN_POLICY.looser * distance
-            if release_distance is None
-            else release_distance,
-            release_angle=JOIN_POLICY.looser * join_angle
-            if release_angle is None
-            else release_angle,
-            min_duration=min_duration,
-            hold=hold,
+        self.rules = JoinRules.completed(
+            side, join_distance, join_angle, release_distance, release_angle, min_duration, hold
         )
         self.bodies = names
         self._unnamed = list(range(bodies)) if isinstance(bodies, int) else []
@@ -317,13 +313,8 @@ def observe(recording: xr.Dataset, *, side: float, **rules: Any) -> xr.Dataset:
     """
     found = classify(recording, side=side, **rules)
     names = [str(name) for name in found["body"].values]
-    used = (
-        *("chirality", "join_distance_m", "join_angle_rad", "release_distance_m"),
-        *("release_angle_rad", "min_duration_s", "hold_s"),
-    )
-    # The arguments have the names of the attributes, without the unit.
-    given = {key.rpartition("_")[0] or key: found.attrs[key] for key in used}
-    observer = AssemblyObserver(names, side=side, **given)
+    # How long joins are held may depend on the recording; the other rules have one default.
+    observer = AssemblyObserver(names, side=side, **{**rules, "hold": found.attrs["hold_s"]})
     poses = np.stack([recording[name].values for name in ("x", "y", "theta")], axis=-1)
     seen = [
         observer.step(
