@@ -251,6 +251,14 @@ def require_assembly(dataset: xr.Dataset, *variables: str) -> None:
         raise InputError(f"not an assembly dataset: '{missing[0]}' is missing")
 
 
+def runs_with_outcome(assembly: xr.Dataset) -> Bools:
+    """Return which runs have an outcome; raise `InputError` when none has."""
+    sound: Bools = assembly["outcome"].values >= 0
+    if not sound.any():
+        raise InputError("there is no run with an outcome: at least one is needed")
+    return sound
+
+
 def check_times(time: Floats, longest: float) -> None:
     """Raise `InputError` unless all times lie within the runs."""
     # A time that was computed, like 100 * 0.3, may miss the duration by rounding.

@@ -55,24 +55,19 @@ def build_assembly(plan: Plan, arrays: Arrays, *, attrs: dict[str, Any]) -> xr.D
     broken = (arrays["status"].astype(np.int64) & BROKEN) != 0
     outcome = np.where(broken, np.int32(-1), replayed.outcome)
     by_event, by_side, by_block = ("run", "event"), ("run", "event", "side"), ("run", "block")
-    whole = {
-        name: values.astype(np.int32)
-        for name, values in arrays.items()
-        if values.dtype.kind in "iu"
-    }
-    ends = {name: times_of(step, time_step=study.time_step_s) for name, step in whole.items()}
-    complete = times_of(completion_step(arrays), time_step=study.time_step_s)
+    whole = {name: array.astype(np.int32) for name, array in arrays.items() if "pose" not in name}
+    step = study.time_step_s
     data: dict[str, Any] = {
         "event_count": ("run", whole["event_count"]),
-        "event_time": (by_event, ends["event_step"]),
+        "event_time": (by_event, times_of(whole["event_step"], time_step=step)),
         "event_block": (by_side, whole["event_block"]),
         "event_face": (by_side, whole["event_face"]),
         "event_assembly": (by_side, replayed.event_assembly),
         "event_shape": ((*by_event, "part"), replayed.event_shape),
         "event_class": (by_event, replayed.event_class),
-        "first_contact_time": ("run", ends["first_contact_step"]),
-        "completion_time": ("run", complete),
-        "end_time": ("run", ends["end_step"]),
+        "first_contact_time": ("run", times_of(whole["first_contact_step"], time_step=step)),
+        "completion_time": ("run", times_of(completion_step(arrays), time_step=step)),
+        "end_time": ("run", times_of(whole["end_step"], time_step=step)),
         **_poses(arrays["pose"], by_block),
         "cell": ((*by_block, "axis"), whole["cell"]),
         "quarter": (by_block, whole["quarter"]),

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.runs.dataset import LAW_NAMES, build_assembly, build_path
-from driftwalk.assembly.runs.parameters import (
+from driftwalk.assembly.runs.draws import (
     RUNS_PER_FLOW,
     draw_flow,
     draw_parameters,

@@ -10,13 +10,18 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from concurrent.futures import Executor
+from statistics import NormalDist
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.outcomes.classes import listed_classes
-from driftwalk.assembly.outcomes.distribution import is_complete, sampling_variance
+from driftwalk.assembly.outcomes.distribution import (
+    check_confidence,
+    is_complete,
+    sampling_variance,
+)
 from driftwalk.assembly.sensitivity.dataset import count_table
 from driftwalk.assembly.sensitivity.settings import (
     FIRST_TRIALS,
@@ -170,12 +175,12 @@ def sobol_indices(
     >>> found["first_order"].values.round(2).tolist(), found["total_order"].values.round(2).tolist()
     ([0.8, 0.2], [0.8, 0.2])
     """
-    inputs, samples = _size_of(design)
+    require_kind(design, "sobol_design", "sobol_design makes one")
+    inputs, samples = design.sizes["input"], int(design.attrs["samples"])
     settings = samples * (inputs + 2)
     table, other = _checked_outputs(outputs, settings)
     noise = _checked_noise(noise_variance, np.shape(outputs)).reshape(table.shape)
-    if not 0 < confidence < 1:
-        raise InputError(f"confidence must lie between 0 and 1, got {confidence}")
+    check_confidence(confidence)
     _check_seed(seed)
     # The first and last of each group of settings are independent draws: Saltelli's A and B.
     place = np.arange(settings) % (inputs + 2)
@@ -186,33 +191,37 @@ def sobol_indices(
         share = np.where(varies, noise[independent].mean(axis=0) / variance, np.nan)
     # The seed itself is usually that of the design; the two draws stay apart.
     drawn = np.random.default_rng(seed + 1).integers(samples, size=(samples, 200)).T
-    sigmas = _normal_quantile(confidence)
+    # Half the width of a normal interval, in standard deviations.
+    sigmas = NormalDist().inv_cdf(0.5 + confidence / 2)
     indices = np.full((len(MEASURES), table.shape[1], inputs), np.nan)
     for i in np.flatnonzero(varies):
         groups = table[:, i].reshape(samples, inputs + 2)
         found = _estimates(groups[np.vstack([np.arange(samples), drawn])])
         indices[0::2, i] = found[:, 0]
         indices[1::2, i] = sigmas * found[:, 1:].std(axis=1, ddof=1)
-    by_name = dict(zip(MEASURES, indices, strict=True)) | _corrected(indices, share)
-    return _dataset(
-        by_name,
-        {"variance": variance, "noise_share": share},
-        coords={"input": design["input"], **other},
-        attrs={
+    by_input = dict(zip(MEASURES, indices, strict=True))
+    # What the outputs would show without noise.
+    signal = np.where(share < 1, 1 - share, np.nan)[:, None]
+    by_input["first_order_corrected"] = by_input["first_order"] / signal
+    by_input["total_order_corrected"] = (by_input["total_order"] - share[:, None]) / signal
+    by_output = {"variance": variance, "noise_share": share}
+    one_output = np.ndim(outputs) == 1
+    data: dict[str, Any] = {}
+    for measures, dims in ((by_input, (*other, "input")), (by_output, (*other,))):
+        for name, values in measures.items():
+            data[name] = (dims, values[0] if one_output else values)
+    return build_dataset(
+        "sobol_indices",
+        data,
+        {"input": design["input"], **other},
+        {
             "samples": samples,
             "confidence": confidence,
             "seed": seed,
             "pure_noise_first_order_half_width": sigmas * math.sqrt(2 / samples),
             "pure_noise_total_order": 1.0,
         },
-        one_output=np.ndim(outputs) == 1,
     )
-
-
-def _size_of(design: xr.Dataset) -> tuple[int, int]:
-    """Return the numbers of inputs and of base samples."""
-    require_kind(design, "sobol_design", "sobol_design makes one")
-    return design.sizes["input"], int(design.attrs["samples"])
 
 
 def _checked_bounds(bounds: Mapping[str, tuple[float, float]]) -> tuple[Floats, Floats]:
@@ -289,41 +298,6 @@ def _estimates(groups: Floats) -> Floats:
     between = np.moveaxis(groups[..., 1:-1], -1, 0)
     found = indices_of(func={"f_A": a, "f_B": b, "f_AB": between}, n=groups.shape[1])
     return np.stack([found.first_order, found.total_order])
-
-
-def _corrected(indices: Floats, noise_share: Floats) -> dict[str, Floats]:
-    """Return the indices that the outputs would show without noise."""
-    measure = dict(zip(MEASURES, indices, strict=True))
-    share = noise_share[:, None]
-    signal = np.where(share < 1, 1 - share, np.nan)
-    return {
-        "first_order_corrected": measure["first_order"] / signal,
-        "total_order_corrected": (measure["total_order"] - share) / signal,
-    }
-
-
-def _normal_quantile(confidence: float) -> float:
-    """Return half the width, in standard deviations, of a normal interval."""
-    from statistics import NormalDist
-
-    return NormalDist().inv_cdf(0.5 + confidence / 2)
-
-
-def _dataset(
-    by_input: dict[str, Floats],
-    by_output: dict[str, Floats],
-    *,
-    coords: dict[str, Any],
-    attrs: dict[str, Any],
-    one_output: bool,
-) -> xr.Dataset:
-
-    dims = tuple(name for name in coords if name != "input")
-    data: dict[str, Any] = {}
-    for table, axes in ((by_input, (*dims, "input")), (by_output, dims)):
-        for name, values in table.items():
-            data[name] = (axes, values[0] if one_output else values)
-    return build_dataset("sobol_indices", data, coords, attrs)
 
 
 INPUTS: Final = ("drag_coefficient", "force_std", "tank_diameter")

@@ -1,4 +1,4 @@
-"""Draw parameters from the uncertainty of a calibration or a fit.
+"""Draw the parameters and the flow of runs from the uncertainty of a calibration or a fit.
 
 A draw from a calibration is a point of its joint region. Where D is the smooth surface of
 distances, m its minimum, L its level at the border and c the confidence of the region, a point is
@@ -9,12 +9,16 @@ border is left out. So draws follow the valley whatever its shape, and widen wit
 the model does not quite explain the recording. The bootstrap's optima would do neither: they lie on
 a lattice, about the optimum, as if the model were true.
 
-A draw from a fit is one of its Gaussian posterior, `driftwalk.assembly.runs.parameters`.
+A draw from a fit is one of its Gaussian posterior, in ln C_d, in the logarithm of the force's noise
+intensity and in the numbers of the force law, with the covariance that the fit stores; numbers of
+the camera are left out. It holds for the block's mass, added mass and side as they are stated: a
+recording tells C_d and sigma_F over the mass, a simulation depends on nothing else, and so what the
+mass leaves open of the two changes no motion and is not drawn.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +32,14 @@ from driftwalk.schema.check import kind_name, refuse_other_version
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+RUNS_PER_FLOW: Final = 25
+"""Runs that share a drawn flow: each drawn one has to be prepared for the core."""
+PLAIN: Final = {"drag_power": "drag_power", "force_memory": "force_memory_s"}
+"""Numbers of a law that [forces] holds as they are, by the fit's name for them."""
+PARAMETERS: Final = ("ln_drag_coefficient", "ln_noise_intensity", "linear_share", *PLAIN)
+"""What is drawn from a fit, by the fit's names."""
 
 
 class DrawnParameters(NamedTuple):
@@ -87,12 +99,13 @@ def draw_parameters(
         numbers = draw_posterior(calibration, runs=runs, seed=seed, trial=trial)
         return DrawnParameters(numbers["drag_coefficient"], numbers["force_std_N"])
     region = _region_of(calibration)
-    index = np.arange(runs)
-    parts = [
-        _draw(region, stream_keys("parameters", seed=seed, trial=trial, index=part))
-        for part in np.array_split(index, max(1, -(-runs // 1024)))
-    ]
-    drawn = np.concatenate(parts)
+    # In parts, so that the proposals of many runs do not fill the memory.
+    drawn = np.concatenate(
+        [
+            _draw(region, stream_keys("parameters", seed=seed, trial=trial, index=part))
+            for part in np.array_split(np.arange(runs), max(1, -(-runs // 1024)))
+        ]
+    )
     return DrawnParameters(np.ascontiguousarray(drawn[:, 0]), np.ascontiguousarray(drawn[:, 1]))
 
 
@@ -134,11 +147,11 @@ def _region_of(calibration: xr.Dataset) -> _Region:
     border = np.column_stack(
         [calibration[f"region_{name}"].values for name in ("drag_coefficient", "force_std")]
     )
-    axes = tuple(
+    across, along = (
         calibration[f"refined_{name}"].values.astype(np.float64)
         for name in ("drag_coefficient", "force_std")
     )
-    return _Region(border, (axes[0], axes[1]), (1.0 - confidence) ** rise)
+    return _Region(border, (across, along), (1.0 - confidence) ** rise)
 
 
 def _draw(region: _Region, keys: npt.NDArray[np.uint64]) -> Floats:
@@ -147,7 +160,9 @@ def _draw(region: _Region, keys: npt.NDArray[np.uint64]) -> Floats:
     waiting = np.arange(keys.size)
     low, high = region.border.min(axis=0), region.border.max(axis=0)
     for attempt in range(1000):
-        numbers = np.stack([_numbers(key, attempt) for key in keys[waiting]])
+        # Three uniform numbers for each of the 32 points that are proposed to a run at once.
+        streams = (np.random.Philox(key=int(key), counter=attempt << 64) for key in keys[waiting])
+        numbers = np.stack([np.random.Generator(bits).random((32, 3)) for bits in streams])
         point = low + numbers[..., :2] * (high - low)
         taken = numbers[..., 2] < _weight_at(region, point)
         taken &= _inside(region.border, point.reshape(-1, 2)).reshape(taken.shape)
@@ -158,13 +173,6 @@ def _draw(region: _Region, keys: npt.NDArray[np.uint64]) -> Floats:
         if waiting.size == 0:
             return np.maximum(found, 0.0)
     raise InputError("the calibration's joint region has no area to draw parameters from")
-
-
-def _numbers(key: Any, attempt: int) -> Floats:
-    """Return three uniform numbers in [0, 1) per proposal of one attempt of one run."""
-    bits = np.random.Philox(key=int(key), counter=attempt << 64)
-    # Points that are proposed to a run at once.
-    return np.random.Generator(bits).random((32, 3))
 
 
 def _weight_at(region: _Region, point: Floats) -> Floats:
@@ -191,13 +199,6 @@ def _inside(border: Floats, point: Floats) -> Bools:
     width = np.where(here[:, 0] == there[:, 0], 1.0, there[:, 0] - here[:, 0])
     above = here[:, 1] + (x - here[:, 0]) / width * (there[:, 1] - here[:, 1]) > y
     return np.asarray((spans & above).sum(axis=1) % 2 == 1)
-
-
-PARAMETERS: Final = ("ln_drag_coefficient", "ln_noise_intensity")
-LINEAR_SHARE: Final = "linear_share"
-PLAIN: Final = {"drag_power": "drag_power", "force_memory": "force_memory_s"}
-"""Numbers of a law that [forces] holds as they are, by the fit's name for them."""
-LAW_NUMBERS: Final = (LINEAR_SHARE, *PLAIN)
 
 
 def has_covariance(fit: xr.Dataset) -> bool:
@@ -256,7 +257,7 @@ def draw_posterior(fit: xr.Dataset, *, runs: int, seed: int, trial: int) -> dict
     if not has_covariance(fit):
         raise InputError("the fit has no covariance to draw parameters from: fit again")
     names = [str(name) for name in fit["log_parameter"].values]
-    chosen = [name for name in (*PARAMETERS, *LAW_NUMBERS) if name in names]
+    chosen = [name for name in PARAMETERS if name in names]
     rows = [names.index(name) for name in chosen]
     covariance = fit["covariance"].values[np.ix_(rows, rows)]
     try:
@@ -266,25 +267,25 @@ def draw_posterior(fit: xr.Dataset, *, runs: int, seed: int, trial: int) -> dict
     shared = RUNS_PER_FLOW if law_of(fit) else 1
     index = np.arange(-(-runs // shared))
     keys = stream_keys("parameters", seed=seed, trial=trial, index=index)
-    normal = np.stack([_normal(key, len(rows)) for key in keys])
+    streams = (np.random.Generator(np.random.Philox(key=int(key))) for key in keys)
+    normal = np.stack([stream.standard_normal(len(rows)) for stream in streams])
     # Sums of products in one order: a product of matrices depends on the processor.
     change = dict(zip(chosen, (root[:, None, :] * normal[None]).sum(axis=2), strict=True))
     with np.errstate(over="ignore"):
         by_drag = np.exp(change["ln_drag_coefficient"])
         by_force = np.exp(0.5 * change["ln_noise_intensity"])
     quadratic, linear = np.ones(keys.size), np.ones(keys.size)
-    if LINEAR_SHARE in change:
-        share = _number(fit, LINEAR_SHARE)
+    if "linear_share" in change:
+        share = _number(fit, "linear_share")
         # With a smaller share of quadratic drag, nothing is known of its C_d.
-        quadratic -= change[LINEAR_SHARE] / max(1.0 - share, 1e-6)
-        linear += change[LINEAR_SHARE] / share
+        quadratic -= change["linear_share"] / max(1.0 - share, 1e-6)
+        linear += change["linear_share"] / share
     drawn = {
         "drag_coefficient": fitted_value(fit, "drag_coefficient") * by_drag * quadratic,
         "force_std_N": fitted_value(fit, "force_std") * by_force,
     }
-    for key in law_of(fit):
-        if key == "linear_drag_kg_s":
-            drawn[key] = fitted_value(fit, "linear_drag") * by_drag * linear
+    if "linear_drag_kg_s" in law_of(fit):
+        drawn["linear_drag_kg_s"] = fitted_value(fit, "linear_drag") * by_drag * linear
     for name, key in PLAIN.items():
         if name in change:
             drawn[key] = _number(fit, name) + change[name]
@@ -297,26 +298,15 @@ def _within(key: str, values: Floats) -> Floats:
     return values if quantity is None else np.clip(values, quantity.ge, quantity.le)
 
 
-def _normal(key: np.uint64, count: int) -> Floats:
-    return np.random.Generator(np.random.Philox(key=int(key))).standard_normal(count)
-
-
 def _number(fit: xr.Dataset, name: str) -> float:
     """Return a number of the law as the fit's filter takes it."""
     return float(fit["number_value"].values[fit["number"].values.tolist().index(name)])
 
 
-RUNS_PER_FLOW: Final = 25
-"""Runs that share a drawn flow: each drawn one has to be prepared for the core."""
-COMPONENTS: Final = ("u", "v")
-
-
 def has_standard_error(flow: xr.Dataset) -> bool:
     """Return whether a flow field states a standard error at any of its nodes."""
-    return all(
-        name in flow and bool(np.isfinite(flow[name].values).any())
-        for name in (f"{part}_standard_error" for part in COMPONENTS)
-    )
+    names = ("u_standard_error", "v_standard_error")
+    return all(name in flow and bool(np.isfinite(flow[name].values).any()) for name in names)
 
 
 def draw_flow(
@@ -352,7 +342,7 @@ def draw_flow(
     key = stream_keys("flow", seed=seed, trial=trial, index=draw)[0]
     generator = np.random.Generator(np.random.Philox(key=int(key)))
     changed = {}
-    for name in COMPONENTS:
+    for name in ("u", "v"):
         error = np.nan_to_num(flow[f"{name}_standard_error"].values, nan=0.0)
         if correlated_over is None:
             number = generator.standard_normal(error.shape)
