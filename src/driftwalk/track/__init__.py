@@ -17,10 +17,9 @@ from driftwalk.track.detect.two_colour.detector import TwoColourDetector
 from driftwalk.track.follow.settings import TrackerSettings
 from driftwalk.track.follow.tracker import Tracker, TrackState
 from driftwalk.track.live import LiveServer, Particle, nmea_frame
-from driftwalk.track.observer.observer import AssemblyObserver, AssemblySeen, SeenEvent, observe
+from driftwalk.track.observer import AssemblyObserver, AssemblySeen, SeenEvent, observe
 from driftwalk.track.overlay import OverlayWriter, draw_states, explain_frame, save_picture
-from driftwalk.track.source.frames import FrameCounts, FrameSource
-from driftwalk.track.source.live_camera import LiveCamera
+from driftwalk.track.source.frames import FrameCounts, FrameSource, LiveCamera
 from driftwalk.track.source.sampled import frame_count, open_source, sample_images
 from driftwalk.track.types import Detection, Detector, Frame, FrameResult, PixelToWorld, Rejected
 

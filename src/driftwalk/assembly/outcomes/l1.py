@@ -330,7 +330,7 @@ def _proportions(distribution: Distribution) -> tuple[list[str] | None, Floats]:
         distribution = distribution.values
     elif isinstance(distribution, Mapping):
         names = [str(name) for name in distribution]
-        distribution = list(distribution.values())
+        distribution = [float(share) for share in distribution.values()]
     values = np.asarray(distribution, dtype=np.float64)
     if names is not None and len(set(names)) < len(names):
         raise InputError("a distribution names a class twice")

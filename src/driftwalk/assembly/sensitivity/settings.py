@@ -45,9 +45,6 @@ if TYPE_CHECKING:
 
 Progress = Callable[[int, int], None]
 
-NUMBERS: Final = ("left_out", "first_contact_median", "completion_median")
-"""Variables with one number per setting."""
-
 
 class TrialPolicy(NamedTuple):
     """First trials, so far apart that these runs and those of `assemble` share no random number."""
@@ -92,10 +89,23 @@ class Settings:
         """Number of settings."""
         return self.trial.size
 
-    def per_unit(self) -> int:
-        """Return the settings of a work unit."""
-        longest = max(w.index.size * w.steps * w.study.assembly.blocks for w in self.worlds)
-        return settings_per_unit(self.size, longest)
+
+def make_settings(
+    worlds: Sequence[Plan],
+    world: Integers,
+    *,
+    first_trial: int,
+    drag_coefficient: Floats | None = None,
+    force_std: Floats | None = None,
+) -> Settings:
+    """Return settings with trials in a row; C_d and sigma_F are those of the study if left out."""
+    forces = worlds[0].study.forces
+    if drag_coefficient is None:
+        drag_coefficient = np.full(world.size, forces.drag_coefficient)
+    if force_std is None:
+        force_std = np.full(world.size, forces.force_std_N)
+    trial = first_trial + np.arange(world.size)
+    return Settings(worlds, world, drag_coefficient, force_std, trial)
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +129,15 @@ class Outcomes:
     first_contact_median: Floats
     completion_median: Floats
     courses: list[str]
+
+    def occurred(self) -> set[str]:
+        """Return the classes that occurred in any setting."""
+        return {name for count in self.count for name in count}
+
+    def table(self, names: Sequence[str]) -> Integers:
+        """Return the numbers of runs by setting and class, shape (setting, class)."""
+        rows = [[count.get(name, 0) for name in names] for count in self.count]
+        return np.array(rows, dtype=np.int64)
 
 
 def world_plan(study: Study, flow: xr.Dataset, *, threads: int | None) -> Plan:
@@ -151,7 +170,9 @@ def simulate_settings(
     InputError
         When the blocks of a run find no place in the tank.
     """
-    units = grid(setting=np.arange(settings.size)).units(settings.per_unit())
+    longest = max(w.index.size * w.steps * w.study.assembly.blocks for w in settings.worlds)
+    design = grid(setting=np.arange(settings.size))
+    units = design.units(settings_per_unit(settings.size, longest))
     kept = _TextStore(MemoryStore() if store is None else store)
     try:
         function = partial(_compute, settings)
@@ -163,8 +184,10 @@ def simulate_settings(
         raise
     return Outcomes(
         [json.loads(text) for text in found["count"]],
-        **{name: found[name] for name in NUMBERS},
-        courses=found["courses"].tolist(),
+        found["left_out"],
+        found["first_contact_median"],
+        found["completion_median"],
+        found["courses"].tolist(),
     )
 
 
@@ -220,7 +243,15 @@ def _compute(settings: Settings, unit: WorkUnit) -> Arrays:
                 mine = {name: values[part] for name, values in found.items()}
                 tally[piece.setting].add(mine, classes, plan)
                 begin = part.stop
-    return _arrays(list(tally.values()), settings.worlds[0].study.time_step_s)
+    time_step, tallies = settings.worlds[0].study.time_step_s, tally.values()
+    texts = [courses_to_text(added(one.courses)) for one in tallies]
+    return {
+        "count": np.array([json.dumps(one.count) for one in tallies], dtype=object),
+        "left_out": np.array([one.left_out for one in tallies]),
+        "first_contact_median": np.array([_median(t.first_contact, time_step) for t in tallies]),
+        "completion_median": np.array([_median(t.completion, time_step) for t in tallies]),
+        "courses": np.array(texts, dtype=object),
+    }
 
 
 class _Piece(NamedTuple):
@@ -279,20 +310,6 @@ def _simulate(
 
 def _keys(plan: Plan, trial: int, runs: range) -> npt.NDArray[np.uint64]:
     return stream_keys("run", seed=plan.study.assembly.seed, trial=trial, index=runs)
-
-
-def _arrays(tallies: list[_Tally], time_step: float) -> Arrays:
-    """Return what a work unit gives: one entry per setting."""
-    medians = {
-        name: np.array([_median(getattr(tally, name), time_step) for tally in tallies])
-        for name in ("first_contact", "completion")
-    }
-    return {
-        "count": np.array([json.dumps(tally.count) for tally in tallies], dtype=object),
-        "left_out": np.array([tally.left_out for tally in tallies]),
-        **{f"{name}_median": values for name, values in medians.items()},
-        "courses": np.array([courses_to_text(added(t.courses)) for t in tallies], dtype=object),
-    }
 
 
 def _median(steps: list[Integers], time_step: float) -> float:
@@ -391,20 +408,15 @@ class Axes:
             for chosen in product(*(self.values[name] for name in apart))
         ]
         size = math.prod(self.shape)
-        forces = self.study.forces
-        table = dict.fromkeys(OF_EACH_RUN, np.empty(0)) | {
-            "drag_coefficient": np.full(size, forces.drag_coefficient),
-            "force_std": np.full(size, forces.force_std_N),
-        }
         inner = np.meshgrid(*(np.array(self.values[name]) for name in along), indexing="ij")
-        for name, values in zip(along, inner, strict=True):
-            table[name] = np.tile(values.ravel(), len(worlds))
-        return Settings(
-            worlds=worlds,
-            world=np.repeat(np.arange(len(worlds)), size // len(worlds)),
-            drag_coefficient=table["drag_coefficient"],
-            force_std=table["force_std"],
-            trial=first_trial + np.arange(size),
+        return make_settings(
+            worlds,
+            np.repeat(np.arange(len(worlds)), size // len(worlds)),
+            first_trial=first_trial,
+            **{
+                name: np.tile(values.ravel(), len(worlds))
+                for name, values in zip(along, inner, strict=True)
+            },
         )
 
     def _world(self, chosen: dict[str, Any], flow: xr.Dataset, threads: int | None) -> Plan:

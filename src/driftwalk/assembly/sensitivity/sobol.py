@@ -22,13 +22,13 @@ from driftwalk.assembly.outcomes.distribution import (
     is_complete,
     sampling_variance,
 )
-from driftwalk.assembly.sensitivity.dataset import count_table
 from driftwalk.assembly.sensitivity.settings import (
     FIRST_TRIALS,
     KEYS,
     Outcomes,
     Progress,
     Settings,
+    make_settings,
     place_first,
     simulate_settings,
     world_plan,
@@ -430,30 +430,23 @@ def _settings(study: Study, flow: xr.Dataset, design: xr.Dataset, threads: int |
 
     names = [str(name) for name in design["input"].values]
     column = dict(zip(names, design["value"].values.T, strict=True))
-    size, forces = design.sizes["setting"], study.forces
-    worlds, world = [study], np.zeros(size, dtype=np.int64)
+    studies, world = [study], np.zeros(design.sizes["setting"], dtype=np.int64)
     if "tank_diameter" in column:
-        diameters, world = np.unique(column["tank_diameter"], return_inverse=True)
-        worlds = [
+        diameters, world = np.unique(column.pop("tank_diameter"), return_inverse=True)
+        studies = [
             apply_overrides(study, {KEYS["tank_diameter"]: diameter})
             for diameter in diameters.tolist()
         ]
-    return Settings(
-        worlds=[world_plan(one, flow, threads=threads) for one in worlds],
-        world=world,
-        drag_coefficient=column.get("drag_coefficient", np.full(size, forces.drag_coefficient)),
-        force_std=column.get("force_std", np.full(size, forces.force_std_N)),
-        trial=FIRST_TRIALS.sobol + np.arange(size),
-    )
+    worlds = [world_plan(one, flow, threads=threads) for one in studies]
+    return make_settings(worlds, world, first_trial=FIRST_TRIALS.sobol, **column)
 
 
 def _indices(study: Study, design: xr.Dataset, outcomes: Outcomes) -> xr.Dataset:
     import xarray as xr
 
     assembly = study.assembly
-    occurred = {name for count in outcomes.count for name in count}
-    names = listed_classes(occurred, assembly.blocks, chirality=assembly.chirality)
-    count = count_table(outcomes.count, names)
+    names = listed_classes(outcomes.occurred(), assembly.blocks, chirality=assembly.chirality)
+    count = outcomes.table(names)
     runs = count.sum(axis=1)
     short = np.flatnonzero(runs < 2)
     if short.size:
@@ -478,15 +471,13 @@ def _indices(study: Study, design: xr.Dataset, outcomes: Outcomes) -> xr.Dataset
         "left_out": int(outcomes.left_out.sum()),
         "blocks": assembly.blocks,
         "study": study.to_toml(),
-        "input_units": " ".join(_unit(str(name)) for name in design["input"].values),
+        # As the axes of a map have them.
+        "input_units": " ".join(
+            str(KINDS["sensitivity"].variable(str(name)).units) for name in design["input"].values
+        ),
     }
     return described(
         found.assign(
             proportion=outputs, value=design["value"], low=design["low"], high=design["high"]
         ).assign_attrs(facts)
     )
-
-
-def _unit(name: str) -> str:
-    """Return the unit of an input, as the axis of a map has it."""
-    return str(KINDS["sensitivity"].variable(name).units)

@@ -11,11 +11,11 @@ from driftwalk.core.extras import require_opencv
 from driftwalk.track.source.frames import (
     FrameSource,
     ImageSequence,
+    LiveCamera,
     VideoFile,
     images_in,
     open_capture,
 )
-from driftwalk.track.source.live_camera import LiveCamera
 from driftwalk.track.types import Image
 
 
