@@ -161,8 +161,8 @@ def sort_out(regions: list[Disc], *, colour: int) -> tuple[list[Disc], list[Reje
     return kept, rejected
 
 
-def _reject(region: Disc, reason: str, kind: str) -> Rejected:
-    return Rejected(region.column, region.row, region.area, reason, kind)
+def _reject(disc: Disc, reason: str, kind: str = "no partner") -> Rejected:
+    return Rejected(disc.column, disc.row, disc.area, reason, kind)
 
 
 def _together(first: Disc, second: Disc) -> Disc:
@@ -238,7 +238,7 @@ def pair_discs(
 
     if not first or not second:
         other = 2 if first else 1
-        return [], [_alone(disc, f"no disc of colour {other} was seen") for disc in first + second]
+        return [], [_reject(disc, f"no disc of colour {other} was seen") for disc in first + second]
     distance, misfit = _misfit(first, second, spacing_per_diameter)
     # A cost above one is no pair; the offset makes more pairs better than closer ones.
     # A sum of misfits is far below 1e6: as many allowed pairs as possible are taken.
@@ -249,14 +249,11 @@ def pair_discs(
             used |= {(1, int(i)), (2, int(j))}
             score = float(1.0 - 0.5 * misfit[i, j] ** 2)
             pairs.append(Pair(first[i], second[j], float(distance[i, j]), score))
-    rejected = [
-        _alone(disc, _nearest(distance[i], 2)) for i, disc in enumerate(first) if (1, i) not in used
-    ]
-    rejected += [
-        _alone(disc, _nearest(distance[:, j], 1))
-        for j, disc in enumerate(second)
-        if (2, j) not in used
-    ]
+    rejected = []
+    for number, discs, apart in ((1, first, distance), (2, second, distance.T)):
+        for place, disc in enumerate(discs):
+            if (number, place) not in used:
+                rejected.append(_reject(disc, _nearest(apart[place], 3 - number)))
     return pairs, rejected
 
 
@@ -278,7 +275,3 @@ def _nearest(distances: Array, colour: int) -> str:
         f"no partner: the nearest disc of colour {colour} is at {distances.min():.2f} of the "
         "marker's spacing, or belongs to another"
     )
-
-
-def _alone(disc: Disc, reason: str) -> Rejected:
-    return Rejected(disc.column, disc.row, disc.area, reason, "no partner")
