@@ -20,7 +20,6 @@ from driftwalk.track.follow.assign import assign
 from driftwalk.track.follow.kalman import (
     STATES,
     Measured,
-    Predicted,
     edge_costs,
     predict,
     start_state,
@@ -31,10 +30,11 @@ from driftwalk.track.follow.naming import Naming
 from driftwalk.track.follow.rivals import Rivals
 from driftwalk.track.follow.settings import TrackerSettings
 from driftwalk.track.follow.tracks import (
-    Rival,
+    Followed,
     Track,
     TrackState,
     measured_of,
+    predicted_of,
     recording_of,
     stacked,
 )
@@ -179,7 +179,7 @@ class Tracker:
         if not self._tracks:
             return
         rivals = [track.rival for track in self._tracks if track.rival is not None]
-        both: list[Track | Rival] = [*self._tracks, *rivals]
+        both: list[Followed] = [*self._tracks, *rivals]
         elapsed = np.array([time - one.time for one in both])
         mean, covariance = predict(*stacked(both), elapsed, self.settings.motion)
         speed = np.hypot(mean[:, 3], mean[:, 4])
@@ -195,12 +195,8 @@ class Tracker:
         if not self._tracks:
             return set()
         tracks, frame = self._tracks, now.number
-        predicted = Predicted(
-            *stacked(tracks),
-            np.array([track.seen_at for track in tracks]),
-            np.array([now.time - track.seen for track in tracks]),
-            np.array([track.samples.last_frame < frame - 1 for track in tracks]),
-        )
+        missed = [track.samples.last_frame < frame - 1 for track in tracks]
+        predicted = predicted_of(tracks, now.time, missed)
         cost = edge_costs(predicted, now.measured, self.settings)
         rival = self._rivals.costs(tracks, now.measured, now.time, frame)
         _obey_keys(cost, tracks, now.found)
@@ -270,9 +266,9 @@ class Tracker:
         )
         for place, j in enumerate(left):
             track = Track(
-                mean[place],
-                covariance[place],
-                now.time,
+                mean=mean[place],
+                covariance=covariance[place],
+                time=now.time,
                 seen_at=poses[place, :2],
                 seen=now.time,
                 began=now.number,
