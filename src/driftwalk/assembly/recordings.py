@@ -106,7 +106,9 @@ def classify(
     """
     require_chirality(chirality)
     poses = _checked_poses(recording)
-    hold = _usual_hold(poses.time) if hold is None else hold
+    if hold is None:
+        usual = float(np.median(np.diff(poses.time))) if poses.time.size > 1 else 0.0
+        hold = max(JOIN_POLICY.hold_s, JOIN_POLICY.frames_held * usual)
     rules = JoinRules.completed(
         side, join_distance, join_angle, release_distance, release_angle, min_duration, hold
     )
@@ -141,11 +143,6 @@ def _checked_poses(recording: xr.Dataset) -> Poses:
     return poses
 
 
-def _usual_hold(time: Floats) -> float:
-    usual = float(np.median(np.diff(time))) if time.size > 1 else 0.0
-    return max(JOIN_POLICY.hold_s, JOIN_POLICY.frames_held * usual)
-
-
 def _unknown_blocks(poses: Poses, hold: float) -> Bools:
     """Return where a block was last seen too long ago, (time, block)."""
     sample = np.arange(poses.time.size)[:, None]
@@ -168,7 +165,10 @@ def _dataset(
     recording: xr.Dataset, poses: Poses, rules: JoinRules, history: JoinHistory
 ) -> xr.Dataset:
     joined, blocks = history.joined, poses.x.shape[1]
-    classes, shapes = _listed(history, blocks)
+    names = {*history.outcome, *(event.outcome for event in (*joined, *history.split))}
+    classes = listed_classes(names, blocks, chirality=history.chirality)
+    parts = {shape for name in names for shape in name.split("+")}
+    shapes = listed_shapes(parts, blocks, chirality=history.chirality)
     known = ~_unknown_blocks(poses, rules.hold)
     sound: Bools = np.logical_and.reduce(known, axis=1)
     outcome = np.where(sound, _places(history.outcome, classes), UNKNOWN).astype(np.int32)
@@ -213,17 +213,6 @@ def _dataset(
             "unknown_samples": int((~sound).sum()),
             "known_s": float(lasts.sum()),
         },
-    )
-
-
-def _listed(history: JoinHistory, blocks: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the classes and the shapes that the dataset lists."""
-    events = (*history.joined, *history.split)
-    classes = {*history.outcome, *(event.outcome for event in events)}
-    shapes = {shape for name in classes for shape in name.split("+")}
-    return (
-        listed_classes(classes, blocks, chirality=history.chirality),
-        listed_shapes(shapes, blocks, chirality=history.chirality),
     )
 
 

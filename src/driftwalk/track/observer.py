@@ -247,30 +247,21 @@ class AssemblyObserver:
         for pair in self._pairs:
             one, other = pair.blocks
             if one in now and other in now:
-                pair.step(sample, _look(time, now[one], now[other]))
-        return self._observation(time)
-
-    def _name(self, poses: Mapping[str, Pose]) -> None:
-        """Name blocks that are seen for the first time."""
-        for name in sorted(poses.keys() - set(self.bodies)):
-            if not self._unnamed:
-                raise InputError(
-                    f"block '{name}' is seen, but there are {len(self.bodies)} others already"
-                )
-            self.bodies[self._unnamed.pop(0)] = name
-
-    def _observation(self, time: float) -> AssemblySeen:
-        samples = len(self._times)
+                pose = np.array([now[one], now[other]]).T
+                apart = pose[:2, 1:] - pose[:2, :1]
+                pair.step(sample, PairPoses(np.array([time]), apart, pose[2][:, None]))
         joins = self._joins()
+        # Joins that hold end with the last sample, which tells nothing new.
         state = [
-            (join.blocks, join.faces, join.start, join.stop if join.stop < samples else -1)
+            (join.blocks, join.faces, join.start, join.stop if join.stop <= sample else -1)
             for join in joins
         ]
-        if state != self._state or samples == 1:
+        if state != self._state or sample == 0:
             self._state, self._history = state, self._replayed(joins)
         events = self._news()
-        active = [join for join in joins if join.stop == samples]
-        hidden = self._hidden(time)
+        active = [join for join in joins if join.stop > sample]
+        limit, every = self.rules.hold * (1.0 + ROUNDING), range(len(self.bodies))
+        hidden = [at for at in every if not time - self._seen.get(at, -math.inf) <= limit]
         outcome = UNKNOWN if hidden else self._history.outcome[-1]
         names = self.bodies
         return AssemblySeen(
@@ -281,6 +272,15 @@ class AssemblyObserver:
             [names[block] for block in hidden],
             events,
         )
+
+    def _name(self, poses: Mapping[str, Pose]) -> None:
+        """Name blocks that are seen for the first time."""
+        for name in sorted(poses.keys() - set(self.bodies)):
+            if not self._unnamed:
+                raise InputError(
+                    f"block '{name}' is seen, but there are {len(self.bodies)} others already"
+                )
+            self.bodies[self._unnamed.pop(0)] = name
 
     def _replayed(self, joins: Sequence[Join]) -> JoinHistory:
         shape = (max(1, len(self._times)), len(self.bodies))
@@ -313,11 +313,6 @@ class AssemblyObserver:
         new = [item for item in self._found() if _identity(*item) not in self._told]
         self._told.update(_identity(*item) for item in new)
         return [self._seen_event(*item) for item in new]
-
-    def _hidden(self, time: float) -> list[int]:
-        limit = self.rules.hold * (1.0 + ROUNDING)
-        every = range(len(self.bodies))
-        return [block for block in every if not time - self._seen.get(block, -math.inf) <= limit]
 
     def _possible(self, active: Sequence[Join], hidden: Sequence[int]) -> frozenset[str]:
         seen = [join for join in active if not set(join.blocks) & set(hidden)]
@@ -422,11 +417,6 @@ def observe(recording: xr.Dataset, *, side: float, **rules: Any) -> xr.Dataset:
     known = outcome >= 0
     possible[known] = np.arange(len(classes)) == outcome[known, None]
     return described(found.assign(possible=(("time", "class"), possible), hidden=("time", hidden)))
-
-
-def _look(time: float, one: Pose, other: Pose) -> PairPoses:
-    apart = np.array([[other[0] - one[0]], [other[1] - one[1]]])
-    return PairPoses(np.array([time]), apart, np.array([[one[2]], [other[2]]]))
 
 
 def _identity(kind: str, event: Event) -> tuple[str, int, tuple[int, int]]:

@@ -17,7 +17,12 @@ from driftwalk.assembly.lattice.polyomino import (
     name_of,
     require_chirality,
 )
-from driftwalk.assembly.outcomes.classes import class_name, listed_classes, listed_shapes
+from driftwalk.assembly.outcomes.classes import (
+    all_single,
+    class_name,
+    listed_classes,
+    listed_shapes,
+)
 from driftwalk.core.arrays import Bools, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.schema.shapes import moved_to_origin
@@ -140,7 +145,7 @@ class _Replay:
             np.zeros((runs, blocks), dtype=np.int64),
             np.tile(np.arange(blocks), (runs, 1)),
         )
-        self.shapes, self.classes = _Names("1"), _Names(class_name(["1"] * blocks))
+        self.shapes, self.classes = _Names("1"), _Names(all_single(blocks))
         # The number of the shape at the lowest block of each assembly, -1 at the other blocks.
         self.shape_of = np.zeros((runs, blocks), dtype=np.int64)
         self.event_assembly = np.full((runs, slots, 2), -1, dtype=np.int32)

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.lattice.polyomino import shape_size
-from driftwalk.assembly.outcomes.classes import class_shapes
+from driftwalk.assembly.outcomes.classes import all_single, class_shapes
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.schema.check import build_dataset, require_kind
@@ -132,7 +132,9 @@ def class_at(assembly: xr.Dataset, time: npt.ArrayLike) -> npt.NDArray[np.int32]
     times = np.asarray(time, dtype=np.float64)
     check_times(times, duration(assembly))
     events, clock = assembly["event_class"].values, assembly["event_time"].values
-    begin = np.full((len(events), 1), class_names(assembly).index(all_single(assembly)))
+    begin = np.full(
+        (len(events), 1), class_names(assembly).index(all_single(int(assembly.attrs["blocks"])))
+    )
     history = np.concatenate([begin, events], axis=1).astype(np.int32)
     history[assembly["outcome"].values < 0] = -1
     run = np.arange(len(events))
@@ -223,13 +225,8 @@ def class_names(assembly: xr.Dataset) -> list[str]:
     then added at the end, where the order has it.
     """
     names = [str(name) for name in assembly["class"].values]
-    start = all_single(assembly)
+    start = all_single(int(assembly.attrs["blocks"]))
     return names if start in names else [*names, start]
-
-
-def all_single(assembly: xr.Dataset) -> str:
-    """Return the name of the class in which every block is alone."""
-    return "+".join(["1"] * int(assembly.attrs["blocks"]))
 
 
 def is_complete(names: list[str]) -> Bools:

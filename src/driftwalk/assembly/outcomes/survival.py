@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.assembly.outcomes.classes import all_single
 from driftwalk.assembly.outcomes.distribution import (
-    all_single,
     check_times,
     class_names,
     duration,
@@ -110,7 +110,7 @@ def class_times(
     count = class_counts(
         assembly["event_time"].values[sound],
         assembly["event_class"].values[sound],
-        start=names.index(all_single(assembly)),
+        start=names.index(all_single(int(assembly.attrs["blocks"]))),
         time=time,
         classes=len(names),
     )

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final, Literal, get_args
 
@@ -336,25 +337,17 @@ def _run(
 ) -> xr.Dataset:
     """Simulate the runs unit by unit, and put them into one dataset."""
     units = grid(run=plan.index).units(runs_per_unit(plan))
-    function = _Runs(plan, start_poses(plan, start))
+    function = partial(_simulate_unit, plan, start_poses(plan, start))
     arrays = run_sweep(function, units, store=store, executor=executor, progress=progress)
     return build_assembly(plan, arrays, attrs={"drawn": drawn})
 
 
-@dataclass(frozen=True, eq=False)
-class _Runs:
-    """The function of the sweep: the runs of a unit, simulated by a worker."""
-
-    plan: Plan
-    poses: Floats
-    """At the start, shape (runs, blocks, 3)."""
-
-    def __call__(self, unit: WorkUnit) -> Arrays:
-        parts = [
-            simulate_rows(plan, self.poses, rows)
-            for rows, plan in _by_draw(self.plan, unit.start, unit.stop)
-        ]
-        return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+def _simulate_unit(plan: Plan, poses: Floats, unit: WorkUnit) -> Arrays:
+    """Return the runs of a unit, simulated by a worker; `poses` are those at the start."""
+    parts = [
+        simulate_rows(drawn, poses, rows) for rows, drawn in _by_draw(plan, unit.start, unit.stop)
+    ]
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 def runs_per_unit(plan: Plan) -> int:

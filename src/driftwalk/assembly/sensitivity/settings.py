@@ -334,22 +334,18 @@ class _TextStore:
 
     def write(self, unit: Unit, arrays: Mapping[str, npt.NDArray[Any]]) -> None:
         """Keep what a unit gave, text as arrays of bytes."""
-        self._inner.write(
-            unit,
-            {
-                name: np.array([text.encode() for text in values]) if values.dtype == object
-                else values
-                for name, values in arrays.items()
-            },
-        )  # fmt: skip
+        encoded = {
+            name: np.char.encode(values.astype(str)) if values.dtype == object else values
+            for name, values in arrays.items()
+        }
+        self._inner.write(unit, encoded)
 
     def read(self, unit: Unit) -> Arrays:
         """Return what was kept for a unit."""
         return {
-            name: np.array([text.decode() for text in values], dtype=object)
-            if values.dtype.kind == "S" else values
+            name: np.char.decode(values).astype(object) if values.dtype.kind == "S" else values
             for name, values in self._inner.read(unit).items()
-        }  # fmt: skip
+        }
 
 
 KEYS: Final[dict[str, str]] = {

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.outcomes.classes import class_name, sort_classes
+from driftwalk.assembly.outcomes.classes import all_single, sort_classes
 from driftwalk.assembly.outcomes.survival import class_counts
 from driftwalk.assembly.runs.dataset import DECIMALS, times_of
 from driftwalk.assembly.runs.plan import Plan, whole_steps
@@ -57,7 +57,7 @@ def courses_of(
     count = class_counts(
         times_of(np.asarray(event_step), time_step=plan.study.time_step_s),
         event_class.astype(np.int64),
-        start=list(classes).index(_all_single(plan)),
+        start=list(classes).index(all_single(plan.study.assembly.blocks)),
         time=kept_times(plan.study),
         classes=len(classes),
     )
@@ -132,7 +132,7 @@ def map_courses(
     """
     known = _known_courses(plan, reference)
     # There is a class even where no run of any setting has an outcome.
-    largest = {_all_single(plan): 0.0}
+    largest = {all_single(plan.study.assembly.blocks): 0.0}
     for courses in (known, *map(courses_from_text, texts)):
         runs = sum(int(row[0]) for row in courses.values())
         for name, row in courses.items():
@@ -151,10 +151,6 @@ def map_courses(
         table = course_table(known, listed)
         variables["reference_over_time"] = (DIMS, table / table.sum(axis=1, keepdims=True))
     return variables, time_coordinates(plan, listed)
-
-
-def _all_single(plan: Plan) -> str:
-    return class_name(["1"] * plan.study.assembly.blocks)
 
 
 def course_table(courses: Courses, listed: Sequence[str]) -> Integers:
