@@ -11,12 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.lattice.polyomino import (
-    STEPS,
-    Chirality,
-    name_of,
-    require_chirality,
-)
+from driftwalk.assembly.lattice.polyomino import STEPS, Chirality, name_of, require_chirality
 from driftwalk.assembly.outcomes.classes import (
     all_single,
     class_name,

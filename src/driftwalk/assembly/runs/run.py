@@ -20,25 +20,12 @@ from driftwalk.assembly.runs.draws import (
     draw_posterior,
     has_standard_error,
 )
-from driftwalk.assembly.runs.plan import (
-    Backend,
-    Plan,
-    make_plan,
-    simulate_rows,
-    start_poses,
-)
+from driftwalk.assembly.runs.plan import Backend, Plan, make_plan, simulate_rows, start_poses
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
 from driftwalk.schema.check import kind_name
-from driftwalk.sweep import (
-    Store,
-    WorkUnit,
-    grid,
-    run_sweep,
-    settings_per_unit,
-    threads_of_unit,
-)
+from driftwalk.sweep import Store, WorkUnit, grid, run_sweep, settings_per_unit, threads_of_unit
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -36,10 +36,7 @@ def kept_times(study: Study) -> Floats:
 
 
 def courses_of(
-    event_step: npt.ArrayLike,
-    event_class: npt.NDArray[Any],
-    classes: Sequence[str],
-    plan: Plan,
+    event_step: npt.ArrayLike, event_class: npt.NDArray[Any], classes: Sequence[str], plan: Plan
 ) -> Courses:
     """Return how many of some runs are in each class over time.
 

@@ -62,12 +62,7 @@ class Rivals:
         return cost
 
     def settle(
-        self,
-        tracks: Sequence[Track],
-        detection: Integers,
-        own: Floats,
-        rival: Floats,
-        frame: int,
+        self, tracks: Sequence[Track], detection: Integers, own: Floats, rival: Floats, frame: int
     ) -> None:
         """Settle what can be settled, before the tracks take what was assigned to them.
 

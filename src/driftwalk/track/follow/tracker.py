@@ -17,14 +17,7 @@ import numpy as np
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.track.follow.assign import assign
-from driftwalk.track.follow.kalman import (
-    STATES,
-    Measured,
-    edge_costs,
-    predict,
-    start_state,
-    update,
-)
+from driftwalk.track.follow.kalman import STATES, Measured, edge_costs, predict, start_state, update
 from driftwalk.track.follow.marks import Marks
 from driftwalk.track.follow.naming import Naming
 from driftwalk.track.follow.rivals import Rivals
