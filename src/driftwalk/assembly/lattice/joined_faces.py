@@ -41,7 +41,7 @@ class JoinPolicy(NamedTuple):
 JOIN_POLICY: Final = JoinPolicy()
 
 JOIN_ANGLE: Final = math.radians(10.0)
-"""Default angle between faces that are joined [rad]."""
+"""Default angle between faces that are joined [rad]; chosen by hand."""
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     Distribution: TypeAlias = xr.Dataset | xr.DataArray | Mapping[str, float] | npt.ArrayLike
 
 
-ENTRIES_AT_ONCE = 1 << 22
-
-
 class L1NoiseFloor(NamedTuple):
     """Result of `l1_noise_floor`: the l1 distance between two samples of one distribution."""
 
@@ -264,7 +261,8 @@ def _normal_mean(p: Floats, per_run: Floats) -> Floats:
 
 def _drawn_distances(p: Floats, runs_a: int, runs_b: int | None, samples: int, seed: int) -> Floats:
     rng = np.random.default_rng(seed)
-    rows = max(1, ENTRIES_AT_ONCE // p.size)
+    # Some 30 MB at a time.
+    rows = max(1, (1 << 22) // p.size)
     parts = []
     for begin in range(0, samples, rows):
         size = min(rows, samples - begin)

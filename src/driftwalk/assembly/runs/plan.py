@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 Backend = Literal["cpu", "reference"]
 
 MOST_STEPS: Final = 2**31 - 1
+"""The native core counts steps in 32 bits."""
 
 
 @dataclass(frozen=True, eq=False)

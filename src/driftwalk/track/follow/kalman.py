@@ -161,7 +161,10 @@ def edge_costs(predicted: Predicted, measured: Measured, settings: TrackerSettin
     difference = innovation(predicted.mean[track], measured.pose[detection])
     total = predicted.covariance[track, :3, :3] + measured.covariance[detection]
     smooth = _position_terms(difference, total)
-    pushed = _position_terms(difference, total + bounce(predicted.unseen_for[track], settings))
+    # A collision just after the last sight gives a body any velocity.
+    bounce = np.zeros_like(total)
+    bounce[:, 0, 0] = bounce[:, 1, 1] = (settings.speed_std * predicted.unseen_for[track]) ** 2
+    pushed = _position_terms(difference, total + bounce)
     square = np.minimum(smooth[0], pushed[0])
     share = settings.bounce_probability
     log_density = np.logaddexp(
@@ -177,13 +180,6 @@ def edge_costs(predicted: Predicted, measured: Measured, settings: TrackerSettin
     value = alone - log_density - log_turned
     cost[track[inside], detection[inside]] = value[inside]
     return cost
-
-
-def bounce(unseen_for: Floats, settings: TrackerSettings) -> Floats:
-    """Return the covariance that a collision just after the last sight adds, (n, 3, 3)."""
-    added = np.zeros((len(unseen_for), 3, 3))
-    added[:, 0, 0] = added[:, 1, 1] = (settings.speed_std * unseen_for) ** 2
-    return added
 
 
 def _position_terms(difference: Floats, total: Floats) -> tuple[Floats, Floats]:

@@ -7,6 +7,7 @@ filter's state: smoothing is for later.
 
 from __future__ import annotations
 
+import json
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -16,6 +17,7 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
+from driftwalk.schema.check import described
 from driftwalk.track.follow.assign import assign
 from driftwalk.track.follow.kalman import STATES, Measured, edge_costs, predict, start_state, update
 from driftwalk.track.follow.marks import Marks
@@ -23,12 +25,12 @@ from driftwalk.track.follow.naming import Naming
 from driftwalk.track.follow.rivals import Rivals
 from driftwalk.track.follow.settings import TrackerSettings
 from driftwalk.track.follow.tracks import (
+    COVARIANCE,
     Followed,
     Track,
     TrackState,
     measured_of,
     predicted_of,
-    recording_of,
     stacked,
 )
 from driftwalk.track.types import Detection
@@ -141,6 +143,8 @@ class Tracker:
         InputError
             When no body was ever followed.
         """
+        from driftwalk.schema import build_trajectory
+
         names = self._naming.names
         if not names:
             raise InputError(
@@ -148,14 +152,28 @@ class Tracker:
                 f"{self.settings.confirm_after} frames in a row"
             )
         tracks = [*self._over, *self._tracks]
-        return recording_of(
+        values = np.full((len(self._times), len(names), 3 + len(COVARIANCE)), np.nan)
+        for track in tracks:
+            if track.body is not None:
+                values[track.samples.frames, track.body] = track.samples.values
+        intervals = np.diff(self._times)
+        recording = build_trajectory(
             self._times,
-            names,
-            tracks,
-            self._marks.scores(len(self._times), len(names), tracks),
-            attrs=attrs or {},
-            counts={**self.counts, **(counts or {})},
+            *(values[..., part] for part in range(3)),
+            body=list(names),
+            attrs={
+                "format": "driftwalk track",
+                "sample_rate_Hz": 1.0 / float(np.median(intervals)) if intervals.size else 0.0,
+                "position_quantum_m": 0.0,
+                "y_axis": "up",
+                **(attrs or {}),
+                "counts": json.dumps({"frames": len(self._times), **self.counts, **(counts or {})}),
+            },
         )
+        ambiguous = self._marks.scores(len(self._times), len(names), tracks)
+        recording["ambiguous"] = (("time", "body"), ambiguous)
+        recording["covariance"] = (("time", "body", "part"), values[..., 3:])
+        return described(recording.assign_coords(part=("part", np.array(COVARIANCE, dtype=object))))
 
     def _unique_keys(self, found: list[Detection]) -> list[Detection]:
         """Keep the best of several detections with the same tag."""

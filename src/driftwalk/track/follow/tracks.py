@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -12,12 +11,11 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
-from driftwalk.schema.check import described
 from driftwalk.track.follow.kalman import Measured, Predicted
 from driftwalk.track.types import Detection
 
 if TYPE_CHECKING:
-    import xarray as xr
+    pass
 
 
 COVARIANCE: Final = ("xx", "xy", "yy", "xtheta", "ytheta", "thetatheta")
@@ -210,53 +208,3 @@ def measured_of(found: Sequence[Detection]) -> Measured:
         pose[place] = one.x, one.y, one.theta
         covariance[place] = one.covariance
     return Measured(pose, covariance + _LEAST_VARIANCE)
-
-
-def recording_of(
-    times: Sequence[float],
-    names: Sequence[str],
-    tracks: Iterable[Track],
-    ambiguous: Floats,
-    *,
-    attrs: Mapping[str, Any],
-    counts: Mapping[str, Any],
-) -> xr.Dataset:
-    """Return a trajectory with the measurements of tracks; see `Tracker.finish`.
-
-    Parameters
-    ----------
-    times : sequence of float
-        Of the frames [s].
-    names : sequence of str
-        Of the bodies.
-    tracks : iterable of Track
-        The tracks followed.
-    ambiguous : array, shape (frames, bodies)
-        Scores.
-    attrs, counts : mapping
-        Attributes and counts to add.
-    """
-    from driftwalk.schema import build_trajectory
-
-    values = np.full((len(times), len(names), 3 + len(COVARIANCE)), np.nan)
-    for track in tracks:
-        if track.body is not None:
-            values[track.samples.frames, track.body] = track.samples.values
-    intervals = np.diff(times)
-    rate = 1.0 / float(np.median(intervals)) if intervals.size else 0.0
-    recording = build_trajectory(
-        times,
-        *(values[..., part] for part in range(3)),
-        body=list(names),
-        attrs={
-            "format": "driftwalk track",
-            "sample_rate_Hz": rate,
-            "position_quantum_m": 0.0,
-            "y_axis": "up",
-            **attrs,
-            "counts": json.dumps({"frames": len(times), **counts}),
-        },
-    )
-    recording["ambiguous"] = (("time", "body"), ambiguous)
-    recording["covariance"] = (("time", "body", "part"), values[..., 3:])
-    return described(recording.assign_coords(part=("part", np.array(COVARIANCE, dtype=object))))

@@ -541,6 +541,6 @@ def _three_channels(image: Any) -> Image:
 
 
 def _same(first: Image, second: Image) -> bool:
-    # Every sixteenth pixel is enough to see that a frame is repeated.
+    # Every sixteenth pixel is enough to see that most frames are not repeated.
     coarse = np.s_[::16, ::16]
     return np.array_equal(first[coarse], second[coarse]) and np.array_equal(first, second)
