@@ -132,9 +132,8 @@ def class_at(assembly: xr.Dataset, time: npt.ArrayLike) -> npt.NDArray[np.int32]
     times = np.asarray(time, dtype=np.float64)
     check_times(times, duration(assembly))
     events, clock = assembly["event_class"].values, assembly["event_time"].values
-    begin = np.full(
-        (len(events), 1), class_names(assembly).index(all_single(int(assembly.attrs["blocks"])))
-    )
+    start = class_names(assembly).index(all_single(int(assembly.attrs["blocks"])))
+    begin = np.full((len(events), 1), start)
     history = np.concatenate([begin, events], axis=1).astype(np.int32)
     history[assembly["outcome"].values < 0] = -1
     run = np.arange(len(events))

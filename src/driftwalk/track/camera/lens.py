@@ -190,22 +190,22 @@ def calibrate_lens(images: Sequence[Image], board: Board) -> LensCalibration:
     sizes = {image.shape[:2] for image in images}
     if len(sizes) > 1:
         raise InputError("the images of the board differ in size: take all with the same camera")
-    found = [board.find(image) for image in images]
-    used = [index for index, seen in enumerate(found) if seen is not None]
-    if len(used) < 3:
+    found = {index: board.find(image) for index, image in enumerate(images)}
+    seen = {index: corners for index, corners in found.items() if corners is not None}
+    if len(seen) < 3:
         raise InputError(
-            f"the {board.kind} of {board.columns} x {board.rows} squares was found in {len(used)} "
+            f"the {board.kind} of {board.columns} x {board.rows} squares was found in {len(seen)} "
             f"of {len(images)} images, 3 are needed: {_advice(board)}"
         )
-    places, pixels = [], []
-    for seen in found:
-        if seen is not None:
-            flat = np.column_stack([seen[0], np.zeros(len(seen[0]))])
-            places.append(flat.astype(np.float32))
-            pixels.append(seen[1].astype(np.float32))
+    flat = [np.column_stack([places, np.zeros(len(places))]) for places, _ in seen.values()]
     ((rows, columns),) = sizes
     rms, matrix, distortion, *_ = cv2.calibrateCamera(
-        places, pixels, (columns, rows), None, None, flags=cv2.CALIB_FIX_K3
+        [places.astype(np.float32) for places in flat],
+        [pixels.astype(np.float32) for _, pixels in seen.values()],
+        (columns, rows),
+        None,
+        None,
+        flags=cv2.CALIB_FIX_K3,
     )
     k1, k2, p1, p2 = (float(value) for value in np.asarray(distortion).ravel()[:4])
     lens = Lens(
@@ -218,8 +218,7 @@ def calibrate_lens(images: Sequence[Image], board: Board) -> LensCalibration:
         p1=p1,
         p2=p2,
     )
-    not_found = [index for index in range(len(images)) if index not in used]
-    return LensCalibration(lens, float(rms), used, not_found)
+    return LensCalibration(lens, float(rms), list(seen), sorted(found.keys() - seen.keys()))
 
 
 def camera_from_board(image: Image, board: Board, lens: Lens | None = None) -> Camera:
