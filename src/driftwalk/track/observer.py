@@ -81,7 +81,10 @@ class _Look(NamedTuple):
 
 
 class PairState:
-    """Two blocks from frame to frame.
+    """Two blocks from frame to frame, by the rules of `driftwalk.classify`.
+
+    Faces join when they have fitted for the shortest duration, they part when they have been beyond
+    the looser tolerances for as long, and both are dated back to where that began.
 
     Parameters
     ----------

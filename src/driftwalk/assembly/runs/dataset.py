@@ -1,6 +1,6 @@
-"""Build the `assembly` dataset from the runs of the native core.
+"""Build the datasets of the runs of the native core: `assembly`, `assembly_path`, a recording.
 
-Dimensions ``run``, ``event`` (one less than there are blocks, at least one), ``side`` (of the
+Of `assembly`: dimensions ``run``, ``event`` (one less than blocks, at least one), ``side`` (of the
 assembly that stayed, of the one that was moved), ``part`` (stayed, moved, became), ``block``,
 ``axis``; coordinates ``class`` (outcome classes) and ``shape`` (polyominoes). Indices of what
 is not there are -1, its times NaN.

@@ -1,4 +1,4 @@
-"""Start poses of the blocks of a run: random or given."""
+"""Start of a run: whether the flow covers the tank and the blocks fit it, and their start poses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Outcomes of many settings, each of many runs: the engine under a sensitivity analysis.
+"""Settings of a sensitivity analysis, from its axes, and the outcomes of their runs.
 
 Every setting has its own random numbers, by its trial: what comes out depends neither on the
 order of the settings nor on how they are cut into work units.

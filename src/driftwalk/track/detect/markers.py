@@ -1,4 +1,4 @@
-"""Description of a marker: the file `markers.toml`."""
+"""Two-colour markers: the file `markers.toml`, and how much of their colours a pixel shows."""
 
 from __future__ import annotations
 
@@ -195,6 +195,10 @@ _LEAST_TOLERANCE: Final = math.radians(18.0)
 
 class ChromaTables:
     """Weights of both colours for every (a*, b*) of an 8-bit CIELAB image.
+
+    Brightness scales a* and b* together, so a colour is a direction in their plane. A pixel's
+    weight for a colour is its chroma along that direction, 1 on the disc itself, and 0 where the
+    hue is another.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Track state of each body."""
+"""Tracks: the state and the samples of each body, and what it may go back to."""
 
 from __future__ import annotations
 

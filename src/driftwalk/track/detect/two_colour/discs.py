@@ -1,4 +1,4 @@
-"""Candidates for the discs of two-colour markers: connected regions of one colour."""
+"""Discs of two-colour markers: connected regions of one colour, and their pairs by assignment."""
 
 from __future__ import annotations
 
