@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     import xarray as xr
 
     Distribution: TypeAlias = xr.Dataset | xr.DataArray | Mapping[str, float] | npt.ArrayLike
+
+
+ENTRIES_AT_ONCE: Final = 1 << 22
+"""Random numbers of one draw: 32 MB."""
 
 
 class L1NoiseFloor(NamedTuple):
@@ -261,8 +265,7 @@ def _normal_mean(p: Floats, per_run: Floats) -> Floats:
 
 def _drawn_distances(p: Floats, runs_a: int, runs_b: int | None, samples: int, seed: int) -> Floats:
     rng = np.random.default_rng(seed)
-    # Some 30 MB at a time.
-    rows = max(1, (1 << 22) // p.size)
+    rows = max(1, ENTRIES_AT_ONCE // p.size)
     parts = []
     for begin in range(0, samples, rows):
         size = min(rows, samples - begin)

@@ -39,7 +39,7 @@ RUNS_PER_FLOW: Final = 25
 PLAIN: Final = {"drag_power": "drag_power", "force_memory": "force_memory_s"}
 """Numbers of a law that [forces] holds as they are, by the fit's name for them."""
 PARAMETERS: Final = ("ln_drag_coefficient", "ln_noise_intensity", "linear_share", *PLAIN)
-"""What is drawn from a fit, by the fit's names."""
+"""Parameters that are drawn from a fit, by the fit's names."""
 
 
 class DrawnParameters(NamedTuple):

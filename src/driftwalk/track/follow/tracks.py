@@ -106,7 +106,7 @@ class Samples:
 
 @dataclass(eq=False, kw_only=True)
 class Followed:
-    """What the filter knows of a body; a track goes back to it where a measurement was wrong."""
+    """State of a body; a track goes back to an earlier one where a measurement was wrong."""
 
     mean: Floats
     """The filter's x, y [m], theta [rad] and their rates [m/s, rad/s], shape (6,)."""
