@@ -13,23 +13,26 @@ from itertools import combinations
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.assembly import classify
-from driftwalk.assembly.lattice.join_history import Event, JoinHistory
-from driftwalk.assembly.lattice.joined_faces import QUARTER, ROUNDING, Join, JoinRules, PairPoses
+from driftwalk.assembly.lattice.join_history import Event, JoinHistory, LatticeWorld
+from driftwalk.assembly.lattice.joined_faces import (
+    JOIN_ANGLE,
+    JOIN_POLICY,
+    QUARTER,
+    ROUNDING,
+    Join,
+    JoinRules,
+    PairPoses,
+)
 from driftwalk.assembly.lattice.polyomino import Chirality, require_chirality
-from driftwalk.assembly.lattice.world import LatticeWorld
-from driftwalk.assembly.recordings import JOIN_ANGLE, JOIN_POLICY
 from driftwalk.core.errors import InputError
 from driftwalk.schema.check import described
-from driftwalk.track.observer.pair_state import PairState
-from driftwalk.track.observer.possible import Lattice, possible_classes
+from driftwalk.track.possible_classes import Lattice, possible_classes
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Floats = npt.NDArray[np.float64]
 Pose = tuple[float, float, float]
 UNKNOWN: Final = ""
 
@@ -65,6 +68,96 @@ class AssemblySeen(NamedTuple):
     """Blocks that have not been seen for longer than a gap is bridged."""
     events: list[SeenEvent]
     """Events that became known with this frame."""
+
+
+class _Look(NamedTuple):
+    """One frame that shows both blocks."""
+
+    sample: int
+    time: float
+    pair: PairPoses
+    kind: int
+    """4 times the face of the first block plus that of the second, -1 when they do not fit."""
+
+
+class PairState:
+    """Two blocks from frame to frame, by the rules of `driftwalk.classify`.
+
+    Faces join when they have fitted for the shortest duration, they part when they have been beyond
+    the looser tolerances for as long, and both are dated back to where that began.
+
+    Parameters
+    ----------
+    blocks : tuple of int
+        The blocks, the lower first.
+    rules : JoinRules
+        Criteria of a join.
+    """
+
+    def __init__(self, blocks: tuple[int, int], rules: JoinRules) -> None:
+        self.blocks = blocks
+        self.rules = rules
+        self.faces: tuple[int, int] | None = None
+        self._over: list[Join] = []
+        self._began = 0
+        self._looseness: list[float] = []
+        self._streak: list[_Look] = []
+
+    def joins(self, samples: int) -> list[Join]:
+        """Return all joins up to now; one that holds ends with the last sample."""
+        if self.faces is None:
+            return self._over
+        loose = float(np.median(self._looseness))
+        return [*self._over, Join(self.blocks, self.faces, self._began, samples, loose)]
+
+    def step(self, sample: int, pair: PairPoses) -> None:
+        """Take a frame that shows both blocks; `pair` holds that one sample."""
+        nearest = pair.nearest_faces()
+        distance, angle = pair.misfit(nearest, self.rules.side)
+        fits = distance[0] <= self.rules.join_distance and angle[0] <= self.rules.join_angle
+        kind = 4 * int(nearest[0, 0]) + int(nearest[1, 0]) if fits else -1
+        self._take(_Look(sample, float(pair.time[0]), pair, kind))
+
+    def _take(self, look: _Look) -> None:
+        if self.faces is None:
+            self._look_for_join(look)
+        else:
+            self._look_for_parting(look)
+
+    def _look_for_join(self, look: _Look) -> None:
+        if look.kind < 0 or (self._streak and self._streak[-1].kind != look.kind):
+            self._streak = []
+        if look.kind >= 0 and self._lasts(look):
+            looks, self._streak = self._streak, []
+            self.faces = divmod(look.kind, 4)
+            self._began, self._looseness = looks[0].sample, []
+            for one in looks:
+                self._look_for_parting(one)
+
+    def _look_for_parting(self, look: _Look) -> None:
+        assert self.faces is not None
+        distance, angle = look.pair.misfit(np.array(self.faces)[:, None], self.rules.side)
+        rules = self.rules
+        if distance[0] <= rules.release_distance and angle[0] <= rules.release_angle:
+            self._streak = []
+        elif self._lasts(look):
+            # What was seen since they came apart may be the beginning of another join.
+            looks, self._streak = self._streak, []
+            loose = float(np.median(self._looseness[: len(self._looseness) - len(looks) + 1]))
+            self._over.append(Join(self.blocks, self.faces, self._began, looks[0].sample, loose))
+            self.faces = None
+            for one in looks:
+                self._take(one)
+            return
+        loose = max(distance[0] / rules.join_distance, angle[0] / rules.join_angle)
+        self._looseness.append(float(loose))
+
+    def _lasts(self, look: _Look) -> bool:
+        """Add to the streak; True when it has lasted for the shortest duration that counts."""
+        if self._streak and look.time - self._streak[-1].time > self.rules.hold * (1 + ROUNDING):
+            self._streak = []
+        self._streak.append(look)
+        return look.time - self._streak[0].time >= self.rules.min_duration * (1 - ROUNDING)
 
 
 class AssemblyObserver:
@@ -112,19 +205,8 @@ class AssemblyObserver:
         names = [f"unseen {i}" for i in range(bodies)] if isinstance(bodies, int) else list(bodies)
         if not names:
             raise InputError("there is no block to observe")
-        distance = JOIN_POLICY.join_distance * side if join_distance is None else join_distance
-        self.rules = JoinRules(
-            side=side,
-            join_distance=distance,
-            join_angle=join_angle,
-            release_distance=JOIN_POLICY.looser * distance
-            if release_distance is None
-            else release_distance,
-            release_angle=JOIN_POLICY.looser * join_angle
-            if release_angle is None
-            else release_angle,
-            min_duration=min_duration,
-            hold=hold,
+        self.rules = JoinRules.completed(
+            side, join_distance, join_angle, release_distance, release_angle, min_duration, hold
         )
         self.bodies = names
         self._unnamed = list(range(bodies)) if isinstance(bodies, int) else []
@@ -168,30 +250,21 @@ class AssemblyObserver:
         for pair in self._pairs:
             one, other = pair.blocks
             if one in now and other in now:
-                pair.step(sample, _look(time, now[one], now[other]))
-        return self._observation(time)
-
-    def _name(self, poses: Mapping[str, Pose]) -> None:
-        """Name blocks that are seen for the first time."""
-        for name in sorted(poses.keys() - set(self.bodies)):
-            if not self._unnamed:
-                raise InputError(
-                    f"block '{name}' is seen, but there are {len(self.bodies)} others already"
-                )
-            self.bodies[self._unnamed.pop(0)] = name
-
-    def _observation(self, time: float) -> AssemblySeen:
-        samples = len(self._times)
+                pose = np.array([now[one], now[other]]).T
+                apart = pose[:2, 1:] - pose[:2, :1]
+                pair.step(sample, PairPoses(np.array([time]), apart, pose[2][:, None]))
         joins = self._joins()
+        # Joins that hold end with the last sample, which tells nothing new.
         state = [
-            (join.blocks, join.faces, join.start, join.stop if join.stop < samples else -1)
+            (join.blocks, join.faces, join.start, join.stop if join.stop <= sample else -1)
             for join in joins
         ]
-        if state != self._state or samples == 1:
+        if state != self._state or sample == 0:
             self._state, self._history = state, self._replayed(joins)
         events = self._news()
-        active = [join for join in joins if join.stop == samples]
-        hidden = self._hidden(time)
+        active = [join for join in joins if join.stop > sample]
+        limit, every = self.rules.hold * (1.0 + ROUNDING), range(len(self.bodies))
+        hidden = [at for at in every if not time - self._seen.get(at, -math.inf) <= limit]
         outcome = UNKNOWN if hidden else self._history.outcome[-1]
         names = self.bodies
         return AssemblySeen(
@@ -202,6 +275,15 @@ class AssemblyObserver:
             [names[block] for block in hidden],
             events,
         )
+
+    def _name(self, poses: Mapping[str, Pose]) -> None:
+        """Name blocks that are seen for the first time."""
+        for name in sorted(poses.keys() - set(self.bodies)):
+            if not self._unnamed:
+                raise InputError(
+                    f"block '{name}' is seen, but there are {len(self.bodies)} others already"
+                )
+            self.bodies[self._unnamed.pop(0)] = name
 
     def _replayed(self, joins: Sequence[Join]) -> JoinHistory:
         shape = (max(1, len(self._times)), len(self.bodies))
@@ -234,11 +316,6 @@ class AssemblyObserver:
         new = [item for item in self._found() if _identity(*item) not in self._told]
         self._told.update(_identity(*item) for item in new)
         return [self._seen_event(*item) for item in new]
-
-    def _hidden(self, time: float) -> list[int]:
-        limit = self.rules.hold * (1.0 + ROUNDING)
-        every = range(len(self.bodies))
-        return [block for block in every if not time - self._seen.get(block, -math.inf) <= limit]
 
     def _possible(self, active: Sequence[Join], hidden: Sequence[int]) -> frozenset[str]:
         seen = [join for join in active if not set(join.blocks) & set(hidden)]
@@ -321,13 +398,8 @@ def observe(recording: xr.Dataset, *, side: float, **rules: Any) -> xr.Dataset:
     """
     found = classify(recording, side=side, **rules)
     names = [str(name) for name in found["body"].values]
-    used = (
-        *("chirality", "join_distance_m", "join_angle_rad", "release_distance_m"),
-        *("release_angle_rad", "min_duration_s", "hold_s"),
-    )
-    # The arguments have the names of the attributes, without the unit.
-    given = {key.rpartition("_")[0] or key: found.attrs[key] for key in used}
-    observer = AssemblyObserver(names, side=side, **given)
+    # How long joins are held may depend on the recording; the other rules have one default.
+    observer = AssemblyObserver(names, side=side, **{**rules, "hold": found.attrs["hold_s"]})
     poses = np.stack([recording[name].values for name in ("x", "y", "theta")], axis=-1)
     seen = [
         observer.step(
@@ -348,11 +420,6 @@ def observe(recording: xr.Dataset, *, side: float, **rules: Any) -> xr.Dataset:
     known = outcome >= 0
     possible[known] = np.arange(len(classes)) == outcome[known, None]
     return described(found.assign(possible=(("time", "class"), possible), hidden=("time", hidden)))
-
-
-def _look(time: float, one: Pose, other: Pose) -> PairPoses:
-    apart = np.array([[other[0] - one[0]], [other[1] - one[1]]])
-    return PairPoses(np.array([time]), apart, np.array([[one[2]], [other[2]]]))
 
 
 def _identity(kind: str, event: Event) -> tuple[str, int, tuple[int, int]]:

@@ -12,8 +12,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
 
 from driftwalk.assembly import class_name, outcome_classes
-from driftwalk.assembly.lattice.polyomino import Chirality, name_of
-from driftwalk.assembly.lattice.world import STEPS
+from driftwalk.assembly.lattice.polyomino import Chirality, name_of, neighbours
 from driftwalk.assembly.outcomes.classes import MOST_BLOCKS
 from driftwalk.schema.shapes import Cell, moved_to_origin
 
@@ -87,7 +86,7 @@ def _free_cells(
         (place, next_to)
         for place, lattice in enumerate(lattices)
         for cell in [*lattice, *(cell for at, cell in cells if at == place)]
-        for next_to in _beside(cell)
+        for next_to in neighbours((cell,))
         if next_to not in lattice and (place, next_to) not in cells
     }
 
@@ -113,14 +112,9 @@ def _connected(left: Lattice) -> list[Cell]:
         for other in [cell for cell, label in left.items() if label == assembly >= 0]:
             waiting.append((other, left.pop(other)))
             found.append(other)
-        for other in _beside(cell):
+        for other in neighbours((cell,)):
             # Seen blocks of two assemblies side by side are not joined: that would have been seen.
             if other in left and -1 in (assembly, left[other]):
                 waiting.append((other, left.pop(other)))
                 found.append(other)
     return found
-
-
-def _beside(cell: Cell) -> Iterator[Cell]:
-    for dx, dy in STEPS:
-        yield cell[0] + dx, cell[1] + dy
