@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -95,35 +95,57 @@ def plot_biplot(
     --------
     ``plot_biplot(components, sensitivity=sensitivity, color="l1_distance")``
     """
-    check_kind(components, "components", "score", "loading", "explained_variance_ratio")
-    if components.sizes["component"] < 2:
-        raise InputError("a biplot needs two components, the dataset has one")
+    found = biplot_of(components)
+    points = found.points
     if color not in COLORS:
         raise InputError(f"color='{color}': choose one of {', '.join(COLORS)}")
     ax = axes_or_new(ax, height_mm=80.0)
-    score = components["score"].isel(component=slice(0, 2)).transpose(..., "component")
-    points = np.asarray(score.values, dtype=np.float64).reshape(-1, 2)
-    loading = np.asarray(
-        components["loading"].transpose("class", "component").values[:, :2], dtype=np.float64
-    )
     if sensitivity is None:
         ax.plot(*points.T, "o", ms=3.0, mew=0.0, color=BLUE, alpha=0.6, label="settings")
     else:
         text, colormap = COLORS[color]
         dots = ax.scatter(
-            points[:, 0], points[:, 1], c=_colour_values(sensitivity, color, score), s=10.0,
-            lw=0, cmap=colormap, label="settings",
+            points[:, 0], points[:, 1], s=10.0, lw=0, cmap=colormap, label="settings",
+            c=_colour_values(sensitivity, color, components["score"]),
         )  # fmt: skip
         add_colorbar(dots, ax, text)
-    share = 100.0 * np.asarray(components["explained_variance_ratio"].values, dtype=np.float64)
-    factor = _arrow_factor(points, loading)
-    ax.set_xlabel(f"component 1 ({share[0]:.3g} % of the variance)")
-    ax.set_ylabel(f"component 2 ({share[1]:.3g} % of the variance)")
-    ax.set_title(f"dots: settings; arrows: loadings × {factor:.2g}", loc="left", size=TITLE_PT)
-    tips = factor * loading
-    _set_limits(ax, np.vstack([points, tips, np.zeros((1, 2))]))
-    _draw_arrows(ax, tips, class_names(components), points)
+    shares = 100.0 * found.shares
+    ax.set_xlabel(f"component 1 ({shares[0]:.3g} % of the variance)")
+    ax.set_ylabel(f"component 2 ({shares[1]:.3g} % of the variance)")
+    title = f"dots: settings; arrows: loadings × {found.factor:.2g}"
+    ax.set_title(title, loc="left", size=TITLE_PT)
+    _set_limits(ax, np.vstack([points, found.tips, np.zeros((1, 2))]))
+    _draw_arrows(ax, found.tips, found.names, points)
     return ax
+
+
+class Biplot(NamedTuple):
+    """What a biplot shows, drawn by matplotlib and by a page."""
+
+    points: Array
+    """The scores of the settings on the first two components, shape (settings, 2)."""
+    tips: Array
+    """The loadings of the classes, lengthened, shape (classes, 2)."""
+    names: list[str]
+    """The classes."""
+    factor: float
+    """By what the loadings are lengthened."""
+    shares: Array
+    """The share of the variance that each component explains."""
+
+
+def biplot_of(components: xr.Dataset) -> Biplot:
+    """Return the first two principal components of a study, or raise `InputError`."""
+    check_kind(components, "components", "score", "loading", "explained_variance_ratio", "class")
+    if components.sizes["component"] < 2:
+        raise InputError("a biplot needs two components, the dataset has one")
+    score, loading, shares = (
+        np.asarray(components[name].transpose(..., "component").values, dtype=np.float64)[..., :2]
+        for name in ("score", "loading", "explained_variance_ratio")
+    )
+    points = score.reshape(-1, 2)
+    factor = _arrow_factor(points, loading)
+    return Biplot(points, factor * loading, class_names(components), factor, shares)
 
 
 def _colour_values(sensitivity: xr.Dataset, color: str, score: xr.DataArray) -> Array:

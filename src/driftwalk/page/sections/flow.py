@@ -93,7 +93,7 @@ def flow_section(flow: xr.Dataset, *, id: str = "flow", title: str = "The flow")
         u=encode_array(flow["u"].values),
         v=encode_array(flow["v"].values),
         # In a file as in a page, "kind" of a section is its own: this one is of the nodes.
-        origin=encode_array(kind, dtype="u1"),
+        origin=encode_array(kind),
         count=encode_array(flow["count"].values) if "count" in flow else None,
         standard_error=error,
     )  # fmt: skip

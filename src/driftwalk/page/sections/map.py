@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
-from driftwalk.page.arrays import encode_array, nice_step, numbers, plain_list
+from driftwalk.page.arrays import binary_step, encode_array, numbers, plain_list
 from driftwalk.page.number_words import percent, quantity
 from driftwalk.page.parameters import PageParameter, page_parameters
 from driftwalk.page.parts import Section, arena_part, require, section, value_of
@@ -63,11 +63,11 @@ def map_section(calibration: xr.Dataset, recording: xr.Dataset | None = None) ->
         "map", "map", "How well each setting explains the recording", _note(calibration, cells),
         x=across.axis(calibration),
         y=up.axis(calibration),
-        value=encode_array(distance, dtype="f8"),
+        value=encode_array(distance),
         standard_error=encode_array(_plane(calibration, "ks_distance_standard_error"))
         if "ks_distance_standard_error" in calibration
         else None,
-        status=encode_array(status, dtype="i2"),
+        status=encode_array(status),
         statuses=causes,
         best=_lowest(calibration, distance, status),
         found=_found(calibration),
@@ -178,13 +178,13 @@ def _cells(calibration: xr.Dataset) -> dict[str, Any] | None:
     if _has(calibration, "excerpt_x", "excerpt_y", "excerpt_time"):
         x, y = (_plane(calibration, f"excerpt_{name}") for name in "xy")
         step = _excerpt_step(x, y)
-        kept["excerpt_x"] = encode_array(x, dtype="i2", resolution=step, delta=True)
-        kept["excerpt_y"] = encode_array(y, dtype="i2", resolution=step, delta=True)
+        kept["excerpt_x"] = encode_array(x, step=step)
+        kept["excerpt_y"] = encode_array(y, step=step)
         kept["excerpt_time"] = plain_list(calibration["excerpt_time"].values)
     if "step_density" in calibration:
         density = _plane(calibration, "step_density")
         kept["density"] = encode_array(
-            density, dtype="i2", resolution=nice_step(float(np.nanmax(density)), DENSITY_PARTS)
+            density, step=binary_step(float(np.nanmax(density)), DENSITY_PARTS)
         )
     for name in ("ks_step_length", "ks_turning_angle"):
         if name in calibration:
@@ -194,7 +194,7 @@ def _cells(calibration: xr.Dataset) -> dict[str, Any] | None:
 
 def _excerpt_step(x: Floats, y: Floats) -> float:
     extents = [float(np.nanmax(v) - np.nanmin(v)) for v in (x, y) if np.isfinite(v).any()]
-    return nice_step(max(extents, default=0.0), EXCERPT_PARTS)
+    return binary_step(max(extents, default=0.0), EXCERPT_PARTS)
 
 
 def _typical(calibration: xr.Dataset, name: str) -> Floats:
@@ -242,6 +242,6 @@ def _note(calibration: xr.Dataset, cells: dict[str, Any] | None) -> str:
     if region is not None and region["confidence"] is not None:
         words.append(f"The line encloses the joint {percent(region['confidence'])} region.")
     if cells is not None and cells["excerpt_x"] is not None:
-        step = quantity(cells["excerpt_x"]["scale"], "m")
+        step = quantity(cells["excerpt_x"]["step"], "m", digits=2)
         words.append(f"Click a setting to see its motion (positions to {step}).")
     return " ".join(words)

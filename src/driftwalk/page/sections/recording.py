@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
-from driftwalk.page.arrays import encode_array, nice_step, number, plain_list
+from driftwalk.page.arrays import binary_step, encode_array, number, plain_list
 from driftwalk.page.number_words import count, percent, quantity
 from driftwalk.page.parts import (
     SIMULATED,
@@ -37,8 +37,8 @@ FAR_SPEED: Final = 2.0
 """How many times the 99th percentile a speed may be and still be in the histogram."""
 POSITION_PARTS: Final = 20_000
 """The extent of a path in steps of its resolution, at least."""
-ANGLE_STEP: Final = 1e-3
-TIME_STEP: Final = 1e-4
+ANGLE_STEP: Final = 2.0**-10
+TIME_STEP: Final = 2.0**-14
 
 
 class Noise(NamedTuple):
@@ -133,20 +133,18 @@ def trajectory_section(
     interval = np.diff(track.time)
     gap = interval > GAP_INTERVALS * np.median(interval)
     shown, every = _shown(track, interval, gap)
-    step = nice_step(max(float(np.ptp(track.x)), float(np.ptp(track.y))), POSITION_PARTS)
+    step = binary_step(max(float(np.ptp(track.x)), float(np.ptp(track.y))), POSITION_PARTS)
     path: dict[str, Any] = {
-        "time": encode_array(shown.time, dtype="i4", resolution=TIME_STEP, delta=True),
-        "x": encode_array(shown.x, dtype="i2", resolution=step, delta=True),
-        "y": encode_array(shown.y, dtype="i2", resolution=step, delta=True),
-        "theta": encode_array(shown.theta, dtype="i2", resolution=ANGLE_STEP, delta=True)
-        if track.has_orientation
-        else None,
+        "time": encode_array(shown.time, step=TIME_STEP, offset=float(shown.time[0])),
+        "x": encode_array(shown.x, step=step),
+        "y": encode_array(shown.y, step=step),
+        "theta": encode_array(shown.theta, step=ANGLE_STEP) if track.has_orientation else None,
     }
     speed = np.hypot(np.diff(track.x), np.diff(track.y))[~gap] / interval[~gap]
     notes = [SIMULATED] if is_simulated(trajectory) else []
     if every > 1:
         notes.append(f"One position in {every} is shown.")
-    notes.append(f"Positions are shown to {quantity(step, 'm')}.")
+    notes.append(f"Positions are shown to {quantity(step, 'm', digits=2)}.")
     top = _top_speed(speed)
     beyond = speed[speed > top]
     if beyond.size:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from driftwalk.assembly import class_cells, outcome_distribution, world_class
+from driftwalk.assembly import outcome_distribution, world_class
+from driftwalk.page.sections.assemblies.classes import cells_of
 from driftwalk.simulation.backend import BROKEN
 from driftwalk.viewer.watch.live_run_page import NO_CELL, Section
 from driftwalk.viewer.watch.shards import FinishedUnit, RunReader
@@ -108,7 +109,7 @@ def _items(count: Mapping[str, int], confidence: float) -> list[dict[str, Any]]:
     items = [
         {
             "class": name,
-            "cells": [cells.tolist() for cells in class_cells(name)],
+            "cells": cells_of(name),
             "count": number,
             "share": share,
             "low": low,

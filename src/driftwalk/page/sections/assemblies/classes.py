@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -11,7 +12,7 @@ from driftwalk.page.arrays import number, numbers
 from driftwalk.page.number_words import count, percent
 from driftwalk.page.parts import Section, require, section, value_of
 from driftwalk.plot.parts.assembly_labels import OTHER, class_names, classes_to_show
-from driftwalk.plot.parts.polyomino_sketch import is_class, shape_cells
+from driftwalk.plot.parts.polyomino_sketch import class_cells, is_class
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,27 +23,17 @@ MOST_TIMES: Final = 401
 """Times at which a page has the shares."""
 
 
-def cells_of(name: str) -> list[list[list[int]]]:
-    """Return the lattice cells of every shape of a class, in the order of its name.
-
-    Parameters
-    ----------
-    name : str
-        Shapes joined by ``+``; anything else has no cells.
-
-    Returns
-    -------
-    list
-        A list of cells [column, row] for each shape, y upwards.
+@functools.cache
+def cells_of(name: str) -> list[list[float]]:
+    """Return the squares in the sketch of a class, see `class_cells`; none of anything else.
 
     Examples
     --------
     >>> cells_of("2+1"), cells_of("other")
-    ([[[0, 0], [1, 0]], [[0, 0]]], [])
+    ([[0.0, 1.6], [1.0, 1.6], [0.0, 0.0]], [])
     """
-    if not is_class(name):
-        return []
-    return [shape_cells(shape).tolist() for shape in name.split("+")]
+    found: list[list[float]] = class_cells(name).tolist() if is_class(name) else []
+    return found
 
 
 def classes_section(series: dict[str, xr.Dataset], *, id: str = "classes") -> Section:
@@ -110,7 +101,7 @@ def class_times_section(times: xr.Dataset) -> Section:
         classes.append(_over_time(OTHER, share[rest].sum(axis=0), None, None))
     return section(
         "class-times", "class_times", "Outcome classes over time", None,
-        time=numbers(thin["time"].values, dtype="f8"), classes=classes,
+        time=numbers(thin["time"].values), classes=classes,
     )  # fmt: skip
 
 

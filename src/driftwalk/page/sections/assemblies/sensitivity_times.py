@@ -46,13 +46,11 @@ def over_time_part(part: xr.Dataset, x: str, y: str) -> dict[str, Any]:
     shown, rest = _chosen(names, _largest(count, runs, known))
     listed = [*(names[index] for index in shown), *([OTHER] if rest else [])]
     return {
-        "time": numbers(part["time"].values, dtype="f8"),
+        "time": numbers(part["time"].values),
         "classes": listed,
         "cells": [cells_of(name) for name in listed],
-        "count": encode_array(
-            _summed(count, shown, rest, axis=2), dtype="i2", resolution=1.0, delta=True
-        ),
-        "runs": numbers(runs, dtype="i4"),
+        "count": encode_array(_summed(count, shown, rest, axis=2)),
+        "runs": numbers(runs),
         "reference": None if known is None else encode_array(_summed(known, shown, rest, axis=0)),
     }
 
