@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.run_stages import tell_nobody
+from driftwalk.core.text.json_text import json_value
 from driftwalk.page.parts import (
     FOUND_TITLE,
     SIMULATED,
@@ -16,12 +17,17 @@ from driftwalk.page.parts import (
     attempt,
     is_simulated,
     section,
+    summary_section,
     warnings_section,
 )
-from driftwalk.page.sections.manifest import manifest_section
-from driftwalk.page.sections.recording import noise_of, recording_sections
-from driftwalk.page.sections.tracking import tracking_sections, tracking_warnings
+from driftwalk.page.sections.recording import (
+    noise_of,
+    recording_sections,
+    tracking_sections,
+    tracking_warnings,
+)
 from driftwalk.schema import body_names
+from driftwalk.schema.answers.citation import bibtex, citation
 from driftwalk.schema.check import kind_name, refuse_other_version
 from driftwalk.schema.runs import RUN_KINDS, RunContents, StoredRun, kind_of, open_run_folder
 
@@ -255,6 +261,67 @@ def name_apart(pages: Sequence[dict[str, Any]]) -> None:
         seen.add(page["subtitle"])
 
 
+def manifest_section(manifest: Mapping[str, Any]) -> Section:
+    """Return the section on how results were made, and how to cite them.
+
+    Parameters
+    ----------
+    manifest : mapping
+        The manifest of a run, or as much of it as there is.
+
+    Returns
+    -------
+    dict
+        A section of kind "manifest". The study stands in it once.
+
+    Examples
+    --------
+    >>> manifest_section({"command": "driftwalk demo"})["command"]
+    'driftwalk demo'
+    """
+    specification = manifest.get("specification")
+    entries = {key: value for key, value in manifest.items() if key != "command"}
+    if isinstance(specification, Mapping):
+        same = specification.get("study") == manifest.get("study")
+        entries["specification"] = {
+            key: value for key, value in specification.items() if not (key == "study" and same)
+        }
+    version = _version(manifest)
+    return section(
+        "manifest", "manifest", "How to reproduce this",
+        "The command reproduces the same numbers from the same inputs.",
+        command=str(manifest.get("command", "")),
+        entries=json_value(entries),
+        inputs=_inputs(manifest),
+        cite=citation(version),
+        bibtex=bibtex(version),
+    )  # fmt: skip
+
+
+def _version(manifest: Mapping[str, Any]) -> str:
+    """Return the version that made the results, that of this program when it is not said."""
+    from driftwalk import __version__
+
+    software = manifest.get("software")
+    found = software.get("driftwalk") if isinstance(software, Mapping) else None
+    return str(found or __version__)
+
+
+def _inputs(manifest: Mapping[str, Any]) -> list[dict[str, str]]:
+    inputs = manifest.get("inputs")
+    if not isinstance(inputs, Mapping):
+        return []
+    return [
+        {
+            "role": str(role),
+            "name": PurePath(str(facts.get("path", ""))).name,
+            "sha256": str(facts.get("sha256", "")),
+        }
+        for role, facts in inputs.items()
+        if isinstance(facts, Mapping)
+    ]
+
+
 def _page(
     *,
     title: str,
@@ -300,7 +367,7 @@ def _sections_of(run: StoredRun) -> list[Section]:
 
 
 def _state_section(words: str) -> Section:
-    return section("state", "summary", "Not finished", paragraphs=[words], numbers=[])
+    return summary_section([words], [], id="state", title="Not finished")
 
 
 def _remarks(run: StoredRun) -> list[str]:

@@ -20,10 +20,9 @@ from synthetic_assembly import (
 )
 
 from driftwalk.page import assembly_sections, sensitivity_sections
-from driftwalk.page.sections.assemblies.assembly import l1_and_chance
-from driftwalk.page.sections.assemblies.assembly_sizes import sizes_section
-from driftwalk.page.sections.assemblies.classes import cells_of
-from driftwalk.page.sections.assemblies.replay import MOST_POSES
+from driftwalk.page.sections.assembly import l1_and_chance
+from driftwalk.page.sections.outcomes import cells_of, sizes_section
+from driftwalk.page.sections.replay import MOST_POSES
 from driftwalk.plot.parts.polyomino_sketch import class_cells
 
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats
 from driftwalk.page.arrays import encode_array, number
 from driftwalk.page.chart import chart, label, mark, series
 from driftwalk.page.number_words import percent
 from driftwalk.page.parts import (
+    Maker,
     Section,
     arena_part,
     attempt,
@@ -19,13 +20,12 @@ from driftwalk.page.parts import (
     empty_section,
     require,
     section,
+    table_section,
     value_of,
 )
 
 if TYPE_CHECKING:
     import xarray as xr
-
-Floats = npt.NDArray[np.float64]
 
 BAND_STDS: Final = 1.96
 """95 % of a normal."""
@@ -43,7 +43,7 @@ def check_sections(check: xr.Dataset) -> list[Section]:
     check : xarray.Dataset
         A `model_check`.
     """
-    makers: tuple[tuple[str, str, Callable[[xr.Dataset], Section]], ...] = (
+    makers: tuple[tuple[str, str, Maker], ...] = (
         ("check", "Does the model explain the recording?", _criteria),
         ("check-innovations", "Are the errors of prediction white?", _innovations),
         ("check-place", "Errors of prediction in the tank", _mean_errors),
@@ -56,7 +56,7 @@ def check_sections(check: xr.Dataset) -> list[Section]:
     )
     made: list[Section] = []
     for id, title, make in makers:
-        parts = attempt(id, title, lambda make=make: make(check))  # type: ignore[misc]
+        parts = attempt(id, title, partial(make, check))
         made += [{**part, "id": id, "title": title} for part in parts]
     return made
 
@@ -70,8 +70,8 @@ def _criteria(check: xr.Dataset) -> Section:
         )
     ]
     level = value_of(check, "level")
-    note = None if level is None else f"A p value below {level:.3g} is a finding."
-    return section("", "table", "", note, columns=["criterion", "p value", ""], rows=rows)
+    note = "" if level is None else f"A p value below {level:.3g} is a finding."
+    return table_section("", "", ["criterion", "p value", ""], rows, note)
 
 
 def _innovations(check: xr.Dataset) -> Section:

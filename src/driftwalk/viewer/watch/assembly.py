@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.assembly import outcome_distribution, world_class
-from driftwalk.page.sections.assemblies.classes import cells_of
+from driftwalk.page.sections.outcomes import cells_of
 from driftwalk.simulation.backend import BROKEN
 from driftwalk.viewer.watch.live_run_page import NO_CELL, Section
 from driftwalk.viewer.watch.shards import FinishedUnit, RunReader

@@ -10,7 +10,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.page.arrays import binary_step, encode_array
 from driftwalk.page.number_words import count, quantity
 from driftwalk.page.parts import Section, arena_part, require, required, section
-from driftwalk.page.sections.assemblies.classes import cells_of
+from driftwalk.page.sections.outcomes import cells_of
 
 if TYPE_CHECKING:
     import xarray as xr
