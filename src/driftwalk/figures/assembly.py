@@ -5,8 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from driftwalk.figures.write import Figures
-from driftwalk.plot.assembly_growth import plot_assembly_sizes, plot_growth
-from driftwalk.plot.class_courses import plot_class_times, plot_survival
+from driftwalk.plot.assembly_courses import (
+    plot_assembly_sizes,
+    plot_class_times,
+    plot_growth,
+    plot_survival,
+)
 from driftwalk.plot.outcome_bars import plot_outcomes
 from driftwalk.plot.parts.polyomino_sketch import figure_of
 from driftwalk.plot.parts.style import DOUBLE_COLUMN_MM, letter_panels, new_figure

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from driftwalk.figures.write import Figures
-from driftwalk.plot.parts.model_panels import label_checks, plot_check_ratios, plot_own_aspects
+from driftwalk.plot.model_check import label_checks, plot_check_ratios, plot_own_aspects
 from driftwalk.plot.parts.style import (
     BLUE,
     DOUBLE_COLUMN_MM,

@@ -5,10 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import numpy.typing as npt
 
-from driftwalk.plot.parts.labels import interval_of, number_fact, require_variables
-from driftwalk.plot.parts.parameters import PlotParameter, plane_of
+from driftwalk.core.arrays import Bools, Floats, Integers
+from driftwalk.plot.parts.labels import (
+    PlotParameter,
+    interval_of,
+    number_fact,
+    plane_of,
+    require_variables,
+)
 from driftwalk.plot.parts.style import INK, SCORE_COLORMAP, add_colorbar, axes_or_new
 
 if TYPE_CHECKING:
@@ -17,7 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.collections import QuadMesh
     from matplotlib.colorbar import Colorbar
 
-Array = npt.NDArray[np.float64]
 # CF flag of `status` -> what the legend says, and the hatch of its cells.
 CAUSES: dict[int, tuple[str, str]] = {
     1: ("no motion (D = 1)", "//////"),
@@ -150,7 +154,7 @@ def plot_refined_map(
     return ax
 
 
-def edges_of(calibration: xr.Dataset, *, prefix: str) -> tuple[Array, Array]:
+def edges_of(calibration: xr.Dataset, *, prefix: str) -> tuple[Floats, Floats]:
     """Return the edges of the cells of the coarse or refined map, in the figure's units."""
     across, up = (
         _parameter_edges(one, one.values(calibration, prefix)) for one in plane_of(calibration)
@@ -158,13 +162,13 @@ def edges_of(calibration: xr.Dataset, *, prefix: str) -> tuple[Array, Array]:
     return across, up
 
 
-def _parameter_edges(parameter: PlotParameter, center: Array) -> Array:
+def _parameter_edges(parameter: PlotParameter, center: Floats) -> Floats:
     if parameter.stored.is_log:
         return np.power(10.0, cell_edges(np.log10(center)))
     return cell_edges(center)
 
 
-def cell_edges(center: Array) -> Array:
+def cell_edges(center: Floats) -> Floats:
     """Return the edges of the cells around grid points: midpoints, and as far out at the ends.
 
     Examples
@@ -218,7 +222,7 @@ def _draw_region(ax: Axes, calibration: xr.Dataset) -> None:
     )  # fmt: skip
 
 
-def region_of(calibration: xr.Dataset) -> Array | None:
+def region_of(calibration: xr.Dataset) -> Floats | None:
     """Return the vertices of the 90 % region in the figure's units, None when there is none."""
     plane = plane_of(calibration)
     if any(f"region_{one.name}" not in calibration for one in plane):
@@ -228,7 +232,7 @@ def region_of(calibration: xr.Dataset) -> Array | None:
     return vertices if len(vertices) >= 3 else None
 
 
-def _status(calibration: xr.Dataset, name: str, dims: tuple[str, str]) -> npt.NDArray[np.int64]:
+def _status(calibration: xr.Dataset, name: str, dims: tuple[str, str]) -> Integers:
     """Return the status bits as whole numbers, 0 throughout when the map has none."""
     if name not in calibration:
         return np.zeros([calibration.sizes[dim] for dim in dims], dtype=np.int64)
@@ -238,8 +242,8 @@ def _status(calibration: xr.Dataset, name: str, dims: tuple[str, str]) -> npt.ND
 
 def _score_mesh(
     ax: Axes,
-    edges: tuple[Array, Array],
-    score: Array,
+    edges: tuple[Floats, Floats],
+    score: Floats,
     *,
     bottom: float | None,
     top: float | None,
@@ -253,9 +257,9 @@ def _score_mesh(
 
 def _hatch_causes(
     ax: Axes,
-    edges: tuple[Array, Array],
-    status: npt.NDArray[np.int64],
-    known: npt.NDArray[np.bool_],
+    edges: tuple[Floats, Floats],
+    status: Integers,
+    known: Bools,
 ) -> None:
     """Cover every cell that has a cause, or no distance, by a hatched rectangle."""
     from matplotlib.patches import Rectangle

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.plot.distances import cell_edges
 from driftwalk.plot.parts.assembly_labels import (
@@ -52,7 +52,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.collections import QuadMesh
 
-Array = npt.NDArray[np.float64]
 # Bright is close to the reference, as bright is a good score in the map of the calibration.
 DISTANCE_COLORMAP: Final = "viridis_r"
 PROPORTION_COLORMAP: Final = "viridis"
@@ -275,12 +274,12 @@ def _one_or_two(sensitivity: xr.Dataset, variable: xr.DataArray) -> list[SweepAx
     return sweep
 
 
-def _values(variable: xr.DataArray, sweep: list[SweepAxis]) -> Array:
+def _values(variable: xr.DataArray, sweep: list[SweepAxis]) -> Floats:
     """Return the values with the first axis of the figure first."""
     return np.asarray(variable.transpose(*(axis.name for axis in sweep)).values, dtype=np.float64)
 
 
-def _draw_map(ax: Axes, sweep: list[SweepAxis], values: Array, *, colormap: str) -> QuadMesh:
+def _draw_map(ax: Axes, sweep: list[SweepAxis], values: Floats, *, colormap: str) -> QuadMesh:
     """Draw values (x, y) as a map, and hatch the cells that have none."""
     from matplotlib.patches import Rectangle
 
@@ -304,7 +303,7 @@ def _draw_map(ax: Axes, sweep: list[SweepAxis], values: Array, *, colormap: str)
     return mesh
 
 
-def _draw_floor_contour(ax: Axes, sweep: list[SweepAxis], values: Array, floor: float) -> bool:
+def _draw_floor_contour(ax: Axes, sweep: list[SweepAxis], values: Floats, floor: float) -> bool:
     """Draw the line of the noise floor; False when the map does not cross it."""
     from matplotlib.patheffects import Normal, Stroke
 
@@ -342,7 +341,7 @@ def _draw_floor_band(ax: Axes, sensitivity: xr.Dataset) -> None:
         ax.axhline(mean, color=INK, lw=0.8, dashes=(4, 2.5), label="mean noise floor")
 
 
-def _draw_lines(ax: Axes, sweep: list[SweepAxis], values: Array, *, color: str) -> None:
+def _draw_lines(ax: Axes, sweep: list[SweepAxis], values: Floats, *, color: str) -> None:
     """Draw values over one axis, one line per value of the other; words are not joined."""
     along, *others = sweep
     if others and along.words and not others[0].words:

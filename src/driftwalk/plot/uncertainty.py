@@ -5,15 +5,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.plot.distances import REGION_LABEL, draw_optimum, region_of
-from driftwalk.plot.parts.labels import interval_of, number_fact, require_variables
-from driftwalk.plot.parts.parameters import (
+from driftwalk.plot.parts.labels import (
     PlotParameter,
+    interval_of,
+    number_fact,
     parameter_named,
     plane_of,
     plot_parameters,
+    require_variables,
 )
 from driftwalk.plot.parts.style import BLUE, INK, MUTED, ORANGE, PALE, axes_or_new, axes_row_or_new
 
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-Array = npt.NDArray[np.float64]
 ESTIMATES_LABEL = "bootstrap estimates"
 
 

@@ -38,9 +38,8 @@ def test_the_table_has_a_row_for_each_parameter(
 ) -> None:
     rows = sections["errors"]["rows"]
     assert [row[0] for row in rows] == [name.replace("_", " ") for name in VALUES]
-    assert [row[2] for row in rows] == [
-        f"{100 * one:.1f} %" for one in found["median_error"].values
-    ]
+    medians = [f"{100 * one:.1f} %" for one in found["median_error"].values]
+    assert [row[2] for row in rows] == medians
     calibrated = int((found["status"] == 0).sum())
     shares = found["determined_share"].values
     assert [row[3] for row in rows] == [

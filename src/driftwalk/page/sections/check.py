@@ -23,14 +23,10 @@ from driftwalk.page.parts import (
     table_section,
     value_of,
 )
+from driftwalk.plot.model_check import BAND_STDS, LEAST_TOP, running_time
 
 if TYPE_CHECKING:
     import xarray as xr
-
-BAND_STDS: Final = 1.96
-"""95 % of a normal."""
-LEAST_TOP: Final = 4.0
-"""Least upper end of the colours of a residual map [sd], so that chance looks pale."""
 
 ABSORBED: Final = "A tenth without a point: the fitted flow has absorbed what would be seen there."
 
@@ -167,15 +163,6 @@ def _over_time(
 
 def _with_bars(name: str, x: Floats, value: Floats, reach: Floats) -> dict[str, Any]:
     return series(name, x, value, ends=(value - reach, value + reach), style="points")
-
-
-def running_time(check: xr.Dataset) -> tuple[Floats, Floats]:
-    """Return start and end of the parts [s], recordings one after the other."""
-    recording = check["part_recording"].values.astype(int)
-    start, end = check["part_start"].values, check["part_end"].values
-    lengths = [float(end[recording == k].max(initial=0.0)) for k in range(int(recording.max()) + 1)]
-    before = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])[recording]
-    return start + before, end + before
 
 
 def _drag_by_speed(check: xr.Dataset) -> Section:

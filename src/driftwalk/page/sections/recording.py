@@ -22,7 +22,7 @@ from driftwalk.page.parts import (
     section,
     summary_section,
 )
-from driftwalk.plot.path import GAP_INTERVALS
+from driftwalk.plot.tank import GAP_INTERVALS
 from driftwalk.schema import Track, body_names, body_track, check_trajectory
 
 if TYPE_CHECKING:
