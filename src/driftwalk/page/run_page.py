@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 from driftwalk.core.errors import InputError
 from driftwalk.core.run_stages import tell_nobody
 from driftwalk.core.text.json_text import json_value
+from driftwalk.page.html import page_frame
 from driftwalk.page.parts import (
     FOUND_TITLE,
     SIMULATED,
@@ -34,8 +35,6 @@ from driftwalk.schema.runs import RUN_KINDS, RunContents, StoredRun, kind_of, op
 if TYPE_CHECKING:
     import xarray as xr
 
-FORMAT: Final = "driftwalk page"
-VERSION: Final = 1
 _SHOWN_ONCE: Final = ("trajectory", "flow")
 """Kinds of sections that several runs have in common: what they were made of."""
 _BESIDE_CONTENT: Final = ("id", "note", "facts")
@@ -331,19 +330,14 @@ def _page(
     created: Any,
     sections: list[Section],
 ) -> dict[str, Any]:
-    from driftwalk import __version__
-
-    return {
-        "format": FORMAT,
-        "version": VERSION,
-        "view": "report",
-        "title": title,
-        "subtitle": subtitle,
-        "state": {"finished": finished, "progress": 1.0 if finished else None, "words": words},
-        "driftwalk_version": __version__,
-        "created_utc": None if created is None else str(created),
-        "sections": sections,
-    }
+    return page_frame(
+        "report",
+        title,
+        subtitle=subtitle,
+        state={"finished": finished, "progress": 1.0 if finished else None, "words": words},
+        created_utc=None if created is None else str(created),
+        sections=sections,
+    )
 
 
 def _words_of_state(run: StoredRun) -> str | None:

@@ -19,10 +19,9 @@ from uvicorn.protocols.http.auto import AutoHTTPProtocol
 
 from driftwalk.core.errors import FormatError
 from driftwalk.core.text.json_text import parse_json
-from driftwalk.viewer.hub import Content, Hub, Source
-from driftwalk.viewer.messages import Outbox, make_message
+from driftwalk.page.html import BUNDLE, bundle_file, html_shell, page_frame
+from driftwalk.viewer.hub import Content, Hub, Outbox, Source, make_message
 from driftwalk.viewer.security import HEADERS, Gate
-from driftwalk.viewer.shell import BUNDLE, bundle_file, html_shell, page_frame
 
 TRY_LATER: Final = 1013
 """Close code of a WebSocket: too many browsers."""

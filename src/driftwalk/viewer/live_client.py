@@ -11,9 +11,9 @@ from typing import Any, Final
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.text.json_text import parse_json
+from driftwalk.page.html import page_frame
 from driftwalk.viewer.frame_filter import SoundFrames
 from driftwalk.viewer.hub import Content, Publish, Source
-from driftwalk.viewer.shell import page_frame
 
 FORMAT: Final = "driftwalk live"
 VERSION: Final = 1

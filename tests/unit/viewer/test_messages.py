@@ -12,8 +12,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from driftwalk.viewer.app import _listen, parsed
-from driftwalk.viewer.hub import Source
-from driftwalk.viewer.messages import Outbox, make_message, to_json
+from driftwalk.viewer.hub import Outbox, Source, make_message, to_json
 
 loop: asyncio.Runner
 

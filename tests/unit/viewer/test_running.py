@@ -19,9 +19,9 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.files.rundir import RunDirectory
 from driftwalk.core.files.shards import ShardStore
 from driftwalk.model import Study
+from driftwalk.page.html import page_frame
 from driftwalk.schema import Parameter
 from driftwalk.sweep import grid
-from driftwalk.viewer.shell import page_frame
 from driftwalk.viewer.watch.run_page import RunSource
 from driftwalk.viewer.watch.sensitivity import RunningSensitivity
 from driftwalk.viewer.watch.shards import StoreReader

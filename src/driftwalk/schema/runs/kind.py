@@ -40,7 +40,7 @@ class RunKind:
     figures : callable or str, optional
         Returns its figures, a table from their names to functions that draw them.
     live : callable or str, optional
-        View of a run under way, see `driftwalk.viewer.watch.live_run_page.Running`; without one the
+        View of a run under way, see `driftwalk.viewer.watch.run_page.Running`; without one the
         page counts the finished work units.
     answer : callable or str, optional
         Returns the `driftwalk.schema.answers.parts.Answer` of its result.

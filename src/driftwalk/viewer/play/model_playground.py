@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.motion import MotionModel, known_values
+from driftwalk.page.html import page_frame
 from driftwalk.schema import Parameter
 from driftwalk.viewer.play.bodies import MovingBodies
 from driftwalk.viewer.play.motion import INTERVAL_S, MotionWindow, beside
 from driftwalk.viewer.play.playground import ANGLE_DIGITS, POSITION_DIGITS, flow_arrows
 from driftwalk.viewer.play.playground_base import Playground
 from driftwalk.viewer.play.settings import SPEED, Knob
-from driftwalk.viewer.shell import page_frame
 
 if TYPE_CHECKING:
     import xarray as xr

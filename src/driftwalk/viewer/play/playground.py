@@ -13,11 +13,11 @@ import numpy.typing as npt
 
 from driftwalk.assembly import LiveTank
 from driftwalk.page import encode_array
+from driftwalk.page.html import page_frame
 from driftwalk.viewer.play.motion import MotionWindow, beside
 from driftwalk.viewer.play.playground_base import Playground
 from driftwalk.viewer.play.settings import controls_section, knobs_for, most_blocks_in, values_of
 from driftwalk.viewer.play.stream import frame_line
-from driftwalk.viewer.shell import page_frame
 
 if TYPE_CHECKING:
     import xarray as xr

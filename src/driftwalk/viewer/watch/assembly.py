@@ -12,7 +12,7 @@ import numpy as np
 from driftwalk.assembly import outcome_distribution, world_class
 from driftwalk.page.sections.outcomes import cells_of
 from driftwalk.simulation.backend import BROKEN
-from driftwalk.viewer.watch.live_run_page import NO_CELL, Section
+from driftwalk.viewer.watch.run_page import NO_CELL, Section
 from driftwalk.viewer.watch.shards import FinishedUnit, RunReader
 
 if TYPE_CHECKING:

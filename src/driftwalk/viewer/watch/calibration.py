@@ -16,7 +16,7 @@ from driftwalk.core.run_stages import CALIBRATION_STAGES, MORE, share_of_map, sh
 from driftwalk.page import bootstrap_section, encode_array, map_section, profile_sections
 from driftwalk.schema import Parameter
 from driftwalk.schema.calibration import BLOCK
-from driftwalk.viewer.watch.live_run_page import NO_CELL, Section
+from driftwalk.viewer.watch.run_page import NO_CELL, Section
 from driftwalk.viewer.watch.shards import FinishedUnit, RunReader
 
 if TYPE_CHECKING:

@@ -23,7 +23,7 @@ from driftwalk.page import encode_array
 from driftwalk.page.sections.outcomes import cells_of
 from driftwalk.page.sections.sensitivity_maps import over_time_part, ranked_axes
 from driftwalk.plot.parts.assembly_labels import classes_to_show
-from driftwalk.viewer.watch.live_run_page import NO_CELL, Section
+from driftwalk.viewer.watch.run_page import NO_CELL, Section
 from driftwalk.viewer.watch.shards import RunReader
 
 if TYPE_CHECKING:
