@@ -12,6 +12,7 @@ from typing import Any, Final
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.text.json_text import parse_json
 from driftwalk.page.html import page_frame
+from driftwalk.page.parts import section
 from driftwalk.viewer.frame_filter import SoundFrames
 from driftwalk.viewer.hub import Content, Publish, Source
 
@@ -185,10 +186,8 @@ class LiveSource(Source):
                 await self._writer.drain()
 
     def _page(self) -> dict[str, Any]:
-        tank = {"id": "live", "kind": "live", "title": "The tank", "note": None}
-        return page_frame(
-            self.view, "Live", subtitle=f"the stream of {self.title}", sections=[tank]
-        )
+        subtitle, tank = f"the stream of {self.title}", section("live", "live", "The tank")
+        return page_frame(self.view, "Live", subtitle=subtitle, sections=[tank])
 
 
 def stream_line(line: bytes) -> dict[str, Any] | None:

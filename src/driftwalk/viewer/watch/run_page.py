@@ -14,6 +14,7 @@ from driftwalk.core.files.shards import read_specification
 from driftwalk.core.provenance import read_manifest, refuse_other_version
 from driftwalk.core.run_stages import tell_nobody
 from driftwalk.page.html import page_frame
+from driftwalk.page.parts import empty_section
 from driftwalk.schema.runs import RUN_KINDS, load_maker
 from driftwalk.viewer.hub import Content, Publish, Source
 from driftwalk.viewer.watch.shards import RunReader, quiet_time
@@ -49,13 +50,8 @@ class Running(Protocol):
 
 NO_CELL: Final[dict[str, Any]] = dict.fromkeys(
     (
-        "excerpt_time",
-        "excerpt_x",
-        "excerpt_y",
-        "density",
-        "ks_step_length",
-        "ks_turning_angle",
-        "over_time",
+        *("excerpt_time", "excerpt_x", "excerpt_y", "density"),
+        *("ks_step_length", "ks_turning_angle", "over_time"),
     )
 )
 """Answer for a setting that has not been simulated."""
@@ -89,9 +85,7 @@ class RunningOther:
     def sections(self) -> list[Section]:
         """Return one section that says that there is nothing to see yet."""
         reason = "This kind of run shows its results when it is finished. The page waits for it."
-        return [
-            {"id": "waiting", "kind": "empty", "title": self.title, "note": None, "reason": reason}
-        ]
+        return [empty_section("waiting", self.title, reason)]
 
     def state(self) -> tuple[float | None, str]:
         """Return that nobody knows how far it is."""
