@@ -28,6 +28,25 @@ _NO_SCRIPT: Final = (
     "This page needs JavaScript, which is switched off here. It loads nothing from anywhere."
 )
 
+_REPORT: Final = """\
+<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" content="{policy}">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="referrer" content="no-referrer">
+<title>{title}</title>
+<style>{style}</style>
+</head>
+<body>
+<div id="app"></div>
+<noscript><p>{no_script}</p></noscript>
+<script type="application/json" id="driftwalk-page">{page}</script>
+<script>{program}</script>
+</body>
+</html>
+"""
 _SHELL: Final = """\
 <!doctype html>
 <html lang="en">
@@ -113,27 +132,13 @@ def report_html(page: Mapping[str, Any], *, connect: Literal["none", "self"] = "
             "form-action 'none'",
         ]
     )
-    return "\n".join(
-        [
-            "<!doctype html>",
-            '<html lang="en">',
-            "<head>",
-            '<meta charset="utf-8">',
-            f'<meta http-equiv="Content-Security-Policy" content="{policy}">',
-            '<meta name="viewport" content="width=device-width, initial-scale=1">',
-            '<meta name="referrer" content="no-referrer">',
-            f"<title>{_text(_title(page))}</title>",
-            f"<style>{style}</style>",
-            "</head>",
-            "<body>",
-            '<div id="app"></div>',
-            f"<noscript><p>{_NO_SCRIPT}</p></noscript>",
-            f'<script type="application/json" id="driftwalk-page">{embedded(page)}</script>',
-            f"<script>{program}</script>",
-            "</body>",
-            "</html>",
-            "",
-        ]
+    return _REPORT.format(
+        policy=policy,
+        title=_text(_title(page)),
+        style=style,
+        no_script=_NO_SCRIPT,
+        page=embedded(page),
+        program=program,
     )
 
 

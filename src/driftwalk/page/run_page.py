@@ -84,12 +84,13 @@ def report_page(folder: str | Path, *, tell: Callable[[str], None] = tell_nobody
         tell(remark)
     sections = _with_remarks(sections, remarks)
     sections.append(manifest_section(run.manifest))
-    return _page(
-        title="Run" if run.kind is None else run.kind.title,
+    created = run.manifest.get("finished_utc")
+    return page_frame(
+        "report",
+        "Run" if run.kind is None else run.kind.title,
         subtitle=run.name,
-        finished=run.state == "finished",
-        words=words,
-        created=run.manifest.get("finished_utc"),
+        state=_state(words, finished=run.state == "finished"),
+        created_utc=None if created is None else str(created),
         sections=sections,
     )
 
@@ -125,14 +126,8 @@ def dataset_page(dataset: xr.Dataset) -> dict[str, Any]:
             f"or one of {', '.join(RUN_KINDS)}"
         )
     contents = RunContents({kind.file: dataset})
-    return _page(
-        title=kind.title,
-        subtitle=None,
-        finished=True,
-        words=None,
-        created=None,
-        sections=attempt("summary", FOUND_TITLE, lambda: contents.make(kind, kind.page)),
-    )
+    sections = attempt("summary", FOUND_TITLE, lambda: contents.make(kind, kind.page))
+    return page_frame("report", kind.title, state=_state(), sections=sections)
 
 
 def recording_page(
@@ -175,14 +170,8 @@ def recording_page(
         *recording_sections(trajectory, noise={name: noise_of(facts, name) for name in names}),
     ]
     source = trajectory.attrs.get("source")
-    return _page(
-        title="Recording",
-        subtitle=None if source is None else str(source),
-        finished=True,
-        words=None,
-        created=None,
-        sections=sections,
-    )
+    subtitle = None if source is None else str(source)
+    return page_frame("report", "Recording", subtitle=subtitle, state=_state(), sections=sections)
 
 
 def joined_page(pages: Sequence[Mapping[str, Any]], *, title: str) -> dict[str, Any]:
@@ -227,12 +216,13 @@ def joined_page(pages: Sequence[Mapping[str, Any]], *, title: str) -> dict[str, 
             heading = part["title"] if len(names) == 1 else f"{page['title']}: {part['title']}"
             sections.append({**part, "id": f"{name}-{part['id']}", "title": heading})
     words = [str(page["state"]["words"]) for page in pages if page["state"]["words"]]
-    return _page(
-        title=title,
+    finished = all(page["state"]["finished"] for page in pages)
+    return page_frame(
+        "report",
+        title,
         subtitle=", ".join(names),
-        finished=all(page["state"]["finished"] for page in pages),
-        words=" ".join(words) or None,
-        created=max((page["created_utc"] for page in pages if page["created_utc"]), default=None),
+        state=_state(" ".join(words) or None, finished=finished),
+        created_utc=max((one["created_utc"] for one in pages if one["created_utc"]), default=None),
         sections=sections,
     )
 
@@ -321,23 +311,8 @@ def _inputs(manifest: Mapping[str, Any]) -> list[dict[str, str]]:
     ]
 
 
-def _page(
-    *,
-    title: str,
-    subtitle: str | None,
-    finished: bool,
-    words: str | None,
-    created: Any,
-    sections: list[Section],
-) -> dict[str, Any]:
-    return page_frame(
-        "report",
-        title,
-        subtitle=subtitle,
-        state={"finished": finished, "progress": 1.0 if finished else None, "words": words},
-        created_utc=None if created is None else str(created),
-        sections=sections,
-    )
+def _state(words: str | None = None, *, finished: bool = True) -> dict[str, Any]:
+    return {"finished": finished, "progress": 1.0 if finished else None, "words": words}
 
 
 def _words_of_state(run: StoredRun) -> str | None:

@@ -27,8 +27,8 @@ from driftwalk.plot.parts.style import (
     MUTED,
     PALE,
     add_colorbar,
+    axes_grid_or_new,
     axes_or_new,
-    axes_row_or_new,
     letter_panels,
 )
 
@@ -316,7 +316,7 @@ def plot_density_panels(
     top = max(
         float(density_of(density, length_mm, angle_deg).max(initial=0.0)) for density in densities
     )
-    row = axes_row_or_new(axes, count=4, sharex=True, sharey=True)
+    row = axes_grid_or_new(axes, count=4, sharex=True, sharey=True)
     limits = _common_limits(densities, length_mm, angle_deg)
     for ax, density in zip(row, densities, strict=True):
         mesh = density_mesh(ax, density, length_mm, angle_deg, top=top)

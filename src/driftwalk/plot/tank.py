@@ -23,8 +23,8 @@ from driftwalk.plot.parts.style import (
     INK,
     TIME_COLORMAP,
     add_colorbar,
+    axes_grid_or_new,
     axes_or_new,
-    new_figure,
 )
 from driftwalk.schema import Track, body_track
 from driftwalk.schema.check import kind_name
@@ -213,7 +213,10 @@ def plot_film_strip(
     one = _one_run(path, run, kind="assembly_path")
     if count < 2:
         raise InputError(f"a strip has at least 2 moments, got {count}")
-    panels = _strip_axes(axes, count)
+    rows = -(-count // STRIP_COLUMNS)
+    columns = -(-count // rows)
+    height_mm = rows * (DOUBLE_COLUMN_MM / columns + 5.0)
+    panels = axes_grid_or_new(axes, count=count, columns=columns, height_mm=height_mm)
     times = one["time"].values
     for ax, moment in zip(panels, np.linspace(times[0], times[-1], count), strict=True):
         plot_blocks(path, ax, run=run, time=float(moment))
@@ -291,20 +294,3 @@ def _draw_blocks(ax: Axes, moment: xr.Dataset) -> None:
         list(block_corners(moment)), facecolors=colors, edgecolors=INK, linewidths=0.6, zorder=3
     )
     ax.add_collection(blocks)
-
-
-def _strip_axes(axes: Any, count: int) -> list[Axes]:
-    if axes is None:
-        rows = -(-count // STRIP_COLUMNS)
-        columns = -(-count // rows)
-        figure = new_figure(
-            width_mm=DOUBLE_COLUMN_MM, height_mm=rows * (DOUBLE_COLUMN_MM / columns + 5.0)
-        )
-        axes = figure.subplots(rows, columns, squeeze=False)
-        for spare in axes.ravel()[count:]:
-            spare.remove()
-        axes = axes.ravel()[:count]
-    panels: list[Axes] = list(np.ravel(np.asarray(axes, dtype=object)))
-    if len(panels) != count:
-        raise InputError(f"got {len(panels)} axes, expected {count}: pass them as axes=[...]")
-    return panels

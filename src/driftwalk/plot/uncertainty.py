@@ -16,7 +16,7 @@ from driftwalk.plot.parts.labels import (
     plot_parameters,
     require_variables,
 )
-from driftwalk.plot.parts.style import BLUE, INK, MUTED, ORANGE, PALE, axes_or_new, axes_row_or_new
+from driftwalk.plot.parts.style import BLUE, INK, MUTED, ORANGE, PALE, axes_grid_or_new, axes_or_new
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -51,7 +51,7 @@ def plot_validation(calibration: xr.Dataset, axes: Any = None) -> list[Axes]:
     ``plot_validation(calibration)[0].figure.savefig("validation.png")``
     """
     parameters = plot_parameters(calibration)
-    row = axes_row_or_new(axes, count=len(parameters) + 1)
+    row = axes_grid_or_new(axes, count=len(parameters) + 1)
     for parameter, ax in zip(parameters, row, strict=False):
         plot_distance_profile(calibration, ax, parameter=parameter.name)
     plot_bootstrap(calibration, row[-1])

@@ -13,7 +13,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from driftwalk.core.text.json_text import json_value
+from driftwalk.core.errors import FormatError
+from driftwalk.core.text.json_text import json_value, parse_json
 
 MOST_CLIENTS: Final = 32
 PACED: Final = frozenset({"tank", "frame"})
@@ -146,6 +147,21 @@ def to_json(content: Any) -> str:
         return json.dumps(content, separators=(",", ":"), allow_nan=False)
     except ValueError:
         return json.dumps(json_value(content), separators=(",", ":"), allow_nan=False)
+
+
+def parsed(text: str | bytes) -> dict[str, Any] | None:
+    """Return the object that a message holds, None when it holds none.
+
+    Examples
+    --------
+    >>> parsed('{"type": "ready"}'), parsed("[1]"), parsed("{")
+    ({'type': 'ready'}, None, None)
+    """
+    try:
+        content = parse_json(text)
+    except FormatError:
+        return None
+    return content if isinstance(content, dict) else None
 
 
 class Outbox:

@@ -325,13 +325,12 @@ def _how_good(calibration: xr.Dataset) -> list[str]:
 
 def _profile(calibration: xr.Dataset, along: PageParameter) -> Section:
     others = [one for one in page_parameters(calibration) if one.name != along.name]
-    line, fixed = calibration, []
-    for other in others:
-        best = float(required(calibration, other.key))
-        nearest = int(np.argmin(np.abs(calibration[other.name].values - best)))
-        line = line.isel({other.name: nearest})
-        at = quantity(float(line[other.name]), other.unit)
-        fixed.append(f"{other.short_symbol} = {at}")
+    best = {other.name: float(required(calibration, other.key)) for other in others}
+    line = calibration.sel(best, method="nearest")
+    fixed = [
+        f"{other.short_symbol} = {quantity(float(line[other.name]), other.unit)}"
+        for other in others
+    ]
     marks = [
         mark("optimum", value_of(calibration, along.key), value_of(calibration, "ks_distance"))
     ]

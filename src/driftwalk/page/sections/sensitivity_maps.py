@@ -30,7 +30,7 @@ MAP_AXES: Final = 2
 NOT_REACHED: Final = "Blank if fewer than half of the runs reached it."
 MOST_SLICES: Final = 12
 MOST_COUNTS: Final = 6_000_000
-"""Numbers of runs that the maps of a page hold together: some 2.2 MB of it."""
+"""Numbers of runs that the maps of a page hold together: some 4 MB of it."""
 
 
 def require_axes(sensitivity: xr.Dataset) -> None:

@@ -247,6 +247,8 @@ def draw_sketches_below(
     --------
     ``ax.set_xlabel("outcome", labelpad=draw_sketches_below(ax, range(2), ["2", "1+1"]))``
     """
+    from matplotlib.offsetbox import TextArea, VPacker
+
     if len(positions) != len(names):
         raise InputError(f"{len(positions)} positions for {len(names)} classes")
     slot_pt = _slot_points(ax, positions)
@@ -270,9 +272,11 @@ def draw_sketches_below(
             )
         if text:
             depth += NAME_GAP_PT + (len(text) * LETTER_PT if upright else NAME_SIZE_PT)
-            parts.append(_name_box(text, upright=upright))
+            style = {"size": NAME_SIZE_PT, "color": INK, "rotation": 90.0 if upright else 0.0}
+            parts.append(TextArea(text, textprops=style))
+        stacked = VPacker(children=parts, align="center", pad=0.0, sep=NAME_GAP_PT)
         _pinned(
-            ax, _stacked(parts), (position, 0.0), transform=ax.get_xaxis_transform(),
+            ax, stacked, (position, 0.0), transform=ax.get_xaxis_transform(),
             alignment=(0.5, 1.0), below_pt=pad_pt,
         )  # fmt: skip
         deepest = max(deepest, depth)
@@ -370,21 +374,6 @@ def _slot_points(ax: Axes, positions: Sequence[float]) -> float:
     low, high = ax.get_xlim()
     step = float(np.min(np.diff(positions))) if len(positions) > 1 else high - low
     return float(axes_points(ax)[0] * step / (high - low))
-
-
-def _name_box(name: str, *, upright: bool) -> Any:
-    from matplotlib.offsetbox import TextArea
-
-    return TextArea(
-        name,
-        textprops={"size": NAME_SIZE_PT, "color": INK, "rotation": 90.0 if upright else 0.0},
-    )
-
-
-def _stacked(parts: list[Any]) -> Any:
-    from matplotlib.offsetbox import VPacker
-
-    return VPacker(children=parts, align="center", pad=0.0, sep=NAME_GAP_PT)
 
 
 def _pinned(
