@@ -119,7 +119,7 @@ def plot_biplot(
 
 
 class Biplot(NamedTuple):
-    """What a biplot shows, drawn by matplotlib and by a page."""
+    """Settings and classes on two principal components, drawn by matplotlib and by a page."""
 
     points: Floats
     """The scores of the settings on the first two components, shape (settings, 2)."""

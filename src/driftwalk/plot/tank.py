@@ -1,4 +1,4 @@
-"""What moves in the tank: the path of one body (Fig. 5a), the blocks at one or several moments."""
+"""The tank: the path of one body (Fig. 5a), and its blocks at one or several moments."""
 
 from __future__ import annotations
 
