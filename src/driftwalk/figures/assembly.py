@@ -9,8 +9,12 @@ from itertools import product
 from typing import TYPE_CHECKING, Any, Literal
 
 from driftwalk.figures.write import Figures
-from driftwalk.plot.assembly_growth import plot_assembly_sizes, plot_growth
-from driftwalk.plot.class_courses import plot_class_times, plot_survival
+from driftwalk.plot.assembly_courses import (
+    plot_assembly_sizes,
+    plot_class_times,
+    plot_growth,
+    plot_survival,
+)
 from driftwalk.plot.components import plot_biplot
 from driftwalk.plot.outcome_bars import plot_outcomes
 from driftwalk.plot.parts.polyomino_sketch import figure_of

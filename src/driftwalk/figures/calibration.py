@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any
 from driftwalk.figures.write import Figures, marked_simulated
 from driftwalk.plot.distances import LEGEND_ORDER, plot_ks_map, plot_refined_map
 from driftwalk.plot.flow_field import COMPONENTS, SPEED_LABEL, plot_flow, velocity_of
-from driftwalk.plot.panels import plot_density_panels, shared_setting_text
 from driftwalk.plot.parts import style
-from driftwalk.plot.parts.parameters import plot_parameters
-from driftwalk.plot.path import plot_trajectory
-from driftwalk.plot.step_densities import plot_steps
+from driftwalk.plot.parts.labels import plot_parameters
+from driftwalk.plot.step_densities import plot_density_panels, plot_steps, shared_setting_text
+from driftwalk.plot.tank import plot_trajectory
 from driftwalk.plot.uncertainty import plot_distance_profile, plot_validation
 from driftwalk.schema import body_track
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from driftwalk.figures.write import Figures
+from driftwalk.plot.model_check import label_checks, plot_check_ratios, plot_own_aspects
 from driftwalk.plot.parts import style
-from driftwalk.plot.parts.model_panels import label_checks, plot_check_ratios, plot_own_aspects
 from driftwalk.schema.check import require_kind
 
 if TYPE_CHECKING:

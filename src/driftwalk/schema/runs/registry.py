@@ -50,7 +50,7 @@ class RunKind:
     figures : callable or str, optional
         Returns its figures, a table from their names to functions that draw them.
     live : callable or str, optional
-        View of a run under way, see `driftwalk.viewer.watch.live_run_page.Running`; without one the
+        View of a run under way, see `driftwalk.viewer.watch.run_page.Running`; without one the
         page counts the finished work units.
     answer : callable or str, optional
         Returns the `driftwalk.schema.answers.parts.Answer` of its result.
@@ -155,7 +155,7 @@ BUILT_IN: Final = (
             "sizes_drawn",
         ),
         figures="driftwalk.figures.assembly:assembly_figures",
-        page=f"{_SECTIONS}.assemblies.assembly:assembly_sections",
+        page=f"{_SECTIONS}.assembly:assembly_sections",
         live=f"{_WATCH}.assembly:RunningAssembly",
     ),
     RunKind(
@@ -167,7 +167,7 @@ BUILT_IN: Final = (
         file="sensitivity.nc",
         datasets=("reference", "components", "sobol"),
         figures="driftwalk.figures.assembly:sensitivity_figures",
-        page=f"{_SECTIONS}.assemblies.sensitivity:sensitivity_sections",
+        page=f"{_SECTIONS}.sensitivity:sensitivity_sections",
         live=f"{_WATCH}.sensitivity:RunningSensitivity",
         answer=f"{_ANSWERS}.sensitivity:sensitivity_answer",
     ),
@@ -192,7 +192,7 @@ BUILT_IN: Final = (
         file="comparison.nc",
         datasets=("recording", "flow"),
         figures="driftwalk.figures.model_comparison:comparison_figures",
-        page=f"{_SECTIONS}.models:model_sections",
+        page=f"{_SECTIONS}.motion_models:model_sections",
         gives_model=True,
         answer=f"{_ANSWERS}.model_comparison:comparison_answer",
         places={"comparison": "comparison.nc", "figures": "figures"},
@@ -206,7 +206,7 @@ BUILT_IN: Final = (
         file="model_calibration.nc",
         datasets=("recording", "flow"),
         figures="driftwalk.figures.model_calibration:model_calibration_figures",
-        page=f"{_SECTIONS}.model_calibration:model_calibration_sections",
+        page=f"{_SECTIONS}.motion_models:model_calibration_sections",
         gives_model=True,
         answer=f"{_ANSWERS}.calibration:model_calibration_answer",
         places={"figures": "figures"},

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.core.errors import InputError
-from driftwalk.page.arrays import encode_array, nice_step
+from driftwalk.page.arrays import binary_step, encode_array
 from driftwalk.page.number_words import count, quantity
 from driftwalk.page.parts import Section, arena_part, require, required, section
+from driftwalk.page.sections.outcomes import cells_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -18,7 +19,8 @@ MOST_POSES: Final = 400_000
 """Poses that a page holds; longer paths are shown more rarely, then fewer of them."""
 FEWEST_TIMES: Final = 300
 POSITION_PARTS: Final = 2000
-ANGLE_STEP: Final = 2e-3
+ANGLE_STEP: Final = 2.0**-9
+TIME_STEP: Final = 2.0**-14
 
 
 def replay_section(path: xr.Dataset, assembly: xr.Dataset | None = None) -> Section:
@@ -40,16 +42,20 @@ def replay_section(path: xr.Dataset, assembly: xr.Dataset | None = None) -> Sect
     side = float(required(path, "block_side_m"))
     runs, every = _shares(path)
     thin = path.isel(run=slice(0, runs), time=slice(None, None, every))
-    step = nice_step(float(np.nanmax(np.abs(thin["x"].values))) * 2.0, POSITION_PARTS)
-    note = f"{count(runs, 'run')}, a position every {_interval(thin)}, to {quantity(step, 'm')}."
+    step = binary_step(2.0 * float(np.nanmax(np.abs(thin["x"].values))), POSITION_PARTS)
+    known_to = quantity(step, "m", digits=2)
+    note = f"{count(runs, 'run')}, a position every {_interval(thin)}, to {known_to}."
     if runs < path.sizes["run"]:
         note += f" {count(path.sizes['run'] - runs, 'more run')} in the file."
+    made = [_run(thin.isel(run=index), index, assembly, step) for index in range(runs)]
+    names = {change["class"] for run in made for change in run["classes"]}
     return section(
         "replay", "replay", "Sample runs", note,
         arena=arena_part(path),
         side=side,
-        time=encode_array(thin["time"].values, dtype="i4", resolution=1e-4, delta=True),
-        runs=[_run(thin.isel(run=index), index, assembly, step) for index in range(runs)],
+        time=encode_array(thin["time"].values, step=TIME_STEP),
+        runs=made,
+        cells={name: cells_of(name) for name in sorted(names)},
     )  # fmt: skip
 
 
@@ -76,10 +82,10 @@ def _run(path: xr.Dataset, index: int, assembly: xr.Dataset | None, step: float)
     turned = np.angle(np.exp(1j * theta.astype(np.float64)))
     return {
         "name": f"run {number_of}",
-        "x": encode_array(x, dtype="i2", resolution=step, delta=True),
-        "y": encode_array(y, dtype="i2", resolution=step, delta=True),
-        "theta": encode_array(turned, dtype="i2", resolution=ANGLE_STEP, delta=True),
-        "assembly": encode_array(joined, dtype="u1" if joined.max(initial=0) < 256 else "i2"),
+        "x": encode_array(x, step=step),
+        "y": encode_array(y, step=step),
+        "theta": encode_array(turned, step=ANGLE_STEP),
+        "assembly": encode_array(joined),
         "events": events,
         "classes": _classes(assembly, number_of, events),
     }

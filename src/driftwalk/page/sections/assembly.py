@@ -11,17 +11,20 @@ from driftwalk.page.number_words import count, percent, quantity
 from driftwalk.page.parts import (
     Section,
     attempt,
-    empty_head,
     figure,
-    head_sections,
     require,
     required,
-    section,
+    sections_of,
+    summary_section,
     value_of,
 )
-from driftwalk.page.sections.assemblies.assembly_sizes import size_numbers, size_sections
-from driftwalk.page.sections.assemblies.classes import class_times_section, classes_section
-from driftwalk.page.sections.assemblies.replay import replay_section
+from driftwalk.page.sections.outcomes import (
+    class_times_section,
+    classes_section,
+    size_numbers,
+    size_sections,
+)
+from driftwalk.page.sections.replay import replay_section
 from driftwalk.plot.parts.assembly_labels import class_names
 from driftwalk.schema.shapes import short_class
 
@@ -71,37 +74,35 @@ def assembly_sections(
     >>> [part["kind"] for part in assembly_sections()]
     ['empty']
     """
-    if distribution is None:
-        made = empty_head("There are no outcomes yet.")
-    else:
-        found = {FOUND: distribution}
-        found |= {} if distribution_drawn is None else {DRAWN: distribution_drawn}
-        if len(found) == 1:
-            found = {"runs": distribution}
-        made = head_sections(
-            lambda: assembly_summary(
-                distribution, distribution_drawn, class_times, assembly, sizes
-            ),
-            lambda: _left_out(found),
-        )
-        if sizes is None:
-            made += attempt("classes", "Structures built", lambda: classes_section(found))
+    outcomes = _by_set(distribution, distribution_drawn)
+    made = sections_of(
+        distribution,
+        "There are no outcomes yet.",
+        lambda found: assembly_summary(found, distribution_drawn, class_times, assembly, sizes),
+        lambda _: _left_out(outcomes),
+    )
+    if outcomes and sizes is None:
+        made += attempt("classes", "Structures built", lambda: classes_section(outcomes))
     if sizes is not None:
-        grown = {"runs": sizes} if sizes_drawn is None else {FOUND: sizes, DRAWN: sizes_drawn}
-        made += size_sections(grown)
+        made += size_sections(_by_set(sizes, sizes_drawn))
     if class_times is not None:
         if sizes is None:
-            made += attempt(
-                "class-times", "Outcome classes over time", lambda: class_times_section(class_times)
-            )
-        made += attempt(
-            "survival", "Time to contact and completion", lambda: survival_section(class_times)
-        )
+            title = "Outcome classes over time"
+            made += attempt("class-times", title, lambda: class_times_section(class_times))
+        title = "Time to contact and completion"
+        made += attempt("survival", title, lambda: survival_section(class_times))
     if path is not None:
         made += attempt("replay", "Sample runs", lambda: replay_section(path, assembly))
     if assembly_drawn is not None:
         made += attempt("drawn", "The drawn parameters", lambda: drawn_section(assembly_drawn))
     return made
+
+
+def _by_set(found: xr.Dataset | None, drawn: xr.Dataset | None) -> dict[str, xr.Dataset]:
+    """Return the results of the sets of runs that there are, by the name of the set."""
+    if found is None:
+        return {}
+    return {"runs": found} if drawn is None else {FOUND: found, DRAWN: drawn}
 
 
 def assembly_summary(
@@ -137,7 +138,7 @@ def assembly_summary(
     paragraphs.append("These predictions use latching rules that no recording has settled.")
     if times is not None:
         shown += [_median(times, name) for name in SURVIVAL]
-    return section("summary", "summary", "Method and results", paragraphs=paragraphs, numbers=shown)
+    return summary_section(paragraphs, shown)
 
 
 def survival_section(times: xr.Dataset) -> Section:
@@ -239,18 +240,17 @@ def _most_common(distribution: xr.Dataset, *, named: bool) -> str:
 
 
 def _complete(distribution: xr.Dataset, words: str) -> dict[str, Any]:
-    low, high, confidence = (
-        value_of(distribution, name) for name in ("complete_low", "complete_high", "confidence")
-    )
-    shown = figure(words, distribution.attrs.get("complete"))
-    return shown | {"low": low, "high": high, "confidence": confidence}
+    value, low, high = (value_of(distribution, f"complete{end}") for end in ("", "_low", "_high"))
+    confidence = value_of(distribution, "confidence")
+    return figure(words, value, ends=(low, high), confidence=confidence)
 
 
 def _median(times: xr.Dataset, name: str) -> dict[str, Any]:
     value, low, high = (value_of(times, f"{name}_median{end}_s") for end in ("", "_low", "_high"))
     note = None if value is not None else "not reached in half the runs"
-    shown = figure(f"{_word(name)}, median", value, "s", note=note)
-    return shown | {"low": low, "high": high, "confidence": value_of(times, "confidence")}
+    confidence = value_of(times, "confidence")
+    words = f"{_word(name)}, median"
+    return figure(words, value, "s", note=note, ends=(low, high), confidence=confidence)
 
 
 def _left_out(found: dict[str, xr.Dataset]) -> list[str]:
