@@ -25,10 +25,12 @@ from recordings import RECORDINGS, read_lines
 import driftwalk as dw
 from driftwalk.calibration.evolution import AspectObjective, Budget, search_minimum
 from driftwalk.calibration.held_out.candidates import prepare_candidates
-from driftwalk.calibration.held_out.checks import CHECKS
-from driftwalk.calibration.held_out.held_out_score import HELD_OUT_REPLICATES, even_blocks
-from driftwalk.calibration.held_out.recorded import RecordedMotion, body_motion
-from driftwalk.calibration.ranking.verdict import checks_off
+from driftwalk.calibration.held_out.held_out_score import (
+    HELD_OUT_REPLICATES,
+    checks_off,
+    even_blocks,
+)
+from driftwalk.calibration.held_out.recorded import CHECKS, RecordedMotion, body_motion
 from driftwalk.comparison.aspects.form import resampled
 from driftwalk.conditions import read_recordings
 from driftwalk.model import Study, load_study

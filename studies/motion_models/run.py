@@ -23,11 +23,10 @@ import driftwalk as dw
 from driftwalk.calibration.evolution import (
     AspectObjective,
     Budget,
-    recorded_ranges,
-    scales_of,
     search_minimum,
     wall_distance,
 )
+from driftwalk.calibration.held_out.recorded import recorded_ranges, scales_of
 from driftwalk.comparison.aspects import (
     AspectReference,
     aspect_reference,

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import math
+from typing import TYPE_CHECKING, Final
 
 from driftwalk.calibration.held_out.recorded import body_motion
 from driftwalk.calibration.problem import recorded_problem
-from driftwalk.calibration.refuse import MOST_PARAMETERS, require_searchable
+from driftwalk.core.errors import ConfigurationError
+from driftwalk.core.grid import MOST_SETTINGS
 from driftwalk.motion import BlockModel, MotionModel, ParticleModel
+from driftwalk.schema.answers.facts import taken_keys, taken_names
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
+
+
+MOST_PARAMETERS: Final = 2
+"""Of a grid; with more a model is searched."""
 
 
 def check_recording(
@@ -68,3 +75,27 @@ def check_recording(
         problem.model.require_others(problem.like)
     if isinstance(problem.model, BlockModel):
         problem.model.native(problem.like)
+
+
+def require_searchable(model: MotionModel) -> None:
+    """Refuse a model that no grid over one or two parameters can be laid over."""
+    names = [parameter.name for parameter in model.parameters]
+    if not 1 <= len(names) <= MOST_PARAMETERS:
+        raise ConfigurationError(
+            f"the model {model.name} has {len(names)} parameters to search"
+            f"{': ' + ', '.join(names) if names else ''}; a grid takes one or two"
+        )
+    taken, taken_flat = taken_names(), taken_keys()
+    for parameter in model.parameters:
+        prefixed = parameter.name.startswith(("refined_", "bootstrap_", "region_"))
+        if parameter.name in taken or parameter.key in taken_flat or prefixed:
+            raise ConfigurationError(
+                f"the model {model.name} has a parameter '{parameter.name}', a name that a "
+                "calibration uses itself: choose another"
+            )
+    settings = math.prod(len(parameter.coordinates) for parameter in model.parameters)
+    if settings > MOST_SETTINGS:
+        raise ConfigurationError(
+            f"the grid over {', '.join(names)} has {settings} settings, more than {MOST_SETTINGS}: "
+            "enlarge a step"
+        )

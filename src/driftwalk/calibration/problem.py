@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.calibration.refuse import require_samples
 from driftwalk.comparison import Statistic, StepDistance, StepReference, plan_steps
 from driftwalk.conditions import (
     Conditions,
@@ -20,6 +19,7 @@ from driftwalk.conditions import (
     require_travel,
 )
 from driftwalk.core.arrays import Floats
+from driftwalk.core.errors import InputError
 from driftwalk.core.random_streams import trial_in
 from driftwalk.core.seeds import world_keys
 from driftwalk.motion import BlockModel, Details, MotionModel, Parameter, Scores, score_worlds
@@ -80,6 +80,14 @@ class Problem:
     def duration(self) -> float:
         """Time from the first to the last sample [s]."""
         return float(self.like.sample_time[-1])
+
+
+def require_samples(track: Track) -> None:
+    """Refuse a track on which no step turns."""
+    if track.time.size < 3:
+        raise InputError(
+            f"the recording has {track.time.size} samples of this body; at least 3 are needed"
+        )
 
 
 def prepare_problem(

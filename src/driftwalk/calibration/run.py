@@ -7,14 +7,14 @@ from concurrent.futures import Executor
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from driftwalk.calibration.check import MOST_PARAMETERS, require_searchable
 from driftwalk.calibration.estimation import Stores, Tell, calibrate_many
 from driftwalk.calibration.goodness_of_fit import Halves, validate_on_halves
 from driftwalk.calibration.grid.grid_map import Progress, SweepProgress
 from driftwalk.calibration.grid.stages import GridCalibration
-from driftwalk.calibration.input_warnings import own_flow_warning, wall_warning
 from driftwalk.calibration.problem import FlowSource, Problem, prepare_problem, recorded_problem
-from driftwalk.calibration.refuse import MOST_PARAMETERS, require_searchable
 from driftwalk.calibration.stationarity import stationarity_of
+from driftwalk.calibration.warnings import own_flow_warning, wall_warning
 from driftwalk.comparison import Statistic, StepDistance
 from driftwalk.conditions import jump_warnings, study_in_arena, unstated_warning
 from driftwalk.core.background_task import run_in_background

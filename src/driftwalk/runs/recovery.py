@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from driftwalk.core.processors import default_threads
-from driftwalk.runs.dataset_hash import dataset_hash
+from driftwalk.runs.resumable_run import dataset_hash
 from driftwalk.schema.runs import run_kind
 
 if TYPE_CHECKING:

@@ -4,7 +4,6 @@ Two stages: a search by six two-dimensional KS distances (`driftwalk.calibration
 summaries of the motion, matched by their synthetic likelihood.
 """
 
-from driftwalk.calibration.estimation.calibrate import calibrate_many
-from driftwalk.calibration.estimation.run import Stores, Tell
+from driftwalk.calibration.estimation.run import Stores, Tell, calibrate_many
 
 __all__ = ["Stores", "Tell", "calibrate_many"]

@@ -18,9 +18,14 @@ from driftwalk.calibration.estimation.gauss_newton import (
     Simulate,
     minimise_discrepancy,
 )
-from driftwalk.calibration.estimation.modes import Modes, find_modes
-from driftwalk.calibration.estimation.posterior import POSTERIOR, Posterior, sample_posterior
-from driftwalk.calibration.estimation.profile import Profiles, discrepancy_profiles
+from driftwalk.calibration.estimation.identifiability import Profiles, discrepancy_profiles
+from driftwalk.calibration.estimation.posterior import (
+    POSTERIOR,
+    Modes,
+    Posterior,
+    find_modes,
+    sample_posterior,
+)
 from driftwalk.calibration.estimation.regression_abc import REGRESSION, Order, sequential_regression
 from driftwalk.core.arrays import Bools, Floats
 

@@ -6,8 +6,12 @@ from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 
-from driftwalk.calibration.estimation.emulator import LocalEmulator, Solution, fit_emulator
-from driftwalk.calibration.evolution.search import RESOLUTION
+from driftwalk.calibration.estimation.synthetic_likelihood import (
+    LocalEmulator,
+    Solution,
+    fit_emulator,
+)
+from driftwalk.calibration.evolution import RESOLUTION
 from driftwalk.core.arrays import Floats
 
 

@@ -10,13 +10,14 @@ import numpy as np
 
 from driftwalk.calibration.estimation.estimate import Matched
 from driftwalk.calibration.estimation.identifiability import DETERMINED
-from driftwalk.calibration.estimation.run import Estimation
 from driftwalk.calibration.held_out.candidates import Candidate
-from driftwalk.calibration.held_out.checks import CHECKS, UNITS
-from driftwalk.calibration.held_out.held_out_score import HELD_OUT_REPLICATES, without_error
-from driftwalk.calibration.held_out.recorded import RecordedMotion
+from driftwalk.calibration.held_out.held_out_score import (
+    HELD_OUT_REPLICATES,
+    verdict_of,
+    without_error,
+)
+from driftwalk.calibration.held_out.recorded import CHECKS, UNITS, RecordedMotion
 from driftwalk.calibration.ranking.result import motion_warnings
-from driftwalk.calibration.ranking.verdict import verdict_of
 from driftwalk.core.arrays import Floats
 from driftwalk.motion import ParticleModel
 from driftwalk.schema.answers.facts import BOUNDS, texts
@@ -25,6 +26,7 @@ from driftwalk.schema.check import build_dataset
 if TYPE_CHECKING:
     import xarray as xr
 
+    from driftwalk.calibration.estimation.run import Estimation
     from driftwalk.model import Study
 
 

@@ -17,6 +17,8 @@ from driftwalk.calibration.estimation.estimate import (
 )
 from driftwalk.calibration.estimation.identifiability import Determination, determination
 from driftwalk.calibration.estimation.label_switching import Order, label_order
+from driftwalk.calibration.estimation.result import build_model_calibration
+from driftwalk.calibration.estimation.summary_objective import SummaryObjective
 from driftwalk.calibration.evolution import (
     AspectObjective,
     Budget,
@@ -24,20 +26,29 @@ from driftwalk.calibration.evolution import (
     SearchResult,
     search_minimum,
 )
-from driftwalk.calibration.held_out.candidates import Candidate
+from driftwalk.calibration.held_out.candidates import (
+    Candidate,
+    prepare_candidates,
+    with_contact_clearance,
+)
 from driftwalk.calibration.held_out.held_out_score import (
     HeldOutScore,
     even_blocks,
     require_numbers,
     score_setting,
 )
-from driftwalk.calibration.held_out.recorded import RecordedMotion
-from driftwalk.calibration.summaries.simulated import SummaryObjective
+from driftwalk.calibration.held_out.recorded import RecordedMotion, body_motion
+from driftwalk.conditions import jump_warnings
 from driftwalk.core.arrays import Floats
 from driftwalk.core.processors import one_blas_thread
+from driftwalk.motion import MotionModel
 
 if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
     from driftwalk.sweep import Store
+
 
 Tell = Callable[[str, int, int], None]
 
@@ -217,3 +228,61 @@ def _weighed(even: AspectObjective, answers: Mapping[str, Floats]) -> dict[str, 
         )
         for name, point in answers.items()
     }
+
+
+def calibrate_many(
+    recording: xr.Dataset,
+    model: MotionModel,
+    study: Study,
+    *,
+    flow: xr.Dataset | None,
+    body: str | None,
+    threads: int | None,
+    executor: Executor | None,
+    stores: Stores,
+    tell: Tell,
+) -> xr.Dataset:
+    """Return the `model_calibration` of a model with any number of parameters.
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        A `trajectory`.
+    model : MotionModel
+        What is calibrated. A self-propelled body without a clearance has that of the recording.
+    study : Study
+        Tank, camera, step interval, seed, confidence; ``bootstrap`` is the number of simulated
+        recordings by which the discrepancy is judged, 0 leaves the second stage out.
+    flow : xarray.Dataset or None
+        The water's velocity.
+    body : str or None
+        The body, where the recording has several.
+    threads : int or None
+        None: all processors. The result does not depend on it.
+    executor : concurrent.futures.Executor or None
+        Computes the summaries' work units elsewhere; the search runs here.
+    stores : callable
+        Where each stage keeps finished work.
+    tell : callable
+        Called with the stage and its progress.
+
+    Raises
+    ------
+    InputError
+        When the recording is too short or does not move, or the model gives no numbers.
+    """
+    motion = body_motion(recording, study, flow=flow, body=body, threads=threads)
+    entries, warnings = prepare_candidates([with_contact_clearance(model, motion)], motion, study)
+    warnings += jump_warnings(recording, body)
+    search = study.calibration
+    found = estimate(
+        entries[0],
+        motion,
+        seed=search.seed,
+        replicates=search.bootstrap if search.refine == "auto" else 0,
+        confidence=search.confidence,
+        executor=executor,
+        stores=stores,
+        tell=tell,
+    )
+    return build_model_calibration(found, entries[0], motion, study, recording, warnings)

@@ -24,9 +24,7 @@ from typing import Any, ClassVar, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.calibration.grid.grid_map import Progress
-from driftwalk.calibration.grid.grid_refinement import RefinedMap
-from driftwalk.calibration.grid.surface import (
+from driftwalk.calibration.grid.energy_score import (
     Optimum,
     Smoother,
     at_settings,
@@ -35,6 +33,8 @@ from driftwalk.calibration.grid.surface import (
     make_smoother,
     nearest_point,
 )
+from driftwalk.calibration.grid.grid_map import Progress
+from driftwalk.calibration.grid.grid_refinement import RefinedMap
 from driftwalk.calibration.problem import Axes, Problem, score_settings
 from driftwalk.comparison import Statistic, StepTable
 from driftwalk.comparison.statistic import distances_among

@@ -14,9 +14,8 @@ from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 
-from driftwalk.calibration.grid.energy_score import EnergyScore, smooth_energy_score
+from driftwalk.calibration.grid.energy_score import EnergyScore, at_settings, smooth_energy_score
 from driftwalk.calibration.grid.grid_map import Map
-from driftwalk.calibration.grid.surface import at_settings
 from driftwalk.calibration.problem import Axes
 from driftwalk.core.arrays import Bools, Floats
 

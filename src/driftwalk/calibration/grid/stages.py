@@ -24,11 +24,7 @@ from driftwalk.calibration.grid.bootstrap_region import (
     confidence_region,
     run_bootstrap,
 )
-from driftwalk.calibration.grid.boundary_warnings import (
-    Boundary,
-    interval_warnings,
-    optimum_warnings,
-)
+from driftwalk.calibration.grid.energy_score import Optimum, at_settings
 from driftwalk.calibration.grid.grid_map import (
     Map,
     MapSimulator,
@@ -42,7 +38,6 @@ from driftwalk.calibration.grid.grid_refinement import (
     locate_minimum,
     refine,
 )
-from driftwalk.calibration.grid.surface import Optimum, at_settings
 from driftwalk.calibration.problem import Problem, limits_of
 from driftwalk.calibration.result import (
     CalibrationParts,
@@ -52,6 +47,11 @@ from driftwalk.calibration.result import (
     interval_facts,
 )
 from driftwalk.calibration.stationarity import Stationarity
+from driftwalk.calibration.warnings import (
+    Boundary,
+    interval_warnings,
+    optimum_warnings,
+)
 from driftwalk.core.errors import InputError
 from driftwalk.core.run_stages import share_of_map, share_of_windows
 from driftwalk.motion.batches import no_numbers

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.calibration.evolution import recorded_ranges, wall_distance
+from driftwalk.calibration.evolution import wall_distance
 from driftwalk.calibration.held_out.baselines import HiddenMarkovWalk, ResampledSteps, runs_of
 from driftwalk.calibration.held_out.hidden_markov import fit_hidden_markov_model
-from driftwalk.calibration.held_out.recorded import RecordedMotion
+from driftwalk.calibration.held_out.recorded import RecordedMotion, recorded_ranges
 from driftwalk.comparison.aspects import block_of, interleaved
 from driftwalk.conditions import Conditions, unstated_warning
 from driftwalk.conditions.own_flow import flow_from_track

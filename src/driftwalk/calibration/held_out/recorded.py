@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.calibration.evolution import Scales, scales_of, wall_distance
-from driftwalk.calibration.held_out.checks import motion_checks
-from driftwalk.calibration.refuse import require_samples
+from driftwalk.calibration.evolution import wall_distance
+from driftwalk.calibration.problem import require_samples
 from driftwalk.comparison import KsReference
 from driftwalk.comparison.aspects import (
     BLOCKS,
@@ -26,6 +26,7 @@ from driftwalk.comparison.aspects import (
     own_distance,
     plan_aspects,
 )
+from driftwalk.comparison.aspects.form import WallDistance, resampled
 from driftwalk.conditions import (
     Conditions,
     Neighbours,
@@ -35,14 +36,169 @@ from driftwalk.conditions import (
     recorded_conditions,
     require_travel,
 )
-from driftwalk.core.arrays import Floats
+from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
-from driftwalk.schema import Track, body_track
+from driftwalk.schema import Parameter, Track, body_track
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
+
+
+LAGS: Final = (1, 3, 10, 30, 100)
+"""Of the mean squared displacement, in step intervals."""
+CHECKS: Final = (*(f"displacement_{lag}" for lag in LAGS), "speed_time", "wall_share", "rest_share")
+UNITS: Final = (*("m2" for _ in LAGS), "s", "1", "1")
+
+
+def motion_checks(
+    plan: AspectPlan,
+    x: npt.ArrayLike,
+    y: npt.ArrayLike,
+    *,
+    wall: WallDistance,
+    depth: float,
+    usual_step: float,
+) -> Floats:
+    """Return facts of a motion, shape (checks,); NaN where it is too short for one."""
+    px, py = resampled(plan.short, x), resampled(plan.short, y)
+    there = np.zeros(px.size - 1, dtype=bool)
+    there[plan.step] = True
+    there &= np.isfinite(np.diff(px)) & np.isfinite(np.diff(py))
+    broken = np.concatenate([[0], np.cumsum(~there)])
+    length = np.hypot(np.diff(px), np.diff(py))
+    found = [_squared_displacement(px, py, broken, lag) for lag in LAGS]
+    found.append(_memory(length, there) * plan.short.step_interval)
+    steps = length[there]
+    if not steps.size:
+        return np.full(len(CHECKS), np.nan)
+    near = wall(px, py)[:-1][there] < 0.2 * depth
+    found += [float(near.mean()), float((steps < 0.2 * usual_step).mean())]
+    return np.array(found)
+
+
+def _squared_displacement(x: Floats, y: Floats, broken: Integers, lag: int) -> float:
+    """Return the mean over all stretches without a gap."""
+    whole = broken[lag:] == broken[:-lag]
+    if not whole.any():
+        return float("nan")
+    squares = (x[lag:] - x[:-lag]) ** 2 + (y[lag:] - y[:-lag]) ** 2
+    return float(squares[whole].mean())
+
+
+def _memory(length: Floats, there: Bools) -> float:
+    """Return after how many intervals the autocorrelation of the step lengths falls below 1/e."""
+    if np.count_nonzero(there) < LAGS[-1]:
+        return float("nan")
+    apart = np.where(there, length, 0.0)
+    apart = np.where(there, apart - apart[there].mean(), 0.0)
+    variance = float((apart**2).sum()) / np.count_nonzero(there)
+    # A speed that is the same all along differs by rounding alone.
+    if variance <= (1e-9 * float(length[there].mean())) ** 2:
+        return float("nan")
+    before, longest = 1.0, 500
+    for lag in range(1, min(longest, length.size // 4)):
+        pairs = int(np.count_nonzero(there[lag:] & there[:-lag]))
+        if not pairs:
+            break
+        now = float((apart[lag:] * apart[:-lag]).sum()) / pairs / variance
+        if now < np.exp(-1.0):
+            return float(lag - 1 + (before - np.exp(-1.0)) / (before - now))
+        before = now
+    return float(min(longest, length.size // 4))
+
+
+@dataclass(frozen=True)
+class Scales:
+    """The scales of a recorded motion.
+
+    Attributes
+    ----------
+    speed : float
+        Mean speed over a step interval [m/s].
+    fastest : float
+        Its 99.9 % quantile [m/s].
+    interval : float
+        Step interval [s].
+    duration : float
+        From the first to the last sample [s].
+    size : float
+        Half the longer side of what the recording covers [m].
+    """
+
+    speed: float
+    fastest: float
+    interval: float
+    duration: float
+    size: float
+
+
+def scales_of(track: Track, *, step_interval: float, steps: Floats) -> Scales:
+    """Return the scales of a track with these step lengths [m].
+
+    Raises
+    ------
+    InputError
+        When the track does not move.
+
+    Examples
+    --------
+    >>> time = np.arange(100) / 10.0
+    >>> track = Track(time, 0.02 * time, 0 * time, 0 * time)
+    >>> round(scales_of(track, step_interval=0.1, steps=np.full(99, 0.002)).speed, 6)
+    0.02
+    """
+    speed = float(np.mean(steps)) / step_interval
+    if not speed > 0.0:
+        raise InputError("the recording does not move: no step has a length")
+    size = 0.5 * max(float(np.ptp(track.x)), float(np.ptp(track.y)))
+    return Scales(
+        speed=speed,
+        fastest=float(np.quantile(steps, 0.999)) / step_interval,
+        interval=step_interval,
+        duration=float(track.time[-1] - track.time[0]),
+        size=size,
+    )
+
+
+def recorded_ranges(parameters: Sequence[Parameter], scales: Scales) -> tuple[Parameter, ...]:
+    """Return the parameters with ranges that a recording of these scales can tell apart.
+
+    Speeds lie about the recorded one, times between half a step interval and a part of the
+    recording, rates below a turn per step, lengths below the size of what was covered. A range is
+    the part of the parameter's own that lies there; where they do not meet, its own stays.
+
+    Examples
+    --------
+    >>> speed = Parameter("speed", "m/s", 1e-6, 10.0, scale="log")
+    >>> scales = Scales(speed=0.1, fastest=0.5, interval=0.1, duration=600.0, size=0.2)
+    >>> found = recorded_ranges([speed], scales)[0]
+    >>> round(found.low, 6), found.high
+    (0.005, 1.0)
+    """
+    return tuple(_ranged(one, scales) for one in parameters)
+
+
+def _ranged(parameter: Parameter, scales: Scales) -> Parameter:
+    per_step = 1.0 / scales.interval
+    usual = {
+        "m/s": (0.05 * scales.speed, max(2.0 * scales.fastest, 2.0 * scales.speed)),
+        "s": (0.5 * scales.interval, 0.1 * scales.duration),
+        "rad2/s": (1e-3 * per_step, 3.0 * per_step),
+        "rad/s": (0.02 * per_step, 5.0 * per_step),
+        "m": (0.01 * scales.size, scales.size),
+        "m2/s": (1e-4 * scales.speed**2 * scales.interval, scales.speed**2 * scales.interval),
+        "Hz": (0.02 * per_step, 2.0 * per_step),
+    }
+    if parameter.unit not in usual:
+        return parameter
+    low, high = usual[parameter.unit]
+    if parameter.low < 0.0:
+        low = -high if parameter.unit != "rad/s" else -0.3 * per_step
+        high = -low
+    low, high = max(low, parameter.low), min(high, parameter.high)
+    return replace(parameter, low=low, high=high, step=0.0) if low < high else parameter
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,6 @@ from typing import Any, ClassVar
 import numpy as np
 
 from driftwalk.calibration.estimation import Stores
-from driftwalk.calibration.estimation.model_evidence import estimate_evidence, most_settings
 from driftwalk.calibration.evolution import Budget
 from driftwalk.calibration.held_out.candidates import Candidate
 from driftwalk.calibration.held_out.held_out_score import (
@@ -27,7 +26,13 @@ from driftwalk.calibration.parallel_search import (
     runs_in_threads,
     with_thread_share,
 )
-from driftwalk.calibration.ranking.evidence_ranking import Evidence, Shortlist, shortlist_models
+from driftwalk.calibration.ranking.model_evidence import (
+    Evidence,
+    Shortlist,
+    estimate_evidence,
+    most_settings,
+    shortlist_models,
+)
 from driftwalk.core.files.shards import Arrays
 from driftwalk.core.processors import one_blas_thread
 from driftwalk.core.run_stages import Course, tell_nobody

@@ -9,21 +9,22 @@ import numpy as np
 
 from driftwalk.calibration.estimation.identifiability import DETERMINED
 from driftwalk.calibration.held_out.candidates import Candidate
-from driftwalk.calibration.held_out.checks import CHECKS, UNITS
 from driftwalk.calibration.held_out.held_out_score import (
     HELD_OUT_REPLICATES,
+    VERDICT,
     HeldOutScore,
+    Verdict,
+    verdict_of,
     without_error,
 )
-from driftwalk.calibration.held_out.recorded import RecordedMotion
-from driftwalk.calibration.ranking.evidence_ranking import (
+from driftwalk.calibration.held_out.recorded import CHECKS, UNITS, RecordedMotion
+from driftwalk.calibration.ranking.model_evidence import (
     Evidence,
     EvidenceRanking,
     discrepancy_sentence,
     rank_by_evidence,
     ranking_sentence,
 )
-from driftwalk.calibration.ranking.verdict import VERDICT, Verdict, verdict_of
 from driftwalk.calibration.stationarity import Stationarity, stationarity_of_steps
 from driftwalk.comparison import KsReference
 from driftwalk.comparison.aspects import points_distance

@@ -12,9 +12,12 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 import numpy as np
 
 from driftwalk.calibration.check import check_recording
-from driftwalk.calibration.recover.calibrated import calibrated_parameters
 from driftwalk.calibration.recover.study import BrokenSimulation, EstimationMethod, Tell
-from driftwalk.calibration.recover.summary import relative_errors, summary_by_parameter
+from driftwalk.calibration.recover.summary import (
+    calibrated_parameters,
+    relative_errors,
+    summary_by_parameter,
+)
 from driftwalk.calibration.run import calibrate
 from driftwalk.conditions import study_in_arena
 from driftwalk.conditions.camera import study_as_seen

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from scipy.stats import truncnorm
 
-from driftwalk.calibration.estimation.emulator import fit_emulator
 from driftwalk.calibration.estimation.gauss_newton import drawn_settings, rounded
 from driftwalk.calibration.estimation.posterior import POSTERIOR, Posterior, sample_posterior
+from driftwalk.calibration.estimation.synthetic_likelihood import fit_emulator
 
 SLOPES = np.array([[1.0, 0.3], [0.2, 1.0], [0.5, 0.5], [0.4, -0.3]])
 SPREAD = np.array([0.02, 0.04, 0.03, 0.05])

@@ -10,7 +10,7 @@ import pytest
 
 from driftwalk.calibration.ranking import comparison_stages
 from driftwalk.calibration.ranking.comparison_stages import Stages
-from driftwalk.calibration.ranking.evidence_ranking import Evidence, Shortlist
+from driftwalk.calibration.ranking.model_evidence import Evidence, Shortlist
 
 
 @pytest.mark.parametrize(

@@ -9,11 +9,9 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from driftwalk.calibration.evolution import AspectObjective, wall_distance
-from driftwalk.calibration.evolution.search import Tell
+from driftwalk.calibration.evolution import AspectObjective, Tell, wall_distance
 from driftwalk.calibration.held_out.recorded import RecordedMotion
-from driftwalk.calibration.summaries.displacements import SummaryPlan, plan_summaries
-from driftwalk.calibration.summaries.statistics import summarise
+from driftwalk.calibration.summaries import SummaryPlan, plan_summaries, summarise
 from driftwalk.comparison.aspects import block_of
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.processors import map_in_threads, one_blas_thread
