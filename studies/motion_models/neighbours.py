@@ -104,12 +104,12 @@ def print_directions(motion: RecordedMotion) -> None:
         print(f"  steps of {low:g} to {high:g} mm: {', '.join(row)}")
 
 
-def searched(motion: RecordedMotion, study: Study, name: str) -> dict[str, Any]:
+def searched(motion: RecordedMotion, name: str) -> dict[str, Any]:
     """Search a model on the even blocks with the displacements besides."""
     ranges = RANGES if "neighbours" in name else {}
     model = dw.motion_model(name, clearance=motion.clearance, **ranges)
-    (entry,), _ = prepare_candidates([model], motion, study)
-    objective = FarObjective(**vars(even_blocks(entry, motion, SEED)), motion=motion)
+    (entry,), _ = prepare_candidates([model], motion)
+    objective = FarObjective(**{**vars(even_blocks(entry, motion)), "seed": SEED}, motion=motion)
     found = search_minimum(objective, len(entry.ranges), budget=Budget(), seed=SEED)
     seen = objective.simulated(found.best[None], HELD_OUT_REPLICATES, stage="judged")
     aspects = objective.aspects(seen)
@@ -153,7 +153,7 @@ def main() -> None:
         for model in given.model or MODELS:
             if (body, model) in done:
                 continue
-            line = {"body": body, **searched(motion, study, model)}
+            line = {"body": body, **searched(motion, model)}
             with given.out.open("a") as file:
                 file.write(json.dumps(line) + "\n")
             ratios = [line["facts_over_recorded"][key] for key in CHECKS[LONG]]

@@ -9,12 +9,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.comparison.aspects import (
-    Aspect,
-    AspectPlan,
-    AspectReference,
-    form_aspects,
-)
+from driftwalk.comparison.aspects import Aspect, AspectPlan, AspectReference, form_aspects
 from driftwalk.comparison.aspects.form import WallDistance
 from driftwalk.conditions import Conditions
 from driftwalk.core.arrays import Bools, Floats

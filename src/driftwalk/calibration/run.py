@@ -5,14 +5,24 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Executor
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from driftwalk.calibration.check import MOST_PARAMETERS, require_searchable
-from driftwalk.calibration.estimation import Stores, Tell, calibrate_many
+from driftwalk.calibration.estimation.run import calibrate_many
 from driftwalk.calibration.goodness_of_fit import Halves, validate_on_halves
 from driftwalk.calibration.grid.grid_map import Progress, SweepProgress
 from driftwalk.calibration.grid.stages import GridCalibration
-from driftwalk.calibration.problem import FlowSource, Problem, prepare_problem, recorded_problem
+from driftwalk.calibration.problem import (
+    Execution,
+    FlowSource,
+    Problem,
+    Stores,
+    Tell,
+    in_memory,
+    prepare_problem,
+    recorded_problem,
+)
+from driftwalk.calibration.result import build_calibration
 from driftwalk.calibration.stationarity import stationarity_of
 from driftwalk.calibration.warnings import own_flow_warning, wall_warning
 from driftwalk.comparison import Statistic, StepDistance
@@ -29,7 +39,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
-    from driftwalk.sweep import Store
 
 
 def calibrate(
@@ -113,8 +122,7 @@ def calibrate(
     0.39
     """
     chosen, searched = _study_and_model(model, study, recording)
-    keep: Stores = stores if stores is not None else _in_memory
-    say = tell if tell is not None else tell_nobody
+    how = Execution(executor, stores or in_memory, tell or tell_nobody)
     if len(searched.parameters) > MOST_PARAMETERS:
         if statistic is not None:
             raise ConfigurationError(
@@ -128,9 +136,7 @@ def calibrate(
             flow=flow,
             body=body,
             threads=threads,
-            executor=executor,
-            stores=keep,
-            tell=say,
+            how=how,
         )
         if meanwhile is not None:
             meanwhile(many)
@@ -140,7 +146,7 @@ def calibrate(
     track, problem = recorded_problem(
         recording, chosen, flow_of, model=searched, statistic=statistic, body=body, threads=threads
     )
-    stages = GridCalibration(problem, keep, say, executor).run()
+    stages = GridCalibration(problem, how).run()
     stationarity = stationarity_of(problem)
     in_tank = isinstance(searched, BlockModel | ParticleModel)
     is_block = isinstance(searched, BlockModel)
@@ -159,7 +165,7 @@ def calibrate(
     stages.warnings += series_warnings(problem.like.flow, duration=problem.duration)
 
     def finish(halves: Halves | None) -> xr.Dataset:
-        return stages.dataset(halves, stationarity, recording)
+        return build_calibration(stages, halves, stationarity, recording)
 
     def compare_halves(progress: Progress | None = None) -> Halves | None:
         return _halves(track, stages, flow_of, executor, progress)
@@ -167,14 +173,16 @@ def calibrate(
     if problem.study.calibration.refine == "none":
         halves = None
     else:
-        say("validation", 0, 1)
+        how.tell("validation", 0, 1)
         # The figures show nothing of the halves, so they are drawn while the core compares them.
         if meanwhile is not None and _is_left_to_threads(problem, executor):
             halves = run_in_background(compare_halves, partial(meanwhile, finish(None)))
             meanwhile = None
         else:
-            halves = compare_halves(SweepProgress(partial(say, "validation"), share_of_windows))
-        say("validation", 1, 1)
+            halves = compare_halves(
+                SweepProgress(partial(how.tell, "validation"), share_of_windows)
+            )
+        how.tell("validation", 1, 1)
     found = finish(halves)
     if meanwhile is not None:
         meanwhile(found)
@@ -211,10 +219,6 @@ def _study_and_model(
         return model.study, model
     # Nothing but the recording says in which tank a model without a study moves.
     return study_in_arena(Study(), recording), model
-
-
-def _in_memory(name: str, fingerprint: dict[str, Any]) -> Store | None:  # noqa: ARG001
-    return None
 
 
 def _flow_source(study: Study, model: MotionModel, flow: xr.Dataset | None) -> FlowSource:

@@ -9,15 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from driftwalk.calibration.estimation.estimate import Matched
-from driftwalk.calibration.estimation.identifiability import DETERMINED
 from driftwalk.calibration.held_out.candidates import Candidate
-from driftwalk.calibration.held_out.held_out_score import (
-    HELD_OUT_REPLICATES,
-    verdict_of,
-    without_error,
-)
-from driftwalk.calibration.held_out.recorded import CHECKS, UNITS, RecordedMotion
-from driftwalk.calibration.ranking.result import motion_warnings
+from driftwalk.calibration.held_out.held_out_score import recording_parts, verdict_of, without_error
+from driftwalk.calibration.held_out.recorded import RecordedMotion
+from driftwalk.calibration.stationarity import motion_warnings
 from driftwalk.core.arrays import Floats
 from driftwalk.motion import ParticleModel
 from driftwalk.schema.answers.facts import BOUNDS, texts
@@ -27,15 +22,12 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.calibration.estimation.run import Estimation
-    from driftwalk.model import Study
 
 
 def build_model_calibration(
     found: Estimation,
     entry: Candidate,
     motion: RecordedMotion,
-    study: Study,
-    recording: xr.Dataset,
     warnings: Sequence[str],
 ) -> xr.Dataset:
     """Return the dataset of a calibration of many parameters."""
@@ -43,7 +35,9 @@ def build_model_calibration(
     verdict = verdict_of(held_out, motion, baseline=False)
     count = len(ranges)
     known = found.known
+    about = recording_parts(motion)
     data: dict[str, Any] = {
+        **about.data,
         "estimate": ("parameter", _values(entry, found.point[None])[0]),
         "interval": (
             ("parameter", "bound"),
@@ -59,13 +53,9 @@ def build_model_calibration(
         "meaning": ("parameter", texts([one.meaning or one.label for one in ranges])),
         "held_out_distance": ("aspect", held_out.held),
         "trained_distance": ("aspect", held_out.trained),
-        "own_distance": ("aspect", motion.own),
-        "floor": ("aspect", motion.held.floor),
-        "check_recorded": ("check", motion.recorded_checks),
         "check_median": ("check", np.median(held_out.checks, axis=0)),
         "check_low": ("check", held_out.checks.min(axis=0)),
         "check_high": ("check", held_out.checks.max(axis=0)),
-        "check_unit": ("check", texts(UNITS)),
         "score": ((), held_out.score),
         "score_std": ((), without_error(held_out.without)),
         "explained": ((), verdict.explained),
@@ -76,23 +66,16 @@ def build_model_calibration(
     coords: dict[str, Any] = {
         "parameter": ("parameter", texts([one.name for one in ranges])),
         "bound": ("bound", texts(BOUNDS)),
-        "aspect": ("aspect", texts(motion.held.names)),
-        "check": ("check", texts(CHECKS)),
+        **about.coords,
         "warning": ("warning", texts(said)),
     }
     attrs: dict[str, Any] = {
         "model": entry.model.name,
         "estimate_from": "search" if known is None else "summaries",
         "fixed": json.dumps(_fixed(entry)),
-        "confidence": study.calibration.confidence,
-        "step_interval_s": float(motion.plan.short.step_interval),
-        "duration_s": motion.duration,
+        "confidence": motion.study.calibration.confidence,
         "position_noise_m": motion.like.camera.position_noise,
-        "worlds": HELD_OUT_REPLICATES,
-        "seed": study.calibration.seed,
-        "arena": study.tank.to_arena_json(),
-        "source": str(recording.attrs.get("source", "")),
-        "simulated_recording": str(recording.attrs.get("simulated", "no")),
+        **about.attrs,
     }
     return build_dataset("model_calibration", data, coords, attrs)
 
@@ -157,16 +140,8 @@ def _said(found: Estimation, entry: Candidate, explained: bool) -> list[str]:
         said.append(
             "the model does not explain the recording; its parameters are the best of bad fits"
         )
-    ended = [
-        one.name
-        for one, share in zip(entry.ranges, found.point, strict=True)
-        if min(share, 1.0 - share) < DETERMINED.range_end
-    ]
-    if ended:
-        said.append(
-            f"at the end of its range: {', '.join(ended)}; extend the range, or doubt the model"
-        )
-    return said
+    ended = entry.at_range_end(found.point)
+    return said if ended is None else [*said, ended]
 
 
 def _open(matched: Matched, entry: Candidate) -> list[str]:

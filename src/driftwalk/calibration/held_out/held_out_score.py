@@ -7,18 +7,15 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.calibration.evolution import (
-    AspectObjective,
-    Budget,
-    search_minimum,
-)
+from driftwalk.calibration.evolution import AspectObjective, Budget, search_minimum
 from driftwalk.calibration.held_out.candidates import Candidate
-from driftwalk.calibration.held_out.recorded import CHECKS, RecordedMotion
+from driftwalk.calibration.held_out.recorded import CHECKS, UNITS, RecordedMotion
 from driftwalk.comparison.aspects import AspectReference
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
 from driftwalk.motion.batches import no_numbers
 from driftwalk.motion.score import broken_worlds
+from driftwalk.schema.answers.facts import AnswerParts, texts
 from driftwalk.schema.answers.model_comparison import ASPECT_WORDS, CHECK_WORDS
 
 Tell = Callable[[int, int], None]
@@ -48,21 +45,35 @@ class HeldOutScore(NamedTuple):
 
 
 def score_candidate(
-    entry: Candidate, motion: RecordedMotion, *, budget: Budget, seed: int, tell: Tell | None
+    entry: Candidate, motion: RecordedMotion, *, budget: Budget, tell: Tell | None
 ) -> HeldOutScore:
     """Search a model on the even blocks of a recording, and judge it on the odd ones."""
-    objective = even_blocks(entry, motion, seed)
+    objective = even_blocks(entry, motion)
     if not entry.ranges:
         return score_setting(objective, motion, np.empty(0))
     require_numbers(objective)
-    found = search_minimum(objective, len(entry.ranges), budget=budget, seed=seed, tell=tell)
+    found = search_minimum(objective, len(entry.ranges), budget=budget, seed=motion.seed, tell=tell)
     held_out = score_setting(objective, motion, found.best)
     return held_out._replace(optimum_scores=found.optimum_scores, evaluations=found.evaluations)
 
 
-def even_blocks(entry: Candidate, motion: RecordedMotion, seed: int) -> AspectObjective:
+def recording_parts(motion: RecordedMotion) -> AnswerParts:
+    """Return what each dataset of held-out scores says of its recording."""
+    data = {
+        "own_distance": ("aspect", motion.own),
+        "floor": ("aspect", motion.held.floor),
+        "check_recorded": ("check", motion.recorded_checks),
+        "check_unit": ("check", texts(UNITS)),
+    }
+    coords = {"aspect": ("aspect", texts(motion.held.names)), "check": ("check", texts(CHECKS))}
+    return AnswerParts(data, coords, {**motion.attrs, "worlds": HELD_OUT_REPLICATES})
+
+
+def even_blocks(entry: Candidate, motion: RecordedMotion) -> AspectObjective:
     """Return how far a model's settings are from the even blocks of a recording."""
-    return AspectObjective(entry.model, entry.ranges, entry.like, motion.plan, motion.fitted, seed)
+    return AspectObjective(
+        entry.model, entry.ranges, entry.like, motion.plan, motion.fitted, motion.seed
+    )
 
 
 def score_setting(

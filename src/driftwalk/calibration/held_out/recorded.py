@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -29,7 +29,7 @@ from driftwalk.comparison.aspects import (
 from driftwalk.comparison.aspects.form import WallDistance, resampled
 from driftwalk.conditions import (
     Conditions,
-    Neighbours,
+    jump_warnings,
     neighbours_of,
     possible_noises,
     recorded_camera,
@@ -235,8 +235,12 @@ class RecordedMotion:
         Median step [m].
     noises : tuple of float
         Noises of positions that the camera may have, each as likely [m]; one where it is stated.
-    recorded_checks : ndarray, shape (checks,)
-        Facts of the recording that are not fitted, see `motion_checks`.
+    study : Study
+        Tank, camera, step interval, seed and search.
+    attrs : mapping
+        Attributes of each dataset of scores on this recording.
+    warnings : list of str
+        Jumps of the body.
     """
 
     track: Track
@@ -253,7 +257,9 @@ class RecordedMotion:
     depth: float
     usual_step: float
     noises: tuple[float, ...]
-    recorded_checks: Floats
+    study: Study
+    attrs: Mapping[str, Any]
+    warnings: list[str]
 
     @cached_property
     def without_each_block(self) -> tuple[AspectReference, ...]:
@@ -272,16 +278,18 @@ class RecordedMotion:
             found.append(AspectReference(self.held.names, self.held.floor, natives))
         return tuple(found)
 
+    @cached_property
+    def recorded_checks(self) -> Floats:
+        """Facts of the recording that are not fitted, see `motion_checks`."""
+        return self._checks(self.own_plan, self.track.x, self.track.y)
+
     def checks(self, x: npt.ArrayLike, y: npt.ArrayLike) -> Floats:
         """Return the facts of a simulated world, see `motion_checks`."""
-        return motion_checks(
-            self.plan,
-            x,
-            y,
-            wall=wall_distance(self.like),
-            depth=self.depth,
-            usual_step=self.usual_step,
-        )
+        return self._checks(self.plan, x, y)
+
+    def _checks(self, plan: AspectPlan, x: npt.ArrayLike, y: npt.ArrayLike) -> Floats:
+        wall = wall_distance(self.like)
+        return motion_checks(plan, x, y, wall=wall, depth=self.depth, usual_step=self.usual_step)
 
     @cached_property
     def usual_distance(self) -> float:
@@ -300,6 +308,17 @@ class RecordedMotion:
         return next(one for one in self.aspects if one.name == "steps")
 
     @property
+    def seed(self) -> int:
+        """Seed of all searches."""
+        return self.study.calibration.seed
+
+    @property
+    def replicates(self) -> int:
+        """Simulated recordings that judge a discrepancy; below 2 the summaries are left out."""
+        search = self.study.calibration
+        return search.bootstrap if search.refine == "auto" else 0
+
+    @property
     def duration(self) -> float:
         """From the first to the last sample [s]."""
         return float(self.track.time[-1])
@@ -313,35 +332,16 @@ def body_motion(
     body: str | None,
     threads: int | None = None,
 ) -> RecordedMotion:
-    """Prepare a body of a recording for motion models; see `recorded_motion`."""
+    """Prepare a body of a recording for the comparison of motion models."""
     track = body_track(recording, body)
     require_samples(track)
     require_travel(track, study, of_block=False)
     quantum = float(recording.attrs.get("position_quantum_m", 0.0))
-    return recorded_motion(
-        track,
-        study,
-        position_quantum=quantum,
-        flow=flow,
-        neighbours=neighbours_of(recording, body, study.tank),
-        threads=threads,
-    )
-
-
-def recorded_motion(
-    track: Track,
-    study: Study,
-    *,
-    position_quantum: float = 0.0,
-    flow: xr.Dataset | None = None,
-    neighbours: Neighbours | None = None,
-    threads: int | None = None,
-) -> RecordedMotion:
-    """Prepare a recorded track for the comparison of motion models."""
+    neighbours = neighbours_of(recording, body, study.tank)
     if neighbours is not None:
         neighbours = neighbours.since(float(track.time[0]))
     track = track._replace(time=track.time - track.time[0])
-    camera = recorded_camera(track, study, position_quantum=position_quantum)
+    camera = recorded_camera(track, study, position_quantum=quantum)
     noises = possible_noises(track, study, camera)
     if not min(noises) <= camera.position_noise <= max(noises):
         # An estimate of zero: bodies that rest would rest to the last digit.
@@ -391,7 +391,14 @@ def recorded_motion(
         depth=depth,
         usual_step=usual_step,
         noises=noises,
-        recorded_checks=motion_checks(
-            plan, track.x, track.y, wall=wall, depth=depth, usual_step=usual_step
-        ),
+        study=study,
+        attrs={
+            "step_interval_s": float(plan.short.step_interval),
+            "duration_s": duration,
+            "seed": study.calibration.seed,
+            "arena": study.tank.to_arena_json(),
+            "source": str(recording.attrs.get("source", "")),
+            "simulated_recording": str(recording.attrs.get("simulated", "no")),
+        },
+        warnings=jump_warnings(recording, body),
     )

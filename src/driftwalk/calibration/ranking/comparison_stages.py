@@ -11,7 +11,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from driftwalk.calibration.estimation import Stores
 from driftwalk.calibration.evolution import Budget
 from driftwalk.calibration.held_out.candidates import Candidate
 from driftwalk.calibration.held_out.held_out_score import (
@@ -26,6 +25,7 @@ from driftwalk.calibration.parallel_search import (
     runs_in_threads,
     with_thread_share,
 )
+from driftwalk.calibration.problem import Stores
 from driftwalk.calibration.ranking.model_evidence import (
     Evidence,
     Shortlist,
@@ -50,7 +50,6 @@ class Searches:
 
     entries: Sequence[Candidate]
     motion: RecordedMotion
-    seed: int
     budget: Budget
     within: Callable[[int, int], None] | None = None
     """Called with the model and the settings done; with all of them when it is finished."""
@@ -67,9 +66,7 @@ class Searches:
 
         say(0, 0)
         with one_blas_thread():
-            found = score_candidate(
-                self.entries[index], self.motion, budget=self.budget, seed=self.seed, tell=say
-            )
+            found = score_candidate(self.entries[index], self.motion, budget=self.budget, tell=say)
         say(self.costs()[index], 0)
         most = max(len(entry.ranges) for entry in self.entries)
         return _packed(found, most, self.budget.starts + 1)
@@ -84,7 +81,7 @@ class Searches:
         return {
             "models": [entry.model.describe() for entry in self.entries],
             "ranges": [[one.describe() for one in entry.ranges] for entry in self.entries],
-            "seed": self.seed,
+            "seed": self.motion.seed,
             "budget": vars(self.budget),
             "aspects": list(self.motion.held.names),
         }
@@ -97,7 +94,7 @@ class Stages:
     work: Searches
     replicates: int
     """Recordings by which a discrepancy is judged; below 2 the second stage is left out."""
-    stores: Stores | None
+    stores: Stores
     executor: Executor | None
     """Elsewhere."""
     tell: Tell
@@ -110,7 +107,7 @@ class Stages:
         """Judge every model, one work unit each."""
         entries = self.work.entries
         units = grid(model=np.arange(len(entries))).units(1)
-        retained = self._store("models", self.work.fingerprint())
+        retained = self.stores("models", self.work.fingerprint())
         retained = MemoryStore() if retained is None else retained
         searched = self._searched_here if self.executor is None else self._searched_elsewhere
         arrays = searched(units, retained, self._each_once(units, retained))
@@ -234,15 +231,11 @@ class Stages:
             entry,
             self.work.motion,
             answer,
-            seed=self.work.seed,
             replicates=self.replicates,
             executor=self.executor or (self.pool if runs_in_threads(entry) else None),
-            store=self._store(f"summaries-{number}", fingerprint),
+            store=self.stores(f"summaries-{number}", fingerprint),
             tell=say,
         )
-
-    def _store(self, name: str, fingerprint: dict[str, Any]) -> Store | None:
-        return None if self.stores is None else self.stores(name, fingerprint)
 
     def _usual(self, entry: Candidate) -> int:
         """Return how many settings the summaries of a model usually need."""

@@ -186,7 +186,6 @@ def estimate_evidence(
     motion: RecordedMotion,
     answer: Floats,
     *,
-    seed: int,
     replicates: int,
     executor: Executor | None,
     store: Store | None,
@@ -196,21 +195,21 @@ def estimate_evidence(
     entry = entry._replace(model=with_contact_clearance(entry.model, motion))
     parameters = len(entry.ranges)
     objective = SummaryObjective(
-        even_blocks(entry, motion, seed),
+        even_blocks(entry, motion),
         motion,
         store=store,
         executor=executor,
         tell=tell,
         most=most_settings(parameters, replicates),
     )
-    simulate = _Blurred(objective, seed)
+    simulate = _Blurred(objective, motion.seed)
     order = label_order(entry)
     optima = find_optima(
         simulate,
         parameters,
         lambda: answer[None],
         order=order,
-        seed=seed,
+        seed=motion.seed,
         hopeless=EVIDENCE.hopeless,
         give_up=EVIDENCE.hopeless,
     )

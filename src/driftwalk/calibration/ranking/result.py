@@ -7,17 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from driftwalk.calibration.estimation.identifiability import DETERMINED
 from driftwalk.calibration.held_out.candidates import Candidate
 from driftwalk.calibration.held_out.held_out_score import (
-    HELD_OUT_REPLICATES,
     VERDICT,
     HeldOutScore,
     Verdict,
+    recording_parts,
     verdict_of,
     without_error,
 )
-from driftwalk.calibration.held_out.recorded import CHECKS, UNITS, RecordedMotion
+from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.calibration.ranking.model_evidence import (
     Evidence,
     EvidenceRanking,
@@ -25,26 +24,19 @@ from driftwalk.calibration.ranking.model_evidence import (
     rank_by_evidence,
     ranking_sentence,
 )
-from driftwalk.calibration.stationarity import Stationarity, stationarity_of_steps
-from driftwalk.comparison import KsReference
-from driftwalk.comparison.aspects import points_distance
+from driftwalk.calibration.stationarity import motion_warnings, stationarity_of_motion
 from driftwalk.core.arrays import Floats
 from driftwalk.schema.answers.facts import texts
 from driftwalk.schema.check import build_dataset
-from driftwalk.simulation.series import series_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from driftwalk.model import Study
 
 
 def build_comparison(
     entries: Sequence[Candidate],
     held_out: Sequence[HeldOutScore],
     motion: RecordedMotion,
-    study: Study,
-    recording: xr.Dataset,
     warnings: Sequence[str],
     evidence_by_model: Mapping[int, Evidence],
 ) -> xr.Dataset:
@@ -82,14 +74,21 @@ def build_comparison(
         < VERDICT.tied_sigmas * without_error(one.without - held_out[closest].without)
     ]
     units, values = _estimates(entries, held_out)
-    stationarity = _stationarity(motion)
-    said = [*warnings, *_edge_warnings(entries, held_out), *motion_warnings(motion)]
+    stationarity = stationarity_of_motion(motion)
+    ended = [
+        f"{name}: {text}"
+        for name, entry, one in zip(names, entries, held_out, strict=True)
+        if (text := entry.at_range_end(one.point)) is not None
+    ]
+    said = [*warnings, *ended, *motion_warnings(motion)]
     why = _findings(names, entries, verdicts, closest, tied)
     if evidence:
         why.insert(0 if answer.best is not None else 1, ranking_sentence(names, evidence, answer))
     best = answer_sentence(names, verdicts, closest, answer)
     findings = [best, *(one for one in why if one != best)]
+    about = recording_parts(motion)
     data: dict[str, Any] = {
+        **about.data,
         "score": ("model", [one.score for one in held_out]),
         "score_std": ("model", [without_error(one.without) for one in held_out]),
         "behind": ("model", behind),
@@ -100,13 +99,9 @@ def build_comparison(
         "verdict": ("model", texts([one.text for one in verdicts])),
         "held_out_distance": (("model", "aspect"), [one.held for one in held_out]),
         "trained_distance": (("model", "aspect"), [one.trained for one in held_out]),
-        "own_distance": ("aspect", motion.own),
-        "floor": ("aspect", motion.held.floor),
-        "check_recorded": ("check", motion.recorded_checks),
         "check_median": (("model", "check"), [np.median(one.checks, axis=0) for one in held_out]),
         "check_low": (("model", "check"), [one.checks.min(axis=0) for one in held_out]),
         "check_high": (("model", "check"), [one.checks.max(axis=0) for one in held_out]),
-        "check_unit": ("check", texts(UNITS)),
         "estimate": (("model", "parameter"), values),
         "parameter_unit": ("parameter", texts(list(units.values()))),
         "end_score": (("model", "end"), _padded([one.optimum_scores for one in held_out])),
@@ -115,26 +110,15 @@ def build_comparison(
     }
     coords = {
         "model": ("model", texts(names)),
-        "aspect": ("aspect", texts(motion.held.names)),
-        "check": ("check", texts(CHECKS)),
+        **about.coords,
         "parameter": ("parameter", texts(list(units))),
         "finding": ("finding", texts(findings)),
         "warning": ("warning", texts(said)),
     }
-    attrs: dict[str, Any] = {
-        "step_interval_s": float(motion.plan.short.step_interval),
-        "duration_s": motion.duration,
-        "worlds": HELD_OUT_REPLICATES,
-        "seed": study.calibration.seed,
-        "arena": study.tank.to_arena_json(),
-        "source": str(recording.attrs.get("source", "")),
-        "simulated_recording": str(recording.attrs.get("simulated", "no")),
-    }
+    attrs = dict(about.attrs)
     if stationarity is not None:
-        attrs |= {
-            "halves_ks_distance": stationarity.distance,
-            "halves_p_value": stationarity.p_value,
-        }
+        attrs["halves_ks_distance"] = stationarity.distance
+        attrs["halves_p_value"] = stationarity.p_value
     return build_dataset("model_comparison", data, coords, attrs)
 
 
@@ -180,58 +164,6 @@ def _estimates(
         answers.append(answer)
     values = np.array([[answer.get(name, np.nan) for name in units] for answer in answers])
     return units, values.reshape(len(entries), len(units))
-
-
-def _edge_warnings(entries: Sequence[Candidate], held_out: Sequence[HeldOutScore]) -> list[str]:
-    """Return a sentence for each model of which a parameter is at the end of its range."""
-    found = []
-    for entry, one in zip(entries, held_out, strict=True):
-        at_end = [
-            parameter.name
-            for parameter, share in zip(entry.ranges, one.point, strict=True)
-            if min(share, 1.0 - share) < DETERMINED.range_end
-        ]
-        if at_end:
-            found.append(
-                f"{entry.model.name}: at the end of its range: {', '.join(at_end)}; extend the "
-                "range, or doubt the model"
-            )
-    return found
-
-
-def _stationarity(motion: RecordedMotion) -> Stationarity | None:
-    steps = next(one for one in motion.aspects if one.name == "steps").points
-    return stationarity_of_steps(steps, lambda one, other: points_distance(KsReference(one), other))
-
-
-def motion_warnings(motion: RecordedMotion) -> list[str]:
-    """Return sentences on a recording and its flow.
-
-    Where its halves differ, with the moment at which its speed changed, and where the flow is a
-    series that goes on beyond its frames.
-    """
-    said = series_warnings(motion.like.flow, duration=motion.duration)
-    stationarity = _stationarity(motion)
-    if stationarity is None or stationarity.warning is None:
-        return said
-    return [stationarity.warning + _change(motion), *said]
-
-
-def _change(motion: RecordedMotion) -> str:
-    """Return when the mean speed changed most, and from what to what."""
-    steps = motion.steps
-    speed = steps.points[:, 0] / motion.plan.short.step_interval
-    share = steps.time / motion.duration
-    splits = np.arange(0.05, 0.96, 0.05)
-    early = np.array([speed[share < split].mean() for split in splits])
-    late = np.array([speed[share >= split].mean() for split in splits])
-    # Of two means with equal variances: their difference in standard errors goes with this weight.
-    weight = np.sqrt(splits * (1.0 - splits))
-    best = int(np.nanargmax(np.abs(late - early) * weight))
-    return (
-        f"; the mean speed changed most at {splits[best] * motion.duration:.0f} s, from "
-        f"{1e3 * early[best]:.3g} to {1e3 * late[best]:.3g} mm/s"
-    )
 
 
 def answer_sentence(

@@ -35,8 +35,8 @@ def motion() -> RecordedMotion:
 
 @pytest.fixture(scope="module")
 def worlds(motion: RecordedMotion) -> AspectObjective:
-    (entry,), _ = prepare_candidates([dw.motion_model("active")], motion, STUDY)
-    return even_blocks(entry, motion, seed=4)
+    (entry,), _ = prepare_candidates([dw.motion_model("active")], motion)
+    return replace(even_blocks(entry, motion), seed=4)
 
 
 def objective_of(
