@@ -33,7 +33,7 @@ from driftwalk.calibration.held_out.held_out_score import (
 from driftwalk.calibration.held_out.recorded import CHECKS, RecordedMotion, body_motion
 from driftwalk.comparison.aspects.form import resampled
 from driftwalk.conditions import read_recordings
-from driftwalk.model import Study, load_study
+from driftwalk.model import load_study
 
 MODELS: Final = ("run_rest+wall", "run_rest+wall+reverse", "run_rest+wall+neighbours")
 RANGES: Final = {
@@ -69,17 +69,14 @@ class FarObjective(AspectObjective):
         return np.asarray((near + WEIGHT * off).reshape(len(settings), replicates).mean(axis=1))
 
 
-def prepared(data: Path, body: str, threads: int) -> tuple[RecordedMotion, Study]:
-    """Return a smarticle among the others, and its study."""
+def prepared(data: Path, body: str, threads: int) -> RecordedMotion:
+    """Return a smarticle among the others."""
     recording = RECORDINGS[f"smarticle-{body}"]
     read = read_recordings(
         [data / recording.file], load_study(recording.study_file), {"body": body}, body=body,
         bodies="all",
     )  # fmt: skip
-    return (
-        body_motion(read.trajectories[0], read.study, flow=None, body=body, threads=threads),
-        read.study,
-    )
+    return body_motion(read.trajectories[0], read.study, flow=None, body=body, threads=threads)
 
 
 def print_directions(motion: RecordedMotion) -> None:
@@ -147,7 +144,7 @@ def main() -> None:
     given = parser.parse_args()
     done = {(one["body"], one["model"]) for one in read_lines(given.out)}
     for body in given.body or ("1", "2", "3"):
-        motion, study = prepared(given.data, body, given.threads)
+        motion = prepared(given.data, body, given.threads)
         print(f"smarticle {body}: mean cosine between a step and the direction to another")
         print_directions(motion)
         for model in given.model or MODELS:

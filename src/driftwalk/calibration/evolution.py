@@ -259,37 +259,34 @@ def search_minimum(
     return _Search(objective, parameters, budget or Budget(), seed, tell or tell_nobody).run()
 
 
+@dataclass
 class _Search:
-    def __init__(
-        self, objective: Objective, parameters: int, budget: Budget, seed: int, tell: Tell
-    ) -> None:
-        self.objective, self.parameters, self.budget = objective, parameters, budget
-        self.seed, self.tell = seed, tell
-        self.done = 0
-        self.most = budget.evaluations(parameters)
+    objective: Objective
+    parameters: int
+    budget: Budget
+    seed: int
+    tell: Tell
+    done: int = 0
+    """Settings evaluated so far: they are the addresses of the next random numbers."""
 
     def run(self) -> SearchResult:
         """Search, and test again."""
-        design = self._design()
+        from scipy.stats import qmc
+
+        design = rounded(qmc.Sobol(self.parameters, seed=self.seed).random(self.budget.design))
         scores = self._scores(design, self.budget.replicates)
         starts = self._apart(design, scores)
         optima = [
             self._evolve(start, 0.12, self.budget.short, number)
             for number, start in enumerate(starts, 1)
         ]
-        first = self._retest(np.array(optima))
+        first = self._scores(np.array(optima), self.budget.retest)
         long = self._evolve(optima[int(first.argmin())], 0.06, self.budget.long, 0)
-        last = self._retest(long[None])
+        last = self._scores(long[None], self.budget.retest)
         means = np.array([*optima, long])
         found = np.array([*first, *last])
         best = int(found.argmin())
         return SearchResult(means[best], float(found[best]), found, self.done, means)
-
-    def _design(self) -> Floats:
-        from scipy.stats import qmc
-
-        engine = qmc.Sobol(self.parameters, seed=self.seed)
-        return _rounded(engine.random(self.budget.design))
 
     def _apart(self, design: Floats, scores: Floats) -> list[Floats]:
         """Return the best settings of the design that are not close to each other."""
@@ -321,22 +318,20 @@ class _Search:
         for _ in range(generations):
             if evolution.should_stop():
                 break
-            settings = _rounded(np.array([evolution.ask() for _ in range(size)]))
+            settings = rounded(np.array([evolution.ask() for _ in range(size)]))
             scores = self._scores(settings, self.budget.replicates)
             evolution.tell(
                 [(one, float(score)) for one, score in zip(settings, scores, strict=True)]
             )
-        return _rounded(np.clip(evolution.mean, 0.0, 1.0))
-
-    def _retest(self, means: Floats) -> Floats:
-        return self._scores(means, self.budget.retest)
+        return rounded(np.clip(evolution.mean, 0.0, 1.0))
 
     def _scores(self, settings: Floats, replicates: int) -> Floats:
         scores = self.objective(settings, self.done, replicates)
         self.done += len(settings)
-        self.tell(self.done, self.most)
+        self.tell(self.done, self.budget.evaluations(self.parameters))
         return np.asarray(scores)
 
 
-def _rounded(settings: Floats) -> Floats:
-    return np.asarray(np.round(settings / RESOLUTION) * RESOLUTION)
+def rounded(values: Floats) -> Floats:
+    """Return multiples of a small number: last bits of linear algebra differ between machines."""
+    return np.asarray(np.round(values / RESOLUTION) * RESOLUTION)

@@ -89,33 +89,23 @@ def discrepancy_profiles(
     points, span = 21, 3.0
     low = np.maximum(emulator.centre - reach * emulator.width, 0.0)
     high = np.minimum(emulator.centre + reach * emulator.width, 1.0)
-    places, rises = [], []
-    for index in range(solution.setting.size):
-        middle = solution.setting[index]
+
+    def rise(index: int, place: Floats) -> Floats:
+        """Return the discrepancy along one parameter less the least, out from the solution."""
+        discrepancy = np.empty(place.size)
+        middle = int(np.abs(place - solution.setting[index]).argmin())
+        for way in (range(middle, place.size), range(middle - 1, -1, -1)):
+            start = solution.setting
+            for number in way:
+                held = (index, float(place[number]))
+                found = emulator.solve(summaries, reach=reach, start=start, held=held)
+                discrepancy[number], start = found.discrepancy, found.setting
+        return np.asarray(np.maximum(discrepancy - solution.discrepancy, 0.0))
+
+    places = []
+    for index, middle in enumerate(solution.setting):
         first = max(middle - span * std[index], low[index])
         last = min(middle + span * std[index], high[index])
-        place = np.linspace(first, last, points)
-        places.append(place)
-        rises.append(_rise(emulator, summaries, solution, index, place, reach))
+        places.append(np.linspace(first, last, points))
+    rises = [rise(index, place) for index, place in enumerate(places)]
     return Profiles(np.array(places), np.array(rises))
-
-
-def _rise(
-    emulator: LocalEmulator,
-    summaries: Floats,
-    solution: Solution,
-    index: int,
-    place: Floats,
-    reach: float,
-) -> Floats:
-    """Return the discrepancy along one parameter less the least, going out from the solution."""
-    discrepancy = np.empty(place.size)
-    middle = int(np.abs(place - solution.setting[index]).argmin())
-    for way in (range(middle, place.size), range(middle - 1, -1, -1)):
-        start = solution.setting
-        for number in way:
-            found = emulator.solve(
-                summaries, reach=reach, start=start, held=(index, float(place[number]))
-            )
-            discrepancy[number], start = found.discrepancy, found.setting
-    return np.asarray(np.maximum(discrepancy - solution.discrepancy, 0.0))

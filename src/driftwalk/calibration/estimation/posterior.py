@@ -157,9 +157,10 @@ class Posterior(NamedTuple):
 
 
 def sample_posterior(
-    simulate: Simulate, recorded: Floats, emulator: LocalEmulator, solution: Solution, *, seed: int
+    simulate: Simulate, recorded: Floats, optimum: LocalOptimum, *, seed: int
 ) -> Posterior:
-    """Return settings that could have given a recording."""
+    """Return settings that could have given a recording, from the end of a search on."""
+    emulator, solution = optimum.emulator, optimum.solution
     count = emulator.centre.size
     half = simulations_of(count)[1] // 2
     sample = _chain(emulator, None, recorded[0], solution, seed)

@@ -126,9 +126,8 @@ class GridCalibration:
         }
         self.bootstrap = run_bootstrap(
             self.problem,
-            self.optimum,
+            energy_score,
             surface,
-            floor=energy_score.floor_at_optimum,
             count=count,
             store=self._how.stores(f"bootstrap-{window_id(refined.map.axes)}", fingerprint),
             executor=self._how.executor,

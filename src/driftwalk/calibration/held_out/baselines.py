@@ -16,7 +16,7 @@ from driftwalk.motion.random import WorldRandom
 
 if TYPE_CHECKING:
     from driftwalk.conditions import Conditions
-    from driftwalk.motion.protocol import Floats, Keys, Values
+    from driftwalk.motion.protocol import Keys, Values
     from driftwalk.schema import Parameter
 
 

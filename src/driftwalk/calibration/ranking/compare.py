@@ -137,7 +137,7 @@ def compare_models(
         )  # fmt: skip
         held_out = stages.held_out()
         evidence = stages.evidence(held_out)
-    stages.finish()
+    stages.course.begin("figures")
     return build_comparison(entries, held_out, motion, warnings, evidence)
 
 

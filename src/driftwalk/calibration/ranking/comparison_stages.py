@@ -132,20 +132,18 @@ class Stages:
             )
         return found
 
-    def finish(self) -> None:
-        """Say that all is done but the figures."""
-        self.course.begin("figures")
-
     @cached_property
     def course(self) -> Course:
         """How far all stages are together."""
         able = [one for one in self.work.entries if one.ranges and not one.baseline]
         asks = self.replicates > 1 and len(able) > 1
-        # Three models are usually matched.
-        usual = sorted(map(self._usual, able))[-3:] if asks else []
+        # Most searches are given up after a few rounds, or find their optimum soon.
+        usual = sorted(most_settings(len(one.ranges), self.replicates) // 4 for one in able)
         # A setting takes three times as long as one of the first stage (5 minutes of the bundled
         # recording): all blocks of time are simulated.
-        parts = {"models": sum(self.work.costs()), "summaries": 3.0 * sum(usual)}
+        # Three models are usually matched.
+        summaries = 3.0 * sum(usual[-3:]) if asks else 0.0
+        parts = {"models": sum(self.work.costs()), "summaries": summaries}
         return Course(self.tell, {**parts, "figures": 0.0})
 
     def _each_once(self, units: Sequence[WorkUnit], retained: Store) -> Callable[[int, int], None]:
@@ -237,11 +235,6 @@ class Stages:
             tell=say,
         )
 
-    def _usual(self, entry: Candidate) -> int:
-        """Return how many settings the summaries of a model usually need."""
-        # Most searches are given up after a few rounds, or find their optimum soon.
-        return most_settings(len(entry.ranges), self.replicates) // 4
-
 
 def _packed(held_out: HeldOutScore, most: int, searches: int) -> dict[str, np.ndarray]:
     """Return arrays of the same shapes for every model, with one entry each."""
@@ -254,13 +247,12 @@ def _packed(held_out: HeldOutScore, most: int, searches: int) -> dict[str, np.nd
 
 
 def _unpacked(arrays: Mapping[str, np.ndarray], entry: Candidate) -> HeldOutScore:
-    return HeldOutScore(
-        point=arrays["point"][: len(entry.ranges)],
-        trained=arrays["trained"],
-        held=arrays["held"],
-        score=float(arrays["score"]),
-        without=arrays["without"],
-        checks=arrays["checks"],
-        optimum_scores=arrays["optimum_scores"][np.isfinite(arrays["optimum_scores"])],
-        evaluations=int(arrays["evaluations"]),
-    )
+    optimum_scores = arrays["optimum_scores"]
+    found = {
+        **arrays,
+        "point": arrays["point"][: len(entry.ranges)],
+        "score": float(arrays["score"]),
+        "optimum_scores": optimum_scores[np.isfinite(optimum_scores)],
+        "evaluations": int(arrays["evaluations"]),
+    }
+    return HeldOutScore(**found)

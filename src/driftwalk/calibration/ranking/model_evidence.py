@@ -8,16 +8,16 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.calibration.estimation import gauss_newton, regression_abc
 from driftwalk.calibration.estimation.estimate import find_optima
-from driftwalk.calibration.estimation.gauss_newton import rounded
+from driftwalk.calibration.estimation.gauss_newton import GAUSS_NEWTON, simulations_of
 from driftwalk.calibration.estimation.label_switching import label_order
+from driftwalk.calibration.estimation.regression_abc import REGRESSION
 from driftwalk.calibration.estimation.summary_objective import SummaryObjective
 from driftwalk.calibration.estimation.synthetic_likelihood import (
     SIMULATIONS,
     synthetic_likelihood_at,
 )
-from driftwalk.calibration.evolution import Tell
+from driftwalk.calibration.evolution import Tell, rounded
 from driftwalk.calibration.held_out.candidates import Candidate, with_contact_clearance
 from driftwalk.calibration.held_out.held_out_score import HeldOutScore, even_blocks, without_error
 from driftwalk.calibration.held_out.recorded import RecordedMotion
@@ -171,13 +171,8 @@ def ranking_sentence(
 
 def most_settings(parameters: int, replicates: int) -> int:
     """Return how many settings `estimate_evidence` simulates at most."""
-    narrow = gauss_newton.simulations_of(parameters)[0] * gauss_newton.GAUSS_NEWTON.most_rounds
-    return (
-        regression_abc.REGRESSION.most_simulations
-        + EVIDENCE.starts * narrow
-        + SIMULATIONS
-        + replicates
-    )
+    narrow = EVIDENCE.starts * simulations_of(parameters)[0] * GAUSS_NEWTON.most_rounds
+    return REGRESSION.most_simulations + narrow + SIMULATIONS + replicates
 
 
 @one_blas_thread()

@@ -48,7 +48,7 @@ def found_from(*centres: tuple[float, float], steep: float = 0.0) -> tuple[Modes
 
     def sample_about(end: LocalOptimum, number: int) -> Posterior:
         sampled.append(number)
-        return sample_posterior(simulate, recorded, end.emulator, end.solution, seed=10 * number)
+        return sample_posterior(simulate, recorded, end, seed=10 * number)
 
     optima = [end_at(one, steep, 5 + place) for place, one in enumerate(centres)]
     return find_modes(optima, sample_about), sampled
