@@ -12,6 +12,7 @@ from driftwalk.calibration.estimation.run import calibrate_many
 from driftwalk.calibration.goodness_of_fit import Halves, validate_on_halves
 from driftwalk.calibration.grid.grid_map import Progress, SweepProgress
 from driftwalk.calibration.grid.stages import GridCalibration
+from driftwalk.calibration.held_out.recorded import body_motion
 from driftwalk.calibration.problem import (
     Execution,
     FlowSource,
@@ -129,15 +130,8 @@ def calibrate(
                 f"a statistic of its own is for one or two parameters; {searched.name} has "
                 f"{len(searched.parameters)}"
             )
-        many = calibrate_many(
-            recording,
-            searched,
-            chosen,
-            flow=flow,
-            body=body,
-            threads=threads,
-            how=how,
-        )
+        motion = body_motion(recording, chosen, flow=flow, body=body, threads=threads)
+        many = calibrate_many(motion, searched, how)
         if meanwhile is not None:
             meanwhile(many)
         return many

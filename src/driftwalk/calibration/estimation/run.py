@@ -30,7 +30,7 @@ from driftwalk.calibration.held_out.held_out_score import (
     require_numbers,
     score_setting,
 )
-from driftwalk.calibration.held_out.recorded import RecordedMotion, body_motion
+from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.calibration.problem import Execution
 from driftwalk.core.arrays import Floats
 from driftwalk.core.processors import one_blas_thread
@@ -38,8 +38,6 @@ from driftwalk.motion import MotionModel
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from driftwalk.model import Study
 
 
 SEARCH: Final = Budget(design=256, starts=3, short=20, long=30, replicates=2, retest=8)
@@ -194,41 +192,11 @@ class _Stages:
         }
 
 
-def calibrate_many(
-    recording: xr.Dataset,
-    model: MotionModel,
-    study: Study,
-    *,
-    flow: xr.Dataset | None,
-    body: str | None,
-    threads: int | None,
-    how: Execution,
-) -> xr.Dataset:
+def calibrate_many(motion: RecordedMotion, model: MotionModel, how: Execution) -> xr.Dataset:
     """Return the `model_calibration` of a model with any number of parameters.
 
-    Parameters
-    ----------
-    recording : xarray.Dataset
-        A `trajectory`.
-    model : MotionModel
-        What is calibrated. A self-propelled body without a clearance has that of the recording.
-    study : Study
-        Tank, camera, step interval, seed, confidence; ``bootstrap`` is the number of simulated
-        recordings by which the discrepancy is judged, 0 leaves the second stage out.
-    flow : xarray.Dataset or None
-        The water's velocity.
-    body : str or None
-        The body, where the recording has several.
-    threads : int or None
-        None: all processors. The result does not depend on it.
-    how : Execution
-        The search runs here, whatever the executor.
-
-    Raises
-    ------
-    InputError
-        When the recording is too short or does not move, or the model gives no numbers.
+    A self-propelled body without a clearance has that of the recording. The search runs in this
+    process, whatever the executor.
     """
-    motion = body_motion(recording, study, flow=flow, body=body, threads=threads)
     (entry,), warnings = prepare_candidates([with_contact_clearance(model, motion)], motion)
     return build_model_calibration(estimate(entry, motion, how), entry, motion, warnings)

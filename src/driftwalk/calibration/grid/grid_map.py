@@ -266,8 +266,6 @@ class _Cells:
 
 def _spread(values: npt.NDArray[Any], cells: Integers, design: Design) -> npt.NDArray[Any]:
     """Return the rows of some settings as rows of all; those of the others are 0."""
-    if cells.size == design.size:
-        return values
     spread = np.zeros((design.size, *values.shape[1:]), dtype=values.dtype)
     spread[cells] = values
     return spread

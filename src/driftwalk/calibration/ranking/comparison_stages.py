@@ -229,7 +229,6 @@ class Stages:
             entry,
             self.work.motion,
             answer,
-            replicates=self.replicates,
             executor=self.executor or (self.pool if runs_in_threads(entry) else None),
             store=self.stores(f"summaries-{number}", fingerprint),
             tell=say,

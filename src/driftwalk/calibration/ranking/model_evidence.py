@@ -181,14 +181,13 @@ def estimate_evidence(
     motion: RecordedMotion,
     answer: Floats,
     *,
-    replicates: int,
     executor: Executor | None,
     store: Store | None,
     tell: Tell,
 ) -> Evidence:
     """Match the summaries of a recording with a model, and say how well that went."""
     entry = entry._replace(model=with_contact_clearance(entry.model, motion))
-    parameters = len(entry.ranges)
+    parameters, replicates = len(entry.ranges), motion.replicates
     objective = SummaryObjective(
         even_blocks(entry, motion),
         motion,
