@@ -57,24 +57,17 @@ def check_recording(
     >>> import driftwalk as dw
     >>> dw.calibration.check_recording(dw.tank30_recording(), dw.Study(), flow=dw.tank30_flow())
     """
-    if model is not None and len(model.parameters) > MOST_PARAMETERS:
-        motion = body_motion(recording, study, flow=flow, body=body)
-        if isinstance(model, ParticleModel):
-            model.require_others(motion.like)
-        return
-    if model is not None:
-        require_searchable(model)
-    _, problem = recorded_problem(
-        recording,
-        study,
-        lambda _: flow,
-        model=BlockModel(study) if model is None else model,
-        body=body,
-    )
-    if isinstance(problem.model, ParticleModel):
-        problem.model.require_others(problem.like)
-    if isinstance(problem.model, BlockModel):
-        problem.model.native(problem.like)
+    chosen = BlockModel(study) if model is None else model
+    if len(chosen.parameters) > MOST_PARAMETERS:
+        like = body_motion(recording, study, flow=flow, body=body).like
+    else:
+        require_searchable(chosen)
+        _, problem = recorded_problem(recording, study, lambda _: flow, model=chosen, body=body)
+        like = problem.like
+    if isinstance(chosen, ParticleModel):
+        chosen.require_others(like)
+    if isinstance(chosen, BlockModel):
+        chosen.native(like)
 
 
 def require_searchable(model: MotionModel) -> None:

@@ -20,7 +20,6 @@ from driftwalk.calibration.problem import (
     Stores,
     Tell,
     in_memory,
-    prepare_problem,
     recorded_problem,
 )
 from driftwalk.calibration.result import build_calibration
@@ -33,7 +32,6 @@ from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.run_stages import share_of_windows, tell_nobody
 from driftwalk.motion import BlockModel, MotionModel, ParticleModel
 from driftwalk.motion.protocol import ScoresItself
-from driftwalk.schema import Track
 from driftwalk.simulation.series import series_warnings
 
 if TYPE_CHECKING:
@@ -162,7 +160,9 @@ def calibrate(
         return build_calibration(stages, halves, stationarity, recording)
 
     def compare_halves(progress: Progress | None = None) -> Halves | None:
-        return _halves(track, stages, flow_of, executor, progress)
+        return validate_on_halves(
+            track, problem, stages.coarse, flow_of, executor=executor, progress=progress
+        )
 
     if problem.study.calibration.refine == "none":
         halves = None
@@ -222,40 +222,3 @@ def _flow_source(study: Study, model: MotionModel, flow: xr.Dataset | None) -> F
     from driftwalk.conditions.own_flow import flow_from_track
 
     return lambda track: flow_from_track(track, study)
-
-
-def _halves(
-    track: Track,
-    stages: GridCalibration,
-    flow_of: FlowSource,
-    executor: Executor | None,
-    progress: Progress | None,
-) -> Halves | None:
-    """Calibrate on the first half, judge on the second; None where a half is too short."""
-    problem = stages.problem
-    middle = 0.5 * (track.time[0] + track.time[-1])
-    others = problem.like.neighbours
-    if others is not None:
-        others = others.since(-float(track.time[0]))
-    early = Track(*(values[track.time <= middle] for values in track))
-    late = Track(*(values[track.time > middle] for values in track))
-    try:
-        flow = flow_of(early)
-        first, second = (
-            prepare_problem(
-                half,
-                problem.study,
-                flow,
-                camera=problem.like.camera,
-                model=problem.model,
-                statistic=problem.statistic,
-                neighbours=others,
-                threads=problem.like.threads,
-            )
-            for half in (early, late)
-        )
-    except InputError:
-        return None
-    return validate_on_halves(
-        problem, stages.coarse, first, second, executor=executor, progress=progress
-    )

@@ -28,7 +28,6 @@ from driftwalk.calibration.parallel_search import (
 from driftwalk.calibration.problem import Stores
 from driftwalk.calibration.ranking.model_evidence import (
     Evidence,
-    Shortlist,
     estimate_evidence,
     most_settings,
     shortlist_models,
@@ -118,18 +117,15 @@ class Stages:
 
     def evidence(self, held_out: Sequence[HeldOutScore]) -> dict[int, Evidence]:
         """Ask the summaries of those that tie, and of others while none of them gives them."""
-        shortlist = (
-            shortlist_models(self.work.entries, held_out)
-            if self.replicates > 1
-            else Shortlist((), 0)
-        )
+        if self.replicates < 2:
+            return {}
+        shortlist = shortlist_models(self.work.entries, held_out)
         found: dict[int, Evidence] = {}
         for number, index in enumerate(shortlist.models):
             if number >= shortlist.tied and any(one.usual for one in found.values()):
                 break
-            found[index] = self._matched(
-                number, index, held_out[index].point, max(shortlist.tied, 1)
-            )
+            planned = max(shortlist.tied, 1)
+            found[index] = self._matched(number, index, held_out[index].point, planned)
         return found
 
     @cached_property
