@@ -1,4 +1,4 @@
-"""Whether a recording can be calibrated on, before anything is computed or written."""
+"""Which recordings and models can be calibrated, before anything is computed or written."""
 
 from __future__ import annotations
 

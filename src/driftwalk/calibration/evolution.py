@@ -1,4 +1,13 @@
-"""How far settings of a motion model are from a recording, in all aspects of its motion."""
+"""Evolutionary search for the smallest mean of a noisy score over several parameters.
+
+A Sobol' design finds the neighbourhoods, CMA-ES (covariance matrix adaptation; Hansen and
+Ostermeier, Evol. Comput. 9 (2001) 159) goes down from the best few, and once more, longer, from the
+best end. Each evaluation has fresh random numbers, so the luckiest one says little: the best means
+are evaluated again with numbers of their own, and the answer is the best of these.
+
+The score of a motion model is its mean distance from a recording, in all aspects of its motion,
+over the recording's own floors.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The problem of a calibration: one recording, made ready once, and the worlds that answer it."""
+"""The problem of a calibration: one recording, made ready once, and how its worlds are computed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Warnings of inputs that a calibration takes for right: the wall, the recording's own flow."""
+"""Warnings of a calibration: at the ends of the search, at the wall, and of the own flow."""
 
 from __future__ import annotations
 

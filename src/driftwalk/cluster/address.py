@@ -1,4 +1,4 @@
-"""Where workers are, as the command line says it: ``local:4``, ``tcp://host:8786``, ``slurm``."""
+"""Where workers are: ``local:4``, ``tcp://host:8786``, or jobs of Slurm and its like."""
 
 from __future__ import annotations
 

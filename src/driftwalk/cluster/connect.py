@@ -1,4 +1,4 @@
-"""Workers for the time of a run: reached or begun, checked, counted, and let go at its end."""
+"""Workers for the time of a run: reached or begun, checked for the same bits, counted, let go."""
 
 from __future__ import annotations
 

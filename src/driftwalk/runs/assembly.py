@@ -1,4 +1,4 @@
-"""The run of self-assembly, with its distributions and the film of one run."""
+"""The runs of self-assembly, with its distributions and a film, and of its sensitivity analysis."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The run of a calibration."""
+"""The runs of a calibration and of a comparison of motion models."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Run any function over the units of a sweep, skip what is done, keep what gets done."""
+"""Run any function over the units of a sweep, skip what is done, keep what gets done.
+
+`driftwalk.core.files.shards` defines the files of a store on disk.
+"""
 
 from __future__ import annotations
 

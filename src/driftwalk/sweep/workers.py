@@ -1,4 +1,8 @@
-"""Executor on a Dask cluster: each worker gets a function once, then units."""
+"""Executor on a Dask cluster: each worker is checked and gets a function once, then units.
+
+A unit is a few numbers; the function of a sweep holds a flow, a recording, a model. On a Dask
+cluster the function is therefore a separate object, which a worker fetches with its first unit.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""Which parameters a recording determines, from settings that could have given it."""
+"""Identifiability: which parameters a recording determines, and their profile likelihoods.
+
+A profile shows how the discrepancy rises along one parameter, with all others where they fit best.
+Where it is a parabola, its curvature gives the same interval as the draws; where it is flat, or
+rises on one side only, the recording does not determine the parameter.
+"""
 
 from __future__ import annotations
 

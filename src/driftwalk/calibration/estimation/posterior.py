@@ -5,6 +5,12 @@ discrepancy: exp(-discrepancy / 2) (Wood, Nature 466 (2010) 1102). Within the re
 that costs nothing to evaluate, and a Markov chain of many walkers samples it, with an even prior
 over the ranges on their scales (emcee; Foreman-Mackey et al., Publ. Astron. Soc. Pac. 125 (2013)
 306). Simulations follow the draws: the next ones fill a region about them, until the draws stay.
+
+The region is an ellipsoid about the draws, along their own axes: parameters that make up for each
+other lie on a narrow ridge, and a box about it is mostly empty of draws. A chain that begins at one
+place that fits does not find the others, so every search that ends at a match has a posterior of
+its own; these modes are weighed by their evidence, the likelihood there times the volume that the
+draws fill.
 """
 
 from __future__ import annotations

@@ -1,6 +1,12 @@
-"""Synthetic likelihood of the summaries of a recording at one setting, from simulations of it.
+"""Synthetic likelihood of the summaries of a recording: by a local emulator, and at one setting.
 
-An emulator's covariance holds what its quadratic misses, and differs from box to box. Models are
+The emulator says how summaries depend on a model's parameters in a small box, from simulations
+there. Their means are linear or quadratic functions of the parameters, as the simulations support;
+what is left has a covariance. Where that is so, the setting of a recording is that of least
+squares, each summary weighed by its covariance: the maximum of the synthetic likelihood (Wood,
+Nature 466 (2010) 1102).
+
+An emulator's covariance holds what its quadratic misses, and differs from box to box. So models are
 compared without one: by simulations of one setting each, all with the same number of them.
 """
 

@@ -1,4 +1,4 @@
-"""How far a recording is from each setting, with what chance does to a setting taken off.
+"""The energy score of a recording at each setting of a grid, and the minimum of its smooth surface.
 
 The distance D of a recording from a simulated one is partly chance: two recordings of one setting
 are apart, too, by the floor of that setting. The mean of D alone favours settings whose simulations
@@ -10,6 +10,13 @@ on average. Half of the floor is therefore taken off,
 the energy score of Gneiting and Raftery (J. Am. Stat. Assoc. 102, 359, 2007) with D for the
 distance: no setting has a smaller expectation than the truth. Chance in S grows with the floor, so
 its height above the minimum is counted in floors.
+
+Distances are noisy, so the optimum is that of a smooth surface, instead of the luckiest cell. At
+every point of a fine lattice a quadratic in the n parameters, (n + 1)(n + 2) / 2 terms, is fitted
+to the distances of the cells nearby, weighted by (1 - r^2/4)^3 for r < 2 bandwidths, and its value
+there is the surface. The fit is linear in the data: one matrix serves the recording and every
+bootstrap sample. The valley of D of the block is narrow and sharp in C_d, so the bandwidth is two
+refined steps: wider ones shift the minimum towards the flatter side.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Held-out score: a model searched on the even blocks of time and scored on the odd ones."""
+"""Held-out score: a model is searched on the even blocks of time and judged on the odd ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A recording as motion models are compared on it: its blocks of time, aspects and scales."""
+"""A recording as motion models are compared on it: blocks of time, aspects, scales and checks."""
 
 from __future__ import annotations
 

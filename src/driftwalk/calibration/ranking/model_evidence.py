@@ -1,4 +1,4 @@
-"""Evidence ranking: which of the models that distances leave tied the summaries speak for."""
+"""Model evidence from summaries of the motion ranks the models that distances leave tied."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Errors of estimates of a known truth, and how often their intervals hold it."""
+"""Errors of estimates of a known truth, how often intervals hold it, and what is determined."""
 
 from __future__ import annotations
 
