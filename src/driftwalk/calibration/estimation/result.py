@@ -1,16 +1,23 @@
-"""The `model_calibration` dataset: the estimate, what it is worth, and how good the model is."""
+"""The `model_calibration` dataset: the estimate, how well it is known, how good the model is."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from driftwalk.calibration.estimation.estimate import Matched
+from driftwalk.calibration.estimation.identifiability import Determination
 from driftwalk.calibration.held_out.candidates import Candidate
-from driftwalk.calibration.held_out.held_out_score import recording_parts, verdict_of, without_error
+from driftwalk.calibration.held_out.held_out_score import (
+    HeldOutScore,
+    recording_parts,
+    verdict_of,
+    without_error,
+)
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.calibration.stationarity import motion_warnings
 from driftwalk.core.arrays import Floats
@@ -21,7 +28,33 @@ from driftwalk.schema.check import build_dataset
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.calibration.estimation.run import Estimation
+
+@dataclass(frozen=True)
+class Estimation:
+    """Everything that was found of a model's parameters.
+
+    Attributes
+    ----------
+    point : ndarray, shape (parameters,)
+        The estimate, in the unit cube.
+    searched : ndarray or None
+        The answer of the first stage; None where it was not needed.
+    matched : Matched or None
+        That of the second stage; None where it was not asked for.
+    scores : mapping of str to float
+        Mean of distance over floor in the even blocks of time, of each answer.
+    known : Determination or None
+        How well the parameters are determined; None where the second stage does not count.
+    held_out : Judged
+        The answer for the even blocks, judged on the odd ones.
+    """
+
+    point: Floats
+    searched: Floats | None
+    matched: Matched | None
+    scores: Mapping[str, float]
+    known: Determination | None
+    held_out: HeldOutScore
 
 
 def build_model_calibration(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -14,9 +13,9 @@ from driftwalk.calibration.estimation.estimate import (
     match_summaries,
     most_simulations,
 )
-from driftwalk.calibration.estimation.identifiability import Determination, determination
+from driftwalk.calibration.estimation.identifiability import determination
 from driftwalk.calibration.estimation.label_switching import label_order
-from driftwalk.calibration.estimation.result import build_model_calibration
+from driftwalk.calibration.estimation.result import Estimation, build_model_calibration
 from driftwalk.calibration.estimation.summary_objective import SummaryObjective
 from driftwalk.calibration.evolution import Budget, CachedObjective, SearchResult, search_minimum
 from driftwalk.calibration.held_out.candidates import (
@@ -25,7 +24,6 @@ from driftwalk.calibration.held_out.candidates import (
     with_contact_clearance,
 )
 from driftwalk.calibration.held_out.held_out_score import (
-    HeldOutScore,
     even_blocks,
     require_numbers,
     score_setting,
@@ -41,34 +39,6 @@ if TYPE_CHECKING:
 
 
 SEARCH: Final = Budget(design=256, starts=3, short=20, long=30, replicates=2, retest=8)
-
-
-@dataclass(frozen=True)
-class Estimation:
-    """Everything that was found of a model's parameters.
-
-    Attributes
-    ----------
-    point : ndarray, shape (parameters,)
-        The estimate, in the unit cube.
-    searched : ndarray or None
-        The answer of the first stage; None where it was not needed.
-    matched : Matched or None
-        That of the second stage; None where it was not asked for.
-    scores : mapping of str to float
-        Mean of distance over floor in the even blocks of time, of each answer.
-    known : Determination or None
-        How well the parameters are determined; None where the second stage does not count.
-    held_out : Judged
-        The answer for the even blocks, judged on the odd ones.
-    """
-
-    point: Floats
-    searched: Floats | None
-    matched: Matched | None
-    scores: Mapping[str, float]
-    known: Determination | None
-    held_out: HeldOutScore
 
 
 @one_blas_thread()
