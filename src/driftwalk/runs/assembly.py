@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 FIXED_TRIAL: Final = 0
 DRAWN_TRIAL: Final = 1
 """The two sets of runs have different random numbers, so that they can be compared."""
-REGION: Final = ("region_drag_coefficient", "region_force_std", "refined_surface")
+REGION: Final[tuple[str, ...]] = ("region_drag_coefficient", "region_force_std", "refined_surface")
 """Variables of a calibration that parameters are drawn from."""
 PATH_RUNS: Final = 4
 PATH_INTERVAL_S: Final = 0.1
@@ -100,12 +100,14 @@ class AssemblyWork:
     def specification(self) -> dict[str, Any]:
         """Return what determines the numbers of the runs."""
         found = self.calibration
-        sha256 = None if found is None else dataset_hash(found, _drawn_from(found))
+        drawn_from = REGION
+        if found is not None and "covariance" in found:
+            drawn_from = ("estimate", "covariance")
         names = ("u", "v", *(f"{part}_standard_error" for part in "uv"))
         return {
             "study": self.study.to_dict(),
             "flow_sha256": dataset_hash(self.flow, tuple(n for n in names if n in self.flow)),
-            "calibration_sha256": sha256,
+            "calibration_sha256": dataset_hash(found, drawn_from),
         }
 
     def compute(self, run: Run) -> AssemblyResult:
@@ -181,11 +183,6 @@ class AssemblyWork:
             "figures": 1.0,
             **({} if self.film == "none" else {"film": 1.0}),
         }
-
-
-def _drawn_from(found: xr.Dataset) -> tuple[str, ...]:
-    """Return the variables of a fit or a calibration that parameters are drawn from."""
-    return ("estimate", "covariance") if "covariance" in found else REGION
 
 
 @dataclass(frozen=True)

@@ -105,13 +105,8 @@ class CalibrationWork:
 
     def specification(self) -> dict[str, Any]:
         """Return what determines the numbers of the calibration."""
-        return {
-            "study": self.study.to_dict(),
-            "body": self.body,
-            "recording_sha256": dataset_hash(self.recording, ("x", "y", "theta")),
-            "flow_sha256": None if self.flow is None else dataset_hash(self.flow, ("u", "v")),
-            **({} if self.model is None else {"model": self.model.describe()}),
-        }
+        about_model = {} if self.model is None else {"model": self.model.describe()}
+        return {**_specification(self), **about_model}
 
     def compute(self, run: Run) -> xr.Dataset:
         """Calibrate; return a `calibration`, or of many parameters a `model_calibration`."""
@@ -209,13 +204,8 @@ class ModelComparisonWork:
 
     def specification(self) -> dict[str, Any]:
         """Return what determines the numbers of the comparison, once it is checked."""
-        return {
-            "models": [one.describe() for one in self.models if not isinstance(one, str)],
-            "study": self.study.to_dict(),
-            "body": self.body,
-            "recording_sha256": dataset_hash(self.recording, ("x", "y", "theta")),
-            "flow_sha256": None if self.flow is None else dataset_hash(self.flow, ("u", "v")),
-        }
+        models = [one.describe() for one in self.models if not isinstance(one, str)]
+        return {**_specification(self), "models": models}
 
     def compute(self, run: Run) -> xr.Dataset:
         """Search and judge every model; return a `model_comparison`."""
@@ -237,3 +227,13 @@ class ModelComparisonWork:
             finished=self.finished,
         )
         return run.keep("comparison.nc", found)
+
+
+def _specification(work: CalibrationWork | ModelComparisonWork) -> dict[str, Any]:
+    """Return what determines the numbers of both, beside their models."""
+    return {
+        "study": work.study.to_dict(),
+        "body": work.body,
+        "recording_sha256": dataset_hash(work.recording, ("x", "y", "theta")),
+        "flow_sha256": dataset_hash(work.flow, ("u", "v")),
+    }

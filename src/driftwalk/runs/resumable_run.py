@@ -215,8 +215,10 @@ def naming_recording(inputs: Mapping[str, Path]) -> Iterator[None]:
         raise InputError(f"{inputs['recording']}: {error}") from error
 
 
-def dataset_hash(dataset: xr.Dataset, names: tuple[str, ...]) -> str:
-    """Return a hash of the coordinates and the named variables of a dataset."""
+def dataset_hash(dataset: xr.Dataset | None, names: tuple[str, ...]) -> str | None:
+    """Return a hash of the coordinates and the named variables of a dataset, None without one."""
+    if dataset is None:
+        return None
     digest = hashlib.sha256()
     for name in (*sorted(str(name) for name in dataset.indexes), *names):
         values = dataset[name].values

@@ -7,9 +7,7 @@ from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 
-from driftwalk.calibration.estimation.bootstrap_correction import (
-    bootstrap_estimates,
-)
+from driftwalk.calibration.estimation.bootstrap_correction import bootstrap_estimates
 from driftwalk.calibration.estimation.gauss_newton import (
     GAUSS_NEWTON,
     LocalOptimum,

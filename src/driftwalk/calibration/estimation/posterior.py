@@ -20,17 +20,13 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.calibration.estimation.gauss_newton import (
-    LocalOptimum,
-    Simulate,
-    rounded,
-    simulations_of,
-)
+from driftwalk.calibration.estimation.gauss_newton import LocalOptimum, Simulate, simulations_of
 from driftwalk.calibration.estimation.synthetic_likelihood import (
     LocalEmulator,
     Solution,
     fit_emulator,
 )
+from driftwalk.calibration.evolution import rounded
 from driftwalk.core.arrays import Bools, Floats
 
 

@@ -12,12 +12,7 @@ import numpy as np
 from driftwalk.calibration.estimation.estimate import Matched
 from driftwalk.calibration.estimation.identifiability import Determination
 from driftwalk.calibration.held_out.candidates import Candidate
-from driftwalk.calibration.held_out.held_out_score import (
-    HeldOutScore,
-    recording_parts,
-    verdict_of,
-    without_error,
-)
+from driftwalk.calibration.held_out.held_out_score import HeldOutScore, recording_parts, verdict_of
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.calibration.stationarity import motion_warnings
 from driftwalk.core.arrays import Floats
@@ -90,7 +85,7 @@ def build_model_calibration(
         "check_low": ("check", held_out.checks.min(axis=0)),
         "check_high": ("check", held_out.checks.max(axis=0)),
         "score": ((), held_out.score),
-        "score_std": ((), without_error(held_out.without)),
+        "score_std": ((), held_out.score_std),
         "explained": ((), verdict.explained),
         "verdict": ((), np.array(verdict.text)),
         **_stages(found, entry),

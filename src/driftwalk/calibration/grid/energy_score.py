@@ -61,15 +61,10 @@ class Smoother:
     axes: tuple[Floats, ...]
     matrix: Floats
 
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Points of the lattice along each axis."""
-        return tuple(axis.size for axis in self.axes)
-
     def surface(self, distance: Floats) -> Floats:
         """Return the surface on the lattice, from distances on the grid (..., cells)."""
         values = np.asarray(distance) @ self.matrix.T
-        return np.asarray(values.reshape(*values.shape[:-1], *self.shape))
+        return np.asarray(values.reshape(*values.shape[:-1], *(axis.size for axis in self.axes)))
 
 
 def nearest_point(axes: Sequence[Floats], point: Sequence[float]) -> tuple[int, ...]:
@@ -122,22 +117,14 @@ def make_smoother(
 def _fit_row(x: float, rest: Sequence[Floats], cells: Sequence[Floats], weights: Floats) -> Floats:
     """Return the weights of the cells at the lattice points (x, rest[0]), (x, rest[1]), ..."""
     near = np.abs(cells[0] - x) < REACH
-    fitted = np.zeros((rest[0].size if rest else 1, near.size))
-    fitted[:, near] = _fit_points(x, rest, [one[near] for one in cells], weights[near])
-    return fitted
-
-
-def _fit_points(
-    x: float, rest: Sequence[Floats], cells: Sequence[Floats], weights: Floats
-) -> Floats:
-    """Return the weights of cells that are near in the first axis."""
+    first, *others = (one[near] for one in cells)
     points = rest[0].size if rest else 1
-    away = [np.broadcast_to(cells[0] - x, (points, cells[0].size))]
-    away += [cell - at[:, None] for cell, at in zip(cells[1:], rest, strict=True)]
+    away = [np.broadcast_to(first - x, (points, first.size))]
+    away += [cell - at[:, None] for cell, at in zip(others, rest, strict=True)]
     squares = away[0] ** 2
     for one in away[1:]:
         squares = squares + one**2
-    weight = weights * np.clip(1.0 - squares / REACH**2, 0.0, None) ** 3
+    weight = weights[near] * np.clip(1.0 - squares / REACH**2, 0.0, None) ** 3
     products = [a * b for a, b in combinations_with_replacement(away, 2)]
     terms = np.stack([np.ones_like(away[0]), *away, *products], axis=-1)
     weighted = terms * weight[..., None]
@@ -149,7 +136,8 @@ def _fit_points(
     value = np.zeros((points, count, 1))
     value[:, 0] = 1.0
     solution = np.linalg.solve(normal, value)[..., 0]
-    fitted: Floats = np.einsum("la,lca->lc", solution, weighted)
+    fitted = np.zeros((points, near.size))
+    fitted[:, near] = np.einsum("la,lca->lc", solution, weighted)
     return fitted
 
 
@@ -190,24 +178,15 @@ def smooth_energy_score(found: Map, bandwidth: Sequence[float]) -> EnergyScore:
     smoother = make_smoother(
         found.axes, bandwidth=bandwidth, weights=found.replicates.astype(float)
     )
-    floor = smooth_floor(smoother, found.apart)
-    surface = height_in_floors(smoother, found.mean, found.apart, floor)
+    apart = found.apart
+    # Kept away from 0, so that heights in floors stay finite.
+    least = 0.2 * float(np.median(apart)) or np.finfo(np.float64).tiny
+    floor = np.clip(smoother.surface(apart.ravel()), least, None)
+    score = smoother.surface((found.mean - 0.5 * apart).ravel())
+    surface = np.asarray((score - score.min()) / floor)
     lowest = np.unravel_index(int(np.argmin(surface)), surface.shape)
     point = lowest_point(smoother.axes, surface)
     distance = float(smoother.surface(found.mean.ravel())[lowest])
     return EnergyScore(
         smoother, Optimum(point, distance), floor, distance + float(floor[lowest]) * surface
     )
-
-
-def smooth_floor(smoother: Smoother, apart: Floats) -> Floats:
-    """Return the floor of every point of the lattice, from the floors of the settings."""
-    # Kept away from 0, so that heights in floors stay finite.
-    least = 0.2 * float(np.median(apart)) or np.finfo(np.float64).tiny
-    return np.asarray(np.clip(smoother.surface(apart.ravel()), least, None))
-
-
-def height_in_floors(smoother: Smoother, distance: Floats, apart: Floats, floor: Floats) -> Floats:
-    """Return how far S lies above its minimum, in floors, on the lattice."""
-    score = smoother.surface((distance - 0.5 * apart).ravel())
-    return np.asarray((score - score.min()) / floor)

@@ -43,6 +43,15 @@ class HeldOutScore(NamedTuple):
     """Scores at the ends of the searches."""
     evaluations: int
 
+    @property
+    def score_std(self) -> float:
+        """Standard error of the score."""
+        return without_error(self.without)
+
+    def behind(self, other: HeldOutScore) -> tuple[float, float]:
+        """Return how far the score is behind another one, and the standard error of that."""
+        return self.score - other.score, without_error(self.without - other.without)
+
 
 def score_candidate(
     entry: Candidate, motion: RecordedMotion, *, budget: Budget, tell: Tell | None

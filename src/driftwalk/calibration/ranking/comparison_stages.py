@@ -13,11 +13,7 @@ import numpy as np
 
 from driftwalk.calibration.evolution import Budget
 from driftwalk.calibration.held_out.candidates import Candidate
-from driftwalk.calibration.held_out.held_out_score import (
-    HeldOutScore,
-    score_candidate,
-    without_error,
-)
+from driftwalk.calibration.held_out.held_out_score import HeldOutScore, score_candidate
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.calibration.parallel_search import (
     SearchProgress,
@@ -156,8 +152,7 @@ class Stages:
                 entry = self.work.entries[index]
                 arrays = {name: values[0] for name, values in retained.read(unit).items()}
                 one = _unpacked(arrays, entry)
-                std = without_error(one.without)
-                self.finished(entry.model.name, one.score, std, len(units))
+                self.finished(entry.model.name, one.score, one.score_std, len(units))
 
         return look
 

@@ -19,7 +19,7 @@ from driftwalk.calibration.estimation.synthetic_likelihood import (
 )
 from driftwalk.calibration.evolution import Tell, rounded
 from driftwalk.calibration.held_out.candidates import Candidate, with_contact_clearance
-from driftwalk.calibration.held_out.held_out_score import HeldOutScore, even_blocks, without_error
+from driftwalk.calibration.held_out.held_out_score import HeldOutScore, even_blocks
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.core.arrays import Floats
 from driftwalk.core.processors import one_blas_thread
@@ -101,8 +101,8 @@ def shortlist_models(entries: Sequence[Candidate], held_out: Sequence[HeldOutSco
     closest = held_out[able[0]]
 
     def is_tied(k: int) -> bool:
-        error = without_error(held_out[k].without - closest.without)
-        return held_out[k].score - closest.score <= EVIDENCE.tied_sigmas * error
+        difference, error = held_out[k].behind(closest)
+        return difference <= EVIDENCE.tied_sigmas * error
 
     tied = [k for k in able if is_tied(k)]
     behind = [k for k in able if not is_tied(k)]

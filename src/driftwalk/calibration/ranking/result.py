@@ -14,7 +14,6 @@ from driftwalk.calibration.held_out.held_out_score import (
     Verdict,
     recording_parts,
     verdict_of,
-    without_error,
 )
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.calibration.ranking.model_evidence import (
@@ -48,30 +47,30 @@ def build_comparison(
     entries, held_out = [entries[k] for k in order], [held_out[k] for k in order]
     evidence = {at: evidence_by_model[k] for at, k in enumerate(order) if k in evidence_by_model}
     answer = rank_by_evidence(entries, evidence)
-    behind = np.array([one.score - held_out[0].score for one in held_out])
-    behind_std = np.array([without_error(one.without - held_out[0].without) for one in held_out])
     names = [entry.model.name for entry in entries]
+    behind, behind_std = np.array([one.behind(held_out[0]) for one in held_out]).T
+    # The first model is closest; the one that the summaries name stands beside it all the same.
+    clearly_behind = behind > VERDICT.tied_sigmas * behind_std
+    # Where no model gives the summaries, they speak against none in particular.
+    asked = {} if answer.best is None else evidence
+    unlike = {k: discrepancy_sentence(one) for k, one in asked.items()}
     verdicts = [
         verdict_of(
             one,
             motion,
             baseline=entry.baseline,
-            clearly_behind=names[0]
-            if behind[k] > VERDICT.tied_sigmas * behind_std[k] and k != answer.best
-            else None,
-            unlike=None
-            if answer.best is None or k not in evidence
-            else discrepancy_sentence(evidence[k]),
+            clearly_behind=names[0] if clearly_behind[k] and k != answer.best else None,
+            unlike=unlike.get(k),
         )
         for k, (entry, one) in enumerate(zip(entries, held_out, strict=True))
     ]
+    # Walks of recorded steps are no answer, however close they are.
     closest = next((k for k, entry in enumerate(entries) if not entry.baseline), 0)
+    apart = [one.behind(held_out[closest]) for one in held_out]
     tied = [
         k
-        for k, one in enumerate(held_out)
-        if k > closest
-        and one.score - held_out[closest].score
-        < VERDICT.tied_sigmas * without_error(one.without - held_out[closest].without)
+        for k, (difference, error) in enumerate(apart)
+        if k > closest and difference < VERDICT.tied_sigmas * error
     ]
     units, values = _estimates(entries, held_out)
     stationarity = stationarity_of_motion(motion)
@@ -90,7 +89,7 @@ def build_comparison(
     data: dict[str, Any] = {
         **about.data,
         "score": ("model", [one.score for one in held_out]),
-        "score_std": ("model", [without_error(one.without) for one in held_out]),
+        "score_std": ("model", [one.score_std for one in held_out]),
         "behind": ("model", behind),
         "behind_std": ("model", behind_std),
         "free_numbers": ("model", [entry.numbers for entry in entries]),
@@ -157,10 +156,7 @@ def _estimates(
             known = units.get(parameter.name, parameter.unit)
             name = parameter.name if known == parameter.unit else parameter.key
             units[name] = parameter.unit
-            low, high = (
-                float(parameter.to_coordinate(end)) for end in (parameter.low, parameter.high)
-            )
-            answer[name] = float(parameter.to_value(low + (high - low) * share))
+            answer[name] = float(parameter.value_at(share))
         answers.append(answer)
     values = np.array([[answer.get(name, np.nan) for name in units] for answer in answers])
     return units, values.reshape(len(entries), len(units))
