@@ -21,7 +21,7 @@ import numpy as np
 from driftwalk.comparison.aspects import Aspect, AspectPlan, AspectReference, form_aspects
 from driftwalk.comparison.aspects.form import WallDistance
 from driftwalk.conditions import Conditions
-from driftwalk.core.arrays import Bools, Floats
+from driftwalk.core.arrays import Floats
 from driftwalk.core.processors import map_in_threads
 from driftwalk.core.random_streams import trial_in
 from driftwalk.core.run_stages import tell_nobody
@@ -70,17 +70,10 @@ class AspectObjective:
 
         A world that lost its numbers is as far as can be, 1.
         """
-        worlds, broken = self.worlds(settings, replicates, stage=stage, first=first)
-        found = self.reference.distances(worlds, threads=self.like.threads)
-        found[broken] = 1.0
-        return found.reshape(len(settings), replicates, -1)
-
-    def worlds(
-        self, settings: Floats, replicates: int, *, stage: str, first: int = 0
-    ) -> tuple[list[Sequence[Aspect]], Bools]:
-        """Return the aspects of simulated worlds, replicates fastest, and which are broken."""
         seen = self.simulated(settings, replicates, stage=stage, first=first)
-        return self.aspects(seen), broken_worlds(seen.status)
+        found = self.reference.distances(self.aspects(seen), threads=self.like.threads)
+        found[broken_worlds(seen.status)] = 1.0
+        return found.reshape(len(settings), replicates, -1)
 
     def simulated(self, settings: Floats, replicates: int, *, stage: str, first: int = 0) -> Worlds:
         """Return simulated worlds, replicates fastest."""

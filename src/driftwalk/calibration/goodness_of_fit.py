@@ -76,7 +76,6 @@ def validate_on_halves(
     whole: Problem,
     coarse: Map,
     flow_of: FlowSource,
-    *,
     executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> Halves | None:

@@ -100,6 +100,7 @@ def _facts(
         "simulated_recording": str(recording.attrs.get("simulated", "no")),
         "study": problem.study.to_toml(),
     }
+    # Only a bootstrap tells how sure the answer is; its mean distance replaces the surface's.
     quality, region = stages.quality, stages.region
     if quality is not None and region is not None:
         facts |= {

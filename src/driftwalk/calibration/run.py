@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from driftwalk.calibration.check import MOST_PARAMETERS, require_searchable
 from driftwalk.calibration.estimation.run import calibrate_many
 from driftwalk.calibration.goodness_of_fit import Halves, validate_on_halves
-from driftwalk.calibration.grid.grid_map import Progress, SweepProgress
+from driftwalk.calibration.grid.grid_map import SweepProgress
 from driftwalk.calibration.grid.stages import GridCalibration
 from driftwalk.calibration.held_out.recorded import body_motion
 from driftwalk.calibration.problem import (
@@ -139,6 +139,7 @@ def calibrate(
         recording, chosen, flow_of, model=searched, statistic=statistic, body=body, threads=threads
     )
     stages = GridCalibration(problem, how).run()
+    # A model is not to blame for what it cannot know: inputs taken for right, an unsteady motion.
     stationarity = stationarity_of(problem)
     in_tank = isinstance(searched, BlockModel | ParticleModel)
     is_block = isinstance(searched, BlockModel)
@@ -159,11 +160,7 @@ def calibrate(
     def finish(halves: Halves | None) -> xr.Dataset:
         return build_calibration(stages, halves, stationarity, recording)
 
-    def compare_halves(progress: Progress | None = None) -> Halves | None:
-        return validate_on_halves(
-            track, problem, stages.coarse, flow_of, executor=executor, progress=progress
-        )
-
+    compare_halves = partial(validate_on_halves, track, problem, stages.coarse, flow_of, executor)
     if problem.study.calibration.refine == "none":
         halves = None
     else:

@@ -141,6 +141,7 @@ class AssemblyWork:
             )
             run.keep("assembly_drawn.nc", assembly_drawn)
             drawn, sizes_drawn = self._outcomes(assembly_drawn, run, "_drawn")
+        # Paths would fill a disk: a few runs are simulated again, with the same random numbers.
         path = assembly_path(
             self.study,
             self.flow,

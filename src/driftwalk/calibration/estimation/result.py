@@ -17,7 +17,8 @@ from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.calibration.stationarity import motion_warnings
 from driftwalk.core.arrays import Floats
 from driftwalk.motion import ParticleModel
-from driftwalk.schema.answers.facts import BOUNDS, texts
+from driftwalk.schema import Parameter
+from driftwalk.schema.answers.facts import BOUNDS, AnswerParts, texts
 from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:
@@ -62,10 +63,12 @@ def build_model_calibration(
     ranges, held_out = entry.ranges, found.held_out
     verdict = verdict_of(held_out, motion, baseline=False)
     count = len(ranges)
+    # None where the summaries' answer does not count: nothing is known of the intervals then.
     known = found.known
-    about = recording_parts(motion)
+    about, named = recording_parts(motion), parameter_parts(ranges)
     data: dict[str, Any] = {
         **about.data,
+        **named.data,
         "estimate": ("parameter", _values(entry, found.point[None])[0]),
         "interval": (
             ("parameter", "bound"),
@@ -76,9 +79,6 @@ def build_model_calibration(
         ),
         "half_width": ("parameter", np.full(count, np.nan) if known is None else known.half_width),
         "range": (("parameter", "bound"), np.array([(one.low, one.high) for one in ranges])),
-        "unit": ("parameter", texts([one.unit for one in ranges])),
-        "scale": ("parameter", texts([one.scale for one in ranges])),
-        "meaning": ("parameter", texts([one.meaning or one.label for one in ranges])),
         "held_out_distance": ("aspect", held_out.held),
         "trained_distance": ("aspect", held_out.trained),
         "check_median": ("check", np.median(held_out.checks, axis=0)),
@@ -92,8 +92,7 @@ def build_model_calibration(
     }  # fmt: skip
     said = [*warnings, *_said(found, entry, verdict.explained), *motion_warnings(motion)]
     coords: dict[str, Any] = {
-        "parameter": ("parameter", texts([one.name for one in ranges])),
-        "bound": ("bound", texts(BOUNDS)),
+        **named.coords,
         **about.coords,
         "warning": ("warning", texts(said)),
     }
@@ -106,6 +105,18 @@ def build_model_calibration(
         **about.attrs,
     }
     return build_dataset("model_calibration", data, coords, attrs)
+
+
+def parameter_parts(parameters: Sequence[Parameter]) -> AnswerParts:
+    """Return what a dataset of estimates says of their parameters."""
+    data = {
+        "unit": ("parameter", texts([one.unit for one in parameters])),
+        "scale": ("parameter", texts([one.scale for one in parameters])),
+        "meaning": ("parameter", texts([one.meaning or one.label for one in parameters])),
+    }
+    names = texts([one.name for one in parameters])
+    coords = {"parameter": ("parameter", names), "bound": ("bound", texts(BOUNDS))}
+    return AnswerParts(data, coords, {})
 
 
 def _stages(found: Estimation, entry: Candidate) -> dict[str, Any]:

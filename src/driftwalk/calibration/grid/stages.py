@@ -118,6 +118,7 @@ class GridCalibration:
     def _bootstrap(self, refined: RefinedMap, count: int, known: Container[Boundary]) -> None:
         surface = build_surface(self.problem, refined)
         energy_score = refined.energy_score
+        # A moved optimum, window or surface makes other recordings: finished ones do not count.
         fingerprint = {
             "optimum": [*self.optimum.point, self.optimum.distance],
             "axes": [axis.tolist() for axis in surface.axes],
@@ -133,6 +134,7 @@ class GridCalibration:
             executor=self._how.executor,
             progress=partial(self._how.tell, "bootstrap"),
         )
+        # From here on the floor is that of recordings as long as the real one, at the optimum.
         self.quality = goodness_of_fit(self.bootstrap)
         self.floor = self.quality.floor
         self.region = confidence_region(
