@@ -1,4 +1,4 @@
-"""Warnings of a calibration: at the ends of the search, at the wall, and of the own flow."""
+"""Warnings of a calibration: the end of the search, contacts with the wall, the own flow."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ class Estimation:
         Mean of distance over floor in the even blocks of time, of each answer.
     known : Determination or None
         How well the parameters are determined; None where the second stage does not count.
-    held_out : Judged
+    held_out : HeldOutScore
         The answer for the even blocks, judged on the odd ones.
     """
 
