@@ -230,7 +230,7 @@ class ModelComparisonWork:
 
 
 def _specification(work: CalibrationWork | ModelComparisonWork) -> dict[str, Any]:
-    """Return what determines the numbers of both, beside their models."""
+    """Return what determines the numbers of either, but for the models."""
     return {
         "study": work.study.to_dict(),
         "body": work.body,
