@@ -142,11 +142,11 @@ class FoundRun:
 
         if "study" in self.found.attrs:
             return parse_study(self.found.attrs["study"], source=f"{self.file}: its study")
-        stored = {} if self.folder is None else read_manifest(self.folder / MANIFEST_FILE)
-        if not isinstance(stored.get("study"), Mapping):
+        stored = self._manifest.get("study")
+        if not isinstance(stored, Mapping):
             raise InputError(f"{self.name} does not hold the study that it used")
         try:
-            return Study(**stored["study"])
+            return Study(**stored)
         except (ConfigurationError, ValueError, TypeError) as error:
             raise InputError(f"{self.name}: its manifest holds no study of this version") from error
 
@@ -287,10 +287,13 @@ class FoundRun:
         return None if self.folder is None else run_file(self.folder, name)
 
     @property
+    def _manifest(self) -> Mapping[str, Any]:
+        return {} if self.folder is None else read_manifest(self.folder / MANIFEST_FILE)
+
+    @property
     def _specification(self) -> dict[str, Any]:
         """Everything that determined the numbers of the run; empty where nothing says it."""
-        stored = {} if self.folder is None else read_manifest(self.folder / MANIFEST_FILE)
-        found = stored.get("specification")
+        found = self._manifest.get("specification")
         return dict(found) if isinstance(found, Mapping) else {}
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.random_streams import Purpose
 from driftwalk.schema.kinds.flow import flow_series_words
@@ -17,8 +18,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
-
-Floats = npt.NDArray[np.float64]
 
 
 class SeriesPolicy(NamedTuple):

@@ -1,14 +1,29 @@
-"""Evidence ranking: which of the models that distances leave tied the summaries speak for."""
+"""Model evidence from summaries of the motion ranks the models that distances leave tied."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.calibration.held_out.candidates import Candidate
-from driftwalk.calibration.held_out.held_out_score import HeldOutScore, without_error
+from driftwalk.calibration.estimation.estimate import find_optima
+from driftwalk.calibration.estimation.gauss_newton import GAUSS_NEWTON, simulations_of
+from driftwalk.calibration.estimation.label_switching import label_order
+from driftwalk.calibration.estimation.regression_abc import REGRESSION
+from driftwalk.calibration.estimation.summary_objective import SummaryObjective
+from driftwalk.calibration.estimation.synthetic_likelihood import (
+    SIMULATIONS,
+    synthetic_likelihood_at,
+)
+from driftwalk.calibration.evolution import Tell, rounded
+from driftwalk.calibration.held_out.candidates import Candidate, with_contact_clearance
+from driftwalk.calibration.held_out.held_out_score import HeldOutScore, even_blocks
+from driftwalk.calibration.held_out.recorded import RecordedMotion
+from driftwalk.core.arrays import Floats
+from driftwalk.core.processors import one_blas_thread
+from driftwalk.sweep import Store
 
 
 class EvidencePolicy(NamedTuple):
@@ -86,8 +101,8 @@ def shortlist_models(entries: Sequence[Candidate], held_out: Sequence[HeldOutSco
     closest = held_out[able[0]]
 
     def is_tied(k: int) -> bool:
-        error = without_error(held_out[k].without - closest.without)
-        return held_out[k].score - closest.score <= EVIDENCE.tied_sigmas * error
+        difference, error = held_out[k].behind(closest)
+        return difference <= EVIDENCE.tied_sigmas * error
 
     tied = [k for k in able if is_tied(k)]
     behind = [k for k in able if not is_tied(k)]
@@ -152,3 +167,74 @@ def ranking_sentence(
     if others:
         sentence += f"; less likely are {', '.join(discrepancies[k] for k in others)}"
     return sentence
+
+
+def most_settings(parameters: int, replicates: int) -> int:
+    """Return how many settings `estimate_evidence` simulates at most."""
+    narrow = EVIDENCE.starts * simulations_of(parameters)[0] * GAUSS_NEWTON.most_rounds
+    return REGRESSION.most_simulations + narrow + SIMULATIONS + replicates
+
+
+@one_blas_thread()
+def estimate_evidence(
+    entry: Candidate,
+    motion: RecordedMotion,
+    answer: Floats,
+    *,
+    executor: Executor | None,
+    store: Store | None,
+    tell: Tell,
+) -> Evidence:
+    """Match the summaries of a recording with a model, and say how well that went."""
+    entry = entry._replace(model=with_contact_clearance(entry.model, motion))
+    parameters, replicates = len(entry.ranges), motion.replicates
+    objective = SummaryObjective(
+        even_blocks(entry, motion),
+        motion,
+        store=store,
+        executor=executor,
+        tell=tell,
+        most=most_settings(parameters, replicates),
+    )
+    simulate = _Blurred(objective, motion.seed)
+    order = label_order(entry)
+    optima = find_optima(
+        simulate,
+        parameters,
+        lambda: answer[None],
+        order=order,
+        seed=motion.seed,
+        hopeless=EVIDENCE.hopeless,
+        give_up=EVIDENCE.hopeless,
+    )
+    best = optima[0].solution
+    found = synthetic_likelihood_at(
+        lambda settings: simulate(settings)[:, 0],
+        objective.recorded[0],
+        rounded(np.clip(best.setting, 0.0, 1.0)),
+        replicates,
+    )
+    return Evidence(
+        discrepancy=found.discrepancy,
+        median_discrepancy=float(np.median(found.own_discrepancies)),
+        upper_discrepancy=float(np.quantile(found.own_discrepancies, EVIDENCE.typical_quantile)),
+        # Laplace's approximation, with a prior that is even over the ranges.
+        deviance=found.discrepancy
+        + found.log_variance
+        - best.log_volume
+        - parameters * float(np.log(2.0 * np.pi)),
+    )
+
+
+class _Blurred:
+    """Simulates and summarises as an objective does, and adds noise of its own."""
+
+    def __init__(self, objective: SummaryObjective, seed: int) -> None:
+        self.recorded = objective.recorded
+        self._objective, self._seed = objective, seed
+
+    def __call__(self, settings: Floats, *, parts: int = 1) -> Floats:
+        """Return the summaries of settings, shape (settings, parts, summaries)."""
+        random = np.random.default_rng([self._seed, self._objective.done])
+        found = self._objective(settings, parts=parts)
+        return found + EVIDENCE.blur * random.standard_normal(found.shape)

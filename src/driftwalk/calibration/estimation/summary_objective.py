@@ -9,11 +9,9 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from driftwalk.calibration.evolution import AspectObjective, wall_distance
-from driftwalk.calibration.evolution.search import Tell
+from driftwalk.calibration.evolution import AspectObjective, Tell, wall_distance
 from driftwalk.calibration.held_out.recorded import RecordedMotion
-from driftwalk.calibration.summaries.displacements import SummaryPlan, plan_summaries
-from driftwalk.calibration.summaries.statistics import summarise
+from driftwalk.calibration.summaries import SummaryPlan, plan_summaries, summarise
 from driftwalk.comparison.aspects import block_of
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.processors import map_in_threads, one_blas_thread
@@ -69,7 +67,12 @@ class SummaryObjective:
     ) -> None:
         self.worlds, self.store, self.tell, self.most = worlds, store, tell, most
         self._executor = executor
-        self._cameras = _cameras(worlds, motion.noises)
+        # Units of an executor have one thread each.
+        like = worlds.like if executor is None else replace(worlds.like, threads=1)
+        self._cameras = [
+            replace(worlds, like=replace(like, camera=replace(like.camera, position_noise=noise)))
+            for noise in motion.noises
+        ]
         self.done = 0
 
         def all_of(time: Floats) -> Bools:
@@ -97,7 +100,7 @@ class SummaryObjective:
             )
             for at in range(0, len(settings), AT_ONCE)
         ]
-        function = _Summaries(self._cameras_of_units(), self.plans[:parts])
+        function = _Summaries(self._cameras, self.plans[:parts])
 
         def say(done: int, _: int) -> None:
             self.tell(first + done, self.most)
@@ -107,12 +110,6 @@ class SummaryObjective:
         ]
         self.done += len(settings)
         return np.asarray(found)
-
-    def _cameras_of_units(self) -> list[AspectObjective]:
-        """Return the cameras, with one thread where an executor has many units."""
-        if self._executor is None:
-            return self._cameras
-        return [replace(one, like=replace(one.like, threads=1)) for one in self._cameras]
 
 
 @dataclass(frozen=True)
@@ -145,12 +142,3 @@ class _Summaries:
             here = settings[at : at + ALIKE]
             parts.append(camera.simulated(here, 1, stage="estimation", first=first + at))
         return Worlds(*map(np.concatenate, zip(*parts, strict=True)))
-
-
-def _cameras(worlds: AspectObjective, noises: Sequence[float]) -> list[AspectObjective]:
-    """Return the conditions of simulations in turn: cameras with these noises [m]."""
-    like = worlds.like
-    return [
-        replace(worlds, like=replace(like, camera=replace(like.camera, position_noise=noise)))
-        for noise in noises
-    ]

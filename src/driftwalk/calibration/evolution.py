@@ -1,22 +1,131 @@
-"""Search for the smallest mean of a noisy score over several parameters.
+"""Evolutionary search for the smallest mean of a noisy score over several parameters.
 
 A Sobol' design finds the neighbourhoods, CMA-ES (covariance matrix adaptation; Hansen and
 Ostermeier, Evol. Comput. 9 (2001) 159) goes down from the best few, and once more, longer, from the
 best end. Each evaluation has fresh random numbers, so the luckiest one says little: the best means
 are evaluated again with numbers of their own, and the answer is the best of these.
+
+The score of a motion model is its mean distance from a recording, in all aspects of its motion,
+over the recording's own floors.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Final, NamedTuple
 
 import numpy as np
 
+from driftwalk.comparison.aspects import (
+    Aspect,
+    AspectPlan,
+    AspectReference,
+    WallDistance,
+    form_aspects,
+)
+from driftwalk.conditions import Conditions
 from driftwalk.core.arrays import Floats
+from driftwalk.core.processors import map_in_threads
+from driftwalk.core.random_streams import trial_in
 from driftwalk.core.run_stages import tell_nobody
+from driftwalk.core.seeds import world_keys
+from driftwalk.motion import MotionModel, Worlds
+from driftwalk.motion.score import broken_worlds
+from driftwalk.schema import Parameter
+from driftwalk.simulation.backend import wall_edges
 from driftwalk.sweep import Store, WorkUnit, run_sweep
+
+
+@dataclass(frozen=True, eq=False)
+class AspectObjective:
+    """The mean of distance over floor, as `search_minimum` wants it.
+
+    Attributes
+    ----------
+    model : MotionModel
+        What is simulated.
+    ranges : tuple of Parameter
+        Its parameters with the ranges of the search; the unit cube is their coordinates.
+    like : Conditions
+        The conditions of the recording.
+    plan : AspectPlan
+        How a world shows its aspects.
+    reference : AspectReference
+        The recording's.
+    seed : int
+        Seed of the worlds.
+    """
+
+    model: MotionModel
+    ranges: tuple[Parameter, ...]
+    like: Conditions
+    plan: AspectPlan
+    reference: AspectReference
+    seed: int
+
+    def __call__(self, settings: Floats, first: int, replicates: int) -> Floats:
+        """Return the mean score of each setting, shape (settings,)."""
+        distances = self.distances(settings, replicates, stage="evolution", first=first)
+        return np.asarray(self.reference.overall(distances).mean(axis=1))
+
+    def distances(self, settings: Floats, replicates: int, *, stage: str, first: int = 0) -> Floats:
+        """Return the distance of every world, shape (settings, replicates, aspects).
+
+        A world that lost its numbers is as far as can be, 1.
+        """
+        seen = self.simulated(settings, replicates, stage=stage, first=first)
+        found = self.reference.distances(self.aspects(seen), threads=self.like.threads)
+        found[broken_worlds(seen.status)] = 1.0
+        return found.reshape(len(settings), replicates, -1)
+
+    def simulated(self, settings: Floats, replicates: int, *, stage: str, first: int = 0) -> Worlds:
+        """Return simulated worlds, replicates fastest."""
+        trial = trial_in(stage, np.arange(first, first + len(settings)))
+        keys = world_keys(
+            self.seed, trial=trial[:, None], replicate=np.arange(replicates)[None, :]
+        ).ravel()
+        values = {
+            name: np.repeat(column, replicates) for name, column in self.values(settings).items()
+        }
+        return self.model.simulate(values, self.like, keys)
+
+    def aspects(self, seen: Worlds) -> list[Sequence[Aspect]]:
+        """Return the aspects of worlds."""
+        wall = wall_distance(self.like)
+
+        def one(world: tuple[Floats, Floats]) -> Sequence[Aspect]:
+            return form_aspects(self.plan, *world, wall=wall)
+
+        return map_in_threads(one, zip(seen.x, seen.y, strict=True), self.like.threads)
+
+    def values(self, settings: Floats) -> dict[str, Floats]:
+        """Return the values of the parameters at points of the unit cube."""
+        columns = np.atleast_2d(settings).T
+        return {
+            one.name: one.value_at(column) for column, one in zip(columns, self.ranges, strict=True)
+        }
+
+
+def wall_distance(like: Conditions) -> WallDistance:
+    """Return the function that gives a point's distance from the wall of a recording [m].
+
+    It pickles.
+    """
+    radius = like.tank.radius_m
+    if radius is not None:
+        return partial(_from_circle, radius)
+    return partial(_from_edges, wall_edges(like.tank))
+
+
+def _from_circle(radius: float, x: Floats, y: Floats) -> Floats:
+    return np.asarray(radius - np.hypot(x, y))
+
+
+def _from_edges(edges: Floats, x: Floats, y: Floats) -> Floats:
+    return np.asarray(np.min([far - nx * x - ny * y for nx, ny, far in edges], axis=0))
+
 
 Objective = Callable[[Floats, int, int], Floats]
 """Settings in the unit cube (n, parameters), number of the first evaluation, replicates: (n,)."""
@@ -157,37 +266,34 @@ def search_minimum(
     return _Search(objective, parameters, budget or Budget(), seed, tell or tell_nobody).run()
 
 
+@dataclass
 class _Search:
-    def __init__(
-        self, objective: Objective, parameters: int, budget: Budget, seed: int, tell: Tell
-    ) -> None:
-        self.objective, self.parameters, self.budget = objective, parameters, budget
-        self.seed, self.tell = seed, tell
-        self.done = 0
-        self.most = budget.evaluations(parameters)
+    objective: Objective
+    parameters: int
+    budget: Budget
+    seed: int
+    tell: Tell
+    done: int = 0
+    """Settings evaluated so far: they are the addresses of the next random numbers."""
 
     def run(self) -> SearchResult:
         """Search, and test again."""
-        design = self._design()
+        from scipy.stats import qmc
+
+        design = rounded(qmc.Sobol(self.parameters, seed=self.seed).random(self.budget.design))
         scores = self._scores(design, self.budget.replicates)
         starts = self._apart(design, scores)
         optima = [
             self._evolve(start, 0.12, self.budget.short, number)
             for number, start in enumerate(starts, 1)
         ]
-        first = self._retest(np.array(optima))
+        first = self._scores(np.array(optima), self.budget.retest)
         long = self._evolve(optima[int(first.argmin())], 0.06, self.budget.long, 0)
-        last = self._retest(long[None])
+        last = self._scores(long[None], self.budget.retest)
         means = np.array([*optima, long])
         found = np.array([*first, *last])
         best = int(found.argmin())
         return SearchResult(means[best], float(found[best]), found, self.done, means)
-
-    def _design(self) -> Floats:
-        from scipy.stats import qmc
-
-        engine = qmc.Sobol(self.parameters, seed=self.seed)
-        return _rounded(engine.random(self.budget.design))
 
     def _apart(self, design: Floats, scores: Floats) -> list[Floats]:
         """Return the best settings of the design that are not close to each other."""
@@ -219,22 +325,20 @@ class _Search:
         for _ in range(generations):
             if evolution.should_stop():
                 break
-            settings = _rounded(np.array([evolution.ask() for _ in range(size)]))
+            settings = rounded(np.array([evolution.ask() for _ in range(size)]))
             scores = self._scores(settings, self.budget.replicates)
             evolution.tell(
                 [(one, float(score)) for one, score in zip(settings, scores, strict=True)]
             )
-        return _rounded(np.clip(evolution.mean, 0.0, 1.0))
-
-    def _retest(self, means: Floats) -> Floats:
-        return self._scores(means, self.budget.retest)
+        return rounded(np.clip(evolution.mean, 0.0, 1.0))
 
     def _scores(self, settings: Floats, replicates: int) -> Floats:
         scores = self.objective(settings, self.done, replicates)
         self.done += len(settings)
-        self.tell(self.done, self.most)
+        self.tell(self.done, self.budget.evaluations(self.parameters))
         return np.asarray(scores)
 
 
-def _rounded(settings: Floats) -> Floats:
-    return np.asarray(np.round(settings / RESOLUTION) * RESOLUTION)
+def rounded(values: Floats) -> Floats:
+    """Return multiples of a small number: last bits of linear algebra differ between machines."""
+    return np.asarray(np.round(values / RESOLUTION) * RESOLUTION)
