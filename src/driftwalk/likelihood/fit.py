@@ -172,6 +172,9 @@ def fit_motion(
     )
     shares = visited_shares(fit)
     warnings = _warnings(many, ready, facts, whiteness, shares, chosen, body)
+    if law.left_out:
+        beside = " and ".join(law.left_out)
+        warnings.append(f"the search for {beside} has no solution and was left out")
     return described(
         fit.assign(visited_share=((), min(shares))).assign_coords(
             warning=("warning", texts(warnings))

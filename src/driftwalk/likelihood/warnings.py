@@ -139,8 +139,11 @@ def _on_the_search(facts: Mapping[str, Any]) -> list[str]:
         )
     elif is_open(facts, "drag_coefficient"):
         found.append(
-            "the recording says less of C_d than the fit assumes of it beforehand (0.5, within a "
-            "factor of two): it does not determine C_d"
+            "the drag is linear within its uncertainty: the recording does not determine C_d, that "
+            "of the quadratic part alone"
+            if facts.get("drag_law") == "mixed"
+            else "the recording says less of C_d than the fit assumes of it beforehand (0.5, "
+            "within a factor of two): it does not determine C_d"
         )
     if facts["restricted"] == "no":
         found.append(
@@ -182,8 +185,8 @@ def _on_the_turning(facts: Mapping[str, Any], side_m: float) -> list[str]:
     apart = facts.get("angle_disagreement_std", 0.0)
     if math.isnan(apart):
         found.append(
-            "the fit with the angle as an input has no solution and was left out: whether the "
-            "turning of the block and its motion follow one drag law is not known"
+            "the fit with the angle as an input has no solution, or does not determine C_d, and was "
+            "left out: whether the turning of the block and its motion follow one drag law is not known"
         )
     if apart > WARNING.disagreement_stds:
         found.append(

@@ -83,6 +83,7 @@ def estimate_wall(
     0
     """
     unknown = undetermined(fit)
+    # Recordings of another fit are the user's mistake, and no breakdown.
     estimate = None if unknown else estimate_of(fit, recordings, body=body)
     # An earlier estimate may have left some.
     earlier = [f"{one.name}{end}" for one in WALL_NUMBERS for end in ("", "_interval")]
@@ -92,12 +93,12 @@ def estimate_wall(
         return fit.assign_attrs(wall_left_out=_stands_on(unknown))
     if fit.attrs["angle"] != "state":
         return fit.assign_attrs(wall_left_out=_no_orientation(fit.attrs["angle"]))
-    found = [passages_of(estimate, one) for one in estimate.passes.series]
-    count = sum(len(one.x) for one in found)
-    fit = described(fit.assign(wall_contacts=((), np.int64(count))))
-    if count < CONTACT.fewest:
-        return fit.assign_attrs(wall_left_out=_too_few(count))
     try:
+        found = [passages_of(estimate, one) for one in estimate.passes.series]
+        count = sum(len(one.x) for one in found)
+        fit = described(fit.assign(wall_contacts=((), np.int64(count))))
+        if count < CONTACT.fewest:
+            return fit.assign_attrs(wall_left_out=_too_few(count))
         data = _answer(fit, estimate, found, seed=seed, tell=tell or tell_nobody)
     except BREAKDOWN as error:
         return fit.assign_attrs(wall_left_out=f"the estimate of the wall failed: {error}")

@@ -139,10 +139,10 @@ def _under(estimate: Estimate, floating: bool, drag: str, *, passed: Passed) -> 
     training = replace(passes, series=[one.part(0, _training(one)) for one in passes.series])
     start = _start(estimate.point, floating=floating, drag=drag)
     search = ModeSearch(training, prior, estimate.study.fit.iterations, passed)
-    mode = search.find(start, estimate.weights)
-    if mode is None:
-        return None
     try:
+        mode = search.find(start, estimate.weights)
+        if mode is None:
+            return None
         with np.errstate(all="ignore"):
             scores = _scores(passes, mode.point)
             if not np.isfinite(scores).any():
