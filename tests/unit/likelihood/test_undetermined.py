@@ -21,7 +21,7 @@ from driftwalk.likelihood.check import run
 from driftwalk.likelihood.contacts import estimate as wall
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.interval_inflation import parameter_facts
-from driftwalk.likelihood.law.forward_selection import ForwardSelection
+from driftwalk.likelihood.law.forward_selection import ForwardSelection, LawResult
 from driftwalk.likelihood.law.search import LawSearch
 from driftwalk.likelihood.newton import Mode, ModeSearch, require_mode
 from driftwalk.notebook.result import answer_lines
@@ -176,24 +176,26 @@ BROKEN = [
 
 
 @pytest.mark.parametrize("error", BROKEN)
-def test_every_search_beside_the_law_may_break_down_alone(error: Any, monkeypatch: Any) -> None:
-    """Departures and the other law: each is left out with a word."""
-
-    def breaks(*given: Any, **options: Any) -> None:
+def test_every_search_beside_the_law_may_break_down_alone(error: Any) -> None:
+    def breaks() -> LawResult:
         raise error
 
-    track, study = recording(20.0), coarse_study()
-    alone = dw.fit_motion(track, study, angle="given")
-    for owner, name in (
-        (ForwardSelection, "select"),
-        (LawSearch, "_reconsidered"),
-        (LawSearch, "_compared"),
-    ):
-        with monkeypatch.context() as patch:
-            patch.setattr(LawSearch, "_is_doubted", lambda *given: True)
-            patch.setattr(owner, name, breaks)
-            left_out = dw.fit_motion(track, study, angle="given")
-        assert np.isfinite(left_out["estimate"]).all(), name
-        assert left_out["estimate"].sizes == alone["estimate"].sizes
-        said = [one for one in sentences(left_out, "warning") if "was left out" in one]
-        assert any("the search for" in one for one in said), name
+    search = object.__new__(LawSearch)
+    law = LawResult(None, None, False, {}, math.inf, None)  # type: ignore[arg-type]
+    for what in ("departures from it", "the other law"):
+        law = search._beside(law, what, breaks)
+    assert law.left_out == ("departures from it", "the other law")
+    other = replace(law, floating=True, left_out=())
+    found = search._beside(law, "another power of the drag", lambda: other)
+    assert (found.floating, found.left_out) == (True, law.left_out)
+
+
+def test_a_fit_without_its_departures_says_so(monkeypatch: Any) -> None:
+    def breaks(*given: Any) -> None:
+        raise OverflowError("math range error")
+
+    monkeypatch.setattr(ForwardSelection, "select", breaks)
+    found = dw.fit_motion(recording(15.0), coarse_study(), angle="given")
+    assert np.isfinite(found["estimate"]).all()
+    said = " ".join(sentences(found, "warning"))
+    assert "the search for departures from it has no solution and was left out" in said
