@@ -79,7 +79,9 @@ class LawSearch:
         found = self._beside(base, "departures from it", lambda: self.selection.select(base))
         if "drag_power" in self.assumptions.tried and self._turns_by_itself(base.mode):
             found = self._beside(
-                found, "another power of the drag", lambda: self._powered(base, found, start, weights)
+                found,
+                "another power of the drag",
+                lambda: self._powered(base, found, start, weights),
             )
         return self._beside(found, "the other law", lambda: self._reconsidered(found, start))
 
