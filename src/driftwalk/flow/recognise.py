@@ -10,7 +10,7 @@ from driftwalk.flow.readers import text
 from driftwalk.flow.readers.columns import column_of, holds_field, names_a_time
 from driftwalk.flow.readers.netcdf import holds_velocities
 from driftwalk.flow.readers.pivlab import holds_velocities as holds_pivlab, is_pivlab
-from driftwalk.flow.readers.text import TextOptions
+from driftwalk.flow.readers.text import Layout, TextOptions
 from driftwalk.flow.rows import grid_rows
 from driftwalk.schema.stores.netcdf import is_netcdf, kind_of_file, open_netcdf
 
@@ -71,7 +71,20 @@ def _text_format(path: Path) -> str | None:
     named = layout.header > 0 and {"x", "y", "u", "v"} <= {column_of(one).base for one in names}
     if named or (program.sign and holds_field(names)):
         return program.name
-    return program.name if holds_field(names) and _fills_a_grid(path) else None
+    along = holds_field(names) and _goes_along_a_line(layout)
+    return program.name if along and _fills_a_grid(path) else None
+
+
+def _goes_along_a_line(layout: Layout) -> bool:
+    """Whether the first two rows share x or y, as two nodes of a grid do that are written in order.
+
+    No more is read of the many recordings in which they do not.
+    """
+    known = [column_of(name).quantity for name in layout.names]
+    rows = [line.split(layout.delimiter) for _, line in layout.rows[:2]]
+    if len(rows) < 2 or any(len(row) < len(known) for row in rows):
+        return False
+    return any(rows[0][at] == rows[1][at] for at in (known.index("x"), known.index("y")))
 
 
 def _netcdf_format(path: Path) -> str | None:

@@ -226,6 +226,14 @@ def test_other_names_with_units_in_the_name_or_under_it(
     check(load_flow(path), scale=1e-3, speed=1e-2)
 
 
+def test_shifts_in_millimetres(tmp_path: Path) -> None:
+    head = "sep=,\nx [mm],y [mm],dx [mm/frame],dy [mm/frame]\n"
+    path = written(tmp_path / "field.csv", head, [list(one[:4]) for one in nodes()])
+    check(load_flow(path, frame_interval=0.01), scale=1e-3, speed=0.1, lost=False)
+    with pytest.raises(InputError, match="give `frame_interval`"):
+        load_flow(path)
+
+
 def test_columns_that_nobody_knows_are_named(tmp_path: Path) -> None:
     rows = [["a", x, y, u, v, int(not lost)] for x, y, u, v, lost in nodes()]
     path = written(tmp_path / "field.csv", "# campaign 3\nArt,Ost,Nord,Vo,Vn,valid\n", rows)

@@ -188,7 +188,7 @@ def layout_of(text: str, options: TextOptions, path: Path) -> Layout:
         for delimiter in _tried(options):
             names = _names(line, delimiter)
             if holds_field(names) or _are_there(options.columns, names):
-                above = any(not one.lstrip().startswith("#") for _, one in lines[:at])
+                above = any(not one.lstrip().startswith(("#", "sep=")) for _, one in lines[:at])
                 own = program
                 bare = above or line.lstrip().startswith("#") or not holds_field(names)
                 if program is PLAIN and bare:

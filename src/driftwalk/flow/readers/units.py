@@ -99,6 +99,8 @@ class FieldScale:
             known = stated if stated == "px" else f"{stated}/s"
         if known in _SHIFTS:
             return self._metres_per_pixel() / self._frame_interval()
+        if known.endswith("/frame"):
+            return self.length(known.removesuffix("/frame")) / self._frame_interval()
         if known.startswith("px"):
             return self._metres_per_pixel() * _parse(f"m{known.removeprefix('px')}", "m/s")
         return _parse(known, "m/s")
