@@ -185,8 +185,9 @@ def _on_the_turning(facts: Mapping[str, Any], side_m: float) -> list[str]:
     apart = facts.get("angle_disagreement_std", 0.0)
     if math.isnan(apart):
         found.append(
-            "the fit with the angle as an input has no solution, or does not determine C_d, and was "
-            "left out: whether the turning of the block and its motion follow one drag law is not known"
+            "the fit with the angle as an input has no solution, or does not determine C_d, and "
+            "was left out: whether the turning of the block and its motion follow one drag law is "
+            "not known"
         )
     if apart > WARNING.disagreement_stds:
         found.append(

@@ -52,7 +52,7 @@ MISSING: Final = frozenset(
 
 
 class Column(NamedTuple):
-    """What the name of a column says."""
+    """Quantity and unit in the name of a column."""
 
     quantity: str
     """x, y, u or v; ``""`` for any other."""

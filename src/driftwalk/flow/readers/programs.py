@@ -19,7 +19,7 @@ _HEAD: Final = 1 << 14
 
 @dataclass(frozen=True)
 class Program:
-    """What a program does not say in the names of its columns."""
+    """Facts on a program that the names of its columns leave out."""
 
     name: str
     title: str

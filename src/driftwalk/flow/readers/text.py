@@ -36,7 +36,7 @@ _MOST_HEAD: Final = 200
 
 @dataclass(frozen=True)
 class TextOptions:
-    """What the user says of a text."""
+    """Columns and header of a text, stated by the user."""
 
     columns: Mapping[str, str] = field(default_factory=dict)
     """Name or number (from 1) of the columns of x, y, u, v; ``":unit"`` may follow."""

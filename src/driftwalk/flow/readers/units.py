@@ -31,7 +31,7 @@ class RawField:
     notes: list[str] = field(default_factory=list)
     """Sentences for the person who loads the file."""
     reading: str = ""
-    """What was taken for what, in a line."""
+    """Meaning of the columns, in a line."""
 
 
 @dataclass(frozen=True)
@@ -164,7 +164,7 @@ class SiRows(NamedTuple):
     notes: list[str]
     """Sentences for the person who loads the file."""
     reading: str
-    """What was taken for what, and how y counts, in a line."""
+    """Meaning of the columns, and direction of y, in a line."""
 
 
 def raw_to_si(raw: RawField, options: FieldOptions) -> SiRows:

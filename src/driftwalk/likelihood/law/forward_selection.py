@@ -78,7 +78,7 @@ class LawResult:
     tests: ScoreTests | None
     """The last score tests of closed numbers; None where they broke down."""
     left_out: tuple[str, ...] = ()
-    """What was searched beside the law and broke down, in words."""
+    """Further searches that broke down, in words."""
 
 
 def least_effects(side: float) -> dict[str, float]:

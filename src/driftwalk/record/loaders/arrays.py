@@ -86,7 +86,7 @@ def _of_array(path: Path, options: ReadOptions) -> RawRecording:
 
 
 def _of_arrays(variables: dict[str, Value], path: Path, options: ReadOptions) -> RawRecording:
-    """Return the recording of arrays by name, at the rate of frames that stands beside them."""
+    """Return the recording of arrays by name, at the frame rate that the file holds."""
     tables = matlab_tables(variables, path)
     recording = recording_of(the_one_that_fits(tables, options, path, "array"), options)
     rates = [value for name, value in variables.items() if name.lower() in _RATES]

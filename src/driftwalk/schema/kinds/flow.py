@@ -46,7 +46,9 @@ FLOW_FIELD: Final = Kind(
         Attribute("arena", "object", ARENA.meaning, "the tank is known"),
         Attribute("parameters", "object", "parameters of the formula", "made from a formula"),
         Attribute("source", "text", SOURCE.meaning, "made from a file or a recording"),
-        Attribute("reading", "text", "what was taken for what", "read from a file"),
+        Attribute(
+            "reading", "text", "meaning of the columns, direction of y", "read from a file"
+        ),
         Attribute("inertia", "text", "how the body's inertia was corrected", _BODY),
         Attribute("window_s", "number", "time over which derivatives are taken", _BODY),
         Attribute("min_count", "number", "samples that make a cell a measured one", _RECORDED),
