@@ -73,8 +73,8 @@ def block_permutation_test(
     """Test whether two serially correlated series of points have one distribution.
 
     This is the p-value of `ks_distance`. Both series are cut into blocks, the blocks are shuffled,
-    and D is computed each time; p = (1 + #{D_permuted >= D}) / (1 + permutations), integers compared. Incomplete blocks at the
-    ends are left out of the test.
+    and D is computed each time; p = (1 + #{D_permuted >= D}) / (1 + permutations), integers
+    compared. Incomplete blocks at the ends are left out of the test.
 
     Parameters
     ----------
