@@ -13,6 +13,7 @@ from command_line import here
 
 from driftwalk.core.errors import InputError
 from driftwalk.flow import flow_format, load_flow
+from driftwalk.flow.readers.columns import column_of
 from driftwalk.schema import FLAGS
 
 NX, NY = 5, 4
@@ -214,6 +215,8 @@ def test_the_piv_plugin_of_imagej(tmp_path: Path, flag: int) -> None:
         ("x position,y position,u velocity,v velocity", "(mm),(mm),(cm/s),(cm/s)"),
         ("x_mm,y_mm,u_cm_s,v_cm_s", ""),
         ("Position X [mm],Position Y [mm],Vel. X [cm/s],Vel. Y [cm/s]", ""),
+        ("X-Koordinate,Y-Koordinate,Geschwindigkeit u,Geschwindigkeit v", "mm,mm,cm/s,cm/s"),
+        ("position x [mm],position y [mm],vitesse x [cm/s],vitesse y [cm/s]", ""),
     ],
 )
 def test_other_names_with_units_in_the_name_or_under_it(
@@ -232,6 +235,24 @@ def test_shifts_in_millimetres(tmp_path: Path) -> None:
     check(load_flow(path, frame_interval=0.01), scale=1e-3, speed=0.1, lost=False)
     with pytest.raises(InputError, match="give `frame_interval`"):
         load_flow(path)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "velocity magnitude",
+        "std u",
+        "dudx",
+        "vorticity",
+        "w [m/s]",
+        "x y",
+        "mean x",
+        "V_z",
+        "x_std",
+    ],
+)
+def test_what_is_no_component_of_the_velocity(name: str) -> None:
+    assert column_of(name).quantity not in ("u", "v")
 
 
 def test_columns_that_nobody_knows_are_named(tmp_path: Path) -> None:

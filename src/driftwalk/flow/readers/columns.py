@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
 from collections.abc import Callable, Mapping, Sequence
 from typing import Final, NamedTuple
 
@@ -15,24 +16,24 @@ from driftwalk.core.errors import InputError
 Array = npt.NDArray[np.float64]
 
 FIELD: Final = ("x", "y", "u", "v")
-_POSITION: Final = ("{}", "pos {}", "{} pos", "position {}", "{} position", "coordinate {}",
-                    "{} coordinate", "{}pos", "pos{}")  # fmt: skip
-_VELOCITY: Final = ("velocity {}", "{} velocity", "vel {}", "{} vel", "vel{}", "v {}", "v{}",
-                    "u {}", "u{}", "d{}", "displacement {}", "{} displacement", "shift {}",
-                    "{} component", "u{}1")  # fmt: skip
-_NAMES: Final[dict[str, str]] = {
-    **{form.format(axis): axis for axis in "xy" for form in _POSITION},
-    **{
-        form.format(name): quantity
-        for quantity, names in (("u", "ux"), ("v", "vy"))
-        for name in names
-        for form in _VELOCITY
-        if form.format(name) not in ("uu", "vv", "vu", "uv", "u v", "v u", "du", "dv")
-    },
-    "u": "u",
-    "v": "v",
-}
-"""From what a program calls a column to the quantity in it."""
+_FILLERS: Final = frozenset({"mean", "avg", "average"})
+"""Words that leave a quantity what it is."""
+_PLACES: Final = frozenset(
+    ("position", "pos", "coordinate", "coord", "posizione", "posicion", "koordinate", "coordonnee")
+)
+"""Words next to x and y that name a position."""
+_VELOCITIES: Final = frozenset(
+    ("velocity", "vel", "component", "displacement", "shift", "geschwindigkeit", "komponente")
+) | frozenset(
+    ("verschiebung", "vitesse", "composante", "deplacement", "velocidad", "velocita", "componente")
+)
+"""Words next to u and v, or x and y, that name a velocity."""
+_SYMBOLS: Final = {
+    **dict.fromkeys(("u", "ux", "vx", "dx", "ux1", "velx"), "u"),
+    **dict.fromkeys(("v", "uy", "vy", "dy", "uy1", "vely"), "v"),
+    **{f"{before}{axis}{after}": axis for axis in "xy" for before, after in
+       (("", ""), ("pos", ""), ("", "pos"))},
+}  # fmt: skip
 
 _MARKS: Final[dict[str, Callable[[Array], npt.NDArray[np.bool_]]]] = {
     **dict.fromkeys(("flags", "mask", "status"), lambda mark: mark == 0.0),
@@ -92,11 +93,28 @@ def column_of(name: str) -> Column:
         return Column(text if known else "", f"{unit}{over}", text)
     while (match := _BRACKET.fullmatch(text)) is not None:
         text, unit = match[1], unit or match[2]
-    base = " ".join(re.split(r"[\s_.-]+", text.lower())).strip()
+    words = [one for one in re.split(r"[\s_.:-]+", _plain(text)) if one]
+    base = " ".join(words)
+    # "U pix[pix]" has its unit twice.
+    quantity = _quantity([one for one in words if not (unit and one == unit.lower())])
     first, _, rest = text.partition(" ")
-    if base not in _NAMES and not unit and first.lower() in FIELD:
+    if not quantity and not unit and first.lower() in FIELD:
         return Column(first.lower(), rest.strip(), first.lower())
-    return Column(_NAMES.get(base, ""), unit, base)
+    return Column(quantity, unit, base)
+
+
+def _plain(text: str) -> str:
+    """Return a text in small letters without accents."""
+    return "".join(one for one in unicodedata.normalize("NFKD", text.lower()) if one.isascii())
+
+
+def _quantity(words: Sequence[str]) -> str:
+    """Return the quantity that words name, ``""`` for any other."""
+    left = [word for word in words if word not in _FILLERS | _PLACES | _VELOCITIES]
+    found = _SYMBOLS.get("".join(left), "") if len(left) <= 2 else ""
+    if found in ("x", "y") and set(words) & _VELOCITIES:
+        return {"x": "u", "y": "v"}[found] if not set(words) & _PLACES else ""
+    return found
 
 
 def holds_field(names: Sequence[str]) -> bool:
