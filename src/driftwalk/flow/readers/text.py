@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -226,13 +227,12 @@ def _under(lines: Lines, at: int, delimiter: str | None, program: Program) -> La
     rest = [one for one in lines[at + 1 :] if not one[1].lstrip().startswith("#")]
     if rest and delimiter is not None and delimiter not in rest[0][1]:
         delimiter = None
-    units = _split(rest[0][1], delimiter) if rest else []
-    numeric = [number(one, comma=delimiter != ",") for one in units]
-    bare = [one.strip().strip("[]()") for one in units]
-    if len(rest) > 1 and len(units) == len(names) and _are_units(bare, numeric, rest[1][1]):
+    units = [one.strip().strip("[]()") for one in _split(rest[0][1], delimiter)] if rest else []
+    below = _split(rest[1][1], delimiter) if len(rest) > 1 else []
+    if len(units) == len(names) and _are_units(units, below, comma=delimiter != ","):
         names = [
             f"{name} [{unit}]" if unit and not column_of(name).unit else name
-            for name, unit in zip(names, bare, strict=True)
+            for name, unit in zip(names, units, strict=True)
         ]
         rest = rest[1:]
     if delimiter is None and rest:
@@ -244,13 +244,14 @@ def _under(lines: Lines, at: int, delimiter: str | None, program: Program) -> La
     return Layout(program, line, names, delimiter, rest)
 
 
-def _are_units(bare: list[str], numeric: list[float | None], after: str) -> bool:
-    """Return whether a row holds units: words, and numbers follow."""
-    words = [one for one, value in zip(bare, numeric, strict=True) if value is None]
+def _are_units(row: list[str], below: list[str], *, comma: bool) -> bool:
+    """Return whether a row holds units: words and no number, and numbers follow."""
+    values = [number(one, comma=comma) for one in row]
+    numbers = [number(one, comma=comma) for one in below]
     return (
-        len(words) >= 2
-        and row_delimiter(after) is not None
-        and len(words) + sum(not one or one == "-" for one in bare) >= len(bare)
+        sum(value is None for value in values) >= 2
+        and all(value is None or math.isnan(value) for value in values)
+        and sum(value is not None and not math.isnan(value) for value in numbers) >= 2
     )
 
 
