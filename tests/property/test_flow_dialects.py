@@ -33,6 +33,7 @@ def dialect(rng: np.random.Generator, path: Path) -> tuple[dict[str, Any], Any, 
     spacing, unit = float(rng.choice([1.0, 2.5, 16.0])), str(rng.choice(list(UNITS)))
     x, y = spacing * np.arange(1, nx + 1), spacing * np.arange(1, ny + 1)
     velocity = np.round(rng.normal(size=(ny, nx, 2)), 4)
+    velocity[np.abs(velocity).max(axis=2) == 0.0] = 1.0  # 0, 0 is what DaVis writes of no vector
     lost = rng.random((ny, nx)) < rng.choice([0.0, 0.2])
     lost[0, 0] = False
     delimiter = str(rng.choice([",", ";", "\t"]))
@@ -78,7 +79,7 @@ def dialect(rng: np.random.Generator, path: Path) -> tuple[dict[str, Any], Any, 
 
 
 @pytest.mark.parametrize(
-    "count", [60, pytest.param(3000, marks=pytest.mark.slow)], ids=["some", "many"]
+    "count", [40, pytest.param(3000, marks=pytest.mark.slow)], ids=["some", "many"]
 )
 def test_random_dialects(tmp_path: Path, count: int) -> None:
     refused = 0

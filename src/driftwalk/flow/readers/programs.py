@@ -111,7 +111,10 @@ PROGRAMS: Final = (
     ),
     Program("dantec", "Dantec DynamicStudio", r">>\*HEADER\*<<|>>\*DATA\*<<|DSExport", y="up"),
     Program("tecplot", "Tecplot", r"(?i)\bVARIABLES\s*="),
-    Program("davis", "DaVis table", r"Velocity u \[", y="up", zero_is_missing=True),
+    Program(
+        *("davis", "DaVis table", r'(?m)^"?x \[\w+\]"?[;,\t]"?y \[.*Velocity u \['),
+        zero_is_missing=True,
+    ),
     Program("openpiv", "OpenPIV", r"(?i)\A\s*#\s*x\s+y\s+u\s+v\b", y="rows"),
 )
 _BY_WIDTH: Final = {
