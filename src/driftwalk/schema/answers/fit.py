@@ -161,8 +161,8 @@ def fit_json(fit: xr.Dataset, check: xr.Dataset | None = None) -> dict[str, Any]
     if check is None:
         left_out = fit.attrs.get("check_left_out")
         return shown | ({} if left_out is None else {"explained": None, "check_left_out": left_out})
-    names = ("ks_distance", "ks_noise_floor", "ks_p_value")
-    distances = {key: float(check.attrs.get(key, "nan")) for key in names}
+    measured = ("ks_distance", "ks_noise_floor", "ks_p_value")
+    distances = {key: float(check.attrs.get(key, "nan")) for key in measured}
     return {
         **shown,
         "explained": bool(check["explained"]),
