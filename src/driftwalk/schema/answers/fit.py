@@ -139,9 +139,9 @@ def _verdict(fit: xr.Dataset, check: xr.Dataset | None) -> list[Part]:
         return [*parts, Row("KS distance", f"not available: {check.attrs['ks_left_out']}")]
     far = explained and distance > FAR_ABOVE_FLOOR * floor
     more = ": far, but within the uncertainty of the fit" if far else ""
+    parts.append(Row("KS distance", f"{distance:.3f}, noise floor {floor:.3f}{more}"))
     chance = float(check.attrs.get("ks_p_value", "nan"))
-    said = f", p-value {chance:.2g}" if isfinite(chance) else ""
-    return [*parts, Row("KS distance", f"{distance:.3f}, noise floor {floor:.3f}{said}{more}")]
+    return [*parts, Row("p-value of it", f"{chance:.2g}")] if isfinite(chance) else parts
 
 
 def fit_json(fit: xr.Dataset, check: xr.Dataset | None = None) -> dict[str, Any]:
