@@ -325,3 +325,12 @@ def test_the_public_case(shared_data: Callable[[str], Path]) -> None:
     assert float(field.y.max()) < 0.0
     # The vortex turns clockwise seen from above once y counts up.
     assert float(field.v[0, -1] - field.v[0, 0]) < 0.0
+
+
+@pytest.mark.parametrize("back", [1, 2, 8, 30])
+def test_a_file_that_ends_within_a_row(tmp_path: Path, back: int) -> None:
+    path = pivlab(tmp_path / "piv.txt")
+    path.write_text(path.read_text().rstrip("\n")[:-back])
+    with pytest.raises(InputError) as caught:
+        load_flow(path, **PIXELS)
+    assert "\n" not in str(caught.value)

@@ -117,6 +117,9 @@ def read(path: Path, options: TextOptions | None = None) -> RawField:
     program, names = layout.program, layout.names
     if not layout.rows:
         raise FormatError("there is no row under the header", path=path, line=layout.header or None)
+    last, ending = layout.rows[-1]
+    if not text.endswith("\n") and not ending.split(layout.delimiter)[-1].strip():
+        raise FormatError("the file ends within a row", path=path, line=last)
     try:
         places = choose_columns(names, options.columns)
     except InputError as error:
