@@ -54,6 +54,7 @@ _NAMES = {
     "driftwalk.calibration": ("recover_model",),
     "driftwalk.comparison": (
         "ComparisonWarning",
+        "block_permutation_test",
         "compare_replicates",
         "ks_distance",
         "steps",

@@ -40,6 +40,7 @@ from driftwalk.calibration import (
 )
 from driftwalk.comparison import (
     ComparisonWarning as ComparisonWarning,
+    block_permutation_test as block_permutation_test,
     compare_replicates as compare_replicates,
     ks_distance as ks_distance,
     steps as steps,

@@ -39,6 +39,7 @@ _NUMBERS = {
 }
 _BY_MOTION = {
     "pairs": "pairs",
+    "effective_pairs": "",
     "zero_length": "zero_length",
     "gaps": "gaps",
     "mode": "mode",
@@ -106,9 +107,14 @@ def compare(
 
 def summarise(result: xr.Dataset) -> dict[str, Any]:
     """Return the numbers of a comparison with units in the keys, ready for JSON."""
+    memory = float(result["autocorrelation_time"])
     motions = {
         f"motion_{name}": {
-            key: result[variable].values[index] for key, variable in _BY_MOTION.items()
+            key: result[variable].values[index]
+            if variable
+            # Steps remember their past: as many independent ones would tell as much. NaN untested.
+            else round(float(result["pairs"].values[index]) / memory, 1)
+            for key, variable in _BY_MOTION.items()
         }
         for index, name in enumerate("ab")
     }

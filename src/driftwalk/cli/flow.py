@@ -182,6 +182,8 @@ def _report_file(field: xr.Dataset, out: Path, *, json: bool) -> None:
     if json:
         print_json({"out": out, **facts})
         return
+    if facts["reading"]:
+        print_note(f"read as {facts['reading']}")
     for warning in facts["warnings"]:
         print_note(f"warning: {to_options(warning)}")
     print_note(

@@ -169,6 +169,9 @@ def ks_distance(
 ) -> float:
     """Return the two-sample, two-dimensional KS distance between two sets of points.
 
+    A distance alone says nothing of significance: `driftwalk.block_permutation_test` of the same
+    two series gives its p-value, which allows for steps that remember their past.
+
     Parameters
     ----------
     a, b : array_like, shapes (n, 2), (m, 2)

@@ -148,6 +148,10 @@ class PermutationTest(NamedTuple):
     """Steps of a block."""
     autocorrelation_time: float
     """The longest found in either series [steps], see `memory_time`; 1 for independent steps."""
+    effective_a: float
+    """Effective number of points of the first series: its points over that time."""
+    effective_b: float
+    """The same of the second series."""
     blocks_a: int
     """Blocks of the first series."""
     blocks_b: int
@@ -164,14 +168,14 @@ def block_permutation_test(
     *,
     block_length: int | None = None,
     permutations: int = 999,
-    seed: int,
+    seed: int = 1,
     ties: Ties = "strict",
 ) -> PermutationTest:
     """Test whether two serially correlated series of points have one distribution.
 
-    Both series are cut into blocks, the blocks are shuffled, and D is computed each time;
-    p = (1 + #{D_permuted >= D}) / (1 + permutations), integers compared. Incomplete blocks at the
-    ends are left out of the test.
+    This is the p-value of `ks_distance`. Both series are cut into blocks, the blocks are shuffled,
+    and D is computed each time; p = (1 + #{D_permuted >= D}) / (1 + permutations), integers
+    compared. Incomplete blocks at the ends are left out of the test.
 
     Parameters
     ----------
@@ -190,7 +194,8 @@ def block_permutation_test(
     Returns
     -------
     PermutationTest
-        D, the p-value, the noise floor, and the block length that was used.
+        D, the p-value, the noise floor, the block length that was used, and the effective number
+        of points of either series.
 
     Raises
     ------
@@ -239,6 +244,8 @@ def block_permutation_test(
         noise_floor=float(np.median(statistic[1:]) / unit),
         block_length=length,
         autocorrelation_time=memory,
+        effective_a=first.shape[0] / memory,
+        effective_b=second.shape[0] / memory,
         blocks_a=blocks_a,
         blocks_b=blocks_b,
         left_out=first.shape[0] + second.shape[0] - pooled.shape[0],

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -16,10 +16,11 @@ from driftwalk.core.files.file_names import text_of_name
 from driftwalk.flow.arena import Outline, outline_of, read_arena
 from driftwalk.flow.fill import fill_velocity
 from driftwalk.flow.grid import Grid
-from driftwalk.flow.readers import davis, insight, openpiv, pivlab, table
+from driftwalk.flow.readers import pivlab, text
 from driftwalk.flow.readers.netcdf import to_si
 from driftwalk.flow.readers.pivlab import is_pivlab
-from driftwalk.flow.readers.units import FieldOptions, RawField, raw_to_si
+from driftwalk.flow.readers.text import TextOptions
+from driftwalk.flow.readers.units import FieldOptions, RawField, raw_to_si, y_words
 from driftwalk.flow.rows import grid_rows
 from driftwalk.schema import FLAGS, build_flow_field, check_flow_field
 from driftwalk.schema.check import check_contents, kind_name
@@ -42,6 +43,9 @@ def load_flow(
     y_axis: str | None = None,
     origin: tuple[float, float] | None = None,
     variables: Mapping[str, str] | None = None,
+    columns: Mapping[str, str | int] | None = None,
+    header_line: int | None = None,
+    delimiter: str | None = None,
 ) -> xr.Dataset:
     """Load a flow field from NetCDF, CSV or the file of a PIV program, recognised by content.
 
@@ -50,8 +54,9 @@ def load_flow(
     path : path-like
         NetCDF that `save_flow` wrote; any other NetCDF with velocities over ([time,] y, x) and
         coordinates x, y, each with its attribute ``units``; CSV with the columns x, y, u, v in m
-        and m/s, a row for every node of a regular grid, in any order; text of OpenPIV, Insight
-        (``.vec``) or DaVis; ``.mat`` of PIVlab.
+        and m/s, a row for every node of a regular grid, in any order; text of PIVlab, OpenPIV,
+        Insight (``.vec``), DaVis, Dantec, Tecplot, the PIV plugin of ImageJ, or any other with a
+        header that names x, y, u, v; ``.mat`` of PIVlab.
     arena : mapping or str, optional
         The tank, for a file that does not know it: nodes beyond its wall are flagged *outside*.
     own_flags : {"refuse", "keep"}
@@ -70,13 +75,21 @@ def load_flow(
     variables : mapping, optional
         From u, v, x, y, time or mask to the variable of a NetCDF file, where names and attributes
         do not say it. Nodes whose mask is not zero are missing.
+    columns : mapping, optional
+        From x, y, u, v to the name or number (from 1) of the column of a text, where the header
+        does not say it; ``":unit"`` may follow, such as ``{"u": "3:mm/s"}``.
+    header_line : int, optional
+        Line of a text, from 1, that names its columns; None: found.
+    delimiter : str, optional
+        Character between the fields of a text, or ``"tab"``, ``"space"``; None: found.
 
     Returns
     -------
     xarray.Dataset
         A `flow_field`. A file without flags has *measured* nodes, and where a velocity is missing
         (NaN in NetCDF, masked or rejected by a PIV program) *filled* ones, continued from their
-        neighbours (`fill_velocity`). ``attrs["warning"]`` says what was left out.
+        neighbours (`fill_velocity`). ``attrs["reading"]`` says what was taken for what,
+        ``attrs["warning"]`` what was left out.
 
     Raises
     ------
@@ -102,9 +115,16 @@ def load_flow(
         metres_per_pixel, frame_interval, length_unit, y_axis, origin, dict(variables or {})
     )
     attrs: dict[str, Any] = {"source": text_of_name(source.name)}
+    said = TextOptions(
+        {quantity: str(name) for quantity, name in (columns or {}).items()},
+        header_line,
+        {"tab": "\t", "space": " "}.get(delimiter or "", delimiter),
+    )
     try:
         if not is_netcdf(source) or is_pivlab(source):
-            return _from_rows(source, options, arena=arena, attrs=attrs)
+            return _from_rows(source, options, said, arena=arena, attrs=attrs)
+        if said != TextOptions():
+            raise InputError("columns and their header are those of a text, and this is NetCDF")
         dataset = open_netcdf(source)
         if kind_name(dataset) == "flow_field" and "flag" in dataset:
             if arena is not None and own_flags == "refuse":
@@ -116,7 +136,8 @@ def load_flow(
         time = si["time"].values if "time" in si.dims else None
         velocity = np.stack([si["u"].values, si["v"].values], axis=-1)
         x, y = si["x"].values, si["y"].values
-        attrs |= _warning(notes)
+        turned = y_words(options, down=options.y_axis == "down")
+        attrs |= {"reading": f"NetCDF; {turned}", **_warning(notes)}
         return _new_field(x, y, velocity, time=time, arena=arena, attrs=attrs)
     except FormatError as error:
         raise error if error.path else FormatError(error.reason, path=source) from error
@@ -127,6 +148,7 @@ def load_flow(
 def _from_rows(
     path: Path,
     options: FieldOptions,
+    said: TextOptions,
     *,
     arena: Mapping[str, Any] | str | None,
     attrs: dict[str, Any],
@@ -134,12 +156,10 @@ def _from_rows(
     """Return the field of a file that has a row for each node."""
     if options.variables:
         raise InputError("`variables` are those of a NetCDF file, and this is none: leave it out")
-    raw = read_raw(path)
-    rows, notes = raw_to_si(raw, options)
-    field = grid_rows(rows, path)
-    return _new_field(
-        field.x, field.y, field.velocity, arena=arena, attrs={**attrs, **_warning(notes)}
-    )
+    si = raw_to_si(read_raw(path, said), options)
+    field = grid_rows(si.rows, path)
+    attrs = {**attrs, "reading": si.reading, **_warning(si.notes)}
+    return _new_field(field.x, field.y, field.velocity, arena=arena, attrs=attrs)
 
 
 def _warning(notes: list[str]) -> dict[str, str]:
@@ -207,30 +227,7 @@ def _fill(
     return velocity if known.all() else fill_velocity(grid, velocity, known=known, outline=outline)
 
 
-_TEXTS: Final = {"davis": davis, "insight": insight, "openpiv": openpiv}
-
-
-def piv_format(path: Path) -> str | None:
-    """Return the name of the PIV program that wrote a file, None of any other file.
-
-    Raises
-    ------
-    FormatError
-        When the file cannot be opened, or is one that only its program reads.
-    """
-    davis.refuse_binary(path)
-    try:
-        if pivlab.is_pivlab(path):
-            return "pivlab"
-        with path.open("rb") as file:
-            head = file.read(1 << 14)
-    except OSError as error:
-        raise FormatError(f"cannot be opened: {error.strerror or error}", path=path) from error
-    text = head.removeprefix(b"\xef\xbb\xbf").decode("utf-8", "replace")
-    return next((name for name, reader in _TEXTS.items() if reader.sniff(text, path)), None)
-
-
-def read_raw(path: Path) -> RawField:
+def read_raw(path: Path, said: TextOptions) -> RawField:
     """Read a field that is no NetCDF file.
 
     Raises
@@ -238,7 +235,12 @@ def read_raw(path: Path) -> RawField:
     FormatError
         When it cannot be read.
     """
-    name = piv_format(path)
-    if name == "pivlab":
-        return pivlab.read(path)
-    return table.read(path) if name is None else _TEXTS[name].read(path)
+    text.refuse_binary(path)
+    try:
+        if not pivlab.is_pivlab(path):
+            return text.read(path, said)
+    except OSError as error:
+        raise FormatError(f"cannot be opened: {error.strerror or error}", path=path) from error
+    if said != TextOptions():
+        raise InputError("columns and their header are those of a text, and this is MATLAB's")
+    return pivlab.read(path)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from os import PathLike
 from pathlib import Path
 
-from driftwalk.core.errors import InputError
-from driftwalk.flow.read import piv_format
-from driftwalk.flow.readers import openpiv
+from driftwalk.core.errors import FormatError, InputError
+from driftwalk.flow.readers import text
+from driftwalk.flow.readers.columns import column_of, holds_field, names_a_time
 from driftwalk.flow.readers.netcdf import holds_velocities
 from driftwalk.flow.readers.pivlab import holds_velocities as holds_pivlab, is_pivlab
-from driftwalk.flow.readers.table import is_field_table
+from driftwalk.flow.readers.text import Layout, TextOptions
 from driftwalk.flow.rows import grid_rows
 from driftwalk.schema.stores.netcdf import is_netcdf, kind_of_file, open_netcdf
 
@@ -28,8 +28,8 @@ def flow_format(path: str | PathLike[str]) -> str | None:
     Returns
     -------
     str or None
-        ``"driftwalk"``, ``"netcdf"``, ``"csv"``, ``"openpiv"``, ``"insight"``, ``"davis"`` or
-        ``"pivlab"``.
+        ``"driftwalk"``, ``"netcdf"``, ``"csv"``, ``"openpiv"``, ``"insight"``, ``"davis"``,
+        ``"pivlab"``, ``"dantec"``, ``"tecplot"`` or ``"fiji"``.
 
     Raises
     ------
@@ -46,14 +46,45 @@ def flow_format(path: str | PathLike[str]) -> str | None:
     source = Path(path)
     if not source.is_file():
         return None
-    if is_netcdf(source) and not is_pivlab(source):
-        return _netcdf_format(source)
-    name = piv_format(source)
-    if name == "openpiv" and not openpiv.has_header(source):
-        return name if _fills_a_grid(source) else None
-    if name == "pivlab" and not holds_pivlab(source):
+    text.refuse_binary(source)
+    try:
+        if is_pivlab(source):
+            return "pivlab" if holds_pivlab(source) else None
+        if is_netcdf(source):
+            return _netcdf_format(source)
+        return _text_format(source)
+    except OSError as error:
+        raise FormatError(f"cannot be opened: {error.strerror or error}", path=source) from error
+
+
+def _text_format(path: Path) -> str | None:
+    """Return the program of a text whose names, or whose rows, are those of a field."""
+    try:
+        head = text.read_text(path, most=1 << 14)
+        layout = text.layout_of(head, TextOptions(), path)
+    except FormatError:
+        # A damaged field of a program is one still.
+        return None if path.stat().st_size == 0 else text.signed(path)
+    names, program = layout.names, layout.program
+    if names_a_time(names):
         return None
-    return name or ("csv" if is_field_table(source) else None)
+    named = layout.header > 0 and {"x", "y", "u", "v"} <= {column_of(one).base for one in names}
+    if named or (program.sign and holds_field(names)):
+        return program.name
+    along = holds_field(names) and _goes_along_a_line(layout)
+    return program.name if along and _fills_a_grid(path) else None
+
+
+def _goes_along_a_line(layout: Layout) -> bool:
+    """Whether the first two rows share x or y, as two nodes of a grid do that are written in order.
+
+    No more is read of the many recordings in which they do not.
+    """
+    known = [column_of(name).quantity for name in layout.names]
+    rows = [line.split(layout.delimiter) for _, line in layout.rows[:2]]
+    if len(rows) < 2 or any(len(row) < len(known) for row in rows):
+        return False
+    return any(rows[0][at] == rows[1][at] for at in (known.index("x"), known.index("y")))
 
 
 def _netcdf_format(path: Path) -> str | None:
@@ -67,11 +98,11 @@ def _netcdf_format(path: Path) -> str | None:
 
 
 def _fills_a_grid(path: Path) -> bool:
-    # Rows without a header in a larger file are taken for a recording.
+    # A larger file whose names do not say so is taken for a recording.
     if path.stat().st_size > 64 << 20:
         return False
     try:
-        grid_rows(openpiv.read(path).rows, path)
+        grid_rows(text.read(path).rows, path)
     except InputError:
         return False
     return True

@@ -16,12 +16,17 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.likelihood.filter.filter_pass import Passes
-from driftwalk.likelihood.interval_inflation import parameter_covariance, parameter_facts
+from driftwalk.likelihood.interval_inflation import (
+    open_where_undetermined,
+    parameter_covariance,
+    parameter_facts,
+)
 from driftwalk.likelihood.newton import FROM_NEAR, Mode, ModeSearch, require_mode
 from driftwalk.likelihood.prior import Prior
 from driftwalk.likelihood.refuse import BREAKDOWN
 from driftwalk.likelihood.reml import Restricted, restricted_drag
 from driftwalk.likelihood.spline import Spline
+from driftwalk.schema.answers.facts import is_open
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
@@ -46,11 +51,13 @@ def angle_given_facts(
         covariance = parameter_covariance(other, again)
         own = parameter_covariance(mode, restricted)
         apart = abs(again.point.log_drag - found.log_drag)
-        facts = parameter_facts(again.point, covariance, study)
+        facts = parameter_facts(
+            again.point, open_where_undetermined(covariance, other, again), study
+        )
         disagreement = apart / math.sqrt(covariance[0, 0] + own[0, 0])
     except BREAKDOWN:
         return {"angle_disagreement_std": math.nan}
-    if other.diverged or not math.isfinite(disagreement):
+    if is_open(facts, "drag_coefficient") or not math.isfinite(disagreement):
         return {"angle_disagreement_std": math.nan}
     return {
         "drag_coefficient_angle_given": facts["drag_coefficient"],
@@ -71,8 +78,10 @@ def spin_correlation(coefficients: Floats, passes: Passes) -> float:
         spins.append(one.omega[seen])
         vorticities.append(_vorticity(coefficients, passes.spline, one.x[seen], one.y[seen]))
     spin, vorticity = np.concatenate(spins), np.concatenate(vorticities)
-    size = float(np.sqrt((spin**2).mean() * (vorticity**2).mean()))
-    return float((spin * vorticity).mean()) / size if size > 0.0 else 0.0
+    with np.errstate(all="ignore"):
+        size = float(np.sqrt((spin**2).mean() * (vorticity**2).mean()))
+        found = float((spin * vorticity).mean()) / size if size > 0.0 else 0.0
+    return found if math.isfinite(found) else 0.0
 
 
 def _vorticity(coefficients: Floats, spline: Spline, x: Floats, y: Floats) -> Floats:

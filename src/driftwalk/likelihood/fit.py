@@ -151,6 +151,9 @@ def fit_motion(
     for recording, track in zip(ready.recordings, ready.tracks, strict=True):
         warnings += jump_warnings(recording, body, track=track)
     warnings += warnings_of(facts, shares, ready.intervals, side_m=chosen.block.side_m)
+    if law.left_out:
+        beside = " and ".join(law.left_out)
+        warnings.append(f"the search for {beside} has no solution and was left out")
     return described(
         fit.assign(visited_share=((), min(shares))).assign_coords(
             warning=("warning", texts(warnings))

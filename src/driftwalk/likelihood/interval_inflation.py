@@ -36,6 +36,9 @@ class InflationPolicy(NamedTuple):
     on 32 recordings."""
     number: float = 1.3
     """Of the numbers of departures. Chosen by hand, as the factor of ln C_d."""
+    most_factor: float = 10.0
+    """Factor at one standard deviation from which on the recording does not determine C_d or
+    sigma_F: a number of no known power of ten. Chosen by hand."""
     mended_force: float = 0.7
     """Error that mended frames add to ln sigma_F, over their share of all frames: 3.5 % (rms) where
     5 % of the frames were dropped, in eight worlds (studies/misfit)."""
@@ -124,6 +127,10 @@ def parameter_facts(
     )
     total = heavier.share**2 * intensity
     drag = (1.0 - point.number("linear_share")) * math.exp(point.log_drag)
+    most = normal * math.log(INFLATION.most_factor)
+    of_drag, of_force, reach_of_drag = (
+        one if one < most else math.inf for one in (of_drag, of_force, reach_of_drag)
+    )
     values = {
         "drag_coefficient": (heavier.share * drag, of_drag),
         "force_std_N": (math.sqrt(total / interval), of_force),
@@ -139,9 +146,7 @@ def parameter_facts(
     facts: dict[str, Any] = {"force_interval_s": interval, "confidence": confidence}
     for name, (value, width) in values.items():
         facts[name] = value
-        # Open where the data leave it so: beyond 300 the exponential would soon not fit a double.
-        high = value * math.exp(width) if width < 300.0 else math.inf
-        facts[f"{name}_interval"] = [value * math.exp(-width), high]
+        facts[f"{name}_interval"] = _ends(value, width)
     return {**facts, **inertia_facts(heavier, facts, normal), **number_facts(point, reach, study)}
 
 
@@ -155,3 +160,14 @@ def _log_drag_std(point: Point, covariance: Floats) -> float:
         at = 1 + list(point.extras).index("linear_share")
         slopes[at] = -1.0 / max(1.0 - point.opened["linear_share"], 1e-6)
     return math.sqrt(float(slopes @ covariance @ slopes))
+
+
+def _ends(value: float, log_width: float) -> list[float]:
+    """Return the ends of an interval, 0 and infinity where the data leave it open.
+
+    A mixed drag with more than all of it linear has a quadratic part below zero: no such drag is.
+    """
+    # Beyond 300 the exponential would soon not fit a double.
+    if value < 0.0 or not log_width < 300.0:
+        return [0.0, math.inf]
+    return [value * math.exp(-log_width), value * math.exp(log_width)]

@@ -127,8 +127,11 @@ def _on_the_search(facts: Mapping[str, Any]) -> Iterator[str]:
         yield (f"the search has not converged in {facts['iterations']} steps ([fit] iterations)")
     elif is_open(facts, "drag_coefficient"):
         yield (
-            "the recording says less of C_d than the fit assumes of it beforehand (0.5, within a "
-            "factor of two): it does not determine C_d"
+            "the drag is linear within its uncertainty: the recording does not determine C_d, that "
+            "of the quadratic part alone"
+            if facts.get("drag_law") == "mixed"
+            else "the recording says less of C_d than the fit assumes of it beforehand (0.5, "
+            "within a factor of two): it does not determine C_d"
         )
     if facts["restricted"] == "no":
         yield (
@@ -164,8 +167,9 @@ def _on_the_turning(facts: Mapping[str, Any], side_m: float) -> Iterator[str]:
     apart = facts.get("angle_disagreement_std", 0.0)
     if math.isnan(apart):
         yield (
-            "the fit with the angle as an input has no solution and was left out: whether the "
-            "turning of the block and its motion follow one drag law is not known"
+            "the fit with the angle as an input has no solution, or does not determine C_d, and "
+            "was left out: whether the turning of the block and its motion follow one drag law is "
+            "not known"
         )
     if apart > WARNING.disagreement_stds:
         yield (

@@ -226,9 +226,10 @@ def _refuse_unused(options: ReadOptions, raw: RawRecording, format: str) -> None
         raise InputError("the file is no ROS bag: leave `topic` out")
     if options.header_line is not None and format not in (PLAIN, "excel"):
         raise InputError(f"`header_line` is for plain tables, and this is '{format}': leave it out")
-    if options.sheet is not None and format not in ("excel", "matlab"):
+    if options.sheet is not None and format not in ("excel", "matlab", "arrays"):
         raise InputError(
-            f"`sheet` is for workbooks and MATLAB files, and this is '{format}': leave it out"
+            f"`sheet` is for workbooks, MATLAB files and arrays, and this is '{format}': leave it "
+            "out"
         )
 
 

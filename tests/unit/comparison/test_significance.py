@@ -91,6 +91,52 @@ def test_the_seed_decides() -> None:
     assert permuted(1) != permuted(2)
 
 
+def quadrants(origin: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return how many points lie in each open quadrant around an origin."""
+    apart = points - origin
+    signs = [(sx, sy) for sx in (-1, 1) for sy in (-1, 1)]
+    return np.array([np.sum((sx * apart[:, 0] > 0) & (sy * apart[:, 1] > 0)) for sx, sy in signs])
+
+
+def plain_distance(a: np.ndarray, b: np.ndarray) -> float:
+    """Return D by its definition, point by point."""
+    largest = [
+        max(abs(quadrants(o, a) / len(a) - quadrants(o, b) / len(b)).max() for o in origins)
+        for origins in (a, b)
+    ]
+    return 0.5 * sum(largest)
+
+
+@pytest.mark.false_alarm(1e-4)
+@pytest.mark.parametrize("shift", [0.0, 0.5, 1.2])
+def test_the_p_value_is_that_of_a_plain_oracle(
+    shift: float, fresh_seed: Callable[[int], int]
+) -> None:
+    """D by its definition and another generator: both p-values within 4 sd of their difference."""
+    rng = np.random.default_rng(fresh_seed(9))
+    a, b = rng.normal(size=(40, 2)), rng.normal(size=(30, 2)) + shift
+    found = block_permutation_test(a, b, block_length=5, permutations=2000)
+    blocks = np.concatenate([a, b]).reshape(14, 5, 2)
+    shuffled = [blocks[rng.permutation(14)].reshape(-1, 2) for _ in range(400)]
+    reached = sum(plain_distance(one[:40], one[40:]) >= found.distance - 1e-12 for one in shuffled)
+    assert found.distance == pytest.approx(plain_distance(a, b), abs=1e-12)
+    plain = (1 + reached) / 401
+    share = max(found.p_value, 5e-3)
+    assert found.p_value == pytest.approx(plain, abs=4.0 * np.sqrt(share * (1 - share) / 330))
+
+
+@pytest.mark.false_alarm(1e-3)
+def test_the_effective_number_is_that_of_the_series(fresh_seed: Callable[[int], int]) -> None:
+    """AR(1) of autocorrelation time 19; the largest of eight estimates, 13 to 40 over 200 seeds."""
+    rng = np.random.default_rng(fresh_seed(10))
+    result = block_permutation_test(
+        autoregressive(rng, 20_000, 0.9), autoregressive(rng, 10_000, 0.9), permutations=1
+    )
+    assert result.effective_a == 20_000 / result.autocorrelation_time
+    assert result.effective_b == result.effective_a / 2
+    assert 20_000 / 40 < result.effective_a < 20_000 / 13
+
+
 @pytest.mark.slow
 @pytest.mark.false_alarm(1e-5)
 def test_a_true_null_is_rejected_about_as_often_as_stated(fresh_seed: Callable[[int], int]) -> None:

@@ -122,7 +122,8 @@ GRID = "x,y,u,v\n0,0,1,0\n1,0,1,0\n0,1,1,0\n1,1,1,0\n"
         ("x,y,u,v\n", "no row", 1),
         (GRID + "0,2,1\n", "expected 4 fields, got 3", 6),
         (GRID + "0,2,one,0\n", "expected a finite number, got 'one'", 6),
-        (GRID + "0,2,nan,0\n", "expected a finite number, got 'nan'", 6),
+        (GRID + "0,2,inf,0\n", "expected a finite number, got 'inf'", 6),
+        (GRID + "nan,2,1,0\n", "a node has no position", 6),
         (GRID + "1,0,2,0\n", "stands in line 3 already", 6),
         (GRID + "0,2,1,0\n", "lacks 1 of them, the first at x = 1, y = 2", None),
         (GRID + "0,2.5,1,0\n1,2.5,1,0\n", "not evenly spaced", None),
@@ -153,8 +154,8 @@ def test_a_wrong_field_is_found_by_its_column(tmp_path: Path) -> None:
 def test_no_file_and_no_text(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match="no such file"):
         load_flow(tmp_path / "absent.nc")
-    (tmp_path / "binary").write_bytes(b"\xff\xfe\x00\x80")
-    with pytest.raises(FormatError, match="not UTF-8"):
+    (tmp_path / "binary").write_bytes(b"\xff\x00\x80\x01")
+    with pytest.raises(FormatError, match="is not text"):
         load_flow(tmp_path / "binary")
 
 

@@ -349,7 +349,7 @@ MAKERS: dict[str, Callable[[Path], Path]] = {
             "openpiv",
             "\t1.000000e+00\t",
             "\tone\t",
-            "line 9, column 4: expected a number, got 'one'",
+            "line 9, column 4: expected a finite number, got 'one'",
         ),
         (
             "openpiv",
@@ -358,13 +358,18 @@ MAKERS: dict[str, Callable[[Path], Path]] = {
             "line 2: a node has no position",
         ),
         ("openpiv", "\t0.000000e+00\n", "\t1.000000e+00\n", "every node is masked or missing"),
-        ("insight", '"U m/s"', '"W m/s"', "line 1: the header names the columns X mm, Y mm, W m/s"),
-        ("insight", '"Y mm"', '"Y m"', "the columns have different units: X mm, Y m"),
+        (
+            "insight",
+            '"U m/s"',
+            '"W m/s"',
+            "line 1: the header needs one column 'u' .* got X mm, Y mm, W m/s",
+        ),
+        ("insight", '"Y mm"', '"Y m"', "x, y, u, v have the units mm, m, m/s, m/s"),
         ("insight", " mm", " furlong", "unknown unit 'furlong'"),
         ("insight", ", 1\n", "\n", "expected 5 fields, got 4"),
         ("davis", "2D-vector", "3D-vector", 'line 1: expected "2D-vector"'),
         ("davis", '"mm"', '"inch"', "unknown unit 'inch'"),
-        ("davis", "16\t64\t", "16\t", "expected 3 fields|expected columns of x, y, u, v, got 3"),
+        ("davis", "16\t64\t", "16\t", "expected 4 fields, got 3"),
     ],
 )
 def test_what_is_refused(tmp_path: Path, name: str, old: str, new: str, message: str) -> None:

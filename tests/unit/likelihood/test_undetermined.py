@@ -19,12 +19,17 @@ from driftwalk.core.errors import InputError
 from driftwalk.likelihood import angle_consistency, compare_laws, estimate_wall, judge_fit
 from driftwalk.likelihood.check import run
 from driftwalk.likelihood.contacts import estimate as wall
+from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.interval_inflation import parameter_facts
+from driftwalk.likelihood.law.forward_selection import ForwardSelection, LawResult
+from driftwalk.likelihood.law.search import LawSearch
 from driftwalk.likelihood.newton import Mode, ModeSearch, require_mode
 from driftwalk.notebook.result import answer_lines
 from driftwalk.page.sections.fit import fit_summary
 from driftwalk.schema import build_trajectory
-from driftwalk.schema.answers.facts import facts_of
+from driftwalk.schema.answers.facts import facts_of, sentences
 from driftwalk.schema.answers.fit import fit_json
+from driftwalk.schema.answers.force_law import law_limits
 
 UNKNOWN = "not determined by this recording"
 
@@ -136,3 +141,61 @@ def test_what_the_prior_alone_says_is_no_number() -> None:
     assert facts["drag_coefficient_interval"] == [0.0, math.inf]
     assert np.isfinite(facts["tracking_noise_m_interval"]).all()
     assert any("does not determine C_d" in one for one in facts["warnings"])
+
+
+@pytest.mark.parametrize("share", [1.6, 1.0 - 1e-9, 0.97])
+def test_a_quadratic_part_of_the_drag_at_or_below_zero_is_no_number(share: float) -> None:
+    study, spline = coarse_study(), np.zeros((2, 4, 4))
+    point = Point(spline, math.log(0.7), -9.0, -16.0, opened={"linear_share": share})
+    facts = parameter_facts(point, np.diag([0.01, 0.01, 0.01, 0.01]), study)
+    assert facts["drag_coefficient_interval"] == [0.0, math.inf]
+    assert math.isfinite(facts["force_std_N_interval"][1])
+    ends = {
+        "drag_coefficient_any_added_mass_interval": facts["drag_coefficient_interval"],
+        "force_std_any_added_mass_interval_N": facts["force_std_N_interval"],
+    }
+    said = law_limits({**facts, **ends, "force_law": "paper", "drag_law": "mixed"})[-1]
+    assert "σ_F is between" in said
+    assert "C_d is between" not in said
+
+
+def test_an_ordinary_interval_is_as_before() -> None:
+    point = Point(np.zeros((2, 4, 4)), math.log(0.7), -9.0, -16.0)
+    facts = parameter_facts(point, np.diag([0.01, 0.01, 0.01]), coarse_study())
+    width = 0.1 * 1.6448536269514722
+    ends = [0.7 * math.exp(-width), 0.7 * math.exp(width)]
+    np.testing.assert_allclose(facts["drag_coefficient_interval"], ends, rtol=1e-12)
+
+
+BROKEN = [
+    OverflowError("math range error"),
+    np.linalg.LinAlgError("not positive definite"),
+    ValueError("the filter refuses it"),
+    FloatingPointError("divide by zero"),
+]
+
+
+@pytest.mark.parametrize("error", BROKEN)
+def test_every_search_beside_the_law_may_break_down_alone(error: Any) -> None:
+    def breaks() -> LawResult:
+        raise error
+
+    search = object.__new__(LawSearch)
+    law = LawResult(None, None, False, {}, math.inf, None)  # type: ignore[arg-type]
+    for what in ("departures from it", "the other law"):
+        law = search._beside(law, what, breaks)
+    assert law.left_out == ("departures from it", "the other law")
+    other = replace(law, floating=True, left_out=())
+    found = search._beside(law, "another power of the drag", lambda: other)
+    assert (found.floating, found.left_out) == (True, law.left_out)
+
+
+def test_a_fit_without_its_departures_says_so(monkeypatch: Any) -> None:
+    def breaks(*given: Any) -> None:
+        raise OverflowError("math range error")
+
+    monkeypatch.setattr(ForwardSelection, "select", breaks)
+    found = dw.fit_motion(recording(15.0), coarse_study(), angle="given")
+    assert np.isfinite(found["estimate"]).all()
+    said = " ".join(sentences(found, "warning"))
+    assert "the search for departures from it has no solution and was left out" in said

@@ -64,8 +64,6 @@ def test_other_containers(tmp_path: Path) -> None:
     assert "it is XML with 'gpx', 'trk'; the nearest are trackmate-xml" in refused(
         tmp_path / "a.xml"
     )
-    (tmp_path / "a.parquet").write_bytes(b"PAR1\x00\x01\x02")
-    assert "it is Parquet, which is to be saved as CSV" in refused(tmp_path / "a.parquet")
     (tmp_path / "folder").mkdir()
     (tmp_path / "folder" / "trajectories.csv").write_text("time,x1,y1\n0,1,2\n")
     assert "idtrackerai (lacks 'attributes.json')" in refused(tmp_path / "folder")

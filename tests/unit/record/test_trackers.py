@@ -328,7 +328,7 @@ def test_idtrackerai_hdf5_and_csv(tmp_path: Path) -> None:
 def test_idtrackerai_files_that_hold_something_else(tmp_path: Path) -> None:
     np.save(tmp_path / "plain.npy", np.zeros((3, 2)))
     with pytest.raises(FormatError, match=r"array of float64 of shape \(3, 2\), and no dictionary"):
-        load(tmp_path / "plain.npy", **PIXELS)
+        load(tmp_path / "plain.npy", format="idtrackerai", **PIXELS)
     np.save(tmp_path / "other.npy", {"a": 1, "b": 2})  # type: ignore[arg-type]
     with pytest.raises(
         FormatError, match=r"has no 'trajectories' as idtracker\.ai's have it, but a, b"

@@ -42,15 +42,18 @@ def read_flow_file(
     """
     from driftwalk.flow import flow_format
 
-    recording = how.format, how.columns, how.x, how.header_line, how.sheet
+    columns = parse_pairs(how.columns or [], "--columns")
+    velocities = bool({"u", "v"} & set(columns))
+    recording = how.format, how.x, how.sheet, None if velocities else how.columns
     said = any(one is not None for one in recording)
-    if variables is None and (said or flow_format(path) is None):
+    if variables is None and not velocities and (said or flow_format(path) is None):
         if frame_interval is not None:
             raise InputError(
-                f"{path}: --frame-interval is for a flow field, and this is read as a recording"
+                f"{path}: --frame-interval is for a flow field, and this is read as a recording; "
+                "--columns x=NAME,y=NAME,u=NAME,v=NAME makes it a flow field"
             )
         return None
-    return _load(path, how, frame_interval, variables)
+    return _load(path, how, frame_interval, variables, columns)
 
 
 def _load(
@@ -58,6 +61,7 @@ def _load(
     how: RecordingOptions,
     frame_interval: float | None,
     variables: str | None,
+    columns: dict[str, str],
 ) -> xr.Dataset:
     from driftwalk.flow import load_flow
 
@@ -67,6 +71,9 @@ def _load(
         "length_unit": how.length_unit,
         "y_axis": how.y_axis,
         "variables": None if variables is None else parse_pairs([variables], "--flow-variables"),
+        "columns": columns,
+        "header_line": how.header_line,
+        "delimiter": how.delimiter,
     }
     tank = None if how.tank is None else tank_text(how.tank)
     return load_flow(path, **values, **({} if tank is None else _placed(tank)))
@@ -108,6 +115,7 @@ def describe_field(field: xr.Dataset) -> dict[str, Any]:
             facts["standard_error_median_m_s"] = float(np.nanmedian(error))
     return {
         "source": field.attrs.get("source"),
+        "reading": field.attrs.get("reading"),
         "method": field.attrs.get("method"),
         "columns": field.sizes["x"],
         "rows": field.sizes["y"],

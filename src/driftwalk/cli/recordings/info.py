@@ -141,6 +141,7 @@ def _print_field(described: dict[str, Any], *, json: bool) -> None:
         [
             ["file", described["source"] or "-"],
             ["method", described["method"] or "-"],
+            *([["read as", described["reading"]]] if described["reading"] else []),
             ["flow field", f"{described['columns']} x {described['rows']} nodes"],
             ["frames", described["frames"]],
             *(

@@ -93,7 +93,8 @@ def read(path: Path) -> RawField:
     if len(frames) > 1:
         notes.append(f"the flow is the mean of {len(frames)} frames: the file holds no times")
     rows = masked_rows(line, values, np.zeros(len(values), dtype=bool), path)
-    return RawField(rows, length, velocity, down=True, notes=notes)
+    reading = "PIVlab's .mat"
+    return RawField(rows, length, velocity, down=True, notes=notes, reading=reading)
 
 
 def _mean(velocity: Array) -> Array:

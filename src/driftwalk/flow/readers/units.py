@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, NamedTuple
 
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.units import parse_quantity
@@ -23,12 +23,15 @@ class RawField:
     """Unit of positions, as the file writes it; ``""`` when it does not say."""
     velocity_unit: str = ""
     """Unit of velocities, likewise."""
-    down: bool = False
-    """Whether y and v count downwards, as in an image."""
+    down: bool | None = None
+    """Whether y and v count downwards, as in an image; None: in pixels, where the first row has the
+    smallest y, as images are written from their top."""
     frame_interval: float | None = None
     """Time between the two images of a pair [s], when the file holds it."""
     notes: list[str] = field(default_factory=list)
     """Sentences for the person who loads the file."""
+    reading: str = ""
+    """Meaning of the columns, in a line."""
 
 
 @dataclass(frozen=True)
@@ -96,6 +99,8 @@ class FieldScale:
             known = stated if stated == "px" else f"{stated}/s"
         if known in _SHIFTS:
             return self._metres_per_pixel() / self._frame_interval()
+        if known.endswith("/frame"):
+            return self.length(known.removesuffix("/frame")) / self._frame_interval()
         if known.startswith("px"):
             return self._metres_per_pixel() * _parse(f"m{known.removeprefix('px')}", "m/s")
         return _parse(known, "m/s")
@@ -103,6 +108,10 @@ class FieldScale:
     def time(self, unit: str) -> float:
         """Return the seconds per unit of a time."""
         return _parse(words_of_unit(unit), "s")
+
+    def in_pixels(self, unit: str) -> bool:
+        """Return whether positions of a unit are in pixels."""
+        return (words_of_unit(unit) or self._stated()) == "px"
 
     def refuse_unused(self) -> None:
         """Refuse facts that the units of the file have no use for.
@@ -147,7 +156,18 @@ class FieldScale:
         )
 
 
-def raw_to_si(raw: RawField, options: FieldOptions) -> tuple[FieldRows, list[str]]:
+class SiRows(NamedTuple):
+    """The rows of a file in SI."""
+
+    rows: FieldRows
+    """[m] and [m/s], y up."""
+    notes: list[str]
+    """Sentences for the person who loads the file."""
+    reading: str
+    """Meaning of the columns, and direction of y, in a line."""
+
+
+def raw_to_si(raw: RawField, options: FieldOptions) -> SiRows:
     """Return the rows in m and m/s with y up, and what to say about them.
 
     Raises
@@ -158,10 +178,13 @@ def raw_to_si(raw: RawField, options: FieldOptions) -> tuple[FieldRows, list[str
     scale = FieldScale(options, raw.frame_interval)
     length, velocity = scale.length(raw.length_unit), scale.velocity(raw.velocity_unit)
     scale.refuse_unused()
-    down = raw.down if options.y_axis is None else options.y_axis == "down"
+    rows = raw.rows
+    found = raw.down
+    if found is None:
+        found = bool(scale.in_pixels(raw.length_unit) and rows.y[0] < rows.y[-1])
+    down = found if options.y_axis is None else options.y_axis == "down"
     sign = -1.0 if down else 1.0
     x0, y0 = options.origin or (0.0, 0.0)
-    rows = raw.rows
     si = FieldRows(
         rows.line,
         length * rows.x - x0,
@@ -170,9 +193,15 @@ def raw_to_si(raw: RawField, options: FieldOptions) -> tuple[FieldRows, list[str
         sign * velocity * rows.v,
     )
     notes = [*raw.notes]
-    if raw.down and options.y_axis is None:
+    if found and options.y_axis is None:
         notes.append("y counts downwards in the file: y and v are negated (`y_axis`)")
-    return si, notes
+    return SiRows(si, notes, f"{raw.reading}; {y_words(options, down=down)}")
+
+
+def y_words(options: FieldOptions, *, down: bool) -> str:
+    """Return how y was taken, in words."""
+    stated = "" if options.y_axis is None else ", as stated"
+    return f"y counts down{stated}: y and v negated" if down else f"y counts up{stated}"
 
 
 def words_of_unit(text: str) -> str:

@@ -224,6 +224,7 @@ def estimate_wall(
     0
     """
     unknown = undetermined(fit)
+    # Recordings of another fit are the user's mistake, and no breakdown.
     estimate = None if unknown else estimate_of(fit, recordings, body=body)
     # An earlier estimate may have left some.
     earlier = [f"{one.name}{end}" for one in WALL_NUMBERS for end in ("", "_interval")]
@@ -248,16 +249,16 @@ def estimate_wall(
             "the estimate of the wall needs the orientation of the block, and this fit used none: "
             'record it, or read the column that holds it (`columns`), and fit with `angle="state"`'
         )
-    found = [passages_of(estimate, one) for one in estimate.passes.series]
-    count = sum(len(one.x) for one in found)
-    fit = described(fit.assign(wall_contacts=((), np.int64(count))))
-    if count < CONTACT.fewest:
-        return left_out(
-            f"the estimate of the wall needs {CONTACT.fewest} contacts with it, and {count} can be "
-            "followed: record for longer, at an even rate, or where the flow drives the block to "
-            "the wall"
-        )
     try:
+        found = [passages_of(estimate, one) for one in estimate.passes.series]
+        count = sum(len(one.x) for one in found)
+        fit = described(fit.assign(wall_contacts=((), np.int64(count))))
+        if count < CONTACT.fewest:
+            return left_out(
+                f"the estimate of the wall needs {CONTACT.fewest} contacts with it, and {count} "
+                "can be followed: record for longer, at an even rate, or where the flow drives "
+                "the block to the wall"
+            )
         data = _answer(fit, estimate, found, seed=seed, tell=tell or tell_nobody)
     except BREAKDOWN as error:
         return left_out(f"the estimate of the wall failed: {error}")

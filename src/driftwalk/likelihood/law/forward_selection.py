@@ -76,6 +76,8 @@ class LawResult:
     fitted."""
     tests: ScoreTests | None
     """The last score tests of closed numbers; None where they broke down."""
+    left_out: tuple[str, ...] = ()
+    """Further searches that broke down, in words."""
 
 
 def least_effects(side: float) -> dict[str, float]:

@@ -141,10 +141,10 @@ def _under(estimate: Estimate, floating: bool, drag: str, *, passed: Passed) -> 
     training = replace(passes, series=[one.part(0, _training(one)) for one in passes.series])
     start = _start(estimate.point, floating=floating, drag=drag)
     search = ModeSearch(training, prior, estimate.study.fit.iterations, passed)
-    mode = search.find(start, estimate.weights)
-    if mode is None:
-        return None
     try:
+        mode = search.find(start, estimate.weights)
+        if mode is None:
+            return None
         with np.errstate(all="ignore"):
             # Logarithms of the densities of the held out samples; NaN where not predicted.
             scores = np.concatenate(

@@ -9,7 +9,7 @@ fitted, and closed again where nothing comes of them.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Final, NamedTuple
 
@@ -28,6 +28,7 @@ from driftwalk.likelihood.newton import (
     require_mode,
 )
 from driftwalk.likelihood.prior import Prior, Weights
+from driftwalk.likelihood.refuse import BREAKDOWN
 from driftwalk.schema.answers.force_law import LEAST_EVIDENCE, OPENED_SIGMAS
 
 
@@ -80,12 +81,30 @@ class LawSearch:
         """Return the law and the mode that the recording supports."""
         start = replace(start, opened=self.assumptions.opened, fixed=self.assumptions.fixed)
         base = self._base(start, weights)
-        found = self.selection.select(base)
+        found = self._beside(base, "departures from it", lambda: self.selection.select(base))
         if "drag_power" in self.assumptions.tried and self._turns_by_itself(base.mode):
-            powered = self._with_power(base, start, weights)
-            if powered is not None and self._ahead(powered.mode, found.mode) > LEAST_EVIDENCE:
-                found = powered
-        return self._reconsidered(found, start)
+            found = self._beside(
+                found,
+                "another power of the drag",
+                lambda: self._powered(base, found, start, weights),
+            )
+        return self._beside(found, "the other law", lambda: self._reconsidered(found, start))
+
+    def _beside(self, found: LawResult, what: str, search: Callable[[], LawResult]) -> LawResult:
+        """Return what a further search finds; the law found before it where it breaks down."""
+        try:
+            return replace(search(), left_out=found.left_out)
+        except BREAKDOWN:
+            return replace(found, left_out=(*found.left_out, what))
+
+    def _powered(
+        self, base: LawResult, found: LawResult, start: Point, weights: Weights
+    ) -> LawResult:
+        """Return the law with another power of the drag where it has more evidence."""
+        powered = self._with_power(base, start, weights)
+        if powered is not None and self._ahead(powered.mode, found.mode) > LEAST_EVIDENCE:
+            return powered
+        return found
 
     def _base(self, start: Point, weights: Weights) -> LawResult:
         floating = replace(start, fixed={**start.fixed, **FLOATING})
@@ -98,7 +117,14 @@ class LawSearch:
             tests = score_tests(self.search, paper, (*FLOATING, *self.assumptions.tried))
             if tests is not None and not self._is_doubted(tests):
                 return self._undoubted(paper, tests)
-        return self._compared({"paper": start, "floating": floating}, weights, paper)
+        starts = {"paper": start, "floating": floating}
+        if paper is None:
+            return self._compared(starts, weights, paper)
+        return self._beside(
+            self._alone(paper, floating=False),
+            "the other law",
+            lambda: self._compared(starts, weights, paper),
+        )
 
     def _is_doubted(self, tests: ScoreTests) -> bool:
         """Return whether the law may be another, from the score tests under the paper's.

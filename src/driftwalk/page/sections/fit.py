@@ -199,8 +199,14 @@ def _verdict(check: xr.Dataset) -> str:
         return f"{words} There is no KS distance: {check.attrs.get('ks_left_out', 'left out')}."
     return (
         f"{words} Recordings simulated with these parameters have a KS distance of {distance:.3g} "
-        f"to the real one, and of {floor:.3g} among themselves (noise floor)."
+        f"to the real one, and of {floor:.3g} among themselves (noise floor){_chance(check)}."
     )
+
+
+def _chance(check: xr.Dataset) -> str:
+    """Return the p-value of the distance in words, nothing where there is none."""
+    found = value_of(check, "ks_p_value")
+    return "" if found is None else f"; the p-value of that distance is {found:.2g}"
 
 
 def _judge(fit: xr.Dataset, check: xr.Dataset | None) -> xr.Dataset | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from typing import Any, Final, NamedTuple
 
@@ -27,6 +28,11 @@ def _values(position: Any, orientation: Any) -> tuple[float, ...]:
 
 def _pose(message: Any, topic: str) -> Iterator[Pose]:
     yield Pose(topic, None, "", _values(message.position, message.orientation))
+
+
+def _pose_2d(message: Any, topic: str) -> Iterator[Pose]:
+    turned = (0.0, 0.0, math.sin(0.5 * message.theta), math.cos(0.5 * message.theta))
+    yield Pose(topic, None, "", (message.x, message.y, 0.0, *turned))
 
 
 def _pose_stamped(message: Any, topic: str) -> Iterator[Pose]:
@@ -60,11 +66,13 @@ def _transforms(message: Any, topic: str) -> Iterator[Pose]:
 
 READERS: Final[dict[str, Callable[[Any, str], Iterator[Pose]]]] = {
     "geometry_msgs/msg/Pose": _pose,
+    "geometry_msgs/msg/Pose2D": _pose_2d,
     "geometry_msgs/msg/PoseStamped": _pose_stamped,
     "geometry_msgs/msg/PoseWithCovarianceStamped": _with_covariance,
     "geometry_msgs/msg/PoseArray": _pose_array,
     "geometry_msgs/msg/TransformStamped": _transform,
     "nav_msgs/msg/Odometry": _with_covariance,
     "tf2_msgs/msg/TFMessage": _transforms,
+    "tf/msg/tfMessage": _transforms,
 }
 """From a type of message to what takes the poses out of one, given the name of its topic."""

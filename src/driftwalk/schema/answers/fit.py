@@ -144,7 +144,9 @@ def _verdict(fit: xr.Dataset, check: xr.Dataset | None) -> list[Part]:
         return [*parts, Row("KS distance", f"not available: {check.attrs['ks_left_out']}")]
     far = explained and distance > FAR_ABOVE_FLOOR * floor
     more = ": far, but within the uncertainty of the fit" if far else ""
-    return [*parts, Row("KS distance", f"{distance:.3f}, noise floor {floor:.3f}{more}")]
+    parts.append(Row("KS distance", f"{distance:.3f}, noise floor {floor:.3f}{more}"))
+    chance = float(check.attrs.get("ks_p_value", "nan"))
+    return [*parts, Row("p-value of it", f"{chance:.2g}")] if isfinite(chance) else parts
 
 
 def fit_json(fit: xr.Dataset, check: xr.Dataset | None = None) -> dict[str, Any]:
@@ -154,7 +156,7 @@ def fit_json(fit: xr.Dataset, check: xr.Dataset | None = None) -> dict[str, Any]
         if is_open(facts, one.key):
             facts[one.key] = None
     if "drag_coefficient" in facts and facts["drag_coefficient"] is None:
-        facts["maximum_likelihood_drag_coefficient"] = None
+        facts |= {"maximum_likelihood_drag_coefficient": None, "filter_drag_coefficient": None}
     numbers = [one.key for one in PARAMETERS.values()]
     names = [*numbers, *(f"{key}_interval" for key in numbers), *flat_variables(FIT), *_ATTRIBUTES]
     shown = {key: facts[key] for key in names if key in facts and key not in _NOT_IN_JSON}
@@ -164,7 +166,8 @@ def fit_json(fit: xr.Dataset, check: xr.Dataset | None = None) -> dict[str, Any]
     if check is None:
         left_out = fit.attrs.get("check_left_out")
         return shown | ({} if left_out is None else {"explained": None, "check_left_out": left_out})
-    distances = {key: float(check.attrs[key]) for key in ("ks_distance", "ks_noise_floor")}
+    measured = ("ks_distance", "ks_noise_floor", "ks_p_value")
+    distances = {key: float(check.attrs.get(key, "nan")) for key in measured}
     return {
         **shown,
         "explained": bool(check["explained"]),

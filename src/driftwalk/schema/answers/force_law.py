@@ -120,15 +120,17 @@ def law_limits(facts: Mapping[str, Any]) -> list[str]:
     force = facts.get("force_std_any_added_mass_interval_N")
     if force is None:
         return said
-    low, high = (1e3 * end for end in force)
-    reach = f"σ_F is between {low:.4g} and {high:.4g} mN"
+    ends = {"σ_F": (force, 1e3, " mN")}
     if not linear:
-        low, high = facts["drag_coefficient_any_added_mass_interval"]
-        reach = f"C_d is between {low:.4g} and {high:.4g}, {reach}"
-    said.append(
-        f"The numbers are those without added mass. If the block carries the usual one, {reach}."
+        ends = {"C_d": (facts["drag_coefficient_any_added_mass_interval"], 1.0, ""), **ends}
+    # Of a number that is not determined there is nothing to say.
+    reach = ", ".join(
+        f"{name} is between {scale * low:.4g} and {scale * high:.4g}{unit}"
+        for name, ((low, high), scale, unit) in ends.items()
+        if isfinite(high)
     )
-    return said
+    without = "The numbers are those without added mass."
+    return [*said, f"{without} If the block carries the usual one, {reach}." if reach else without]
 
 
 class ComparedLaw(NamedTuple):

@@ -51,6 +51,8 @@ attributes (made from a formula):
     parameters object: parameters of the formula
 attributes (made from a file or a recording):
     source
+attributes (read from a file):
+    reading text: meaning of the columns, direction of y
 attributes ({_BODY}):
     inertia text: how the body's inertia was corrected
     window_s number: time over which derivatives are taken

@@ -24,6 +24,7 @@ from driftwalk.record.space.turns import QUATERNION, Turns
 METADATA: Final = "metadata.yaml"
 _MCAP: Final = b"\x89MCAP0\r\n"
 _SQLITE: Final = b"SQLite format 3\0"
+_ROS_1: Final = b"#ROSBAG V2.0\n"
 _UP: Final = "z"
 
 
@@ -37,13 +38,13 @@ class RosLoader:
     """Bodies by their frames, or by their topics where a message names no frame of the body."""
 
     name = "ros"
-    description = "ROS 2 bag, sqlite3 or MCAP (poses, odometry, transforms; z up)"
+    description = "ROS bag, of ROS 1, sqlite3 or MCAP (poses, odometry, transforms; z up)"
 
     def sniff(self, head: bytes, path: Path) -> float:
         """Recognise the folder of a bag, or one of its files."""
         if path.is_dir():
             return 0.95 if (path / METADATA).is_file() else 0.0
-        return 0.95 if head.startswith((_MCAP, _SQLITE)) else 0.0
+        return 0.95 if head.startswith((_MCAP, _SQLITE, _ROS_1)) else 0.0
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the poses of the chosen topics."""

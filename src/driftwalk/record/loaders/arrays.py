@@ -1,0 +1,130 @@
+"""Plain arrays: ``.npy`` with a row per sample, ``.npz`` and HDF5 with an array per quantity."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from driftwalk.core.errors import FormatError, InputError, reason_of
+from driftwalk.record.column_names import column_meaning
+from driftwalk.record.raw import RawRecording, ReadOptions
+from driftwalk.record.stores.hdf5 import Hdf5Contents, names_in, opened_hdf5
+from driftwalk.record.stores.matlab import Struct, Value
+from driftwalk.record.stores.npz import ZIP, members, opened_npz
+from driftwalk.record.tables.choose import the_one_that_fits
+from driftwalk.record.tables.in_memory import table_in_memory
+from driftwalk.record.tables.matlab import matlab_tables
+from driftwalk.record.tables.rows import recording_of
+from driftwalk.schema.stores.netcdf import HDF5, file_start
+
+_NPY: Final = b"\x93NUMPY"
+_RATES: Final = ("fps", "frame_rate", "framerate", "frame_rate_hz", "frames_per_second")
+
+
+class ArraysLoader:
+    """Names of arrays, or of the fields of a structured one, are read as those of columns."""
+
+    name = "arrays"
+    description = "NumPy .npy (`columns` by number), .npz and HDF5 with arrays t, x, y"
+
+    def sniff(self, head: bytes, path: Path) -> float:
+        """Recognise arrays of numbers, and names of positions."""
+        if head.startswith(_NPY):
+            return 0.4 if b"'|O'" not in head[:200] else 0.0
+        if head.startswith(ZIP):
+            return 0.3 if _are_positions(members(path)) else 0.0
+        if not head.startswith(HDF5):
+            return 0.0
+        names = names_in(path, head)
+        return 0.3 if _are_positions(names) or (names and _inner_positions(path)) else 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read the array, or those that belong together."""
+        start = file_start(path)
+        if start.startswith(_NPY):
+            return _of_array(path, options)
+        if start.startswith(ZIP):
+            with opened_npz(path) as arrays:
+                return _of_arrays({name: _value(arrays[name]) for name in arrays}, path, options)
+        with opened_hdf5(path) as contents:
+            return _of_arrays(_of_hdf5(contents), path, options)
+
+
+def _are_positions(names: set[str]) -> bool:
+    meanings = (column_meaning(name) for name in names)
+    return {"x", "y"} <= {one.quantity for one in meanings if one is not None}
+
+
+def _inner_positions(path: Path) -> bool:
+    """Whether a group of an HDF5 file holds positions."""
+    try:
+        with opened_hdf5(path) as contents:
+            groups = [one for one in contents.file.values() if hasattr(one, "keys")]
+            return any(_are_positions(set(map(str, one))) for one in groups)
+    except InputError:
+        return False
+
+
+def _of_array(path: Path, options: ReadOptions) -> RawRecording:
+    """Return the recording of one array, whose rows are samples."""
+    try:
+        with path.open("rb") as file:
+            array = np.load(io.BytesIO(file.read()), allow_pickle=False)
+    except Exception as error:
+        # On a damaged file the library fails with whatever the damage leads it to.
+        raise FormatError(f"cannot be read as .npy: {reason_of(error)}", path=path) from error
+    if array.ndim == 2 and array.dtype.names is None and array.shape[0] < array.shape[1]:
+        # There are more samples than quantities, whichever way they lie.
+        array = array.T
+    table = table_in_memory(array.ravel() if array.dtype.names is not None else array)
+    if table is None:
+        raise FormatError("holds no table", path=path)
+    return recording_of(table, options)
+
+
+def _of_arrays(variables: dict[str, Value], path: Path, options: ReadOptions) -> RawRecording:
+    """Return the recording of arrays by name, at the frame rate that the file holds."""
+    tables = matlab_tables(variables, path)
+    recording = recording_of(the_one_that_fits(tables, options, path, "array"), options)
+    rates = [value for name, value in variables.items() if name.lower() in _RATES]
+    if len(rates) == 1 and isinstance(rates[0], np.ndarray) and rates[0].size == 1:
+        recording.frame_rate_hz = float(rates[0].ravel()[0])
+    return recording
+
+
+def _value(array: np.ndarray[Any, Any]) -> Value:
+    """Return an array in the form of a MATLAB variable: with two axes."""
+    if array.dtype.names is not None:
+        return Struct([{name: _value(array[name]) for name in array.dtype.names}])
+    if array.dtype.kind in "SU":
+        return [one.decode() if isinstance(one, bytes) else str(one) for one in array.ravel()]
+    if array.dtype.kind == "M":
+        array = array.astype("datetime64[ns]").astype(np.int64)
+    if array.dtype.kind not in "fiub" or array.ndim > 2:
+        return None
+    return array[:, None] if array.ndim < 2 and array.size > 1 else np.atleast_2d(array)
+
+
+def _of_hdf5(contents: Hdf5Contents) -> dict[str, Value]:
+    """Return the arrays at the top of an HDF5 file, and its groups as structs."""
+    found: dict[str, Value] = {}
+    for name, entry in contents.file.items():
+        if hasattr(entry, "keys"):
+            inner = [one for one in entry if hasattr(entry[one], "shape")]
+            found[str(name)] = Struct(
+                [{str(one): _value(contents.array(f"{name}/{one}")) for one in inner}]
+            )
+        elif hasattr(entry, "shape"):
+            found[str(name)] = _value(contents.array(str(name)))
+    found |= {
+        str(name): np.atleast_2d(np.float64(value))
+        for name, value in contents.file.attrs.items()
+        if str(name).lower() in _RATES and np.size(value) == 1
+    }
+    return found
+
+
+LOADER = ArraysLoader()

@@ -1,0 +1,118 @@
+"""Qualisys Track Manager TSV: lines of facts, then markers (3D) or rigid bodies (6D) [mm], z up."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from driftwalk.core.errors import FormatError
+from driftwalk.record.raw import Array, RawRecording, ReadOptions, TableLayout
+from driftwalk.record.space.flat import SpaceTrack, lay_flat
+from driftwalk.record.space.plane import plane_of
+from driftwalk.record.space.turns import QUATERNION, Turns
+from driftwalk.record.text import read_table
+
+_FIRST: Final = "NO_OF_FRAMES"
+_BODIES: Final = ("BODY_NAMES", "MARKER_NAMES")
+_MOST_HEAD: Final = 40
+_WIDTH: Final = {"3D": 3, "6D": 16}
+"""Columns of a marker: X, Y, Z; of a rigid body: with three angles, the residual, nine of the
+rotation matrix."""
+
+
+class QualisysLoader:
+    """Every body, or every marker of a file without bodies."""
+
+    name = "qualisys"
+    description = "Qualisys Track Manager TSV, 3D and 6D (mm; z up)"
+
+    def sniff(self, head: bytes, _path: Path) -> float:
+        """Recognise the first line."""
+        return 0.95 if head.startswith(_FIRST.encode() + b"\t") else 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read the frames; the unit, the rate and the names stand above them."""
+        facts, skip, fields = _head(path)
+        kind = (facts.get("DATA_INCLUDED") or ["3D"])[0].strip()
+        names = next((facts[one] for one in _BODIES if one in facts), [])
+        names = [name for name in names if name]
+        if kind not in _WIDTH or not names:
+            raise FormatError(
+                "expected DATA_INCLUDED 3D with MARKER_NAMES, or 6D with BODY_NAMES: export these "
+                "from Qualisys Track Manager",
+                path=path,
+            )
+        # Frame and time may stand before the positions, and a tab at the end.
+        first = len(fields) - _WIDTH[kind] * len(names) - (not fields[-1].strip())
+        if not 0 <= first <= 2:
+            raise FormatError(
+                f"expected {_WIDTH[kind]} columns for each of {len(names)} names, after frame and "
+                f"time or none; got {len(fields)}",
+                path=path,
+                line=skip + 1,
+            )
+        wanted = tuple(range(first, first + _WIDTH[kind] * len(names)))
+        table = read_table(path, TableLayout("\t", [""] * len(fields), skip, wanted))
+        tracks = [
+            _track(name, table.numbers, first + at * _WIDTH[kind], kind, table.rows)
+            for at, name in enumerate(names)
+        ]
+        rate = _rate(facts, path)
+        flat = lay_flat(tracks, plane_of(options.up or "z"))
+        return replace(
+            flat, clock_unit="frame", length_unit="mm", frame_rate_hz=rate, rows=table.rows
+        )
+
+
+def _head(path: Path) -> tuple[dict[str, list[str]], int, list[str]]:
+    """Return the facts above the rows, their lines, and the fields of the first row."""
+    with path.open("rb") as file:
+        lines = file.read(1 << 20).split(b"\n")
+    facts: dict[str, list[str]] = {}
+    for at, line in enumerate(lines[:_MOST_HEAD]):
+        fields = line.decode("utf-8-sig", "replace").rstrip("\r").split("\t")
+        if _is_number(fields[0]):
+            return facts, at, fields
+        facts[fields[0]] = fields[1:]
+    raise FormatError("has no rows under its head", path=path)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _rate(facts: dict[str, list[str]], path: Path) -> float:
+    """Return the frames per second [Hz]."""
+    text = (facts.get("FREQUENCY") or [""])[0]
+    if not _is_number(text) or not float(text) > 0.0:
+        raise FormatError(f"FREQUENCY is '{text}', and no rate of frames", path=path)
+    return float(text)
+
+
+def _track(name: str, columns: dict[int, Array], first: int, kind: str, rows: int) -> SpaceTrack:
+    """Return a marker or a body; three zeros are where it was not seen."""
+    position = np.column_stack([columns[first + axis] for axis in range(3)])
+    position[(position == 0.0).all(axis=1)] = np.nan
+    clock = np.arange(rows, dtype=np.float64)
+    if kind == "3D":
+        return SpaceTrack(name, clock, position)
+    # The nine elements go down the columns of the matrix.
+    elements = np.column_stack([columns[first + 7 + at] for at in range(9)])
+    matrix = elements.reshape(-1, 3, 3).transpose(0, 2, 1)
+    known = np.isfinite(matrix).all(axis=(1, 2)) & (np.abs(matrix).max(axis=(1, 2)) > 0.0)
+    quaternion = np.full((rows, 4), np.nan)
+    if known.any():
+        from scipy.spatial.transform import Rotation
+
+        quaternion[known] = Rotation.from_matrix(matrix[known]).as_quat()
+    return SpaceTrack(name, clock, position, Turns(quaternion, QUATERNION))
+
+
+LOADER = QualisysLoader()

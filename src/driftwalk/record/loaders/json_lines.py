@@ -1,0 +1,100 @@
+"""JSON lines: an object per line, ``{"t": .., "x": .., "y": ..}``, with objects inside or not."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from driftwalk.core.errors import FormatError
+from driftwalk.core.files.bounded import MIB
+from driftwalk.core.text.json_text import MOST_BYTES, parse_json
+from driftwalk.record.raw import RawRecording, ReadOptions
+from driftwalk.record.tables.in_memory import MemorySource
+from driftwalk.record.tables.rows import recording_of
+from driftwalk.record.text import open_binary
+
+
+class JsonLinesLoader:
+    """Keys are read as the names of columns; ``pose.x`` for an x inside a pose."""
+
+    name = "jsonl"
+    description = "JSON lines, one object per sample (keys as the columns of a plain table)"
+
+    def sniff(self, head: bytes, _path: Path) -> float:
+        """Recognise an object in the first line, and none that goes on in the second."""
+        first, *rest = head.split(b"\n")
+        if not first.lstrip().startswith(b"{") or not first.rstrip().endswith(b"}"):
+            return 0.0
+        if rest and rest[0].strip() and not rest[0].lstrip().startswith(b"{"):
+            return 0.0
+        try:
+            return 0.6 if isinstance(json.loads(first), dict) else 0.0
+        except (ValueError, RecursionError):
+            return 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read the lines; a list of objects in one makes a row of each, for several bodies."""
+        with open_binary(path) as file:
+            text = file.read(MOST_BYTES + 1)
+        if len(text) > MOST_BYTES:
+            raise FormatError(f"holds more than {MOST_BYTES / MIB:g} MiB of JSON", path=path)
+        rows: list[dict[str, Any]] = []
+        for number, line in enumerate(text.splitlines(), start=1):
+            if not line.strip():
+                continue
+            try:
+                entry = parse_json(line, path=path)
+            except FormatError as error:
+                raise FormatError(error.reason, path=path, line=number) from error
+            if not isinstance(entry, dict):
+                raise FormatError("expected an object in each line", path=path, line=number)
+            rows += _rows(entry, path, number)
+        names = list(dict.fromkeys(name for row in rows for name in row))
+        columns = [_column([row.get(name) for row in rows]) for name in names]
+        return recording_of(MemorySource("the lines", names, columns), options)
+
+
+def _rows(entry: dict[str, Any], path: Path, number: int) -> list[dict[str, Any]]:
+    """Return a line as rows: one, or one for each object of the list that it holds."""
+    flat = _flat(entry)
+    lists = [name for name, value in flat.items() if isinstance(value, list) and _objects(value)]
+    if len(lists) > 1:
+        raise FormatError(
+            f"holds several lists of objects: {', '.join(lists)}", path=path, line=number
+        )
+    shared = {name: value for name, value in flat.items() if not isinstance(value, list)}
+    if not lists:
+        return [shared]
+    return [{**shared, **_flat(one)} for one in flat[lists[0]]]
+
+
+def _objects(value: list[Any]) -> bool:
+    return all(isinstance(one, dict) for one in value)
+
+
+def _flat(entry: dict[str, Any], before: str = "") -> dict[str, Any]:
+    """Return the values of an object, those inside with their path for a name."""
+    found: dict[str, Any] = {}
+    for name, value in entry.items():
+        if isinstance(value, dict):
+            found |= _flat(value, f"{before}{name}.")
+        else:
+            found[f"{before}{name}"] = value
+    return found
+
+
+def _column(values: list[Any]) -> np.ndarray[Any, Any]:
+    """Return numbers as float64, NaN where one is missing; whole ones and words as they are."""
+    if all(isinstance(one, int) and abs(one) < 1 << 63 for one in values):
+        return np.array(values, dtype=np.int64)
+    if all(one is None or isinstance(one, int | float) for one in values):
+        return np.array([np.nan if one is None else float(one) for one in values])
+    column = np.empty(len(values), dtype=object)
+    column[:] = values
+    return column
+
+
+LOADER = JsonLinesLoader()
