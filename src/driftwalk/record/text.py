@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import check_lines
-from driftwalk.record.raw import MISSING, Array, TableLayout
+from driftwalk.record.raw import MISSING, NAMELESS, Array, TableLayout
 from driftwalk.record.tables.encoding import WINDOWS, TranscodedText, other_encoding
 from driftwalk.record.tables.growing import GrowingColumn
 from driftwalk.record.tables.stamps import StampError, StampReader, calendar_of, clock_of_stamps
@@ -451,7 +451,10 @@ def _parse(block: bytes, layout: TableLayout, *, path: Path, line: int, decimal:
             dtype=dict.fromkeys((*layout.texts, *layout.stamps), str),
             decimal=decimal,
             sep=r"\s+" if layout.delimiter == " " else layout.delimiter,
-            na_values=list(MISSING),
+            na_values={
+                **dict.fromkeys((*layout.numbers, *layout.stamps), list(MISSING)),
+                **dict.fromkeys(layout.texts, list(NAMELESS)),
+            },
             keep_default_na=False,
             index_col=False,
             skipinitialspace=True,

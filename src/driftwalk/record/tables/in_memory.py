@@ -16,6 +16,7 @@ from driftwalk.record.tables.cells import (
     as_numbers,
     as_ticks,
     form_of,
+    text_of_cell,
 )
 from driftwalk.record.tables.heading import TABLE
 from driftwalk.record.tables.stamps import (
@@ -58,6 +59,7 @@ class MemorySource:
     ) -> None:
         self.what = what
         self.names = names
+        self.units: list[str] = []
         self.has_header = has_header
         self._columns = columns
         self._zoned = zoned
@@ -70,6 +72,14 @@ class MemorySource:
     def column(self, at: int) -> Values:
         """Return the values of a column, which must not be changed."""
         return self._columns[at]
+
+    def sample(self) -> list[list[str]]:
+        """Return the first rows as texts."""
+        texts = [
+            [text_of_cell(cell) for cell in column[: TABLE.sample_rows].tolist()]
+            for column in self._columns
+        ]
+        return [list(row) for row in zip(*texts, strict=True)]
 
     def stamps(self, column: int) -> StampForm | None:
         """Return how the first time stamp of a column is written, None where it has none."""

@@ -21,7 +21,7 @@ from driftwalk.record.tables.cells import (
     text_of_cell,
 )
 from driftwalk.record.tables.growing import GrowingColumn
-from driftwalk.record.tables.heading import TABLE, header_advice, heading_of
+from driftwalk.record.tables.heading import TABLE, header_advice, heading_of, is_data, units_below
 from driftwalk.record.tables.stamps import (
     StampError,
     StampForm,
@@ -70,12 +70,18 @@ class SheetSource:
         first = texts[0] if texts and (stated or options.header_line is None) else []
         self.has_header = stated or (bool(first) and not is_numeric_row(first))
         self.names = first if self.has_header else [""] * len(first)
+        self.units: list[str] = []
         self._header, self._advice = (lines[0] if lines else 0), ""
+        if self.has_header and not stated and is_data(first, texts[1:], options):
+            self.has_header, self.names = False, [""] * len(first)
+        if stated and len(texts) > 2 and (units := units_below(first, texts[1], options)):
+            self.units, self._header = units, lines[1]
         if self.has_header and not stated:
             for at in range(len(texts)):
                 found = heading_of(texts[at : at + 3], options)
                 if found is not None:
-                    self.names, self._header = found.names, lines[at + found.rows - 1]
+                    self.names, self.units = found.names, found.units
+                    self._header = lines[at + found.rows - 1]
                     break
             else:
                 self._advice = header_advice(texts, lines[0])
@@ -84,6 +90,10 @@ class SheetSource:
     def is_blank(self) -> bool:
         """Whether the sheet has no header."""
         return not self.names
+
+    def sample(self) -> list[list[str]]:
+        """Return the first rows as texts."""
+        return [_texts(row) for _, row in islice(self._data(), TABLE.sample_rows)]
 
     def stamps(self, column: int) -> StampForm | None:
         """Return how the first time stamp of a column is written, None where it has none."""
