@@ -16,6 +16,7 @@ from driftwalk.record.vocabulary import (
     TIME_WORDS,
     UNITS,
     WITH_ID,
+    words,
 )
 
 QUATERNION: Final = ("qx", "qy", "qz", "qw")
@@ -23,12 +24,12 @@ OF_BODY: Final = ("x", "y", "z", "theta", *QUATERNION, "lon", "lat", "confidence
 """Quantities that a table may have once for each body."""
 # Words before x, y, z or w that make them a part of a quaternion: "orientation.x", "q_w".
 _QUATERNION_WORDS = frozenset({"q", "quat", "quaternion", "orientation"})
-_FRAME_WORDS = frozenset({"number", "no", "index", "stamp", "col", "num"})
+_FRAME_WORDS = words("number no index stamp col num")
 # The words of English that every version knew: they come before others of the same quantity.
-_FIRST = frozenset(
-    "t time timestamp datetime date frame frames framenumber frameno frameid frameindex body id "
-    "track trackid robot robotid individual animal name particle agent subject fish mouse rat bot "
-    "particleid agentid objectid tagid uid tracklet".split()
+_FIRST = words(
+    "t time timestamp datetime date frame frames framenumber frameno frameid frameindex body "
+    "id track trackid robot robotid individual animal name particle agent subject fish mouse "
+    "rat bot particleid agentid objectid tagid uid tracklet"
 )
 _BRACKETS = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*)\s*[\])]\s*$")
 _JOINED = re.compile(r"(position|cent(?:er|re|roid)|head|nose|tail)([xy])\b", re.IGNORECASE)
@@ -80,7 +81,11 @@ def column_meaning(name: str, unit_below: str = "") -> ColumnMeaning | None:
     if stamp is not None:
         return stamp
     index, quantity, number = _quantity(tokens[:-1] if last in UNITS or last in NO_UNIT else tokens)
-    if not inside and quantity and (last in ALLOWED[quantity] or UNITS.get(last) in ALLOWED[quantity]):
+    if (
+        not inside
+        and quantity
+        and (last in ALLOWED[quantity] or UNITS.get(last) in ALLOWED[quantity])
+    ):
         unit = UNITS[tokens.pop().lower()]
     elif not inside and quantity and last in NO_UNIT and ALLOWED[quantity]:
         unknown = tokens.pop()
@@ -116,7 +121,7 @@ def _plain(name: str) -> str:
 
 
 def _quantity(tokens: list[str]) -> tuple[int, str, str]:
-    """Return (index of its word, quantity, number of the body) of a name, ("" where it has none)."""
+    """Return (index of its word, quantity, number of the body) of a name, if it has one."""
     found = [(index, *_root(token)) for index, token in enumerate(tokens)]
     found = [entry for entry in found if entry[1]]
     kinds = tuple(entry[1] for entry in found)

@@ -14,15 +14,15 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-NAMELESS = frozenset(
-    {"", "#N/A", "NaN", "nan", "NAN", "NA", "N/A", "null", "NULL", "None", "none", "-nan"}
-)
+from driftwalk.record.vocabulary import words
+
+NAMELESS = words("#N/A NaN nan NAN NA N/A null NULL None none -nan") | {""}
 """Words that stand for no name of a body."""
 
-MISSING = NAMELESS | frozenset(
-    "- -- --- . .. n/a n.a. missing Missing MISSING <NA> NaT nil 1.#QNAN -1.#QNAN 1.#IND -1.#IND "
-    "1.#QNB 1.#SNAN nan(ind) -nan(ind) nan(snan) -nan(snan) nanq nans #DIV/0! #VALUE! #REF! #NUM! "
-    "#NAME? #NULL! #NV #NV! #WERT! #N/D".split()
+MISSING = NAMELESS | words(
+    "- -- --- . .. n/a n.a. missing Missing MISSING <NA> NaT nil 1.#QNAN -1.#QNAN 1.#IND "
+    "-1.#IND 1.#QNB 1.#SNAN nan(ind) -nan(ind) nan(snan) -nan(snan) nanq nans #DIV/0! #VALUE! "
+    "#REF! #NUM! #NAME? #NULL! #NV #NV! #WERT! #N/D"
 )
 """Words that trackers, spreadsheets and compilers write for a missing number."""
 
@@ -199,7 +199,7 @@ class ReadOptions:
     min_confidence: float | None = None
     """Keypoints seen with less confidence are missing; None: as usual for the format."""
     box: str | None = None
-    """Which columns of a box there are: ``"xyxy"``, ``"xywh"``, ``"cxcywh"``; ``"none"``: no box."""
+    """Columns of a box: ``"xyxy"``, ``"xywh"``, ``"cxcywh"``; ``"none"``: there is no box."""
     missing: tuple[str, ...] = ()
     """Places that mean that the body was not seen: ``"0,0"``, ``"-9999"``, ``"held"``."""
     replicate: int = 0

@@ -440,21 +440,20 @@ def _parse(block: bytes, layout: TableLayout, *, path: Path, line: int, decimal:
     if (whole != width).any():
         widest = check_lines(block, layout, path=path, line=line, decimal=decimal)
         width = max(width, widest)
+    used = sorted({*layout.numbers, *layout.texts, *layout.stamps})
     # The stubs of pandas cannot follow options in a dictionary.
+    missing: Any = {at: list(NAMELESS if at in layout.texts else MISSING) for at in used}
     exact: Any = {} if _pandas_is_exact(pd.__version__) else {"float_precision": "round_trip"}
     try:
         frame = pd.read_csv(
             io.BytesIO(block),
             header=None,
             names=list(range(width)),
-            usecols=sorted({*layout.numbers, *layout.texts, *layout.stamps}),
+            usecols=used,
             dtype=dict.fromkeys((*layout.texts, *layout.stamps), str),
             decimal=decimal,
             sep=r"\s+" if layout.delimiter == " " else layout.delimiter,
-            na_values={
-                **dict.fromkeys((*layout.numbers, *layout.stamps), list(MISSING)),
-                **dict.fromkeys(layout.texts, list(NAMELESS)),
-            },
+            na_values=missing,
             keep_default_na=False,
             index_col=False,
             skipinitialspace=True,

@@ -5,6 +5,11 @@ from __future__ import annotations
 from typing import Final
 
 
+def words(text: str) -> frozenset[str]:
+    """Return the words of a text."""
+    return frozenset(text.split())
+
+
 def _words(meaning: str, words: str) -> dict[str, str]:
     return dict.fromkeys(words.split(), meaning)
 
@@ -32,11 +37,11 @@ ROOTS: Final[dict[str, str]] = {
     **_words("confidence", "p conf confidence likelihood prob probability score valid visible"),
     **_words("confidence", "visibility certainty konfidenz confiance confianza confidenza"),
 }
-WITH_ID: Final = frozenset("object obj cell marker tag target blob instance tracking".split())
+WITH_ID: Final = words("object obj cell marker tag target blob instance tracking")
 """These name bodies only with "id": alone they may be a class or a state, which changes."""
 UNITS: Final[dict[str, str]] = {
-    **{unit: unit for unit in "m cm mm um km dm nm ft in yd s ms us ns min h d px".split()},
-    **{unit: unit for unit in "rad mrad deg gon turn ddeg cdeg".split()},
+    **{unit: unit for unit in words("m cm mm um km dm nm ft in yd s ms us ns min h d px")},
+    **{unit: unit for unit in words("rad mrad deg gon turn ddeg cdeg")},
     **{"µm": "um", "μm": "um", "µs": "us", "μs": "us", "°": "deg", "deg/10": "ddeg"},
     **_words("m", "metre metres meter meters metri metro metros mètre mètres"),
     **_words("cm", "centimetre centimetres centimeter centimeters zentimeter"),
@@ -60,52 +65,52 @@ UNITS: Final[dict[str, str]] = {
     **_words("ddeg", "decideg decidegree decidegrees deg10"),
     **_words("cdeg", "centideg centidegree centidegrees"),
 }
-LENGTHS: Final = frozenset("m cm mm um km dm nm ft in yd px".split())
+LENGTHS: Final = words("m cm mm um km dm nm ft in yd px")
 ALLOWED: Final[dict[str, frozenset[str]]] = {
-    "t": frozenset("s ms us ns min h d".split()),
+    "t": words("s ms us ns min h d"),
     **dict.fromkeys(("x", "y", "z", "x1", "y1", "x2", "y2", "w", "h"), LENGTHS),
-    "theta": frozenset("rad mrad deg gon turn ddeg cdeg".split()),
+    "theta": words("rad mrad deg gon turn ddeg cdeg"),
     **dict.fromkeys(("lon", "lat"), frozenset({"deg"})),
     **dict.fromkeys(("date", "frame", "qx", "qy", "qz", "qw", "body", "confidence"), frozenset()),
 }
 """Quantities, and the units that each may have."""
-NO_UNIT: Final = frozenset(
-    "bl norm normed normalized normalised rel pct percent % grid cell cells tile tiles au unit "
-    "units arb mil mils thou mi mile miles nmi fathom fathoms furlong furlongs grad voxel voxels "
-    "ly pc steps ticks counts ratio frac fraction".split()
+NO_UNIT: Final = words(
+    "bl norm normed normalized normalised rel pct percent % grid cell cells tile tiles au "
+    "unit units arb mil mils thou mi mile miles nmi fathom fathoms furlong furlongs grad "
+    "voxel voxels ly pc steps ticks counts ratio frac fraction"
 )
 """Units without a length or an angle of their own, or with several: they are refused by name."""
 
-IMAGE_WORDS: Final = frozenset(
+IMAGE_WORDS: Final = words(
     "pos position center centre centroid image coord coordinate mitte schwerpunkt mittelpunkt "
-    "posición posicion centro posizione centroide".split()
+    "posición posicion centro posizione centroide"
 )
 """Words beside x or y that name no body. They hint at an image: such lengths are not metres."""
-NO_POSITION: Final = frozenset(
+NO_POSITION: Final = words(
     "velocity vel speed acceleration acc accel force err error std sigma var variance min max "
     "confidence likelihood score dot ddot gyro gyroscope mag magnetometer accelerometer rate "
     "omega angular linear twist torque jerk cov covariance bias noise diff delta gradient "
-    "geschwindigkeit vitesse velocidad velocità kraft".split()
+    "geschwindigkeit vitesse velocidad velocità kraft"
 )
 """Words beside a coordinate or an angle that rule out a position."""
-SETPOINTS: Final = frozenset(
+SETPOINTS: Final = words(
     "ref reference cmd command commanded goal target setpoint desired des origin wind current "
-    "waypoint wp offset soll sollwert consigne".split()
+    "waypoint wp offset soll sollwert consigne"
 )
 """Words of pairs that are no body where another pair is: what it was to do, or what pushed it."""
-VARIANTS: Final = frozenset(
-    "raw filt filtered smooth smoothed est estimate estimated true truth gt meas measured pred "
-    "predicted kf ekf interp interpolated corrected".split()
+VARIANTS: Final = words(
+    "raw filt filtered smooth smoothed est estimate estimated true truth gt meas measured "
+    "pred predicted kf ekf interp interpolated corrected"
 )
 """Words of pairs that are one body once more, from before or after a computation."""
-TIME_WORDS: Final = frozenset(
+TIME_WORDS: Final = words(
     "number no index stamp col num n° nr n trial recording elapsed video date ros unix epoch "
-    "system relative simulation sim of day".split()
+    "system relative simulation sim of day"
 )
 """Words beside a time, a frame or a name that do not change what it is."""
-FRONT: Final = frozenset("head nose snout front kopf nase tête tete nez cabeza nariz testa".split())
-REAR: Final = frozenset("tail rear back tailbase schwanz queue cola coda".split())
-MIDDLE: Final = frozenset("body center centre centroid middle mid".split()) | {""}
+FRONT: Final = words("head nose snout front kopf nase tête tete nez cabeza nariz testa")
+REAR: Final = words("tail rear back tailbase schwanz queue cola coda")
+MIDDLE: Final = words("body center centre centroid middle mid") | {""}
 """Parts of one body: its orientation is the direction from the middle to the front."""
 
 _CORNERS: Final = {

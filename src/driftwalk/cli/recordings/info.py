@@ -186,7 +186,7 @@ def _print_file(described: dict[str, Any]) -> None:
 
 
 def _print_columns(columns: list[dict[str, str]]) -> None:
-    """Print what each column was taken for, in which unit, and why; of many, those that are read."""
+    """Print what each column was taken for, in which unit, and why."""
     shown = [one for one in columns if one["meaning"] != "not read"]
     rest = [one for one in columns if one["meaning"] == "not read"]
     shown += rest[:MOST_UNREAD]

@@ -5,12 +5,14 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.text.argument_text import argument_text
 from driftwalk.record.raw import Array, RawBody, RawRecording
 
 HELD: Final = "held"
+Flags = npt.NDArray[np.bool_]
 
 
 class MissingPolicy(NamedTuple):
@@ -63,7 +65,7 @@ def blank_missing(raw: RawRecording, marks: tuple[str, ...]) -> None:
         raw.notes.append(f"samples that are missing by {argument_text('missing', mark)}: {count}")
 
 
-def _lost(body: RawBody, mark: str) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _lost(body: RawBody, mark: str) -> Flags:
     if mark == HELD:
         same = (np.diff(body.x) == 0.0) & (np.diff(body.y) == 0.0)
         return np.append(False, same)[: body.x.size]
@@ -72,9 +74,9 @@ def _lost(body: RawBody, mark: str) -> np.ndarray[tuple[int], np.dtype[np.bool_]
     except ValueError:
         numbers = []
     if len(numbers) == 1:
-        return (body.x == numbers[0]) | (body.y == numbers[0])
+        return np.asarray((body.x == numbers[0]) | (body.y == numbers[0]))
     if len(numbers) == 2:
-        return (body.x == numbers[0]) & (body.y == numbers[1])
+        return np.asarray((body.x == numbers[0]) & (body.y == numbers[1]))
     raise InputError(
         f"`missing` is a place such as '0,0', a number such as '-9999', or '{HELD}'; got '{mark}'"
     )
@@ -127,14 +129,18 @@ def _marks_of(body: RawBody) -> list[tuple[str, str]]:
         runs, rows = _held_runs(square, still, usual)
         if runs > 1 or rows > 2 * MARK.held:
             times = "once" if runs == 1 else f"{runs} times"
-            marks.append((HELD, f"stays at exactly one place for several samples and leaps, {times}"))
+            marks.append(
+                (HELD, f"stays at exactly one place for several samples and leaps, {times}")
+            )
     return marks
 
 
-def _far_places(x: Array, y: Array, far: np.ndarray[tuple[int], np.dtype[np.int64]]) -> list[tuple[str, str]]:
+def _far_places(x: Array, y: Array, far: npt.NDArray[np.int64]) -> list[tuple[str, str]]:
     """Return the place that samples share exactly, and reach by far steps alone."""
     reached = np.unique(np.concatenate([far, far + 1]))
-    places, counts = np.unique(np.column_stack([x[reached], y[reached]]), axis=0, return_counts=True)
+    places, counts = np.unique(
+        np.column_stack([x[reached], y[reached]]), axis=0, return_counts=True
+    )
     for at in np.argsort(-counts, kind="stable")[:3]:
         px, py = places[at].tolist()
         there = (x == px) & (y == py)
@@ -146,11 +152,12 @@ def _far_places(x: Array, y: Array, far: np.ndarray[tuple[int], np.dtype[np.int6
         if not np.isin(edges, far).all() or np.hypot(x[~there] - px, y[~there] - py).min() <= 0.0:
             continue
         text = f"{px:.10g},{py:.10g}"
-        return [(text, f"is at exactly one place, {text} in the file, in {count} samples, far from those around them")]
+        what = f"is at exactly one place, {text} in the file, in {count} samples"
+        return [(text, f"{what}, far from those around them")]
     return []
 
 
-def _held_runs(square: Array, still: np.ndarray[tuple[int], np.dtype[np.bool_]], usual: float) -> tuple[int, int]:
+def _held_runs(square: Array, still: Flags, usual: float) -> tuple[int, int]:
     """Return how often the body stays for several rows and then leaps, and for how many rows."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(np.int8)))
     begins, ends = edges[::2], edges[1::2]

@@ -15,7 +15,7 @@ from driftwalk.core.text.argument_text import argument_text
 from driftwalk.core.text.did_you_mean import listed
 from driftwalk.record.column_names import ColumnMeaning, words_of
 from driftwalk.record.raw import Array, ReadOptions, TableLayout
-from driftwalk.record.vocabulary import BOXES, LENGTHS, NO_UNIT, UNITS
+from driftwalk.record.vocabulary import BOXES, LENGTHS, NO_UNIT, UNITS, words
 
 if TYPE_CHECKING:
     from driftwalk.record.tables.source import TableSource
@@ -24,8 +24,8 @@ FORMS: Final = ("xyxy", "xywh", "cxcywh", "none")
 _CORNERS: Final = ("x1", "y1", "x2", "y2")
 _QUAD: Final = tuple(f"{axis}{corner}" for corner in range(1, 5) for axis in "xy")
 _OF_QUAD: Final = re.compile(r"(?:tag)?(?:c|corner|p|pt)([0-3])([xy])")
-_CENTRE: Final = frozenset("cx cy xc yc center centre centroid mitte centro".split())
-_CLASSES: Final = frozenset("class cls classid classname label category".split())
+_CENTRE: Final = words("cx cy xc yc center centre centroid mitte centro")
+_CLASSES: Final = words("class cls classid classname label category")
 
 
 class BoxPolicy(NamedTuple):
@@ -83,6 +83,8 @@ def find_box(
         return _stated(options.box, found, units)
     if {"x", "y"} & set(chosen) and not {"x1", "w"} & set(chosen):
         return None
+    if getattr(source, "matrices", False):
+        return None
     quad = _quad(source)
     if quad is not None:
         return quad
@@ -128,8 +130,12 @@ def _sides(
         elif stated:
             unit = UNITS.get(stated.lower(), "")
         side = BOXES.get("".join(words), "")
-        if side in ("x", "y") or (meaning is not None and meaning.quantity in ("x", "y") and not side):
-            side = meaning.quantity if meaning is not None and meaning.quantity in ("x", "y") else ""
+        if side in ("x", "y") or (
+            meaning is not None and meaning.quantity in ("x", "y") and not side
+        ):
+            side = (
+                meaning.quantity if meaning is not None and meaning.quantity in ("x", "y") else ""
+            )
             if meaning is not None and (meaning.body and meaning.rank >= 0):
                 side = ""
         if side and side not in found:
@@ -149,7 +155,7 @@ def _stated(form: str, found: Mapping[str, int], units: Mapping[str, str]) -> Bo
         sides = ("x1", "y1", "w", "h") if corner else ("x", "y", "w", "h")
     missing = [side for side in sides if side not in found]
     if missing:
-        wanted = argument_text("columns", {side: "NAME" for side in sides})
+        wanted = argument_text("columns", dict.fromkeys(sides, "NAME"))
         raise InputError(f"a box of the form '{form}' has no column of {listed(missing)}: {wanted}")
     names = dict(zip(sides, _CORNERS if form == "xyxy" else ("x", "y", "w", "h"), strict=True))
     return Box(
@@ -168,12 +174,13 @@ def _corners(
     *,
     plain: bool,
 ) -> Box | None:
-    """Return the box of two corners; of x1, y1, x2, y2 the values decide whether they are bodies."""
+    """Return the box of two corners; values decide whether x1, y1, x2, y2 are two bodies."""
     box = _stated("xyxy", found, units)
     numbered = {one.body for one in meanings.values() if one.body.isdecimal()}
-    if plain and (numbered - {"1", "2"} or any(
-        one.quantity == "theta" and one.body in numbered for one in meanings.values()
-    )):
+    if plain and (
+        numbered - {"1", "2"}
+        or any(one.quantity == "theta" and one.body in numbered for one in meanings.values())
+    ):
         return None
     if not plain and not {"x", "y"} <= set(found):
         return box
@@ -254,8 +261,9 @@ def box_centre(box: Box, values: Mapping[int, Array]) -> tuple[Array, Array]:
         if box.form == "xyxy":
             return 0.5 * (side["x1"] + side["x2"]), 0.5 * (side["y1"] + side["y2"])
         if box.form == "quad":
-            x, y = (sum(side[f"{axis}{n}"] for n in range(1, 5)) for axis in "xy")
-            return 0.25 * x, 0.25 * y
+            corners = [[side[f"{axis}{n}"] for n in range(1, 5)] for axis in "xy"]
+            x, y = (np.mean(of_axis, axis=0) for of_axis in corners)
+            return x, y
         if box.form == "xywh":
             return side["x"] + 0.5 * side["w"], side["y"] + 0.5 * side["h"]
     return side["x"], side["y"]
@@ -287,11 +295,17 @@ def box_angle(
     """
     side = {name: values[at] for name, at in box.sides.items()}
     if box.form == "quad" and theta is None:
-        along = [side[f"{axis}2"] + side[f"{axis}3"] - side[f"{axis}1"] - side[f"{axis}4"] for axis in "xy"]
+        along = [
+            side[f"{axis}2"] + side[f"{axis}3"] - side[f"{axis}1"] - side[f"{axis}4"]
+            for axis in "xy"
+        ]
         theta = np.arctan2(along[1], along[0])
         w = np.hypot(*along)
         h = np.hypot(
-            *(side[f"{axis}3"] + side[f"{axis}4"] - side[f"{axis}1"] - side[f"{axis}2"] for axis in "xy")
+            *(
+                side[f"{axis}3"] + side[f"{axis}4"] - side[f"{axis}1"] - side[f"{axis}2"]
+                for axis in "xy"
+            )
         )
         turn = 2.0 * np.pi
     elif theta is None or "w" not in side:

@@ -94,7 +94,9 @@ class TableReading:
         return next(iter((*self.stamps, *self.numbers)), None)
 
 
-def read_columns(source: TableSource, options: ReadOptions, *, lenient: bool = False) -> TableReading:
+def read_columns(
+    source: TableSource, options: ReadOptions, *, lenient: bool = False
+) -> TableReading:
     """Return what each column of a table is, by its names, its first rows and what the user says.
 
     Parameters
@@ -218,10 +220,12 @@ class _Reader:
         kinds = {one.body: _kinds(one.body) for one in self._meanings.values() if one.body}
         real = [body for body in bodies if body not in kinds or not any(kinds[body])]
         setpoints = [body for body in bodies if body in kinds and kinds[body][0]]
-        variants = [body for body in bodies if body in kinds and kinds[body][1] and not kinds[body][0]]
-        left = {body: _OTHER_BODY for body in setpoints} if real or variants else {}
+        variants = [
+            body for body in bodies if body in kinds and kinds[body][1] and not kinds[body][0]
+        ]
+        left = dict.fromkeys(setpoints, _OTHER_BODY) if real or variants else {}
         if self._result.box is not None:
-            left = {body: _OTHER_BODY for body in setpoints}
+            left = dict.fromkeys(setpoints, _OTHER_BODY)
         if len(setpoints) > 1 and not left and not self._lenient:
             raise InputError(self._one_of([f"x_{body}" for body in setpoints], setpoints))
         of_base: dict[str, list[str]] = {}
@@ -270,7 +274,11 @@ class _Reader:
                 for other, one in self._meanings.items()
                 if (one.quantity, one.body) == (meaning.quantity, meaning.body) and not one.unknown
             ]
-            if same or meaning.quantity == "z" or (meaning.quantity == "t" and self._bodies("frame")):
+            if (
+                same
+                or meaning.quantity == "z"
+                or (meaning.quantity == "t" and self._bodies("frame"))
+            ):
                 self._drop([at], f"'{meaning.unknown}' is no unit that is known")
                 continue
             raise InputError(self._no_unit(at, meaning.unknown))
@@ -285,7 +293,12 @@ class _Reader:
             if at in pairs
         )
         word = next(iter(words)) if len(words) == 1 else ""
-        if pairs and lone and _may_be_unit(word) and not any(self._meanings[at].unit for at in pairs):
+        if (
+            pairs
+            and lone
+            and _may_be_unit(word)
+            and not any(self._meanings[at].unit for at in pairs)
+        ):
             raise InputError(
                 self._no_unit(pairs[0], word)
                 + "; if it names the body, state the unit of its positions with `length_unit`"
@@ -306,22 +319,7 @@ class _Reader:
 
     def _find_bodies(self) -> None:
         """Put the columns of each body together, and refuse what is ambiguous."""
-        chosen, options = self._chosen, self._options
-        for at in [at for at, one in self._meanings.items() if one.quantity in ("z", *QUATERNION)]:
-            meaning = self._meanings[at]
-            if meaning.quantity == "z" and options.up is None:
-                self._drop([at], "height: the plane of the water is x, y without `up`")
-            elif meaning.quantity in QUATERNION and not self._is_turned(meaning.body):
-                self._result.columns[at].why = "no whole quaternion, or an angle beside it"
-        turned = {one.body for one in self._meanings.values() if self._is_turned(one.body)}
-        self._drop(
-            [
-                at
-                for at, one in self._meanings.items()
-                if one.quantity in QUATERNION and one.body not in turned
-            ],
-            "no whole quaternion, or an angle beside it",
-        )
+        self._leave_out_the_third_axis()
         places: dict[str, dict[str, int]] = {}
         for at, meaning in sorted(self._meanings.items()):
             if meaning.quantity not in OF_BODY or meaning.quantity == "confidence":
@@ -353,8 +351,19 @@ class _Reader:
         self._result.bodies = bodies
         self._result.body_column = self._single("body")
         self._find_parts()
-        if "confidence" in chosen or options.min_confidence is not None:
+        if self._options.min_confidence is not None:
             self._find_confidences()
+
+    def _leave_out_the_third_axis(self) -> None:
+        """Leave out heights that nobody asks for, and parts of quaternions that are not whole."""
+        meanings = self._meanings
+        turned = {body for body in {one.body for one in meanings.values()} if self._is_turned(body)}
+        parts = [at for at, one in meanings.items() if one.quantity in QUATERNION]
+        loose = [at for at in parts if meanings[at].body not in turned]
+        self._drop(loose, "no whole quaternion, or an angle beside it")
+        if self._options.up is None:
+            height = [at for at, one in meanings.items() if one.quantity == "z"]
+            self._drop(height, "height: the plane of the water is x, y without `up`")
 
     def _is_turned(self, body: str) -> bool:
         """Whether a body has a quaternion and no angle; half of a chosen quaternion is refused."""
@@ -371,13 +380,17 @@ class _Reader:
         self, only: dict[str, int], places: dict[str, dict[str, int]], bodies: set[str]
     ) -> None:
         """Give the only body an orientation that stands without its number: x1, y1, heading."""
-        loose = [one["theta"] for body, one in places.items() if body not in bodies and "theta" in one]
+        loose = [
+            one["theta"] for body, one in places.items() if body not in bodies and "theta" in one
+        ]
         if "theta" in only or not loose:
             return
         if len(loose) > 1:
             names = listed([repr(self._names[at]) for at in loose])
             choice = argument_text("columns", {"theta": self._names[loose[0]]})
-            self._result.notes.append(f"no orientation is read of {names}: name one, as in {choice}")
+            self._result.notes.append(
+                f"no orientation is read of {names}: name one, as in {choice}"
+            )
             return
         meaning = self._meanings[loose[0]]
         if meaning.last and _may_be_unit(meaning.body) and not self._lenient:
@@ -388,7 +401,11 @@ class _Reader:
         """Find the middle and the front of one body among bodies that are its parts."""
         bodies = self._result.bodies
         lower = {body.lower(): body for body in bodies}
-        if len(lower) < 2 or set(lower) - MIDDLE - FRONT - REAR or self._options.heading is not None:
+        if (
+            len(lower) < 2
+            or set(lower) - MIDDLE - FRONT - REAR
+            or self._options.heading is not None
+        ):
             return
         middle = [body for name, body in lower.items() if name in MIDDLE]
         front = [body for name, body in lower.items() if name in FRONT]
@@ -467,7 +484,9 @@ class _Reader:
             meaning = self._meanings[time]
             result.clock_unit, result.numbers = meaning.unit or "s", (time,)
             result.bare_clock = not meaning.unit
-            if part is not None and (part in self._chosen_columns() or self._is_fraction(time, part)):
+            if part is not None and (
+                part in self._chosen_columns() or self._is_fraction(time, part)
+            ):
                 result.numbers = (time, part)
             if meaning.rank == 0 and not meaning.unit and self._is_of_ros(time):
                 result.clock_unit, result.bare_clock = "ns", False
@@ -476,7 +495,9 @@ class _Reader:
         date_form = None if date is None else source.stamps(date)
         if time is None:
             result.stamps = () if date is None or date_form is None else (date,)
-        elif form is not None and form.kind == OF_DAY and date is not None and date_form is not None:
+        elif (
+            form is not None and form.kind == OF_DAY and date is not None and date_form is not None
+        ):
             # A date that has its own time of day says all.
             result.stamps = (date,) if date_form.kind and date_form.has_time else (date, time)
         else:
@@ -507,12 +528,16 @@ class _Reader:
         result = self._result
         lengths = ("x", "y", "z")
         used = {at for one in result.bodies.values() for at in one.values()}
-        wanted = [one for at, one in self._meanings.items() if one.quantity in lengths and at in used]
+        wanted = [
+            one for at, one in self._meanings.items() if one.quantity in lengths and at in used
+        ]
         units = [one.unit for one in wanted]
         if result.box is not None:
             units += result.box.units
         result.length_unit = _agreed(units, "positions")
-        angles = [one for at, one in self._meanings.items() if one.quantity == "theta" and at in used]
+        angles = [
+            one for at, one in self._meanings.items() if one.quantity == "theta" and at in used
+        ]
         result.angle_unit = _agreed([one.unit for one in angles], "angles") if angles else ""
         result.bare = all(one.bare for one in wanted) and (result.box is None or bool(wanted))
 
@@ -547,7 +572,10 @@ class _Reader:
             return "; unit from the row below the names"
         if column.unit and unit_of_name(self._names[at]) == column.unit:
             return "; unit from its name"
-        options, length = self._options, column.role in ("x", "y", "z", "x1", "y1", "x2", "y2", "w", "h")
+        options, length = (
+            self._options,
+            column.role in ("x", "y", "z", "x1", "y1", "x2", "y2", "w", "h"),
+        )
         if not column.unit and length:
             if options.length_unit or options.metres_per_pixel is not None:
                 column.unit = options.length_unit or "px"

@@ -52,7 +52,7 @@ class _Names:
     def stamps(self, _column: int, /) -> StampForm | None:
         return None
 
-    def read(self, _wanted: TableLayout, /, *, head: bool = False) -> Table:
+    def read(self, _wanted: TableLayout, /, *, head: bool = False) -> Table:  # noqa: ARG002
         raise InputError("these are names alone")
 
     def error(self, message: str, /) -> FormatError:
@@ -106,9 +106,11 @@ def units_below(names: list[str], row: list[str], options: ReadOptions) -> list[
             continue
         if field.lower() in UNITS:
             known += 1
-        elif is_number(field) or name in chosen:
-            return []
-        elif (meaning := column_meaning(name)) is not None and meaning.quantity != "body":
+        elif (
+            is_number(field)
+            or name in chosen
+            or ((meaning := column_meaning(name)) is not None and meaning.quantity != "body")
+        ):
             return []
     return ["" if field in MISSING else field for field in fields] if known else []
 

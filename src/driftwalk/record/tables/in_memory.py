@@ -46,6 +46,8 @@ class MemorySource:
         Whether the columns have names.
     zoned : set of int
         Columns of times of NumPy that are in UTC.
+    matrices : bool
+        Whether numbers after x and y count the columns of matrices, each of which is a body.
     """
 
     def __init__(
@@ -56,11 +58,13 @@ class MemorySource:
         *,
         has_header: bool = True,
         zoned: frozenset[int] = frozenset(),
+        matrices: bool = False,
     ) -> None:
         self.what = what
         self.names = names
         self.units: list[str] = []
         self.has_header = has_header
+        self.matrices = matrices
         self._columns = columns
         self._zoned = zoned
 

@@ -71,17 +71,21 @@ def other_order(source: TableSource, reading: TableReading, names: list[str]) ->
     apart = _tracks(table, counters, free, reading.body_column)
     if apart is not None:
         body, frame = apart
-        named = {} if body == reading.body_column or body is None else {"body": names[body]}
-        columns = argument_text("columns", {**named, "frame": names[frame]})
-        what = f"'{names[frame]}' counts frames" + (f" and '{names[body]}' names bodies" if named else "")
-        return f"no column is known to hold times or frames, but it seems that {what}: add {columns}"
+        what, columns = f"'{names[frame]}' counts frames", {"frame": names[frame]}
+        if body is not None and body != reading.body_column:
+            what += f" and '{names[body]}' names bodies"
+            columns["body"] = names[body]
+        return (
+            f"no column is known to hold times or frames, but it seems that {what}: add "
+            f"{argument_text('columns', columns)}"
+        )
     if reading.body_column is None:
         for at in free:
             if _leaps(table, at, x, y):
                 columns = argument_text("columns", {"body": names[at]})
                 return (
-                    f"the position leaps wherever '{names[at]}' changes: if it names bodies, or runs, "
-                    f"add {columns}; if it is one body, name its clock"
+                    f"the position leaps wherever '{names[at]}' changes: if it names bodies, or "
+                    f"runs, add {columns}; if it is one body, name its clock"
                 )
     return None
 
@@ -130,33 +134,30 @@ def _tracks(
     """Return the columns of body and frame of a table whose frames repeat or begin anew."""
     found: list[tuple[int, int | None, int]] = []
     for frame, values in counters.items():
-        if not np.isfinite(values).all() or (values % 1.0 != 0.0).any() or table.rows < 4:
+        whole = np.isfinite(values).all() and not (values % 1.0 != 0.0).any()
+        one = body is None and (np.diff(values) > 0).all()  # a body, row by row
+        if not whole or one or table.rows < 4 or np.unique(values).size < 3:
             continue
-        if (np.diff(values) > 0).all() and body is None:
-            continue  # one body, row by row
-        if np.unique(values).size < 3:
-            continue
-        for other in (free if body is None else [body]):
-            if other == frame:
-                continue
-            codes = table.codes[other]
-            if len(table.labels[other]) > table.rows // 2 or len(table.labels[other]) < 2 - (body is not None):
-                continue
-            order = np.argsort(codes, kind="stable")
-            same = codes[order][1:] == codes[order][:-1]
-            steps = np.diff(values[order])[same]
-            if not steps.size or not (steps > 0).all() or np.median(steps) != 1.0:
-                continue
-            firsts = values[order][np.append(True, ~same)]
-            if body is not None and (steps == 1.0).all() and np.unique(firsts).size == 1:
-                continue  # counting its rows says the same
-            found.append((len(table.labels[other]), other, frame))
+        for other in free if body is None else [body]:
+            bodies = len(table.labels[other])
+            few = (2 if body is None else 1) <= bodies <= table.rows // 2
+            if few and other != frame and _counts_each(table.codes[other], values, body):
+                found.append((bodies, other, frame))
         if not found and body is None and _begins_anew(values):
             found.append((table.rows, None, frame))
-    if not found:
-        return None
-    _, other, frame = min(found, key=lambda one: one[0])
-    return other, frame
+    return min(found, key=lambda entry: entry[0])[1:] if found else None
+
+
+def _counts_each(codes: npt.NDArray[np.int32], values: Array, body: int | None) -> bool:
+    """Whether values count up, mostly one by one, in the rows of each body."""
+    order = np.argsort(codes, kind="stable")
+    same = codes[order][1:] == codes[order][:-1]
+    steps = np.diff(values[order])[same]
+    if not steps.size or not (steps > 0).all() or np.median(steps) != 1.0:
+        return False
+    firsts = values[order][np.append(True, ~same)]
+    # Of known bodies that all begin with the same number, counting the rows says the same.
+    return body is None or not ((steps == 1.0).all() and np.unique(firsts).size == 1)
 
 
 def _begins_anew(values: Array) -> bool:

@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 
 from driftwalk.core.errors import FormatError
-from driftwalk.record.bad_row import is_number, split_fields
+from driftwalk.record.bad_row import split_fields
 from driftwalk.record.raw import MISSING, ReadOptions, TableLayout
 from driftwalk.record.tables.heading import TABLE, header_advice, heading_of, is_data, units_below
 from driftwalk.record.tables.stamps import StampForm, stamp_form
