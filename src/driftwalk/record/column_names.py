@@ -51,8 +51,8 @@ class ColumnMeaning:
     """What stands in the place of a unit and is none that is known."""
     rank: int = 1
     """Of several columns of a quantity that a table has once, the one of the lowest rank counts."""
-    last: bool = False
-    """Whether the name of the body is one word that ends the name, where a unit may stand."""
+    ending: str = ""
+    """The word of the body's name that ends the name of the column, where a unit may stand."""
 
 
 def words_of(name: str) -> list[str]:
@@ -68,7 +68,7 @@ def column_meaning(name: str, unit_below: str = "") -> ColumnMeaning | None:
     Examples
     --------
     >>> column_meaning("x_mm")
-    ColumnMeaning(quantity='x', unit='mm', body='', bare=True, unknown='', rank=1, last=False)
+    ColumnMeaning(quantity='x', unit='mm', body='', bare=True, unknown='', rank=1, ending='')
     >>> column_meaning("robot2 theta (deg)").body
     'robot2'
     """
@@ -112,7 +112,7 @@ def column_meaning(name: str, unit_below: str = "") -> ColumnMeaning | None:
         bare=not image and root.rstrip("0123456789") in ("x", "y", "z", "theta", "t"),
         unknown=unknown,
         rank=1 if root in _FIRST and not lower - _FRAME_WORDS - {"id"} else 2,
-        last=not (number or unit) and len(names) == 1 and tokens[-1] == names[0],
+        ending=tokens[-1] if not unit and tokens[-1] in names else "",
     )
 
 

@@ -34,6 +34,7 @@ from driftwalk.record.vocabulary import (
 )
 
 _SKIP: Final = "skip"
+LEFT_OUT: Final = "you left it out"
 _OTHER_BODY: Final = "what it was to do, or what moved it: no body where another is"
 _SAME_BODY: Final = "the same body, before or after a computation"
 _WORDS: Final = {"t": "time", "t+": "fraction of the time", "frame": "frame number", "w": "width"}
@@ -155,7 +156,7 @@ class _Reader:
         skipped = self._options.columns.get(_SKIP, "")
         for name in filter(None, skipped.split("+")):
             index, _ = self._find(name, _SKIP)
-            self._drop([index], "you left it out")
+            self._drop([index], LEFT_OUT)
         for quantity, reference in self._chosen.items():
             first, *more = self._references(reference, quantity)
             for part, (index, unit) in zip((quantity, "t+"), (first, *more), strict=False):
@@ -170,8 +171,7 @@ class _Reader:
                     for other, meaning in self._meanings.items()
                     if meaning.quantity != part and other != index
                 }
-                below = self._below[index]
-                stated = unit_of_name(f"_ {below}") if below else unit_of_name(self._names[index])
+                stated = self._unit_of(index)
                 inferred = stated if stated in ALLOWED[quantity] else ""
                 unknown = known.unknown if known and not unit and known.quantity == quantity else ""
                 kept[index] = ColumnMeaning(
@@ -179,6 +179,11 @@ class _Reader:
                 )
                 self._meanings = kept
                 self._result.columns[index].why = "you named it"
+
+    def _unit_of(self, at: int) -> str:
+        """Return the unit of any column, as its name or the row below states it."""
+        below = self._below[at]
+        return unit_of_name(f"_ {below}") if below else unit_of_name(self._names[at])
 
     def _references(self, reference: str, quantity: str) -> list[tuple[int, str]]:
         """Return the columns that are named; of a time there may be two, with a plus between."""
@@ -284,29 +289,19 @@ class _Reader:
             raise InputError(self._no_unit(at, meaning.unknown))
         if stated or self._lenient:
             return
-        ends = {at: one for at, one in self._meanings.items() if one.quantity in ("x", "y")}
-        pairs = [at for at, one in ends.items() if one.body in self._bodies("y")]
-        words = {self._meanings[at].body.split("_")[-1] for at in pairs}
-        lone = all(
-            one.last or (len(one.body.split("_")) > 1 and self._ends(at, one))
-            for at, one in ends.items()
-            if at in pairs
-        )
+        bodies = self._bodies("y")
+        pairs = {
+            at: one
+            for at, one in self._meanings.items()
+            if one.quantity in ("x", "y") and one.body in bodies
+        }
+        words = {one.ending for one in pairs.values()}
         word = next(iter(words)) if len(words) == 1 else ""
-        if (
-            pairs
-            and lone
-            and _may_be_unit(word)
-            and not any(self._meanings[at].unit for at in pairs)
-        ):
+        if _may_be_unit(word) and not any(one.unit for one in pairs.values()):
             raise InputError(
-                self._no_unit(pairs[0], word)
+                self._no_unit(next(iter(pairs)), word)
                 + "; if it names the body, state the unit of its positions with `length_unit`"
             )
-
-    def _ends(self, at: int, meaning: ColumnMeaning) -> bool:
-        """Whether the last word of a body's name ends the name of the column."""
-        return self._names[at].lower().endswith(meaning.body.split("_")[-1].lower())
 
     def _no_unit(self, at: int, word: str) -> str:
         quantity = self._meanings[at].quantity
@@ -393,7 +388,7 @@ class _Reader:
             )
             return
         meaning = self._meanings[loose[0]]
-        if meaning.last and _may_be_unit(meaning.body) and not self._lenient:
+        if _may_be_unit(meaning.ending) and meaning.body == meaning.ending and not self._lenient:
             raise InputError(self._no_unit(loose[0], meaning.body))
         only["theta"] = loose[0]
 
@@ -550,6 +545,7 @@ class _Reader:
         for at, column in enumerate(result.columns):
             meaning = self._meanings.get(at)
             if at not in used and at not in clock and at != result.body_column:
+                column.unit = self._unit_of(at)
                 if meaning is not None and meaning.quantity == "confidence":
                     column.why = "confidence, of use with `min_confidence`"
                 elif meaning is not None:

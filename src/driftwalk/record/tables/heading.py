@@ -13,7 +13,7 @@ from driftwalk.record.tables.columns import read_columns
 from driftwalk.record.tables.stamps import StampForm
 from driftwalk.record.text import Table
 from driftwalk.record.text_head import is_numeric_row
-from driftwalk.record.vocabulary import UNITS
+from driftwalk.record.vocabulary import NO_UNIT, UNITS
 
 
 class TablePolicy(NamedTuple):
@@ -104,7 +104,7 @@ def units_below(names: list[str], row: list[str], options: ReadOptions) -> list[
     for name, field in zip(names, fields, strict=True):
         if not field or field in MISSING:
             continue
-        if field.lower() in UNITS:
+        if field.lower() in UNITS or field.lower() in NO_UNIT:
             known += 1
         elif (
             is_number(field)
@@ -172,12 +172,15 @@ def _holds_positions(
         reading = read_columns(_Names(names, units), options, lenient=True)
     except InputError:
         return False
-    cells = [
-        below[at] if at < len(below) else ""
+    columns = [
+        at
         for places in reading.bodies.values()
         for quantity, at in places.items()
         if quantity != "theta"
     ]
+    if any(_is_numeric(names[at]) for at in columns):
+        return False  # a row of data
+    cells = [below[at] if at < len(below) else "" for at in columns]
     known = [cell for cell in cells if cell not in MISSING]
     numeric = all(is_number(cell) or is_number(cell, decimal=",") for cell in known)
     return numeric and any(below)  # a body that is not seen yet has a row without a position

@@ -16,7 +16,7 @@ from driftwalk.record.bad_row import is_number
 from driftwalk.record.cleaning.several_bodies import LARGEST_SHARE
 from driftwalk.record.column_names import column_meaning
 from driftwalk.record.raw import MISSING, Array, TableLayout
-from driftwalk.record.tables.columns import TableReading
+from driftwalk.record.tables.columns import LEFT_OUT, TableReading
 from driftwalk.record.tables.source import TableSource
 from driftwalk.record.text import Table
 
@@ -36,6 +36,8 @@ class UnevenClockPolicy(NamedTuple):
     leap: float = 5.0
     """Lengths of the usual step (its 90th percentile) from which on a body cannot have gone from
     one row to the next; chosen by hand."""
+    turns: float = 1.5
+    """The same where bodies take turns, of medians; chosen by hand."""
 
 
 _ORDER: Final = UnevenClockPolicy()
@@ -54,7 +56,8 @@ def other_order(source: TableSource, reading: TableReading, names: list[str]) ->
         Names of all columns.
     """
     used = {at for places in reading.bodies.values() for at in places.values()}
-    free = [at for at in range(len(names)) if at not in (*used, reading.body_column)]
+    skipped = [at for at, column in enumerate(reading.columns) if column.why == LEFT_OUT]
+    free = [at for at in range(len(names)) if at not in (*used, *skipped, reading.body_column)]
     x, y = _position(reading)
     texts = [*free, *([] if reading.body_column is None else [reading.body_column])]
     if not free:
@@ -82,10 +85,12 @@ def other_order(source: TableSource, reading: TableReading, names: list[str]) ->
     if reading.body_column is None:
         for at in free:
             if _leaps(table, at, x, y):
-                columns = argument_text("columns", {"body": names[at]})
+                body, skip = (
+                    argument_text("columns", {key: names[at]}) for key in ("body", "skip")
+                )
                 return (
-                    f"the position leaps wherever '{names[at]}' changes: if it names bodies, or "
-                    f"runs, add {columns}; if it is one body, name its clock"
+                    f"rows seem to be of several bodies, or runs, which '{names[at]}' names: add "
+                    f"{body} if so, {skip} if it is one body, whose rows are its frames"
                 )
     return None
 
@@ -168,18 +173,29 @@ def _begins_anew(values: Array) -> bool:
 
 
 def _leaps(table: Table, column: int, x: int, y: int) -> bool:
-    """Whether the position leaps at each change of a column that seldom changes."""
+    """Whether a column tells bodies, or runs, apart: the position leaps wherever it changes."""
     codes = table.codes[column]
-    changes = np.flatnonzero(np.diff(codes)) + 1
-    if not changes.size or len(table.labels[column]) != changes.size + 1:
+    labels = len(table.labels[column])
+    changes = codes[1:] != codes[:-1]
+    if labels < 2 or labels > table.rows // 4 or not changes.any():
         return False
-    steps = np.hypot(np.diff(table.numbers[x]), np.diff(table.numbers[y]))
-    within = np.delete(steps, changes - 1)
+    counts = np.bincount(codes)
+    turns = np.arange(codes.size) % labels
+    if (counts == counts[0]).all() and (changes.sum() == labels - 1 or (codes == turns).all()):
+        return True  # as many rows of each, one after the other or in turns
+    order = np.argsort(codes, kind="stable")
+    same = codes[order][1:] == codes[order][:-1]
+    within = np.hypot(*(np.diff(table.numbers[axis][order])[same] for axis in (x, y)))
+    leaps = np.hypot(*(np.diff(table.numbers[axis])[changes] for axis in (x, y)))
     within = within[np.isfinite(within) & (within > 0)]
-    if within.size < 10 * changes.size:
+    leaps = leaps[np.isfinite(leaps)]
+    if not within.size or not leaps.size:
         return False
-    leaps = steps[changes - 1]
-    return bool((leaps > _ORDER.leap * np.percentile(within, 90.0)).all())
+    if 2 * changes.sum() >= changes.size:
+        # Bodies take turns: of one body the like values would be farther apart.
+        return bool(np.median(leaps) > _ORDER.turns * np.median(within))
+    least = np.median(leaps) if changes.sum() >= labels else leaps.min()
+    return bool(least > _ORDER.leap * np.percentile(within, 90.0))
 
 
 def body_columns(

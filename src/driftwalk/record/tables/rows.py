@@ -10,7 +10,6 @@ import numpy.typing as npt
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.text.argument_text import argument_text
 from driftwalk.record.cleaning.stacked import order_in_body, split_bodies
-from driftwalk.record.column_names import unit_of_name
 from driftwalk.record.convert_units import scale_wanted
 from driftwalk.record.pose.keypoints import angle_between
 from driftwalk.record.raw import (
@@ -185,9 +184,9 @@ def _unread_angles(reading: TableReading) -> list[str]:
     """Say which columns look like the orientation by their unit alone, where none was found."""
     if any({"theta", "qw"} & set(places) for places in reading.bodies.values()):
         return []
-    unread = [column.name for column in reading.columns if not column.role]
-    angles = [name for name in unread if unit_of_name(name) in ANGLE_UNITS]
-    if len(angles) != 1:
+    unread = [column for column in reading.columns if not column.role]
+    angles = [column.name for column in unread if column.unit in ANGLE_UNITS]
+    if not angles:
         return []
     argument = argument_text("columns", {"theta": angles[0]})
     return [f"no orientation is read: add {argument} if that column holds it"]

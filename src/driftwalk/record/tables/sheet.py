@@ -72,8 +72,6 @@ class SheetSource:
         self.names = first if self.has_header else [""] * len(first)
         self.units: list[str] = []
         self._header, self._advice = (lines[0] if lines else 0), ""
-        if self.has_header and not stated and is_data(first, texts[1:], options):
-            self.has_header, self.names = False, [""] * len(first)
         if stated and len(texts) > 2 and (units := units_below(first, texts[1], options)):
             self.units, self._header = units, lines[1]
         if self.has_header and not stated:
@@ -84,6 +82,8 @@ class SheetSource:
                     self._header = lines[at + found.rows - 1]
                     break
             else:
+                if is_data(first, texts[1:], options):
+                    self.has_header, self.names = False, [""] * len(first)
                 self._advice = header_advice(texts, lines[0])
 
     @property

@@ -38,10 +38,6 @@ class TextSource:
         count = 3 if stated else TABLE.heading_rows
         lines = header_rows(self._path, begin + count)[begin:]
         below = self._fields(lines[1:])
-        if not stated and is_data(self.names, below, options):
-            self.names, self._skip = [""] * len(self.names), begin
-            self.has_header = False
-            return
         if stated:
             if len(below) > 1 and (units := units_below(self.names, below[0], options)):
                 self.units, self._skip = units, begin + 2
@@ -51,13 +47,18 @@ class TextSource:
                 continue
             here = self._delimiter if not at else None
             delimiter = options.delimiter or here or detect_delimiter(lines[at : at + 2])
-            rows = [split_fields(one.lstrip("# "), delimiter) for one in lines[at : at + 3]]
+            texts = [line.lstrip("# "), *lines[at + 1 : at + 3]]
+            rows = [split_fields(one, delimiter) for one in texts]
             found = heading_of(rows, options)
             if found is not None:
                 if at or found.rows > 1:
                     self.names, self.units, self._delimiter = found.names, found.units, delimiter
                     self._skip = begin + at + found.rows
                 return
+        if is_data(self.names, below, options):
+            self.names, self._skip = [""] * len(self.names), begin
+            self.has_header = False
+            return
         rows = [split_fields(line, options.delimiter or detect_delimiter([line])) for line in lines]
         self._advice = header_advice(rows, begin + 1)
 
