@@ -136,7 +136,7 @@ class _Reader:
         box = find_box(self._source, self._options, self._meanings, self._chosen)
         if box is not None:
             self._drop((at for at in box.replaced), box.why)
-            self._result.box = box
+            self._result.box = box if box.sides else None
             self._result.notes += box.notes
         self._leave_out_other_pairs()
         self._refuse_unknown_units()
