@@ -75,7 +75,7 @@ class Dialect:
         return path
 
 
-def draw(seed: int) -> Dialect:
+def draw(seed: int) -> Dialect:  # noqa: C901
     """Return the recording of a seed."""
     random = np.random.default_rng(seed)
 
@@ -222,7 +222,7 @@ def draw(seed: int) -> Dialect:
     )
 
 
-def verdict(dialect: Dialect, folder: Path) -> str:
+def verdict(dialect: Dialect, folder: Path) -> str:  # noqa: C901
     """Load a recording; return "right", "refused: …", or what is other than it was written."""
     from driftwalk.core.errors import InputError
     from driftwalk.record import load

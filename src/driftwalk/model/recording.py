@@ -37,6 +37,16 @@ class Columns(Section):
     qz: Column = Field(default=None, description="Column of the quaternion's z.")
     qw: Column = Field(default=None, description="Column of the quaternion's w, its real part.")
     body: Column = Field(default=None, description="Column of the body's name.")
+    x1: Column = Field(default=None, description="Column of x of a box's first corner.")
+    y1: Column = Field(default=None, description="Column of y of a box's first corner.")
+    x2: Column = Field(default=None, description="Column of x of a box's second corner.")
+    y2: Column = Field(default=None, description="Column of y of a box's second corner.")
+    w: Column = Field(default=None, description="Column of the width of a box.")
+    h: Column = Field(default=None, description="Column of the height of a box.")
+    lon: Column = Field(default=None, description="Column of the longitude.")
+    lat: Column = Field(default=None, description="Column of the latitude.")
+    confidence: Column = Field(default=None, description="Column of the confidence.")
+    skip: Column = Field(default=None, description="Columns to leave out, with + between them.")
 
     def to_dict(self) -> dict[str, str]:
         """Return the columns that are set, from quantity to column."""
@@ -70,7 +80,9 @@ class Recording(Section):
         description="Size of a pixel in m, if the file is in pixels.",
         examples=[0.0005],
     )
-    length_unit: Literal["auto", "m", "cm", "mm", "um", "km", "px"] = Field(
+    length_unit: Literal[
+        "auto", "m", "dm", "cm", "mm", "um", "nm", "km", "ft", "in", "yd", "px"
+    ] = Field(
         default="auto", description='Unit of the positions; "auto" uses the unit of the file.'
     )
     y_axis: Literal["auto", "up", "down"] = Field(
@@ -83,7 +95,7 @@ class Recording(Section):
     columns: Columns | None = Field(
         default=None,
         description=(
-            "Columns of a table (t, frame, x, y, z, theta, qx, qy, qz, qw, body), each by its name "
+            "Columns of a table (t, frame, x, y, theta, body and others), each by its name "
             'in the header or its number from 1; a unit may follow, as in "angle:deg".'
         ),
         examples=['{ t = "time", x = 2, y = 3 }'],
@@ -134,8 +146,25 @@ class Recording(Section):
     )
     min_confidence: Annotated[float | None, Quantity("1", ge=0)] = Field(
         default=None,
-        description="Smallest confidence of a keypoint; others are missing. Not set: the format's.",
+        description=(
+            "Smallest confidence of a keypoint or row; others are missing. Not set: the format's."
+        ),
         examples=[0.6],
+    )
+    box: Literal["auto", "xyxy", "xywh", "cxcywh", "none"] = Field(
+        default="auto",
+        description=(
+            "Columns of a box: two corners, corner or centre with width and height, or no box; "
+            '"auto" goes by their names.'
+        ),
+    )
+    missing: tuple[str, ...] | None = Field(
+        default=None,
+        description=(
+            'Positions that mean that the body was not seen: "X,Y", a number, or "held" for that '
+            "of the sample before."
+        ),
+        examples=['["0,0"]'],
     )
     sort: Literal["error", "sort"] = Field(
         default="error", description='Times that go back: "error" refuses them, "sort" sorts them.'
@@ -187,6 +216,8 @@ class Recording(Section):
             "keypoint": self.keypoint,
             "heading": self.heading,
             "min_confidence": self.min_confidence,
+            "box": self.box if self.box != "auto" else None,
+            "missing": self.missing,
         }
         return {name: value for name, value in named.items() if value is not None}
 

@@ -25,7 +25,8 @@ from driftwalk.record.space.columns import body_in_plane, plane_of_columns
 from driftwalk.record.space.globe import on_the_ground
 from driftwalk.record.space.plane import Plane
 from driftwalk.record.tables.boxes import box_angle, box_centre
-from driftwalk.record.tables.columns import TableReading, read_columns
+from driftwalk.record.tables.column_reading import TableReading
+from driftwalk.record.tables.columns import read_columns
 from driftwalk.record.tables.midnights import count_days
 from driftwalk.record.tables.row_order import body_columns, other_order
 from driftwalk.record.tables.source import TableSource

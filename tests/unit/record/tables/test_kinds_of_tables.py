@@ -276,7 +276,7 @@ def test_counters_that_run_over(tmp_path: Path, name: str, sort: str) -> None:
 def test_a_clock_that_begins_anew_is_not_to_be_sorted(tmp_path: Path, sort: str) -> None:
     clock = [*(100 + np.arange(20) * 3), *(101 + np.arange(20) * 3)]
     path = table(tmp_path, "frame,x_m,y_m", lambda k: f"{clock[k]},{X[k]},{Y[k]}")
-    with pytest.raises(InputError, match="begins anew there.*split the file") as caught:
+    with pytest.raises(InputError, match=r"begins anew there.*split the file") as caught:
         load(path, frame_rate=25.0, sort=sort)
     assert "`sort" not in str(caught.value)
 
@@ -331,7 +331,7 @@ def test_pairs_that_are_no_body(tmp_path: Path, pair: str) -> None:
 @pytest.mark.parametrize("pairs", ["x_raw,y_raw,x_filt,y_filt", "x_true,y_true,x_est,y_est"])
 def test_of_one_body_twice_the_one_is_to_be_named(tmp_path: Path, pairs: str) -> None:
     path = table(tmp_path, f"t,{pairs}", lambda k: f"{T[k]},{X[k]},{Y[k]},{X[k] + 1},{Y[k]}")
-    with pytest.raises(InputError, match='hold one body more than once.*columns={"x": "x_'):
+    with pytest.raises(InputError, match=r'hold one body more than once.*columns={"x": "x_'):
         load(path)
     x, y = pairs.split(",")[:2]
     check(load(path, columns={"x": f"{x}:m", "y": f"{y}:m"}))
