@@ -179,7 +179,7 @@ def draw(seed: int) -> Dialect:  # noqa: C901
             table.append((extra, "", [f"{value:.3f}" for value in random.normal(5, 1, len(order))]))
     if {"x_ref", "y_ref"} & {name for name, _, _ in table} and random.random() < 0.5:
         table = [one_ for one_ in table if one_[0] not in ("x_ref", "y_ref")]
-    random.shuffle(table)  # type: ignore[arg-type]
+    random.shuffle(table)
 
     def header(name: str, its_unit: str) -> str:
         if not its_unit or placing == "row":
@@ -251,7 +251,7 @@ def verdict(dialect: Dialect, folder: Path) -> str:  # noqa: C901
         if dialect.theta is None:
             if has:
                 return "an orientation that is not there"
-        elif has:
+        elif has and angles is not None:
             apart = np.angle(np.exp(1j * (angles - dialect.theta[body])))
             if not np.nanmax(np.abs(apart)) < 1e-9:
                 return f"theta of {body}: {angles[:3]}, not {dialect.theta[body][:3]}"

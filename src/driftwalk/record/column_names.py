@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 from typing import Final
 
@@ -57,9 +58,10 @@ class ColumnMeaning:
 
 def words_of(name: str) -> list[str]:
     """Return the words of a column's name."""
-    return [token for token in re.split(r"[\s_.\-/]+", name) if token]
+    return [token for token in re.split(r"[\s_.\-/:]+", name) if token]
 
 
+@lru_cache(maxsize=4096)
 def column_meaning(name: str, unit_below: str = "") -> ColumnMeaning | None:
     """Return what a column of that name holds, or None when the name says nothing known.
 
@@ -68,7 +70,7 @@ def column_meaning(name: str, unit_below: str = "") -> ColumnMeaning | None:
     Examples
     --------
     >>> column_meaning("x_mm")
-    ColumnMeaning(quantity='x', unit='mm', body='', bare=True, unknown='', rank=1, ending='')
+    ColumnMeaning(quantity='x', unit='mm', body='', bare=True, unknown='', rank=2, ending='')
     >>> column_meaning("robot2 theta (deg)").body
     'robot2'
     """
@@ -97,6 +99,7 @@ def column_meaning(name: str, unit_below: str = "") -> ColumnMeaning | None:
     lower = {token.lower() for token in rest}
     root = tokens[index].lower()
     allowed = IMAGE_WORDS | TIME_WORDS | {"id"} | (WITH_ID if root == "id" else frozenset())
+    allowed |= {word.lower() for word in words_of(text.rpartition(": ")[0])}  # "Latest: Time"
     if quantity not in OF_BODY and lower - allowed - ({"date"} if quantity == "t" else set()):
         return None
     if quantity in OF_BODY and lower & NO_POSITION:

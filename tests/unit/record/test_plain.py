@@ -281,7 +281,10 @@ def test_resolution_of_few_or_many_digits(tmp_path: Path) -> None:
 
 
 # As a lab's program may write it: 25 Hz, the rows of frames 3 and 4 missing, in degrees.
-FOREIGN = "Aufnahme;x [mm];y [mm];Drehung [°]\n0;1;2;350\n1;2;3;355\n2;3;4;0\n5;4;5;5\n6;5;6;10\n7;6;7;15\n"
+FOREIGN = (
+    "Aufnahme;x [mm];y [mm];Drehung [°]\n0;1;2;350\n1;2;3;355\n2;3;4;0\n"
+    "5;4;5;5\n6;5;6;10\n7;6;7;15\n"
+)
 
 
 def test_a_clock_of_unknown_name_that_skips_rows_is_named(tmp_path: Path) -> None:

@@ -127,7 +127,7 @@ def _marks_of(body: RawBody) -> list[tuple[str, str]]:
     still = square == 0.0
     if still.any() and 0.0 < still.mean() <= 1.0 - MARK.moving:
         runs, rows = _held_runs(square, still, usual)
-        if runs > 1 or rows > 2 * MARK.held:
+        if runs > 1 or rows > MARK.held:
             times = "once" if runs == 1 else f"{runs} times"
             marks.append(
                 (HELD, f"stays at exactly one place for several samples and leaps, {times}")
@@ -162,5 +162,7 @@ def _held_runs(square: Array, still: Flags, usual: float) -> tuple[int, int]:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(np.int8)))
     begins, ends = edges[::2], edges[1::2]
     after = np.append(square, 0.0)[ends]
-    held = (ends - begins >= MARK.held - 1) & (after > (MARK.leap * usual) ** 2)
+    # The body went on: over a longer rest it leaps farther.
+    leap = usual * np.maximum(MARK.leap, 0.5 * (ends - begins + 1))
+    held = (ends - begins >= MARK.held - 1) & (after > leap**2)
     return int(held.sum()), int((ends - begins)[held].sum())

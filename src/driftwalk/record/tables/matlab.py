@@ -123,6 +123,11 @@ def _of_fields(fields: dict[str, Value], what: str, path: Path) -> MemorySource 
             columns.append(column)
             matrices |= several
         _refuse_wide(len(columns), what, path)
+    counts = np.asarray(fields.get("ntargets", [])).ravel()
+    if counts.size and counts.dtype.kind in "fiu" and counts.sum() == rows:
+        # As Ctrax has it: bodies frame after frame, and how many there are in each.
+        names.append("frame")
+        columns.append(np.repeat(np.arange(counts.size), counts.astype(np.int64)))
     return MemorySource(what, names, columns, matrices=matrices) if columns else None
 
 

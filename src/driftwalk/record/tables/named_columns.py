@@ -130,6 +130,11 @@ class NamedColumns:
             left = dict.fromkeys(setpoints, _OTHER_BODY)
         if len(setpoints) > 1 and not left and not self.lenient:
             raise InputError(self._one_of([f"x_{body}" for body in setpoints], setpoints))
+        if len(setpoints) == 1 and not left and not self.lenient:
+            self.result.notes.append(
+                f"'{setpoints[0]}' is read as a body, though its name is that of a setpoint: "
+                "there is no other pair of x and y"
+            )
         of_base: dict[str, list[str]] = {}
         for body in variants:
             of_base.setdefault(_base(body), []).append(body)

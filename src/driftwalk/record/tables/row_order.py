@@ -86,12 +86,10 @@ def other_order(source: TableSource, reading: TableReading, names: list[str]) ->
     if reading.body_column is None:
         for at in free:
             if _leaps(table, at, x, y):
-                body, skip = (
-                    argument_text("columns", {key: names[at]}) for key in ("body", "skip")
-                )
+                add, skip = (argument_text("columns", {one: names[at]}) for one in ("body", "skip"))
                 return (
                     f"rows seem to be of several bodies, or runs, which '{names[at]}' names: add "
-                    f"{body} if so, {skip} if it is one body, whose rows are its frames"
+                    f"{add} if so, {skip} if it is one body, whose rows are its frames"
                 )
     return None
 

@@ -139,7 +139,7 @@ def test_an_angle_of_no_known_unit_is_refused(tmp_path: Path, name: str) -> None
     assert not body_track(load(path, columns={"skip": name})).has_orientation
 
 
-STACKED = {
+STACKED: dict[str, Callable[[int, int], str]] = {
     "Trajectory,Frame,x,y": lambda b, k: f"{b + 1},{k},{X[k] + b},{Y[k]}",
     "Piste;Trame;x_m;y_m": lambda b, k: f"{b + 1};{k};{X[k] + b};{Y[k]}",
     "traccia,fotogramma,x,y": lambda b, k: f"r{b},{k},{X[k] + b},{Y[k]}",
@@ -155,7 +155,7 @@ def test_stacked_tracks_in_other_languages(tmp_path: Path, head: str) -> None:
     check(load(path, frame_rate=25.0, length_unit="m"), bodies=3)
 
 
-UNKNOWN = {
+UNKNOWN: dict[str, tuple[Callable[[int, int], str], str]] = {
     "Ścieżka,Klatka,x_m,y_m": (lambda b, k: f"{b},{k},{X[k]},{Y[k]}", "Klatka.*Ścieżka"),
     "Foo,Bar,x_m,y_m": (lambda b, k: f"{b},{k + 7 * b},{X[k]},{Y[k]}", "'Bar'.*'Foo'"),
     "trial,x_m,y_m": (lambda b, k: f"{b},{X[k] + b},{Y[k]}", "'trial'"),
@@ -252,7 +252,7 @@ def test_the_sides_of_an_upright_rectangle_change_places(tmp_path: Path) -> None
     np.testing.assert_allclose(np.unwrap(track.theta), ANGLE, atol=1e-9)
 
 
-WRAPS = {
+WRAPS: dict[str, tuple[Callable[[int], float], dict[str, Any]]] = {
     "frame": (lambda k: (250 + k) % 256, {"frame_rate": 25.0}),
     "frame_id": (lambda k: (65_530 + k) % 65_536, {"frame_rate": 25.0}),
     "t_us": (lambda k: (4_294_000_000 + 40_000 * k) % 2**32, {}),
@@ -281,7 +281,7 @@ def test_a_clock_that_begins_anew_is_not_to_be_sorted(tmp_path: Path, sort: str)
     assert "`sort" not in str(caught.value)
 
 
-FIRST = {
+FIRST: dict[str, tuple[Row, dict[str, str]]] = {
     "ros": (lambda k: f"{17 + k // 25},{k % 25 * 40_000_000},map,{X[k]},{Y[k]}",
             {"t": "1:s+2:ns", "x": "4:m", "y": "5:m"}),
     "name first": (lambda k: f"block,{T[k]},{X[k]},{Y[k]}", {"t": "2:s", "x": "3:m", "y": "4:m"}),
@@ -304,7 +304,7 @@ def test_the_first_row_is_data(tmp_path: Path, kind: str) -> None:
 
 
 NANO = 1_700_000_000_000_000_000
-STAMPS = {
+STAMPS: dict[str, Row] = {
     "sec,nanosec,x,y": lambda k: f"{NANO // 10**9 + k // 25},{k % 25 * 40_000_000}",
     "header.stamp.sec,header.stamp.nanosec,x,y": lambda k: f"{5 + k // 25},{k % 25 * 40_000_000}",
     "stamp_secs,stamp_nsecs,x,y": lambda k: f"{5 + k // 25},{k % 25 * 40_000_000}",
@@ -383,7 +383,7 @@ def test_confidences(tmp_path: Path, name: str) -> None:
     assert body_track(load(path, min_confidence=0.5)).time.size == 36
 
 
-CLOCKS = {
+CLOCKS: dict[str, Row] = {
     "t_h": lambda k: f"{T[k] / 3600:.17g}",
     "time [min]": lambda k: f"{T[k] / 60:.17g}",
     "Zeit (d)": lambda k: f"{T[k] / 86_400:.17g}",
