@@ -135,14 +135,7 @@ class NamedColumns:
                 f"'{setpoints[0]}' is read as a body, though its name is that of a setpoint: "
                 "there is no other pair of x and y"
             )
-        of_base: dict[str, list[str]] = {}
-        for body in variants:
-            of_base.setdefault(_base(body), []).append(body)
-        for base, several in of_base.items():
-            if base in real or (not base and self.result.box is not None):
-                left |= dict.fromkeys(several, _SAME_BODY)
-            elif len(several) > 1 and not self.lenient:
-                raise InputError(self._one_of([], several))
+        left |= self._computed(variants, real)
         for body, kind in kinds.items():
             # An angle of a setpoint stands alone where its position has other names.
             if kind[0] and body not in bodies:
@@ -157,6 +150,19 @@ class NamedColumns:
                 f"pairs of x and y that are read as no body: {listed(named)} (name one by "
                 f"{argument_text('columns', {'x': 'NAME', 'y': 'NAME'})} if it is the one)"
             )
+
+    def _computed(self, variants: list[str], real: list[str]) -> dict[str, str]:
+        """Return the pairs that are a body once more; of several, one has to be named."""
+        left: dict[str, str] = {}
+        of_base: dict[str, list[str]] = {}
+        for body in variants:
+            of_base.setdefault(_base(body), []).append(body)
+        for base, several in of_base.items():
+            if base in real or (not base and self.result.box is not None):
+                left |= dict.fromkeys(several, _SAME_BODY)
+            elif len(several) > 1 and not self.lenient:
+                raise InputError(self._one_of([], several))
+        return left
 
     def _one_of(self, _names: list[str], bodies: list[str]) -> str:
         columns = self.bodies_with("x")
