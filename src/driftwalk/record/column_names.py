@@ -49,7 +49,7 @@ class ColumnMeaning:
     bare: bool = True
     """Whether the name is the quantity's plain symbol, without a word that hints at an image."""
     unknown: str = ""
-    """What stands in the place of a unit and is none that is known."""
+    """Text in the place of a unit that is no known unit."""
     rank: int = 1
     """Of several columns of a quantity that a table has once, the one of the lowest rank counts."""
     ending: str = ""

@@ -139,7 +139,7 @@ def load(
         What columns of a box hold: two corners, the corner of the least x and y with width and
         height, or the centre with them; ``"none"``: they are no box. The body is its centre.
     missing : str or sequence of str, optional
-        What stands for a position that was not seen, in the file's units: a place such as
+        Mark of a position that was not seen, in the file's units: a place such as
         ``"0,0"``, a number such as ``"-9999"``, or ``"held"``, the place of the sample before.
     replicate : int, optional
         Replicate of a simulation, counted from 0; default: the first.

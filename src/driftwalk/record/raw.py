@@ -17,7 +17,7 @@ import numpy.typing as npt
 from driftwalk.record.vocabulary import words
 
 NAMELESS = words("#N/A NaN nan NAN NA N/A null NULL None none -nan") | {""}
-"""Words that stand for no name of a body."""
+"""Words for a missing name of a body."""
 
 MISSING = NAMELESS | words(
     "- -- --- . .. n/a n.a. missing Missing MISSING <NA> NaT nil 1.#QNAN -1.#QNAN 1.#IND "
@@ -156,7 +156,7 @@ class RawRecording:
     """Finds the columns that could name the body, see `record.several_bodies`; None: there are no
     columns to choose from."""
     columns: list[dict[str, str]] = field(default_factory=list)
-    """What each column of a table was taken for: column, meaning, unit, why."""
+    """Readings of the columns of a table: column, meaning, unit, why."""
 
 
 @dataclass(frozen=True)

@@ -85,14 +85,14 @@ IMAGE_WORDS: Final = words(
     "pos position center centre centroid image coord coordinate mitte schwerpunkt mittelpunkt "
     "posición posicion centro posizione centroide"
 )
-"""Words beside x or y that name no body. They hint at an image: such lengths are not metres."""
+"""Words next to x or y that name no body. They hint at an image: such lengths are not metres."""
 NO_POSITION: Final = words(
     "velocity vel speed acceleration acc accel force err error std sigma var variance min max "
     "confidence likelihood score dot ddot gyro gyroscope mag magnetometer accelerometer rate "
     "omega angular linear twist torque jerk cov covariance bias noise diff delta gradient "
     "geschwindigkeit vitesse velocidad velocità kraft"
 )
-"""Words beside a coordinate or an angle that rule out a position."""
+"""Words next to a coordinate or an angle that rule out a position."""
 SETPOINTS: Final = words(
     "ref reference cmd command commanded goal target setpoint desired des origin wind current "
     "waypoint wp offset soll sollwert consigne"
@@ -107,7 +107,7 @@ TIME_WORDS: Final = words(
     "number no index stamp col num n° nr n trial recording elapsed video date ros unix epoch "
     "system relative simulation sim of day"
 )
-"""Words beside a time, a frame or a name that do not change what it is."""
+"""Words next to a time, a frame or a name that do not change what it is."""
 FRONT: Final = words("head nose snout front kopf nase tête tete nez cabeza nariz testa")
 REAR: Final = words("tail rear back tailbase schwanz queue cola coda")
 MIDDLE: Final = words("body center centre centroid middle mid") | {""}

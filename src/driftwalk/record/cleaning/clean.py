@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
-from driftwalk.record.cleaning.counters import begins_anew, overlap
+from driftwalk.record.cleaning.counters import overlap, starts_over
 from driftwalk.record.cleaning.jumps import find_jumps
 from driftwalk.record.cleaning.several_bodies import (
     BodyColumns,
@@ -137,7 +137,7 @@ def _in_order(body: RawBody, counts: Counts, *, sort: str, columns: BodyColumns 
     backwards = np.flatnonzero(body.clock[1:] < body.clock[:-1])
     if not backwards.size:
         return body
-    anew = begins_anew(body.clock)
+    anew = starts_over(body.clock)
     if sort == "error" or (anew and overlap(body.clock)):
         at = int(backwards[0])
         found = [] if columns is None else columns(True)
@@ -145,7 +145,7 @@ def _in_order(body: RawBody, counts: Counts, *, sort: str, columns: BodyColumns 
             remedy = f'{name_the_body(found)}, or `sort="sort"` if it is one body'
         elif anew:
             remedy = (
-                "the clock begins anew there, as where a counter was reset or recordings were "
+                "the clock starts over there, as where a counter was reset or recordings were "
                 "joined: split the file before that row"
             )
         else:

@@ -29,8 +29,9 @@ class ClockPolicy(NamedTuple):
     longest_recording_s: float = 1e12
     """30,000 years; powers of much longer times are beyond float64."""
     first_serial: float = 15_000.0
+    """Days since 1900 of the year 1941, as spreadsheets count them; chosen by hand."""
     last_serial: float = 80_000.0
-    """Days since 1900 of the years 1941 to 2119, as spreadsheets count them."""
+    """The same of the year 2119; chosen by hand."""
     fastest_s: float = 1e-4
     """Shortest interval of a likely camera [s]; chosen by hand."""
     slowest_s: float = 2.0

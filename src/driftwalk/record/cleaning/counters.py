@@ -1,4 +1,4 @@
-"""Clocks that run over: counters of few bits, and those that begin anew."""
+"""Clocks that run over: counters of few bits, and those that start over."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from driftwalk.record.raw import CLOCK_UNITS, Array, RawRecording
 
 
 class CounterPolicy(NamedTuple):
-    """When a step back is a counter that runs over, and when the clock begins anew."""
+    """When a step back is a counter that runs over, and when the clock starts over."""
 
     near: float = 0.1
     """Share of its range that a counter is from its end before it runs over, and from its
@@ -19,10 +19,10 @@ class CounterPolicy(NamedTuple):
     steps: float = 50.0
     """Usual steps that it goes on by at most when it runs over; chosen by hand."""
     displaced: int = 3
-    """Usual steps that rows out of order are displaced by at least for a clock that begins anew;
+    """Usual steps that rows out of order are displaced by at least for a clock that starts over;
     chosen by hand."""
     seldom: float = 0.05
-    """Share of the steps that go back, up to which the clock begins anew; chosen by hand."""
+    """Share of the steps that go back, up to which the clock starts over; chosen by hand."""
 
 
 COUNTER: Final = CounterPolicy()
@@ -103,8 +103,8 @@ def _unwrapped(clock: Array, modulus: float) -> Array:
     return counted
 
 
-def begins_anew(clock: Array) -> bool:
-    """Whether a clock that goes back begins anew, and is not only out of order here and there.
+def starts_over(clock: Array) -> bool:
+    """Whether a clock that goes back starts over, and is not only out of order here and there.
 
     Parameters
     ----------
@@ -122,9 +122,9 @@ def begins_anew(clock: Array) -> bool:
 
 
 def overlap(clock: Array) -> bool:
-    """Whether the parts of a clock that begins anew would be mixed by sorting.
+    """Whether the parts of a clock that starts over would be mixed by sorting.
 
-    Parts with most of their times in common are not: they are several bodies, which is told apart.
+    Parts with most of their times in common are several bodies, which another check refuses.
     """
     if np.unique(clock).size < 0.9 * clock.size:
         return False

@@ -1,4 +1,4 @@
-"""Places that stand for a body that was not seen: one place far off, or the last one held."""
+"""Places that mean that a body was not seen: one place far off, or the last one held."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ MARK: Final = MissingPolicy()
 
 
 def blank_missing(raw: RawRecording, marks: tuple[str, ...]) -> None:
-    """Make samples missing whose place stands for none, in place, in the units of the file.
+    """Make samples missing whose place means that nothing was seen, in place, in the file's units.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ _WORDS_MORE: Final = {"h": "height", "theta": "orientation", "body": "name of th
 
 @dataclass
 class ColumnReading:
-    """What one column was taken for."""
+    """Reading of one column."""
 
     name: str
     role: str = ""
@@ -37,7 +37,7 @@ class ColumnReading:
 
 @dataclass
 class TableReading:
-    """What the columns (from 0) of a table were taken for, as the reader executes it."""
+    """Reading of the columns (from 0) of a table, as the reader executes it."""
 
     columns: list[ColumnReading]
     bodies: dict[str, dict[str, int]] = field(default_factory=dict)
@@ -53,7 +53,7 @@ class TableReading:
     length_unit: str = ""
     angle_unit: str = ""
     bare: bool = True
-    """Whether the names of positions are plain symbols, which mean metres beside seconds."""
+    """Whether the names of positions are plain symbols, which mean metres next to seconds."""
     box: Box | None = None
     parts: tuple[str, str] | None = None
     """Two bodies that are the middle and the front of one."""

@@ -103,7 +103,7 @@ class _Reader(NamedColumns):
         turned = {body for body in {one.body for one in meanings.values()} if self._is_turned(body)}
         parts = [at for at, one in meanings.items() if one.quantity in QUATERNION]
         loose = [at for at in parts if meanings[at].body not in turned]
-        self.drop(loose, "no whole quaternion, or an angle beside it")
+        self.drop(loose, "no whole quaternion, or an angle next to it")
         if self.options.up is None:
             height = [at for at, one in meanings.items() if one.quantity == "z"]
             self.drop(height, "height: the plane of the water is x, y without `up`")
@@ -244,7 +244,7 @@ class _Reader(NamedColumns):
         return [one for one in rows if one not in MISSING]
 
     def _is_fraction(self, time: int, part: int) -> bool:
-        """Whether a column holds less than a second, beside whole seconds."""
+        """Whether a column holds less than a second, next to whole seconds."""
         whole = all(one.lstrip("-").isdecimal() for one in self._sampled(time))
         ticks = {"ns": 9, "us": 6, "ms": 3}.get(self.meanings[part].unit, 0)
         parts = self._sampled(part)

@@ -240,7 +240,7 @@ def _base(body: str) -> str:
 
 
 def may_be_unit(word: str) -> bool:
-    """Whether a word beside a coordinate may be a unit rather than the name of a body."""
+    """Whether a word next to a coordinate may be a unit rather than the name of a body."""
     lower = word.lower()
     other = lower in VARIANTS or lower in SETPOINTS or lower in MIDDLE | FRONT | REAR
     return lower.isalpha() and len(lower) > 1 and not other and ROOTS.get(lower) != "body"

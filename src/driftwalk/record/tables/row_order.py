@@ -135,7 +135,7 @@ def _skips_rows(values: Array) -> bool:
 def _tracks(
     table: Table, counters: dict[int, Array], free: list[int], body: int | None
 ) -> tuple[int | None, int] | None:
-    """Return the columns of body and frame of a table whose frames repeat or begin anew."""
+    """Return the columns of body and frame of a table whose frames repeat or start over."""
     found: list[tuple[int, int | None, int]] = []
     for frame, values in counters.items():
         whole = np.isfinite(values).all() and not (values % 1.0 != 0.0).any()
@@ -147,7 +147,7 @@ def _tracks(
             few = (2 if body is None else 1) <= bodies <= table.rows // 2
             if few and other != frame and _counts_each(table.codes[other], values, body):
                 found.append((bodies, other, frame))
-        if not found and body is None and _begins_anew(values):
+        if not found and body is None and _starts_over(values):
             found.append((table.rows, None, frame))
     return min(found, key=lambda entry: entry[0])[1:] if found else None
 
@@ -164,7 +164,7 @@ def _counts_each(codes: npt.NDArray[np.int32], values: Array, body: int | None) 
     return body is None or not ((steps == 1.0).all() and np.unique(firsts).size == 1)
 
 
-def _begins_anew(values: Array) -> bool:
+def _starts_over(values: Array) -> bool:
     """Whether values count up one by one, but for a few steps back to where they began."""
     steps = np.diff(values)
     back = steps < 0

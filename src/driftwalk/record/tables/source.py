@@ -1,4 +1,4 @@
-"""What a table is to the reader: names, units, first rows, and columns that can be read."""
+"""Interface of a table to the reader: names, units, first rows, and columns to read."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class TableSource(Protocol):
 
     @property
     def units(self) -> list[str]:
-        """What a row below the names says of each column; empty where there is no such row."""
+        """Units in a row below the names; empty where there is no such row."""
 
     @property
     def has_header(self) -> bool:

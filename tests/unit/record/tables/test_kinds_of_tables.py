@@ -273,10 +273,10 @@ def test_counters_that_run_over(tmp_path: Path, name: str, sort: str) -> None:
 
 
 @pytest.mark.parametrize("sort", ["error", "sort"])
-def test_a_clock_that_begins_anew_is_not_to_be_sorted(tmp_path: Path, sort: str) -> None:
+def test_a_clock_that_starts_over_is_not_to_be_sorted(tmp_path: Path, sort: str) -> None:
     clock = [*(100 + np.arange(20) * 3), *(101 + np.arange(20) * 3)]
     path = table(tmp_path, "frame,x_m,y_m", lambda k: f"{clock[k]},{X[k]},{Y[k]}")
-    with pytest.raises(InputError, match=r"begins anew there.*split the file") as caught:
+    with pytest.raises(InputError, match=r"starts over there.*split the file") as caught:
         load(path, frame_rate=25.0, sort=sort)
     assert "`sort" not in str(caught.value)
 
