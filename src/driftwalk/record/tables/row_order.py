@@ -165,7 +165,10 @@ def _counts_each(codes: npt.NDArray[np.int32], values: Array, body: int | None) 
 
 
 def _starts_over(values: Array) -> bool:
-    """Whether values count up one by one, but for a few steps back to where they began."""
+    """Whether values count up one by one, and start over or stay the same for several bodies."""
+    _, counts = np.unique(values, return_counts=True)
+    if (np.diff(values) >= 0).all():
+        return bool(counts[0] > 1 and (counts == counts[0]).all() and np.diff(values).max() == 1.0)
     steps = np.diff(values)
     back = steps < 0
     return bool(back.any() and (steps[~back] == 1.0).mean() > _ORDER.own and back.mean() < 0.1)

@@ -173,8 +173,6 @@ def test_stacked_tracks_of_unknown_names_are_refused(
     order = [(b, k) for b in range(3) for k in range(40)]
     rows = [row(b, k) for b, k in (sorted(order, key=lambda one: one[1]) if turns else order)]
     path = table(tmp_path, head, lambda k: rows[k], rows=120)
-    if turns and head.startswith("Bar"):
-        pytest.skip("rows at one time without a name are refused once the clock is named")
     with pytest.raises(InputError, match=message):
         load(path, frame_rate=25.0)
 
