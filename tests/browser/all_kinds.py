@@ -6,7 +6,9 @@ from collections.abc import Callable
 from typing import Any, Final
 
 # What a program reads; everything else in a page is text for people.
-STRUCTURE: Final = frozenset({"format", "view", "kind", "data", "style", "shape"})
+STRUCTURE: Final = frozenset(
+    {"format", "view", "kind", "dtype", "packed", "data", "style", "shape"}
+)
 
 ARENA: Final = {"shape": "circle", "diameter_m": 0.3}
 WAY: Final = {

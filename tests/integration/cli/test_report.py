@@ -84,13 +84,13 @@ def test_a_calibration(run: Path, tmp_path: Path) -> None:
     np.testing.assert_array_equal(values(part["value"]), found["ks_distance"].values)
     excerpt = part["cells"]["excerpt_x"]
     np.testing.assert_allclose(
-        values(excerpt), found["excerpt_x"].values, rtol=0, atol=0.5001 * excerpt["step"]
+        values(excerpt), found["excerpt_x"].values, rtol=0, atol=0.5001 * excerpt["scale"]
     )
-    assert part["cells"]["excerpt_x"]["step"] <= 1e-4
+    assert part["cells"]["excerpt_x"]["scale"] <= 1e-4
     np.testing.assert_allclose(
         values(part["cells"]["density"]),
         found["step_density"].values,
-        atol=0.5001 * part["cells"]["density"]["step"],
+        atol=0.5001 * part["cells"]["density"]["scale"],
     )
     recording = xr.load_dataset(run / "recording.nc", engine="h5netcdf")
     np.testing.assert_allclose(
@@ -164,7 +164,7 @@ def test_self_assembly(assembled: Path, tmp_path: Path) -> None:
     assert len(replay["runs"]) == 4
     for index, one in enumerate(replay["runs"]):
         np.testing.assert_allclose(
-            values(one["x"]), path["x"].values[index].T, atol=0.51 * one["x"]["step"]
+            values(one["x"]), path["x"].values[index].T, atol=0.51 * one["x"]["scale"]
         )
         np.testing.assert_array_equal(values(one["assembly"]), path["assembly"].values[index].T)
         joined = int(runs["event_count"][index])

@@ -168,7 +168,7 @@ def test_the_replay_has_the_poses_and_what_joined_when(sections: list[dict[str, 
         assert run["name"] == f"run {index}"
         for name in "xy":
             np.testing.assert_allclose(
-                values(run[name]), one[name].values, rtol=0, atol=0.5001 * run[name]["step"]
+                values(run[name]), one[name].values, rtol=0, atol=0.5001 * run[name]["scale"]
             )
         turned = np.angle(np.exp(1j * (values(run["theta"]) - one["theta"].values)))
         assert np.abs(turned).max() < 1.01e-3
@@ -204,7 +204,7 @@ def test_a_long_path_of_many_blocks_is_thinned() -> None:
     assert 0.5 * MOST_POSES < poses <= 1.1 * MOST_POSES
     every = round(3000 / (run["x"]["shape"][1] - 1))
     np.testing.assert_allclose(
-        values(run["x"]), path["x"].values[0, ::every].T, atol=0.5001 * run["x"]["step"]
+        values(run["x"]), path["x"].values[0, ::every].T, atol=0.5001 * run["x"]["scale"]
     )
     assert run["events"] == []
 

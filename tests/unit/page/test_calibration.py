@@ -89,9 +89,9 @@ def test_a_click_shows_what_is_kept_of_the_setting(
     for name in ("excerpt_x", "excerpt_y", "density"):
         kept = {"density": "step_density"}.get(name, name)
         exact = on_map(calibration, kept)
-        assert cells[name]["step"] <= np.ptp(exact) / 2000
+        assert cells[name]["scale"] <= np.ptp(exact) / 2000
         np.testing.assert_allclose(
-            values(cells[name]), exact, rtol=0, atol=0.5001 * cells[name]["step"]
+            values(cells[name]), exact, rtol=0, atol=0.5001 * cells[name]["scale"]
         )
     assert values(cells["excerpt_time"]).tolist() == calibration["excerpt_time"].values.tolist()
     distance = on_map(calibration, "ks_distance_replicate")

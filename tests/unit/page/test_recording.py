@@ -26,7 +26,7 @@ def recording() -> xr.Dataset:
 
 def test_positions_are_those_of_the_recording(recording: xr.Dataset) -> None:
     part = trajectory_section(recording)
-    step = part["x"]["step"]
+    step = part["x"]["scale"]
     assert step <= 1e-5
     for name in "xy":
         np.testing.assert_allclose(
