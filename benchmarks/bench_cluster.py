@@ -39,7 +39,7 @@ from timing import machine, spread
 import driftwalk as dw
 from driftwalk.assembly.runs.run import RUNS_TOGETHER
 from driftwalk.sweep import WorkUnit, grid, run_sweep, settings_per_unit
-from driftwalk.sweep.remote import packed
+from driftwalk.sweep.workers import packed
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "helpers"))
 

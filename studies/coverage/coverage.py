@@ -93,13 +93,7 @@ def answer_of(
     """Return what a calibration says from its refined map, and what holds the truth."""
     energy_score = found.energy_score
     stored = build_surface(problem, found)
-    simulated = run_bootstrap(
-        problem,
-        energy_score.optimum,
-        stored,
-        floor=energy_score.floor_at_optimum,
-        count=bootstrap,
-    )
+    simulated = run_bootstrap(problem, energy_score, stored, count=bootstrap)
     quality = goodness_of_fit(simulated)
     region = confidence_region(
         energy_score.smoother,

@@ -23,7 +23,7 @@ import numpy as np
 from coverage import answer_of, read, refined_map, write
 
 import driftwalk as dw
-from driftwalk.calibration.grid.surface import lowest_point
+from driftwalk.calibration.grid.energy_score import lowest_point
 from driftwalk.calibration.problem import Problem, prepare_problem
 from driftwalk.conditions import recorded_camera
 from driftwalk.schema import body_track

@@ -9,8 +9,7 @@ from worlds import RADIUS_M, Floats, World
 
 import driftwalk as dw
 from driftwalk.flow.arena import outline_of
-from driftwalk.likelihood.filter.series import FILTER
-from driftwalk.likelihood.wall import wall_intervals
+from driftwalk.likelihood.filter.series import wall_intervals
 from driftwalk.model import Tank
 from driftwalk.schema import build_trajectory
 
@@ -63,7 +62,6 @@ def wall_share(poses: Poses) -> float:
         *poses,
         outline=outline_of(dw.Study().tank.to_arena()),
         side=dw.Study().block.side_m,
-        longest_gap=FILTER.longest_gap_s,
     )
     return float(near[1:].mean())
 

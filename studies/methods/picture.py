@@ -12,7 +12,7 @@ from recordings import Known, bundled
 from run import read_lines
 
 import driftwalk as dw
-from driftwalk.likelihood.recover.score import block_flow
+from driftwalk.likelihood.score import block_flow
 from driftwalk.plot.parts.arena import draw_arena, label_position
 from driftwalk.plot.parts.style import (
     DOUBLE_COLUMN_MM,

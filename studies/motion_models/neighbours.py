@@ -25,13 +25,15 @@ from recordings import RECORDINGS, read_lines
 import driftwalk as dw
 from driftwalk.calibration.evolution import AspectObjective, Budget, search_minimum
 from driftwalk.calibration.held_out.candidates import prepare_candidates
-from driftwalk.calibration.held_out.checks import CHECKS
-from driftwalk.calibration.held_out.held_out_score import HELD_OUT_REPLICATES, even_blocks
-from driftwalk.calibration.held_out.recorded import RecordedMotion, body_motion
-from driftwalk.calibration.ranking.verdict import checks_off
-from driftwalk.comparison.aspects.form import resampled
+from driftwalk.calibration.held_out.held_out_score import (
+    HELD_OUT_REPLICATES,
+    checks_off,
+    even_blocks,
+)
+from driftwalk.calibration.held_out.recorded import CHECKS, RecordedMotion, body_motion
+from driftwalk.comparison.aspects import resampled
 from driftwalk.conditions import read_recordings
-from driftwalk.model import Study, load_study
+from driftwalk.model import load_study
 
 MODELS: Final = ("run_rest+wall", "run_rest+wall+reverse", "run_rest+wall+neighbours")
 RANGES: Final = {
@@ -67,17 +69,14 @@ class FarObjective(AspectObjective):
         return np.asarray((near + WEIGHT * off).reshape(len(settings), replicates).mean(axis=1))
 
 
-def prepared(data: Path, body: str, threads: int) -> tuple[RecordedMotion, Study]:
-    """Return a smarticle among the others, and its study."""
+def prepared(data: Path, body: str, threads: int) -> RecordedMotion:
+    """Return a smarticle among the others."""
     recording = RECORDINGS[f"smarticle-{body}"]
     read = read_recordings(
         [data / recording.file], load_study(recording.study_file), {"body": body}, body=body,
         bodies="all",
     )  # fmt: skip
-    return (
-        body_motion(read.trajectories[0], read.study, flow=None, body=body, threads=threads),
-        read.study,
-    )
+    return body_motion(read.trajectories[0], read.study, flow=None, body=body, threads=threads)
 
 
 def print_directions(motion: RecordedMotion) -> None:
@@ -102,12 +101,12 @@ def print_directions(motion: RecordedMotion) -> None:
         print(f"  steps of {low:g} to {high:g} mm: {', '.join(row)}")
 
 
-def searched(motion: RecordedMotion, study: Study, name: str) -> dict[str, Any]:
+def searched(motion: RecordedMotion, name: str) -> dict[str, Any]:
     """Search a model on the even blocks with the displacements besides."""
     ranges = RANGES if "neighbours" in name else {}
     model = dw.motion_model(name, clearance=motion.clearance, **ranges)
-    (entry,), _ = prepare_candidates([model], motion, study)
-    objective = FarObjective(**vars(even_blocks(entry, motion, SEED)), motion=motion)
+    (entry,), _ = prepare_candidates([model], motion)
+    objective = FarObjective(**{**vars(even_blocks(entry, motion)), "seed": SEED}, motion=motion)
     found = search_minimum(objective, len(entry.ranges), budget=Budget(), seed=SEED)
     seen = objective.simulated(found.best[None], HELD_OUT_REPLICATES, stage="judged")
     aspects = objective.aspects(seen)
@@ -145,13 +144,13 @@ def main() -> None:
     given = parser.parse_args()
     done = {(one["body"], one["model"]) for one in read_lines(given.out)}
     for body in given.body or ("1", "2", "3"):
-        motion, study = prepared(given.data, body, given.threads)
+        motion = prepared(given.data, body, given.threads)
         print(f"smarticle {body}: mean cosine between a step and the direction to another")
         print_directions(motion)
         for model in given.model or MODELS:
             if (body, model) in done:
                 continue
-            line = {"body": body, **searched(motion, study, model)}
+            line = {"body": body, **searched(motion, model)}
             with given.out.open("a") as file:
                 file.write(json.dumps(line) + "\n")
             ratios = [line["facts_over_recorded"][key] for key in CHECKS[LONG]]

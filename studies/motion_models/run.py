@@ -23,11 +23,10 @@ import driftwalk as dw
 from driftwalk.calibration.evolution import (
     AspectObjective,
     Budget,
-    recorded_ranges,
-    scales_of,
     search_minimum,
     wall_distance,
 )
+from driftwalk.calibration.held_out.recorded import recorded_ranges, scales_of
 from driftwalk.comparison.aspects import (
     AspectReference,
     aspect_reference,
@@ -97,7 +96,7 @@ def judged(prepared: Prepared, name: str) -> dict[str, Any]:
     objective = prepared.objective(name)
     found = search_minimum(objective, len(objective.ranges), budget=Budget(), seed=SEED)
     seconds = time.perf_counter() - began
-    worlds, _ = objective.worlds(found.best[None], JUDGED, stage="judged")
+    worlds = objective.aspects(objective.simulated(found.best[None], JUDGED, stage="judged"))
     held = aspect_reference(prepared.held, duration=prepared.duration)
     apart = held.distances(worlds)
     again = aspect_reference(worlds[0], duration=prepared.duration)

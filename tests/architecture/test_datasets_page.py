@@ -6,9 +6,9 @@ import re
 from pathlib import Path
 
 import pytest
+from datasets_tables import datasets_page, kinds_on
 
 from driftwalk.schema.kinds import KINDS
-from driftwalk.schema.page import datasets_page, kinds_on
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "reference" / "datasets.md"
@@ -21,7 +21,7 @@ def test_every_kind_is_on_the_page() -> None:
 def test_tables_are_those_of_the_schemas() -> None:
     page = PAGE.read_text(encoding="utf-8")
     assert datasets_page(page) == page, (
-        f"run: python -m driftwalk.schema.page {PAGE.relative_to(ROOT)}"
+        f"run: python tests/architecture/datasets_tables.py {PAGE.relative_to(ROOT)}"
     )
 
 

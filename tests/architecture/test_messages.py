@@ -19,8 +19,8 @@ OPTION = re.compile(r"(?<![\w-])--[a-z{]")
 COMMAND_WITH_OPTION = re.compile(r"`driftwalk [a-z]+[^`]* --[a-z]")
 ARGUMENT = re.compile(r"`([a-z_]+(?:\.[A-Za-z_]+)?)(=[^`]*)?`")
 
-NO_ARGUMENTS = {"complete", "depth"}
-"""An outcome, in the name of a method, and a key of [block], in the description of another."""
+NO_ARGUMENTS = {"complete"}
+"""An outcome, in the name of a method."""
 
 
 class Text(NamedTuple):

@@ -6,9 +6,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 # What a program reads; everything else in a page is text for people.
-STRUCTURE: Final = frozenset(
-    {"format", "view", "kind", "dtype", "packed", "data", "style", "shape"}
-)
+STRUCTURE: Final = frozenset({"format", "view", "kind", "data", "style", "shape"})
 
 ARENA: Final = {"shape": "circle", "diameter_m": 0.3}
 WAY: Final = {
@@ -17,7 +15,7 @@ WAY: Final = {
     "y": [0.0, 0.0, 0.01, 0.02],
 }
 GRID: Final = [[0.1, 0.2], [0.3, None]]
-PAIR: Final = [[[0, 0], [1, 0]]]
+PAIR: Final = [[0.0, 0.0], [1.0, 0.0]]
 
 
 def axis(name: str) -> dict[str, Any]:
@@ -119,7 +117,14 @@ def replay() -> dict[str, Any]:
         "events": [{"time": 0.1, "blocks": [0, 1], "class": "2"}],
         "classes": [{"time": 0.0, "class": "1+1"}, {"time": 0.1, "class": "2"}],
     }
-    return {"kind": "replay", "arena": ARENA, "side": 0.03, "time": [0.0, 0.1, 0.2], "runs": [run]}
+    return {
+        "kind": "replay",
+        "arena": ARENA,
+        "side": 0.03,
+        "time": [0.0, 0.1, 0.2],
+        "runs": [run],
+        "cells": {"2": PAIR},
+    }
 
 
 def every_kind() -> list[dict[str, Any]]:
@@ -152,7 +157,7 @@ def every_kind() -> list[dict[str, Any]]:
             "kind": "biplot",
             "axes": [{"label": "first", "share": 0.7}, {"label": "second", "share": 0.2}],
             "points": {"x": [0.0, 1.0], "y": [1.0, 0.0], "names": ["a", "b"], "values": None},
-            "arrows": [{"name": "along", "x": 1.0, "y": 0.5}],
+            "arrows": [{"name": "along", "x": 1.0, "y": 0.5, "cells": PAIR}],
         },
         replay(),
         {"kind": "table", "columns": ["first", "second"], "rows": [["a word", 1.0], ["b", None]]},

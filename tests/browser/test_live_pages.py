@@ -182,7 +182,7 @@ def test_the_page_follows_a_sweep_from_begin_to_end(
         shown = page.locator("[data-part=map]")
         row, column = (int(shown.get_attribute(f"data-{name}")) for name in ("row", "column"))
         value = float(shown.get_attribute("data-value"))
-        assert value == float(found["ks_distance"][column, row])
+        assert value == np.float32(found["ks_distance"][column, row])
 
 
 def test_class_proportions_fill_as_runs_end(visit: Callable[..., Visit], tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from browser.all_kinds import every_kind, page_of, with_texts
 from browser.conftest import PHONE, Visit
 from browser.pictures import assert_same_path, drawn_share, path_points, pixels
 from driftwalk.page import map_section
-from driftwalk.schema.calibration import BLOCK
+from driftwalk.schema.parameters import BLOCK
 
 pytestmark = pytest.mark.browser
 
@@ -66,7 +66,7 @@ def test_a_click_shows_the_setting_s_own_motion(
     page.wait_for_selector(f'.map-setting[data-shown="{row},{column}"]')
     shown = page.locator("[data-part=map]")
     said = {name: float(shown.get_attribute(f"data-{name}")) for name in ("value", "x", "y")}
-    assert said["value"] == float(calibration["ks_distance"][row, column])
+    assert said["value"] == np.float32(calibration["ks_distance"][row, column])
     assert said["x"] == float(calibration["drag_coefficient"][column])
     assert said["y"] == float(calibration["force_std"][row])
     # The recording's excerpt is the first of the two pictures, the setting's the second.
@@ -165,7 +165,7 @@ def test_the_keyboard_does_the_same(page: Any, calibration: xr.Dataset) -> None:
     shown = page.locator("[data-part=map]")
     row, column = (int(shown.get_attribute(f"data-{name}")) for name in ("row", "column"))
     value = float(shown.get_attribute("data-value"))
-    assert value == float(calibration["ks_distance"][row, column])
+    assert value == np.float32(calibration["ks_distance"][row, column])
 
 
 def test_every_section_is_drawn(page: Any, picture: Callable[..., Path]) -> None:

@@ -14,7 +14,7 @@ import pytest
 from command_line import leave_out_figures
 from ports import held_port
 
-from driftwalk.cli.terminal.demo_answer import demo_truth
+from driftwalk.cli.demo import demo_truth
 from examples.printed import NUMBER, Numbers
 from examples.provisions import ELSEWHERE, NOT_COMPARED, PAGES
 from examples.reading import ROOT, blocks_of, commands_of, pages, read_blocks

@@ -27,7 +27,7 @@ from driftwalk.flow import extract_flow
 from driftwalk.record import describe
 from driftwalk.schema.check import check_dataset
 
-LONGEST_S = 1.0
+LONGEST_S = 3.0
 """Processor time of a file; one of several megabytes may take longer."""
 BYTES_A_SECOND = 4 << 20
 TANK_M = 0.3

@@ -7,43 +7,18 @@ import json
 import struct
 import zlib
 from html.parser import HTMLParser
-from itertools import islice
 from typing import Any
 
 import numpy as np
-
-LETTERS = {"f4": "f", "f8": "d", "i2": "h", "i4": "i", "u1": "B"}
 
 
 def values(part: Any) -> np.ndarray:
     """Decode an array of a page number by number, as docs/reference/page-data.md says."""
     if isinstance(part, list):
         return np.array(part, dtype=np.float64)
-    content = base64.b64decode(part["data"])
-    if part["packed"] == "deflate":
-        content = zlib.decompress(content)
-    count = int(np.prod(part["shape"]))
-    stored = struct.unpack(f"<{count}{LETTERS[part['dtype']]}", content)
-    if part["dtype"][0] == "f":
-        return np.array(stored, dtype=np.float64).reshape(part["shape"])
-    if part["delta"]:
-        stored = _summed(iter(stored), part["shape"][-1], 8 * int(part["dtype"][1]), count)
-    found = [
-        np.nan if number == part["missing"] else part["offset"] + part["scale"] * number
-        for number in stored
-    ]
-    return np.array(found).reshape(part["shape"])
-
-
-def _summed(differences: Any, length: int, bits: int, count: int) -> list[int]:
-    summed: list[int] = []
-    for _ in range(count // length):
-        total = 0
-        for difference in islice(differences, length):
-            # Wraps as an integer with a sign does.
-            total = (total + difference + 2 ** (bits - 1)) % 2**bits - 2 ** (bits - 1)
-            summed.append(total)
-    return summed
+    content = zlib.decompress(base64.b64decode(part["data"]))
+    stored = struct.unpack(f"<{int(np.prod(part['shape']))}f", content)
+    return part["offset"] + np.array(stored, dtype=np.float64).reshape(part["shape"])
 
 
 def part_of(sections: Any, id: str) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from driftwalk import _core
 from driftwalk.core.seeds import world_keys
 from driftwalk.flow import uniform_flow
 from driftwalk.model import Tank
-from driftwalk.motion.family import family_model
+from driftwalk.motion.choose import family_model
 from driftwalk.motion.family.columns import ParticleTable
 from driftwalk.simulation.backend import Camera, native_scene
 

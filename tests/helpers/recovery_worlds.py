@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from driftwalk.likelihood.recover.run import FACTS, FLOW_PARTS, PARTS
-from driftwalk.likelihood.recover.summary import add_summary
+from driftwalk.likelihood.recovery import FACTS, FLOW_PARTS, PARTS
+from driftwalk.likelihood.score import add_summary
 from driftwalk.model import Study
 from driftwalk.schema.kinds.recovery import RECOVERED
 

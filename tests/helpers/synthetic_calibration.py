@@ -15,7 +15,7 @@ import xarray as xr
 
 from driftwalk.schema import FLAGS, build_flow_field, build_trajectory
 from driftwalk.schema.answers.facts import calibration_parts, facts_of
-from driftwalk.schema.calibration import stored_parameters
+from driftwalk.schema.parameters import stored_parameters
 
 BUNDLED = Path(__file__).parents[2] / "src" / "driftwalk" / "datasets" / "tank30_ode_a"
 ARENA = json.dumps({"shape": "circle", "diameter_m": 0.3, "center_m": [0.0, 0.0]})

@@ -20,7 +20,7 @@ from driftwalk.runs import Run
 from driftwalk.schema.answers.parts import Answer, Row, lines_of
 from driftwalk.schema.runs import RunKind, register
 from driftwalk.sweep import WorkUnit, grid, run_sweep
-from driftwalk.viewer.watch.live_run_page import NO_CELL
+from driftwalk.viewer.watch.run_page import NO_CELL
 from driftwalk.viewer.watch.shards import RunReader
 
 

@@ -11,9 +11,9 @@ import pytest
 import xarray as xr
 from command_line import here, refusal
 
-from driftwalk.assembly.lattice.events import class_at
+from driftwalk.assembly.outcomes.distribution import class_at
 from driftwalk.assembly.recordings import classify
-from driftwalk.assembly.runs.path_recording import path_recording
+from driftwalk.assembly.runs.dataset import path_recording
 from driftwalk.assembly.runs.run import assemble, assembly_path
 from driftwalk.core.errors import InputError
 from driftwalk.datasets import tank30_flow

@@ -11,8 +11,7 @@ import pytest
 import xarray as xr
 from hypothesis import assume, given, settings, strategies as st
 
-from driftwalk.export.data.clock import frame_numbers, frame_rate
-from driftwalk.export.data.motion import Motion
+from driftwalk.export.data.motion import Motion, frame_numbers, frame_rate
 from driftwalk.export.data.movement import write_movement
 from driftwalk.export.data.tables import particle_numbers, write_csv, write_trackpy
 from driftwalk.record import load

@@ -49,7 +49,7 @@ def whole_run(study: dw.Study, flow: xr.Dataset, seed: int, steps: int) -> dict[
         study, flow, settings={"seed": seed, "duration_s": steps * STEP}, index=np.arange(1),
         backend="reference",
     )  # fmt: skip
-    found = simulate_rows(plan, start_poses(plan), slice(None), flow, sample_every=steps)
+    found = simulate_rows(plan, start_poses(plan), sample_every=steps)
     return {name: values[0] for name, values in found.items()}
 
 

@@ -17,7 +17,7 @@ from scipy import stats
 
 from driftwalk.flow import uniform_flow
 from driftwalk.model import Tank
-from driftwalk.motion.family import family_model
+from driftwalk.motion.choose import family_model
 from driftwalk.motion.family.columns import State, switching_table
 from driftwalk.schema import build_flow_field
 

@@ -1,29 +1,8 @@
-/** Arrays as a page carries them: packed base64, or plain lists with null for "not a number". */
+/** Arrays as a page carries them: deflated float32 in base64, or plain lists with null for "not a number". */
 
-import {
-  type Check,
-  PageError,
-  number,
-  object,
-  nullable,
-  oneOf,
-  list,
-  flag,
-  text,
-  withDefault,
-  plainObject,
-} from "./check";
+import { type Check, PageError, list, number, object, plainObject, text, withDefault } from "./check";
 
-const packedShape = object({
-  dtype: oneOf("f4", "f8", "i2", "i4", "u1"),
-  shape: list(number),
-  data: text,
-  packed: withDefault(oneOf("none", "deflate"), "none"),
-  scale: nullable(number),
-  offset: nullable(number),
-  missing: nullable(number),
-  delta: withDefault(flag, false),
-});
+const packedShape = object({ shape: list(number), offset: withDefault(number, 0), data: text });
 
 type Packed = ReturnType<typeof packedShape>;
 type Nested = readonly (number | null | Nested)[];
@@ -125,66 +104,17 @@ function fromNested(source: Nested): Grid {
   return { shape, data };
 }
 
-async function fromPacked(source: Packed): Promise<Grid> {
-  let bytes = fromBase64(source.data);
-  if (source.packed === "deflate") bytes = await inflate(bytes);
-  const raw = typed(source.dtype, bytes);
-  const size = sizeOf(source.shape);
-  if (raw.length !== size) {
-    throw new PageError(`an array of shape ${source.shape.join(" × ")} holds ${raw.length} numbers`);
+/** Reads little-endian numbers; every browser's machine is little-endian. */
+async function fromPacked({ shape, offset, data }: Packed): Promise<Grid> {
+  const bytes = Uint8Array.from(atob(data), (letter) => letter.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+  const content = await new Response(stream).arrayBuffer();
+  if (content.byteLength !== 4 * sizeOf(shape)) {
+    throw new PageError(`an array of shape ${shape.join(" × ")} holds ${content.byteLength} bytes`);
   }
-  if (source.delta) undoDifferences(raw, source.shape.at(-1) ?? 0);
-  return { shape: source.shape, data: toValues(raw, source) };
+  return { shape, data: Float64Array.from(new Float32Array(content), (value) => offset + value) };
 }
 
 function sizeOf(shape: readonly number[]): number {
   return shape.reduce((product, length) => product * length, 1);
-}
-
-function fromBase64(data: string): Uint8Array<ArrayBuffer> {
-  const letters = atob(data);
-  const bytes = new Uint8Array(letters.length);
-  for (let index = 0; index < letters.length; index += 1) bytes[index] = letters.charCodeAt(index);
-  return bytes;
-}
-
-async function inflate(bytes: Uint8Array<ArrayBuffer>): Promise<Uint8Array<ArrayBuffer>> {
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
-  return new Uint8Array(await new Response(stream).arrayBuffer());
-}
-
-type Raw = Float32Array | Float64Array | Int16Array | Int32Array | Uint8Array;
-
-/** Reads little-endian numbers; every browser's machine is little-endian. */
-function typed(dtype: Packed["dtype"], bytes: Uint8Array<ArrayBuffer>): Raw {
-  const width = { f4: 4, f8: 8, i2: 2, i4: 4, u1: 1 }[dtype];
-  if (bytes.length % width !== 0) throw new PageError(`an array of ${dtype} has ${bytes.length} bytes`);
-  switch (dtype) {
-    case "f4":
-      return new Float32Array(bytes.buffer);
-    case "f8":
-      return new Float64Array(bytes.buffer);
-    case "i2":
-      return new Int16Array(bytes.buffer);
-    case "i4":
-      return new Int32Array(bytes.buffer);
-    case "u1":
-      return bytes;
-  }
-}
-
-/** Adds up first differences along the last axis; the sum wraps as the stored numbers do. */
-function undoDifferences(raw: Raw, length: number): void {
-  for (let start = 0; length > 0 && start < raw.length; start += length) {
-    for (let index = start + 1; index < start + length; index += 1) {
-      raw[index] = at(raw, index) + at(raw, index - 1);
-    }
-  }
-}
-
-function toValues(raw: Raw, source: Packed): Float64Array {
-  if (raw instanceof Float32Array || raw instanceof Float64Array) return Float64Array.from(raw);
-  const scale = source.scale ?? 1;
-  const offset = source.offset ?? 0;
-  return Float64Array.from(raw, (value) => (value === source.missing ? Number.NaN : offset + scale * value));
 }

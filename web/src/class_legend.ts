@@ -1,20 +1,18 @@
 /** A legend of outcome classes: colour, sketch, name. */
 
 import { el } from "./dom";
-import type { Polyominoes } from "./page";
-import { cellsOfName, sketchPicture, writtenName } from "./polyomino";
+import { type Square, sketchPicture, writtenName } from "./polyomino";
 
 export function classLegend(
-  classes: readonly { readonly name: string; readonly cells: Polyominoes; readonly colour: string }[],
+  classes: readonly { readonly name: string; readonly cells: readonly Square[]; readonly colour: string }[],
 ): HTMLElement {
   const list = el("ul", { class: "legend class-legend" });
   for (const one of classes) {
-    const cells = one.cells.length > 0 ? one.cells : cellsOfName(one.name);
     list.append(
       el(
         "li",
         {},
-        cells.length > 0 ? sketchPicture(cells, 7, one.colour) : box(one.colour),
+        one.cells.length > 0 ? sketchPicture(one.cells, 7, one.colour) : box(one.colour),
         el("span", {}, writtenName(one.name)),
       ),
     );

@@ -27,9 +27,8 @@ const pair: Check<[number, number]> = (value, where) => {
   return ends as [number, number];
 };
 
-const cell = pair;
-/** Lattice cells of every polyomino of an outcome class. */
-const polyominoes = list(list(cell));
+/** The sketch of an outcome class: lower left corners of its squares, y upwards, in sides of a block. */
+const squares = list(pair);
 
 const arena = object({
   shape: oneOf("circle", "rectangle", "polygon"),
@@ -178,7 +177,7 @@ const classes = object({
       items: list(
         object({
           class: text,
-          cells: withDefault(polyominoes, []),
+          cells: withDefault(squares, []),
           count: nullable(number),
           share: nullable(number),
           low: nullable(number),
@@ -196,7 +195,7 @@ const classTimes = object({
   classes: list(
     object({
       class: text,
-      cells: withDefault(polyominoes, []),
+      cells: withDefault(squares, []),
       share: numbers,
       low: nullable(numbers),
       high: nullable(numbers),
@@ -208,7 +207,7 @@ const classTimes = object({
 const overTime = object({
   time: numbers,
   classes: list(text),
-  cells: withDefault(list(polyominoes), []),
+  cells: withDefault(list(squares), []),
   count: numbers,
   runs: numbers,
   reference: nullable(numbers),
@@ -223,7 +222,7 @@ const l1Map = object({
   noise: nullable(number),
   label: text,
   classes: withDefault(list(text), []),
-  cells: withDefault(list(polyominoes), []),
+  cells: withDefault(list(squares), []),
   shares: nullable(numbers),
   over_time: nullable(overTime),
 });
@@ -239,7 +238,7 @@ const biplot = object({
     names: list(text),
     values: nullable(record(numbers)),
   }),
-  arrows: list(object({ name: text, x: number, y: number })),
+  arrows: list(object({ name: text, x: number, y: number, cells: withDefault(squares, []) })),
 });
 
 const replay = object({
@@ -258,6 +257,7 @@ const replay = object({
       classes: withDefault(list(object({ time: number, class: text })), []),
     }),
   ),
+  cells: withDefault(record(squares), new Map<string, [number, number][]>()),
 });
 
 const table = object({ ...base, columns: list(text), rows: list(list(anything)) });
@@ -307,7 +307,6 @@ const tank = object({
 
 export { tank as checkTank, controls as checkControls, overTime as checkOverTime };
 export type Arena = Checked<typeof arena>;
-export type Polyominoes = Checked<typeof polyominoes>;
 export type SummarySection = Checked<typeof summary>;
 export type WarningsSection = Checked<typeof warnings>;
 export type TrajectorySection = Checked<typeof trajectory>;

@@ -47,7 +47,7 @@ test("a section that is wrong says where", () => {
   );
   assert.throws(
     () => SECTIONS.map({ ...head, x: axis, y: axis, value: { dtype: "f2" } }, ""),
-    /'value.dtype'/,
+    /'value.shape'/,
   );
   const map = SECTIONS.map({ ...head, x: axis, y: axis, value: [[0.5]], statuses: { "1": "no motion" } }, "");
   assert.equal(map.statuses.get("1"), "no motion");

@@ -1,56 +1,38 @@
 import assert from "node:assert/strict";
 import test from "node:test";
-import { cellsOfName, sketchOf, writtenName } from "../src/polyomino";
+import { type Square, cellsOfShape, sizeOf, writtenName } from "../src/polyomino";
 import { type Join, assemblies, code, shapeName } from "../src/tank/joined";
 
-test("names and codes give cells, other words none", () => {
-  assert.deepEqual(cellsOfName("2+1"), [
-    [
-      [0, 0],
-      [1, 0],
-    ],
-    [[0, 0]],
+test("names and codes give cells, the longer side lying, other words none", () => {
+  assert.deepEqual(cellsOfShape("2"), [
+    [0, 0],
+    [1, 0],
   ]);
-  assert.deepEqual(cellsOfName("x./xx"), [
-    [
-      [0, 1],
-      [0, 0],
-      [1, 0],
-    ],
+  assert.deepEqual(cellsOfShape("x./xx"), [
+    [0, 1],
+    [0, 0],
+    [1, 0],
   ]);
-  for (const none of ["other", "", "...", "Q", "2+Q"]) assert.deepEqual(cellsOfName(none), []);
+  // Turned, not mirrored.
+  assert.deepEqual(cellsOfShape("L"), [
+    [0, 0],
+    [1, 0],
+    [2, 0],
+    [2, 1],
+  ]);
+  for (const none of ["other", "", "...", "Q", "2+1"]) assert.deepEqual(cellsOfShape(none), []);
   assert.equal(writtenName("L3+1"), "L3+1");
   assert.equal(writtenName("xxx/x.x"), "");
 });
 
-test("the squares of a sketch do not overlap and fill no more than its box", () => {
-  for (const name of ["I", "T", "L3+1", "2+2", "1+1+1+1", "xxx/x.x+I3+2+1+1"]) {
-    const sketch = sketchOf(cellsOfName(name));
-    const count = cellsOfName(name).flat().length;
-    assert.equal(sketch.squares.length, count);
-    sketch.squares.forEach(([x, y], index) => {
-      assert.ok(x >= 0 && y >= 0 && x + 1 <= sketch.width + 1e-9 && y + 1 <= sketch.height + 1e-9, name);
-      for (const [otherX, otherY] of sketch.squares.slice(index + 1)) {
-        assert.ok(
-          Math.max(Math.abs(x - otherX), Math.abs(y - otherY)) >= 1 - 1e-9,
-          `${name}: squares overlap`,
-        );
-      }
-    });
-  }
-});
-
-test("the sketch of a class packs as the printed figure does", () => {
-  // From the figures of the Python package: class_cells("2+1").
-  const squares = sketchOf(cellsOfName("2+1")).squares.map(([x, y]) => [
-    Number(x.toFixed(9)),
-    Number(y.toFixed(9)),
-  ]);
-  assert.deepEqual(squares, [
+test("a sketch is as large as its squares reach", () => {
+  const squares: Square[] = [
     [0, 1.6],
     [1, 1.6],
     [0, 0],
-  ]);
+  ];
+  assert.deepEqual(sizeOf(squares), { width: 2, height: 2.6 });
+  assert.deepEqual(sizeOf([]), { width: 0, height: 0 });
 });
 
 test("blocks that are joined, also by others, are one assembly", () => {
@@ -116,7 +98,7 @@ test("joined faces give the shape, whichever way the blocks are turned", () => {
 
 test("every placement of every tetromino has its name", () => {
   for (const name of ["I", "O", "T", "S", "Z", "L", "J"]) {
-    const cells = cellsOfName(name)[0] ?? [];
+    const cells = cellsOfShape(name);
     for (let quarter = 0; quarter < 4; quarter += 1) {
       const names = cells.map((_, index) => `b${index}`);
       // Blocks that all look the same way: the face towards a neighbour is the direction itself.

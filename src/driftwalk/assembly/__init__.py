@@ -1,6 +1,6 @@
 """Self-assembly of many blocks: outcomes, their uncertainty, and their dependence on the model."""
 
-from driftwalk.assembly.lattice.events import ReplayedEvents, class_at, replay_events
+from driftwalk.assembly.lattice.events import ReplayedEvents, replay_events
 from driftwalk.assembly.lattice.polyomino import polyomino_cells, polyomino_name, polyominoes
 from driftwalk.assembly.live_world import LiveEvent, LiveTank
 from driftwalk.assembly.outcomes.classes import (
@@ -18,6 +18,7 @@ from driftwalk.assembly.outcomes.components import (
     principal_components,
 )
 from driftwalk.assembly.outcomes.distribution import (
+    class_at,
     outcome_distribution,
     proportion_interval,
     sampling_variance,
@@ -33,16 +34,20 @@ from driftwalk.assembly.outcomes.l1 import (
 from driftwalk.assembly.outcomes.sizes import assembly_sizes
 from driftwalk.assembly.outcomes.survival import SurvivalCurve, class_times, survival_curve
 from driftwalk.assembly.recordings import classify
-from driftwalk.assembly.runs.parameters import draw_parameters, has_uncertainty
-from driftwalk.assembly.runs.path_recording import path_recording
+from driftwalk.assembly.runs.dataset import path_recording
+from driftwalk.assembly.runs.draws import draw_parameters, has_uncertainty
 from driftwalk.assembly.runs.run import assemble, assemble_drawn, assembly_path, check_assembly
-from driftwalk.assembly.sensitivity.outcome_indices import check_indices, sensitivity_indices
 from driftwalk.assembly.sensitivity.run import (
     check_sensitivity,
     sensitivity_map,
     sensitivity_reference,
 )
-from driftwalk.assembly.sensitivity.sobol import sobol_design, sobol_indices
+from driftwalk.assembly.sensitivity.sobol import (
+    check_indices,
+    sensitivity_indices,
+    sobol_design,
+    sobol_indices,
+)
 
 __all__ = [
     "Alignment",

@@ -11,11 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
+from driftwalk.assembly.lattice.join_history import LatticeWorld
 from driftwalk.assembly.lattice.joined_faces import ROUNDING
-from driftwalk.assembly.lattice.live import Lattice
 from driftwalk.assembly.runs.dataset import times_of
 from driftwalk.assembly.runs.plan import MOST_STEPS, make_plan, start_poses
 from driftwalk.assembly.runs.start import require_room
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.simulation.backend import BROKEN
 
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
 
     from driftwalk.model import Study
     from driftwalk.model.assembly import HiddenFaceDrag, Latching
-
-Floats = npt.NDArray[np.float64]
 
 
 class LiveEvent(NamedTuple):
@@ -49,7 +48,7 @@ class _Moment:
 
     @cached_property
     def outcome(self) -> str:
-        return Lattice.of(self.state).outcome(self._chirality)
+        return LatticeWorld.of(self.state).outcome(self._chirality)
 
 
 class _Wishes(NamedTuple):
@@ -121,7 +120,7 @@ class LiveTank:
         # Never held while the world advances. Where both are held, this one is taken second.
         self._wishes_lock = Lock()
         self._wishes = _Wishes(plan.study, 1.0)
-        self._model = plan.model(plan.flow)
+        self._model = plan.model()
         self.restart(start=start)
 
     def restart(self, *, seed: int | None = None, start: npt.ArrayLike | None = None) -> None:
@@ -147,19 +146,14 @@ class LiveTank:
                 index=np.arange(1),
                 ends=False,
             )
-            rules, forces = plan.study.assembly, plan.study.forces
+            forces = plan.study.forces
             self._world = _core.LiveWorld(
                 self._model,
                 start=np.ascontiguousarray(start_poses(plan, start)[0]),
                 key=int(plan.keys[0]),
                 drag_coefficient=forces.drag_coefficient,
                 force_std=forces.force_std_N,
-                latching=rules.latching,
-                connector_distance=rules.connector_distance_m,
-                connector_axis=rules.connector_axis_rad,
-                hidden_face_drag=rules.hidden_face_drag,
-                block_restitution=rules.block_restitution,
-                block_friction=rules.block_friction,
+                **plan.rules(),
                 flow_start=0.0 if plan.flow_start is None else float(plan.flow_start[0]),
             )
             self._wishes = self._active = _Wishes(plan.study, self._wishes.flow_scale)
@@ -389,14 +383,10 @@ class LiveTank:
     def _step(self, steps: int) -> None:
         """Take time steps and note what has joined in them."""
         study = self._active.study
-        lattice = Lattice.of(self._world.state())
+        lattice = LatticeWorld.of(self._world.state())
         found = self._world.advance(steps)
-        for step, blocks, faces in zip(found["step"], found["block"], found["face"], strict=True):
-            lattice = lattice.joined(blocks, faces)
-            self._events.append(
-                LiveEvent(
-                    float(times_of(step, time_step=study.time_step_s)),
-                    (int(blocks[0]), int(blocks[1])),
-                    lattice.outcome(study.assembly.chirality),
-                )
-            )
+        times = times_of(found["step"], time_step=study.time_step_s).tolist()
+        pairs, faces = (map(tuple, found[name].tolist()) for name in ("block", "face"))
+        for time, blocks, joined in zip(times, pairs, faces, strict=True):
+            lattice.join(blocks, joined)
+            self._events.append(LiveEvent(time, blocks, lattice.outcome(study.assembly.chirality)))

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.lattice.join_history import Event, JoinHistory
 from driftwalk.assembly.lattice.joined_faces import (
+    JOIN_ANGLE,
+    JOIN_POLICY,
     ROUNDING,
-    Booleans,
-    Floats,
     JoinRules,
     Poses,
     find_joins,
@@ -21,6 +21,7 @@ from driftwalk.assembly.lattice.joined_faces import (
 )
 from driftwalk.assembly.lattice.polyomino import Chirality, require_chirality
 from driftwalk.assembly.outcomes.classes import listed_classes, listed_shapes
+from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
 from driftwalk.schema import body_names, check_trajectory
 from driftwalk.schema.check import build_dataset
@@ -29,25 +30,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-class JoinPolicy(NamedTuple):
-    """When blocks of a recording are joined, unless stated otherwise."""
-
-    join_distance: float = 0.1
-    """Distance of faces that are joined, in sides; chosen by hand."""
-    looser: float = 2.0
-    """Tolerances to let go, in units of those to join; chosen by hand."""
-    min_duration_s: float = 0.5
-    """Shortest duration that counts [s]; chosen by hand."""
-    hold_s: float = 1.0
-    """Time for which a block that is not seen keeps its joins [s]; chosen by hand."""
-    frames_held: float = 3.0
-    """The same in frames, where they are so rare that it is longer; chosen by hand."""
-
-
-JOIN_POLICY: Final = JoinPolicy()
-
-JOIN_ANGLE: Final = math.radians(10.0)
-"""Default angle between faces that are joined [rad]."""
 UNKNOWN: Final = -1
 
 
@@ -124,17 +106,11 @@ def classify(
     """
     require_chirality(chirality)
     poses = _checked_poses(recording)
-    join_distance = JOIN_POLICY.join_distance * side if join_distance is None else join_distance
-    rules = JoinRules(
-        side=side,
-        join_distance=join_distance,
-        join_angle=join_angle,
-        release_distance=JOIN_POLICY.looser * join_distance
-        if release_distance is None
-        else release_distance,
-        release_angle=JOIN_POLICY.looser * join_angle if release_angle is None else release_angle,
-        min_duration=min_duration,
-        hold=_usual_hold(poses.time) if hold is None else hold,
+    if hold is None:
+        usual = float(np.median(np.diff(poses.time))) if poses.time.size > 1 else 0.0
+        hold = max(JOIN_POLICY.hold_s, JOIN_POLICY.frames_held * usual)
+    rules = JoinRules.completed(
+        side, join_distance, join_angle, release_distance, release_angle, min_duration, hold
     )
     history = JoinHistory(poses.x.shape, find_joins(poses, rules), chirality=chirality)
     return _dataset(recording, poses, rules, history)
@@ -167,17 +143,12 @@ def _checked_poses(recording: xr.Dataset) -> Poses:
     return poses
 
 
-def _usual_hold(time: Floats) -> float:
-    usual = float(np.median(np.diff(time))) if time.size > 1 else 0.0
-    return max(JOIN_POLICY.hold_s, JOIN_POLICY.frames_held * usual)
-
-
-def _unknown_blocks(poses: Poses, hold: float) -> Booleans:
+def _unknown_blocks(poses: Poses, hold: float) -> Bools:
     """Return where a block was last seen too long ago, (time, block)."""
     sample = np.arange(poses.time.size)[:, None]
     last = np.maximum.accumulate(np.where(poses.seen, sample, -1), axis=0)
     age = poses.time[:, None] - poses.time[last]
-    unknown: Booleans = (last < 0) | (age > hold * (1.0 + ROUNDING))
+    unknown: Bools = (last < 0) | (age > hold * (1.0 + ROUNDING))
     return unknown
 
 
@@ -193,9 +164,13 @@ def _shares(outcome: npt.NDArray[np.int32], lasts: Floats, classes: int) -> Floa
 def _dataset(
     recording: xr.Dataset, poses: Poses, rules: JoinRules, history: JoinHistory
 ) -> xr.Dataset:
-    classes, shapes = _listed(history, poses.x.shape[1])
+    joined, blocks = history.joined, poses.x.shape[1]
+    names = {*history.outcome, *(event.outcome for event in (*joined, *history.split))}
+    classes = listed_classes(names, blocks, chirality=history.chirality)
+    parts = {shape for name in names for shape in name.split("+")}
+    shapes = listed_shapes(parts, blocks, chirality=history.chirality)
     known = ~_unknown_blocks(poses, rules.hold)
-    sound: Booleans = np.logical_and.reduce(known, axis=1)
+    sound: Bools = np.logical_and.reduce(known, axis=1)
     outcome = np.where(sound, _places(history.outcome, classes), UNKNOWN).astype(np.int32)
     assembly = np.where(known, history.assembly, UNKNOWN).astype(np.int32)
     # A sample holds until the next one, if that comes in time.
@@ -205,9 +180,13 @@ def _dataset(
         "outcome": ("time", outcome),
         "assembly": (("time", "body"), assembly),
         "proportion": ("class", _shares(outcome, lasts, len(classes))),
-        **_event_variables("event", history.joined, poses.time, classes),
+        **_event_variables("event", joined, poses.time, classes),
         **_event_variables("split", history.split, poses.time, classes),
-        **_assembly_variables(history.joined, shapes),
+        "event_assembly": (("event", "side"), _padded([one.assemblies for one in joined], 2)),
+        "event_shape": (
+            ("event", "part"),
+            _padded([_places(one.shapes, shapes) for one in joined], 3),
+        ),
     }
     return build_dataset(
         "classification",
@@ -218,19 +197,22 @@ def _dataset(
             "class": ("class", np.array(classes, dtype=object)),
             "shape": ("shape", np.array(shapes, dtype=object)),
         },
-        _attributes(recording, poses, rules, history)
-        | {"unknown_samples": int((~sound).sum()), "known_s": float(lasts.sum())},
-    )
-
-
-def _listed(history: JoinHistory, blocks: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the classes and the shapes that the dataset lists."""
-    events = (*history.joined, *history.split)
-    classes = {*history.outcome, *(event.outcome for event in events)}
-    shapes = {shape for name in classes for shape in name.split("+")}
-    return (
-        listed_classes(classes, blocks, chirality=history.chirality),
-        listed_shapes(shapes, blocks, chirality=history.chirality),
+        {
+            **{key: recording.attrs[key] for key in ("source", "arena") if key in recording.attrs},
+            "blocks": blocks,
+            "chirality": history.chirality,
+            "block_side_m": rules.side,
+            "join_distance_m": rules.join_distance,
+            "join_angle_rad": rules.join_angle,
+            "release_distance_m": rules.release_distance,
+            "release_angle_rad": rules.release_angle,
+            "min_duration_s": rules.min_duration,
+            "hold_s": rules.hold,
+            "dropped_joins": len(history.dropped),
+            "closest_m": smallest_distance(poses),
+            "unknown_samples": int((~sound).sum()),
+            "known_s": float(lasts.sum()),
+        },
     )
 
 
@@ -254,35 +236,6 @@ def _event_variables(
     }
 
 
-def _assembly_variables(events: list[Event], shapes: Sequence[str]) -> dict[str, Any]:
-    """Return which assemblies joined, and their shapes."""
-    rows = [_places(event.shapes, shapes) for event in events]
-    return {
-        "event_assembly": (("event", "side"), _padded([event.assemblies for event in events], 2)),
-        "event_shape": (("event", "part"), _padded(rows, 3)),
-    }
-
-
 def _padded(rows: Sequence[Sequence[int]], width: int) -> npt.NDArray[np.int32]:
     """Return rows of whole numbers, one of -1 where there is none."""
     return np.array(rows or [(UNKNOWN,) * width], dtype=np.int32)
-
-
-def _attributes(
-    recording: xr.Dataset, poses: Poses, rules: JoinRules, history: JoinHistory
-) -> dict[str, Any]:
-    kept = ("source", "arena")
-    return {
-        **{name: recording.attrs[name] for name in kept if name in recording.attrs},
-        "blocks": poses.x.shape[1],
-        "chirality": history.chirality,
-        "block_side_m": rules.side,
-        "join_distance_m": rules.join_distance,
-        "join_angle_rad": rules.join_angle,
-        "release_distance_m": rules.release_distance,
-        "release_angle_rad": rules.release_angle,
-        "min_duration_s": rules.min_duration,
-        "hold_s": rules.hold,
-        "dropped_joins": len(history.dropped),
-        "closest_m": smallest_distance(poses),
-    }

@@ -12,9 +12,11 @@ import numpy as np
 from driftwalk.calibration.grid.bootstrap_region import Bootstrap, simulated_steps
 from driftwalk.calibration.grid.grid_map import Map, MapSimulator, Progress
 from driftwalk.calibration.grid.grid_refinement import first_window, locate_minimum
-from driftwalk.calibration.problem import Problem, limits_of
+from driftwalk.calibration.problem import FlowSource, Problem, limits_of, prepare_problem
 from driftwalk.comparison.statistic import distances_among
 from driftwalk.core.arrays import Bools
+from driftwalk.core.errors import InputError
+from driftwalk.schema import Track
 from driftwalk.schema.answers.facts import FAR_ABOVE_FLOOR, is_explained
 
 
@@ -70,21 +72,45 @@ class Halves(NamedTuple):
 
 
 def validate_on_halves(
+    track: Track,
     whole: Problem,
     coarse: Map,
-    first: Problem,
-    second: Problem,
-    *,
+    flow_of: FlowSource,
     executor: Executor | None = None,
     progress: Progress | None = None,
-) -> Halves:
+) -> Halves | None:
     """Calibrate on the first half of a recording and measure the distance on the second.
+
+    None where a half is too short.
 
     The search is the usual one with a single replicate per setting on the coarse map, and ends
     with the window that locates the valley: enough for an optimum, and a small part of the main
     calibration's time. Settings of the coarse map that the triangle inequality excludes are not
     simulated again: see `could_be_best`.
     """
+    middle = 0.5 * (track.time[0] + track.time[-1])
+    others = whole.like.neighbours
+    if others is not None:
+        others = others.since(-float(track.time[0]))
+    early = Track(*(values[track.time <= middle] for values in track))
+    late = Track(*(values[track.time > middle] for values in track))
+    try:
+        flow = flow_of(early)
+        first, second = (
+            prepare_problem(
+                half,
+                whole.study,
+                flow,
+                camera=whole.like.camera,
+                model=whole.model,
+                statistic=whole.statistic,
+                neighbours=others,
+                threads=whole.like.threads,
+            )
+            for half in (early, late)
+        )
+    except InputError:
+        return None
     halves = MapSimulator(first, "first_half", apart=False, executor=executor, progress=progress)
     map_of_half = halves.full(coarse.axes, 1, could_be_best(whole, coarse, first))
     lowest = map_of_half.point(map_of_half.cell_of_minimum())

@@ -1,15 +1,15 @@
-"""The problem of a calibration: one recording, made ready once, and the worlds that answer it."""
+"""The problem of a calibration: one recording, made ready once, and how its worlds are computed."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.calibration.refuse import require_samples
 from driftwalk.comparison import Statistic, StepDistance, StepReference, plan_steps
 from driftwalk.conditions import (
     Conditions,
@@ -20,11 +20,14 @@ from driftwalk.conditions import (
     require_travel,
 )
 from driftwalk.core.arrays import Floats
+from driftwalk.core.errors import InputError
 from driftwalk.core.random_streams import trial_in
+from driftwalk.core.run_stages import tell_nobody
 from driftwalk.core.seeds import world_keys
 from driftwalk.motion import BlockModel, Details, MotionModel, Parameter, Scores, score_worlds
 from driftwalk.schema import Track, body_track
 from driftwalk.simulation.backend import Camera
+from driftwalk.sweep import Store
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,6 +38,29 @@ Axes = tuple[Floats, ...]
 """One array per parameter, in its coordinate."""
 FlowSource = Callable[[Track], "xr.Dataset | None"]
 """Gives the flow for a track."""
+Tell = Callable[[str, int, int], None]
+"""Hears of a stage, of what is done of it, and of all of it."""
+
+
+class Stores(Protocol):
+    """Gives the store in which a stage keeps its finished work units."""
+
+    def __call__(self, name: str, fingerprint: dict[str, Any]) -> Store | None:
+        """Return the store of a stage; None keeps results in memory."""
+
+
+def in_memory(name: str, fingerprint: dict[str, Any]) -> Store | None:  # noqa: ARG001
+    """Keep the results of a stage in memory."""
+    return None
+
+
+class Execution(NamedTuple):
+    """How a calibration is computed; its result does not depend on it."""
+
+    executor: Executor | None = None
+    """Computes work units elsewhere, with one thread each."""
+    stores: Stores = in_memory
+    tell: Tell = tell_nobody
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +106,14 @@ class Problem:
     def duration(self) -> float:
         """Time from the first to the last sample [s]."""
         return float(self.like.sample_time[-1])
+
+
+def require_samples(track: Track) -> None:
+    """Refuse a track on which no step turns."""
+    if track.time.size < 3:
+        raise InputError(
+            f"the recording has {track.time.size} samples of this body; at least 3 are needed"
+        )
 
 
 def prepare_problem(

@@ -10,18 +10,19 @@ a dimension; see `driftwalk.schema.answers.facts`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.calibration.grid.energy_score import at_settings
 from driftwalk.calibration.grid.grid_map import Map
 from driftwalk.calibration.problem import Problem
-from driftwalk.comparison.density import BINS
+from driftwalk.comparison.statistic import BINS
 from driftwalk.core.arrays import Floats
 from driftwalk.motion.score import broken_worlds, excerpt_samples
 from driftwalk.schema import Parameter
-from driftwalk.schema.answers.facts import calibration_parts
+from driftwalk.schema.answers.facts import FAR_ABOVE_FLOOR, calibration_parts
 from driftwalk.schema.check import build_dataset
 from driftwalk.schema.kinds.calibration import CELL_STATUS
 from driftwalk.simulation.backend import STATUS
@@ -29,52 +30,116 @@ from driftwalk.simulation.backend import STATUS
 if TYPE_CHECKING:
     import xarray as xr
 
+    from driftwalk.calibration.goodness_of_fit import Halves
     from driftwalk.calibration.grid.bootstrap_region import Bootstrap, Region
+    from driftwalk.calibration.grid.stages import GridCalibration
+    from driftwalk.calibration.stationarity import Stationarity
 
 
 _Variable = tuple[tuple[str, ...], npt.NDArray[Any]]
 
 
-class CalibrationParts(NamedTuple):
-    """Pieces of a calibration that its dataset is made of."""
-
-    coarse: Map
-    """The first pass, with densities and excerpts."""
-    refined: Map | None
-    surface: Floats | None
-    """The smooth surface at the refined settings."""
-    bootstrap: Bootstrap | None
-    region: Region | None
-
-
 def build_calibration(
-    problem: Problem, found: CalibrationParts, facts: dict[str, Any]
+    stages: GridCalibration,
+    halves: Halves | None,
+    stationarity: Stationarity | None,
+    recording: xr.Dataset,
 ) -> xr.Dataset:
-    """Return the dataset of a calibration."""
+    """Put what the stages of a calibration left into one dataset, and state the answer."""
+    problem, coarse, refined = stages.problem, stages.coarse, stages.refined
     parameters = problem.parameters
     names = tuple(parameter.name for parameter in parameters)
-    answer = calibration_parts(facts, parameters)
+    answer = calibration_parts(_facts(stages, halves, stationarity, recording), parameters)
     data: dict[str, Any] = {
         **answer.data,
-        **_map_variables(found.coarse, names, "", "replicate"),
-        **_details(found.coarse, names),
+        **_map_variables(coarse, names, "", "replicate"),
+        **_details(coarse, names),
         **_recording(problem),
     }
     length_edge, angle_edge = _bin_edges(problem)
     coords: dict[str, Any] = {
         **answer.coords,
-        **_axes(parameters, found.coarse.axes, ""),
+        **_axes(parameters, coarse.axes, ""),
         "step_length_edge": ("step_length_edge", length_edge),
         "turning_angle_edge": ("turning_angle_edge", angle_edge),
     }
-    if found.refined is not None and found.surface is not None:
+    if refined is not None:
         dims = tuple(f"refined_{name}" for name in names)
-        data.update(_map_variables(found.refined, dims, "refined_", "refined_replicate"))
-        data["refined_surface"] = (dims, found.surface)
-        coords.update(_axes(parameters, found.refined.axes, "refined_"))
-    if found.bootstrap is not None and found.region is not None:
-        data.update(_uncertainty(parameters, found.bootstrap, found.region))
+        data.update(_map_variables(refined.map, dims, "refined_", "refined_replicate"))
+        data["refined_surface"] = (dims, at_settings(refined.energy_score.surface))
+        coords.update(_axes(parameters, refined.map.axes, "refined_"))
+    if stages.bootstrap is not None and stages.region is not None:
+        data.update(_uncertainty(parameters, stages.bootstrap, stages.region))
     return build_dataset("calibration", data, coords, answer.attrs)
+
+
+def _facts(
+    stages: GridCalibration,
+    halves: Halves | None,
+    stationarity: Stationarity | None,
+    recording: xr.Dataset,
+) -> dict[str, Any]:
+    """Return the point estimate, what the model says of it, and how sure and good it is."""
+    problem, point = stages.problem, stages.optimum.point
+    lowest = stages.coarse.point(stages.coarse.cell_of_minimum())
+    names = [parameter.name for parameter in problem.parameters]
+    facts: dict[str, Any] = {
+        **_estimate(problem, point),
+        **problem.model.facts(dict(zip(names, _values(problem, point), strict=True))),
+        "position_noise_m": problem.like.camera.position_noise,
+        "orientation_noise_rad": problem.like.camera.orientation_noise,
+        "position_quantum_m": problem.like.camera.position_quantum,
+        "step_interval_s": float(problem.reference.plan.step_interval),
+        "duration_s": problem.duration,
+        "recording_pairs": len(problem.steps),
+        **_estimate(problem, lowest, "coarse_"),
+        "ks_distance": stages.optimum.distance,
+        "noise_floor": stages.floor,
+        "warnings": stages.warnings,
+        "recording_name": str(recording.attrs.get("source", "")),
+        "simulated_recording": str(recording.attrs.get("simulated", "no")),
+        "study": problem.study.to_toml(),
+    }
+    # Only a bootstrap tells how sure the answer is; its mean distance replaces the surface's.
+    quality, region = stages.quality, stages.region
+    if quality is not None and region is not None:
+        facts |= {
+            f"{parameter.key}_interval": [float(parameter.to_value(end)) for end in ends]
+            for parameter, ends in zip(problem.parameters, region.intervals, strict=True)
+        }
+        facts |= {
+            "confidence": problem.study.calibration.confidence,
+            "ks_distance": quality.distance,
+            "ks_distance_standard_error": quality.standard_error,
+            "noise_floor_upper": quality.floor_upper,
+            "distance_to_floor_ratio": quality.distance / quality.floor,
+            "far_above_floor": FAR_ABOVE_FLOOR,
+            "explained": quality.explained,
+            "region_level": region.level,
+            "interval_stretch": quality.stretch,
+        }
+    if halves is not None:
+        facts |= _estimate(problem, halves.point, "first_half_")
+        facts["second_half_ks_distance"] = halves.distance
+        facts["second_half_noise_floor"] = halves.floor
+    if stationarity is not None:
+        facts["halves_ks_distance"] = stationarity.distance
+        facts["halves_ks_distance_expected"] = stationarity.expected
+        facts["halves_p_value"] = stationarity.p_value
+    return facts
+
+
+def _estimate(problem: Problem, point: Sequence[float], prefix: str = "") -> dict[str, float]:
+    """Return a point under the parameters' names with their units."""
+    keys = (f"{prefix}{parameter.key}" for parameter in problem.parameters)
+    return dict(zip(keys, _values(problem, point), strict=True))
+
+
+def _values(problem: Problem, point: Sequence[float]) -> list[float]:
+    return [
+        float(parameter.to_value(coordinate))
+        for parameter, coordinate in zip(problem.parameters, point, strict=True)
+    ]
 
 
 def _axes(
@@ -103,44 +168,6 @@ def _uncertainty(
         found[f"bootstrap_{parameter.name}"] = (("bootstrap",), parameter.to_value(estimates))
         found[f"region_{parameter.name}"] = (("region_vertex",), parameter.to_value(border))
     return found
-
-
-def answer_facts(problem: Problem, point: Sequence[float]) -> dict[str, Any]:
-    """Return the point estimate, what the model says of it, and what it was estimated from."""
-    estimate = dict(
-        zip((one.name for one in problem.parameters), _values(problem, point), strict=True)
-    )
-    return {
-        **estimate_facts(problem, point),
-        **problem.model.facts(estimate),
-        "position_noise_m": problem.like.camera.position_noise,
-        "orientation_noise_rad": problem.like.camera.orientation_noise,
-        "position_quantum_m": problem.like.camera.position_quantum,
-        "step_interval_s": float(problem.reference.plan.step_interval),
-        "duration_s": problem.duration,
-        "recording_pairs": len(problem.steps),
-    }
-
-
-def estimate_facts(problem: Problem, point: Sequence[float], prefix: str = "") -> dict[str, float]:
-    """Return a point under the parameters' names with their units."""
-    keys = (f"{prefix}{parameter.key}" for parameter in problem.parameters)
-    return dict(zip(keys, _values(problem, point), strict=True))
-
-
-def interval_facts(problem: Problem, region: Region) -> dict[str, list[float]]:
-    """Return the intervals under the same names."""
-    return {
-        f"{parameter.key}_interval": [float(parameter.to_value(end)) for end in ends]
-        for parameter, ends in zip(problem.parameters, region.intervals, strict=True)
-    }
-
-
-def _values(problem: Problem, point: Sequence[float]) -> list[float]:
-    return [
-        float(parameter.to_value(coordinate))
-        for parameter, coordinate in zip(problem.parameters, point, strict=True)
-    ]
 
 
 def _map_variables(

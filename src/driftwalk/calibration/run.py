@@ -5,16 +5,26 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Executor
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from driftwalk.calibration.estimation import Stores, Tell, calibrate_many
+from driftwalk.calibration.check import MOST_PARAMETERS, require_searchable
+from driftwalk.calibration.estimation.run import calibrate_many
 from driftwalk.calibration.goodness_of_fit import Halves, validate_on_halves
-from driftwalk.calibration.grid.grid_map import Progress, SweepProgress
+from driftwalk.calibration.grid.grid_map import SweepProgress
 from driftwalk.calibration.grid.stages import GridCalibration
-from driftwalk.calibration.input_warnings import own_flow_warning, wall_warning
-from driftwalk.calibration.problem import FlowSource, Problem, prepare_problem, recorded_problem
-from driftwalk.calibration.refuse import MOST_PARAMETERS, require_searchable
+from driftwalk.calibration.held_out.recorded import body_motion
+from driftwalk.calibration.problem import (
+    Execution,
+    FlowSource,
+    Problem,
+    Stores,
+    Tell,
+    in_memory,
+    recorded_problem,
+)
+from driftwalk.calibration.result import build_calibration
 from driftwalk.calibration.stationarity import stationarity_of
+from driftwalk.calibration.warnings import own_flow_warning, wall_warning
 from driftwalk.comparison import Statistic, StepDistance
 from driftwalk.conditions import jump_warnings, study_in_arena, unstated_warning
 from driftwalk.core.background_task import run_in_background
@@ -22,14 +32,12 @@ from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.run_stages import share_of_windows, tell_nobody
 from driftwalk.motion import BlockModel, MotionModel, ParticleModel
 from driftwalk.motion.protocol import ScoresItself
-from driftwalk.schema import Track
 from driftwalk.simulation.series import series_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
-    from driftwalk.sweep import Store
 
 
 def calibrate(
@@ -113,25 +121,15 @@ def calibrate(
     0.39
     """
     chosen, searched = _study_and_model(model, study, recording)
-    keep: Stores = stores if stores is not None else _in_memory
-    say = tell if tell is not None else tell_nobody
+    how = Execution(executor, stores or in_memory, tell or tell_nobody)
     if len(searched.parameters) > MOST_PARAMETERS:
         if statistic is not None:
             raise ConfigurationError(
                 f"a statistic of its own is for one or two parameters; {searched.name} has "
                 f"{len(searched.parameters)}"
             )
-        many = calibrate_many(
-            recording,
-            searched,
-            chosen,
-            flow=flow,
-            body=body,
-            threads=threads,
-            executor=executor,
-            stores=keep,
-            tell=say,
-        )
+        motion = body_motion(recording, chosen, flow=flow, body=body, threads=threads)
+        many = calibrate_many(motion, searched, how)
         if meanwhile is not None:
             meanwhile(many)
         return many
@@ -140,7 +138,8 @@ def calibrate(
     track, problem = recorded_problem(
         recording, chosen, flow_of, model=searched, statistic=statistic, body=body, threads=threads
     )
-    stages = GridCalibration(problem, keep, say, executor).run()
+    stages = GridCalibration(problem, how).run()
+    # A model is not to blame for what it cannot know: inputs taken for right, an unsteady motion.
     stationarity = stationarity_of(problem)
     in_tank = isinstance(searched, BlockModel | ParticleModel)
     is_block = isinstance(searched, BlockModel)
@@ -159,22 +158,22 @@ def calibrate(
     stages.warnings += series_warnings(problem.like.flow, duration=problem.duration)
 
     def finish(halves: Halves | None) -> xr.Dataset:
-        return stages.dataset(halves, stationarity, recording)
+        return build_calibration(stages, halves, stationarity, recording)
 
-    def compare_halves(progress: Progress | None = None) -> Halves | None:
-        return _halves(track, stages, flow_of, executor, progress)
-
+    compare_halves = partial(validate_on_halves, track, problem, stages.coarse, flow_of, executor)
     if problem.study.calibration.refine == "none":
         halves = None
     else:
-        say("validation", 0, 1)
+        how.tell("validation", 0, 1)
         # The figures show nothing of the halves, so they are drawn while the core compares them.
         if meanwhile is not None and _is_left_to_threads(problem, executor):
             halves = run_in_background(compare_halves, partial(meanwhile, finish(None)))
             meanwhile = None
         else:
-            halves = compare_halves(SweepProgress(partial(say, "validation"), share_of_windows))
-        say("validation", 1, 1)
+            halves = compare_halves(
+                SweepProgress(partial(how.tell, "validation"), share_of_windows)
+            )
+        how.tell("validation", 1, 1)
     found = finish(halves)
     if meanwhile is not None:
         meanwhile(found)
@@ -213,51 +212,10 @@ def _study_and_model(
     return study_in_arena(Study(), recording), model
 
 
-def _in_memory(name: str, fingerprint: dict[str, Any]) -> Store | None:  # noqa: ARG001
-    return None
-
-
 def _flow_source(study: Study, model: MotionModel, flow: xr.Dataset | None) -> FlowSource:
     """Return what gives the flow for a track: the given field, or one extracted from the track."""
     if flow is not None or not model.needs_flow:
         return lambda track: flow  # noqa: ARG005
-    from driftwalk.conditions.own_flow import flow_from_track
+    from driftwalk.conditions.recorded import flow_from_track
 
     return lambda track: flow_from_track(track, study)
-
-
-def _halves(
-    track: Track,
-    stages: GridCalibration,
-    flow_of: FlowSource,
-    executor: Executor | None,
-    progress: Progress | None,
-) -> Halves | None:
-    """Calibrate on the first half, judge on the second; None where a half is too short."""
-    problem = stages.problem
-    middle = 0.5 * (track.time[0] + track.time[-1])
-    others = problem.like.neighbours
-    if others is not None:
-        others = others.since(-float(track.time[0]))
-    early = Track(*(values[track.time <= middle] for values in track))
-    late = Track(*(values[track.time > middle] for values in track))
-    try:
-        flow = flow_of(early)
-        first, second = (
-            prepare_problem(
-                half,
-                problem.study,
-                flow,
-                camera=problem.like.camera,
-                model=problem.model,
-                statistic=problem.statistic,
-                neighbours=others,
-                threads=problem.like.threads,
-            )
-            for half in (early, late)
-        )
-    except InputError:
-        return None
-    return validate_on_halves(
-        problem, stages.coarse, first, second, executor=executor, progress=progress
-    )

@@ -6,9 +6,14 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Final, NamedTuple
 
+import numpy as np
+
+from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.calibration.problem import Problem
-from driftwalk.comparison import block_permutation_test
+from driftwalk.comparison import KsReference, block_permutation_test
+from driftwalk.comparison.aspects import points_distance
 from driftwalk.core.arrays import Floats
+from driftwalk.simulation.series import series_warnings
 
 
 class StationarityPolicy(NamedTuple):
@@ -86,3 +91,39 @@ def stationarity_of_steps(
         seed=STATIONARITY.seed,
     )
     return Stationarity(distance(first, second), drawn.noise_floor, drawn.p_value)
+
+
+def stationarity_of_motion(motion: RecordedMotion) -> Stationarity | None:
+    """Compare the halves of a recording with each other, by the distance of its comparison."""
+    steps = motion.steps.points
+    return stationarity_of_steps(steps, lambda one, other: points_distance(KsReference(one), other))
+
+
+def motion_warnings(motion: RecordedMotion) -> list[str]:
+    """Return sentences on a recording and its flow.
+
+    Where its halves differ, with the moment at which its speed changed, and where the flow is a
+    series that goes on beyond its frames.
+    """
+    said = series_warnings(motion.like.flow, duration=motion.duration)
+    stationarity = stationarity_of_motion(motion)
+    if stationarity is None or stationarity.warning is None:
+        return said
+    return [stationarity.warning + _change(motion), *said]
+
+
+def _change(motion: RecordedMotion) -> str:
+    """Return when the mean speed changed most, and from what to what."""
+    steps = motion.steps
+    speed = steps.points[:, 0] / motion.plan.short.step_interval
+    share = steps.time / motion.duration
+    splits = np.arange(0.05, 0.96, 0.05)
+    early = np.array([speed[share < split].mean() for split in splits])
+    late = np.array([speed[share >= split].mean() for split in splits])
+    # Of two means with equal variances: their difference in standard errors goes with this weight.
+    weight = np.sqrt(splits * (1.0 - splits))
+    best = int(np.nanargmax(np.abs(late - early) * weight))
+    return (
+        f"; the mean speed changed most at {splits[best] * motion.duration:.0f} s, from "
+        f"{1e3 * early[best]:.3g} to {1e3 * late[best]:.3g} mm/s"
+    )

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from typing import Annotated
 
-import typer
-
-from driftwalk.cli.inputs.study_recording import opening_note, read_with_flow
-from driftwalk.cli.options.cluster import ClusterAt, ClusterOptions, Workers
+from driftwalk.cli.inputs.recordings import read_for_models
 from driftwalk.cli.options.model import ModelName, ParameterChoices, chosen_model
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import FlowFile, Json, Overwrite, RunFolder, Threads
+from driftwalk.cli.options.run import RunOptions, with_run_options
+from driftwalk.cli.options.shared import FlowFile, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal.answer import print_result
+from driftwalk.cli.terminal.output import print_result
 from driftwalk.core.study_keys import CALIBRATION_KEYS
 
 
+@with_run_options
 @with_recording_options
 @with_study_options(
     CALIBRATION_KEYS,
@@ -26,7 +25,6 @@ from driftwalk.core.study_keys import CALIBRATION_KEYS
 )
 def calibrate(
     recording: RecordingFile,
-    out: RunFolder,
     given: StudyOptions,
     how: RecordingOptions,
     model: ModelName = None,
@@ -34,17 +32,14 @@ def calibrate(
     flow: FlowFile = None,
     posterior: Annotated[
         bool,
-        typer.Option(
+        option(
             "--posterior",
-            help="Also write posterior.csv: draws from the approximate posterior of a --model with "
+            "Also write posterior.csv: draws from the approximate posterior of a --model with "
             "more than two parameters.",
         ),
     ] = False,
-    threads: Threads = None,
-    cluster: ClusterAt = None,
-    cluster_options: ClusterOptions = None,
-    overwrite: Overwrite = False,
-    json: Json = False,
+    *,
+    options: RunOptions,
 ) -> None:
     """Find the drag coefficient and the stochastic force that explain a recording.
 
@@ -54,22 +49,11 @@ def calibrate(
     estimated from summaries of the motion. Reports how well the parameters are known and whether
     the model explains the motion. If you stop the run, the same command continues it.
     """
-    from driftwalk.conditions import About, jump_warnings
-    from driftwalk.motion import feels_others
-    from driftwalk.runs import CalibrationWork, run_work
+    from driftwalk.runs import CalibrationWork
 
     chosen = chosen_model(model, parameters)
-    others = feels_others(chosen)
-    read, field, inputs = read_with_flow(
-        recording, flow, given, how, bodies="all" if others else "named"
-    )
-    body = read.body if others else how.body
-    work = CalibrationWork(
-        read.trajectories[0], read.study, field, body, inputs, threads, chosen, posterior
-    )
-    about: About = "block" if model is None else "tank"
-    jumps = jump_warnings(read.trajectories[0], read.body)
-    begun = opening_note(read.study, given, how=how, about=about, warnings=jumps)
-    with Workers(cluster, cluster_options).reported("calibrate") as told:
-        found = run_work(work, out, overwrite=overwrite, begun=begun, **told)
-    print_result(found, out, json=json)
+    models = ["block" if chosen is None else chosen]
+    read, begun = read_for_models(recording, flow, given, how, models)
+    work = CalibrationWork(**read, threads=options.threads, model=chosen, posterior=posterior)
+    found = options.run(work, "calibrate", begun=begun)
+    print_result(found, options.out, json=options.json)

@@ -8,17 +8,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import typer
-
-from driftwalk.cli.inputs.motion import load_motion
+from driftwalk.cli.inputs.recordings import load_motion
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import Json, Replace
+from driftwalk.cli.options.shared import Json, Replace, argument, option
 from driftwalk.cli.options.study import study_option
 from driftwalk.cli.terminal.output import (
     print_json,
     print_next,
-    print_note,
     print_table,
+    print_warnings,
     require_place,
     save_dataset,
 )
@@ -52,40 +50,22 @@ _BY_MOTION = {
 
 @with_recording_options
 def compare(
-    a: Annotated[
-        Path, typer.Argument(metavar="A", help="Recording, or output of driftwalk simulate.")
-    ],
-    b: Annotated[
-        Path, typer.Argument(metavar="B", help="Recording, or output of driftwalk simulate.")
-    ],
+    a: Annotated[Path, argument("A", "Recording, or output of driftwalk simulate.")],
+    b: Annotated[Path, argument("B", "Recording, or output of driftwalk simulate.")],
     how: RecordingOptions,
-    body_b: Annotated[
-        str | None,
-        typer.Option("--body-b", help="Body in B (default: same as A).", show_default=False),
-    ] = None,
+    body_b: Annotated[str | None, option("--body-b", "Body in B (default: same as A).")] = None,
     step_interval: Annotated[Any, study_option("step_interval")] = None,
     ties: Annotated[
         Literal["strict", "limits"],
-        typer.Option(
-            "--ties",
-            help="Treatment of points that tie with an origin: in no quadrant, or in each.",
+        option(
+            "--ties", "Treatment of points that tie with an origin: in no quadrant, or in each."
         ),
     ] = "strict",
     permutations: Annotated[
-        int,
-        typer.Option(
-            "--permutations", min=0, metavar="N", help="Permutations of the test; 0 for no test."
-        ),
+        int, option("--permutations N", "Permutations of the test; 0 for no test.", min=0)
     ] = 999,
-    seed: Annotated[
-        int, typer.Option("--seed", min=0, metavar="N", help="Seed of the permutations.")
-    ] = 1,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out", "-o", metavar="FILE.nc", help="File for the comparison.", show_default=False
-        ),
-    ] = None,
+    seed: Annotated[int, option("--seed N", "Seed of the permutations.", min=0)] = 1,
+    out: Annotated[Path | None, option("--out -o FILE.nc", "File for the comparison.")] = None,
     overwrite: Replace = False,
     json: Json = False,
 ) -> None:
@@ -120,8 +100,7 @@ def compare(
         print_json({"a": a, "b": b, **summary})
         return
     _print(summary)
-    for warning in summary["warnings"]:
-        print_note(f"warning: {warning}")
+    print_warnings(summary["warnings"])
     print_next("report", b, "-o", "report.html")
 
 

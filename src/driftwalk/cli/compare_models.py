@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Annotated
 
-import typer
-
-from driftwalk.cli.inputs.study_recording import opening_note, read_with_flow
-from driftwalk.cli.options.cluster import ClusterAt, ClusterOptions, Workers
+from driftwalk.cli.inputs.recordings import read_for_models
 from driftwalk.cli.options.model import ComparedParameters, parameter_choices
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import FlowFile, Json, Overwrite, RunFolder, Threads
+from driftwalk.cli.options.run import RunOptions, with_run_options
+from driftwalk.cli.options.shared import FlowFile, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal.answer import print_result
-from driftwalk.cli.terminal.output import printable
+from driftwalk.cli.terminal.output import print_result, printable
 from driftwalk.cli.terminal.progress import ProgressReporter
 from driftwalk.core.study_keys import CALIBRATION_KEYS
 
 
+@with_run_options
 @with_recording_options
 @with_study_options(
     CALIBRATION_KEYS,
@@ -29,26 +27,20 @@ from driftwalk.core.study_keys import CALIBRATION_KEYS
 )
 def compare_models(
     recording: RecordingFile,
-    out: RunFolder,
     given: StudyOptions,
     how: RecordingOptions,
     models: Annotated[
         str | None,
-        typer.Option(
-            "--models",
-            metavar="NAMES",
-            help="Models, separated by commas, such as block,run_tumble+wall; or all. Default: the "
+        option(
+            "--models NAMES",
+            "Models, separated by commas, such as block,run_tumble+wall; or all. Default: the "
             "block and the family with an interaction with the wall.",
-            show_default=False,
         ),
     ] = None,
     parameters: ComparedParameters = None,
     flow: FlowFile = None,
-    threads: Threads = None,
-    cluster: ClusterAt = None,
-    cluster_options: ClusterOptions = None,
-    overwrite: Overwrite = False,
-    json: Json = False,
+    *,
+    options: RunOptions,
 ) -> None:
     """Say which motion models explain a recording.
 
@@ -58,8 +50,7 @@ def compare_models(
     the recording. If you stop the run, the same command continues it.
     """
     from driftwalk.calibration import ALL_MODELS, DEFAULT_MODELS
-    from driftwalk.conditions import About, jump_warnings
-    from driftwalk.motion import feels_others, models_knowing
+    from driftwalk.motion import models_knowing
     from driftwalk.runs import ModelComparisonWork, run_work
 
     if models is None:
@@ -69,21 +60,13 @@ def compare_models(
     else:
         named = [name for name in map(str.strip, models.split(",")) if name]
     chosen = models_knowing(named, parameter_choices(parameters))
-    others = any(map(feels_others, chosen))
-    read, field, inputs = read_with_flow(
-        recording, flow, given, how, bodies="all" if others else "named"
-    )
-    body = read.body if others else how.body
-    about: About = "block" if "block" in chosen else "tank"
-    jumps = jump_warnings(read.trajectories[0], read.body)
-    begun = opening_note(read.study, given, how=how, about=about, warnings=jumps)
-    with Workers(cluster, cluster_options).reported("compare models") as told:
-        said: dict[str, Any] = {} if json else {"finished": Ranking(told["progress"])}
-        work = ModelComparisonWork(
-            read.trajectories[0], chosen, read.study, field, body, inputs, threads, **said
-        )
-        found = run_work(work, out, overwrite=overwrite, begun=begun, **told)
-    print_result(found, out, json=json)
+    read, begun = read_for_models(recording, flow, given, how, chosen)
+    with options.reported("compare models") as told:
+        if not options.json:
+            read["finished"] = Ranking(told["progress"])
+        work = ModelComparisonWork(**read, models=chosen, threads=options.threads)
+        found = run_work(work, options.out, overwrite=options.overwrite, begun=begun, **told)
+    print_result(found, options.out, json=options.json)
 
 
 class Ranking:

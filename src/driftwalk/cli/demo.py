@@ -2,32 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from dataclasses import dataclass
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
-import typer
-
-from driftwalk.cli.options.shared import Json, Overwrite, Threads
-from driftwalk.cli.terminal.demo_answer import (
-    Fitted,
-    in_json,
-    print_calibration,
-    print_check,
-    print_fit,
-    print_next,
-    print_places,
-)
+from driftwalk.cli.options.shared import Json, Overwrite, Threads, option
 from driftwalk.cli.terminal.output import print_json, print_note
 from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.run_stages import tell_nobody
+from driftwalk.schema.answers.calibration import calibration_answer
+from driftwalk.schema.answers.fit import fit_json
+from driftwalk.schema.answers.parts import estimates, number_text
+from driftwalk.schema.kinds.fit import PARAMETERS
 from driftwalk.schema.stores.netcdf import open_netcdf
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
+    from driftwalk.runs import Work
+
 
 # A coarser search that still finds the optimum: for a quick look and for tests.
 QUICK = {
@@ -47,11 +42,9 @@ PAGE = "report.html"
 
 
 def demo(
-    out: Annotated[
-        Path, typer.Option("--out", "-o", metavar="DIR", help="Directory of both runs.")
-    ] = Path("demo"),
+    out: Annotated[Path, option("--out -o DIR", "Directory of both runs.")] = Path("demo"),
     quick: Annotated[
-        bool, typer.Option("--quick", help="Search only a small part; takes seconds, not minutes.")
+        bool, option("--quick", "Search only a small part; takes seconds, not minutes.")
     ] = False,
     threads: Threads = None,
     overwrite: Overwrite = False,
@@ -65,20 +58,30 @@ def demo(
     DIR/report.html shows both.
     """
     from driftwalk.datasets import tank30_recording
+    from driftwalk.flow import load_flow
+    from driftwalk.runs import CalibrationWork, FitWork
 
     _require_own(out)
     recording, study = tank30_recording(), demo_study(quick=quick)
+    tell = tell_nobody if json else print_fit
+    fit, flow = out / FIT, out / FIT / "flow.nc"
     folder = files("driftwalk.datasets") / "tank30_ode_a"
     with as_file(folder / "recording.csv") as path:
-        tell = tell_nobody if json else print_fit
-        fitted = Fitted(
-            *_fit(recording, study, path, out / FIT, overwrite=overwrite, tell=tell), recording
-        )
+        inputs = {"recording": path}
+        # The fit is printed before it is checked.
+        work = FitWork([recording], study, None, inputs, fitted=tell)
+        if not _run(work, fit, overwrite=overwrite):
+            tell(open_netcdf(fit / "fit.nc"))
+        fitted = Fitted(open_netcdf(fit / "fit.nc"), open_netcdf(fit / "check.nc"), recording)
         _write_page(out, FIT)
         if not json:
             print_check(fitted)
             print_next(out / PAGE)
-        calibration = _calibrate(recording, study, path, out, overwrite=overwrite, threads=threads)
+        field = load_flow(flow, arena=study.tank.to_arena(), own_flags="keep")
+        inputs = {**inputs, "flow": flow}
+        search = CalibrationWork(recording, study, field, None, inputs, threads)
+        _run(search, out / CALIBRATION, overwrite=overwrite)
+    calibration = open_netcdf(out / CALIBRATION / "calibration.nc")
     _write_page(out, FIT, CALIBRATION)
     if json:
         print_json(in_json(fitted, calibration))
@@ -104,49 +107,19 @@ def demo_study(*, quick: bool) -> Study:
     return apply_overrides(Study(), {**known, **(QUICK if quick else {})})
 
 
-def _fit(
-    recording: xr.Dataset,
-    study: Study,
-    path: Path,
-    folder: Path,
-    *,
-    overwrite: bool,
-    tell: Callable[[xr.Dataset], None],
-) -> tuple[xr.Dataset, xr.Dataset]:
-    """Fit and check, or read a finished run; the fit is printed before it is checked."""
-    from driftwalk.runs import FitWork, run_work
+def _run(work: Work, folder: Path, *, overwrite: bool) -> bool:
+    """Do a piece of work, unless its run is there and finished; return whether it was done."""
+    from driftwalk.core.files.run_layout import state_of
+    from driftwalk.runs import run_work
 
-    if _finished(folder, overwrite):
-        tell(open_netcdf(folder / "fit.nc"))
-    else:
-        work = FitWork([recording], study, None, {"recording": path}, fitted=tell)
-        with reported("fit") as told:
-            run_work(work, folder, overwrite=overwrite, **told)
-    return open_netcdf(folder / "fit.nc"), open_netcdf(folder / "check.nc")
-
-
-def _calibrate(
-    recording: xr.Dataset,
-    study: Study,
-    path: Path,
-    out: Path,
-    *,
-    overwrite: bool,
-    threads: int | None,
-) -> xr.Dataset:
-    """Calibrate on the fitted flow, or read what a finished run found."""
-    from driftwalk.flow import load_flow
-    from driftwalk.runs import CalibrationWork, run_work
-
-    folder, flow = out / CALIBRATION, out / FIT / "flow.nc"
-    if _finished(folder, overwrite):
-        return open_netcdf(folder / "calibration.nc")
-    given = load_flow(flow, arena=study.tank.to_arena(), own_flags="keep")
-    inputs = {"recording": path, "flow": flow}
-    work = CalibrationWork(recording, study, given, None, inputs, threads)
-    with reported("calibrate") as told:
-        found: xr.Dataset = run_work(work, folder, overwrite=overwrite, **told)
-    return found
+    if not overwrite and folder.is_dir() and state_of(folder) == "finished":
+        print_note(
+            f"{folder} holds a finished run (--overwrite starts a new one); these are its results"
+        )
+        return False
+    with reported(folder.name) as told:
+        run_work(work, folder, overwrite=overwrite, **told)
+    return True
 
 
 def _write_page(out: Path, *runs: str) -> None:
@@ -173,12 +146,145 @@ def _require_own(out: Path) -> None:
     refuse_leading_out(out)
 
 
-def _finished(folder: Path, overwrite: bool) -> bool:
-    from driftwalk.core.files.run_layout import state_of
+ROWS: Final = ("drag_coefficient", "force_std", "tracking_noise")
+TRUTH: Final = {
+    "drag_coefficient": "acting_drag_coefficient",
+    **{name: name for name in ("force_std_N", "force_interval_s", "tracking_noise_m")},
+}
+"""Keys of the truth that estimates are compared with: of the drag, the one that acts."""
 
-    if overwrite or not folder.is_dir() or state_of(folder) != "finished":
-        return False
-    print_note(
-        f"{folder} holds a finished run (--overwrite starts a new one); these are its results"
+
+@dataclass(frozen=True)
+class Fitted:
+    """Results of the first half of the demo.
+
+    Attributes
+    ----------
+    fit : xarray.Dataset
+        A `fit`.
+    check : xarray.Dataset
+        Its `model_check`.
+    recording : xarray.Dataset
+        The `trajectory`.
+    """
+
+    fit: xr.Dataset
+    check: xr.Dataset
+    recording: xr.Dataset
+
+    @property
+    def flow_error(self) -> float:
+        """Relative error of the fitted flow, averaged over the block; see `score_fit`."""
+        from driftwalk.datasets import tank30_flow
+        from driftwalk.likelihood import score_fit
+
+        truth = demo_truth()
+        score = score_fit(
+            self.fit,
+            drag_coefficient=truth["drag_coefficient"],
+            force_std=truth["force_std_N"],
+            tracking_noise=truth["tracking_noise_m"],
+            flow=tank30_flow(),
+            recordings=self.recording,
+        )
+        return float(score["flow_error"])
+
+
+def demo_truth() -> dict[str, float]:
+    """Return what the estimates are compared with, units in the keys."""
+    from driftwalk.datasets import tank30_truth
+
+    truth = tank30_truth()
+    return {name: truth[key] for name, key in TRUTH.items()}
+
+
+def in_json(fitted: Fitted, calibration: xr.Dataset) -> dict[str, Any]:
+    """Return what ``--json`` prints: the two answers and the truth."""
+    return {
+        "truth": demo_truth(),
+        "fit": fit_json(fitted.fit, fitted.check) | {"flow_error": fitted.flow_error},
+        "calibration": calibration_answer(calibration).facts,
+    }
+
+
+def print_fit(fit: xr.Dataset) -> None:
+    """Print the estimates of the fit next to the truth, as soon as they are ready."""
+    from driftwalk.datasets import tank30_truth
+
+    truth = tank30_truth()
+    print("This recording was simulated by another engine (ODE): the truth is known.")
+    _print_estimates("likelihood fit", fit)
+    every, step = (1e3 * truth[name] for name in ("force_interval_s", "time_step_s"))
+    was, acts = (truth[name] for name in ("drag_coefficient", "acting_drag_coefficient"))
+    # Through a pipe the answer would wait in the buffer for the check and the map.
+    print(
+        f"Intervals of 90 %; σ_F redrawn every {every:g} ms. The engine's C_d was set to {was:g}; "
+        f"in its steps\nof {step:g} ms the drag acts like {acts:g}.",
+        flush=True,
     )
-    return True
+
+
+def print_check(fitted: Fitted) -> None:
+    """Print how far the flow is off, whether the model explains the recording, and what warns."""
+    fit = fit_json(fitted.fit, fitted.check)
+    print_row("flow past the block", "", f"{fitted.flow_error:.1%} off")
+    print_row("KS distance, floor", "", _distance(fit, "ks_noise_floor"))
+    print_row("model explains it", "", _word(fit["explained"]))
+    for finding in fit["findings"]:
+        print_note(f"model check: {finding}")
+    for warning in fit["warnings"]:
+        print_note(f"warning: fit: {warning}")
+
+
+def print_next(page: Path) -> None:
+    """Say what comes next; whoever waits may open the page of the fit meanwhile."""
+    print(f"Its page: {page}")
+    # How long it takes stands at the bar below, which measures it.
+    print("Next, the paper's method: a map of KS distances in the fitted flow.\n", flush=True)
+
+
+def print_calibration(calibration: xr.Dataset) -> None:
+    """Print the minimum of the map next to the truth, and its warnings."""
+    search = calibration_answer(calibration).facts
+    _print_estimates("KS map in the fitted flow", calibration)
+    print_row("KS distance, floor", "", _distance(search))
+    print_row("model explains it", "", _word(bool(calibration["explained"])))
+    for warning in search["warnings"]:
+        print_note(f"warning: KS map: {warning}")
+
+
+def print_places(folder: Path, page: Path) -> None:
+    """Print where the figures are and, last, the page to open."""
+    print(f"\nfigures: {folder}/fit/figures, {folder}/calibrate/figures")
+    print(f"open in a browser: {page}")
+
+
+def _print_estimates(method: str, found: xr.Dataset) -> None:
+    truth = demo_truth()
+    print_row("", "truth", method)
+    shown = {one.number.name: one for one in estimates(found)}
+    for name in ROWS:
+        number, text = PARAMETERS[name], "taken from the recording"
+        if name in shown:
+            value, *ends = (
+                number_text(number.factor * one)
+                for one in (shown[name].value, *(shown[name].ends or ()))
+            )
+            text = f"{value} ({' to '.join(ends)})" if ends else value
+        label = f"{number.words} [{number.reader_unit}]" if number.reader_unit else number.words
+        print_row(label, f"{number.factor * truth[number.key]:.4g}", text)
+
+
+def print_row(name: str, *cells: str) -> None:
+    """Print a row of the table."""
+    widths = (9, 0)
+    line = "".join(f"{cell:{width}}" for cell, width in zip(cells, widths, strict=True))
+    print(f"{name:27}{line}".rstrip())
+
+
+def _distance(facts: dict[str, Any], floor: str = "noise_floor") -> str:
+    return f"{facts['ks_distance']:.3f}, {facts[floor]:.3f}"
+
+
+def _word(yes: bool) -> str:
+    return "yes" if yes else "no"

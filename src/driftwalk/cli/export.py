@@ -6,12 +6,9 @@ import sys
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from driftwalk.cli.options.shared import Json
-from driftwalk.cli.terminal.answer import print_row
+from driftwalk.cli.options.shared import Json, argument, option
 from driftwalk.cli.terminal.argument_names import to_options
-from driftwalk.cli.terminal.output import print_json, print_note
+from driftwalk.cli.terminal.output import print_json, print_note, print_row
 from driftwalk.cli.terminal.progress import ProgressReporter
 from driftwalk.core.errors import InputError
 from driftwalk.export import TARGETS, Source, Verification, export_run, target_named
@@ -20,63 +17,41 @@ from driftwalk.export import TARGETS, Source, Verification, export_run, target_n
 def export(
     run: Annotated[
         Path,
-        typer.Argument(
-            metavar="RUN",
-            help="Run directory, or a study file with --flow; for tables, bags and films also a "
+        argument(
+            "RUN",
+            "Run directory, or a study file with --flow; for tables, bags and films also a "
             "recording or a simulation.",
         ),
     ],
     to: Annotated[
         str,
-        typer.Option(
-            "--to",
-            metavar="|".join(TARGETS),
-            help="; ".join(f"{target.name}: {target.gives}" for target in TARGETS.values()) + ".",
+        option(
+            f"--to {'|'.join(TARGETS)}",
+            "; ".join(f"{target.name}: {target.gives}" for target in TARGETS.values()) + ".",
         ),
     ],
-    out: Annotated[
-        Path, typer.Option("--out", "-o", metavar="DIR", help="New or empty folder to write.")
-    ],
+    out: Annotated[Path, option("--out -o DIR", "New or empty folder to write.")],
     flow: Annotated[
-        Path | None,
-        typer.Option(
-            "--flow",
-            metavar="FILE",
-            help="Flow field of a study file, or another one for a run.",
-            show_default=False,
-        ),
+        Path | None, option("--flow FILE", "Flow field of a study file, or another one for a run.")
     ] = None,
     seed: Annotated[
         int | None,
-        typer.Option(
-            "--seed",
-            min=0,
-            metavar="N",
-            help="Seed of the stochastic force (default: the study's).",
-            show_default=False,
-        ),
+        option("--seed N", "Seed of the stochastic force (default: the study's).", min=0),
     ] = None,
     replicate: Annotated[
         int | None,
-        typer.Option(
-            "--replicate",
-            min=0,
-            metavar="N",
-            help="Replicate of a simulation to take, counted from 0 (default: all; of a film the "
+        option(
+            "--replicate N",
+            "Replicate of a simulation to take, counted from 0 (default: all; of a film the "
             "first).",
-            show_default=False,
+            min=0,
         ),
     ] = None,
     speed: Annotated[
-        float | None,
-        typer.Option(
-            "--speed",
-            help="How much faster than real time a film is (default: 1).",
-            show_default=False,
-        ),
+        float | None, option("--speed", "How much faster than real time a film is (default: 1).")
     ] = None,
     verify: Annotated[
-        bool, typer.Option("--verify", help="Run what was written, and compare it with driftwalk.")
+        bool, option("--verify", "Run what was written, and compare it with driftwalk.")
     ] = False,
     json: Json = False,
 ) -> int:

@@ -5,24 +5,18 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
-from driftwalk.cli.inputs.study_recording import opening_note, read_for_run
+from driftwalk.cli.inputs.recordings import opening_note, read_for_run
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import Json, Overwrite
+from driftwalk.cli.options.shared import Json, Overwrite, argument, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal.answer import print_parts, print_places, print_result
 from driftwalk.cli.terminal.argument_names import to_options
-from driftwalk.cli.terminal.output import print_note
+from driftwalk.cli.terminal.output import print_note, print_parts, print_places, print_result
 from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.study_keys import FIT_KEYS
 
 RecordingFiles = Annotated[
     list[Path],
-    typer.Argument(
-        metavar="RECORDING...",
-        help="Recordings of one block in one tank, read with the same options.",
-    ),
+    argument("RECORDING...", "Recordings of one block in one tank, read with the same options."),
 ]
 
 
@@ -36,25 +30,21 @@ RecordingFiles = Annotated[
 )
 def fit(
     recordings: RecordingFiles,
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Run directory to make.")],
+    out: Annotated[Path, option("--out -o DIR", "Run directory to make.")],
     given: StudyOptions,
     how: RecordingOptions,
     no_check: Annotated[
-        bool,
-        typer.Option("--no-check", help="Skip the check whether the model explains the recording."),
+        bool, option("--no-check", "Skip the check whether the model explains the recording.")
     ] = False,
     compare_laws: Annotated[
         bool,
-        typer.Option(
+        option(
             "--compare-laws",
-            help="Compare force laws by evidence and held out prediction (takes some eight fits).",
+            "Compare force laws by evidence and held out prediction (takes some eight fits).",
         ),
     ] = False,
     wall: Annotated[
-        bool,
-        typer.Option(
-            "--wall", help="Estimate restitution and friction of the wall from the contacts."
-        ),
+        bool, option("--wall", "Estimate restitution and friction of the wall from the contacts.")
     ] = False,
     overwrite: Overwrite = False,
     json: Json = False,

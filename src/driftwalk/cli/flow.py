@@ -6,15 +6,18 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
-import typer
-
 from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import FlowVariables, FrameInterval, Json, Replace
+from driftwalk.cli.options.shared import FlowVariables, FrameInterval, Json, Replace, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal.answer import print_warnings
 from driftwalk.cli.terminal.argument_names import to_options
-from driftwalk.cli.terminal.output import print_json, print_next, print_note, sibling
+from driftwalk.cli.terminal.output import (
+    print_json,
+    print_next,
+    print_note,
+    print_warnings,
+    sibling,
+)
 from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import FLOW_KEYS
 
@@ -37,19 +40,14 @@ NOISE: Final = FLOW_KEYS["position_noise"]
 )
 def flow(
     recording: RecordingFile,
-    out: Annotated[
-        Path,
-        typer.Option("--out", "-o", metavar="FILE", help="File to write; ends in .nc or .csv."),
-    ],
+    out: Annotated[Path, option("--out -o FILE", "File to write; ends in .nc or .csv.")],
     given: StudyOptions,
     how: RecordingOptions,
     frame_interval: FrameInterval = None,
     flow_variables: FlowVariables = None,
     tracers: Annotated[
         bool,
-        typer.Option(
-            "--tracers", help="The bodies are passive tracers: their tracks make one flow (PTV)."
-        ),
+        option("--tracers", "The bodies are passive tracers: their tracks make one flow (PTV)."),
     ] = False,
     overwrite: Replace = False,
     json: Json = False,
@@ -114,7 +112,7 @@ def flow(
         print_next("simulate", "--flow", out, "-o", "motion.nc")
         return
     warning = unstated_warning(study_for([trajectory], resolved), about="block")
-    print_warnings([] if warning is None else [warning])
+    print_warnings([warning])
     run = sibling(out.with_suffix(""), "run")
     words = [*how.words(), *given.words("side", "mass", "depth")]
     print_next("calibrate", recording, *words, "--flow", out, "-o", run)

@@ -23,52 +23,42 @@ from driftwalk.core.extras import hide_dask
 
 
 class Command(NamedTuple):
-    """One command: its heading and line in the list of commands, and where it is."""
+    """One command: its heading and line in the list of commands, and its module.
+
+    The module names the function as the command, or the application of several `NAME_app`.
+    """
 
     heading: str
     help: str
     module: str
-    attribute: str
 
 
 _GET, _FIT, _PREDICT = "Get a recording", "Fit", "Predict"
 _COMPARE, _SHARE, _SET_UP = "Compare", "Share", "Set up"
 COMMANDS: Final[dict[str, Command]] = {
-    "demo": Command(_GET, "Try driftwalk on its bundled recording.", "demo", "demo"),
-    "read": Command(_GET, "Read a tracker's file into a recording.", "recordings.read", "read"),
-    "info": Command(_GET, "Show what a file holds.", "recordings.info", "info"),
-    "track": Command(_GET, "Track blocks in a video.", "recordings.track", "track"),
-    "watch": Command(_GET, "Watch blocks assemble, live.", "recordings.watch", "watch"),
-    "fit": Command(_FIT, "Fit flow, drag, force and noise by likelihood.", "fit", "fit"),
-    "calibrate": Command(_FIT, "Fit any motion model by simulation.", "calibrate", "calibrate"),
-    "flow": Command(_FIT, "Extract the flow field alone.", "flow", "flow"),
-    "simulate": Command(
-        _PREDICT, "Simulate the motion of one body.", "prediction.simulate", "simulate"
-    ),
-    "assemble": Command(
-        _PREDICT, "Simulate the self-assembly of many blocks.", "prediction.assemble", "assemble"
-    ),
-    "sensitivity": Command(
-        _PREDICT, "Vary the model and see what assembles.", "prediction.sensitivity", "sensitivity"
-    ),
-    "play": Command(
-        _PREDICT, "Change parameters while a simulation runs.", "prediction.play", "play"
-    ),
-    "compare": Command(_COMPARE, "Measure the distance between two motions.", "compare", "compare"),
-    "compare-models": Command(
-        _COMPARE, "Rank motion models on a recording.", "compare_models", "compare_models"
-    ),
-    "models": Command(_COMPARE, "List the motion models.", "models", "models"),
-    "classify": Command(
-        _COMPARE, "Count what the blocks assembled into.", "recordings.classify", "classify"
-    ),
-    "view": Command(_SHARE, "Explore a run in the browser.", "view", "view"),
-    "report": Command(_SHARE, "Write a run as one HTML file.", "sharing.report", "report"),
-    "export": Command(_SHARE, "Write a run for another program.", "export", "export"),
-    "cite": Command(_SHARE, "Print what to cite for a run.", "sharing.cite", "cite"),
-    "study": Command(_SET_UP, "Write study files and plan experiments.", "study", "study_app"),
-    "camera": Command(_SET_UP, "Calibrate the camera.", "recordings.camera", "camera_app"),
-    "markers": Command(_SET_UP, "Describe the markers.", "recordings.markers", "markers_app"),
+    "demo": Command(_GET, "Try driftwalk on its bundled recording.", "demo"),
+    "read": Command(_GET, "Read a tracker's file into a recording.", "recordings.read"),
+    "info": Command(_GET, "Show what a file holds.", "recordings.info"),
+    "track": Command(_GET, "Track blocks in a video.", "recordings.track"),
+    "watch": Command(_GET, "Watch blocks assemble, live.", "recordings.watch"),
+    "fit": Command(_FIT, "Fit flow, drag, force and noise by likelihood.", "fit"),
+    "calibrate": Command(_FIT, "Fit any motion model by simulation.", "calibrate"),
+    "flow": Command(_FIT, "Extract the flow field alone.", "flow"),
+    "simulate": Command(_PREDICT, "Simulate the motion of one body.", "simulate"),
+    "assemble": Command(_PREDICT, "Simulate the self-assembly of many blocks.", "assemble"),
+    "sensitivity": Command(_PREDICT, "Vary the model and see what assembles.", "sensitivity"),
+    "play": Command(_PREDICT, "Change parameters while a simulation runs.", "play"),
+    "compare": Command(_COMPARE, "Measure the distance between two motions.", "compare"),
+    "compare-models": Command(_COMPARE, "Rank motion models on a recording.", "compare_models"),
+    "models": Command(_COMPARE, "List the motion models.", "models"),
+    "classify": Command(_COMPARE, "Count what the blocks assembled into.", "recordings.classify"),
+    "view": Command(_SHARE, "Explore a run in the browser.", "view"),
+    "report": Command(_SHARE, "Write a run as one HTML file.", "report"),
+    "export": Command(_SHARE, "Write a run for another program.", "export"),
+    "cite": Command(_SHARE, "Print what to cite for a run.", "cite"),
+    "study": Command(_SET_UP, "Write study files and plan experiments.", "study"),
+    "camera": Command(_SET_UP, "Calibrate the camera.", "recordings.camera"),
+    "markers": Command(_SET_UP, "Describe the markers.", "recordings.markers"),
 }
 
 
@@ -97,9 +87,8 @@ def load_command(name: str) -> Any:
     """Import a command and return it in the form that the group runs."""
     import importlib
 
-    entry = COMMANDS[name]
-    module = importlib.import_module(f"driftwalk.cli.{entry.module}")
-    target = getattr(module, entry.attribute)
+    module = importlib.import_module(f"driftwalk.cli.{COMMANDS[name].module}")
+    target = vars(module).get(f"{name}_app") or getattr(module, name.replace("-", "_"))
     if isinstance(target, typer.Typer):
         return to_click_command(target)
     return _one_command_app(name, target)
@@ -144,7 +133,7 @@ def driftwalk(
     version: Annotated[  # noqa: ARG001
         bool,
         typer.Option(
-            "--version", is_eager=True, callback=_print_version, help="Print the version."
+            "--version", help="Print the version.", is_eager=True, callback=_print_version
         ),
     ] = False,
 ) -> None:

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
-from driftwalk.cli.options.shared import Json
+from driftwalk.cli.options.shared import Json, argument
 from driftwalk.cli.terminal.output import print_json, print_next, print_table
 
 if TYPE_CHECKING:
@@ -15,12 +13,7 @@ if TYPE_CHECKING:
 
 def models(
     name: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="[NAME]",
-            help="A model with its parts, such as run_rest+wall.",
-            show_default=False,
-        ),
+        str | None, argument("[NAME]", "A model with its parts, such as run_rest+wall.")
     ] = None,
     json: Json = False,
 ) -> None:

@@ -2,16 +2,55 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 
 import typer
 
+from driftwalk.cli.inputs.model_source import ModelSource, load_flow_for, open_source
 from driftwalk.cli.main import paragraphs
-from driftwalk.cli.options.shared import Json, Replace
-from driftwalk.cli.study_recover import recover
+from driftwalk.cli.options.flatten_options import with_options
+from driftwalk.cli.options.model import (
+    KnownModel,
+    KnownParameters,
+    ModelName,
+    ParameterValues,
+    partly_known_model,
+)
+from driftwalk.cli.options.recording import RecordingOptions
+from driftwalk.cli.options.run import RunOptions
+from driftwalk.cli.options.shared import (
+    BodyOfLike,
+    Json,
+    Replace,
+    Run,
+    argument,
+    option,
+    quantity_option,
+)
+from driftwalk.cli.options.study import StudyOptions, option_name, with_study_options
 from driftwalk.cli.terminal.help import HelpCommand, HelpGroup
-from driftwalk.cli.terminal.output import print_json, print_next, print_note, require_place
+from driftwalk.cli.terminal.output import (
+    print_json,
+    print_next,
+    print_note,
+    print_result,
+    print_warnings,
+    require_place,
+)
+from driftwalk.core.errors import ConfigurationError
+from driftwalk.core.study_keys import RECOVER_KEYS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.calibration import ModelRecovery
+    from driftwalk.likelihood import FitRecovery
+    from driftwalk.model import Study
+    from driftwalk.runs import FoundRun
+
 
 ALL_PARAMETERS = "\n# All parameters, with their units and meanings: driftwalk study new --full\n"
 
@@ -27,12 +66,9 @@ def study(ctx: typer.Context) -> None:
 
 @study_app.command(cls=HelpCommand)
 def new(
-    path: Annotated[
-        Path | None,
-        typer.Argument(metavar="[FILE]", help="File to write (default: -, stdout)."),
-    ] = None,
+    path: Annotated[Path | None, argument("[FILE]", "File to write (default: -, stdout).")] = None,
     full: Annotated[
-        bool, typer.Option("--full", help="List every parameter with its unit and meaning.")
+        bool, option("--full", "List every parameter with its unit and meaning.")
     ] = False,
     overwrite: Replace = False,
 ) -> None:
@@ -51,9 +87,7 @@ def new(
 
 
 @study_app.command(cls=HelpCommand)
-def check(
-    path: Annotated[Path, typer.Argument(metavar="FILE", help="Study file.")], json: Json = False
-) -> None:
+def check(path: Annotated[Path, argument("FILE", "Study file.")], json: Json = False) -> None:
     """Read a study file and print all parameters that follow from it."""
     from driftwalk.model import load_study
 
@@ -64,6 +98,216 @@ def check(
     else:
         typer.echo(study.to_toml(), nl=False)
         print_next("fit", "RECORDING", "--study", path, "-o", "fit")
+
+
+STATED: Final = ("forces.drag_coefficient", "forces.force_std_N")
+"""Parameters with a default that count as the truth only if the file states them."""
+
+
+OF_THE_BLOCK: Final = ("recover.drag_coefficient_precision",)
+OF_A_MODEL: Final = (
+    "tank.diameter_m",
+    "observation.position_noise_m",
+    "steps.step_interval_s",
+    "calibration.bootstrap",
+)
+"""Keys whose options are for one of the two only."""
+RANDOM: Final = "random"
+"""The flow of a study that is drawn for each recording."""
+NOISE: Final = "position_noise"
+"""Known by this name, the noise of the camera is not estimated."""
+Noise = Literal["estimated", "known"]
+
+
+# What --threads counts depends on the model here: it has a text of its own.
+@with_options(RunOptions, "out", "cluster", "cluster_options", "overwrite", "json")
+@with_study_options(
+    RECOVER_KEYS,
+    *("flow", "recordings", "duration", "precision", "seed"),
+    *("tank_diameter", "position_noise", "step_interval", "bootstrap"),
+)
+def recover(
+    given: StudyOptions,
+    run: Run = None,
+    model: ModelName = None,
+    parameters: ParameterValues = None,
+    known: KnownParameters = None,
+    like: Annotated[
+        Path | None,
+        option(
+            "--like RECORDING",
+            "Recording that gives start, time stamps, gaps and camera, with --model.",
+        ),
+    ] = None,
+    body: BodyOfLike = None,
+    sample_rate: Annotated[
+        Any,
+        quantity_option("--sample-rate", "Hz", "Samples per second, with --model (default: 10)."),
+    ] = None,
+    threads: Annotated[
+        int | None,
+        option(
+            "--threads N",
+            "Recordings to fit at the same time; threads of a calibration with --model "
+            "(default: one per core).",
+            min=1,
+        ),
+    ] = None,
+    *,
+    options: RunOptions,
+) -> None:
+    """Simulate recordings of known truth, fit them, and report how well the fit recovers the truth.
+
+    Use it to design an experiment: how precise are the estimates with this length, this camera and
+    this flow? The truth is the answer of a RUN, or a study file (--study) with the true values and
+    its section [recover]. For another motion model (--model, or a RUN about one), simulates
+    recordings of that model and calibrates each, with all parameters unknown except those that you
+    state (--known). The directory holds the result, figures and manifest.json. If you stop the run,
+    the same command continues it.
+    """
+    from driftwalk.runs import RecoveryWork
+
+    source = open_source(run, given, model)
+    method: FitRecovery | ModelRecovery
+    if not source.is_block:
+        _refuse(given, OF_THE_BLOCK, "about the block, which --model replaces; leave it out")
+        of_model = [name for name in known or () if name != NOISE]
+        chosen = partly_known_model(model, parameters, run, of_model)
+        noise: Noise = "known" if NOISE in (known or ()) else "estimated"
+        method, inputs = _of_model(chosen, source, sample_rate, like, body, noise)
+        print_warnings(chosen.warnings)
+    else:
+        _refuse(given, OF_A_MODEL, "belongs to a --model; for the block it stands in --study FILE")
+        beside = {
+            "--parameter": parameters, "--known": known,
+            "--like": like, "--body": body, "--sample-rate": sample_rate,
+        }  # fmt: skip
+        for name, value in beside.items():
+            if value:
+                raise ConfigurationError(f"{name} belongs to a --model; the block has --study FILE")
+        method, inputs = _of_block(source)
+    found = options.run(RecoveryWork(method, inputs, threads), "recover")
+    print_result(found, options.out, json=options.json)
+
+
+def _of_model(
+    chosen: KnownModel,
+    source: ModelSource,
+    sample_rate: float | None,
+    like: Path | None,
+    body: str | None,
+    noise: Noise,
+) -> tuple[ModelRecovery, dict[str, Path]]:
+    """Return a motion model of known truth, and the files that were read."""
+    from driftwalk.calibration import ModelRecovery
+    from driftwalk.conditions import study_for
+
+    given, recording = source.given, None
+    if like is not None:
+        recording = RecordingOptions(body=body).load(like)
+        _refuse(given, ("recover.durations_s",), "given by the recording of --like")
+        if sample_rate is not None:
+            raise ConfigurationError("--sample-rate: given by the recording of --like")
+    elif body is not None:
+        raise ConfigurationError("--body belongs to --like")
+    if sample_rate is not None:
+        if not sample_rate > 0.0:
+            raise ConfigurationError(f"--sample-rate {sample_rate:g}: give a rate above 0")
+        clock = {"recover.sample_interval_s": 1.0 / sample_rate}
+        keys = {"sample_rate": "recover.sample_interval_s"}
+        source = replace(source, given=given.and_also(clock, keys=keys))
+    study = source.study()
+    if recording is not None:
+        study = study_for([recording], study, body=body)
+    flow_file: Path | None = None
+    found = source.found
+    if found is not None and given.file is None and RECOVER_KEYS["flow"] not in given.overrides:
+        # A run may be someone else's: it brings its own flow, and names no file of this machine.
+        field = source.flow_for(chosen.model, study, None)
+    elif study.recover.flow == RANDOM:
+        raise ConfigurationError(
+            'the flow "random" is for the block: name the file of a flow field (--flow), or leave '
+            "it out"
+        )
+    else:
+        field, flow_file = _named_flow(study, given)
+    parameters = None if found is None else found.file
+    inputs = {"truth": given.file, "parameters": parameters, "like": like, "flow": flow_file}
+    method = ModelRecovery(study, chosen.model, chosen.values, field, recording, body, noise)
+    return method, _files(inputs)
+
+
+def _of_block(source: ModelSource) -> tuple[FitRecovery, dict[str, Path]]:
+    """Return a block of known truth, and the files that were read."""
+    from driftwalk.likelihood import FitRecovery
+
+    given = source.given
+    if source.found is not None:
+        study, field, inputs = _of_run(source.found, source)
+        return FitRecovery(study, field), inputs
+    if given.file is None:
+        raise ConfigurationError(
+            "the truth is missing: give a finished run, a study file of the block (--study FILE), "
+            "or a motion model with its values (--model NAME --parameter NAME=VALUE)"
+        )
+    study = given.study()
+    _require_stated(given.file)
+    field, flow_file = _named_flow(study, given)
+    return FitRecovery(study, field), _files({"truth": given.file, "flow": flow_file})
+
+
+def _of_run(
+    found: FoundRun, source: ModelSource
+) -> tuple[Study, xr.Dataset | None, dict[str, Path]]:
+    """Return the truth that a run has found: its study with its camera and options; flow, files."""
+    from driftwalk.conditions import study_as_seen
+    from driftwalk.schema import body_track
+
+    given, own = source.given, found.block_study()
+    recording = found.recording()
+    if recording is not None:
+        own = study_as_seen(own, recording, body_track(recording, found.body))
+    study = given.over(own, base=f"the study of {source.folder}")
+    if RECOVER_KEYS["flow"] not in given.overrides:
+        return study, found.flow(own), found.inputs
+    field, flow_file = _named_flow(study, given)
+    return study, field, {**found.inputs, **_files({"flow": flow_file})}
+
+
+def _named_flow(study: Study, given: StudyOptions) -> tuple[xr.Dataset | None, Path | None]:
+    """Return the flow field that the study names, and its file; None for random flows."""
+    named = study.recover.flow
+    if named is None or named == RANDOM:
+        return None, None
+    path = Path(named)
+    if given.file is not None and RECOVER_KEYS["flow"] not in given.overrides:
+        path = given.file.parent / named
+    return load_flow_for(path, study), path
+
+
+def _files(roles: dict[str, Path | None]) -> dict[str, Path]:
+    """Return the files that were given, by their role."""
+    return {role: path for role, path in roles.items() if path is not None}
+
+
+def _refuse(given: StudyOptions, keys: Sequence[str], why: str) -> None:
+    names = [option_name(key, keys=given.keys) for key in keys if key in given.overrides]
+    if names:
+        raise ConfigurationError(f"{', '.join(names)}: {why}")
+
+
+def _require_stated(path: Path) -> None:
+    """Refuse a file in which a true value is only a default."""
+    from driftwalk.model import load_study
+
+    study = load_study(path)
+    for name in STATED:
+        section, _, key = name.partition(".")
+        if key not in getattr(study, section).model_fields_set:
+            raise ConfigurationError(
+                f"{path}: the truth lacks [{section}] {key}: give the true value, a "
+                "fitted one or a guess"
+            )
 
 
 study_app.command("recover", cls=HelpCommand, help=paragraphs(recover.__doc__ or ""))(recover)

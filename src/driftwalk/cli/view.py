@@ -7,31 +7,19 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from driftwalk.cli.terminal.answer import print_warnings
-from driftwalk.cli.terminal.output import print_note
+from driftwalk.cli.options.shared import argument, option
+from driftwalk.cli.terminal.output import print_note, print_warnings
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
     from driftwalk.viewer import Source
 
-Port = Annotated[int, typer.Option("--port", help="Port to serve on; 0 for a free port.")]
+Port = Annotated[int, option("--port", "Port to serve on; 0 for a free port.")]
 Host = Annotated[
-    str,
-    typer.Option(
-        "--host",
-        metavar="ADDRESS",
-        help="Address to serve on; other machines need the printed token.",
-    ),
+    str, option("--host ADDRESS", "Address to serve on; other machines need the printed token.")
 ]
 Open = Annotated[
-    bool | None,
-    typer.Option(
-        "--open/--no-open",
-        help="Open the browser (default: only on a terminal).",
-        show_default=False,
-    ),
+    bool | None, option("--open/--no-open", "Open the browser (default: only on a terminal).")
 ]
 LAST_PORT = 65535
 
@@ -39,10 +27,7 @@ LAST_PORT = 65535
 def view(
     source: Annotated[
         str,
-        typer.Argument(
-            metavar="RUN|ADDRESS:PORT",
-            help="Run directory, finished or not; or the address of a stream.",
-        ),
+        argument("RUN|ADDRESS:PORT", "Run directory, finished or not; or the address of a stream."),
     ],
     port: Port = 8765,
     host: Host = "127.0.0.1",

@@ -1,13 +1,15 @@
-"""Where workers are, as the command line says it: ``local:4``, ``tcp://host:8786``, ``slurm``."""
+"""Where workers are: ``local:4``, ``tcp://host:8786``, or jobs of Slurm and its like."""
 
 from __future__ import annotations
 
 import json
+import re
+import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from driftwalk.core.errors import ConfigurationError
+from driftwalk.core.errors import ClusterError, ConfigurationError, InputError
 from driftwalk.core.text.did_you_mean import did_you_mean
 
 JOB_SYSTEMS: Final = {
@@ -109,3 +111,121 @@ def _refuse_options(options: Mapping[str, Any], where: str) -> None:
             f"the option {next(iter(options))} is for jobs of slurm, pbs and the like, not "
             f"for {where}"
         )
+
+
+MEMORY: Final = "2GB"
+LIFETIME: Final = "-" * 2 + "lifetime"
+"""The worker's own option for the time after which it ends by itself. Its dashes stand apart, as
+messages must name no option of the command line, and this is none of driftwalk's."""
+OAR_MEMORY: Final = "memory_per_core_property_name"
+"""Under which name a site of OAR counts memory."""
+EARLY: Final = 0.05
+"""A worker ends by itself before its walltime is over, by this part of it,"""
+EARLY_S: Final = 60
+"""and by so many seconds at least: the scheduler then knows, and its unit is not lost."""
+
+
+def begin_jobs(address: ClusterAddress) -> Any:
+    """Submit jobs and return dask-jobqueue's cluster; a job that is lost is submitted again.
+
+    Options that are not given come from the site's own configuration of dask-jobqueue, otherwise a
+    job has one core and 2 GB.
+
+    Raises
+    ------
+    InputError
+        When dask-jobqueue is not installed.
+    ConfigurationError
+        When it does not know an option.
+    ClusterError
+        When a job cannot be submitted.
+    """
+    kind = job_class(address.kind)
+    command = str(kind.job_cls.submit_command).split()[0]
+    if shutil.which(command) is None:
+        raise ClusterError(
+            f"{address.words}: there is no command {command} here; run driftwalk where "
+            f"jobs of {address.kind} are submitted"
+        )
+    try:
+        begun = kind(**job_options(address))
+    except (TypeError, ValueError) as error:
+        raise ConfigurationError(
+            f"{address.words}: {_line(error)}; the options are those of "
+            f"dask_jobqueue.{JOB_SYSTEMS[address.kind]}"
+        ) from error
+    try:
+        begun.adapt(minimum_jobs=address.workers, maximum_jobs=address.workers)
+    except (OSError, RuntimeError) as error:
+        begun.close()
+        raise ClusterError(
+            f"no job could be submitted to {address.kind}: {_line(error)}"
+        ) from error
+    return begun
+
+
+def job_class(system: str) -> Any:
+    """Return dask-jobqueue's class of clusters of a job system.
+
+    Raises
+    ------
+    InputError
+        When dask-jobqueue is not installed.
+
+    Examples
+    --------
+    >>> job_class("slurm").__name__
+    'SLURMCluster'
+    """
+    try:
+        import dask_jobqueue
+    except ImportError as error:
+        raise InputError(
+            "jobs need dask-jobqueue, which is not installed: pip install 'driftwalk[cluster]'"
+        ) from error
+    return getattr(dask_jobqueue, JOB_SYSTEMS[system])
+
+
+def job_options(address: ClusterAddress) -> dict[str, Any]:
+    """Return the keywords of dask-jobqueue: one thread for each worker, an end before the walltime.
+
+    Examples
+    --------
+    >>> hour = ClusterAddress("slurm", 2, "", {"walltime": "01:00:00"})
+    >>> job_options(hour)["worker_extra_args"][1]
+    '3420s'
+    """
+    import dask
+
+    options = dict(address.options)
+
+    def site(name: str) -> Any:
+        return dask.config.get(f"jobqueue.{address.kind}.{name}", None)
+
+    cores = int(options.setdefault("cores", site("cores") or 1))
+    options.setdefault("processes", cores)
+    options.setdefault("memory", site("memory") or MEMORY)
+    options.setdefault("job_name", "driftwalk")
+    if address.kind == "oar" and site(OAR_MEMORY) is None:
+        # Sites name it as they like; where nobody says how, memory is not asked for.
+        options.setdefault(OAR_MEMORY, "not_applicable")
+    walltime = options.get("walltime") or site("walltime")
+    seconds = _seconds(str(walltime)) if walltime else None
+    if seconds is not None and "worker_extra_args" not in options:
+        lifetime = seconds - max(int(EARLY * seconds), EARLY_S)
+        if lifetime > 0:
+            options["worker_extra_args"] = [LIFETIME, f"{lifetime}s"]
+    return options
+
+
+def _seconds(walltime: str) -> int | None:
+    """Return a walltime such as 02:00:00 or 1-00:00:00 in seconds; None where it is no such."""
+    found = re.fullmatch(r"(?:(\d+)-)?(\d+):(\d\d)(?::(\d\d))?", walltime)
+    if found is None:
+        return None
+    days, hours, minutes, seconds = (int(part or 0) for part in found.groups())
+    return ((24 * days + hours) * 60 + minutes) * 60 + seconds
+
+
+def _line(error: BaseException) -> str:
+    return " ".join(str(error).split())[:300]

@@ -1,23 +1,114 @@
-"""Workers for the time of a run: reached or begun, checked, counted, and let go at its end."""
+"""Workers for the time of a run: reached or begun, checked for the same bits, counted, let go."""
 
 from __future__ import annotations
 
+import hashlib
 import logging
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Final
 
-from driftwalk.cluster.address import ClusterAddress
-from driftwalk.cluster.jobs import begin_jobs
-from driftwalk.cluster.probe import SameBits, probe_digest, refuse_other_bits
+import numpy as np
+
+from driftwalk.cluster.address import ClusterAddress, begin_jobs
 from driftwalk.core.errors import ClusterError, InputError, reason_of
 from driftwalk.core.extras import show_dask
 from driftwalk.core.provenance import package_versions
 from driftwalk.core.run_stages import tell_nobody
-from driftwalk.sweep import WorkerExecutor, refuse_others
+from driftwalk.flow import uniform_flow
+from driftwalk.model import Study, Tank
+from driftwalk.simulation import simulate
+from driftwalk.sweep import WorkerExecutor, refuse_others, this_worker
+
+BLOCKS: Final = 20
+"""More than the lanes of any instruction set, and not a whole number of them."""
+DURATION_S: Final = 30.0
+SEED: Final = 1729
+SHOWN: Final = 12
+"""Digits of a hash in a message."""
+
+
+def probe_digest() -> str:
+    """Return the SHA-256 of a short simulation: drag, force and impacts on the wall.
+
+    It is the same on every processor, for every compiler and number of threads.
+
+    Examples
+    --------
+    >>> len(probe_digest())
+    64
+    """
+    # The flow carries every block to the wall of this narrow tank.
+    study = Study(tank=Tank(diameter_m=0.15))
+    found = simulate(
+        study,
+        uniform_flow(0.03, -0.01),
+        sample_time=np.arange(0.0, DURATION_S, 0.5),
+        replicates=BLOCKS,
+        seed=SEED,
+        threads=1,
+    )
+    digest = hashlib.sha256()
+    for name in ("x", "y", "theta", "status"):
+        digest.update(np.ascontiguousarray(found[name].values).tobytes())
+    return digest.hexdigest()
+
+
+@dataclass(frozen=True)
+class SameBits:
+    """Lets a process compute only if the probe gives the same bits there.
+
+    Attributes
+    ----------
+    expected : str
+        What `probe_digest` gives on the machine of the run.
+    """
+
+    expected: str
+
+    def __call__(self) -> None:
+        """Raise where this process has other bits.
+
+        Raises
+        ------
+        ClusterError
+            Names the machine.
+        """
+        refuse_other_bits(self.expected, probe_digest(), this_worker())
+
+
+def refuse_other_bits(expected: str, found: Any, who: str) -> None:
+    """Raise where a probe gave other bits.
+
+    Parameters
+    ----------
+    expected : str
+        What this machine gives.
+    found : Any
+        What was found elsewhere.
+    who : str
+        Where, for the message.
+
+    Raises
+    ------
+    ClusterError
+        Names the machine.
+
+    Examples
+    --------
+    >>> refuse_other_bits("60d1", "60d1", "a worker on node7")
+    """
+    if found != expected:
+        raise ClusterError(
+            f"{who} computes other numbers than this machine: a short simulation gave "
+            f"{str(found)[:SHOWN]} there, {expected[:SHOWN]} here; install the same driftwalk "
+            "there, from the same package"
+        )
+
 
 ANSWER_S: Final = 10.0
 """How long a scheduler may take to answer [s]."""

@@ -4,8 +4,6 @@
 general tool for any two sets of points in the plane.
 """
 
-from driftwalk.comparison.autocorrelation import autocorrelation_time, memory_time
-from driftwalk.comparison.density import joint_density, step_length_edges, turning_angle_edges
 from driftwalk.comparison.ks import (
     QUADRANTS,
     ComparisonWarning,
@@ -16,19 +14,25 @@ from driftwalk.comparison.ks import (
     ks_distance,
     ks_reference,
 )
-from driftwalk.comparison.motion import compare
-from driftwalk.comparison.plan import AppliedSteps, StepPlan, apply_steps, plan_steps
-from driftwalk.comparison.replicates import compare_replicates
-from driftwalk.comparison.significance import PermutationTest, block_permutation_test
+from driftwalk.comparison.motion import compare, compare_replicates
+from driftwalk.comparison.plan import AppliedSteps, StepPlan, apply_steps, plan_steps, steps
+from driftwalk.comparison.significance import (
+    PermutationTest,
+    autocorrelation_time,
+    block_permutation_test,
+    memory_time,
+)
 from driftwalk.comparison.statistic import (
     Distances,
     Statistic,
     StepDistance,
     StepReference,
     StepTable,
+    joint_density,
+    step_length_edges,
     step_table,
+    turning_angle_edges,
 )
-from driftwalk.comparison.walk import steps
 
 __all__ = [
     "QUADRANTS",

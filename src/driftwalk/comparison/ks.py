@@ -22,6 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 
 
@@ -29,7 +30,7 @@ class ComparisonWarning(UserWarning):
     """A comparison was made, but the data limit its meaning."""
 
 
-Points = npt.NDArray[np.float64]
+Points = Floats
 Ties = Literal["strict", "limits"]
 Combine = Literal["mean", "max"]
 Method = Literal["fasano-franceschini", "peacock"]

@@ -1,17 +1,18 @@
-"""Compare two recorded or simulated motions by their steps."""
+"""Compare two motions, or a recording with the replicates of a simulation, by their steps."""
 
 from __future__ import annotations
 
+import itertools
 import json
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from driftwalk.comparison.density import joint_density, step_length_edges, turning_angle_edges
-from driftwalk.comparison.ks import KsComparison, Points, Ties, ks_compare
-from driftwalk.comparison.plan import usual_interval
+from driftwalk.comparison.ks import KsComparison, Points, Ties, ks_compare, ks_distance
+from driftwalk.comparison.plan import steps, usual_interval
 from driftwalk.comparison.significance import PermutationTest, block_permutation_test
-from driftwalk.comparison.walk import steps
+from driftwalk.comparison.statistic import joint_density, step_length_edges, turning_angle_edges
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.text.json_text import parse_json
 from driftwalk.schema import body_track
@@ -130,25 +131,6 @@ def _points(walk: xr.Dataset) -> Points:
     return np.column_stack([walk["step_length"].values, walk["turning_angle"].values])
 
 
-def _numbers(result: KsComparison, test: PermutationTest | None) -> dict[str, Any]:
-    """Return the scalar variables."""
-    place = result.place
-    return {
-        "ks_distance": ((), result.distance),
-        "ks_distance_a": ((), result.distance_a),
-        "ks_distance_b": ((), result.distance_b),
-        "score": ((), 1.0 - result.distance),
-        "ks_step_length": ((), place.x),
-        "ks_turning_angle": ((), place.y),
-        "ks_quadrant": ((), np.int8(place.quadrant)),
-        "tied_fraction": ((), result.tied_fraction),
-        "p_value": ((), test.p_value if test else np.nan),
-        "noise_floor": ((), test.noise_floor if test else np.nan),
-        "block_length": ((), test.block_length if test else 0),
-        "autocorrelation_time": ((), test.autocorrelation_time if test else np.nan),
-    }
-
-
 def _dataset(
     walks: list[xr.Dataset],
     result: KsComparison,
@@ -163,27 +145,118 @@ def _dataset(
         joint_density(length, angle, step_length_edge=length_edge, turning_angle_edge=angle_edge)
         for length, angle in zip(lengths, angles, strict=True)
     ]
-    by_motion: dict[str, Any] = {
-        name: ("motion", [walk.attrs[name] for walk in walks])
-        for name in ("pairs", "zero_length", "gaps")
+    place = result.place
+    data: dict[str, Any] = {
+        "ks_distance": ((), result.distance),
+        "ks_distance_a": ((), result.distance_a),
+        "ks_distance_b": ((), result.distance_b),
+        "score": ((), 1.0 - result.distance),
+        "ks_step_length": ((), place.x),
+        "ks_turning_angle": ((), place.y),
+        "ks_quadrant": ((), np.int8(place.quadrant)),
+        "tied_fraction": ((), result.tied_fraction),
+        "p_value": ((), test.p_value if test else np.nan),
+        "noise_floor": ((), test.noise_floor if test else np.nan),
+        "block_length": ((), test.block_length if test else 0),
+        "autocorrelation_time": ((), test.autocorrelation_time if test else np.nan),
     }
-    by_motion["mode"] = ("motion", np.array([walk.attrs["mode"] for walk in walks], dtype=object))
-    by_motion |= {
+    for name in ("pairs", "zero_length", "gaps"):
+        data[name] = ("motion", [walk.attrs[name] for walk in walks])
+    data |= {
+        "mode": ("motion", np.array([walk.attrs["mode"] for walk in walks], dtype=object)),
         "mean_step_length": ("motion", [length.mean() for length in lengths]),
         "median_step_length": ("motion", [np.median(length) for length in lengths]),
         "std_turning_angle": ("motion", [angle.std() for angle in angles]),
-        "step_density": (
-            ("motion", "density_step_length", "density_turning_angle"),
-            np.stack(density),
-        ),
+        "step_density": (("motion", "density_step_length", "density_turning_angle"), density),
     }
+    coords = {
+        "motion": ("motion", np.array(["a", "b"], dtype=object)),
+        "step_length_edge": ("step_length_edge", length_edge),
+        "turning_angle_edge": ("turning_angle_edge", angle_edge),
+    }
+    return build_dataset("comparison", data, coords, attrs)
+
+
+def compare_replicates(
+    recording: xr.Dataset,
+    simulation: xr.Dataset,
+    *,
+    body: str | None = None,
+    step_interval: float | None = None,
+    ties: Ties = "strict",
+) -> xr.Dataset:
+    """Compare the steps of a recording with those of every replicate of a simulation.
+
+    If the model is right, recording and replicates are exchangeable: each is as far from the others
+    as any. The p-value is the share of these motions whose mean KS distance to the others is at
+    least the recording's. A model that was fitted to the recording lies nearer to it than the truth
+    does, so that the p-value is then on the safe side (too large).
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        A `trajectory`.
+    simulation : xarray.Dataset
+        As of `simulate`, with at least two replicates.
+    body : str, optional
+        The recorded body, where there are several.
+    step_interval : float, optional
+        Time between the positions of a step [s], the same for all; default: the longer of the two
+        median sampling intervals.
+    ties : {"strict", "limits"}
+        As in `ks_distance`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Kind "replicate_comparison". ``ks_distance`` (replicate): KS distance of each replicate to
+        the recording; ``mean_ks_distance``: their mean; ``noise_floor``: mean KS distance of two
+        replicates; ``p_value``, from 1 / (replicates + 1) to 1. ``attrs``: ``step_interval_s``,
+        ``ties``.
+
+    Raises
+    ------
+    InputError
+        When there are fewer than two replicates, or no steps can be formed.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> recording = dw.tank30_recording().isel(time=slice(0, 600))
+    >>> run = dw.simulate(dw.Study(), dw.tank30_flow(), like=recording, replicates=3)
+    >>> dw.comparison.compare_replicates(recording, run)["ks_distance"].sizes["replicate"]
+    3
+    """
+    count = simulation.sizes.get("replicate", 0)
+    if count < 2:
+        raise InputError(f"at least two replicates are needed, got {count}: simulate more")
+    replicates = [simulation.isel(replicate=index) for index in range(count)]
+    interval = step_interval
+    if interval is None:
+        interval = max(sampling_interval(recording, body), sampling_interval(replicates[0], None))
+    motions = [step_points(recording, body, interval)]
+    motions += [step_points(one, None, interval) for one in replicates]
+    distance = _pairwise(motions, ties)
+    mean = distance.sum(axis=1) / count
+    among = distance[1:, 1:][np.triu_indices(count, k=1)]
     return build_dataset(
-        "comparison",
-        {**_numbers(result, test), **by_motion},
+        "replicate_comparison",
         {
-            "motion": ("motion", np.array(["a", "b"], dtype=object)),
-            "step_length_edge": ("step_length_edge", length_edge),
-            "turning_angle_edge": ("turning_angle_edge", angle_edge),
+            "ks_distance": ("replicate", distance[0, 1:]),
+            "mean_ks_distance": ((), mean[0]),
+            "noise_floor": ((), among.mean()),
+            "p_value": ((), np.mean(mean >= mean[0])),
         },
-        attrs,
+        {"replicate": simulation["replicate"]},
+        {"step_interval_s": interval, "ties": ties},
     )
+
+
+def _pairwise(motions: list[Floats], ties: Ties) -> Floats:
+    """Return the KS distances of every two motions, shape (motions, motions), 0 with itself."""
+    found = np.zeros((len(motions), len(motions)))
+    for first, second in itertools.combinations(range(len(motions)), 2):
+        found[first, second] = found[second, first] = ks_distance(
+            motions[first], motions[second], ties=ties
+        )
+    return found

@@ -1,21 +1,31 @@
-"""Samples that form steps, decided once from the time stamps.
+"""Steps of a correlated random walk: samples that form them, and their lengths and turns.
 
-The plan knows no positions. Built from a recording, it is applied to the recording and to every
-trajectory simulated at the same time stamps, so that both pass through the same function.
+The plan is decided once from the time stamps; it knows no positions. Built from a recording, it is
+applied to the recording and to every trajectory simulated at the same time stamps, so that both
+pass through the same function.
 """
 
 from __future__ import annotations
 
+import json
+import warnings
 from dataclasses import dataclass
-from typing import Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
+from driftwalk.comparison.ks import ComparisonWarning
+from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
+from driftwalk.schema import body_track
+from driftwalk.schema.trajectory import Track, build_steps
 
-Floats = npt.NDArray[np.float64]
+if TYPE_CHECKING:
+    import xarray as xr
+
+
 Integers = npt.NDArray[np.int32]
 Mode = Literal["exact", "interpolated"]
 
@@ -207,15 +217,8 @@ def apply_steps(plan: StepPlan, x: npt.ArrayLike, y: npt.ArrayLike) -> AppliedSt
             f"the step plan was made for {plan.samples} samples, got x {x_m.shape} and y "
             f"{y_m.shape}"
         )
-    return AppliedSteps(
-        *_core.apply_step_plan(
-            plan.left,
-            plan.weight,
-            plan.triple,
-            np.ascontiguousarray(x_m, dtype=kind),
-            np.ascontiguousarray(y_m, dtype=kind),
-        )
-    )
+    positions = (np.ascontiguousarray(axis, dtype=kind) for axis in (x_m, y_m))
+    return AppliedSteps(*_core.apply_step_plan(plan.left, plan.weight, plan.triple, *positions))
 
 
 def usual_interval(time: Floats) -> float:
@@ -240,7 +243,7 @@ def _checked_times(time: npt.ArrayLike) -> Floats:
 
 
 def _decimate(
-    stamps: Floats, within: npt.NDArray[np.bool_], multiple: int, wanted: float, tolerance: float
+    stamps: Floats, within: Bools, multiple: int, wanted: float, tolerance: float
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
     """Return every `multiple`-th sample of each gap-free run, and where three of them follow."""
     sample = np.arange(stamps.size)
@@ -276,3 +279,108 @@ def _interpolate(
     follows = np.diff(index[known]) == 1
     triple = np.flatnonzero(follows[:-1] & follows[1:])
     return left[known], weight[known], triple, grid[known]
+
+
+class StepChoicePolicy(NamedTuple):
+    """Which longer step is suggested where many steps have no length."""
+
+    zero_fraction: float = 0.05
+    """Share of steps without a length above which the step interval is too short for the
+    resolution of the file; chosen by hand."""
+    longest_suggestion: int = 64
+    """Samples of the longest step that is suggested; chosen by hand."""
+
+
+_CHOICE: Final = StepChoicePolicy()
+
+
+def steps(
+    trajectory: xr.Dataset, *, body: str | None = None, step_interval: float | None = None
+) -> xr.Dataset:
+    """Return the step lengths and turning angles of one body.
+
+    With positions p_i at constant interval: step length S_i = |p_{i+1} - p_i| and turning angle
+    A_i, the signed angle from step i - 1 to step i, in (-pi, pi] (the paper's step angle); n
+    samples without a gap give n - 2 pairs. `plan_steps` says which samples form a pair.
+
+    Parameters
+    ----------
+    trajectory : xarray.Dataset
+        A `trajectory`.
+    body : str, optional
+        Name of the body; may be left out when there is only one.
+    step_interval : float, optional
+        Time between the positions of a step [s]; default: the recording's median interval.
+
+    Returns
+    -------
+    xarray.Dataset
+        A `steps` dataset. ``attrs``: ``body``, ``step_interval_s``, ``mode`` ("exact" or
+        "interpolated"), ``samples``, ``pairs``, ``zero_length`` (pairs left out because a step has
+        no direction), ``gaps``, ``irregular_intervals``, ``warnings`` (JSON list of sentences).
+
+    Raises
+    ------
+    InputError
+        When there is no such body or no pair can be formed.
+
+    Warns
+    -----
+    ComparisonWarning
+        When more than 5 % of the pairs hold a step of zero length.
+
+    Examples
+    --------
+    >>> from driftwalk.schema import build_trajectory
+    >>> path = build_trajectory([0.0, 0.1, 0.2], [0.0, 0.01, 0.01], [0.0, 0.0, 0.02])
+    >>> steps(path)["turning_angle"].values.round(4)
+    array([1.5708])
+    """
+    track = body_track(trajectory, body)
+    plan = plan_steps(track.time, step_interval=step_interval)
+    applied = apply_steps(plan, track.x, track.y)
+    if applied.step_length.size == 0:
+        raise InputError(
+            f"none of the {plan.pairs} step pairs has a direction: the body does not move at a "
+            f"step_interval of {plan.step_interval:.6g} s: name {_advice(track, plan)}"
+        )
+    sentences = []
+    zero = applied.zero_length / plan.pairs
+    if zero > _CHOICE.zero_fraction:
+        sentences.append(
+            f"{100 * zero:.0f} % of the step pairs hold a step of zero length, which has no "
+            f"direction, and were left out: the body rests, or {_advice(track, plan)} is needed "
+            "for the file's resolution"
+        )
+        warnings.warn(sentences[0], ComparisonWarning, stacklevel=2)
+    return build_steps(
+        applied.step_length,
+        applied.turning_angle,
+        time=plan.time[applied.pair],
+        attrs={
+            "body": body or "",
+            "step_interval_s": plan.step_interval,
+            "mode": plan.mode,
+            "samples": plan.samples,
+            "pairs": int(applied.step_length.size),
+            "zero_length": applied.zero_length,
+            "gaps": plan.gaps,
+            "irregular_intervals": plan.irregular,
+            "warnings": json.dumps(sentences),
+        },
+    )
+
+
+def _advice(track: Track, plan: StepPlan) -> str:
+    """Return what to ask for: the first doubling at which few steps have zero length."""
+    factor = 2
+    while factor <= _CHOICE.longest_suggestion:
+        try:
+            longer = plan_steps(track.time, step_interval=factor * plan.step_interval)
+        except InputError:
+            break
+        applied = apply_steps(longer, track.x, track.y)
+        if applied.zero_length <= _CHOICE.zero_fraction * longer.pairs:
+            return f"a step_interval of {np.round(longer.step_interval, 9):.6g} s or more"
+        factor *= 2
+    return "a longer step_interval"

@@ -1,4 +1,4 @@
-"""Permutation test in blocks, which respects serial correlation.
+"""Permutation test in blocks, which respects serial correlation, and the autocorrelation time.
 
 The steps of a trajectory remember their past, so single steps must not be exchanged between two
 samples: at an autocorrelation time of 19 steps such a test rejects a true null 92 % of the time at
@@ -8,15 +8,116 @@ the 5 % level. Whole blocks, long against that memory, are exchanged instead.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
-from driftwalk.comparison.autocorrelation import steps_memory_time
-from driftwalk.comparison.ks import Points, Ties, checked_points
+from driftwalk.comparison.ks import Ties, checked_points
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
+
+
+class AutocorrelationPolicy(NamedTuple):
+    """How far an autocorrelation is summed, and when it counts."""
+
+    window: float = 2.5
+    """Largest lag, in autocorrelation times: five times 1/2 + sum of rho, the rule of Sokal."""
+    fewest: int = 4
+    """Values without which there is no correlation, and one more than the last lag that tells
+    how much of a series is correlated; chosen by hand."""
+    significant: float = 3.0
+    """Standard errors of white noise from which on a correlation is significant: 0.3 % of white
+    series."""
+
+
+_AUTOCORRELATION: Final = AutocorrelationPolicy()
+
+
+def autocorrelation_time(series: npt.ArrayLike) -> float:
+    """Return the integrated autocorrelation time of a series, in samples.
+
+    tau = 1 + 2 sum of rho(t) over the lags t up to the first one that exceeds 2.5 tau (Sokal).
+    White noise gives 1, an AR(1) process of coefficient phi (1 + phi) / (1 - phi). Never below 1.
+
+    Parameters
+    ----------
+    series : array_like, shape (n,)
+        Values; a constant series gives 1.
+
+    Examples
+    --------
+    >>> autocorrelation_time([1.0, 1.0, 1.0])
+    1.0
+    """
+    return _integrated(_autocorrelation(np.asarray(series, dtype=np.float64)), 1.0)
+
+
+def memory_time(series: npt.ArrayLike) -> float:
+    """Return the autocorrelation time of the correlated part of a series, in samples.
+
+    White noise on top of a slow motion makes every correlation smaller, and with it the integrated
+    autocorrelation time, but the motion remembers as long as before. So the correlations are taken
+    relative to the largest at lags 1 to 3; where that one is not significant, this is
+    `autocorrelation_time`.
+
+    Parameters
+    ----------
+    series : array_like, shape (n,)
+        Values.
+
+    Examples
+    --------
+    >>> memory_time([1.0, 1.0, 1.0])
+    1.0
+    """
+    rho = _autocorrelation(np.asarray(series, dtype=np.float64))
+    if rho.size < _AUTOCORRELATION.fewest:
+        return 1.0
+    share = float(rho[1 : _AUTOCORRELATION.fewest].max())
+    significant = share > _AUTOCORRELATION.significant / np.sqrt(rho.size)
+    return _integrated(rho, share if significant else 1.0)
+
+
+def steps_memory_time(points: Floats) -> float:
+    """Return the longest memory of what the KS statistic can see of a series of points.
+
+    Taken over the ranks of either column, which a monotone map of an axis does not change, and over
+    their distances from the middle rank, which show a slowly changing spread.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 2)
+        The series in time order.
+    """
+    times = []
+    for column in points.T:
+        rank = np.argsort(np.argsort(column, kind="stable"), kind="stable").astype(np.float64)
+        times += [memory_time(rank), memory_time(np.abs(rank - rank.mean()))]
+    return max(times)
+
+
+def _autocorrelation(values: Floats) -> Floats:
+    """Return rho at every lag; empty where there is none."""
+    centred = values - values.mean() if values.size else values
+    power = float(centred @ centred)
+    if values.size < _AUTOCORRELATION.fewest or power <= 0.0:
+        return np.empty(0)
+    length = 1 << (2 * values.size - 1).bit_length()
+    spectrum = np.abs(np.fft.rfft(centred, length)) ** 2
+    rho: Floats = np.fft.irfft(spectrum, length)[: values.size] / power
+    return rho
+
+
+def _integrated(rho: Floats, share: float) -> float:
+    """Return 1 + 2 sum of rho / share with Sokal's window."""
+    if rho.size == 0:
+        return 1.0
+    tau = 1.0 + 2.0 * (np.cumsum(rho) - rho[0]) / share
+    beyond = np.arange(rho.size) >= _AUTOCORRELATION.window * tau
+    return max(1.0, float(tau[int(np.argmax(beyond)) if beyond.any() else -1]))
 
 
 class PermutationPolicy(NamedTuple):
@@ -53,7 +154,7 @@ class PermutationTest(NamedTuple):
     """Blocks of the second series."""
     left_out: int
     """Steps at the ends of the series that filled no whole block."""
-    permuted_distance: npt.NDArray[np.float64]
+    permuted_distance: Floats
     """D of every permutation."""
 
 
@@ -109,23 +210,27 @@ def block_permutation_test(
     if seed < 0:
         raise InputError(f"seed must not be negative, got {seed}")
     memory = max(steps_memory_time(first), steps_memory_time(second))
-    length = (
-        math.ceil(_PERMUTATION.block_times * memory) if block_length is None else int(block_length)
-    )
+    usual = math.ceil(_PERMUTATION.block_times * memory)
+    length = usual if block_length is None else int(block_length)
     if length < 1:
         raise InputError(f"block_length must be at least 1, got {block_length}")
     blocks_a, blocks_b = first.shape[0] // length, second.shape[0] // length
-    if (
-        math.comb(blocks_a + blocks_b, blocks_a) < _PERMUTATION.fewest_arrangements
-        or not blocks_a * blocks_b
-    ):
+    arrangements = math.comb(blocks_a + blocks_b, blocks_a) if blocks_a and blocks_b else 0
+    if arrangements < _PERMUTATION.fewest_arrangements:
         raise InputError(
             f"the series of {first.shape[0]} and {second.shape[0]} points hold only {blocks_a} and "
             f"{blocks_b} blocks of {length}, too few for a permutation test: record longer, or "
             "name a shorter block_length"
         )
     pooled = np.concatenate([first[: blocks_a * length], second[: blocks_b * length]])
-    statistic = _permuted(pooled, length, blocks_a, blocks_b, permutations, seed, ties)
+    block_of = np.repeat(np.arange(blocks_a + blocks_b, dtype=np.int32), length)
+    # D1 + D2 in integer units: of the series as they are, then of every permutation.
+    statistic = np.concatenate(
+        [
+            _core.ks_permutations(pooled, blocks_a * length, block_of, labels, ties == "limits")
+            for labels in _labels(blocks_a, blocks_b, permutations, seed)
+        ]
+    )
     unit = 2.0 * (blocks_a * length) * (blocks_b * length)
     reached = int((statistic[1:] >= statistic[0]).sum())
     return PermutationTest(
@@ -141,28 +246,14 @@ def block_permutation_test(
     )
 
 
-def _permuted(
-    pooled: Points,
-    length: int,
-    blocks_a: int,
-    blocks_b: int,
-    permutations: int,
-    seed: int,
-    ties: Ties,
-) -> npt.NDArray[np.int64]:
-    """Return D1 + D2 in integer units: of the series as they are, then of every permutation."""
-    blocks = blocks_a + blocks_b
+def _labels(
+    blocks_a: int, blocks_b: int, permutations: int, seed: int
+) -> Iterator[npt.NDArray[np.uint8]]:
+    """Yield the series of each block, one row as they are and one for every permutation."""
     as_they_are = np.r_[np.zeros(blocks_a, np.uint8), np.ones(blocks_b, np.uint8)]
-    block_of = np.repeat(np.arange(blocks, dtype=np.int32), length)
+    yield as_they_are[None, :]
     rng = np.random.default_rng(seed)
-    rows = max(1, _PERMUTATION.labels_at_once // blocks)
-    parts = [as_they_are[None, :]]
-    statistic: list[npt.NDArray[np.int64]] = []
+    rows = max(1, _PERMUTATION.labels_at_once // as_they_are.size)
     for begin in range(0, permutations, rows):
         count = min(rows, permutations - begin)
-        parts.append(rng.permuted(np.tile(as_they_are, (count, 1)), axis=1))
-        labels = np.concatenate(parts)
-        n1 = blocks_a * length
-        statistic.append(_core.ks_permutations(pooled, n1, block_of, labels, ties == "limits"))
-        parts = []
-    return np.concatenate(statistic)
+        yield rng.permuted(np.tile(as_they_are, (count, 1)), axis=1)

@@ -5,16 +5,21 @@ reconciled with the study; times and gaps, start and camera; the flow.
 """
 
 from driftwalk.conditions.camera import possible_noises, recorded_camera, study_as_seen
-from driftwalk.conditions.like import simulate_like
-from driftwalk.conditions.neighbours import Neighbours, neighbours_of
-from driftwalk.conditions.own_flow import recording_flow
 from driftwalk.conditions.reading import (
     ReadRecordings,
     load_for_run,
     load_with_study,
     read_recordings,
 )
-from driftwalk.conditions.recorded import Conditions, recorded_conditions, recorded_start
+from driftwalk.conditions.recorded import (
+    Conditions,
+    Neighbours,
+    neighbours_of,
+    recorded_conditions,
+    recorded_start,
+    recording_flow,
+    simulate_like,
+)
 from driftwalk.conditions.refuse import (
     jump_warnings,
     require_motion,
@@ -27,11 +32,12 @@ from driftwalk.conditions.study import (
     block_attributes,
     estimated_study,
     is_stated,
+    require_inside,
     study_for,
+    study_in_arena,
     study_of_block,
     unstated_warning,
 )
-from driftwalk.conditions.tank import require_inside, study_in_arena
 
 __all__ = [
     "About",

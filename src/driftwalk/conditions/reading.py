@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from driftwalk.conditions.refuse import require_motion, require_positions
-from driftwalk.conditions.study import is_stated, study_for
-from driftwalk.conditions.tank import study_in_arena
+from driftwalk.conditions.study import is_stated, study_for, study_in_arena
 from driftwalk.core.text.json_text import parse_json
 from driftwalk.record import load
 

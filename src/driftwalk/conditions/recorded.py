@@ -1,4 +1,4 @@
-"""The conditions that a simulation takes over: times and gaps, start, camera, tank and flow."""
+"""The conditions that a simulation takes over: times and gaps, start, camera, neighbours, flow."""
 
 from __future__ import annotations
 
@@ -8,10 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.conditions.neighbours import Neighbours
+from driftwalk.conditions.camera import study_as_seen
+from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.processors import default_threads
 from driftwalk.core.smoothing import local_quadratic
+from driftwalk.flow import extract_flow
+from driftwalk.flow.arena import outline_of
+from driftwalk.schema import Track, body_names, body_track, build_trajectory
+from driftwalk.simulation import simulate
 from driftwalk.simulation.backend import Camera
 from driftwalk.simulation.initial import Start
 from driftwalk.simulation.series import continued_flow
@@ -20,9 +25,139 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import FieldOfView, Study, Tank
-    from driftwalk.schema import Track
 
-Floats = npt.NDArray[np.float64]
+
+@dataclass(frozen=True, eq=False)
+class Neighbours:
+    """The other bodies in the tank, each with its recorded samples.
+
+    Attributes
+    ----------
+    tracks : tuple of Track
+        Present samples of each.
+
+    Examples
+    --------
+    >>> from driftwalk.schema import Track
+    >>> time = np.arange(5.0)
+    >>> other = Track(time, 0.01 * time, 0.0 * time, np.full(5, np.nan))
+    >>> Neighbours((other,)).at([0.5, 9.0])[:, 0].tolist()
+    [[0.005, 0.0], [nan, nan]]
+    """
+
+    tracks: tuple[Track, ...]
+
+    def since(self, begin: float) -> Neighbours:
+        """Return the same with times [s] that count from `begin` on."""
+        return Neighbours(tuple(one._replace(time=one.time - begin) for one in self.tracks))
+
+    def at(self, time: npt.ArrayLike) -> Floats:
+        """Return where they are at times [s], shape (times, bodies, 2) [m].
+
+        Between two samples in a straight line; NaN within gaps, before the first and after the last
+        sample.
+        """
+        wanted = np.asarray(time, dtype=np.float64)
+        found = np.full((wanted.size, len(self.tracks), 2), np.nan)
+        for k, track in enumerate(self.tracks):
+            there = _within_samples(track.time, wanted)
+            for axis, values in enumerate((track.x, track.y)):
+                found[there, k, axis] = np.interp(wanted[there], track.time, values)
+        return found
+
+
+def neighbours_of(recording: xr.Dataset, body: str | None, tank: Tank) -> Neighbours | None:
+    """Return the other bodies of a recording that are in the tank; None where there are none.
+
+    A body that is mostly beyond the wall is in another tank: one recording may show several. Where
+    each body has its own tank, none is another's neighbour.
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        A `trajectory`.
+    body : str or None
+        The body that is followed; None where there is one alone.
+    tank : Tank
+        Its tank.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> neighbours_of(dw.tank30_recording(), None, dw.Study().tank) is None
+    True
+    """
+    names = body_names(recording)
+    if body is None or len(names) < 2 or recording.attrs.get("bodies_apart") == "yes":
+        return None
+    outline = outline_of(tank.to_arena())
+    tracks = [body_track(recording, name) for name in names if name != body]
+    inside = tuple(
+        one
+        for one in tracks
+        if one.time.size > 1 and np.mean(outline.depth(one.x, one.y) >= 0.0) > 0.5
+    )
+    return Neighbours(inside) if inside else None
+
+
+def _within_samples(time: Floats, wanted: Floats) -> Bools:
+    """Return which times lie between two samples that are no more than a gap apart."""
+    # Over five median intervals a body has moved straight on: trackers drop a frame or two, and
+    # after more its place is unknown.
+    longest = 5.0 * float(np.median(np.diff(time)))
+    after = np.clip(np.searchsorted(time, wanted), 1, time.size - 1)
+    close = time[after] - time[after - 1] <= longest
+    return np.asarray((wanted >= time[0]) & (wanted <= time[-1]) & close)
+
+
+def recording_flow(recording: xr.Dataset, study: Study, *, body: str | None = None) -> xr.Dataset:
+    """Return the flow field that a calibration takes from the recording if none is given.
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        A `trajectory`.
+    study : Study
+        Tank, block, water and the section [flow].
+    body : str, optional
+        The body, where there are several.
+
+    Returns
+    -------
+    xarray.Dataset
+        A `flow_field`, by the paper's estimator (Eq. 4).
+
+    Raises
+    ------
+    InputError
+        When no cell can be measured.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> int(dw.conditions.recording_flow(dw.tank30_recording(), dw.Study()).sizes["x"])
+    50
+    """
+    return flow_from_track(body_track(recording, body), study)
+
+
+def flow_from_track(track: Track, study: Study) -> xr.Dataset:
+    """Return the flow field of one track; see `recording_flow`."""
+    settings = study.flow
+    return extract_flow(
+        build_trajectory(track.time, track.x, track.y, track.theta),
+        arena=study.tank.to_arena(),
+        cells=settings.cells,
+        cell_size=settings.cell_size_m,
+        window=settings.smoothing_window_s,
+        inertia=settings.inertia,
+        mass=study.block.mass_kg,
+        side=study.block.side_m,
+        depth=study.wetted_depth_m,
+        water_density=study.water.density_kg_m3,
+        flow_drag_coefficient=settings.flow_drag_coefficient,
+        min_count=settings.min_count,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,15 +258,10 @@ def recorded_conditions(
 def sample_times(track: Track, study: Study) -> Floats:
     """Return the time stamps of a world [s]: the recording's, from its first sample on.
 
-    Without its gaps, where the study leaves them out.
+    Without its gaps, where the study leaves them out: even stamps at the median interval.
     """
-    time = track.time - track.time[0]
-    return _without_gaps(time) if study.observation.gaps == "none" else time
-
-
-def _without_gaps(time: Floats) -> Floats:
-    """Return even time stamps [s] over the same span, at the median interval of the given ones."""
-    if time.size < 2:
+    time: Floats = track.time - track.time[0]
+    if study.observation.gaps != "none" or time.size < 2:
         return time
     interval = float(np.median(np.diff(time)))
     count = int(np.floor(time[-1] / interval + 1e-6)) + 1
@@ -181,3 +311,61 @@ def recorded_start(track: Track, *, window: float = 0.7) -> Start:
     if not np.isfinite(track.theta[first]).all():
         position[2], velocity[2] = np.nan, 0.0
     return Start(*(float(value) for value in (*position, *velocity)))
+
+
+def simulate_like(
+    study: Study,
+    flow: xr.Dataset,
+    recording: xr.Dataset,
+    *,
+    body: str | None = None,
+    replicates: int | None = None,
+    seed: int | None = None,
+    threads: int | None = None,
+) -> xr.Dataset:
+    """Simulate with the start, time stamps, gaps and camera of a recording.
+
+    Parameters
+    ----------
+    study, flow
+        As in `simulate`; noise and resolution that the study leaves open are the recording's.
+    recording : xarray.Dataset
+        A `trajectory`; its present samples give the time stamps, its first samples the start.
+    body : str, optional
+        The body to follow, where there are several.
+    replicates, seed, threads
+        As in `simulate`.
+
+    Returns
+    -------
+    xarray.Dataset
+        As of `simulate`; time 0 is the recording's first sample.
+
+    Raises
+    ------
+    InputError
+        When the body is not named and there are several.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> recording, flow = dw.tank30_recording(), dw.tank30_flow()
+    >>> run = dw.simulate_like(dw.Study(), flow, recording.isel(time=slice(0, 100)))
+    >>> run.sizes["time"]
+    100
+    """
+    from driftwalk.schema import body_track
+
+    track = body_track(recording, body)
+    study = study_as_seen(study, recording, track)
+    begin = recorded_start(track)
+    return simulate(
+        study,
+        flow,
+        sample_time=sample_times(track, study),
+        start=begin,
+        flow_start=0.0,
+        replicates=replicates,
+        seed=seed,
+        threads=threads,
+    )

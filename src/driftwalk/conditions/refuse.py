@@ -63,7 +63,7 @@ def require_positions(recording: xr.Dataset, *, where: str | PathLike[str] = "")
     """
     if not (np.isfinite(recording["x"].values) & np.isfinite(recording["y"].values)).any():
         raise InputError(
-            f"{_begin(recording, where)}no row holds a position: are these the right columns?"
+            f"{prefix_of(recording, where)}no row holds a position: are these the right columns?"
         )
 
 
@@ -96,20 +96,20 @@ def require_motion(
     try:
         tracks = [body_track(recording, name) for name in names]
     except InputError as error:
-        raise InputError(f"{_begin(recording, where)}{error}") from error
+        raise InputError(f"{prefix_of(recording, where)}{error}") from error
     most = max(track.time.size for track in tracks)
     if most < _MOTION.fewest_positions:
         rows = "1 position" if most == 1 else f"{most} positions"
         raise InputError(
-            f"{_begin(recording, where)}holds {rows} in the time that is kept, at least "
+            f"{prefix_of(recording, where)}holds {rows} in the time that is kept, at least "
             f"{_MOTION.fewest_positions} are needed for a motion"
         )
     if not any(one.x.size and (np.ptp(one.x) > 0 or np.ptp(one.y) > 0) for one in tracks):
         still = body_names(recording) if body is None else names
         which = ", ".join(f"'{name}'" for name in still)
         raise InputError(
-            f"{_begin(recording, where)}the body never moves ({which}): all {most} positions are "
-            f"({tracks[0].x[0]:g}, {tracks[0].y[0]:g}) m"
+            f"{prefix_of(recording, where)}the body never moves ({which}): all {most} positions "
+            f"are ({tracks[0].x[0]:g}, {tracks[0].y[0]:g}) m"
         )
 
 
@@ -200,7 +200,8 @@ def typical_speed(tracks: Sequence[Track]) -> float:
     return float(np.sqrt(np.mean(np.minimum(speed, np.quantile(speed, 0.99)) ** 2)))
 
 
-def _begin(recording: xr.Dataset, where: str | PathLike[str]) -> str:
+def prefix_of(recording: xr.Dataset, where: str | PathLike[str] = "") -> str:
+    """Return what a message on a recording begins with: its file or its name, where it has one."""
     name = str(where) or recording.attrs.get("source", "")
     return f"{name}: " if name else ""
 

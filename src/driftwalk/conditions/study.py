@@ -1,13 +1,17 @@
-"""Merge the study: the user's statements, with tank and block of the recording."""
+"""The study of a piece of work: statements of the user, tank and block of the recording."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, Literal
 
-from driftwalk.conditions.tank import OUTLINE, require_inside, study_in_arena
+import numpy as np
+
+from driftwalk.conditions.refuse import prefix_of
 from driftwalk.core.errors import InputError
-from driftwalk.flow.arena import read_arena
+from driftwalk.flow.arena import outline_of, read_arena
+from driftwalk.record import noise_reach
+from driftwalk.schema import body_track
 from driftwalk.schema.answers.facts import fitted_value
 from driftwalk.schema.answers.parts import undetermined
 from driftwalk.schema.check import kind_name
@@ -16,6 +20,96 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
+
+
+OUTLINE: Final = ("shape", "diameter_m", "width_m", "height_m", "vertices_m")
+"""Keys of a tank that state its outline; the others are about its wall."""
+MOST_OUTSIDE = 0.01
+"""Share of positions outside the tank, farther than noise takes them, from which on the tank cannot
+be right."""
+
+
+def study_in_arena(study: Study, recording: xr.Dataset) -> Study:
+    """Return the study with the recording's arena as its tank, the wall's properties kept.
+
+    Parameters
+    ----------
+    study : Study
+        Its [tank] stays where the recording has no arena.
+    recording : xarray.Dataset
+        A `trajectory`, read with an arena or without.
+
+    Returns
+    -------
+    Study
+        The same study where the recording has no arena.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> wide = dw.apply_overrides(dw.Study(), {"tank.diameter_m": 1.0})
+    >>> study_in_arena(wide, dw.tank30_recording()).tank.diameter_m
+    0.3
+    """
+    from driftwalk.model import Tank, apply_overrides
+
+    arena = recording.attrs.get("arena")
+    if arena is None:
+        return study
+    tank = Tank.from_arena(arena)
+    given = {f"tank.{key}": getattr(tank, key) for key in OUTLINE if getattr(tank, key) is not None}
+    return apply_overrides(study, given)
+
+
+def require_inside(study: Study, recording: xr.Dataset, body: str | None) -> None:
+    """Refuse a tank that does not hold the recorded positions.
+
+    The camera's noise shows a body at the wall beyond it: by four standard deviations at most, of
+    the study's noise or of the one that is estimated (`driftwalk.record.noise_reach`). A simulated
+    recording in its own tank is not looked at: the body kept to it.
+
+    Parameters
+    ----------
+    study : Study
+        Its tank.
+    recording : xarray.Dataset
+        A `trajectory`.
+    body : str or None
+        The body, where there are several.
+
+    Raises
+    ------
+    InputError
+        When more than 1 % of the positions lie farther outside than noise takes them.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> require_inside(dw.Study(), dw.tank30_recording(), None)
+    """
+    tank = study.tank
+    own = study_in_arena(study, recording).tank
+    if "arena" in recording.attrs and recording.attrs.get("simulated") == "yes" and own == tank:
+        return
+    track = body_track(recording, body)
+    outline = outline_of(tank.to_arena())
+    beyond = -outline.depth(track.x, track.y)
+    if np.mean(beyond > 0.0) <= MOST_OUTSIDE:
+        return
+    x_min, y_min, x_max, y_max = outline.bounds
+    stated = study.observation.position_noise_m
+    noise = None if isinstance(stated, str) else stated
+    reach = noise_reach(track, noise, size=min(x_max - x_min, y_max - y_min))
+    share = np.mean(beyond > reach)
+    if share > MOST_OUTSIDE:
+        raise InputError(
+            f"{share:.0%} of the positions lie outside the tank, a {tank.describe()} "
+            f"about the origin, farther than noise takes them ({1e3 * reach:.2g} mm): the "
+            f"recording spans x {track.x.min():.3g} to {track.x.max():.3g} m, y "
+            f"{track.y.min():.3g} to {track.y.max():.3g} m; "
+            "state the tank with `tank.diameter_m`, `tank` of `load` or [tank] in a study file"
+        )
+
 
 About = Literal["tank", "block", "simulation"]
 """Work whose numbers the tank decides, the block in it too, or its forces as well."""
@@ -88,9 +182,17 @@ def study_for(
     fitted = False
     for recording in recordings:
         # A circle that is fitted to the positions states no tank: another recording has another.
-        if not (fitted and _is_fitted(recording)):
-            chosen = _with_tank(chosen, recording, is_stated=tank)
-        fitted = fitted or _is_fitted(recording)
+        if not (fitted and is_fitted(recording)):
+            own = study_in_arena(chosen, recording)
+            same = all(getattr(own.tank, key) == getattr(chosen.tank, key) for key in OUTLINE)
+            if tank and not same:
+                raise InputError(
+                    f"{prefix_of(recording)}the recording is in a {own.tank.describe()}, and the "
+                    f"study says a {chosen.tank.describe()}: state the tank once, `tank` when the "
+                    "recording is loaded"
+                )
+            chosen = own
+        fitted = fitted or is_fitted(recording)
         chosen = study_of_block(chosen, recording, stated=block)
         tank = tank or "arena" in recording.attrs
         block |= {key for key, (name, *_) in _BLOCK_ATTRIBUTES.items() if name in recording.attrs}
@@ -138,7 +240,7 @@ def study_of_block(
             stated_by = next(one for one in _BLOCK_ATTRIBUTES if one in same_fact & known)
             stated = f"{getattr(study.block, stated_by)} {_BLOCK_ATTRIBUTES[stated_by][1]}"
             raise InputError(
-                f"{_name_of(recording)}the recording is of a block of {word} "
+                f"{prefix_of(recording)}the recording is of a block of {word} "
                 f"{f'{own} {unit}'.rstrip()}, and the study says {stated.rstrip()}: state the "
                 f"{word} once, {way}"
             )
@@ -211,15 +313,14 @@ def estimated_study(
                 f"the {kind_name(found)} does not determine {name}: its recording tells too "
                 f"little of it; take its flow field alone (`flow`), and state `forces.{key}`"
             )
-    return apply_overrides(
-        parse_study(found.attrs["study"], source=source),
-        {
-            **{f"forces.{key}": fitted_value(found, name) for key, name in FORCE_KEYS.items()},
-            **fitted_law(found),
-            **_fitted_wall(found),
-            **stated,
-        },
-    )
+    estimates = {f"forces.{key}": fitted_value(found, name) for key, name in FORCE_KEYS.items()}
+    estimates |= fitted_law(found)
+    if "wall_friction" in found:
+        estimates["tank.wall_restitution"] = float(found["wall_restitution"])
+        # With a friction of 10, every contact with the wall sticks.
+        estimates["tank.wall_friction"] = min(float(found["wall_friction"]), 10.0)
+    study = parse_study(found.attrs["study"], source=source)
+    return apply_overrides(study, {**estimates, **stated})
 
 
 def fitted_law(found: xr.Dataset) -> dict[str, Any]:
@@ -244,17 +345,6 @@ def fitted_law(found: xr.Dataset) -> dict[str, Any]:
         if name in known:
             law[f"forces.{key}"] = max(fitted_value(found, name), 0.0)
     return law
-
-
-def _fitted_wall(found: xr.Dataset) -> dict[str, Any]:
-    """Return the keys of [tank] that say what wall a fit has found."""
-    if "wall_friction" not in found:
-        return {}
-    return {
-        "tank.wall_restitution": float(found["wall_restitution"]),
-        # With a friction of 10, every contact with the wall sticks.
-        "tank.wall_friction": min(float(found["wall_friction"]), 10.0),
-    }
 
 
 def unstated_warning(study: Study, *, about: About) -> str | None:
@@ -339,26 +429,6 @@ def _listed(words: Sequence[str]) -> str:
     return f"{', '.join(first)} and {last}" if first else last
 
 
-def _with_tank(study: Study, recording: xr.Dataset, *, is_stated: bool) -> Study:
-    """Return the study in the tank of a recording; refuse one that is not the stated tank."""
-    own = study_in_arena(study, recording)
-    if is_stated and _outline(own) != _outline(study):
-        raise InputError(
-            f"{_name_of(recording)}the recording is in a {own.tank.describe()}, and the study says "
-            f"a {study.tank.describe()}: state the tank once, `tank` when the recording is loaded"
-        )
-    return own
-
-
-def _is_fitted(recording: xr.Dataset) -> bool:
+def is_fitted(recording: xr.Dataset) -> bool:
     """Return whether the arena is the circle that was fitted to the positions."""
     return "radius_is" in read_arena(str(recording.attrs.get("arena_found", "{}")))
-
-
-def _outline(study: Study) -> tuple[Any, ...]:
-    return tuple(getattr(study.tank, key) for key in OUTLINE)
-
-
-def _name_of(recording: xr.Dataset) -> str:
-    name = recording.attrs.get("source", "")
-    return f"{name}: " if name else ""

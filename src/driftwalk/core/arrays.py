@@ -6,5 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 Floats = npt.NDArray[np.float64]
+Singles = npt.NDArray[np.float32]
 Bools = npt.NDArray[np.bool_]
 Integers = npt.NDArray[np.int64]
+Indices = npt.NDArray[np.intp]
+Keys = npt.NDArray[np.uint64]
+"""Addresses of random numbers, one for each world."""

@@ -13,6 +13,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.arrays import Keys
+
 
 class Purpose(IntEnum):
     """Purpose of a number within a world's stream; the last word of its counter.
@@ -86,7 +88,7 @@ class VideoStream(IntEnum):
     IMAGE = 3
 
 
-def trial_in(work: str, index: npt.ArrayLike) -> npt.NDArray[np.uint64]:
+def trial_in(work: str, index: npt.ArrayLike) -> Keys:
     """Return the trials of a work's settings: their place in the addresses of random numbers.
 
     Parameters

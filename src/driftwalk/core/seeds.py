@@ -10,14 +10,13 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.arrays import Keys
 from driftwalk.core.errors import InputError
 
 _GAMMA = np.uint64(0x9E3779B97F4A7C15)
 
 
-def world_keys(
-    seed: int, *, trial: npt.ArrayLike, replicate: npt.ArrayLike
-) -> npt.NDArray[np.uint64]:
+def world_keys(seed: int, *, trial: npt.ArrayLike, replicate: npt.ArrayLike) -> Keys:
     """Return the keys of the random streams of worlds.
 
     Three rounds of the SplitMix64 finaliser (Steele, Lea and Flood, OOPSLA 2014), one per part of
@@ -56,9 +55,9 @@ def world_keys(
         return _mix(key ^ replicates.ravel())
 
 
-def _mix(value: npt.NDArray[np.uint64]) -> npt.NDArray[np.uint64]:
+def _mix(value: Keys) -> Keys:
     value = value + _GAMMA
     value = (value ^ (value >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     value = (value ^ (value >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    result: npt.NDArray[np.uint64] = value ^ (value >> np.uint64(31))
+    result: Keys = value ^ (value >> np.uint64(31))
     return result

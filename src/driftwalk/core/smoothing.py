@@ -11,10 +11,8 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.arrays import Bools, Floats, Indices
 from driftwalk.core.errors import InputError
-
-Array = npt.NDArray[np.float64]
-Indices = npt.NDArray[np.intp]
 
 MIN_SAMPLES = 5
 """Samples that a window needs: a parabola through three has no residual to average."""
@@ -30,7 +28,7 @@ _CHUNK = 1 << 15
 
 def local_quadratic(
     time: npt.ArrayLike, values: npt.ArrayLike, *, window: float, gap_factor: float = 1.5
-) -> tuple[Array, Array, Array]:
+) -> tuple[Floats, Floats, Floats]:
     """Fit a parabola by least squares around every sample, and return it at the sample.
 
     The fit at sample ``i`` uses the samples within ``window / 2`` of its time, at the times at
@@ -85,7 +83,7 @@ def local_quadratic(
 
 def _checked(
     time: npt.ArrayLike, values: npt.ArrayLike, window: float, gap_factor: float
-) -> tuple[Array, Array]:
+) -> tuple[Floats, Floats]:
     times, samples = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
     if times.ndim != 1 or samples.ndim not in (1, 2) or samples.shape[0] != times.size:
         raise InputError(
@@ -100,7 +98,7 @@ def _checked(
     return times, samples if samples.ndim == 2 else samples[:, None]
 
 
-def _fit_present(time: Array, values: Array, window: float, gap_factor: float) -> Array:
+def _fit_present(time: Floats, values: Floats, window: float, gap_factor: float) -> Floats:
     """Return value, velocity, acceleration, shape (3, n, k), of samples that are all present."""
     intervals = np.diff(time)
     interval = float(np.median(intervals))
@@ -118,7 +116,7 @@ def _fit_present(time: Array, values: Array, window: float, gap_factor: float) -
     return fit
 
 
-def _windows(time: Array, intervals: Array, reach: float, gap: float) -> tuple[Indices, Indices]:
+def _windows(time: Floats, intervals: Floats, reach: float, gap: float) -> tuple[Indices, Indices]:
     """Return the first and last sample of every window, clipped at gaps."""
     after_gap = np.concatenate([[True], intervals > gap])
     run = np.cumsum(after_gap) - 1
@@ -130,8 +128,8 @@ def _windows(time: Array, intervals: Array, reach: float, gap: float) -> tuple[I
 
 
 def _even_windows(
-    intervals: Array, interval: float, first: Indices, last: Indices, half: int
-) -> npt.NDArray[np.bool_]:
+    intervals: Floats, interval: float, first: Indices, last: Indices, half: int
+) -> Bools:
     """Return which windows are complete, centred and evenly sampled."""
     index = np.arange(first.size)
     odd_before = np.concatenate([[0], np.cumsum(abs(intervals - interval) > _EVEN * interval)])
@@ -139,7 +137,7 @@ def _even_windows(
     return np.asarray(whole & (odd_before[last] == odd_before[first]))
 
 
-def _convolve(values: Array, half: int, interval: float) -> Array:
+def _convolve(values: Floats, half: int, interval: float) -> Floats:
     """Return the fit, shape (3, n, k), as if every window were complete and even."""
     j = np.arange(-half, half + 1, dtype=np.float64)
     s0, s2, s4 = 2.0 * half + 1.0, float(np.sum(j**2)), float(np.sum(j**4))
@@ -161,7 +159,9 @@ def _convolve(values: Array, half: int, interval: float) -> Array:
     return fit
 
 
-def _fit_windows(time: Array, values: Array, at: Indices, first: Indices, last: Indices) -> Array:
+def _fit_windows(
+    time: Floats, values: Floats, at: Indices, first: Indices, last: Indices
+) -> Floats:
     """Return the fit, shape (3, len(at), k), on the windows ``first`` to ``last`` around ``at``.
 
     The parabola is built on polynomials that are orthogonal over the window's own times, with
@@ -170,7 +170,7 @@ def _fit_windows(time: Array, values: Array, at: Indices, first: Indices, last: 
     offsets = range(int((first - at).min()), int((last - at).max()) + 1)
     scale = np.maximum(time[last] - time[at], time[at] - time[first])
 
-    def members(offset: int) -> tuple[Array, Array, Indices]:
+    def members(offset: int) -> tuple[Floats, Floats, Indices]:
         index = at + offset
         inside = (index >= first) & (index <= last)
         index = np.where(inside, index, at)
@@ -191,7 +191,9 @@ def _fit_windows(time: Array, values: Array, at: Indices, first: Indices, last: 
     return _parabola(moments, products, mean, scale, values[at])
 
 
-def _parabola(moments: Array, products: Array, mean: Array, scale: Array, origin: Array) -> Array:
+def _parabola(
+    moments: Floats, products: Floats, mean: Floats, scale: Floats, origin: Floats
+) -> Floats:
     """Return the least-squares parabola at the centre sample from the sums over the window."""
     s0, _, s2, s3, s4 = moments
     # p0 = 1, p1 = c, p2 = c² - (s3/s2) c - s2/s0, orthogonal over the window; c = tau - mean.

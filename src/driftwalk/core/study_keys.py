@@ -1,63 +1,106 @@
-"""Short names for the keys of a study: arguments of functions and options of the command line."""
+"""Short names for the keys of a study: arguments of functions and options of the command line.
 
-from __future__ import annotations
+A name, its type and the key that it sets are declared once, as keyword arguments that a type
+checker knows (`FitSettings`); the tables from names to keys (`FIT_KEYS`) are made of them.
+"""
 
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Annotated, Any, Final, TypedDict
 
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.text.did_you_mean import did_you_mean
 from driftwalk.core.units import Uncertain, split_uncertain
 
-STUDY_KEYS: Final[dict[str, str]] = {
-    "tank_diameter": "tank.diameter_m",
-    "wall_friction": "tank.wall_friction",
-    "wall_restitution": "tank.wall_restitution",
-    "side": "block.side_m",
-    "mass": "block.mass_kg",
-    "depth": "block.depth",
-    "drag_coefficient": "forces.drag_coefficient",
-    "force_std": "forces.force_std_N",
-    "force_interval": "forces.force_interval_s",
-    "time_step": "simulation.time_step_s",
-    "duration": "simulation.duration_s",
-    "sample_rate": "simulation.sample_rate_Hz",
-    "seed": "simulation.seed",
-    "replicates": "simulation.replicates",
-    "step_interval": "steps.step_interval_s",
-    "position_noise": "observation.position_noise_m",
-    "orientation_noise": "observation.orientation_noise_rad",
-    "flow_repeat": "flow.repeat",
-    "flow_start": "flow.start",
-}
+Number = float | str
+"""A number in SI units, or a text with a unit such as ``"16ms"``."""
+
+
+class ModelSettings(TypedDict, total=False):
+    """Parameters of the model and its conditions."""
+
+    tank_diameter: Annotated[Number, "tank.diameter_m"]
+    wall_friction: Annotated[Number, "tank.wall_friction"]
+    wall_restitution: Annotated[Number, "tank.wall_restitution"]
+    side: Annotated[Number, "block.side_m"]
+    mass: Annotated[Number, "block.mass_kg"]
+    depth: Annotated[Number, "block.depth"]
+    drag_coefficient: Annotated[Number, "forces.drag_coefficient"]
+    force_std: Annotated[Number, "forces.force_std_N"]
+    force_interval: Annotated[Number, "forces.force_interval_s"]
+    time_step: Annotated[Number, "simulation.time_step_s"]
+    sample_rate: Annotated[Number, "simulation.sample_rate_Hz"]
+    step_interval: Annotated[Number, "steps.step_interval_s"]
+    position_noise: Annotated[Number, "observation.position_noise_m"]
+    orientation_noise: Annotated[Number, "observation.orientation_noise_rad"]
+    flow_repeat: Annotated[str, "flow.repeat"]
+    flow_start: Annotated[str, "flow.start"]
+
+
+class StudySettings(ModelSettings, total=False):
+    """The same, and the times and numbers of a simulation."""
+
+    duration: Annotated[Number, "simulation.duration_s"]
+    seed: Annotated[int, "simulation.seed"]
+    replicates: Annotated[int, "simulation.replicates"]
+
+
+class CalibrationSettings(ModelSettings, total=False):
+    """The same for a calibration, where seed and replicates are those of its simulations."""
+
+    duration: Annotated[Number, "simulation.duration_s"]
+    seed: Annotated[int, "calibration.seed"]
+    replicates: Annotated[int, "calibration.replicates"]
+    bootstrap: Annotated[int, "calibration.bootstrap"]
+    confidence: Annotated[Number, "calibration.confidence"]
+
+
+class AssemblySettings(ModelSettings, total=False):
+    """The same for self-assembly, where seed, duration and confidence are those of its runs."""
+
+    replicates: Annotated[int, "simulation.replicates"]
+    blocks: Annotated[int, "assembly.blocks"]
+    runs: Annotated[int, "assembly.runs"]
+    duration: Annotated[Number, "assembly.duration_s"]
+    seed: Annotated[int, "assembly.seed"]
+    latching: Annotated[str, "assembly.latching"]
+    connector_distance: Annotated[Number, "assembly.connector_distance_m"]
+    connector_axis: Annotated[Number, "assembly.connector_axis_rad"]
+    hidden_face_drag: Annotated[str, "assembly.hidden_face_drag"]
+    chirality: Annotated[str, "assembly.chirality"]
+    block_restitution: Annotated[Number, "assembly.block_restitution"]
+    block_friction: Annotated[Number, "assembly.block_friction"]
+    confidence: Annotated[Number, "assembly.confidence"]
+
+
+class FitSettings(StudySettings, total=False):
+    """The same for a likelihood fit."""
+
+    angle: Annotated[str, "fit.angle"]
+    spline_spacing: Annotated[Number, "fit.spline_spacing_m"]
+    confidence: Annotated[Number, "fit.confidence"]
+    switching_times: Annotated[list[Number], "fit.switching_times_s"]
+    flow_labels: Annotated[list[str], "fit.flow_labels"]
+    precision: Annotated[Number, "fit.drag_coefficient_precision"]
+    law: Annotated[str, "fit.law"]
+    pressure_gradient: Annotated[str, "fit.pressure_gradient"]
+    added_mass: Annotated[Number, "fit.added_mass_share"]
+    added_mass_std: Annotated[Number, "fit.added_mass_share_std"]
+    mass_std: Annotated[Number, "fit.mass_std_kg"]
+    side_std: Annotated[Number, "fit.side_std_m"]
+    force_memory: Annotated[Number, "fit.force_memory_s"]
+    flow_strength: Annotated[str, "fit.flow_strength"]
+    camera: Annotated[str, "fit.camera"]
+
+
+def _keys_of(settings: type) -> dict[str, str]:
+    return {name: hint.__metadata__[0] for name, hint in settings.__annotations__.items()}
+
+
+STUDY_KEYS: Final = _keys_of(StudySettings)
 """From an argument's name to the key of the study that it sets."""
-
-CALIBRATION_KEYS: Final[dict[str, str]] = {
-    **STUDY_KEYS,
-    "seed": "calibration.seed",
-    "replicates": "calibration.replicates",
-    "bootstrap": "calibration.bootstrap",
-    "confidence": "calibration.confidence",
-}
-"""The same for a calibration, where seed and replicates are those of its simulations."""
-
-ASSEMBLY_KEYS: Final[dict[str, str]] = {
-    **STUDY_KEYS,
-    "blocks": "assembly.blocks",
-    "runs": "assembly.runs",
-    "duration": "assembly.duration_s",
-    "seed": "assembly.seed",
-    "latching": "assembly.latching",
-    "connector_distance": "assembly.connector_distance_m",
-    "connector_axis": "assembly.connector_axis_rad",
-    "hidden_face_drag": "assembly.hidden_face_drag",
-    "chirality": "assembly.chirality",
-    "block_restitution": "assembly.block_restitution",
-    "block_friction": "assembly.block_friction",
-    "confidence": "assembly.confidence",
-}
-"""The same for self-assembly, where seed, duration and confidence are those of its runs."""
-
+CALIBRATION_KEYS: Final = _keys_of(CalibrationSettings)
+ASSEMBLY_KEYS: Final = _keys_of(AssemblySettings)
+FIT_KEYS: Final = _keys_of(FitSettings)
 SENSITIVITY_KEYS: Final[dict[str, str]] = {
     **ASSEMBLY_KEYS,
     "runs": "sensitivity.runs",
@@ -65,7 +108,6 @@ SENSITIVITY_KEYS: Final[dict[str, str]] = {
     "seed": "sensitivity.seed",
 }
 """The same for a sensitivity analysis, where runs are those of a setting."""
-
 FLOW_KEYS: Final[dict[str, str]] = {
     **STUDY_KEYS,
     "cells": "flow.cells",
@@ -76,27 +118,6 @@ FLOW_KEYS: Final[dict[str, str]] = {
     "inertia": "flow.inertia",
 }
 """The same for the extraction of a flow field."""
-
-FIT_KEYS: Final[dict[str, str]] = {
-    **STUDY_KEYS,
-    "angle": "fit.angle",
-    "spline_spacing": "fit.spline_spacing_m",
-    "confidence": "fit.confidence",
-    "switching_times": "fit.switching_times_s",
-    "flow_labels": "fit.flow_labels",
-    "precision": "fit.drag_coefficient_precision",
-    "law": "fit.law",
-    "pressure_gradient": "fit.pressure_gradient",
-    "added_mass": "fit.added_mass_share",
-    "added_mass_std": "fit.added_mass_share_std",
-    "mass_std": "fit.mass_std_kg",
-    "side_std": "fit.side_std_m",
-    "force_memory": "fit.force_memory_s",
-    "flow_strength": "fit.flow_strength",
-    "camera": "fit.camera",
-}
-"""The same for a likelihood fit."""
-
 RECOVER_KEYS: Final[dict[str, str]] = {
     "recordings": "recover.recordings",
     "duration": "recover.durations_s",

@@ -14,19 +14,29 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats, Singles
 from driftwalk.core.errors import InputError
 from driftwalk.core.extras import require_opencv
 from driftwalk.core.random_streams import VideoStream
-from driftwalk.datasets.synthetic_video_bars import Bars, marker_points, place_bars
-from driftwalk.datasets.synthetic_video_camera import image_to_world, local_scale, world_to_image
-from driftwalk.datasets.synthetic_video_light import Glare, ripples, shading
-from driftwalk.datasets.synthetic_video_settings import Colour, VideoSettings
+from driftwalk.datasets.synthetic_video_light import (
+    Bars,
+    Glare,
+    marker_points,
+    place_bars,
+    ripples,
+    shading,
+)
+from driftwalk.datasets.synthetic_video_settings import (
+    Colour,
+    VideoSettings,
+    image_to_world,
+    local_scale,
+    world_to_image,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = npt.NDArray[np.float64]
-Grid = npt.NDArray[np.float32]
 Image = npt.NDArray[np.uint8]
 
 _FINE: Final = 3
@@ -185,12 +195,12 @@ class _Painter:
     def __init__(self, trajectory: xr.Dataset, settings: VideoSettings) -> None:
         self.cv2: Any = require_opencv("drawing a synthetic video")
         self.settings = settings
-        self.time: Array = np.asarray(trajectory["time"].values, dtype=np.float64)
+        self.time: Floats = np.asarray(trajectory["time"].values, dtype=np.float64)
         columns = [trajectory[name].transpose("time", "body").values for name in ("x", "y")]
         theta = trajectory["theta"].transpose("time", "body").values
         if (np.isfinite(columns[0]) & ~np.isfinite(theta)).any():
             raise InputError("a block is drawn with its orientation, and the trajectory lacks some")
-        self.poses: Array = np.stack([*columns, theta], axis=-1).astype(np.float64)
+        self.poses: Floats = np.stack([*columns, theta], axis=-1).astype(np.float64)
         self.rates = _rates(self.time, self.poses)
         self.bars: Bars = place_bars(settings, self.time, self.poses.shape[1])
         self.glare = Glare(settings)
@@ -202,7 +212,7 @@ class _Painter:
         # Drawing new noise for each frame would take longer than all the rest.
         generator = np.random.default_rng([settings.seed, VideoStream.IMAGE])
         count = _NOISE_FRAMES * self.tank.size if settings.noise_std > 0.0 else 0
-        self.noise: Grid = generator.standard_normal(count, dtype=np.float32)
+        self.noise: Singles = generator.standard_normal(count, dtype=np.float32)
         self.noise *= np.float32(settings.noise_std)
 
     def frame(self, index: int, time: float) -> Image:
@@ -226,14 +236,14 @@ class _Painter:
         # Rounds, and stops at 255; what is below zero is stopped before.
         return np.asarray(self.cv2.convertScaleAbs(self.cv2.max(image, 0.0)), dtype=np.uint8)
 
-    def _noise_of(self, index: int) -> Grid:
+    def _noise_of(self, index: int) -> Singles:
         """Return the noise of a frame: a stretch of the drawn noise, from a place of its own."""
         size = self.tank.size
         generator = np.random.default_rng([self.settings.seed, VideoStream.IMAGE, index])
         start = int(generator.integers(self.noise.size - size))
         return self.noise[start : start + size].reshape(self.tank.shape)
 
-    def visible(self, index: int) -> Array:
+    def visible(self, index: int) -> Floats:
         """Return the share of each marker that can be seen in a frame, shape (bodies,)."""
         shares = np.full(self.poses.shape[1], np.nan)
         for body in np.flatnonzero(np.isfinite(self.poses[index, :, 0])):
@@ -250,7 +260,7 @@ class _Painter:
             shares[body] = seen.mean()
         return shares
 
-    def _paint_block(self, image: Grid, index: int, body: int) -> None:
+    def _paint_block(self, image: Singles, index: int, body: int) -> None:
         box = self._box(index, body)
         if box is None:
             return
@@ -268,7 +278,7 @@ class _Painter:
         part *= (1.0 - bar)[..., None]
         part += bar[..., None] * _bgr(_BAR)
 
-    def _coverage(self, index: int, body: int, rows: slice, columns: slice) -> list[Grid]:
+    def _coverage(self, index: int, body: int, rows: slice, columns: slice) -> list[Singles]:
         """Return the shares of the pixels of a box that block, discs and bar cover."""
         fine = tuple(slice(s.start * _FINE, s.stop * _FINE) for s in (rows, columns))
         world = self.world[fine]
@@ -285,7 +295,7 @@ class _Painter:
         means = total.reshape(4, height, _FINE, width, _FINE).mean(axis=(2, 4))
         return list(means)
 
-    def _shapes(self, index: int, body: int, world: Grid, pose: Array, scale: float) -> Grid:
+    def _shapes(self, index: int, body: int, world: Singles, pose: Floats, scale: float) -> Singles:
         settings = self.settings
         own = self._to_marker(pose[:, None, :].astype(np.float32), world)
         turn = settings.marker_angle_rad
@@ -304,7 +314,7 @@ class _Painter:
         covered[0] = np.maximum(covered[0], covered[1] + covered[2])
         return np.asarray(covered, dtype=np.float32)
 
-    def _moments(self, rate: Array, rows: slice) -> list[Array]:
+    def _moments(self, rate: Floats, rows: slice) -> list[Floats]:
         """Return the moments at which a block is drawn, relative to its time stamp, by row [s]."""
         settings = self.settings
         row = np.arange(rows.start, rows.stop)
@@ -331,20 +341,20 @@ class _Painter:
             return None
         return rows, columns
 
-    def _to_marker(self, pose: Array, world: npt.NDArray[Any]) -> Array:
+    def _to_marker(self, pose: Floats, world: npt.NDArray[Any]) -> Floats:
         """Return world points in the frame of a marker: u from disc 1 to disc 2."""
         angle = pose[..., 2] + self.settings.marker_angle_rad
         x, y = world[..., 0] - pose[..., 0], world[..., 1] - pose[..., 1]
         cos, sin = np.cos(angle), np.sin(angle)
         return np.stack([cos * x + sin * y, cos * y - sin * x], axis=-1)
 
-    def _from_marker(self, pose: Array, own: Array) -> Array:
+    def _from_marker(self, pose: Floats, own: Floats) -> Floats:
         angle = pose[2] + self.settings.marker_angle_rad
         cos, sin = np.cos(angle), np.sin(angle)
         x, y = own[..., 0], own[..., 1]
         return np.stack([pose[0] + cos * x - sin * y, pose[1] + sin * x + cos * y], axis=-1)
 
-    def _world_map(self, fine: int) -> Grid:
+    def _world_map(self, fine: int) -> Singles:
         """Return the world point of every fine point of the image."""
         settings = self.settings
         column = (np.arange(settings.width_px * fine) + 0.5) / fine - 0.5
@@ -352,7 +362,7 @@ class _Painter:
         pixels = np.stack(np.meshgrid(column, row), axis=-1)
         return image_to_world(settings, pixels).astype(np.float32)
 
-    def _empty_tank(self) -> Grid:
+    def _empty_tank(self) -> Singles:
         settings = self.settings
         image = np.empty((settings.height_px, settings.width_px, 3), dtype=np.float32)
         image[:] = _bgr(settings.water)
@@ -368,11 +378,11 @@ class _Painter:
         return image
 
 
-def _bgr(colour: Colour) -> Grid:
+def _bgr(colour: Colour) -> Singles:
     return np.asarray(colour[::-1], dtype=np.float32)
 
 
-def _rates(time: Array, poses: Array) -> Array:
+def _rates(time: Floats, poses: Floats) -> Floats:
     """Return velocities and turning rates, zero where they are not known, shape of the poses."""
     rates = np.zeros_like(poses)
     if time.size > 1:

@@ -2,86 +2,55 @@
 
 from __future__ import annotations
 
+import os
+import secrets
+import shutil
+from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from driftwalk.core.errors import InputError
+from driftwalk.core.files.atomic import PARTIAL, rename, storage_error
+from driftwalk.core.files.run_layout import faults_of
 from driftwalk.core.text.did_you_mean import did_you_mean
 from driftwalk.export.data.targets import DATA_TARGETS
-from driftwalk.export.figures.targets import FIGURE_TARGETS
-from driftwalk.export.target import Source, Target, Verification
+from driftwalk.export.figures import FIGURE_TARGETS
+from driftwalk.export.target import Source, Target
 
 
-# A target's module is imported when it is used: help answers at once.
-def _write_mujoco(source: Source, folder: Path) -> list[Path]:
-    from driftwalk.export.simulators.mujoco import write_mujoco
+def _simulator(place: str) -> Callable[..., Any]:
+    """Return a function of `driftwalk.export.simulators`, imported when it is called."""
+    module, _, name = place.partition(":")
 
-    return write_mujoco(source, folder)
+    # Help answers at once: a simulator's module is imported when it is used.
+    def call(*arguments: Any) -> Any:
+        return getattr(import_module(f"driftwalk.export.simulators.{module}"), name)(*arguments)
 
-
-def _verify_mujoco(folder: Path) -> Verification:
-    from driftwalk.export.simulators.mujoco import verify_mujoco
-
-    return verify_mujoco(folder)
-
-
-def _require_mujoco() -> None:
-    from driftwalk.export.simulators.mujoco import require_mujoco
-
-    require_mujoco()
-
-
-def _write_webots(source: Source, folder: Path) -> list[Path]:
-    from driftwalk.export.simulators.webots import write_webots
-
-    return write_webots(source, folder)
-
-
-def _verify_webots(folder: Path) -> Verification:
-    from driftwalk.export.simulators.webots import verify_webots
-
-    return verify_webots(folder)
-
-
-def _write_gazebo(source: Source, folder: Path) -> list[Path]:
-    from driftwalk.export.simulators.gazebo import write_gazebo
-
-    return write_gazebo(source, folder)
-
-
-def _verify_gazebo(folder: Path) -> Verification:
-    from driftwalk.export.simulators.gazebo import verify_gazebo
-
-    return verify_gazebo(folder)
-
-
-def _require_compiler() -> None:
-    from driftwalk.export.simulators.compiled import compiler
-
-    compiler()
+    return call
 
 
 _SIMULATORS: Final = (
     Target(
         name="mujoco",
         gives="the tank as MJCF, the water as a Python module, and verify.py",
-        write=_write_mujoco,
-        verify=_verify_mujoco,
-        require=_require_mujoco,
+        write=_simulator("mujoco:write_mujoco"),
+        verify=_simulator("mujoco:verify_mujoco"),
+        require=_simulator("mujoco:require_mujoco"),
     ),
     Target(
         name="webots",
         gives="a world, a PROTO and a physics plugin in C",
-        write=_write_webots,
-        verify=_verify_webots,
-        require=_require_compiler,
+        write=_simulator("webots:write_webots"),
+        verify=_simulator("webots:verify_webots"),
+        require=_simulator("compiled:compiler"),
     ),
     Target(
         name="gazebo",
         gives="a world and a system plugin in C++",
-        write=_write_gazebo,
-        verify=_verify_gazebo,
-        require=_require_compiler,
+        write=_simulator("gazebo:write_gazebo"),
+        verify=_simulator("gazebo:verify_gazebo"),
+        require=_simulator("compiled:compiler"),
     ),
 )
 _ALL: Final = (*_SIMULATORS, *DATA_TARGETS, *FIGURE_TARGETS)
@@ -108,3 +77,84 @@ def target_named(name: str) -> Target:
         f"there is no export to '{name}'{did_you_mean(name, TARGETS)}; "
         f"what can be made: {', '.join(TARGETS)}"
     )
+
+
+def export_run(source: Source, target: Target, folder: Path) -> list[Path]:
+    """Write an export into a folder, whole or not at all, and return its files.
+
+    Parameters
+    ----------
+    source : Source
+        What is exported.
+    target : Target
+        To what.
+    folder : Path
+        A folder that is empty or not there yet.
+
+    Raises
+    ------
+    InputError
+        When the folder holds something, or the source is not what the target takes; nothing is
+        written then.
+    RunDirectoryError
+        When the folder cannot be written.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> from driftwalk.export import target_named
+    >>> source, target = Source(Path("run")), target_named("mujoco")
+    >>> files = export_run(source, target, Path("tank"))  # doctest: +SKIP
+    """
+    require_empty(folder)
+    require_used(source, target)
+    for fault in faults_of(source.path, unread=True):
+        source.tell(fault)
+    made = folder.parent / f".{folder.name}{PARTIAL}{os.getpid()}-{secrets.token_hex(4)}"
+    try:
+        made.mkdir()
+        files = [path.relative_to(made) for path in target.write(source, made)]
+        # A folder that is renamed onto another takes its place where that is empty, on POSIX only.
+        if folder.exists():
+            folder.rmdir()
+        rename(made, folder)
+    except BaseException as error:
+        shutil.rmtree(made, ignore_errors=True)
+        refusal = storage_error(error, folder)
+        if refusal is None:
+            raise
+        raise refusal from error
+    return [folder / path for path in files]
+
+
+def require_used(source: Source, target: Target) -> None:
+    """Refuse what is said for another target than this one.
+
+    Raises
+    ------
+    InputError
+        Names it.
+    """
+    for name in ("flow", "seed", "replicate", "speed"):
+        if getattr(source, name) is not None and name not in target.options:
+            raise InputError(f"an export to {target.name} has no use for `{name}`: leave it out")
+
+
+def require_empty(folder: Path) -> None:
+    """Refuse a folder with anything in it, and one whose own folder is not there.
+
+    Raises
+    ------
+    InputError
+        Says which.
+    """
+    if folder.is_dir():
+        inside = next(folder.iterdir(), None)
+        if inside is not None:
+            raise InputError(
+                f"{folder} is not empty ({inside.name}, ...): name a new or an empty folder"
+            )
+    elif folder.exists() or folder.is_symlink():
+        raise InputError(f"{folder} is a file: name a new or an empty folder")
+    elif not folder.parent.is_dir():
+        raise InputError(f"{folder}: the folder {folder.parent} does not exist")

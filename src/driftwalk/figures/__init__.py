@@ -1,11 +1,15 @@
 """The figures of a run: a table from their names to what draws them, and the writer of such."""
 
-from driftwalk.figures.assembly import LABELS, assembly_figures
+from driftwalk.figures.assembly import LABELS, assembly_figures, sensitivity_figures
 from driftwalk.figures.calibration import calibration_figures
-from driftwalk.figures.fit import fit_figures, plot_flow_error
-from driftwalk.figures.laws import laws_figures, plot_laws
+from driftwalk.figures.fit import (
+    check_figures,
+    fit_figures,
+    laws_figures,
+    plot_flow_error,
+    plot_laws,
+)
 from driftwalk.figures.model_calibration import model_calibration_figures
-from driftwalk.figures.model_check import check_figures
 from driftwalk.figures.model_comparison import comparison_figures, plot_models
 from driftwalk.figures.recovery import (
     model_recovery_figures,
@@ -15,7 +19,6 @@ from driftwalk.figures.recovery import (
     plot_recovery_error,
     recovery_figures,
 )
-from driftwalk.figures.sensitivity import sensitivity_figures
 from driftwalk.figures.write import write_figures
 
 __all__ = [

@@ -8,17 +8,10 @@ from typing import TYPE_CHECKING, Any
 from driftwalk.figures.write import Figures, marked_simulated
 from driftwalk.plot.distances import LEGEND_ORDER, plot_ks_map, plot_refined_map
 from driftwalk.plot.flow_field import COMPONENTS, SPEED_LABEL, plot_flow, velocity_of
-from driftwalk.plot.panels import plot_density_panels, shared_setting_text
-from driftwalk.plot.parts.parameters import plot_parameters
-from driftwalk.plot.parts.style import (
-    DOUBLE_COLUMN_MM,
-    SINGLE_COLUMN_MM,
-    add_colorbar,
-    letter_panels,
-    new_figure,
-)
-from driftwalk.plot.path import plot_trajectory
-from driftwalk.plot.step_densities import plot_steps
+from driftwalk.plot.parts import style
+from driftwalk.plot.parts.labels import plot_parameters
+from driftwalk.plot.step_densities import plot_density_panels, plot_steps, shared_setting_text
+from driftwalk.plot.tank import plot_trajectory
 from driftwalk.plot.uncertainty import plot_distance_profile, plot_validation
 from driftwalk.schema import body_track
 
@@ -77,7 +70,9 @@ def flow_figure(flow: xr.Dataset) -> Figure:
     """Return Fig. 2: the block's velocity next to the water's, or the water's alone."""
     has_block = all(name in flow for name in COMPONENTS["block"])
     if not has_block:
-        figure = new_figure(width_mm=SINGLE_COLUMN_MM, height_mm=76.0, layout="compressed")
+        figure = style.new_figure(
+            width_mm=style.SINGLE_COLUMN_MM, height_mm=76.0, layout="compressed"
+        )
         plot_flow(flow, figure.add_subplot())
         return figure
     import numpy as np
@@ -86,26 +81,26 @@ def flow_figure(flow: xr.Dataset) -> Figure:
         float(np.nanmax(np.hypot(*velocity_of(flow, field)[:2]), initial=0.0)) / 100.0
         for field in ("block", "water")
     )
-    figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=92.0, layout="compressed")
+    figure = style.new_figure(width_mm=style.DOUBLE_COLUMN_MM, height_mm=92.0, layout="compressed")
     row = list(figure.subplots(1, 2, sharex=True, sharey=True))
     plot_flow(flow, row[0], field="block", speed_limit=top, colorbar="none")
     plot_flow(flow, row[1], field="water", speed_limit=top, colorbar="none")
     row[1].set_ylabel("")
     filled = any(str(patch.get_label()).startswith("filled") for patch in row[1].patches)
-    letter_panels(
+    style.letter_panels(
         row,
         [
             "block velocity",
             "corrected flow" + (" (hatched: filled, not measured)" if filled else ""),
         ],
     )
-    add_colorbar(row[1].collections[0], row, SPEED_LABEL)
+    style.add_colorbar(row[1].collections[0], row, SPEED_LABEL)
     return figure
 
 
 def trajectory_figure(trajectory: xr.Dataset, *, body: str | None = None) -> Figure:
     """Return Fig. 5a: the first minute of the path."""
-    figure = new_figure(width_mm=SINGLE_COLUMN_MM, height_mm=80.0, layout="compressed")
+    figure = style.new_figure(width_mm=style.SINGLE_COLUMN_MM, height_mm=80.0, layout="compressed")
     ax = figure.add_subplot()
     time = body_track(trajectory, body).time
     if time.size and time[-1] - time[0] > EXCERPT_S:
@@ -121,7 +116,7 @@ def trajectory_figure(trajectory: xr.Dataset, *, body: str | None = None) -> Fig
 
 def steps_figure(calibration: xr.Dataset) -> Figure:
     """Return Fig. 5b: the recording's steps with their marginals."""
-    figure = new_figure(width_mm=SINGLE_COLUMN_MM, height_mm=76.0)
+    figure = style.new_figure(width_mm=style.SINGLE_COLUMN_MM, height_mm=76.0)
     plot_steps(
         calibration["recording_step_length"].values,
         calibration["recording_turning_angle"].values,
@@ -138,14 +133,14 @@ def ks_map_figure(calibration: xr.Dataset) -> Figure:
     if len(plot_parameters(calibration)) == 1:
         return _profiles_figure(calibration)
     if "refined_ks_distance" not in calibration:
-        figure = new_figure(width_mm=SINGLE_COLUMN_MM, height_mm=80.0)
+        figure = style.new_figure(width_mm=style.SINGLE_COLUMN_MM, height_mm=80.0)
         _legend_above(plot_ks_map(calibration, figure.add_subplot()))
         return figure
-    figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=80.0)
+    figure = style.new_figure(width_mm=style.DOUBLE_COLUMN_MM, height_mm=80.0)
     row = list(figure.subplots(1, 2))
     plot_ks_map(calibration, row[0])
     plot_refined_map(calibration, row[1])
-    letter_panels(row, ["whole box", "near the optimum (lines: fitted surface)"])
+    style.letter_panels(row, ["whole box", "near the optimum (lines: fitted surface)"])
     handles, labels = row[0].get_legend_handles_labels()
     order = sorted(range(len(labels)), key=lambda index: LEGEND_ORDER.index(labels[index]))
     figure.legend(
@@ -159,7 +154,7 @@ def ks_map_figure(calibration: xr.Dataset) -> Figure:
 
 def panels_figure(calibration: xr.Dataset, parameter: str) -> Figure:
     """Return the densities along a parameter: Fig. 7 (drag coefficient), Fig. 8 (force)."""
-    figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=62.0)
+    figure = style.new_figure(width_mm=style.DOUBLE_COLUMN_MM, height_mm=62.0)
     row = list(figure.subplots(1, 4, sharex=True, sharey=True))
     plot_density_panels(calibration, row, parameter=parameter)
     shared = shared_setting_text(calibration, parameter=parameter)
@@ -173,9 +168,9 @@ def validation_figure(calibration: xr.Dataset) -> Figure:
     parameters = plot_parameters(calibration)
     if any(f"bootstrap_{one.name}" not in calibration for one in parameters):
         return _profiles_figure(calibration)
-    figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=68.0)
+    figure = style.new_figure(width_mm=style.DOUBLE_COLUMN_MM, height_mm=68.0)
     row = plot_validation(calibration, list(figure.subplots(1, len(parameters) + 1)))
-    letter_panels(row, [*(f"along {one.symbol}" for one in parameters), "estimates"])
+    style.letter_panels(row, [*(f"along {one.symbol}" for one in parameters), "estimates"])
     handles, labels = row[0].get_legend_handles_labels()
     more = zip(*row[-1].get_legend_handles_labels(), strict=True)
     for handle, label in more:
@@ -188,11 +183,11 @@ def validation_figure(calibration: xr.Dataset) -> Figure:
 
 def _profiles_figure(calibration: xr.Dataset) -> Figure:
     parameters = plot_parameters(calibration)
-    figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=68.0)
+    figure = style.new_figure(width_mm=style.DOUBLE_COLUMN_MM, height_mm=68.0)
     row = list(figure.subplots(1, len(parameters), squeeze=False)[0])
     for parameter, ax in zip(parameters, row, strict=True):
         plot_distance_profile(calibration, ax, parameter=parameter.name)
-    letter_panels(row, [f"along {one.symbol}" for one in parameters])
+    style.letter_panels(row, [f"along {one.symbol}" for one in parameters])
     figure.legend(*row[0].get_legend_handles_labels(), loc="outside upper center", ncols=7)
     return figure
 

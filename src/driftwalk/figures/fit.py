@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Sequence
 from functools import partial
@@ -11,26 +12,26 @@ import numpy as np
 
 from driftwalk.core.errors import InputError
 from driftwalk.figures.calibration import trajectory_figure
-from driftwalk.figures.laws import laws_figures
-from driftwalk.figures.model_check import check_figures
 from driftwalk.figures.write import Figures, marked_simulated
 from driftwalk.plot.flow_field import plot_flow
+from driftwalk.plot.model_check import (
+    legend_of,
+    plot_innovations,
+    plot_predicted_steps,
+    plot_residual_map,
+    plot_residual_time,
+)
+from driftwalk.plot.parts import style
 from driftwalk.plot.parts.arena import arena_of, draw_arena, label_position
 from driftwalk.plot.parts.labels import in_unit
-from driftwalk.plot.parts.style import (
-    DOUBLE_COLUMN_MM,
-    add_colorbar,
-    axes_or_new,
-    letter_panels,
-    new_figure,
-    speed_colormap,
-)
 from driftwalk.schema import FLAGS
+from driftwalk.schema.answers.force_law import compared_laws
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
 
 ERROR_LABEL = "standard error (mm/s)"
 TITLE_WIDTH = 90
@@ -70,17 +71,17 @@ def plot_flow_error(flow: xr.Dataset, ax: Axes | None = None) -> Axes:
     absent = [name for name in names if name not in flow]
     if absent:
         raise InputError(f"the flow field has no {' and '.join(absent)}")
-    ax = axes_or_new(ax, layout="compressed")
+    ax = style.axes_or_new(ax, layout="compressed")
     error = 10.0 * np.maximum(*(in_unit(flow[name], "cm/s", stored="m s-1") for name in names))
     shown = np.where(flow["flag"].values == FLAGS["measured"], error, np.nan)
     x, y = (in_unit(flow[axis], "cm", stored="m") for axis in ("x", "y"))
-    mesh = ax.pcolormesh(x, y, shown, cmap=speed_colormap(), vmin=0.0, shading="nearest")
+    mesh = ax.pcolormesh(x, y, shown, cmap=style.speed_colormap(), vmin=0.0, shading="nearest")
     mesh.set_rasterized(True)
     outline = draw_arena(ax, arena_of(flow, None))
     if outline is not None:
         mesh.set_clip_path(outline)
     label_position(ax)
-    add_colorbar(mesh, ax, ERROR_LABEL)
+    style.add_colorbar(mesh, ax, ERROR_LABEL)
     return ax
 
 
@@ -134,14 +135,163 @@ def _label(flow: xr.Dataset) -> list[str]:
 
 
 def _flow_figure(flow: xr.Dataset) -> Figure:
-    figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=80.0, layout="compressed")
+    figure = style.new_figure(width_mm=style.DOUBLE_COLUMN_MM, height_mm=80.0, layout="compressed")
     row = list(figure.subplots(1, 2, sharex=True, sharey=True))
     plot_flow(flow, row[0])
     plot_flow_error(flow, row[1])
     row[1].set_ylabel("")
     filled = bool((flow["flag"].values == FLAGS["filled"]).any())
     title = " ".join(["fitted flow", *_label(flow)])
-    letter_panels(row, [title + (" (hatched: filled)" if filled else ""), "its standard error"])
+    style.letter_panels(
+        row, [title + (" (hatched: filled)" if filled else ""), "its standard error"]
+    )
     if "intervals" in flow.attrs:
         figure.suptitle(textwrap.fill(f"from {flow.attrs['intervals']}", TITLE_WIDTH))
+    return figure
+
+
+LEAST_SHOWN = 1e-5
+"""Smallest width of the even part of the axis [nats]."""
+MOST_EVEN = 20.0
+"""Largest loss, in standard errors, up to which the axis is even; beyond it is logarithmic."""
+
+
+def laws_figures(fit: xr.Dataset) -> Figures:
+    """Return the figure of the laws that a fit has compared.
+
+    Parameters
+    ----------
+    fit : xarray.Dataset
+        A `fit` whose laws were compared.
+
+    Returns
+    -------
+    dict of str to callable
+        ``laws``.
+
+    Raises
+    ------
+    InputError
+        When no laws were compared.
+
+    Examples
+    --------
+    ``write_figures(laws_figures(fit), "fit/figures")``
+    """
+    if "compared_law" not in fit.dims:
+        raise InputError("the fit has compared no force laws: `compare_laws` adds them")
+    return {"laws": lambda: _laws_figure(fit)}
+
+
+def _laws_figure(fit: xr.Dataset) -> Figure:
+    figure = style.new_figure(width_mm=1.4 * style.SINGLE_COLUMN_MM, height_mm=55.0)
+    plot_laws(fit, figure.add_subplot())
+    return figure
+
+
+def plot_laws(fit: xr.Dataset, ax: Axes) -> Axes:
+    """Plot by how much each law predicts held out samples worse than the best.
+
+    Parameters
+    ----------
+    fit : xarray.Dataset
+        A `fit` whose laws were compared.
+    ax : matplotlib.axes.Axes
+        Where to plot.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The same axes.
+
+    Examples
+    --------
+    ``plot_laws(fit, ax)``
+    """
+    every = compared_laws(fit)
+    known = [law for law in reversed(every) if law.solved]
+    if not known:
+        ax.set_title("no law has a solution")
+        return ax
+    names = [law.name for law in known]
+    lost, std = (np.array(one) for one in zip(*((law.loss, law.std) for law in known), strict=True))
+    place = np.arange(len(names))
+    ax.errorbar(lost, place, xerr=std, fmt="o", ms=3.0, lw=0.9, capsize=2.0, color=style.BLUE)
+    even = max(float(std.max()), LEAST_SHOWN)
+    if float(lost.max()) > MOST_EVEN * even:
+        # From a power of ten on: no other label of the axis is then next to that of 0.
+        ax.set_xscale("symlog", linthresh=10.0 ** math.ceil(math.log10(even)))
+    else:
+        ax.locator_params(axis="x", nbins=5)
+    ax.axvline(0.0, color=style.MUTED, lw=0.6)
+    ax.set_yticks(place, names)
+    ax.set_ylim(-0.6, len(names) - 0.4)
+    ax.set_xlabel("loss per held out sample, against the best law (nats)")
+    unsolved = len(every) - len(known)
+    if unsolved:
+        ax.set_title(f"not shown, without a solution: {unsolved}")
+    return ax
+
+
+def check_figures(check: xr.Dataset) -> Figures:
+    """Return the figures of a model check.
+
+    Parameters
+    ----------
+    check : xarray.Dataset
+        A `model_check`.
+
+    Returns
+    -------
+    dict of str to callable
+        ``check_innovations``, ``check_map``, ``check_time`` and, where recordings could be
+        simulated, ``check_steps``.
+
+    Examples
+    --------
+    ``write_figures(check_figures(check), "fit/figures")``
+    """
+    figures: Figures = {
+        "check_innovations": lambda: _innovations_figure(check),
+        "check_map": lambda: _map_figure(check),
+        "check_time": lambda: _time_figure(check),
+    }
+    if "step_length_edge" in check:
+        figures["check_steps"] = lambda: _steps_figure(check)
+    return marked_simulated(figures, check)
+
+
+def _innovations_figure(check: xr.Dataset) -> Figure:
+    figure = style.new_figure(width_mm=style.DOUBLE_COLUMN_MM, height_mm=62.0)
+    ax = plot_innovations(check, figure.add_subplot())
+    figure.legend(**legend_of(ax), loc="outside upper center", ncols=2 + check.sizes["component"])
+    return figure
+
+
+def _map_figure(check: xr.Dataset) -> Figure:
+    figure = style.new_figure(width_mm=style.DOUBLE_COLUMN_MM, height_mm=80.0, layout="compressed")
+    row = list(figure.subplots(1, 2, sharex=True, sharey=True))
+    plot_residual_map(check, row[0])
+    plot_residual_map(check, row[1], show="noise")
+    row[1].set_ylabel("")
+    style.letter_panels(row, ["mean error of prediction", "its noise"])
+    return figure
+
+
+def _time_figure(check: xr.Dataset) -> Figure:
+    figure = style.new_figure(width_mm=style.DOUBLE_COLUMN_MM, height_mm=58.0)
+    row = list(figure.subplots(1, 2, sharex=True))
+    plot_residual_time(check, row[0])
+    plot_residual_time(check, row[1], show="noise")
+    style.letter_panels(row, ["flow (bars: 95 %)", "noise (bars: 95 %)"])
+    return figure
+
+
+def _steps_figure(check: xr.Dataset) -> Figure:
+    figure = style.new_figure(width_mm=style.DOUBLE_COLUMN_MM, height_mm=66.0)
+    row = list(figure.subplots(1, 2))
+    plot_predicted_steps(check, row[0])
+    plot_predicted_steps(check, row[1], show="turning_angle")
+    style.letter_panels(row, ["step length", "turning angle"])
+    figure.legend(**legend_of(row[0]), loc="outside upper center", ncols=3)
     return figure

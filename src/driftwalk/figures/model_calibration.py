@@ -8,16 +8,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from driftwalk.figures.write import Figures
-from driftwalk.plot.parts.model_panels import label_checks, plot_check_ratios, plot_own_aspects
-from driftwalk.plot.parts.style import (
-    BLUE,
-    DOUBLE_COLUMN_MM,
-    INK,
-    MUTED,
-    ORANGE,
-    letter_panels,
-    new_figure,
-)
+from driftwalk.plot.model_check import label_checks, plot_check_ratios, plot_own_aspects
+from driftwalk.plot.parts import style
 from driftwalk.schema.check import require_kind
 
 if TYPE_CHECKING:
@@ -73,8 +65,8 @@ def pairs_figure(calibration: xr.Dataset) -> Figure:
     """Return the draws of each pair of parameters, with those of each on the diagonal."""
     names = [str(name) for name in calibration["parameter"].values]
     count = len(names)
-    width = max(DOUBLE_COLUMN_MM, PANEL_MM * count)
-    figure = new_figure(width_mm=width, height_mm=max(LEAST_MM, PANEL_MM * count) + ABOVE_MM)
+    width = max(style.DOUBLE_COLUMN_MM, PANEL_MM * count)
+    figure = style.new_figure(width_mm=width, height_mm=max(LEAST_MM, PANEL_MM * count) + ABOVE_MM)
     axes = figure.subplots(count, count, sharex="col", squeeze=False)
     for row in range(count):
         for column in range(count):
@@ -109,7 +101,9 @@ def profiles_figure(calibration: xr.Dataset) -> Figure:
     names = [str(name) for name in calibration["parameter"].values]
     across = min(PROFILES_ACROSS, len(names))
     rows = -(-len(names) // across)
-    figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=PROFILE_MM * rows + ABOVE_MM)
+    figure = style.new_figure(
+        width_mm=style.DOUBLE_COLUMN_MM, height_mm=PROFILE_MM * rows + ABOVE_MM
+    )
     axes = figure.subplots(rows, across, sharey=True, squeeze=False)
     confidence = float(calibration.attrs["confidence"])
     level = float(chi2.ppf(confidence, 1))
@@ -129,15 +123,17 @@ def profiles_figure(calibration: xr.Dataset) -> Figure:
 
 def quality_figure(calibration: xr.Dataset) -> Figure:
     """Return the distances in each aspect, and facts that were not fitted."""
-    figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=72.0)
+    figure = style.new_figure(width_mm=style.DOUBLE_COLUMN_MM, height_mm=72.0)
     aspects, checks = figure.subplots(1, 2)
     held = calibration["held_out_distance"].values
     name = str(calibration.attrs["model"])
-    aspects.plot(held, np.arange(held.size), "o", ms=3.5, color=BLUE, label=name)
+    aspects.plot(held, np.arange(held.size), "o", ms=3.5, color=style.BLUE, label=name)
     plot_own_aspects(calibration, aspects, label="the recording's own parts")
-    plot_check_ratios(calibration, checks, color=BLUE)
+    plot_check_ratios(calibration, checks, color=style.BLUE)
     label_checks(calibration, checks)
-    letter_panels([aspects, checks], ["distance from blocks not seen", "not fitted, 20 worlds"])
+    style.letter_panels(
+        [aspects, checks], ["distance from blocks not seen", "not fitted, 20 worlds"]
+    )
     figure.legend(*aspects.get_legend_handles_labels(), loc="outside upper center", ncols=2)
     return figure
 
@@ -146,7 +142,7 @@ def _plot_one(calibration: xr.Dataset, index: int, ax: Axes) -> None:
     """Draw the histogram of a parameter's draws, its interval and its estimate."""
     one = calibration.isel(parameter=index)
     values = one["draws"].values
-    ax.hist(values, bins=BINS, color=MUTED)
+    ax.hist(values, bins=BINS, color=style.MUTED)
     _plot_answer(one, ax)
     ax.set_yticks([])
     ax.xaxis.set_major_locator(_few_ticks())
@@ -155,8 +151,8 @@ def _plot_one(calibration: xr.Dataset, index: int, ax: Axes) -> None:
 def _plot_profile(calibration: xr.Dataset, index: int, level: float, ax: Axes) -> None:
     """Draw a parameter's profile, the level of the interval, and the interval of the draws."""
     one = calibration.isel(parameter=index)
-    ax.plot(one["profile_value"].values, one["profile_misfit"].values, color=BLUE)
-    ax.axhline(level, color=MUTED, lw=0.8)
+    ax.plot(one["profile_value"].values, one["profile_misfit"].values, color=style.BLUE)
+    ax.axhline(level, color=style.MUTED, lw=0.8)
     _plot_answer(one, ax)
     ax.set_ylim(0.0, HIGHEST_RISE)
     ax.xaxis.set_major_locator(_few_ticks())
@@ -167,17 +163,19 @@ def _plot_answer(one: xr.Dataset, ax: Axes) -> None:
     """Draw a parameter's interval and estimate, and say where it is not determined."""
     for end in one["interval"].values:
         if np.isfinite(end):
-            ax.axvline(float(end), color=BLUE, lw=0.8, ls="--")
-    ax.axvline(float(one["estimate"]), color=ORANGE, lw=1.2)
+            ax.axvline(float(end), color=style.BLUE, lw=0.8, ls="--")
+    ax.axvline(float(one["estimate"]), color=style.ORANGE, lw=1.2)
     if not bool(one["determined"]):
-        ax.set_title("not determined", loc="left", fontsize="x-small", color=INK)
+        ax.set_title("not determined", loc="left", fontsize="x-small", color=style.INK)
 
 
 def _plot_pair(calibration: xr.Dataset, column: int, row: int, ax: Axes) -> None:
     """Draw the draws of two parameters and the estimate."""
     across, up = (calibration.isel(parameter=index) for index in (column, row))
-    ax.plot(across["draws"].values, up["draws"].values, ".", ms=1.2, color=BLUE, alpha=0.6)
-    ax.plot(float(across["estimate"]), float(up["estimate"]), "+", ms=5.0, mew=1.2, color=ORANGE)
+    ax.plot(across["draws"].values, up["draws"].values, ".", ms=1.2, color=style.BLUE, alpha=0.6)
+    ax.plot(
+        float(across["estimate"]), float(up["estimate"]), "+", ms=5.0, mew=1.2, color=style.ORANGE
+    )
     ax.yaxis.set_major_locator(_few_ticks())
 
 

@@ -7,17 +7,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from driftwalk.figures.write import Figures
-from driftwalk.plot.parts.model_panels import label_checks, plot_check_ratios, plot_own_aspects
-from driftwalk.plot.parts.style import (
-    BLUE,
-    DOUBLE_COLUMN_MM,
-    INK,
-    MUTED,
-    ORANGE,
-    axes_or_new,
-    letter_panels,
-    new_figure,
-)
+from driftwalk.plot.model_check import label_checks, plot_check_ratios, plot_own_aspects
+from driftwalk.plot.parts import style
 from driftwalk.schema.answers.model_comparison import own_score
 from driftwalk.schema.check import require_kind
 
@@ -28,7 +19,7 @@ if TYPE_CHECKING:
 
 SHOWN: Final = 3
 """Models of which the facts that were not fitted are drawn."""
-COLORS: Final = (BLUE, ORANGE, "#009E73")
+COLORS: Final = (style.BLUE, style.ORANGE, "#009E73")
 ROW_MM: Final = 5.0
 AXIS_MM: Final = 12.0
 BELOW_MM: Final = 60.0
@@ -64,14 +55,14 @@ def comparison_figures(comparison: xr.Dataset) -> Figures:
 
 def _figure(comparison: xr.Dataset) -> Figure:
     rows = comparison.sizes["model"]
-    figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=ROW_MM * rows + OTHERS_MM)
+    figure = style.new_figure(width_mm=style.DOUBLE_COLUMN_MM, height_mm=ROW_MM * rows + OTHERS_MM)
     grid = figure.add_gridspec(2, 2, height_ratios=(ROW_MM * rows + AXIS_MM, BELOW_MM))
     scores = figure.add_subplot(grid[0, :])
     aspects, checks = figure.add_subplot(grid[1, 0]), figure.add_subplot(grid[1, 1])
     plot_models(comparison, scores)
     _plot_aspects(comparison, aspects)
     _plot_checks(comparison, checks)
-    letter_panels(
+    style.letter_panels(
         [scores, aspects, checks],
         ["on blocks that none was fitted to", "the same by aspect", "not fitted, 20 worlds"],
     )
@@ -103,10 +94,10 @@ def plot_models(comparison: xr.Dataset, ax: Axes | None = None) -> Axes:
     ``plot_models(comparison)``
     """
     require_kind(comparison, "model_comparison")
-    ax = axes_or_new(ax)
+    ax = style.axes_or_new(ax)
     shown = comparison.isel(model=slice(None, None, -1))
     place = np.arange(shown.sizes["model"])
-    for baseline, color, marker in ((False, BLUE, "o"), (True, MUTED, "D")):
+    for baseline, color, marker in ((False, style.BLUE, "o"), (True, style.MUTED, "D")):
         of = shown["baseline"].values.astype(bool) == baseline
         if of.any():
             ax.errorbar(
@@ -121,7 +112,7 @@ def plot_models(comparison: xr.Dataset, ax: Axes | None = None) -> Axes:
                 label="walk of recorded steps" if baseline else "motion model",
             )
     own = own_score(comparison)
-    ax.axvline(own, color=INK, lw=0.6, ls="--", label="the recording's own parts")
+    ax.axvline(own, color=style.INK, lw=0.6, ls="--", label="the recording's own parts")
     names = [
         f"{name}{' (explains)' if explained else ''}"
         for name, explained in zip(shown["model"].values, shown["explained"].values, strict=True)

@@ -10,18 +10,7 @@ import numpy as np
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
 from driftwalk.figures.write import Figures
-from driftwalk.plot.parts.style import (
-    BLUE,
-    DOUBLE_COLUMN_MM,
-    INK,
-    MUTED,
-    ORANGE,
-    PALE,
-    SINGLE_COLUMN_MM,
-    axes_or_new,
-    letter_panels,
-    new_figure,
-)
+from driftwalk.plot.parts import style
 from driftwalk.schema.check import require_kind
 
 if TYPE_CHECKING:
@@ -35,7 +24,7 @@ SHOWN: Final = {
     "tracking_noise": ("tracking_noise_m", 1e3, "tracking noise (mm)"),
 }
 """Attribute that holds the truth, factor to the unit shown, and label."""
-COLORS: Final = (BLUE, ORANGE, "#009E73", "#CC79A7")
+COLORS: Final = (style.BLUE, style.ORANGE, "#009E73", "#CC79A7")
 """By use of the angle."""
 LABELLED: Final = ("drag_coefficient", "force_std")
 BETWEEN_GROUPS: Final = 2.0
@@ -83,7 +72,7 @@ def plot_recovery(
     if parameter not in SHOWN:
         raise InputError(f"parameter must be one of {', '.join(SHOWN)}, got {parameter!r}")
     attribute, factor, label = SHOWN[parameter]
-    ax = axes_or_new(ax)
+    ax = style.axes_or_new(ax)
     for at, used, color, angle, part in _groups(recovery):
         value, low, high = (
             factor * part[f"{parameter}{end}"].values for end in ("", "_low", "_high")
@@ -96,7 +85,7 @@ def plot_recovery(
                 label=angle if face == color else None,
             )  # fmt: skip
     truth = factor * float(recovery.attrs[attribute])
-    ax.axhline(truth, color=INK, lw=0.7, zorder=0, label="truth")
+    ax.axhline(truth, color=style.INK, lw=0.7, zorder=0, label="truth")
     ax.set_ylabel(label)
     _label_groups(ax, recovery)
     return ax
@@ -127,7 +116,7 @@ def plot_flow_recovery(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:
     ``plot_flow_recovery(recovery)``
     """
     require_kind(recovery, "recovery", "recovery_study makes one")
-    ax = axes_or_new(ax)
+    ax = style.axes_or_new(ax)
     for at, used, color, angle, part in _groups(recovery):
         error = 100.0 * part["flow_error"].values
         for kept, face in ((used, color), (~used, "white")):
@@ -169,7 +158,7 @@ def plot_recovery_error(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:
     ``plot_recovery_error(recovery)``
     """
     require_kind(recovery, "recovery", "recovery_study makes one")
-    ax = axes_or_new(ax)
+    ax = style.axes_or_new(ax)
     minutes = recovery["duration"].values / 60.0
     needed = recovery["needed_duration"].values / 60.0
     drawn = np.geomspace(minutes[0] / 1.5, 1.5 * np.nanmax([minutes[-1], *needed]), 50)
@@ -192,7 +181,7 @@ def plot_recovery_error(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:
         ax.fill_between(drawn, 100.0 * low / root, 100.0 * high / root, color=color, alpha=0.15)
     asked = float(recovery.attrs["drag_coefficient_precision"])
     if np.isfinite(asked):
-        ax.axhline(100.0 * asked, color=MUTED, lw=0.7, dashes=(3, 3), label="wanted")
+        ax.axhline(100.0 * asked, color=style.MUTED, lw=0.7, dashes=(3, 3), label="wanted")
     if np.isfinite(recovery["drag_coefficient_error_scale"].values).any():
         # Without a point a logarithmic axis has no range.
         _logarithmic(ax)
@@ -232,7 +221,7 @@ def recovery_figures(recovery: xr.Dataset) -> Figures:
 
 
 def _recovery_figure(recovery: xr.Dataset) -> Figure:
-    figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=125.0)
+    figure = style.new_figure(width_mm=style.DOUBLE_COLUMN_MM, height_mm=125.0)
     rows = list(figure.subplots(3, 1, sharex=True))
     for name, ax in zip(LABELLED, rows, strict=False):
         plot_recovery(recovery, name, ax)
@@ -243,12 +232,12 @@ def _recovery_figure(recovery: xr.Dataset) -> Figure:
     figure.legend(handles, texts, loc="outside upper right", ncols=len(texts))
     confidence = float(recovery.attrs["confidence"])
     titles = (f"drag coefficient, {confidence:.0%} intervals", "stochastic force", "flow")
-    letter_panels(rows, list(titles))
+    style.letter_panels(rows, list(titles))
     return figure
 
 
 def _error_figure(recovery: xr.Dataset) -> Figure:
-    figure = new_figure(width_mm=SINGLE_COLUMN_MM, height_mm=75.0)
+    figure = style.new_figure(width_mm=style.SINGLE_COLUMN_MM, height_mm=75.0)
     plot_recovery_error(recovery, figure.add_subplot())
     return figure
 
@@ -277,7 +266,7 @@ def _label_groups(ax: Axes, recovery: xr.Dataset) -> None:
     ax.set_xticks(first + 0.5 * (count - 1), [_length(s) for s in recovery["duration"].values])
     ax.tick_params(axis="x", length=0.0)
     for begin in first[1:]:
-        ax.axvline(begin - 0.5 * (BETWEEN_GROUPS + 1.0), color=PALE, lw=0.8)
+        ax.axvline(begin - 0.5 * (BETWEEN_GROUPS + 1.0), color=style.PALE, lw=0.8)
     ax.set_xlim(-1.5, first[-1] + count + 0.5)
     ax.set_xlabel(f"length of the recording; each point is one of {count}")
 
@@ -327,17 +316,17 @@ def plot_model_recovery(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:
     ``plot_model_recovery(recovery)``
     """
     require_kind(recovery, "model_recovery", "recover_model makes one")
-    ax = axes_or_new(ax)
+    ax = style.axes_or_new(ax)
     names = [str(name) for name in recovery["parameter"].values]
     count = recovery.sizes["recording"]
     errors, ends = _percent(recovery, "error"), _percent(recovery, "error_interval", "bound")
     offsets = ROW_SPREAD * ((np.arange(count) + 0.5) / count - 0.5)
     known = recovery["determined"].transpose("recording", "parameter").values.astype(bool)
-    ax.axvline(0.0, color=INK, lw=0.7, zorder=0)
+    ax.axvline(0.0, color=style.INK, lw=0.7, zorder=0)
     for row in range(len(names)):
         for kept, color, marker, face, words in (
-            (known[:, row], BLUE, "o", BLUE, "determined"),
-            (~known[:, row], ORANGE, "s", "white", "not determined"),
+            (known[:, row], style.BLUE, "o", style.BLUE, "determined"),
+            (~known[:, row], style.ORANGE, "s", "white", "not determined"),
         ):
             at, value = (row + offsets)[kept], errors[kept, row]
             low, high = ends[kept, row].T
@@ -348,7 +337,7 @@ def plot_model_recovery(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:
                 label=words if row == 0 else None,
             )  # fmt: skip
         if row:
-            ax.axhline(row - 0.5, color=PALE, lw=0.8, zorder=0)
+            ax.axhline(row - 0.5, color=style.PALE, lw=0.8, zorder=0)
     ax.set_yticks(np.arange(len(names)), [name.replace("_", " ") for name in names])
     ax.tick_params(axis="y", length=0.0)
     ax.set_ylim(len(names) - 0.5, -0.5)
@@ -385,7 +374,7 @@ def model_recovery_figures(model_recovery: xr.Dataset) -> Figures:
 
 def _model_figure(recovery: xr.Dataset) -> Figure:
     rows = recovery.sizes["parameter"]
-    figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=ROW_MM * rows + AROUND_MM)
+    figure = style.new_figure(width_mm=style.DOUBLE_COLUMN_MM, height_mm=ROW_MM * rows + AROUND_MM)
     ax = plot_model_recovery(recovery, figure.add_subplot())
     facts = recovery.attrs
     ax.set_title(

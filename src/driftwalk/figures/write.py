@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import csv
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.atomic import atomic_path
 from driftwalk.core.provenance import file_sha256
-from driftwalk.figures.drawn_data import write_drawn_data
 from driftwalk.plot.parts.style import add_footer, print_style
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
 
 # What would make two files of the same figure differ (the date) or says nothing of the data.
 METADATA: dict[str, dict[str, Any]] = {
@@ -138,3 +143,163 @@ def _print(figure: Figure, name: str, path: Path, sentence: str) -> None:
     # The methods have no types.
     about = {**METADATA[name], **({SENTENCE[name]: sentence} if sentence else {})}
     getattr(canvases[name](figure), f"print_{name}")(path, metadata=about)
+
+
+COLUMNS: Final = (
+    *("panel", "title", "x_axis", "y_axis", "artist", "kind", "label", "part"),
+    *("x", "y", "dx", "dy", "value"),
+)
+"""The head of the table. x and y are in the units that the labels of the axes name."""
+
+Rows = Iterator[tuple[int, npt.NDArray[np.float64]]]
+"""The number of a part of an artist, and its rows of x, y, dx, dy and value; NaN where it has
+none."""
+
+
+def write_drawn_data(figure: Figure, path: Path) -> None:
+    """Write every number that is drawn in the axes of a figure as CSV.
+
+    One row per point: the panel with its title and the labels of its axes, the artist, what kind it
+    is and its label in the legend, and the numbers. A line, the outline of an area and a contour
+    have x and y; an arrow also has dx and dy, a rectangle its lower left corner and its width
+    and height; points, cells of a map and contours have the value that is their colour. A legend
+    and other artists that are placed relative to the axes are no data, and left out.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+        The figure, laid out.
+    path : Path
+        The file to make.
+
+    Examples
+    --------
+    >>> from driftwalk.plot.parts.style import new_figure
+    >>> write_drawn_data(new_figure(width_mm=90, height_mm=60), Path("a.csv"))  # doctest: +SKIP
+    """
+    with path.open("w", encoding="utf-8", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(COLUMNS)
+        for panel, ax in enumerate(_axes_of(figure), start=1):
+            title = ax.get_title(loc="left") or ax.get_title()
+            head = [panel, title, ax.get_xlabel(), ax.get_ylabel()]
+            for number, artist in enumerate(_artists(ax), start=1):
+                label = str(artist.get_label())
+                about = [number, type(artist).__name__, "" if label.startswith("_") else label]
+                for part, rows in _rows_of(artist):
+                    for row in rows.tolist():
+                        table.writerow([*head, *about, part, *map(_text, row)])
+
+
+def _axes_of(figure: Figure) -> list[Axes]:
+    """Return the axes of a figure and those inside others, such as insets."""
+    found: list[Axes] = []
+    waiting: list[Any] = list(figure.axes)
+    while waiting:
+        ax = waiting.pop(0)
+        if ax not in found:
+            found.append(ax)
+            waiting += list(ax.child_axes)
+    return found
+
+
+def _artists(ax: Axes) -> list[Any]:
+    """Return what is drawn in the data's own coordinates, in the order in which it was added."""
+    return [
+        artist
+        for artist in (*ax.lines, *ax.collections, *ax.images, *ax.patches)
+        if artist.get_visible() and _in_data(artist, ax)
+    ]
+
+
+def _in_data(artist: Any, ax: Axes) -> bool:
+    moves: Any = artist.get_transform()
+    places = getattr(artist, "get_offset_transform", artist.get_transform)()
+    return bool(moves.contains_branch(ax.transData) or places.contains_branch(ax.transData))
+
+
+def _rows_of(artist: Any) -> Rows:
+    """Give the rows of an artist: of a line, a field or points, else of an outline."""
+    from matplotlib.collections import PathCollection, QuadMesh
+    from matplotlib.contour import ContourSet
+    from matplotlib.image import AxesImage
+    from matplotlib.lines import Line2D
+    from matplotlib.quiver import Quiver
+
+    if isinstance(artist, Line2D):
+        yield 0, _points(artist.get_xydata())
+    elif isinstance(artist, Quiver):
+        yield 0, _table(artist.X, artist.Y, artist.U, artist.V, artist.get_array())
+    elif isinstance(artist, QuadMesh):
+        yield 0, _of_mesh(artist)
+    elif isinstance(artist, AxesImage):
+        yield 0, _of_image(artist)
+    elif isinstance(artist, ContourSet):
+        for part, (level, path) in enumerate(zip(artist.levels, artist.get_paths(), strict=False)):
+            yield part, _points(path.vertices, value=level)
+    elif isinstance(artist, PathCollection):
+        yield 0, _points(artist.get_offsets(), value=artist.get_array())
+    else:
+        yield from _outlines(artist)
+
+
+def _outlines(artist: Any) -> Rows:
+    from matplotlib.patches import Circle, Rectangle
+
+    if isinstance(artist, Rectangle):
+        x, y = artist.get_xy()
+        yield 0, _table(x, y, artist.get_width(), artist.get_height())
+    elif isinstance(artist, Circle):
+        x, y = artist.center
+        yield 0, _table(x, y, 2.0 * artist.radius, 2.0 * artist.radius)
+    elif hasattr(artist, "get_paths"):
+        for part, path in enumerate(artist.get_paths()):
+            yield part, _points(path.vertices)
+    elif hasattr(artist, "get_path"):
+        own = artist.get_path().transformed(artist.get_patch_transform())
+        yield 0, _points(own.vertices)
+
+
+def _of_mesh(mesh: Any) -> npt.NDArray[np.float64]:
+    corners = np.asarray(mesh.get_coordinates(), dtype=np.float64)
+    middle = (corners[:-1, :-1] + corners[1:, :-1] + corners[:-1, 1:] + corners[1:, 1:]) / 4.0
+    values = _filled(mesh.get_array())
+    # Colours that go smoothly from corner to corner have a value at each corner.
+    places = middle if values.size == middle[..., 0].size else corners
+    return _table(places[..., 0], places[..., 1], value=values)
+
+
+def _of_image(image: Any) -> npt.NDArray[np.float64]:
+    """Return the cells of an image, or nothing of a picture that has colours and no values."""
+    values = _filled(image.get_array())
+    if values.ndim != 2:
+        return np.zeros((0, 5))
+    left, right, bottom, top = image.get_extent()
+    rows, columns = values.shape
+    if image.origin == "upper":
+        bottom, top = top, bottom
+    x = left + (np.arange(columns) + 0.5) * (right - left) / columns
+    y = bottom + (np.arange(rows) + 0.5) * (top - bottom) / rows
+    across, up = np.meshgrid(x, y)
+    return _table(across, up, value=values)
+
+
+def _points(places: Any, value: Any = None) -> npt.NDArray[np.float64]:
+    found = _filled(places).reshape(-1, 2)
+    return _table(found[:, 0], found[:, 1], value=value)
+
+
+def _filled(values: Any) -> npt.NDArray[np.float64]:
+    return np.ma.filled(np.ma.asarray(values, dtype=np.float64), np.nan)
+
+
+def _table(
+    x: Any, y: Any, dx: Any = None, dy: Any = None, value: Any = None
+) -> npt.NDArray[np.float64]:
+    columns = [_filled(np.nan if one is None else one).ravel() for one in (x, y, dx, dy, value)]
+    return np.stack(np.broadcast_arrays(*columns), axis=1)
+
+
+def _text(number: float) -> str:
+    """Return a number with all of its digits, nothing where there is none."""
+    return "" if np.isnan(number) else repr(number)

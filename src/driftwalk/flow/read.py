@@ -22,8 +22,7 @@ from driftwalk.flow.readers.pivlab import is_pivlab
 from driftwalk.flow.readers.units import FieldOptions, RawField, raw_to_si
 from driftwalk.flow.rows import grid_rows
 from driftwalk.schema import FLAGS, build_flow_field, check_flow_field
-from driftwalk.schema.check import kind_name
-from driftwalk.schema.stores.contents import check_contents
+from driftwalk.schema.check import check_contents, kind_name
 from driftwalk.schema.stores.netcdf import is_netcdf, open_netcdf
 
 if TYPE_CHECKING:

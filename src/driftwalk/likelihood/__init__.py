@@ -3,11 +3,11 @@
 from driftwalk.likelihood.check.run import Judged, check_model, judge_fit
 from driftwalk.likelihood.contacts.estimate import estimate_wall
 from driftwalk.likelihood.fit import check_fit, fit_motion
-from driftwalk.likelihood.flow_of_fit import fitted_flow
+from driftwalk.likelihood.flow_intervals import fitted_flow
 from driftwalk.likelihood.law.held_out import compare_laws
-from driftwalk.likelihood.recover.run import FitRecovery, recovery_study
-from driftwalk.likelihood.recover.score import score_fit
+from driftwalk.likelihood.recovery import FitRecovery, recovery_study
 from driftwalk.likelihood.refuse import fit_work
+from driftwalk.likelihood.score import score_fit
 
 __all__ = [
     "FitRecovery",

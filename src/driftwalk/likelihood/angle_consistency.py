@@ -9,20 +9,19 @@ its orientation is counted clockwise.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from driftwalk.core.arrays import Floats
 from driftwalk.likelihood.filter.filter_pass import Passes
-from driftwalk.likelihood.filter.series import Series
 from driftwalk.likelihood.interval_inflation import parameter_covariance, parameter_facts
 from driftwalk.likelihood.newton import FROM_NEAR, Mode, ModeSearch, require_mode
 from driftwalk.likelihood.prior import Prior
+from driftwalk.likelihood.refuse import BREAKDOWN
 from driftwalk.likelihood.reml import Restricted, restricted_drag
-from driftwalk.likelihood.solution import BREAKDOWN
-from driftwalk.likelihood.spline import Floats, Spline, basis_matrix
+from driftwalk.likelihood.spline import Spline
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
@@ -40,11 +39,10 @@ def angle_given_facts(
     found = restricted.point
     known = {**found.fixed, **found.opened}
     start = replace(found, log_lever=None, log_angle_noise=None, opened={}, fixed=known)
-    prior = Prior(passes)
     try:
-        search = ModeSearch(passes, prior, study.fit.iterations)
+        search = ModeSearch(passes, Prior(passes), study.fit.iterations)
         other = require_mode(search.find(start, mode.weights, held=FROM_NEAR))
-        again = restricted_drag(passes, other, prior, intensity=False)
+        again = restricted_drag(search, other, intensity=False)
         covariance = parameter_covariance(other, again)
         own = parameter_covariance(mode, restricted)
         apart = abs(again.point.log_drag - found.log_drag)
@@ -61,17 +59,17 @@ def angle_given_facts(
     }
 
 
-def spin_correlation(coefficients: Floats, spline: Spline, series: Sequence[Series]) -> float:
+def spin_correlation(coefficients: Floats, passes: Passes) -> float:
     """Return the correlation of the block's spin with the vorticity of the water around it.
 
     A block in water turns with it, at about half the vorticity. With the orientation counted the
     wrong way round the correlation is negative.
     """
     spins, vorticities = [], []
-    for one in series:
+    for one in passes.series:
         seen = np.isfinite(one.x) & np.isfinite(one.y) & (one.excluded == 0)
         spins.append(one.omega[seen])
-        vorticities.append(_vorticity(coefficients, spline, one.x[seen], one.y[seen]))
+        vorticities.append(_vorticity(coefficients, passes.spline, one.x[seen], one.y[seen]))
     spin, vorticity = np.concatenate(spins), np.concatenate(vorticities)
     size = float(np.sqrt((spin**2).mean() * (vorticity**2).mean()))
     return float((spin * vorticity).mean()) / size if size > 0.0 else 0.0
@@ -82,8 +80,7 @@ def _vorticity(coefficients: Floats, spline: Spline, x: Floats, y: Floats) -> Fl
     step = 0.05 * spline.spacing
 
     def at(component: int, dx: float, dy: float) -> Floats:
-        along_x = basis_matrix((x + dx - spline.origin_x) / spline.spacing, spline.columns)
-        along_y = basis_matrix((y + dy - spline.origin_y) / spline.spacing, spline.rows)
+        along_x, along_y = spline.design(x + dx, y + dy)
         return np.asarray(np.einsum("ni,ji,nj->n", along_x, coefficients[component], along_y))
 
     return (at(1, step, 0.0) - at(1, -step, 0.0) - at(0, 0.0, step) + at(0, 0.0, -step)) / (

@@ -3,44 +3,35 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from driftwalk.conditions import jump_warnings, unstated_warning
 from driftwalk.core.processors import one_blas_thread
 from driftwalk.core.run_stages import Course, share_of_search, tell_nobody
-from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.angle_consistency import angle_given_facts, spin_correlation
-from driftwalk.likelihood.filter.excerpt import pieces
 from driftwalk.likelihood.filter.filter_pass import Passes
-from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.interval_inflation import (
     open_where_undetermined,
     parameter_covariance,
     parameter_facts,
     with_mended_frames,
 )
-from driftwalk.likelihood.law.assumptions import assumptions_of
-from driftwalk.likelihood.law.facts import law_facts, side_slopes, stated_drag
+from driftwalk.likelihood.law.force_law import assumptions_of, side_slopes, stated_drag
 from driftwalk.likelihood.law.forward_selection import LawResult
 from driftwalk.likelihood.law.search import LawSearch
-from driftwalk.likelihood.newton import WORK, ModeSearch, Passed, Tell, work_of_pass
+from driftwalk.likelihood.newton import WORK, Mode, ModeSearch, Passed, Tell, pieces, work_of_pass
 from driftwalk.likelihood.preparation import (
     AngleUse,
     PreparedRecordings,
     as_list,
-    body_of,
-    is_simulated,
     prepare,
-    series_of,
-    spline_of,
-    usable_intervals,
 )
 from driftwalk.likelihood.prior import Prior
+from driftwalk.likelihood.refuse import BREAKDOWN, require_noise_below_motion, solved
 from driftwalk.likelihood.reml import Restricted, restricted_drag
-from driftwalk.likelihood.result import Whiteness, build_fit, visited_shares, whiteness_of
-from driftwalk.likelihood.solution import BREAKDOWN, require_noise_below_motion, solved
+from driftwalk.likelihood.result import build_fit, law_facts, visited_shares, whiteness_of
 from driftwalk.likelihood.start import first_point, first_weights
 from driftwalk.likelihood.warnings import precision_facts, warnings_of
 from driftwalk.schema.answers.facts import texts
@@ -108,70 +99,58 @@ def fit_motion(
     from driftwalk.model import Study
 
     chosen = study if study is not None else Study()
-    many = as_list(recordings)
-    ready = prepare(many, chosen, angle, body)
-    spline = spline_of(chosen, outline_of(chosen.tank.to_arena()))
-    flows = len(ready.intervals.labels)
-    passes = Passes(ready.series, body_of(chosen, ready.angle), spline, flows)
-    start = _start(passes, ready, chosen)
-    assumptions = assumptions_of(chosen, ready.angle, recordings=len(ready.tracks), flows=flows)
-    course = Course(tell or tell_nobody, _usual_parts(passes, ready.angle))
-    prior = Prior(passes)
-    weights = first_weights(ready.tracks, spline)
+    ready = prepare(as_list(recordings), chosen, angle, body)
+    passes = ready.passes
+    start = first_point(ready, passes.spline)
+    assumptions = assumptions_of(
+        chosen, ready.angle, recordings=len(ready.tracks), flows=passes.flows
+    )
+    course = Course(tell or tell_nobody, _usual_parts(passes))
     # The stages stay in one function: they share most of their variables.
     with solved(ready.wall_share):
         passed = _work_listener(course, _usual_search(passes))
-        search = ModeSearch(passes, prior, chosen.fit.iterations, passed)
-        law = LawSearch(search, assumptions).find(start, weights)
+        search = ModeSearch(passes, Prior(passes), chosen.fit.iterations, passed)
+        law = LawSearch(search, assumptions).find(start, first_weights(ready.tracks, passes.spline))
         course.begin("drag")
         try:
-            restricted = restricted_drag(passes, law.mode, prior)
+            restricted = restricted_drag(search, law.mode)
         except BREAKDOWN:
             # What was opened may have no restricted likelihood; the law without it has one.
             law = replace(law, mode=law.base)
-            restricted = restricted_drag(passes, law.mode, prior)
-        noise = math.exp(restricted.point.log_noise)
-    require_noise_below_motion(noise, ready.tracks, ready.wall_share)
+            restricted = restricted_drag(search, law.mode)
+    require_noise_below_motion(math.exp(restricted.point.log_noise), ready.tracks, ready.wall_share)
     with solved(ready.wall_share):
         innovations = passes.innovations(restricted.point)
-    whiteness = whiteness_of(
-        [
-            (white, used & one.settled)
-            for (white, used), one in zip(innovations, ready.series, strict=True)
-        ]
-    )
-    consistency: dict[str, Any] = {}
+    counted = [
+        (white, used & one.settled)
+        for (white, used), one in zip(innovations, ready.series, strict=True)
+    ]
+    turning: dict[str, Any] = {}
+    # How the block's spin goes with the water's, where orientations and one flow are.
+    if ready.angle != "none" and ready.intervals.steady:
+        turning["spin_correlation"] = spin_correlation(start.coefficients, passes)
     if ready.angle == "state":
         course.begin("angle as given")
-        outline = outline_of(chosen.tank.to_arena())
-        given = series_of(ready.parts, chosen, outline, "given", ready.places)
-        passes_given = Passes(given, body_of(chosen, "given"), spline, flows)
-        consistency = angle_given_facts(passes_given, law.mode, restricted, chosen)
+        given = ready.with_angle("given").passes
+        turning |= angle_given_facts(given, law.mode, restricted, chosen)
     with solved(ready.wall_share):
-        facts = _parameter_facts(passes, law, restricted, ready, chosen)
+        parameters = _parameter_facts(search, law.mode, restricted, ready)
     facts = {
-        **facts,
+        **parameters,
         **law_facts(law, assumptions),
-        **_turning(start, passes),
-        **consistency,
-        **whiteness._asdict(),
-        **_recording_facts(many, ready),
+        **turning,
+        **whiteness_of(counted)._asdict(),
+        **ready.facts,
         **_search_facts(law, restricted),
         "wetted_depth_m": chosen.wetted_depth_m,
     }
-    fit = build_fit(
-        spline,
-        law,
-        restricted,
-        ready.series,
-        study=chosen,
-        oriented=ready.angle != "none",
-        intervals=ready.intervals,
-        first=float(ready.tracks[0].time[0]),
-        facts=facts,
-    )
+    fit = build_fit(ready, law, restricted, facts)
     shares = visited_shares(fit)
-    warnings = _warnings(many, ready, facts, whiteness, shares, chosen, body)
+    unstated = unstated_warning(chosen, about="block")
+    warnings = [] if unstated is None else [unstated]
+    for recording, track in zip(ready.recordings, ready.tracks, strict=True):
+        warnings += jump_warnings(recording, body, track=track)
+    warnings += warnings_of(facts, shares, ready.intervals, side_m=chosen.block.side_m)
     return described(
         fit.assign(visited_share=((), min(shares))).assign_coords(
             warning=("warning", texts(warnings))
@@ -180,37 +159,19 @@ def fit_motion(
 
 
 def _parameter_facts(
-    passes: Passes, law: LawResult, restricted: Restricted, ready: PreparedRecordings, study: Study
+    search: ModeSearch, mode: Mode, restricted: Restricted, ready: PreparedRecordings
 ) -> dict[str, Any]:
     """Return the parameters with their intervals, and the precision of C_d."""
-    mode = law.mode
-    mended = ready.dropped_frames / max(ready.samples, 1)
+    study = ready.study
+    mended = sum(one.frames for one in ready.dropped) / max(ready.samples, 1)
     covariance = with_mended_frames(parameter_covariance(mode, restricted), mended)
     stated = open_where_undetermined(covariance, mode, restricted)
-    slopes = side_slopes(passes, law, restricted, study)
+    slopes = side_slopes(search, mode, restricted, study)
     std = math.inf if mode.diverged else math.sqrt(covariance[0, 0])
     return {
         **parameter_facts(restricted.point, stated, study, by_side=slopes),
         "maximum_likelihood_drag_coefficient": stated_drag(mode.point, study),
         **precision_facts(std, ready.duration, study),
-    }
-
-
-def _recording_facts(many: Sequence[xr.Dataset], ready: PreparedRecordings) -> dict[str, Any]:
-    """Return what stands in a fit of its recordings."""
-    return {
-        "wall_share": ready.wall_share,
-        "angle": ready.angle,
-        "samples": ready.samples,
-        "mistakes": ready.mistakes,
-        "jumps_removed": ready.jumps_removed,
-        "dropped_frames": ready.dropped_frames,
-        "dropped_places": ready.dropped_places,
-        "intervals_usable": usable_intervals(ready.series),
-        "duration_s": ready.duration,
-        "recordings": len(ready.tracks),
-        "source": ", ".join(str(one.attrs.get("source", "")) for one in many),
-        "simulated_recording": "yes" if any(is_simulated(one) for one in many) else "no",
     }
 
 
@@ -226,35 +187,6 @@ def _search_facts(law: LawResult, restricted: Restricted) -> dict[str, Any]:
         "roughness_weight": mode.weights.roughness,
         "size_weight": mode.weights.size,
     }
-
-
-def _warnings(
-    many: Sequence[xr.Dataset],
-    ready: PreparedRecordings,
-    facts: Mapping[str, Any],
-    whiteness: Whiteness,
-    shares: Sequence[float],
-    study: Study,
-    body: str | None,
-) -> list[str]:
-    """Return the warnings of a fit, in sentences."""
-    unstated = unstated_warning(study, about="block")
-    jumps = [
-        sentence
-        for recording, track in zip(many, ready.tracks, strict=True)
-        for sentence in jump_warnings(recording, body, track=track)
-    ]
-    side = study.block.side_m
-    own = warnings_of(facts, whiteness, shares, ready.intervals, side_m=side)
-    return [*([] if unstated is None else [unstated]), *jumps, *own]
-
-
-def _turning(start: Point, passes: Passes) -> dict[str, float]:
-    """Return how the block's spin goes with the water's, where orientations and one flow are."""
-    if passes.body.orientation == "none" or start.coefficients.ndim > 3:
-        return {}
-    found = spin_correlation(start.coefficients, passes.spline, passes.series)
-    return {"spin_correlation": found}
 
 
 def check_fit(
@@ -296,14 +228,13 @@ def _usual_search(passes: Passes) -> float:
     return near + (WORK.from_pieces + WORK.score_tests) * whole
 
 
-def _usual_parts(passes: Passes, angle: str) -> dict[str, float]:
+def _usual_parts(passes: Passes) -> dict[str, float]:
     """Return the work of each stage of a fit, in samples."""
     whole = work_of_pass(passes)
-    return {
-        "likelihood": _usual_search(passes),
-        "drag": WORK.restricted * whole,
-        **({"angle as given": WORK.angle_given * whole} if angle == "state" else {}),
-    }
+    parts = {"likelihood": _usual_search(passes), "drag": WORK.restricted * whole}
+    if passes.body.orientation == "state":
+        parts["angle as given"] = WORK.angle_given * whole
+    return parts
 
 
 def _work_listener(course: Course, usual: float) -> Passed:
@@ -317,19 +248,3 @@ def _work_listener(course: Course, usual: float) -> Passed:
 
     course.begin("likelihood")
     return passed
-
-
-def _start(passes: Passes, ready: PreparedRecordings, study: Study) -> Point:
-    """Return the point from which the search begins."""
-
-    def longest(flow: int) -> Any:
-        in_flow = zip(ready.parts, ready.places, strict=True)
-        return max((part for part, (one, _) in in_flow if one == flow), key=lambda p: p.time.size)
-
-    return first_point(
-        ready.tracks,
-        study,
-        passes.spline,
-        angle=passes.body.orientation,
-        in_flows=[longest(flow) for flow in range(passes.flows)],
-    )

@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
+from driftwalk.core.arrays import Floats
 from driftwalk.likelihood.filter.parameters import Point
-from driftwalk.likelihood.law.facts import inertia_facts, inertia_of, number_facts
+from driftwalk.likelihood.law.force_law import inertia_facts, inertia_of, number_facts
 from driftwalk.likelihood.newton import Mode, known_numbers_variance
 from driftwalk.likelihood.prior import PRIOR
 from driftwalk.likelihood.reml import Restricted
-from driftwalk.likelihood.spline import Floats
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
@@ -116,7 +116,7 @@ def parameter_facts(
     normal = float(ndtri(0.5 + 0.5 * confidence))
     reach = normal * np.sqrt(np.diag(covariance))
     reach_of_drag = normal * _log_drag_std(point, covariance)
-    heavier = inertia_of(study, floating=point.number("water_acceleration") != 0.0)
+    heavier = inertia_of(study, point)
     side = normal * study.fit.side_std_m / study.block.side_m
     of_drag, of_force = (
         math.hypot(one, normal * heavier.log_std, side * slope)
@@ -139,7 +139,9 @@ def parameter_facts(
     facts: dict[str, Any] = {"force_interval_s": interval, "confidence": confidence}
     for name, (value, width) in values.items():
         facts[name] = value
-        facts[f"{name}_interval"] = [value * math.exp(-width), _upper(value, width)]
+        # Open where the data leave it so: beyond 300 the exponential would soon not fit a double.
+        high = value * math.exp(width) if width < 300.0 else math.inf
+        facts[f"{name}_interval"] = [value * math.exp(-width), high]
     return {**facts, **inertia_facts(heavier, facts, normal), **number_facts(point, reach, study)}
 
 
@@ -153,9 +155,3 @@ def _log_drag_std(point: Point, covariance: Floats) -> float:
         at = 1 + list(point.extras).index("linear_share")
         slopes[at] = -1.0 / max(1.0 - point.opened["linear_share"], 1e-6)
     return math.sqrt(float(slopes @ covariance @ slopes))
-
-
-def _upper(value: float, log_width: float) -> float:
-    """Return the upper end of an interval; infinity where the data leave it open."""
-    # Beyond 300 the exponential would soon not fit a double.
-    return value * math.exp(log_width) if log_width < 300.0 else math.inf

@@ -11,14 +11,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.likelihood.filter.departures import NUMBERS
+from driftwalk.core.arrays import Floats
 from driftwalk.likelihood.filter.filter_pass import Passes, Sums
-from driftwalk.likelihood.filter.parameters import Point
-from driftwalk.likelihood.spline import Floats, penalties
+from driftwalk.likelihood.filter.parameters import NUMBERS, Point
+from driftwalk.likelihood.spline import penalties
+
+if TYPE_CHECKING:
+    pass
 
 
 class PriorPolicy(NamedTuple):

@@ -1,18 +1,84 @@
-"""Recordings that cannot be fitted, and the remedies: too short, or at the wall."""
+"""Fits that are refused, with the remedies: recordings too short or at the wall, no solution."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final, NamedTuple
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
 
 from driftwalk.conditions import is_stated
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.processors import machine_memory
-from driftwalk.likelihood.length import in_words, length_advice
+from driftwalk.likelihood.filter.series import FILTER, Series, usable_intervals
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
     from driftwalk.schema import Track
+
+
+class LengthPolicy(NamedTuple):
+    """The precision of C_d that a recording of usual length gives."""
+
+    usual_precision: float = 0.1
+    """Standard error of ln C_d above which a fit warns, where the user states no precision. Chosen
+    by hand."""
+    usual_s: float = 1200.0
+    """Length [s] in which C_d comes out to the two precisions that follow: 20 minutes, 10 to 30 by
+    the flow. A rule of thumb."""
+    without_angle: float = 0.1
+    """Standard error of ln C_d in that time without orientations. Cautious: half an hour has 6 % on
+    the bundled recording (docs/explanation/likelihood.md)."""
+    with_angle: float = 0.05
+    """Standard error of ln C_d in that time with orientations. Cautious: half an hour has 1 % on
+    the bundled recording."""
+
+
+LENGTH: Final = LengthPolicy()
+
+
+def needed_duration(duration: float, std: float, precision: float) -> float:
+    """Return how long a recording like this one has to be for a precision [s].
+
+    Examples
+    --------
+    >>> needed_duration(600.0, 0.2, 0.1)
+    2400.0
+    """
+    return duration * (std / precision) ** 2
+
+
+def in_words(seconds: float) -> str:
+    """Return a length of time, rounded up to two digits.
+
+    Examples
+    --------
+    >>> in_words(61.0), in_words(1234.0), in_words(30000.0)
+    ('61 s', '21 min', '8.4 h')
+    """
+    unit, name = (1.0, "s") if seconds < 120 else (60.0, "min") if seconds < 5400 else (3600.0, "h")
+    value = seconds / unit
+    grain = 10.0 ** (math.floor(math.log10(max(value, 1e-9))) - 1)
+    return f"{grain * math.ceil(value / grain - 1e-9):.6g} {name}"
+
+
+def length_advice(precision: float | None) -> str:
+    """Return the sentence on how long to record, for a precision or in general."""
+    if precision is None:
+        return (
+            "As a rule 10 to 30 min give C_d to 10 % without orientations, to about 5 % with them"
+        )
+    with_angle, without = (
+        in_words(needed_duration(LENGTH.usual_s, usual, precision))
+        for usual in (LENGTH.with_angle, LENGTH.without_angle)
+    )
+    return (
+        f"For C_d to {100 * precision:.3g} % record some {with_angle} with orientations, "
+        f"{without} without, as a rule"
+    )
 
 
 class LimitPolicy(NamedTuple):
@@ -72,11 +138,8 @@ class Work(NamedTuple):
 
     def advice(self) -> str:
         """Return how to take fewer samples."""
-        every = max(
-            math.ceil(self.memory / LIMIT.notable_bytes),
-            math.ceil(self.seconds / LIMIT.notable_s),
-            2,
-        )
+        excess = max(self.memory / LIMIT.notable_bytes, self.seconds / LIMIT.notable_s)
+        every = max(math.ceil(excess), 2)
         return (
             "fit a part of the time (`start`, `stop` of `load`), or fewer samples a second, such "
             f"as one row in {every} of the file"
@@ -123,8 +186,9 @@ def require_length(track: Track, study: Study, *, where: str) -> None:
         )
 
 
-def require_own_arena(study: Study, *, intervals: int, near_wall: int, where: str) -> None:
+def require_own_arena(series: Sequence[Series], study: Study, *, where: str) -> None:
     """Refuse a tank that was fitted to the positions and then excludes nearly all of them."""
+    intervals, near_wall = _intervals_of(series)
     if near_wall <= LIMIT.most_at_own_wall * intervals:
         return
     reason = (
@@ -141,12 +205,12 @@ def require_own_arena(study: Study, *, intervals: int, near_wall: int, where: st
     )
 
 
-def require_usable(
-    usable: int, *, intervals: int, near_wall: int, tank: str, longest_gap: float, where: str
-) -> None:
+def require_usable(series: Sequence[Series], study: Study, *, where: str = "") -> None:
     """Refuse when too few intervals are left after those at the wall and in gaps."""
+    usable = usable_intervals(series)
     if usable >= LIMIT.fewest_samples:
         return
+    (intervals, near_wall), tank = _intervals_of(series), study.tank.describe()
     advice = (
         "check size and place of the tank, and record where the block stays away from the wall"
         if near_wall > intervals / 2
@@ -157,9 +221,14 @@ def require_usable(
         if near_wall == intervals
         else f"only {usable} of {intervals} intervals can be used, at least "
         f"{LIMIT.fewest_samples} are needed: {near_wall} are at the wall of the tank (a {tank}), "
-        f"the others are longer than {longest_gap:g} s or have no orientation near"
+        f"the others are longer than {FILTER.longest_gap_s:g} s or have no orientation near"
     )
     raise InputError(f"{where}{left_out}; {advice}")
+
+
+def _intervals_of(series: Sequence[Series]) -> tuple[int, int]:
+    """Return how many intervals between samples there are, and how many are at the wall."""
+    return sum(one.time.size - 1 for one in series), sum(one.near_wall for one in series)
 
 
 def require_size(flows: int, coefficients: int) -> None:
@@ -179,3 +248,57 @@ def require_size(flows: int, coefficients: int) -> None:
         "back the same name (`fit.flow_labels`), or fit parts of the recording (`start`, `stop` "
         "of `load`)"
     )
+
+
+BREAKDOWN = (np.linalg.LinAlgError, ArithmeticError, ValueError)
+"""Errors of a search that diverges: a matrix that is not positive definite, a parameter that
+is no longer a number, the root of a negative variance, a value that the filter refuses."""
+
+
+@contextmanager
+def solved(wall_share: float = 0.0) -> Iterator[None]:
+    """Turn every way in which a search breaks down into one error for people."""
+    try:
+        with np.errstate(all="ignore"):
+            yield
+    except InputError:
+        raise
+    except BREAKDOWN as error:
+        raise InputError(
+            f"the fit has no solution for this recording: {_reason(wall_share)}"
+        ) from error
+
+
+def _reason(wall_share: float) -> str:
+    """Return why a search may break down, and what to do."""
+    if wall_share > LIMIT.most_wall_share:
+        return (
+            f"{wall_share:.0%} of the intervals are at the wall and were left out, and the motion "
+            "in the others does not follow the model; record where the body stays away from the "
+            "wall, or check the tank, the side of the block and the units"
+        )
+    return (
+        "the motion does not follow the model at all, or the tank, the block or the units are wrong"
+    )
+
+
+def cholesky(information: Floats) -> Any:
+    """Return scipy's Cholesky factor of an information matrix."""
+    from scipy.linalg import cho_factor
+
+    if not np.isfinite(information).all():
+        raise np.linalg.LinAlgError("the information matrix is not finite")
+    return cho_factor(information, check_finite=False)
+
+
+def require_noise_below_motion(
+    noise: float, tracks: Sequence[Track], wall_share: float = 0.0
+) -> None:
+    """Refuse a solution that takes the whole motion for tracking noise."""
+    scatter = max(float(axis.std()) for track in tracks for axis in (track.x, track.y))
+    if noise > scatter:
+        raise InputError(
+            "the fit has no solution for this recording: it attributes the whole "
+            f"motion to tracking noise ({1e3 * noise:.3g} mm, while the positions "
+            f"scatter by {1e3 * scatter:.3g} mm); {_reason(wall_share)}"
+        )

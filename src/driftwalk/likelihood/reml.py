@@ -18,12 +18,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.likelihood.filter.filter_pass import Passes
+from driftwalk.core.arrays import Floats
 from driftwalk.likelihood.filter.parameters import Point
-from driftwalk.likelihood.newton import Mode, known_numbers_variance
-from driftwalk.likelihood.prior import Prior
-from driftwalk.likelihood.solution import cholesky
-from driftwalk.likelihood.spline import Floats
+from driftwalk.likelihood.newton import Mode, ModeSearch, known_numbers_variance
+from driftwalk.likelihood.refuse import cholesky
 
 
 class RemlPolicy(NamedTuple):
@@ -74,9 +72,7 @@ class Restricted(NamedTuple):
     """Whether the criterion has a minimum; if not, point and std are the likelihood's."""
 
 
-def profile_at(
-    passes: Passes, mode: Mode, prior: Prior, log_drag: float, coefficients: Floats
-) -> Profile:
+def profile_at(search: ModeSearch, mode: Mode, log_drag: float, coefficients: Floats) -> Profile:
     """Return the profile at a C_d, from one pass at coefficients that are nearly the best."""
     from scipy.linalg import cho_solve
 
@@ -85,7 +81,8 @@ def profile_at(
         log_drag=log_drag,
         coefficients=coefficients.reshape(mode.point.coefficients.shape),
     )
-    sums = prior.add(passes.sums(point, noise="without"), point, mode.weights)
+    sums = search.passes.sums(point, noise="without")
+    sums = search.prior.add(sums, point, mode.weights)
     factor = cholesky(sums.information[:-1, :-1])
     step = cho_solve(factor, sums.score[:-1])
     return Profile(
@@ -97,28 +94,25 @@ def profile_at(
     )
 
 
-def restricted_drag(
-    passes: Passes, mode: Mode, prior: Prior, *, intensity: bool = True
-) -> Restricted:
+def restricted_drag(search: ModeSearch, mode: Mode, *, intensity: bool = True) -> Restricted:
     """Minimise the restricted criterion over ln C_d."""
     start = mode.point
     drag = start.coefficients.size
     # The profile takes the opened numbers for known.
     sd = math.sqrt(known_numbers_variance(mode))
     slopes = mode.covariance[:, drag] / mode.covariance[drag, drag]
-    found = [profile_at(passes, mode, prior, start.log_drag, start.coefficients.ravel())]
+    found = [profile_at(search, mode, start.log_drag, start.coefficients.ravel())]
 
     def add_profile(log_drag: float) -> None:
         near = min(found, key=lambda one: abs(one.log_drag - log_drag))
         guess = near.coefficients + slopes[:drag] * (log_drag - near.log_drag)
-        found.append(profile_at(passes, mode, prior, log_drag, guess))
+        found.append(profile_at(search, mode, log_drag, guess))
 
     add_profile(start.log_drag - REML.span * sd)
     # Two points give the slope of the determinant and with it a first guess of the minimum.
     guess, _ = _minimum(found)
-    guess = float(
-        np.clip(guess, start.log_drag - 2 * REML.span * sd, start.log_drag + REML.span * sd)
-    )
+    ends = start.log_drag - 2 * REML.span * sd, start.log_drag + REML.span * sd
+    guess = float(np.clip(guess, *ends))
     if abs(guess - start.log_drag) > REML.near * sd:
         add_profile(guess)
         add_profile(guess - REML.span * sd)
@@ -136,26 +130,23 @@ def restricted_drag(
         point, log_drag=log_drag, coefficients=coefficients.reshape(start.coefficients.shape)
     )
     if intensity:
-        point = _with_restricted_intensity(passes, mode, prior, point, found)
+        point = _with_restricted_intensity(search, mode, point, found)
     return Restricted(point, std, found, has_minimum=True)
 
 
 def _with_restricted_intensity(
-    passes: Passes, mode: Mode, prior: Prior, point: Point, found: list[Profile]
+    search: ModeSearch, mode: Mode, point: Point, found: list[Profile]
 ) -> Point:
     """Return the point after one Newton step in ln q on the restricted criterion.
 
     The other noises go along the ridge of the likelihood; their own slopes, and the slope of
     the lever, are too small to matter.
     """
-    at = np.array([one.log_drag for one in found])
-    order = np.argsort(at)
-    values = np.array([one.half_log_determinant for one in found])
-    here = float(np.interp(point.log_drag, at[order], values[order]))
+    at, values = zip(*((one.log_drag, one.half_log_determinant) for one in found), strict=True)
+    here = float(np.interp(point.log_drag, at, values))
     more = replace(point, log_intensity=point.log_intensity + REML.intensity_step)
-    there = profile_at(
-        passes, replace(mode, point=more), prior, point.log_drag, point.coefficients.ravel()
-    )
+    moved = replace(mode, point=more)
+    there = profile_at(search, moved, point.log_drag, point.coefficients.ravel())
     slope = (there.half_log_determinant - here) / REML.intensity_step
     drag = point.coefficients.size
     with_drag = mode.covariance[drag + 1 :, drag]

@@ -18,15 +18,16 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.arrays import Bools, Floats
 from driftwalk.flow.arena import Outline, outline_of
 from driftwalk.flow.grid import Grid, make_grid
+from driftwalk.likelihood.filter.parameters import DRAG_SHAPES, Point
 from driftwalk.likelihood.filter.series import Series
 from driftwalk.likelihood.interval_inflation import open_where_undetermined, parameter_covariance
-from driftwalk.likelihood.intervals import Intervals
-from driftwalk.likelihood.law.facts import number_variables
+from driftwalk.likelihood.law.force_law import Assumptions
 from driftwalk.likelihood.law.forward_selection import LawResult
+from driftwalk.likelihood.preparation import PreparedRecordings, spline_of
 from driftwalk.likelihood.reml import Restricted
-from driftwalk.likelihood.spline import Floats, Spline
 from driftwalk.schema import FLAGS
 from driftwalk.schema.answers.facts import fit_parts
 from driftwalk.schema.kinds import KINDS
@@ -34,7 +35,6 @@ from driftwalk.schema.kinds import KINDS
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.model import Study
 
 PARAMETERS: Final = (
     "ln_drag_coefficient",
@@ -63,7 +63,7 @@ class Whiteness(NamedTuple):
     """Its standard deviation if the model is right."""
 
 
-def whiteness_of(innovations: list[tuple[Floats, npt.NDArray[np.bool_]]]) -> Whiteness:
+def whiteness_of(innovations: list[tuple[Floats, Bools]]) -> Whiteness:
     """Return the check of whitened innovations (n, D), given with which of them were used.
 
     An innovation of exactly 0 means a missing angle and does not count.
@@ -89,43 +89,45 @@ def whiteness_of(innovations: list[tuple[Floats, npt.NDArray[np.bool_]]]) -> Whi
 
 
 def build_fit(
-    spline: Spline,
-    law: LawResult,
-    restricted: Restricted,
-    series: list[Series],
-    *,
-    study: Study,
-    oriented: bool,
-    intervals: Intervals,
-    first: float,
-    facts: dict[str, Any],
+    ready: PreparedRecordings, law: LawResult, restricted: Restricted, facts: dict[str, Any]
 ) -> xr.Dataset:
     """Assemble the dataset of a fit, without warnings and the share of the tank that was visited.
 
-    `first` is the first recording's first time stamp [s]; for `facts` see `fit_parts`.
+    For `facts` see `fit_parts`.
     """
     import xarray as xr
 
-    mode = law.mode
-    outline = outline_of(study.tank.to_arena())
+    mode, study, intervals = law.mode, ready.study, ready.intervals
+    outline, spline = outline_of(study.tank.to_arena()), spline_of(study)
     grid = make_grid(outline, cells=study.flow.cells, cell_size=study.flow.cell_size_m)
-    flows = [
-        _flow_variables(
-            spline,
-            restricted.point.in_flow(flow).coefficients,
-            mode.covariance[_block(spline, flow), _block(spline, flow)],
-            [one for one in series if one.flow == flow],
-            grid=grid,
-            outline=outline,
-            study=study,
-            oriented=oriented,
+    plane, knots = ("y", "x"), ("component", "knot_y", "knot_x")
+    flows = []
+    for flow in range(len(intervals.labels)):
+        in_flow = [one for one in ready.series if one.flow == flow]
+        count = footprint_count(
+            grid, in_flow, side=study.block.side_m, oriented=ready.angle != "none"
         )
-        for flow in range(len(intervals.labels))
-    ]
+        # Where the coefficients of this flow are among all parameters.
+        own = slice(flow * 2 * spline.size, (flow + 1) * 2 * spline.size)
+        coefficients = restricted.point.in_flow(flow).coefficients
+        u, v = spline.values(coefficients, grid.x, grid.y)
+        errors = spline.standard_errors(mode.covariance[own, own], grid.x, grid.y)
+        flows.append(
+            {
+                "u": (plane, u),
+                "v": (plane, v),
+                "u_standard_error": (plane, errors[0]),
+                "v_standard_error": (plane, errors[1]),
+                "count": (plane, count),
+                "flag": (plane, _flags(grid, outline, count)),
+                "coefficient": (knots, coefficients),
+            }
+        )
     profiles = restricted.profiles
     # Only differences of a profile mean anything: it begins at zero.
     least = min(one.deviance for one in profiles)
     flat = profiles[0].half_log_determinant
+    determinant = [one.half_log_determinant - flat for one in profiles]
     uncertainty = parameter_covariance(mode, restricted)
     # The stored covariance stays finite where C_d is known from its prior alone, as the check draws
     # from it; a search that was given up has none.
@@ -137,10 +139,7 @@ def build_fit(
         **(flows[0] if intervals.steady else _stacked(flows)),
         "covariance": (("log_parameter", "other_log_parameter"), uncertainty),
         "profile_deviance": ("profile", [one.deviance - least for one in profiles]),
-        "profile_half_log_determinant": (
-            "profile",
-            [one.half_log_determinant - flat for one in profiles],
-        ),
+        "profile_half_log_determinant": ("profile", determinant),
     }
     coords: dict[str, Any] = {
         "y": ("y", grid.y),
@@ -160,10 +159,9 @@ def build_fit(
         coords["flow"] = ("flow", np.array(intervals.labels, dtype=object))
         data["interval_flow"] = ("flow_interval", np.array(intervals.flows, dtype=np.int32))
         facts["switching_times_s"] = list(intervals.times)
-        facts["recording_start_s"] = first
+        facts["recording_start_s"] = float(ready.tracks[0].time[0])
     numbers, names_of, _ = fit_parts(facts)
     found, names_found = number_variables(restricted.point, law)
-    data, coords = data | found, coords | names_found
     attrs = {
         "kind": "fit",
         "schema_version": KINDS["fit"].version,
@@ -171,40 +169,48 @@ def build_fit(
         **{name: facts[name] for name in WORDS},
         "study": study.to_toml(),
     }
-    return xr.Dataset(data | numbers, coords | names_of, attrs)
+    return xr.Dataset(data | found | numbers, coords | names_found | names_of, attrs)
 
 
-def _block(spline: Spline, flow: int) -> slice:
-    """Return where the coefficients of a flow are among all parameters."""
-    count = 2 * spline.size
-    return slice(flow * count, (flow + 1) * count)
-
-
-def _flow_variables(
-    spline: Spline,
-    coefficients: Floats,
-    covariance: Floats,
-    series: list[Series],
-    *,
-    grid: Grid,
-    outline: Outline,
-    study: Study,
-    oriented: bool,
-) -> dict[str, Any]:
-    """Return the variables of one flow, with their dimensions."""
-    count = footprint_count(grid, series, side=study.block.side_m, oriented=oriented)
-    values = spline.values(coefficients, grid.x, grid.y)
-    errors = spline.standard_errors(covariance, grid.x, grid.y)
-    plane, knots = ("y", "x"), ("component", "knot_y", "knot_x")
-    return {
-        "u": (plane, values[0]),
-        "v": (plane, values[1]),
-        "u_standard_error": (plane, errors[0]),
-        "v_standard_error": (plane, errors[1]),
-        "count": (plane, count),
-        "flag": (plane, _flags(grid, outline, count)),
-        "coefficient": (knots, coefficients),
+def law_facts(law: LawResult, assumptions: Assumptions) -> dict[str, Any]:
+    """Return the law, whether it was stated, and by how much the recording supports it."""
+    point = law.mode.point
+    searched = bool(set(DRAG_SHAPES) & set(assumptions.tried))
+    if "drag_power" in {**point.opened, **point.fixed}:
+        drag = "power"
+    elif "linear_share" in point.opened:
+        drag = "mixed"
+    else:
+        drag = "linear" if point.number("linear_share") == 1.0 else "quadratic"
+    facts: dict[str, Any] = {
+        "force_law": "floating body" if law.floating else "paper",
+        "force_law_stated": "no" if assumptions.pressure_gradient == "auto" else "yes",
+        "drag_law": drag,
+        "drag_law_stated": "no" if searched else "yes",
     }
+    if math.isfinite(law.settled_by):
+        facts["law_settled_by"] = law.settled_by
+    return facts
+
+
+def number_variables(point: Point, law: LawResult) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return variables and coordinates with the numbers of the law, and what was tested."""
+    values = {**point.fixed, **point.opened}
+    data: dict[str, Any] = {
+        "number_value": ("number", np.array(list(values.values()), dtype=np.float64)),
+        "number_opened": ("number", np.array([name in point.opened for name in values], bool)),
+        "filter_drag_coefficient": ((), np.float64(math.exp(point.log_drag))),
+        "law_log_evidence": ("law", np.array(list(law.evidence.values()), dtype=np.float64)),
+    }
+    coords: dict[str, Any] = {
+        "number": ("number", np.array(list(values), dtype=np.str_)),
+        "law": ("law", np.array(list(law.evidence), dtype=np.str_)),
+    }
+    if law.tests is not None:
+        data["departure_estimate"] = ("departure", law.tests.estimate)
+        data["departure_std"] = ("departure", law.tests.std)
+        coords["departure"] = ("departure", np.array(law.tests.names, dtype=np.str_))
+    return data, coords
 
 
 def _stacked(flows: list[dict[str, Any]]) -> dict[str, Any]:
@@ -224,9 +230,7 @@ def visited_shares(fit: xr.Dataset) -> list[float]:
     ]
 
 
-def footprint_count(
-    grid: Grid, series: list[Series], *, side: float, oriented: bool
-) -> npt.NDArray[np.float64]:
+def footprint_count(grid: Grid, series: list[Series], *, side: float, oriented: bool) -> Floats:
     """Return for each node how many samples have the block over it.
 
     Without orientations the circle inside the block is used; samples that lack one among

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
+
+from driftwalk.core.arrays import Floats
 
 if TYPE_CHECKING:
     from driftwalk.flow.arena import Outline
 
-Floats = npt.NDArray[np.float64]
 
 DEGREE = 3
 
@@ -96,18 +96,8 @@ def lay_spline(outline: Outline, *, side: float, spacing: float) -> Spline:
 def basis(share: Floats) -> Floats:
     """Return the four cubic B-splines of a cell at shares of it in [0, 1], shape (n, 4)."""
     t = share
-    return (
-        np.stack(
-            [
-                (1.0 - t) ** 3,
-                4.0 - 6.0 * t**2 + 3.0 * t**3,
-                1.0 + 3.0 * t + 3.0 * t**2 - 3.0 * t**3,
-                t**3,
-            ],
-            axis=-1,
-        )
-        / 6.0
-    )
+    inner = 4.0 - 6.0 * t**2 + 3.0 * t**3, 1.0 + 3.0 * t + 3.0 * t**2 - 3.0 * t**3
+    return np.stack([(1.0 - t) ** 3, *inner, t**3], axis=-1) / 6.0
 
 
 def basis_matrix(position: Floats, count: int) -> Floats:

@@ -10,26 +10,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from driftwalk.conditions import recorded_camera, typical_speed
-from driftwalk.conditions.own_flow import flow_from_track
+from driftwalk.conditions.recorded import flow_from_track
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.preparation import PreparedRecordings
 from driftwalk.likelihood.prior import PRIOR, Weights
-from driftwalk.likelihood.spline import Floats, Spline, penalties
+from driftwalk.likelihood.spline import Spline, penalties
 from driftwalk.schema import FLAGS, Track
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
 
 
-def first_point(
-    tracks: Sequence[Track],
-    study: Study,
-    spline: Spline,
-    *,
-    angle: str,
-    in_flows: Sequence[Track] = (),
-) -> Point:
+def first_point(ready: PreparedRecordings, spline: Spline) -> Point:
     """Return the first values: C_d = 0.5, the flow of Eq. 4, the noise of `driftwalk info`."""
+    study, tracks = ready.study, ready.tracks
     cameras = [recorded_camera(track, study, position_quantum=0.0) for track in tracks]
     steps = np.concatenate([np.hypot(np.diff(track.x), np.diff(track.y)) for track in tracks])
     # A noise of a thousandth of the step between samples at least.
@@ -37,17 +33,23 @@ def first_point(
     # The first q is a tenth of U^3 / a, speed U and side a: rather too large than too small, as a
     # small one makes the filter lose the track.
     unrest = 0.1 * typical_speed(tracks) ** 3 / study.block.side_m
+    if ready.intervals.steady:
+        coefficients = _flow_coefficients(tracks[0], study, spline)
+    else:
+        # Each flow begins with the longest stretch that was recorded in it.
+        longest: dict[int, Track] = {}
+        for (flow, _), part in zip(ready.places, ready.parts, strict=True):
+            if flow not in longest or part.time.size > longest[flow].time.size:
+                longest[flow] = part
+        flows = range(len(ready.intervals.labels))
+        coefficients = np.stack([_flow_coefficients(longest[k], study, spline) for k in flows])
     point = Point(
-        coefficients=(
-            np.stack([_flow_coefficients(one, study, spline) for one in in_flows])
-            if len(in_flows) > 1
-            else _flow_coefficients(tracks[0], study, spline)
-        ),
+        coefficients,
         log_drag=math.log(PRIOR.drag),
         log_intensity=math.log(unrest),
         log_noise=_log_noise([camera.position_noise for camera in cameras], least),
     )
-    if angle != "state":
+    if ready.angle != "state":
         return point
     # The angle that a noise of the position at a corner would make.
     least_angle = least / study.block.side_m

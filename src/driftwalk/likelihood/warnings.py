@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from driftwalk.likelihood.intervals import Intervals
+from driftwalk.likelihood.flow_intervals import Intervals
 from driftwalk.likelihood.law.search import LAW
-from driftwalk.likelihood.length import LENGTH, in_words, needed_duration
-from driftwalk.likelihood.refuse import LIMIT
-from driftwalk.likelihood.result import Whiteness
+from driftwalk.likelihood.refuse import LENGTH, LIMIT, in_words, needed_duration
 from driftwalk.schema.answers.facts import is_open
 
 if TYPE_CHECKING:
@@ -53,51 +51,45 @@ def precision_facts(std: float, duration: float, study: Study) -> dict[str, floa
 
 
 def warnings_of(
-    facts: Mapping[str, Any],
-    whiteness: Whiteness,
-    visited: Sequence[float],
-    intervals: Intervals,
-    *,
-    side_m: float,
+    facts: Mapping[str, Any], visited: Sequence[float], intervals: Intervals, *, side_m: float
 ) -> list[str]:
-    """Return the warnings."""
+    """Return the warnings; `visited` is the share of the tank that was visited in each flow."""
     return [
         *_on_the_data(facts, visited, intervals),
         *_on_the_search(facts),
-        *_on_the_model(facts, whiteness),
+        *_on_the_model(facts),
         *_on_the_turning(facts, side_m),
     ]
 
 
 def _on_the_data(
     facts: Mapping[str, Any], visited: Sequence[float], intervals: Intervals
-) -> list[str]:
-    found = []
+) -> Iterator[str]:
     if facts["wall_share"] > LIMIT.most_wall_share:
-        found.append(
+        yield (
             f"{facts['wall_share']:.0%} of the intervals are at the wall and were "
             "left out: do not trust C_d above 30 %; record where the block stays "
             "away from the wall"
         )
     if facts["mistakes"]:
-        found.append(
+        yield (
             f"{facts['mistakes']} of {facts['samples']} samples were left out: each lies far from "
             "both of its neighbours, as mistakes of a tracker do"
         )
     if facts["jumps_removed"]:
-        found.append(
+        yield (
             f"{facts['jumps_removed']} samples were left out when the recording was read: with "
             "them the body would have been faster than the greatest speed that was given"
         )
     if facts["dropped_frames"]:
-        found.append(
+        yield (
             f"{facts['dropped_frames']} frames are missing although the time stamps say a constant "
             f"rate, {facts['dropped_places']}: the steps across them are two or more times as long "
             "as their neighbours; their time was put in. Record the time of every frame"
         )
     used, usable = facts["samples_used"], facts["intervals_usable"]
     if used < WARNING.least_used * usable:
-        found.append(
+        yield (
             f"the fit used {used} of {usable} intervals only: at the end of the others the body "
             "was more than 6 standard deviations from where the model predicted it; "
             "the fit describes only a part of the motion"
@@ -108,7 +100,7 @@ def _on_the_data(
         # Infinite where the criterion is flat.
         needed = facts["needed_duration_s"]
         length = f"about {in_words(needed)}" if math.isfinite(needed) else "another recording"
-        found.append(
+        yield (
             f"C_d is known to {100 * std:.2g} % only (one standard deviation) from "
             f"{in_words(facts['duration_s'])}: for "
             f"{100 * (wanted or LENGTH.usual_precision):.3g} % {length} like this would be needed"
@@ -116,77 +108,67 @@ def _on_the_data(
     for flow, share in enumerate(visited):
         if share < WARNING.least_visited:
             name = "" if intervals.steady else f"in {intervals.describe_flow(flow)} "
-            found.append(
+            yield (
                 f"{name}the block has been over {share:.0%} of the tank only: elsewhere the flow "
                 "is continued smoothly and not measured (flag filled)"
             )
-    return found
 
 
-def _on_the_search(facts: Mapping[str, Any]) -> list[str]:
-    found = []
+def _on_the_search(facts: Mapping[str, Any]) -> Iterator[str]:
     left = facts.get("search_left", 0.0)
     if left:
-        found.append(
+        yield (
             f"the search was given up after {facts['iterations']} steps ([fit] iterations), "
             f"{left:.2g} standard deviations from a maximum of the likelihood: this recording does "
             "not determine the parameters of the model; a motion without random force, as that of "
             "a driven body, tells nothing of them"
         )
     elif facts["converged"] == "no":
-        found.append(
-            f"the search has not converged in {facts['iterations']} steps ([fit] iterations)"
-        )
+        yield (f"the search has not converged in {facts['iterations']} steps ([fit] iterations)")
     elif is_open(facts, "drag_coefficient"):
-        found.append(
+        yield (
             "the recording says less of C_d than the fit assumes of it beforehand (0.5, within a "
             "factor of two): it does not determine C_d"
         )
     if facts["restricted"] == "no":
-        found.append(
+        yield (
             "the restricted likelihood has no minimum: C_d comes from the plain "
             "likelihood and is likely too large; the motion says little about C_d or "
             "does not follow the model"
         )
-    return found
 
 
-def _on_the_model(facts: Mapping[str, Any], whiteness: Whiteness) -> list[str]:
-    found = []
+def _on_the_model(facts: Mapping[str, Any]) -> Iterator[str]:
     if facts["angle"] == "none":
-        found.append(
+        yield (
             "no orientation was used: the drag is averaged over all orientations of the block, "
             "which made C_d 31 % too small to 6 % too large on recordings of known truth"
         )
-    off = abs(whiteness.autocorrelation)
-    if off > max(
-        WARNING.autocorrelation_stds * whiteness.autocorrelation_std, WARNING.autocorrelation
-    ):
-        found.append(
-            f"the errors of prediction are correlated ({whiteness.autocorrelation:+.2f} from one "
+    least = WARNING.autocorrelation_stds * facts["autocorrelation_std"]
+    if abs(facts["autocorrelation"]) > max(least, WARNING.autocorrelation):
+        yield (
+            f"the errors of prediction are correlated ({facts['autocorrelation']:+.2f} from one "
             "sample to the next): the motion contains something that the model "
             "lacks, and the intervals are too narrow"
         )
-    return found
 
 
-def _on_the_turning(facts: Mapping[str, Any], side_m: float) -> list[str]:
-    found = []
+def _on_the_turning(facts: Mapping[str, Any], side_m: float) -> Iterator[str]:
     along = facts.get("spin_correlation", 0.0)
     if along < WARNING.mirrored_correlation:
-        found.append(
+        yield (
             f"the block seems to turn against the water (correlation {along:.2f} of its spin with "
             "the vorticity of the flow): the recorded orientation is likely mirrored, counted "
             "clockwise; C_d is then meaningless; negate the angle, or turn y upwards"
         )
     apart = facts.get("angle_disagreement_std", 0.0)
     if math.isnan(apart):
-        found.append(
+        yield (
             "the fit with the angle as an input has no solution and was left out: whether the "
             "turning of the block and its motion follow one drag law is not known"
         )
     if apart > WARNING.disagreement_stds:
-        found.append(
+        yield (
             f"with the angle as an input C_d is {facts['drag_coefficient_angle_given']:.3g}, "
             f"{apart:.1f} combined standard deviations away: the turning of the block "
             "and its motion do not follow one drag law, and the intervals are too "
@@ -194,9 +176,8 @@ def _on_the_turning(facts: Mapping[str, Any], side_m: float) -> list[str]:
         )
     lever = facts.get("force_lever_m_interval", (0.0, 0.0))[0]
     if lever > LAW.notable_lever * side_m:
-        found.append(
+        yield (
             f"the block turns as if the force acted {1e3 * facts['force_lever_m']:.2g} mm from its "
             "centre: the recorded angle is late, or not that of the block's faces, "
             "or something else makes the block turn; C_d and the force are then wrong"
         )
-    return found

@@ -3,24 +3,28 @@
 from driftwalk.model.assembly import Assembly
 from driftwalk.model.block import Block
 from driftwalk.model.calibration import Calibration
-from driftwalk.model.declaration import Declaration, declared
 from driftwalk.model.fit import Fit
 from driftwalk.model.flow import Flow
 from driftwalk.model.forces import Forces
 from driftwalk.model.observation import Observation
-from driftwalk.model.recording import Columns, Recording
+from driftwalk.model.recording import Columns, Recording, Steps
 from driftwalk.model.recover import Recover
 from driftwalk.model.sensitivity import Sensitivity
 from driftwalk.model.simulation import Pose, Simulation
-from driftwalk.model.steps import Steps
-from driftwalk.model.study import Study, apply_overrides, load_study, parse_study
-from driftwalk.model.study_file.template import (
+from driftwalk.model.study import (
+    Declaration,
+    Study,
+    apply_overrides,
+    declared,
+    load_study,
+    parse_study,
+)
+from driftwalk.model.tank import FieldOfView, Tank, Water
+from driftwalk.model.template import (
     parameter_table,
     short_study_template,
     study_template,
 )
-from driftwalk.model.tank import FieldOfView, Tank
-from driftwalk.model.water import Water
 
 __all__ = [
     "Assembly",

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar, Final, Literal
 
-from pydantic import Field
-
-from driftwalk.model.section import Quantity, Section
+from driftwalk.model.section import Quantity, Section, Seed
 
 MOST_BLOCKS: Final = 256
 """The most that the native core takes."""
@@ -27,66 +25,44 @@ class Assembly(Section):
 
     section_name: ClassVar[str] = "assembly"
 
-    blocks: Annotated[int, Quantity("1", ge=1, le=MOST_BLOCKS, whole=True)] = Field(
-        default=4, description="Blocks in the tank."
-    )
-    runs: Annotated[int, Quantity("1", ge=1, le=10_000_000, whole=True)] = Field(
-        default=1000, description="Simulated runs, each with its own start and random numbers."
-    )
-    duration_s: Annotated[float, Quantity("s", gt=0, le=1e6)] = Field(
-        default=300.0,
-        description="Length of a run; a run ends earlier if all blocks are in one assembly.",
-    )
-    seed: Annotated[int, Quantity("1", ge=0, le=2**63 - 1, whole=True)] = Field(
-        default=1, description="Seed of the starts, the forces and the drawn parameters."
-    )
-    latching: Latching = Field(
-        default="collision",
-        title="Rule by which two blocks latch.",
-        description=(
-            'Latching rule: "collision", whenever two blocks touch (the paper); '
-            '"connector", when two faces are within the tolerances of a connector; '
-            '"none", never: hard bodies.'
-        ),
-    )
-    connector_distance_m: Annotated[float, Quantity("m", ge=0, le=10)] = Field(
-        default=0.010,
-        description="Largest distance between the centres of two faces at which connectors latch.",
-    )
-    connector_axis_rad: Annotated[float, Quantity("rad", ge=0, le=3.15)] = Field(
-        default=0.2,
-        description="Largest angle between the axes of two connectors that latch.",
-    )
-    connector_rotation_rad: Annotated[float, Quantity("rad", ge=0, le=3.15)] = Field(
-        default=0.2,
-        description=(
-            "Largest rotation of two connectors against each other about their axis. "
-            "Blocks float upright, so this rotation is always 0 and the condition is "
-            "always met; the key only completes the description of a connector."
-        ),
-    )
-    hidden_face_drag: HiddenFaceDrag = Field(
-        default="none",
-        title="Drag on faces that are joined.",
-        description=(
-            'Drag on faces that are joined to another block: "none", or "full" as on a free face.'
-        ),
-    )
-    chirality: Chirality = Field(
-        default="merged",
-        title="Mirror images as one class or two.",
-        description=(
-            'Treatment of mirror images: "merged" into one class (the paper), or "distinct".'
-        ),
-    )
-    block_restitution: Annotated[float, Quantity("1", ge=0, le=1)] = Field(
-        default=0.5,
-        title="Restitution between blocks, 0 to 1.",
-        description="Restitution of an impact between two blocks that do not latch.",
-    )
-    block_friction: Annotated[float, Quantity("1", ge=0, le=100)] = Field(
-        default=0.0, description="Coulomb friction between two blocks; 0 for wet faces."
-    )
-    confidence: Annotated[float, Quantity("1", gt=0, lt=1)] = Field(
-        default=0.9, description="Simultaneous confidence of the intervals of the proportions."
-    )
+    blocks: Annotated[int, Quantity("1", ge=1, le=MOST_BLOCKS, whole=True)] = 4
+    """Blocks in the tank."""
+    runs: Annotated[int, Quantity("1", ge=1, le=10_000_000, whole=True)] = 1000
+    """Simulated runs, each with its own start and random numbers."""
+    duration_s: Annotated[float, Quantity("s", gt=0, le=1e6)] = 300.0
+    """Length of a run; a run ends earlier if all blocks are in one assembly."""
+    seed: Seed = 1
+    """Seed of the starts, the forces and the drawn parameters."""
+    latching: Latching = "collision"
+    """Rule by which two blocks latch.
+
+    Latching rule: "collision", whenever two blocks touch (the paper); "connector", when two faces
+    are within the tolerances of a connector; "none", never: hard bodies.
+    """
+    connector_distance_m: Annotated[float, Quantity("m", ge=0, le=10)] = 0.010
+    """Largest distance between the centres of two faces at which connectors latch."""
+    connector_axis_rad: Annotated[float, Quantity("rad", ge=0, le=3.15)] = 0.2
+    """Largest angle between the axes of two connectors that latch."""
+    connector_rotation_rad: Annotated[float, Quantity("rad", ge=0, le=3.15)] = 0.2
+    """Largest rotation of two connectors against each other about their axis. Blocks float upright,
+    so this rotation is always 0 and the condition is always met; the key only completes the
+    description of a connector."""
+    hidden_face_drag: HiddenFaceDrag = "none"
+    """Drag on faces that are joined.
+
+    Drag on faces that are joined to another block: "none", or "full" as on a free face.
+    """
+    chirality: Chirality = "merged"
+    """Mirror images as one class or two.
+
+    Treatment of mirror images: "merged" into one class (the paper), or "distinct".
+    """
+    block_restitution: Annotated[float, Quantity("1", ge=0, le=1)] = 0.5
+    """Restitution between blocks, 0 to 1.
+
+    Restitution of an impact between two blocks that do not latch.
+    """
+    block_friction: Annotated[float, Quantity("1", ge=0, le=100)] = 0.0
+    """Coulomb friction between two blocks; 0 for wet faces."""
+    confidence: Annotated[float, Quantity("1", gt=0, lt=1)] = 0.9
+    """Simultaneous confidence of the intervals of the proportions."""

@@ -21,34 +21,29 @@ class Block(Section):
 
     section_name: ClassVar[str] = "block"
 
-    side_m: Annotated[float, Quantity("m", gt=0, le=10)] = Field(
-        default=0.03,
-        title="Side of the block.",
-        description="Side a of the square, seen from above.",
-    )
-    mass_kg: Annotated[float, Quantity("kg", gt=0, le=1e4)] = Field(
-        default=0.0116,
-        title="Mass of the block.",
-        description="Mass m, with everything that the block carries.",
-    )
-    depth: Annotated[Literal["immersed", "archimedes"] | None, OrNumber("depth_m")] = Field(
-        default=None,
-        title="Wetted depth of a side face.",
-        description=(
-            'Wetted depth d of a side face: "immersed" is d = a (the default), "archimedes" is the '
-            "depth at which the block floats, d = m / (density a^2). The drag "
-            "depends only on the product of drag_coefficient and depth, so always "
-            "state the two together."
-        ),
-    )
+    side_m: Annotated[float, Quantity("m", gt=0, le=10)] = 0.03
+    """Side of the block.
+
+    Side a of the square, seen from above.
+    """
+    mass_kg: Annotated[float, Quantity("kg", gt=0, le=1e4)] = 0.0116
+    """Mass of the block.
+
+    Mass m, with everything that the block carries.
+    """
+    depth: Annotated[Literal["immersed", "archimedes"] | None, OrNumber("depth_m")] = None
+    """Wetted depth of a side face.
+
+    Wetted depth d of a side face: "immersed" is d = a (the default), "archimedes" is the depth at
+    which the block floats, d = m / (density a^2). The drag depends only on the product of
+    drag_coefficient and depth, so always state the two together.
+    """
     depth_m: Annotated[float | None, Quantity("m", gt=0, le=10)] = Field(
-        default=None,
-        description="Wetted depth d as a length, instead of `depth`.",
-        examples=[0.0129],
+        default=None, examples=[0.0129]
     )
-    strips_per_face: Annotated[int, Quantity("1", ge=1, le=64, whole=True)] = Field(
-        default=8, description="Vertical strips into which each side face is cut for the drag."
-    )
+    """Wetted depth d as a length, instead of `depth`."""
+    strips_per_face: Annotated[int, Quantity("1", ge=1, le=64, whole=True)] = 8
+    """Vertical strips into which each side face is cut for the drag."""
 
     @model_validator(mode="wrap")
     @classmethod

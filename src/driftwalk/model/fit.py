@@ -27,131 +27,92 @@ class Fit(Section):
 
     spline_spacing_m: Annotated[
         float | Literal["auto"], Quantity("m", gt=0, le=10, words=("auto",))
-    ] = Field(
-        default="auto",
-        description=(
-            'Distance between the knots of the flow. "auto" is two thirds of the side of the block '
-            "(2 cm for 3 cm), or a 24th of the tank if that is more."
-        ),
-    )
-    angle: Literal["auto", "state", "given", "none"] = Field(
-        default="auto",
-        title="Use of the recorded orientation.",
-        description=(
-            'Use of the recorded orientation: "state" predicts it like the position '
-            'and learns from its errors too; "given" uses it, smoothed, as an input; '
-            '"none" averages the drag over all orientations; "auto" is "state" if '
-            'most samples have one, else "none".'
-        ),
-    )
-    iterations: Annotated[int, Quantity("1", ge=4, le=1000, whole=True)] = Field(
-        default=25,
-        description="Largest number of steps of the search, which ends "
-        "when the steps become small.",
-    )
-    confidence: Annotated[float, Quantity("1", gt=0, lt=1)] = Field(
-        default=0.9, description="Confidence of the intervals."
-    )
-    switching_times_s: tuple[Time, ...] | None = Field(
-        default=None,
-        title=(
-            "Times at which the pumps were switched, on each recording's clock; each interval has "
-            "its own flow."
-        ),
-        description=(
-            "Times, on the clock of each recording, at which the pumps were "
-            "switched. Each interval between them has its own flow, and all share "
-            "drag and noises. Without them the flow is steady."
-        ),
-        examples=["[600.0, 1200.0]"],
-    )
+    ] = "auto"
+    """Distance between the knots of the flow. "auto" is two thirds of the side of the block (2 cm
+    for 3 cm), or a 24th of the tank if that is more."""
+    angle: Literal["auto", "state", "given", "none"] = "auto"
+    """Use of the recorded orientation.
+
+    Use of the recorded orientation: "state" predicts it like the position and learns from its
+    errors too; "given" uses it, smoothed, as an input; "none" averages the drag over all
+    orientations; "auto" is "state" if most samples have one, else "none".
+    """
+    iterations: Annotated[int, Quantity("1", ge=4, le=1000, whole=True)] = 25
+    """Largest number of steps of the search, which ends when the steps become small."""
+    confidence: Annotated[float, Quantity("1", gt=0, lt=1)] = 0.9
+    """Confidence of the intervals."""
+    switching_times_s: tuple[Time, ...] | None = Field(default=None, examples=["[600.0, 1200.0]"])
+    """Times at which the pumps were switched, on each recording's clock; each interval has its own
+    flow.
+
+    Times, on the clock of each recording, at which the pumps were switched. Each interval between
+    them has its own flow, and all share drag and noises. Without them the flow is steady.
+    """
     flow_labels: Annotated[tuple[str, ...] | None, Placeholder("A,B,...")] = Field(
-        default=None,
-        title=(
-            "Names of the flows between switching times; repeat a name for a flow that comes back."
-        ),
-        description=(
-            "Names of the flows in the intervals between the switching times: "
-            "intervals with the same name have the same flow. Without names all "
-            "flows differ."
-        ),
-        examples=['["A", "B", "A"]'],
+        default=None, examples=['["A", "B", "A"]']
     )
-    law: Literal["auto", "paper", "quadratic", "linear", "mixed", "power"] = Field(
-        default="auto",
-        title="Drag law.",
-        description=(
-            'How the drag goes with the speed: "quadratic", "linear", "mixed" of both, or with a '
-            '"power" that is estimated. "paper" is quadratic without pressure gradient. "auto" is '
-            "quadratic unless the recording supports a linear part or another power."
-        ),
-    )
-    pressure_gradient: Literal["auto", "on", "off"] = Field(
-        default="auto",
-        title="Whether the water's own acceleration pushes the block.",
-        description=(
-            "Whether the water's own acceleration pushes the block and its added mass, as it does "
-            'a floating body. "auto" takes what the recording supports.'
-        ),
-    )
+    """Names of the flows between switching times; repeat a name for a flow that comes back.
+
+    Names of the flows in the intervals between the switching times: intervals with the same name
+    have the same flow. Without names all flows differ.
+    """
+    law: Literal["auto", "paper", "quadratic", "linear", "mixed", "power"] = "auto"
+    """Drag law.
+
+    How the drag goes with the speed: "quadratic", "linear", "mixed" of both, or with a "power" that
+    is estimated. "paper" is quadratic without pressure gradient. "auto" is quadratic unless the
+    recording supports a linear part or another power.
+    """
+    pressure_gradient: Literal["auto", "on", "off"] = "auto"
+    """Whether the water's own acceleration pushes the block.
+
+    Whether the water's own acceleration pushes the block and its added mass, as it does a floating
+    body. "auto" takes what the recording supports.
+    """
     added_mass_share: Annotated[
         float | Literal["auto"], Quantity("1", ge=0, le=5, words=("auto",))
-    ] = Field(
-        default="auto",
-        title="Added mass as a share of the block's mass.",
-        description=(
-            "Added mass as a share of the block's mass; the inertia grows by the same share. A "
-            "recording determines only drag and force divided by the mass with its added mass. "
-            '"auto" is 0.5 with a standard deviation of 0.2 where the acceleration of the water '
-            "pushes the block, else 0."
-        ),
-    )
-    added_mass_share_std: Annotated[float, Quantity("1", ge=0, le=5)] = Field(
-        default=0.0, description="Standard deviation of the added mass that is stated."
-    )
-    mass_std_kg: Annotated[float, Quantity("kg", ge=0, le=100)] = Field(
-        default=0.0, description="Standard deviation of the mass of the block."
-    )
-    side_std_m: Annotated[float, Quantity("m", ge=0, le=10)] = Field(
-        default=0.0, description="Standard deviation of the side of the block."
-    )
+    ] = "auto"
+    """Added mass as a share of the block's mass.
+
+    Added mass as a share of the block's mass; the inertia grows by the same share. A recording
+    determines only drag and force divided by the mass with its added mass. "auto" is 0.5 with a
+    standard deviation of 0.2 where the acceleration of the water pushes the block, else 0.
+    """
+    added_mass_share_std: Annotated[float, Quantity("1", ge=0, le=5)] = 0.0
+    """Standard deviation of the added mass that is stated."""
+    mass_std_kg: Annotated[float, Quantity("kg", ge=0, le=100)] = 0.0
+    """Standard deviation of the mass of the block."""
+    side_std_m: Annotated[float, Quantity("m", ge=0, le=10)] = 0.0
+    """Standard deviation of the side of the block."""
     force_memory_s: Annotated[
         float | Literal["auto", "white"], Quantity("s", gt=0, le=10, words=("auto", "white"))
-    ] = Field(
-        default="auto",
-        title="Correlation time of the stochastic force.",
-        description=(
-            'Correlation time of the stochastic force, or "white" for none. "auto" estimates one '
-            "if the recording supports it."
-        ),
-    )
-    flow_strength: Literal["auto", "constant", "smooth"] = Field(
-        default="auto",
-        title="Strength of the flow over time.",
-        description=(
-            'Strength of the flow over time: "constant", or "smooth". "auto" is constant unless '
-            "the recording supports changes; it also searches for pulses."
-        ),
-    )
-    camera: Literal["auto", "exact"] = Field(
-        default="auto",
-        title="Errors of the camera that are estimated.",
-        description=(
-            '"auto" estimates jitter of the time stamps, an offset of the orientation and of the '
-            'marker if the recording supports them, and refuses smoothed positions; "exact" takes '
-            "the positions as recorded."
-        ),
-    )
+    ] = "auto"
+    """Correlation time of the stochastic force.
+
+    Correlation time of the stochastic force, or "white" for none. "auto" estimates one if the
+    recording supports it.
+    """
+    flow_strength: Literal["auto", "constant", "smooth"] = "auto"
+    """Strength of the flow over time.
+
+    Strength of the flow over time: "constant", or "smooth". "auto" is constant unless the recording
+    supports changes; it also searches for pulses.
+    """
+    camera: Literal["auto", "exact"] = "auto"
+    """Errors of the camera that are estimated.
+
+    "auto" estimates jitter of the time stamps, an offset of the orientation and of the marker if
+    the recording supports them, and refuses smoothed positions; "exact" takes the positions as
+    recorded.
+    """
     drag_coefficient_precision: Annotated[float | None, Quantity("1", gt=0, lt=1)] = Field(
-        default=None,
-        title="Wanted relative standard error of C_d.",
-        description=(
-            "Wanted relative standard error of C_d: the fit says whether it is "
-            "reached, and if not, how long a recording must be. Without it, a "
-            "warning appears above 0.1."
-        ),
-        examples=[0.05],
+        default=None, examples=[0.05]
     )
+    """Wanted relative standard error of C_d.
+
+    Wanted relative standard error of C_d: the fit says whether it is reached, and if not, how long
+    a recording must be. Without it, a warning appears above 0.1.
+    """
 
     @field_validator("switching_times_s")
     @classmethod

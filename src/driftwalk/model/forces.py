@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar
 
-from pydantic import Field
-
 from driftwalk.model.section import Quantity, Section
 
 DragCoefficient = Annotated[float, Quantity("1", ge=0, le=100)]
@@ -26,76 +24,55 @@ class Forces(Section):
 
     section_name: ClassVar[str] = "forces"
 
-    drag_coefficient: DragCoefficient = Field(
-        default=0.45, description="Drag coefficient C_d of a side face."
-    )
-    force_std_N: ForceStd = Field(
-        default=0.55e-3,
-        title="Standard deviation of the stochastic force.",
-        description=(
-            "Standard deviation sigma_F of each horizontal component of the stochastic force on "
-            "the centre of mass."
-        ),
-    )
-    force_interval_s: Annotated[float, Quantity("s", gt=0, le=10)] = Field(
-        default=0.010,
-        description=(
-            "Interval at which the stochastic force is redrawn. It is part of the "
-            "model: a recording determines only sigma_F^2 * force_interval, so "
-            "always state the two together."
-        ),
-    )
+    drag_coefficient: DragCoefficient = 0.45
+    """Drag coefficient C_d of a side face."""
+    force_std_N: ForceStd = 0.55e-3
+    """Standard deviation of the stochastic force.
 
-    force_memory_s: Annotated[float, Quantity("s", ge=0, le=1e3)] = Field(
-        default=0.0,
-        title="Correlation time of the stochastic force.",
-        description=(
-            "Correlation time T of the stochastic force, 0 for none. With T > 0 a force keeps the "
-            "share k = exp(-force_interval / T) of the one before it, and 1 - k is new, with "
-            "standard deviation sigma_F: the noise intensity is still sigma_F^2 * force_interval."
-        ),
-    )
-    linear_drag_kg_s: Annotated[float, Quantity("kg/s", ge=0, le=1e4)] = Field(
-        default=0.0,
-        title="Drag of the block linear in the slip.",
-        description=(
-            "Drag k linear in the slip, in addition to the quadratic one: each of the 4 N strips, "
-            "windward or not, feels k / (4 N) times the velocity of the water relative to it."
-        ),
-    )
-    drag_power: Annotated[float, Quantity("1", ge=0.5, le=3.5)] = Field(
-        default=2.0,
-        title="Power p of the speed in the drag law.",
-        description=(
-            "Power p of the speed in the drag of windward strips: the force is "
-            "(|w| / drag_speed)^(p - 2) times the force of the quadratic law, with |w| the speed "
-            "of the water relative to the strip."
-        ),
-    )
-    drag_speed_m_s: Annotated[float, Quantity("m/s", gt=0, le=1e3)] = Field(
-        default=0.03,
-        title="Speed at which C_d holds, where the power of the drag is not 2.",
-        description=(
-            "Speed of the water past a strip at which C_d is the drag coefficient, with any "
-            "power of the drag; with the power 2 it has no effect."
-        ),
-    )
-    added_mass_share: Annotated[float, Quantity("1", ge=0, le=5)] = Field(
-        default=0.0,
-        title="Added mass as a share of the block's mass.",
-        description=(
-            "Added mass m_a of the water that moves along, as a share of the block's mass; the "
-            "moment of inertia grows by the same share."
-        ),
-    )
-    pressure_gradient: bool = Field(
-        default=False,
-        title="Whether water that accelerates pushes the block.",
-        description=(
-            "Whether the pressure that accelerates the water, Du/Dt, pushes the block too, by "
-            "(m + m_a) Du/Dt: a floating block displaces its own mass of water."
-        ),
-    )
+    Standard deviation sigma_F of each horizontal component of the stochastic force on the centre of
+    mass.
+    """
+    force_interval_s: Annotated[float, Quantity("s", gt=0, le=10)] = 0.010
+    """Interval at which the stochastic force is redrawn. It is part of the model: a recording
+    determines only sigma_F^2 * force_interval, so always state the two together."""
+
+    force_memory_s: Annotated[float, Quantity("s", ge=0, le=1e3)] = 0.0
+    """Correlation time of the stochastic force.
+
+    Correlation time T of the stochastic force, 0 for none. With T > 0 a force keeps the share k =
+    exp(-force_interval / T) of the one before it, and 1 - k is new, with standard deviation
+    sigma_F: the noise intensity is still sigma_F^2 * force_interval.
+    """
+    linear_drag_kg_s: Annotated[float, Quantity("kg/s", ge=0, le=1e4)] = 0.0
+    """Drag of the block linear in the slip.
+
+    Drag k linear in the slip, in addition to the quadratic one: each of the 4 N strips, windward or
+    not, feels k / (4 N) times the velocity of the water relative to it.
+    """
+    drag_power: Annotated[float, Quantity("1", ge=0.5, le=3.5)] = 2.0
+    """Power p of the speed in the drag law.
+
+    Power p of the speed in the drag of windward strips: the force is (|w| / drag_speed)^(p - 2)
+    times the force of the quadratic law, with |w| the speed of the water relative to the strip.
+    """
+    drag_speed_m_s: Annotated[float, Quantity("m/s", gt=0, le=1e3)] = 0.03
+    """Speed at which C_d holds, where the power of the drag is not 2.
+
+    Speed of the water past a strip at which C_d is the drag coefficient, with any power of the
+    drag; with the power 2 it has no effect.
+    """
+    added_mass_share: Annotated[float, Quantity("1", ge=0, le=5)] = 0.0
+    """Added mass as a share of the block's mass.
+
+    Added mass m_a of the water that moves along, as a share of the block's mass; the moment of
+    inertia grows by the same share.
+    """
+    pressure_gradient: bool = False
+    """Whether water that accelerates pushes the block.
+
+    Whether the pressure that accelerates the water, Du/Dt, pushes the block too, by (m + m_a)
+    Du/Dt: a floating block displaces its own mass of water.
+    """
 
     @property
     def force_noise_intensity_N2_s(self) -> float:

@@ -17,43 +17,28 @@ class Observation(Section):
 
     position_noise_m: Annotated[
         float | Literal["estimate"], Quantity("m", ge=0, le=1, words=("estimate",))
-    ] = Field(
-        default="estimate",
-        title="Position noise of the tracker.",
-        description=(
-            "Standard deviation of the position noise of the tracker, per axis; "
-            '"estimate" takes it from the recording; without a recording there is no '
-            "noise."
-        ),
-    )
+    ] = "estimate"
+    """Position noise of the tracker.
+
+    Standard deviation of the position noise of the tracker, per axis; "estimate" takes it from the
+    recording; without a recording there is no noise.
+    """
     orientation_noise_rad: Annotated[
         float | Literal["estimate"], Quantity("rad", ge=0, le=3.2, words=("estimate",))
-    ] = Field(
-        default="estimate",
-        title="Orientation noise of the tracker.",
-        description=(
-            'Standard deviation of the orientation noise of the tracker; "estimate" as for the '
-            "position."
-        ),
-    )
+    ] = "estimate"
+    """Orientation noise of the tracker.
+
+    Standard deviation of the orientation noise of the tracker; "estimate" as for the position.
+    """
     position_quantum_m: Annotated[
         float | Literal["recording"], Quantity("m", ge=0, le=1, words=("recording",))
-    ] = Field(
-        default="recording",
-        description=(
-            "Resolution to which simulated positions are rounded, 0 for none; "
-            '"recording" uses the resolution of the recorded file.'
-        ),
-    )
-    gaps: Literal["recording", "none"] = Field(
-        default="recording",
-        description='Missed samples: "recording" removes the samples that the recording lacks.',
-    )
+    ] = "recording"
+    """Resolution to which simulated positions are rounded, 0 for none; "recording" uses the
+    resolution of the recorded file."""
+    gaps: Literal["recording", "none"] = "recording"
+    """Missed samples: "recording" removes the samples that the recording lacks."""
     field_of_view: FieldOfView | None = Field(
-        default=None,
-        description=(
-            "Field of view of the camera, if smaller than the tank: the keys of "
-            "[tank] for a shape, and center_m; samples outside are missing."
-        ),
-        examples=['{ shape = "rectangle", width_m = 0.25, height_m = 0.2 }'],
+        default=None, examples=['{ shape = "rectangle", width_m = 0.25, height_m = 0.2 }']
     )
+    """Field of view of the camera, if smaller than the tank: the keys of [tank] for a shape, and
+    center_m; samples outside are missing."""

@@ -1,4 +1,4 @@
-"""How a recording is read, so that a study file is complete for the file it belongs to."""
+"""How a recording is read, so that a study file is complete for its file; how steps are formed."""
 
 from __future__ import annotations
 
@@ -26,27 +26,48 @@ class Columns(Section):
 
     section_name: ClassVar[str] = "recording.columns"
 
-    t: Column = Field(default=None, description="Column of the time.")
-    frame: Column = Field(default=None, description="Column of the frame number.")
-    x: Column = Field(default=None, description="Column of x.")
-    y: Column = Field(default=None, description="Column of y.")
-    z: Column = Field(default=None, description="Column of z, if the positions are in space.")
-    theta: Column = Field(default=None, description="Column of the orientation.")
-    qx: Column = Field(default=None, description="Column of the quaternion's x.")
-    qy: Column = Field(default=None, description="Column of the quaternion's y.")
-    qz: Column = Field(default=None, description="Column of the quaternion's z.")
-    qw: Column = Field(default=None, description="Column of the quaternion's w, its real part.")
-    body: Column = Field(default=None, description="Column of the body's name.")
-    x1: Column = Field(default=None, description="Column of x of a box's first corner.")
-    y1: Column = Field(default=None, description="Column of y of a box's first corner.")
-    x2: Column = Field(default=None, description="Column of x of a box's second corner.")
-    y2: Column = Field(default=None, description="Column of y of a box's second corner.")
-    w: Column = Field(default=None, description="Column of the width of a box.")
-    h: Column = Field(default=None, description="Column of the height of a box.")
-    lon: Column = Field(default=None, description="Column of the longitude.")
-    lat: Column = Field(default=None, description="Column of the latitude.")
-    confidence: Column = Field(default=None, description="Column of the confidence.")
-    skip: Column = Field(default=None, description="Columns to leave out, with + between them.")
+    t: Column = None
+    """Column of the time."""
+    frame: Column = None
+    """Column of the frame number."""
+    x: Column = None
+    """Column of x."""
+    y: Column = None
+    """Column of y."""
+    z: Column = None
+    """Column of z, if the positions are in space."""
+    theta: Column = None
+    """Column of the orientation."""
+    qx: Column = None
+    """Column of the quaternion's x."""
+    qy: Column = None
+    """Column of the quaternion's y."""
+    qz: Column = None
+    """Column of the quaternion's z."""
+    qw: Column = None
+    """Column of the quaternion's w, its real part."""
+    body: Column = None
+    """Column of the body's name."""
+    x1: Column = None
+    """Column of x of a box's first corner."""
+    y1: Column = None
+    """Column of y of a box's first corner."""
+    x2: Column = None
+    """Column of x of a box's second corner."""
+    y2: Column = None
+    """Column of y of a box's second corner."""
+    w: Column = None
+    """Column of the width of a box."""
+    h: Column = None
+    """Column of the height of a box."""
+    lon: Column = None
+    """Column of the longitude."""
+    lat: Column = None
+    """Column of the latitude."""
+    confidence: Column = None
+    """Column of the confidence."""
+    skip: Column = None
+    """Columns to leave out, with + between them."""
 
     def to_dict(self) -> dict[str, str]:
         """Return the columns that are set, from quantity to column."""
@@ -58,135 +79,76 @@ class Recording(Section):
 
     section_name: ClassVar[str] = "recording"
 
-    format: str = Field(
-        default="auto", description='Name of the file\'s format; "auto" looks at the file.'
-    )
-    body: str | None = Field(
-        default=None, description="Body to use, if the recording holds several.", examples=["0"]
-    )
-    start_s: Annotated[float | None, Quantity("s")] = Field(
-        default=None, description="First time to use.", examples=[0.0]
-    )
-    stop_s: Annotated[float | None, Quantity("s")] = Field(
-        default=None, description="Last time to use.", examples=[1800.0]
-    )
+    format: str = "auto"
+    """Name of the file's format; "auto" looks at the file."""
+    body: str | None = Field(default=None, examples=["0"])
+    """Body to use, if the recording holds several."""
+    start_s: Annotated[float | None, Quantity("s")] = Field(default=None, examples=[0.0])
+    """First time to use."""
+    stop_s: Annotated[float | None, Quantity("s")] = Field(default=None, examples=[1800.0])
+    """Last time to use."""
     frame_rate_Hz: Annotated[float | None, Quantity("Hz", gt=0, le=1e6)] = Field(
-        default=None,
-        description="Frames per second, if the file has frame numbers but no times.",
-        examples=[25.0],
+        default=None, examples=[25.0]
     )
+    """Frames per second, if the file has frame numbers but no times."""
     metres_per_pixel: Annotated[float | None, Quantity("m", gt=0, le=10)] = Field(
-        default=None,
-        description="Size of a pixel in m, if the file is in pixels.",
-        examples=[0.0005],
+        default=None, examples=[0.0005]
     )
+    """Size of a pixel in m, if the file is in pixels."""
     length_unit: Literal[
         "auto", "m", "dm", "cm", "mm", "um", "nm", "km", "ft", "in", "yd", "px"
-    ] = Field(
-        default="auto", description='Unit of the positions; "auto" uses the unit of the file.'
-    )
-    y_axis: Literal["auto", "up", "down"] = Field(
-        default="auto",
-        description=(
-            'Direction of the file\'s y axis; "auto" uses the direction of the format, down for '
-            "pixels."
-        ),
-    )
-    columns: Columns | None = Field(
-        default=None,
-        description=(
-            "Columns of a table (t, frame, x, y, theta, body and others), each by its name "
-            'in the header or its number from 1; a unit may follow, as in "angle:deg".'
-        ),
-        examples=['{ t = "time", x = 2, y = 3 }'],
-    )
-    delimiter: str | None = Field(
-        default=None,
-        description="Character between the fields of a table; recognised when not given.",
-        examples=[";"],
-    )
-    up: Literal["auto", "x", "y", "z", "-x", "-y", "-z"] = Field(
-        default="auto",
-        description='Axis that points up, if the file has three axes; "auto" uses the format\'s.',
-    )
-    topic: str | None = Field(
-        default=None, description="Topic of a ROS bag.", examples=["/block/pose"]
-    )
+    ] = "auto"
+    """Unit of the positions; "auto" uses the unit of the file."""
+    y_axis: Literal["auto", "up", "down"] = "auto"
+    """Direction of the file's y axis; "auto" uses the direction of the format, down for pixels."""
+    columns: Columns | None = Field(default=None, examples=['{ t = "time", x = 2, y = 3 }'])
+    """Columns of a table (t, frame, x, y, theta, body and others), each by its name in the header or
+    its number from 1; a unit may follow, as in "angle:deg"."""
+    delimiter: str | None = Field(default=None, examples=[";"])
+    """Character between the fields of a table; recognised when not given."""
+    up: Literal["auto", "x", "y", "z", "-x", "-y", "-z"] = "auto"
+    """Axis that points up, if the file has three axes; "auto" uses the format's."""
+    topic: str | None = Field(default=None, examples=["/block/pose"])
+    """Topic of a ROS bag."""
     header_line: Annotated[int | None, Quantity("1", ge=1, le=10_000, whole=True)] = Field(
-        default=None,
-        description="Line of a table, from 1, that names its columns, if it is not the first.",
-        examples=[7],
+        default=None, examples=[7]
     )
-    sheet: str | None = Field(
-        default=None,
-        description="Sheet of a workbook, or variable of a MATLAB file, if several hold positions.",
-        examples=["Run 2"],
-    )
-    x_file: str | None = Field(
-        default=None,
-        description="File of the x matrix, if each coordinate has its own file.",
-        examples=["x.csv"],
-    )
-    y_file: str | None = Field(
-        default=None, description="File of the y matrix.", examples=["y.csv"]
-    )
-    theta_file: str | None = Field(
-        default=None, description="File of the orientation matrix.", examples=["theta.csv"]
-    )
-    keypoint: str | None = Field(
-        default=None, description="Keypoint of a pose file to use as the body.", examples=["centre"]
-    )
-    heading: tuple[str, str] | None = Field(
-        default=None,
-        description=(
-            "Two keypoints of a pose file, or two bodies that are markers of one: the orientation "
-            "is the angle from the first to the second."
-        ),
-        examples=['["tail", "nose"]'],
-    )
+    """Line of a table, from 1, that names its columns, if it is not the first."""
+    sheet: str | None = Field(default=None, examples=["Run 2"])
+    """Sheet of a workbook, or variable of a MATLAB file, if several hold positions."""
+    x_file: str | None = Field(default=None, examples=["x.csv"])
+    """File of the x matrix, if each coordinate has its own file."""
+    y_file: str | None = Field(default=None, examples=["y.csv"])
+    """File of the y matrix."""
+    theta_file: str | None = Field(default=None, examples=["theta.csv"])
+    """File of the orientation matrix."""
+    keypoint: str | None = Field(default=None, examples=["centre"])
+    """Keypoint of a pose file to use as the body."""
+    heading: tuple[str, str] | None = Field(default=None, examples=['["tail", "nose"]'])
+    """Two keypoints of a pose file, or two bodies that are markers of one: the orientation is the
+    angle from the first to the second."""
     min_confidence: Annotated[float | None, Quantity("1", ge=0)] = Field(
-        default=None,
-        description=(
-            "Smallest confidence of a keypoint or row; others are missing. Not set: the format's."
-        ),
-        examples=[0.6],
+        default=None, examples=[0.6]
     )
-    box: Literal["auto", "xyxy", "xywh", "cxcywh", "none"] = Field(
-        default="auto",
-        description=(
-            "Columns of a box: two corners, corner or centre with width and height, or no box; "
-            '"auto" goes by their names.'
-        ),
-    )
-    missing: tuple[str, ...] | None = Field(
-        default=None,
-        description=(
-            'Positions that mean that the body was not seen: "X,Y", a number, or "held" for that '
-            "of the sample before."
-        ),
-        examples=['["0,0"]'],
-    )
-    sort: Literal["error", "sort"] = Field(
-        default="error", description='Times that go back: "error" refuses them, "sort" sorts them.'
-    )
+    """Smallest confidence of a keypoint or row; others are missing. Not set: the format's."""
+    box: Literal["auto", "xyxy", "xywh", "cxcywh", "none"] = "auto"
+    """Columns of a box: two corners, corner or centre with width and height, or no box; "auto" goes
+    by their names."""
+    missing: tuple[str, ...] | None = Field(default=None, examples=['["0,0"]'])
+    """Positions that mean that the body was not seen: "X,Y", a number, or "held" for that of the
+    sample before."""
+    sort: Literal["error", "sort"] = "error"
+    """Times that go back: "error" refuses them, "sort" sorts them."""
     max_speed_m_s: Annotated[float | None, Quantity("m/s", gt=0, le=1e4)] = Field(
-        default=None,
-        description="Fastest plausible speed; samples that need a faster one become gaps.",
-        examples=[1.0],
+        default=None, examples=[1.0]
     )
-    arena: Literal["tank", "fit", "file"] = Field(
-        default="tank",
-        description=(
-            'Arena of the positions: "tank" is [tank], with its centre at the file\'s origin if '
-            'that agrees with the positions, and fitted to them otherwise; "fit" is a circle '
-            'fitted to the positions; "file" uses the arena of the file, if any.'
-        ),
-    )
-    arena_center_m: tuple[float, float] | None = Field(
-        default=None,
-        description="Centre [x, y] of the tank in the file's frame in m, y up, if known.",
-        examples=["[0.42, -0.31]"],
-    )
+    """Fastest plausible speed; samples that need a faster one become gaps."""
+    arena: Literal["tank", "fit", "file"] = "tank"
+    """Arena of the positions: "tank" is [tank], with its centre at the file's origin if that agrees
+    with the positions, and fitted to them otherwise; "fit" is a circle fitted to the positions;
+    "file" uses the arena of the file, if any."""
+    arena_center_m: tuple[float, float] | None = Field(default=None, examples=["[0.42, -0.31]"])
+    """Centre [x, y] of the tank in the file's frame in m, y up, if known."""
 
     def load_options(self) -> dict[str, Any]:
         """Return the keyword arguments of `driftwalk.record.load` but for the arena.
@@ -228,3 +190,14 @@ class Recording(Section):
                 f"stop_s = {self.stop_s:g} is not after start_s = {self.start_s:g}"
             )
         return self
+
+
+class Steps(Section):
+    """Formation of step lengths and turning angles, the same for real and simulated motion."""
+
+    section_name: ClassVar[str] = "steps"
+
+    step_interval_s: Annotated[
+        float | Literal["auto"], Quantity("s", gt=0, le=1e5, words=("auto",))
+    ] = "auto"
+    """Time between the positions of a step; "auto" uses the interval of the recording."""

@@ -10,7 +10,7 @@ from pydantic import Field, field_validator
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.text.did_you_mean import did_you_mean
 from driftwalk.model.fit import Fit
-from driftwalk.model.section import Placeholder, Quantity, Section, quoted, words_of
+from driftwalk.model.section import Placeholder, Quantity, Section, Seed, quoted, words_of
 
 LARGEST_STEP_S: Final = 0.0025
 """Largest time step of a simulation that is taken for the truth: its error is then far below what
@@ -33,65 +33,42 @@ class Recover(Section):
 
     section_name: ClassVar[str] = "recover"
 
-    flow: Annotated[str | None, Placeholder("FILE")] = Field(
-        default=None,
-        title="File of the true flow field (default: the study file's).",
-        description=(
-            'File of the true flow field, relative to the study file; "random" draws '
-            "a different flow for every recording."
-        ),
-        examples=["fit/flow.nc"],
-    )
-    flow_family: Literal["swirl", "eddies"] = Field(
-        default="swirl",
-        description=(
-            'Family of random flows: "swirl" with jets and a sink, in which a block '
-            'goes round on regular orbits, or "eddies".'
-        ),
-    )
+    flow: Annotated[str | None, Placeholder("FILE")] = Field(default=None, examples=["fit/flow.nc"])
+    """File of the true flow field (default: the study file's).
+
+    File of the true flow field, relative to the study file; "random" draws a different flow for
+    every recording.
+    """
+    flow_family: Literal["swirl", "eddies"] = "swirl"
+    """Family of random flows: "swirl" with jets and a sink, in which a block goes round on regular
+    orbits, or "eddies"."""
     flow_speed_m_s: Annotated[float | None, Quantity("m/s", gt=0, le=100)] = Field(
-        default=None,
-        description="Root mean square speed of random flows; if not set, the speed as drawn.",
-        examples=[0.05],
+        default=None, examples=[0.05]
     )
-    recordings: Annotated[int, Quantity("1", ge=2, le=100_000, whole=True)] = Field(
-        default=20, description="Number of recordings to simulate and fit, for each length."
-    )
-    durations_s: tuple[Annotated[float, Quantity("s", gt=0, le=1e6)], ...] = Field(
-        default=(1800.0,), description="Lengths of the recordings to compare."
-    )
-    sample_interval_s: Annotated[float, Quantity("s", gt=0, le=1)] = Field(
-        default=0.1, description="Time between two samples of the camera."
-    )
-    recordings_per_fit: Annotated[int, Quantity("1", ge=1, le=1000, whole=True)] = Field(
-        default=1,
-        description="Number of recordings of one flow, from different starts, to fit together.",
-    )
-    missing_share: Annotated[float, Quantity("1", ge=0, le=0.9)] = Field(
-        default=0.0, description="Share of the samples that the camera misses, at random."
-    )
-    settling_s: Annotated[float, Quantity("s", ge=0, le=1e6)] = Field(
-        default=20.0,
-        description="Time from the start, at rest, to the first sample of the recording.",
-    )
-    angle: tuple[str, ...] | None = Field(
-        default=None,
-        description="Uses of the orientation to compare, as in [fit] angle; if not "
-        "set, the one in [fit].",
-        examples=['["given", "none"]'],
-    )
+    """Root mean square speed of random flows; if not set, the speed as drawn."""
+    recordings: Annotated[int, Quantity("1", ge=2, le=100_000, whole=True)] = 20
+    """Number of recordings to simulate and fit, for each length."""
+    durations_s: tuple[Annotated[float, Quantity("s", gt=0, le=1e6)], ...] = (1800.0,)
+    """Lengths of the recordings to compare."""
+    sample_interval_s: Annotated[float, Quantity("s", gt=0, le=1)] = 0.1
+    """Time between two samples of the camera."""
+    recordings_per_fit: Annotated[int, Quantity("1", ge=1, le=1000, whole=True)] = 1
+    """Number of recordings of one flow, from different starts, to fit together."""
+    missing_share: Annotated[float, Quantity("1", ge=0, le=0.9)] = 0.0
+    """Share of the samples that the camera misses, at random."""
+    settling_s: Annotated[float, Quantity("s", ge=0, le=1e6)] = 20.0
+    """Time from the start, at rest, to the first sample of the recording."""
+    angle: tuple[str, ...] | None = Field(default=None, examples=['["given", "none"]'])
+    """Uses of the orientation to compare, as in [fit] angle; if not set, the one in [fit]."""
     drag_coefficient_precision: Annotated[float | None, Quantity("1", gt=0, lt=1)] = Field(
-        default=None,
-        title="Wanted relative error of C_d (rms).",
-        description=(
-            "Wanted relative error of C_d, root mean square: the study says how long "
-            "to record for it."
-        ),
-        examples=[0.05],
+        default=None, examples=[0.05]
     )
-    seed: Annotated[int, Quantity("1", ge=0, le=2**63 - 1, whole=True)] = Field(
-        default=1, description="Seed of the flows, starts, forces, camera and gaps."
-    )
+    """Wanted relative error of C_d (rms).
+
+    Wanted relative error of C_d, root mean square: the study says how long to record for it.
+    """
+    seed: Seed = 1
+    """Seed of the flows, starts, forces, camera and gaps."""
 
     @field_validator("durations_s")
     @classmethod

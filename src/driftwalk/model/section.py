@@ -1,15 +1,23 @@
 """Base of every section of a study: declared quantities and readable errors.
 
 A field is declared once: type, unit, range, default and meaning stand together, and the same
-declaration checks the value, writes the commented template and makes the reference page.
+declaration checks the value, writes the commented template and makes the reference page. The text
+below a field is its description; where it has two paragraphs, the first one says in a sentence what
+the help of its option says.
 """
 
 from __future__ import annotations
 
+import ast
 import inspect
-from collections.abc import Iterable, Iterator
+import json
+import re
+import sys
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Final, get_args
+from functools import lru_cache
+from itertools import pairwise
+from typing import Annotated, Any, ClassVar, Final, get_args
 
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError
 from pydantic_core import CoreSchema, ErrorDetails, core_schema
@@ -109,6 +117,9 @@ class Quantity:
         return value
 
 
+Seed = Annotated[int, Quantity("1", ge=0, le=2**63 - 1, whole=True)]
+
+
 @dataclass(frozen=True)
 class OrNumber:
     """Declares that a word may be given as a number instead, which has its own key."""
@@ -164,6 +175,53 @@ class Section(_WithSignature, BaseModel):
 
 class _SectionError(ConfigurationError):
     """An error whose message names its section already."""
+
+
+# A sentence may begin with a word in quotes; "Eq. 4" is no end of one.
+_END_OF_SENTENCE: Final = re.compile(r'(?<=\.) (?=[A-Z"])')
+
+
+def description_of(section: type[Section], key: str) -> str:
+    """Return the description of a field: the last paragraph of the text below it."""
+    return _paragraphs(section, key)[-1]
+
+
+def meaning_of(section: type[Section], key: str) -> str:
+    """Return the description of a field in one sentence: its first paragraph, or sentence."""
+    first, *more = _paragraphs(section, key)
+    return first if more else _END_OF_SENTENCE.split(first)[0]
+
+
+def _paragraphs(section: type[Section], key: str) -> list[str]:
+    """Return the paragraphs below a field in the source of its class, each in one line.
+
+    Only help and templates need them. pydantic could read them, but for every section at import.
+    """
+    stated = section.model_fields[key].description
+    owners = (kind for kind in section.__mro__ if key in vars(kind).get("__annotations__", {}))
+    owner = next(owners, section)
+    text = stated or _texts_of(owner.__module__).get((owner.__name__, key), "")
+    return [" ".join(part.split()) for part in text.split("\n\n")]
+
+
+@lru_cache
+def _texts_of(module: str) -> dict[tuple[str, str], str]:
+    """Return the texts below the fields of a module's classes, by class and field."""
+    try:
+        tree = ast.parse(inspect.getsource(sys.modules[module]))
+    except OSError:  # a program that was frozen without its source
+        return {}
+    return {
+        (kind.name, field.target.id): text.value.value
+        for kind in tree.body
+        if isinstance(kind, ast.ClassDef)
+        for field, text in pairwise(kind.body)
+        if isinstance(field, ast.AnnAssign)
+        and isinstance(field.target, ast.Name)
+        and isinstance(text, ast.Expr)
+        and isinstance(text.value, ast.Constant)
+        and isinstance(text.value.value, str)
+    }
 
 
 def quoted(words: Iterable[str]) -> str:
@@ -246,3 +304,33 @@ def _unknown_key(section: type[Section], key: str) -> str:
     if section.section_name:
         return f"[{section.section_name}] unknown key '{key}'{hint}"
     return f"unknown section or key '{key}'{hint}"
+
+
+def write_toml(sections: Mapping[str, Section]) -> str:
+    """Return named sections as TOML without comments and without the keys that are not set."""
+    parts = []
+    for name, section in sections.items():
+        lines = [f"{key} = {toml_text(value)}" for key, value in _set_values(section)]
+        parts.append("\n".join([f"[{name}]", *lines]))
+    return "\n\n".join(parts) + "\n"
+
+
+def toml_text(value: Any) -> str:
+    """Return a value as TOML; its strings are JSON's, but for the delete character."""
+    if isinstance(value, Section):
+        inner = ", ".join(f"{key} = {toml_text(item)}" for key, item in _set_values(value))
+        return f"{{ {inner} }}" if inner else "{}"
+    if isinstance(value, (tuple, list)):
+        return "[" + ", ".join(toml_text(item) for item in value) + "]"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return repr(value)
+
+
+def _set_values(section: Section) -> Iterator[tuple[str, Any]]:
+    for key in type(section).model_fields:
+        value = getattr(section, key)
+        if value is not None:
+            yield key, value

@@ -10,9 +10,9 @@ from pydantic import Field, field_validator, model_validator
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.grid import MOST_SETTINGS
 from driftwalk.model.assembly import MOST_BLOCKS, HiddenFaceDrag, Latching
-from driftwalk.model.force_grid import ForceGrid
+from driftwalk.model.calibration import ForceGrid
 from driftwalk.model.forces import DragCoefficient, ForceStd
-from driftwalk.model.section import Quantity
+from driftwalk.model.section import Quantity, Seed
 
 AXES: Final[dict[str, str]] = {
     "tank_diameter": "tank_diameter_m",
@@ -43,59 +43,40 @@ class Sensitivity(ForceGrid):
 
     section_name: ClassVar[str] = "sensitivity"
 
-    drag_coefficient_max: DragCoefficient = Field(
-        default=1.5, description="Largest drag coefficient of the grid, included."
-    )
-    force_std_max_N: ForceStd = Field(
-        default=1.5e-3, description="Largest force_std of the grid, included."
-    )
-    runs: Annotated[int, Quantity("1", ge=1, le=10_000_000, whole=True)] = Field(
-        default=1000,
-        description="Simulated runs per setting, and per realisation of the reference.",
-    )
-    reference_realisations: Annotated[int, Quantity("1", ge=2, le=100_000, whole=True)] = Field(
-        default=10, description="Number of realisations of the reference, which is their mean."
-    )
-    seed: Annotated[int, Quantity("1", ge=0, le=2**63 - 1, whole=True)] = Field(
-        default=1, description="Seed of the random numbers."
-    )
+    drag_coefficient_max: DragCoefficient = 1.5
+    """Largest drag coefficient of the grid, included."""
+    force_std_max_N: ForceStd = 1.5e-3
+    """Largest force_std of the grid, included."""
+    runs: Annotated[int, Quantity("1", ge=1, le=10_000_000, whole=True)] = 1000
+    """Simulated runs per setting, and per realisation of the reference."""
+    reference_realisations: Annotated[int, Quantity("1", ge=2, le=100_000, whole=True)] = 10
+    """Number of realisations of the reference, which is their mean."""
+    seed: Seed = 1
+    """Seed of the random numbers."""
     tank_diameter_m: tuple[Annotated[float, Quantity("m", gt=0, le=1e3)], ...] | None = Field(
-        default=None,
-        description="Diameters of circular tanks to compare, an axis of the map.",
-        examples=["[0.25, 0.3]"],
+        default=None, examples=["[0.25, 0.3]"]
     )
+    """Diameters of circular tanks to compare, an axis of the map."""
     blocks: tuple[Annotated[int, Quantity("1", ge=1, le=MOST_BLOCKS, whole=True)], ...] | None = (
-        Field(
-            default=None,
-            description="Numbers of blocks to compare, an axis of the map.",
-            examples=["[3, 4, 5]"],
-        )
+        Field(default=None, examples=["[3, 4, 5]"])
     )
-    flow: tuple[str, ...] | None = Field(
-        default=None,
-        description="Files of flow fields to compare, an axis of the map.",
-        examples=['["flow_a.nc", "flow_b.nc"]'],
-    )
+    """Numbers of blocks to compare, an axis of the map."""
+    flow: tuple[str, ...] | None = Field(default=None, examples=['["flow_a.nc", "flow_b.nc"]'])
+    """Files of flow fields to compare, an axis of the map."""
     latching: tuple[Latching, ...] | None = Field(
-        default=None,
-        description="Latching rules to compare, an axis of the map.",
-        examples=['["collision", "connector"]'],
+        default=None, examples=['["collision", "connector"]']
     )
+    """Latching rules to compare, an axis of the map."""
     hidden_face_drag: tuple[HiddenFaceDrag, ...] | None = Field(
-        default=None,
-        description="Rules for the drag on joined faces to compare, an axis of the map.",
-        examples=['["none", "full"]'],
+        default=None, examples=['["none", "full"]']
     )
+    """Rules for the drag on joined faces to compare, an axis of the map."""
     drag_coefficient: tuple[DragCoefficient, ...] | None = Field(
-        default=None,
-        description="Drag coefficients to compare, an axis of the map, instead of the range.",
-        examples=["[0.2, 0.45, 1.0]"],
+        default=None, examples=["[0.2, 0.45, 1.0]"]
     )
-    force_std_N: tuple[ForceStd, ...] | None = Field(
-        default=None,
-        description="Values of force_std to compare, an axis of the map, instead of the range.",
-        examples=['["0.2mN", "0.55mN"]'],
-    )
+    """Drag coefficients to compare, an axis of the map, instead of the range."""
+    force_std_N: tuple[ForceStd, ...] | None = Field(default=None, examples=['["0.2mN", "0.55mN"]'])
+    """Values of force_std to compare, an axis of the map, instead of the range."""
 
     @field_validator(*LISTS)
     @classmethod

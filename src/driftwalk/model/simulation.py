@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, field_validator
+from pydantic import field_validator
 
 from driftwalk.core.errors import ConfigurationError
-from driftwalk.model.section import Quantity, Section
+from driftwalk.model.section import Quantity, Section, Seed
 
 
 class Pose(Section):
@@ -16,11 +16,12 @@ class Pose(Section):
 
     section_name: ClassVar[str] = "simulation.start"
 
-    x_m: Annotated[float, Quantity("m")] = Field(default=0.0, description="Position x.")
-    y_m: Annotated[float, Quantity("m")] = Field(default=0.0, description="Position y.")
-    theta_rad: Annotated[float, Quantity("rad")] = Field(
-        default=0.0, description="Orientation, counter-clockwise from x."
-    )
+    x_m: Annotated[float, Quantity("m")] = 0.0
+    """Position x."""
+    y_m: Annotated[float, Quantity("m")] = 0.0
+    """Position y."""
+    theta_rad: Annotated[float, Quantity("rad")] = 0.0
+    """Orientation, counter-clockwise from x."""
 
 
 class Simulation(Section):
@@ -30,35 +31,23 @@ class Simulation(Section):
 
     time_step_s: Annotated[
         float | Literal["auto"], Quantity("s", gt=0, le=0.1, words=("auto",))
-    ] = Field(
-        default="auto",
-        title="Time step; divides the force interval.",
-        description=(
-            'Time step of the integrator; "auto" is the largest whole divisor of '
-            "force_interval_s up to 10 ms. A step that does not divide the interval "
-            "is an error."
-        ),
-    )
-    duration_s: Annotated[float, Quantity("s", gt=0, le=1e7)] = Field(
-        default=1800.0, description="Length of a simulated trajectory."
-    )
-    sample_rate_Hz: Annotated[float, Quantity("Hz", gt=0, le=1e5)] = Field(
-        default=10.0,
-        description="Sampling rate of a simulation without a recording's time stamps.",
-    )
-    replicates: Annotated[int, Quantity("1", ge=1, le=10_000_000, whole=True)] = Field(
-        default=1, description="Trajectories with the same parameters and different random numbers."
-    )
-    seed: Annotated[int, Quantity("1", ge=0, le=2**63 - 1, whole=True)] = Field(
-        default=1, description="Seed of the random numbers; the same seed gives the same bits."
-    )
-    start: Literal["random"] | Pose = Field(
-        default="random",
-        description=(
-            'First pose: "random", anywhere in the tank, or a pose such as '
-            "{ x_m = 0.0, y_m = 0.0, theta_rad = 0.0 }. The block starts at rest."
-        ),
-    )
+    ] = "auto"
+    """Time step; divides the force interval.
+
+    Time step of the integrator; "auto" is the largest whole divisor of force_interval_s up to 10
+    ms. A step that does not divide the interval is an error.
+    """
+    duration_s: Annotated[float, Quantity("s", gt=0, le=1e7)] = 1800.0
+    """Length of a simulated trajectory."""
+    sample_rate_Hz: Annotated[float, Quantity("Hz", gt=0, le=1e5)] = 10.0
+    """Sampling rate of a simulation without a recording's time stamps."""
+    replicates: Annotated[int, Quantity("1", ge=1, le=10_000_000, whole=True)] = 1
+    """Trajectories with the same parameters and different random numbers."""
+    seed: Seed = 1
+    """Seed of the random numbers; the same seed gives the same bits."""
+    start: Literal["random"] | Pose = "random"
+    """First pose: "random", anywhere in the tank, or a pose such as { x_m = 0.0, y_m = 0.0,
+    theta_rad = 0.0 }. The block starts at rest."""
 
     @field_validator("start", mode="before")
     @classmethod

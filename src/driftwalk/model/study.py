@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
@@ -19,15 +20,23 @@ from driftwalk.model.fit import Fit
 from driftwalk.model.flow import Flow
 from driftwalk.model.forces import Forces
 from driftwalk.model.observation import Observation
-from driftwalk.model.recording import Recording
+from driftwalk.model.recording import Recording, Steps
 from driftwalk.model.recover import Recover
-from driftwalk.model.section import Section
+from driftwalk.model.section import (
+    OrNumber,
+    Placeholder,
+    Quantity,
+    Section,
+    is_list,
+    item_quantity_of,
+    meaning_of,
+    quantity_of,
+    words_of,
+    write_toml,
+)
 from driftwalk.model.sensitivity import Sensitivity
 from driftwalk.model.simulation import Pose, Simulation, resolve_time_step
-from driftwalk.model.steps import Steps
-from driftwalk.model.study_file.toml import write_toml
-from driftwalk.model.tank import Tank
-from driftwalk.model.water import Water
+from driftwalk.model.tank import Tank, Water
 
 
 class Study(Section):
@@ -47,38 +56,34 @@ class Study(Section):
     0.008
     """
 
-    block: Block = Field(default_factory=Block, description="The floating block.")
-    tank: Tank = Field(default_factory=Tank, description="The tank and its wall.")
-    water: Water = Field(default_factory=Water, description="The liquid.")
-    forces: Forces = Field(default_factory=Forces, description="Drag and stochastic force.")
-    simulation: Simulation = Field(
-        default_factory=Simulation, description="Settings of a simulation."
-    )
-    observation: Observation = Field(
-        default_factory=Observation, description="Effects of the camera on the poses."
-    )
-    recording: Recording = Field(default_factory=Recording, description="Reading of the recording.")
-    flow: Flow = Field(
-        default_factory=Flow, description="Extraction of the flow field from the recording."
-    )
-    steps: Steps = Field(default_factory=Steps, description="Formation of steps.")
-    calibration: Calibration = Field(
-        default_factory=Calibration, description="Search of a calibration."
-    )
-    fit: Fit = Field(
-        default_factory=Fit,
-        description="Joint fit of flow, drag, force and tracking noise.",
-    )
-    recover: Recover = Field(
-        default_factory=Recover,
-        description="Recordings of known truth that a recovery study simulates and fits.",
-    )
-    assembly: Assembly = Field(
-        default_factory=Assembly, description="Rules of self-assembly, and the number of runs."
-    )
-    sensitivity: Sensitivity = Field(
-        default_factory=Sensitivity, description="Axes and size of a sensitivity analysis."
-    )
+    block: Block = Field(default_factory=Block)
+    """The floating block."""
+    tank: Tank = Field(default_factory=Tank)
+    """The tank and its wall."""
+    water: Water = Field(default_factory=Water)
+    """The liquid."""
+    forces: Forces = Field(default_factory=Forces)
+    """Drag and stochastic force."""
+    simulation: Simulation = Field(default_factory=Simulation)
+    """Settings of a simulation."""
+    observation: Observation = Field(default_factory=Observation)
+    """Effects of the camera on the poses."""
+    recording: Recording = Field(default_factory=Recording)
+    """Reading of the recording."""
+    flow: Flow = Field(default_factory=Flow)
+    """Extraction of the flow field from the recording."""
+    steps: Steps = Field(default_factory=Steps)
+    """Formation of steps."""
+    calibration: Calibration = Field(default_factory=Calibration)
+    """Search of a calibration."""
+    fit: Fit = Field(default_factory=Fit)
+    """Joint fit of flow, drag, force and tracking noise."""
+    recover: Recover = Field(default_factory=Recover)
+    """Recordings of known truth that a recovery study simulates and fits."""
+    assembly: Assembly = Field(default_factory=Assembly)
+    """Rules of self-assembly, and the number of runs."""
+    sensitivity: Sensitivity = Field(default_factory=Sensitivity)
+    """Axes and size of a sensitivity analysis."""
 
     @model_validator(mode="after")
     def _time_step_divides(self) -> Self:
@@ -270,3 +275,75 @@ def _known_section(section: str, name: str) -> str:
             f"{did_you_mean(section, Study.model_fields)}"
         )
     return section
+
+
+@dataclass(frozen=True)
+class Declaration:
+    """Unit, bounds, words and meaning of one key of a study.
+
+    Attributes
+    ----------
+    meaning : str
+        In one sentence.
+    quantity : Quantity or None
+        The number that it takes, or that an item of its list is; None for a text.
+    words : tuple of str
+        The words that it takes, alone or instead of a number.
+    is_list : bool
+        Whether it takes a list.
+    placeholder : str
+        Shown in the help in place of a text, empty where nothing is declared.
+    """
+
+    meaning: str
+    quantity: Quantity | None
+    words: tuple[str, ...]
+    is_list: bool
+    placeholder: str
+
+
+def declared(key: str) -> Declaration:
+    """Return the declaration of a key.
+
+    Parameters
+    ----------
+    key : str
+        Such as ``"tank.diameter_m"``. A word that may be given as a number under another key
+        (``"block.depth"``) has the quantity of that key.
+
+    Raises
+    ------
+    ConfigurationError
+        When a study has no such key.
+
+    Examples
+    --------
+    >>> declared("simulation.time_step_s").words, declared("simulation.time_step_s").quantity.unit
+    (('auto',), 's')
+    >>> declared("block.depth").words, declared("block.depth").quantity.unit
+    (('immersed', 'archimedes'), 'm')
+    """
+    name, _, field_name = key.partition(".")
+    section = _sections().get(name)
+    if section is None or field_name not in section.model_fields:
+        raise ConfigurationError(f"a study has no key '{key}'")
+    field = section.model_fields[field_name]
+    number = next((one.key for one in field.metadata if isinstance(one, OrNumber)), field_name)
+    placeholders = [one.text for one in field.metadata if isinstance(one, Placeholder)]
+    return Declaration(
+        meaning=meaning_of(section, field_name),
+        quantity=quantity_of(section, number) or item_quantity_of(section, field_name),
+        words=words_of(section, field_name),
+        is_list=is_list(section, field_name),
+        placeholder="".join(placeholders),
+    )
+
+
+def _sections() -> dict[str, type[Section]]:
+    """Return the sections of a study by their names, without making one."""
+    kinds = {name: field.annotation for name, field in Study.model_fields.items()}
+    return {
+        name: kind
+        for name, kind in kinds.items()
+        if isinstance(kind, type) and issubclass(kind, Section)
+    }

@@ -1,4 +1,4 @@
-"""The tank: a circle, a rectangle or a convex polygon, and its wall."""
+"""The tank (a circle, a rectangle or a convex polygon), its wall, and the water."""
 
 from __future__ import annotations
 
@@ -30,25 +30,25 @@ class Outline(Section):
     (0.4, 0.2)
     """
 
-    shape: Literal["circle", "rectangle", "polygon"] = Field(
-        default="circle", description="Shape; each shape has its own keys."
-    )
-    diameter_m: Annotated[float | None, Quantity("m", gt=0, le=1e3)] = Field(
-        default=None,
-        title="Diameter of a circular tank.",
-        description="Diameter of a circle (0.3 m when it is not given).",
-    )
+    shape: Literal["circle", "rectangle", "polygon"] = "circle"
+    """Shape; each shape has its own keys."""
+    diameter_m: Annotated[float | None, Quantity("m", gt=0, le=1e3)] = None
+    """Diameter of a circular tank.
+
+    Diameter of a circle (0.3 m when it is not given).
+    """
     width_m: Annotated[float | None, Quantity("m", gt=0, le=1e3)] = Field(
-        default=None, description="Width of a rectangle, along x.", examples=[0.4]
+        default=None, examples=[0.4]
     )
+    """Width of a rectangle, along x."""
     height_m: Annotated[float | None, Quantity("m", gt=0, le=1e3)] = Field(
-        default=None, description="Height of a rectangle, along y.", examples=[0.3]
+        default=None, examples=[0.3]
     )
+    """Height of a rectangle, along y."""
     vertices_m: Vertices | None = Field(
-        default=None,
-        description="Corners [x, y] of a convex polygon in m, in order; stored counter-clockwise.",
-        examples=["[[-0.1, -0.1], [0.2, -0.1], [0.0, 0.2]]"],
+        default=None, examples=["[[-0.1, -0.1], [0.2, -0.1], [0.0, 0.2]]"]
     )
+    """Corners [x, y] of a convex polygon in m, in order; stored counter-clockwise."""
 
     @model_validator(mode="wrap")
     @classmethod
@@ -159,9 +159,8 @@ class FieldOfView(Outline):
 
     section_name: ClassVar[str] = "observation.field_of_view"
 
-    center_m: tuple[float, float] = Field(
-        default=(0.0, 0.0), description="Centre [x, y] of a circle or rectangle in m."
-    )
+    center_m: tuple[float, float] = (0.0, 0.0)
+    """Centre [x, y] of a circle or rectangle in m."""
 
     def contains(self, x_m: float, y_m: float) -> bool:
         """Return whether the camera sees a point [m]."""
@@ -189,17 +188,15 @@ class Tank(Outline):
 
     section_name: ClassVar[str] = "tank"
 
-    wall_restitution: Annotated[float, Quantity("1", ge=0, le=1)] = Field(
-        default=0.5,
-        title="Restitution of the wall, 0 to 1.",
-        description="Restitution e of an impact on the wall.",
-    )
-    wall_friction: Annotated[float, Quantity("1", ge=0, le=100)] = Field(
-        default=0.0, description="Coulomb friction of the wall; 0 for a wet wall."
-    )
-    bounce_speed_m_s: Annotated[float, Quantity("m/s", ge=0, le=1e3)] = Field(
-        default=0.01, description="Approach speed below which there is no bounce."
-    )
+    wall_restitution: Annotated[float, Quantity("1", ge=0, le=1)] = 0.5
+    """Restitution of the wall, 0 to 1.
+
+    Restitution e of an impact on the wall.
+    """
+    wall_friction: Annotated[float, Quantity("1", ge=0, le=100)] = 0.0
+    """Coulomb friction of the wall; 0 for a wet wall."""
+    bounce_speed_m_s: Annotated[float, Quantity("m/s", ge=0, le=1e3)] = 0.01
+    """Approach speed below which there is no bounce."""
 
     @classmethod
     def from_arena(cls, arena: str | dict[str, Any], **wall: Any) -> Self:
@@ -273,3 +270,14 @@ def counter_clockwise(vertices: Vertices) -> Vertices:
                     f"{list(edge[0])} to {list(edge[1])}"
                 )
     return ordered
+
+
+class Water(Section):
+    """The liquid in the tank; the defaults are water at 25 °C."""
+
+    section_name: ClassVar[str] = "water"
+
+    density_kg_m3: Annotated[float, Quantity("kg/m3", gt=0, le=2e4)] = 1000.0
+    """Density."""
+    viscosity_Pa_s: Annotated[float, Quantity("Pa s", gt=0, le=1e3)] = 8.9e-4
+    """Dynamic viscosity; used only for the reported Reynolds number."""

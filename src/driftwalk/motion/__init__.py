@@ -2,16 +2,15 @@
 
 from driftwalk.motion.block import BlockModel
 from driftwalk.motion.camera import observe_worlds
-from driftwalk.motion.choose import feels_others, is_family_name, motion_model
+from driftwalk.motion.choose import feels_others, is_family_name, models, motion_model
 from driftwalk.motion.external_program.program import ProgramModel
-from driftwalk.motion.family import MEMBERS, PARTS, Member, Part, ParticleModel, models
+from driftwalk.motion.family import MEMBERS, PARTS, Member, Part, ParticleModel
 from driftwalk.motion.function import FunctionModel, Scene
-from driftwalk.motion.known import models_knowing
 from driftwalk.motion.protocol import Details, MotionModel, Scores, ScoresItself, Worlds
 from driftwalk.motion.random import WorldRandom
 from driftwalk.motion.score import score_worlds
 from driftwalk.motion.simulated import model_start, simulate_motion
-from driftwalk.motion.values import estimated_values, known_values
+from driftwalk.motion.values import estimated_values, known_values, models_knowing
 from driftwalk.schema import Parameter
 
 __all__ = [

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.motion.protocol import Floats, Keys
+from driftwalk.core.arrays import Floats, Keys
 from driftwalk.simulation.initial import Start, world_orientations
 
 

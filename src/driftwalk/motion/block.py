@@ -10,9 +10,10 @@ import numpy as np
 from driftwalk import _core
 from driftwalk.comparison import StepReference
 from driftwalk.conditions.recorded import Conditions
+from driftwalk.core.arrays import Floats, Keys
 from driftwalk.core.errors import InputError
-from driftwalk.motion.native import scored
-from driftwalk.motion.protocol import Details, Floats, Keys, Scores, Values, Worlds
+from driftwalk.motion.protocol import Details, Scores, Values, Worlds
+from driftwalk.motion.score import scored
 from driftwalk.schema import Parameter
 from driftwalk.simulation.backend import native_model, world_table
 from driftwalk.simulation.initial import world_orientations

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.arrays import Bools, Floats, Keys
 from driftwalk.core.random_streams import MotionStream
-from driftwalk.motion.protocol import Keys, Worlds
+from driftwalk.motion.protocol import Worlds
 from driftwalk.motion.random import WorldRandom
 from driftwalk.schema.trajectory import wrap_angle
 from driftwalk.simulation.backend import STATUS, wall_edges
@@ -16,8 +17,6 @@ from driftwalk.simulation.backend import STATUS, wall_edges
 if TYPE_CHECKING:
     from driftwalk.conditions.recorded import Conditions
     from driftwalk.model import FieldOfView
-
-Floats = npt.NDArray[np.float64]
 
 
 def observe_worlds(
@@ -95,7 +94,7 @@ def _rounded(values: Floats, quantum: float) -> Floats:
     return np.asarray(np.copysign(np.floor(np.abs(values) / quantum + 0.5), values) * quantum)
 
 
-def _seen(view: FieldOfView, x: Floats, y: Floats) -> npt.NDArray[np.bool_]:
+def _seen(view: FieldOfView, x: Floats, y: Floats) -> Bools:
     dx, dy = x - view.center_m[0], y - view.center_m[1]
     if view.radius_m is not None:
         return np.asarray(dx**2 + dy**2 <= view.radius_m**2)

@@ -19,13 +19,13 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol, runtime_ch
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats, Keys
+
 if TYPE_CHECKING:
     from driftwalk.comparison import StepReference
     from driftwalk.conditions.recorded import Conditions
     from driftwalk.schema import Parameter
 
-Floats = npt.NDArray[np.float64]
-Keys = npt.NDArray[np.uint64]
 Values = Mapping[str, Floats]
 Details = Literal["none", "steps", "all"]
 """Results kept of a world besides its distance: nothing, its steps, or its density and excerpt."""

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats, Keys
 from driftwalk.core.random_streams import MotionStream
 from driftwalk.core.seeds import world_keys
-
-Floats = npt.NDArray[np.float64]
-Keys = npt.NDArray[np.uint64]
 
 
 class WorldRandom:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk import _core
 from driftwalk.comparison import Statistic, StepDistance, StepReference, StepTable, step_table
-from driftwalk.comparison.density import BINS
+from driftwalk.comparison.statistic import BINS
 from driftwalk.conditions.recorded import Conditions
-from driftwalk.motion.protocol import Details, Keys, MotionModel, Scores, ScoresItself, Values
+from driftwalk.core.arrays import Bools, Floats, Keys, Singles
+from driftwalk.motion.protocol import Details, MotionModel, Scores, ScoresItself, Values
 from driftwalk.simulation.backend import BROKEN
 
 
@@ -95,7 +97,7 @@ def score_worlds(
     return scores
 
 
-def broken_worlds(status: npt.NDArray[np.uint32]) -> npt.NDArray[np.bool_]:
+def broken_worlds(status: npt.NDArray[np.uint32]) -> Bools:
     """Return which worlds lost their numbers: they have no distance."""
     return np.asarray((status & BROKEN) != 0)
 
@@ -105,7 +107,7 @@ def excerpt_samples(like: Conditions) -> int:
     return int(np.searchsorted(like.sample_time, 30.0, side="right"))
 
 
-def step_densities(reference: StepReference, table: StepTable) -> npt.NDArray[np.float32]:
+def step_densities(reference: StepReference, table: StepTable) -> Singles:
     """Return the share of each world's steps in every bin, (worlds, 32 lengths, 32 angles).
 
     The last bin of the lengths holds all longer steps, the outer bins of the angles all beyond.
@@ -119,3 +121,36 @@ def step_densities(reference: StepReference, table: StepTable) -> npt.NDArray[np
         counts = np.bincount(cell, minlength=BINS**2)
         density[world] = counts.reshape(BINS, BINS) / np.float32(max(count, 1))
     return density
+
+
+def scored(
+    model: _core.Model,
+    worlds: Floats,
+    like: Conditions,
+    keys: Keys,
+    reference: StepReference,
+    *,
+    details: Details,
+    particle: _core.Particle | None = None,
+) -> Scores:
+    """Simulate worlds and return how far each is from the recording; see `score_worlds`."""
+    full = details == "all"
+    return dict(
+        _core.score(
+            model,
+            worlds,
+            keys,
+            left=reference.plan.left,
+            weight=reference.plan.weight,
+            triple=reference.plan.triple,
+            reference=reference.steps,
+            bins=BINS if full else 0,
+            length_limit=reference.length_limit,
+            angle_limit=reference.angle_limit,
+            excerpt=excerpt_samples(like) if full else 0,
+            keep_steps=details == "steps",
+            threads=like.threads,
+            particle=particle,
+            flow_start=like.flow_start,
+        )
+    )

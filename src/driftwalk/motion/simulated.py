@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.conditions.camera import study_as_seen
-from driftwalk.conditions.neighbours import neighbours_of
-from driftwalk.conditions.recorded import Conditions, recorded_conditions
+from driftwalk.conditions.recorded import Conditions, neighbours_of, recorded_conditions
+from driftwalk.core.arrays import Floats, Keys
 from driftwalk.core.errors import InputError
 from driftwalk.core.processors import default_threads
 from driftwalk.core.seeds import world_keys
@@ -20,7 +20,7 @@ from driftwalk.motion.block import BlockModel
 from driftwalk.motion.external_program.program import ProgramModel
 from driftwalk.motion.family import ParticleModel
 from driftwalk.motion.family.particle import time_step_of
-from driftwalk.motion.protocol import Keys, MotionModel, Worlds
+from driftwalk.motion.protocol import MotionModel, Worlds
 from driftwalk.motion.values import known_values
 from driftwalk.schema import body_track
 from driftwalk.schema.check import build_dataset
@@ -155,7 +155,7 @@ def _check_flow(model: MotionModel, flow: xr.Dataset | None) -> None:
 def _conditions(
     model: MotionModel,
     study: Study,
-    times: npt.NDArray[np.float64],
+    times: Floats,
     start: Start | None,
     flow: xr.Dataset | None,
     keys: Keys,

@@ -4,12 +4,9 @@ Every call takes what an earlier one returned. Tank and block are stated once, w
 loaded; a second, different statement is an error.
 """
 
-from driftwalk.notebook.assembling import assemble
-from driftwalk.notebook.calibrating import calibrate
-from driftwalk.notebook.comparing import compare
-from driftwalk.notebook.comparing_models import compare_models
-from driftwalk.notebook.fitting import fit
+from driftwalk.notebook.comparing import compare, compare_models
+from driftwalk.notebook.fitting import calibrate, fit
 from driftwalk.notebook.reporting import report
-from driftwalk.notebook.simulating import simulate
+from driftwalk.notebook.simulating import assemble, simulate
 
 __all__ = ["assemble", "calibrate", "compare", "compare_models", "fit", "report", "simulate"]

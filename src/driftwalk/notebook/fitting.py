@@ -1,20 +1,28 @@
-"""Fit a recording: flow, drag, stochastic force and tracking noise together."""
+"""Fit a recording by likelihood, or calibrate any motion model on it by simulation."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import Executor
 from os import PathLike
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Unpack
 
 from driftwalk.conditions import require_motion, study_for
-from driftwalk.core.study_keys import FIT_KEYS, study_overrides
+from driftwalk.core.errors import InputError
+from driftwalk.core.study_keys import (
+    CALIBRATION_KEYS,
+    FIT_KEYS,
+    CalibrationSettings,
+    FitSettings,
+    study_overrides,
+)
+from driftwalk.notebook.simulating import flow_field_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
-    from driftwalk.notebook.settings import FitSettings
+    from driftwalk.motion import MotionModel
     from driftwalk.runs import Progress
 
 
@@ -75,23 +83,112 @@ def fit(
     import xarray as xr
 
     from driftwalk.likelihood import fit_motion, judge_fit
-    from driftwalk.notebook.result import as_result
-    from driftwalk.runs import FitWork, run_work
+    from driftwalk.notebook.result import as_result, run_in_folder
+    from driftwalk.runs import FitWork
     from driftwalk.runs.resumable_run import silent
 
     many = [recordings] if isinstance(recordings, xr.Dataset) else list(recordings)
-    given: dict[str, Any] = dict(settings)
     for one in many:
         require_motion(one, body=body)
-    chosen = study_for(many, study, study_overrides(keys=FIT_KEYS, **given), body=body)
-    if folder is None:
-        found = fit_motion(many, chosen, body=body, tell=progress)
-        return as_result(judge_fit(found, many, body=body).fit if check else found)
-    done = run_work(
-        FitWork(many, chosen, body, {}, check=check),
-        Path(folder),
-        overwrite=overwrite,
-        progress=progress or silent,
-        command=f"driftwalk.fit(..., folder={str(folder)!r})",
+    chosen = study_for(many, study, study_overrides(keys=FIT_KEYS, **settings), body=body)
+    if folder is not None:
+        work = FitWork(many, chosen, body, {}, check=check)
+        return as_result(run_in_folder(folder, "fit", work, overwrite, progress or silent).fit)
+    found = fit_motion(many, chosen, body=body, tell=progress)
+    return as_result(judge_fit(found, many, body=body).fit if check else found)
+
+
+def calibrate(
+    recording: xr.Dataset,
+    model: MotionModel | Study | None = None,
+    *,
+    study: Study | None = None,
+    flow: xr.Dataset | None = None,
+    body: str | None = None,
+    folder: str | PathLike[str] | None = None,
+    overwrite: bool = False,
+    threads: int | None = None,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+    **settings: Unpack[CalibrationSettings],
+) -> xr.Dataset:
+    """Find the parameters of a motion model that explain a recording.
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        A `trajectory` as `load` returns it; tank and block are those it was loaded with.
+    model : MotionModel or Study, optional
+        A `motion_model`, or the block of a study; default: the paper's block, whose drag
+        coefficient and stochastic force are searched.
+    study : Study, optional
+        Tank, camera, step interval and search, with a `motion_model`; default: the paper's.
+    flow : xarray.Dataset, optional
+        The water's velocity: a `flow_field` or a `fit`. For the block it is extracted from the
+        recording when left out.
+    body : str, optional
+        The body, where the recording has several.
+    folder : path-like, optional
+        Run directory to make or continue, the same as that of ``driftwalk calibrate``.
+    overwrite : bool
+        Whether a finished run there is moved aside; it is refused otherwise.
+    threads : int, optional
+        Default: all processors. The result does not depend on it.
+    executor : concurrent.futures.Executor, optional
+        Computes work units elsewhere, such as that of `driftwalk.cluster.connect`. The result does
+        not depend on it.
+    progress : callable, optional
+        Called as ``progress(done, total, text)`` while the work goes on.
+    **settings
+        Keys of the study by their short names: ``force_interval="16ms"``, ``bootstrap=50``.
+
+    Returns
+    -------
+    xarray.Dataset
+        A `calibration`, see `driftwalk.calibration.calibrate`. Printed, it begins with the answer.
+
+    Raises
+    ------
+    InputError
+        When the recording cannot be calibrated on, or it and the study state two tanks or blocks.
+    RunDirectoryError
+        When the directory is in use, holds another run, or cannot be written.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> found = dw.calibrate(dw.tank30_recording(), flow=dw.tank30_flow())  # doctest: +SKIP
+    """
+    from driftwalk.calibration import calibrate as calibrate_model
+    from driftwalk.model import Study
+    from driftwalk.motion import BlockModel
+    from driftwalk.notebook.result import as_result, run_in_folder
+    from driftwalk.runs import CalibrationWork
+    from driftwalk.runs.resumable_run import silent
+
+    if isinstance(model, Study):
+        if study is not None:
+            raise InputError("two studies are given: give one, or a motion model and a study")
+        model, study = None, model
+    if isinstance(model, BlockModel) and study is None:
+        study = model.study
+    is_block = model is None or isinstance(model, BlockModel)
+    require_motion(recording, body=body)
+    overrides = study_overrides(keys=CALIBRATION_KEYS, **settings)
+    chosen = study_for([recording], study, overrides, body=body, needs_tank=is_block)
+    field = None if flow is None else flow_field_of(flow)
+    say = progress or silent
+    if folder is not None:
+        work = CalibrationWork(recording, chosen, field, body, {}, threads, model)
+        return as_result(run_in_folder(folder, "calibrate", work, overwrite, say, executor))
+    found = calibrate_model(
+        recording,
+        model,
+        study=chosen,
+        flow=field,
+        body=body,
+        threads=threads,
+        executor=executor,
+        tell=lambda stage, done, total: say(done, total, stage),
     )
-    return as_result(done.fit)
+    return as_result(found)

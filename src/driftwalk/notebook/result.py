@@ -1,11 +1,16 @@
-"""A dataset that shows its answer first when a notebook prints it."""
+"""A dataset that shows its answer first when a notebook prints it, and the run that makes one."""
 
 from __future__ import annotations
 
+from concurrent.futures import Executor
 from html import escape
+from os import PathLike
+from pathlib import Path
+from typing import Any
 
 import xarray as xr
 
+from driftwalk.runs import Progress, Work, run_work
 from driftwalk.schema.answers.parts import lines_of
 from driftwalk.schema.runs import answer_of
 
@@ -39,6 +44,25 @@ def as_result(dataset: xr.Dataset) -> Result:
     found = Result(dataset.data_vars, dataset.coords, dataset.attrs)
     found.encoding = dataset.encoding
     return found
+
+
+def run_in_folder(
+    folder: str | PathLike[str],
+    call: str,
+    work: Work,
+    overwrite: bool,
+    progress: Progress,
+    executor: Executor | None = None,
+) -> Any:
+    """Make or continue the run of a call in a run directory, and return what it found."""
+    return run_work(
+        work,
+        Path(folder),
+        overwrite=overwrite,
+        executor=executor,
+        progress=progress,
+        command=f"driftwalk.{call}(..., folder={str(folder)!r})",
+    )
 
 
 def answer_lines(found: xr.Dataset) -> list[str]:

@@ -1,12 +1,15 @@
-"""Simulate: a study in a flow, a fit, a calibration or a motion model, like a recording."""
+"""Simulate the motion or the self-assembly that a study, a fit or a calibration says."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from concurrent.futures import Executor
+from os import PathLike
+from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
 
 from driftwalk.conditions import study_for
 from driftwalk.core.errors import InputError
+from driftwalk.core.study_keys import ASSEMBLY_KEYS, AssemblySettings, study_overrides
 from driftwalk.motion import (
     BlockModel,
     MotionModel,
@@ -14,13 +17,14 @@ from driftwalk.motion import (
     estimated_values,
     simulate_motion,
 )
-from driftwalk.notebook.model_of import flow_field_of, model_of
+from driftwalk.schema.check import kind_name
 
 if TYPE_CHECKING:
     import numpy.typing as npt
     import xarray as xr
 
     from driftwalk.model import Study
+    from driftwalk.runs import Progress
     from driftwalk.simulation import Start
     from driftwalk.simulation.run import Backend
 
@@ -159,3 +163,149 @@ def _refuse_numbers_alone(source: Study | xr.Dataset) -> None:
             f"the calibration is about the model {name}, of which it holds the numbers alone: give "
             "the model, and the calibration as `parameters`"
         )
+
+
+def assemble(
+    model: Study | xr.Dataset,
+    flow: xr.Dataset | None = None,
+    *,
+    folder: str | PathLike[str] | None = None,
+    overwrite: bool = False,
+    threads: int | None = None,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+    **settings: Unpack[AssemblySettings],
+) -> xr.Dataset:
+    """Simulate what many blocks build.
+
+    Parameters
+    ----------
+    model : Study or xarray.Dataset
+        A study, a `fit`, a `calibration`, or a `model_comparison` whose best model is the block.
+        With `folder`, a fit, or a calibration that has a joint region, is simulated with parameters
+        drawn from its uncertainty, too.
+    flow : xarray.Dataset, optional
+        The water's velocity, a `flow_field`; a fit brings its own.
+    folder : path-like, optional
+        Run directory to make or continue, the same as that of ``driftwalk assemble``.
+    overwrite : bool
+        Whether a finished run there is moved aside; it is refused otherwise.
+    threads : int, optional
+        Default: all processors. The result does not depend on it.
+    executor : concurrent.futures.Executor, optional
+        Computes work units elsewhere, such as that of `driftwalk.cluster.connect`. The result does
+        not depend on it.
+    progress : callable, optional
+        Called as ``progress(done, total, text)`` while the work goes on.
+    **settings
+        Keys of the study by their short names: ``blocks=4``, ``runs=1000``, ``duration="10min"``.
+
+    Returns
+    -------
+    xarray.Dataset
+        An `assembly`, see `driftwalk.assembly.assemble`; `outcome_distribution` makes proportions
+        of it.
+
+    Raises
+    ------
+    InputError
+        When there is no flow, the blocks do not fit, or the flow does not cover the tank.
+    RunDirectoryError
+        When the directory is in use, holds another run, or cannot be written.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> runs = dw.assemble(dw.Study(), dw.tank30_flow(), blocks=2, runs=4, duration="1s")
+    >>> runs.sizes["run"]
+    4
+    """
+    from driftwalk.assembly import assemble as assemble_study
+    from driftwalk.notebook.result import run_in_folder
+    from driftwalk.runs import AssemblyWork
+    from driftwalk.runs.resumable_run import silent
+
+    found = model_of(model, flow, study_overrides(keys=ASSEMBLY_KEYS, **settings))
+    say = progress or silent
+    if folder is not None:
+        work = AssemblyWork(found.study, found.flow, found.uncertainty, {}, threads)
+        done = run_in_folder(folder, "assemble", work, overwrite, say, executor)
+        made: xr.Dataset = done.assembly
+        return made
+    return assemble_study(
+        found.study,
+        found.flow,
+        threads=threads,
+        executor=executor,
+        progress=lambda done, total: say(done, total, "runs"),
+    )
+
+
+class FoundModel(NamedTuple):
+    """A model whose parameters are known."""
+
+    study: Study
+    flow: xr.Dataset
+    """A `flow_field`."""
+    uncertainty: xr.Dataset | None
+    """The `fit` or `calibration` where parameters can be drawn from it."""
+
+
+def model_of(
+    source: Study | xr.Dataset,
+    flow: xr.Dataset | None,
+    overrides: Mapping[str, Any],
+) -> FoundModel:
+    """Return the model of a study, or of what a run found.
+
+    Parameters
+    ----------
+    source : Study or xarray.Dataset
+        A study, a `fit`, a `calibration`, or a `model_comparison` whose best model is the block.
+    flow : xarray.Dataset or None
+        A `flow_field` or a `fit`. A fit has its own; a calibration in a run directory has the one
+        that is stored there.
+    overrides : mapping
+        Over the study, from ``"section.key"`` to the value.
+
+    Raises
+    ------
+    InputError
+        When there is no flow, or the dataset is of another kind.
+    """
+    from driftwalk.model import Study, apply_overrides
+    from driftwalk.runs import read_found
+    from driftwalk.schema.runs import kind_of
+
+    if isinstance(source, Study):
+        return FoundModel(apply_overrides(source, overrides), _flow(flow), None)
+    if not hasattr(source, "attrs"):
+        raise InputError(
+            f"a study, a fit or a calibration is needed, got {source!r}; `motion_model` makes a "
+            "motion model of a name, and xarray.open_dataset opens what a run directory holds, "
+            "such as fit.nc"
+        )
+    kind = kind_of(source)
+    if kind is None or not kind.gives_model:
+        raise InputError(
+            "a study, a fit or a calibration is needed, got a dataset of kind "
+            f"{kind_name(source)!r}"
+        )
+    found = read_found(source)
+    study = found.block_study(overrides)
+    field = found.flow(study) if flow is None else _flow(flow)
+    return FoundModel(study, field, found.uncertainty)
+
+
+def flow_field_of(flow: xr.Dataset) -> xr.Dataset:
+    """Return a flow field: the given one, or that of a given fit."""
+    from driftwalk.runs import flow_of_result
+
+    held = flow_of_result(flow)
+    return flow if held is None else held
+
+
+def _flow(flow: xr.Dataset | None) -> xr.Dataset:
+    if flow is None:
+        raise InputError("a study says nothing of the water: give `flow`, a flow field or a fit")
+    return flow_field_of(flow)

@@ -5,12 +5,12 @@ from driftwalk.page.html import report_html, write_report
 from driftwalk.page.run_page import (
     dataset_page,
     joined_page,
+    manifest_section,
     name_apart,
     recording_page,
     report_page,
 )
-from driftwalk.page.sections.assemblies.assembly import assembly_sections
-from driftwalk.page.sections.assemblies.sensitivity import sensitivity_sections
+from driftwalk.page.sections.assembly import assembly_sections
 from driftwalk.page.sections.calibration import (
     bootstrap_section,
     calibration_sections,
@@ -18,11 +18,11 @@ from driftwalk.page.sections.calibration import (
 )
 from driftwalk.page.sections.fit import fit_sections
 from driftwalk.page.sections.flow import flow_section
-from driftwalk.page.sections.manifest import manifest_section
 from driftwalk.page.sections.map import map_section
-from driftwalk.page.sections.models import model_sections
+from driftwalk.page.sections.motion_models import model_sections
 from driftwalk.page.sections.recording import trajectory_section
 from driftwalk.page.sections.recovery import model_recovery_sections, recovery_sections
+from driftwalk.page.sections.sensitivity import sensitivity_sections
 
 __all__ = [
     "assembly_sections",

@@ -79,7 +79,7 @@ def series(
     if ends is not None and np.isfinite(np.asarray(ends, dtype=np.float64)).any():
         low, high = (numbers(end) for end in ends)
     return {
-        "name": name, "x": numbers(x, dtype="f8"), "y": numbers(y), "low": low, "high": high,
+        "name": name, "x": numbers(x), "y": numbers(y), "low": low, "high": high,
         "style": style,
     }  # fmt: skip
 

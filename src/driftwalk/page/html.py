@@ -1,4 +1,4 @@
-"""The one HTML file: page data, style sheet and program, with nothing to load from anywhere."""
+"""The HTML of pages: a report in one file that loads nothing, and what a server sends first."""
 
 from __future__ import annotations
 
@@ -10,18 +10,88 @@ from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Final, Literal
+from urllib.parse import quote
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.atomic import require_target, write_atomic
 
-BUNDLE: Final = ("driftwalk.css", "driftwalk.js")
-# What could end the element that holds the data, or break it as a program.
-_ESCAPES: Final = {
-    character: f"\\u{ord(character):04x}" for character in ("<", ">", "&", "\u2028", "\u2029")
+FORMAT: Final = "driftwalk page"
+VERSION: Final = 1
+BUNDLE: Final[dict[str, str]] = {
+    "driftwalk.css": "text/css; charset=utf-8",
+    "driftwalk.js": "text/javascript; charset=utf-8",
 }
+"""The files of the front end and their types."""
+# What could end the element that holds the data, or break it as a program.
+_ESCAPES: Final = {ord(sign): f"\\u{ord(sign):04x}" for sign in "<>&\u2028\u2029"}
 _NO_SCRIPT: Final = (
     "This page needs JavaScript, which is switched off here. It loads nothing from anywhere."
 )
+
+_REPORT: Final = """\
+<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" content="{policy}">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="referrer" content="no-referrer">
+<title>{title}</title>
+<style>{style}</style>
+</head>
+<body>
+<div id="app"></div>
+<noscript><p>{no_script}</p></noscript>
+<script type="application/json" id="driftwalk-page">{page}</script>
+<script>{program}</script>
+</body>
+</html>
+"""
+_SHELL: Final = """\
+<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>driftwalk</title>
+<link rel="icon" href="data:,">
+<link rel="stylesheet" href="driftwalk.css{query}">
+</head>
+<body>
+<div id="app"></div>
+<script type="application/json" id="driftwalk-page">{page}</script>
+<script src="driftwalk.js{query}"></script>
+</body>
+</html>
+"""
+
+
+def page_frame(view: str, title: str, **more: Any) -> dict[str, Any]:
+    """Return a page without sections.
+
+    Parameters
+    ----------
+    view : {"report", "run", "live", "play"}
+        Which page it is.
+    title : str
+        Its title.
+    **more
+        Over the other keys.
+    """
+    from driftwalk import __version__
+
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "view": view,
+        "title": title,
+        "subtitle": None,
+        "state": {"finished": False, "progress": None, "words": None},
+        "driftwalk_version": __version__,
+        "created_utc": None,
+        "sections": [],
+        **more,
+    }
 
 
 def report_html(page: Mapping[str, Any], *, connect: Literal["none", "self"] = "none") -> str:
@@ -50,7 +120,7 @@ def report_html(page: Mapping[str, Any], *, connect: Literal["none", "self"] = "
     --------
     ``Path("report.html").write_text(report_html(report_page("run")), encoding="utf-8")``
     """
-    style, program = (_bundled(name) for name in BUNDLE)
+    style, program = (bundle_file(name) for name in BUNDLE)
     policy = "; ".join(
         [
             "default-src 'none'",
@@ -62,27 +132,13 @@ def report_html(page: Mapping[str, Any], *, connect: Literal["none", "self"] = "
             "form-action 'none'",
         ]
     )
-    return "\n".join(
-        [
-            "<!doctype html>",
-            '<html lang="en">',
-            "<head>",
-            '<meta charset="utf-8">',
-            f'<meta http-equiv="Content-Security-Policy" content="{policy}">',
-            '<meta name="viewport" content="width=device-width, initial-scale=1">',
-            '<meta name="referrer" content="no-referrer">',
-            f"<title>{_text(_title(page))}</title>",
-            f"<style>{style}</style>",
-            "</head>",
-            "<body>",
-            '<div id="app"></div>',
-            f"<noscript><p>{_NO_SCRIPT}</p></noscript>",
-            f'<script type="application/json" id="driftwalk-page">{embedded(page)}</script>',
-            f"<script>{program}</script>",
-            "</body>",
-            "</html>",
-            "",
-        ]
+    return _REPORT.format(
+        policy=policy,
+        title=_text(_title(page)),
+        style=style,
+        no_script=_NO_SCRIPT,
+        page=embedded(page),
+        program=program,
     )
 
 
@@ -122,6 +178,26 @@ def write_report(
     return target
 
 
+def html_shell(page: Mapping[str, Any], *, token: str | None) -> str:
+    """Return the HTML; what stands in the page is escaped, so that it can only be data.
+
+    Parameters
+    ----------
+    page : dict
+        As of `page_frame`.
+    token : str or None
+        Token that the browser must send with its requests.
+
+    Examples
+    --------
+    >>> html = html_shell(page_frame("run", "</script><script>alert(1)"), token=None)
+    >>> html.count("<script")
+    2
+    """
+    query = "" if token is None else f"?token={quote(token)}"
+    return _SHELL.format(page=embedded(page), query=query)
+
+
 def embedded(page: Mapping[str, Any]) -> str:
     """Return page data as JSON that can stand inside a script element and is never run.
 
@@ -135,9 +211,7 @@ def embedded(page: Mapping[str, Any]) -> str:
     except ValueError as error:
         raise InputError(f"the page cannot be written as JSON: {error}") from error
     # `<`, `>` and `&` occur in JSON only inside strings, where an escape means the same.
-    for character, escape in _ESCAPES.items():
-        text = text.replace(character, escape)
-    return text
+    return text.translate(_ESCAPES)
 
 
 def _title(page: Mapping[str, Any]) -> str:
@@ -151,7 +225,7 @@ def _text(value: str) -> str:
     return html.escape(shown.encode("utf-8", "replace").decode("utf-8"))
 
 
-def _bundled(name: str) -> str:
+def bundle_file(name: str) -> str:
     """Return a file of the built front end, with the line ends that a browser will see."""
     try:
         text = (files("driftwalk.page") / "static" / name).read_text(encoding="utf-8")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from itertools import product
 from typing import TYPE_CHECKING, Any, Final
 
@@ -15,13 +16,14 @@ from driftwalk.page.arrays import number
 from driftwalk.page.number_words import percent
 from driftwalk.plot.parts.arena import arena_of
 from driftwalk.schema.answers.facts import facts_of, sentences
-from driftwalk.schema.answers.parts import NOT_DETERMINED, Estimate
+from driftwalk.schema.answers.parts import NOT_DETERMINED, Answer, Estimate, Table
 from driftwalk.schema.check import kind_name
 
 if TYPE_CHECKING:
     import xarray as xr
 
 Section = dict[str, Any]
+Maker = Callable[["xr.Dataset"], Section | list[Section]]
 
 _ARENA_KEYS: Final = {
     "circle": ("diameter_m",),
@@ -69,19 +71,49 @@ def attempt(id: str, title: str, make: Callable[[], Section | list[Section]]) ->
     return made if isinstance(made, list) else [made]
 
 
-def head_sections(
-    summary: Callable[[], Section], warnings: Callable[[], Sequence[str]]
+def sections_of(
+    found: xr.Dataset | None,
+    nothing: str,
+    summary: Maker,
+    warnings: Callable[[xr.Dataset], Sequence[str]],
+    parts: Iterable[tuple[str, str, Maker]] = (),
 ) -> list[Section]:
-    """Return what the page of every kind of run begins with: what was found, and its warnings."""
-    return [
-        *attempt("summary", FOUND_TITLE, summary),
-        *attempt("warnings", "Warnings", lambda: warnings_section(warnings())),
-    ]
+    """Return the sections of a result: its summary, its warnings and its other parts.
+
+    `nothing` says why there are none while there is no result. Each part has the id and the title
+    of the empty section that stands in its place when the data do not allow it.
+    """
+    if found is None:
+        return [empty_section("summary", FOUND_TITLE, nothing)]
+    made = attempt("summary", FOUND_TITLE, partial(summary, found))
+    made += attempt("warnings", "Warnings", lambda: warnings_section(warnings(found)))
+    for id, title, make in parts:
+        made += attempt(id, title, partial(make, found))
+    return made
 
 
-def empty_head(reason: str) -> list[Section]:
-    """Return what stands there while nothing has been found, and why."""
-    return [empty_section("summary", FOUND_TITLE, reason)]
+def summary_section(
+    paragraphs: Sequence[str],
+    numbers: Sequence[dict[str, Any]],
+    *,
+    id: str = "summary",
+    title: str = "Method and results",
+) -> Section:
+    """Return paragraphs, and results of `card` and `figure`."""
+    return section(id, "summary", title, paragraphs=list(paragraphs), numbers=list(numbers))
+
+
+def table_section(
+    id: str, title: str, columns: Sequence[str], rows: Iterable[Sequence[Any]], note: str = ""
+) -> Section:
+    """Return a table; cells that a row lacks at its end stay empty."""
+    filled = [[*row, *[""] * (len(columns) - len(row))] for row in rows]
+    return section(id, "table", title, note or None, columns=list(columns), rows=filled)
+
+
+def answer_table(answer: Answer) -> Table:
+    """Return the first table of an answer."""
+    return next(part for part in answer.parts if isinstance(part, Table))
 
 
 def require(dataset: xr.Dataset, *names: str) -> None:
@@ -156,25 +188,33 @@ def card(one: Estimate) -> dict[str, Any]:
     elif one.open:
         share = "" if one.confidence is None else f"{percent(one.confidence)}: "
         note = f"{share}{low:.2g} or more; {note}"
-    found = figure(
+    closed = not one.stated and math.isfinite(low) and math.isfinite(high)
+    return figure(
         number_of.words.removesuffix(number_of.symbol).rstrip(),
         None if one.unknown else value,
         unit or "1",
         symbol=number_of.symbol,
         note=note,
+        ends=(low, high) if closed else (None, None),
+        confidence=one.confidence if closed else None,
     )
-    if one.stated or not (math.isfinite(low) and math.isfinite(high)):
-        return found
-    return found | {"low": low, "high": high, "confidence": one.confidence}
 
 
 def figure(
-    label: str, value: Any, unit: str = "1", *, symbol: str = "", note: str | None = None
+    label: str,
+    value: Any,
+    unit: str = "1",
+    *,
+    symbol: str = "",
+    note: str | None = None,
+    ends: tuple[Any, Any] = (None, None),
+    confidence: float | None = None,
 ) -> dict[str, Any]:
-    """Return a number without an interval, for a summary."""
+    """Return a number for a summary, with its interval where it has one."""
+    low, high = map(number, ends)
     return {
-        "label": label, "symbol": symbol, "value": number(value), "unit": unit, "low": None,
-        "high": None, "confidence": None, "note": note,
+        "label": label, "symbol": symbol, "value": number(value), "unit": unit, "low": low,
+        "high": high, "confidence": confidence, "note": note,
     }  # fmt: skip
 
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.run_stages import tell_nobody
+from driftwalk.core.text.json_text import json_value
+from driftwalk.page.html import page_frame
 from driftwalk.page.parts import (
     FOUND_TITLE,
     SIMULATED,
@@ -16,20 +18,23 @@ from driftwalk.page.parts import (
     attempt,
     is_simulated,
     section,
+    summary_section,
     warnings_section,
 )
-from driftwalk.page.sections.manifest import manifest_section
-from driftwalk.page.sections.recording import noise_of, recording_sections
-from driftwalk.page.sections.tracking import tracking_sections, tracking_warnings
+from driftwalk.page.sections.recording import (
+    noise_of,
+    recording_sections,
+    tracking_sections,
+    tracking_warnings,
+)
 from driftwalk.schema import body_names
+from driftwalk.schema.answers.citation import bibtex, citation
 from driftwalk.schema.check import kind_name, refuse_other_version
 from driftwalk.schema.runs import RUN_KINDS, RunContents, StoredRun, kind_of, open_run_folder
 
 if TYPE_CHECKING:
     import xarray as xr
 
-FORMAT: Final = "driftwalk page"
-VERSION: Final = 1
 _SHOWN_ONCE: Final = ("trajectory", "flow")
 """Kinds of sections that several runs have in common: what they were made of."""
 _BESIDE_CONTENT: Final = ("id", "note", "facts")
@@ -79,12 +84,13 @@ def report_page(folder: str | Path, *, tell: Callable[[str], None] = tell_nobody
         tell(remark)
     sections = _with_remarks(sections, remarks)
     sections.append(manifest_section(run.manifest))
-    return _page(
-        title="Run" if run.kind is None else run.kind.title,
+    created = run.manifest.get("finished_utc")
+    return page_frame(
+        "report",
+        "Run" if run.kind is None else run.kind.title,
         subtitle=run.name,
-        finished=run.state == "finished",
-        words=words,
-        created=run.manifest.get("finished_utc"),
+        state=_state(words, finished=run.state == "finished"),
+        created_utc=None if created is None else str(created),
         sections=sections,
     )
 
@@ -120,14 +126,8 @@ def dataset_page(dataset: xr.Dataset) -> dict[str, Any]:
             f"or one of {', '.join(RUN_KINDS)}"
         )
     contents = RunContents({kind.file: dataset})
-    return _page(
-        title=kind.title,
-        subtitle=None,
-        finished=True,
-        words=None,
-        created=None,
-        sections=attempt("summary", FOUND_TITLE, lambda: contents.make(kind, kind.page)),
-    )
+    sections = attempt("summary", FOUND_TITLE, lambda: contents.make(kind, kind.page))
+    return page_frame("report", kind.title, state=_state(), sections=sections)
 
 
 def recording_page(
@@ -170,14 +170,8 @@ def recording_page(
         *recording_sections(trajectory, noise={name: noise_of(facts, name) for name in names}),
     ]
     source = trajectory.attrs.get("source")
-    return _page(
-        title="Recording",
-        subtitle=None if source is None else str(source),
-        finished=True,
-        words=None,
-        created=None,
-        sections=sections,
-    )
+    subtitle = None if source is None else str(source)
+    return page_frame("report", "Recording", subtitle=subtitle, state=_state(), sections=sections)
 
 
 def joined_page(pages: Sequence[Mapping[str, Any]], *, title: str) -> dict[str, Any]:
@@ -222,12 +216,13 @@ def joined_page(pages: Sequence[Mapping[str, Any]], *, title: str) -> dict[str, 
             heading = part["title"] if len(names) == 1 else f"{page['title']}: {part['title']}"
             sections.append({**part, "id": f"{name}-{part['id']}", "title": heading})
     words = [str(page["state"]["words"]) for page in pages if page["state"]["words"]]
-    return _page(
-        title=title,
+    finished = all(page["state"]["finished"] for page in pages)
+    return page_frame(
+        "report",
+        title,
         subtitle=", ".join(names),
-        finished=all(page["state"]["finished"] for page in pages),
-        words=" ".join(words) or None,
-        created=max((page["created_utc"] for page in pages if page["created_utc"]), default=None),
+        state=_state(" ".join(words) or None, finished=finished),
+        created_utc=max((one["created_utc"] for one in pages if one["created_utc"]), default=None),
         sections=sections,
     )
 
@@ -255,28 +250,69 @@ def name_apart(pages: Sequence[dict[str, Any]]) -> None:
         seen.add(page["subtitle"])
 
 
-def _page(
-    *,
-    title: str,
-    subtitle: str | None,
-    finished: bool,
-    words: str | None,
-    created: Any,
-    sections: list[Section],
-) -> dict[str, Any]:
+def manifest_section(manifest: Mapping[str, Any]) -> Section:
+    """Return the section on how results were made, and how to cite them.
+
+    Parameters
+    ----------
+    manifest : mapping
+        The manifest of a run, or as much of it as there is.
+
+    Returns
+    -------
+    dict
+        A section of kind "manifest". The study stands in it once.
+
+    Examples
+    --------
+    >>> manifest_section({"command": "driftwalk demo"})["command"]
+    'driftwalk demo'
+    """
+    specification = manifest.get("specification")
+    entries = {key: value for key, value in manifest.items() if key != "command"}
+    if isinstance(specification, Mapping):
+        same = specification.get("study") == manifest.get("study")
+        entries["specification"] = {
+            key: value for key, value in specification.items() if not (key == "study" and same)
+        }
+    version = _version(manifest)
+    return section(
+        "manifest", "manifest", "How to reproduce this",
+        "The command reproduces the same numbers from the same inputs.",
+        command=str(manifest.get("command", "")),
+        entries=json_value(entries),
+        inputs=_inputs(manifest),
+        cite=citation(version),
+        bibtex=bibtex(version),
+    )  # fmt: skip
+
+
+def _version(manifest: Mapping[str, Any]) -> str:
+    """Return the version that made the results, that of this program when it is not said."""
     from driftwalk import __version__
 
-    return {
-        "format": FORMAT,
-        "version": VERSION,
-        "view": "report",
-        "title": title,
-        "subtitle": subtitle,
-        "state": {"finished": finished, "progress": 1.0 if finished else None, "words": words},
-        "driftwalk_version": __version__,
-        "created_utc": None if created is None else str(created),
-        "sections": sections,
-    }
+    software = manifest.get("software")
+    found = software.get("driftwalk") if isinstance(software, Mapping) else None
+    return str(found or __version__)
+
+
+def _inputs(manifest: Mapping[str, Any]) -> list[dict[str, str]]:
+    inputs = manifest.get("inputs")
+    if not isinstance(inputs, Mapping):
+        return []
+    return [
+        {
+            "role": str(role),
+            "name": PurePath(str(facts.get("path", ""))).name,
+            "sha256": str(facts.get("sha256", "")),
+        }
+        for role, facts in inputs.items()
+        if isinstance(facts, Mapping)
+    ]
+
+
+def _state(words: str | None = None, *, finished: bool = True) -> dict[str, Any]:
+    return {"finished": finished, "progress": 1.0 if finished else None, "words": words}
 
 
 def _words_of_state(run: StoredRun) -> str | None:
@@ -300,7 +336,7 @@ def _sections_of(run: StoredRun) -> list[Section]:
 
 
 def _state_section(words: str) -> Section:
-    return section("state", "summary", "Not finished", paragraphs=[words], numbers=[])
+    return summary_section([words], [], id="state", title="Not finished")
 
 
 def _remarks(run: StoredRun) -> list[str]:

@@ -1,10 +1,11 @@
 """Figures of stored datasets: functions that take axes and return them."""
 
-from driftwalk.plot.assembly_growth import (
+from driftwalk.plot.assembly_courses import (
     plot_assembly_sizes as assembly_sizes,
+    plot_class_times as class_times,
     plot_growth as growth,
+    plot_survival as survival,
 )
-from driftwalk.plot.class_courses import plot_class_times as class_times, plot_survival as survival
 from driftwalk.plot.components import plot_biplot as biplot
 from driftwalk.plot.distances import plot_ks_map as map, plot_refined_map as refined_map
 from driftwalk.plot.film import write_animation
@@ -16,18 +17,21 @@ from driftwalk.plot.model_check import (
     plot_residual_time as residual_time,
 )
 from driftwalk.plot.outcome_bars import plot_outcomes as outcomes
-from driftwalk.plot.panels import plot_density_panels as density_panels
 from driftwalk.plot.parts.film_file import require_film_writer
-from driftwalk.plot.path import plot_trajectory as trajectory
 from driftwalk.plot.sensitivity_maps import (
     plot_class_key as class_key,
     plot_class_panels as class_panels,
     plot_l1_map as l1_map,
 )
-from driftwalk.plot.step_densities import plot_step_density as step_density, plot_steps as steps
+from driftwalk.plot.step_densities import (
+    plot_density_panels as density_panels,
+    plot_step_density as step_density,
+    plot_steps as steps,
+)
 from driftwalk.plot.tank import (
     plot_blocks as blocks,
     plot_film_strip as film_strip,
+    plot_trajectory as trajectory,
 )
 from driftwalk.plot.uncertainty import (
     plot_bootstrap as bootstrap,

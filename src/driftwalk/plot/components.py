@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.plot.parts.assembly_labels import check_kind, class_names
 from driftwalk.plot.parts.polyomino_sketch import (
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-Array = npt.NDArray[np.float64]
 # The longest arrow, as a share of the distance of the farthest setting.
 LONGEST_ARROW: Final = 0.9
 # Arrows shorter than this share of the longest carry no label; nor do those after the longest 14.
@@ -95,38 +94,60 @@ def plot_biplot(
     --------
     ``plot_biplot(components, sensitivity=sensitivity, color="l1_distance")``
     """
-    check_kind(components, "components", "score", "loading", "explained_variance_ratio")
-    if components.sizes["component"] < 2:
-        raise InputError("a biplot needs two components, the dataset has one")
+    found = biplot_of(components)
+    points = found.points
     if color not in COLORS:
         raise InputError(f"color='{color}': choose one of {', '.join(COLORS)}")
     ax = axes_or_new(ax, height_mm=80.0)
-    score = components["score"].isel(component=slice(0, 2)).transpose(..., "component")
-    points = np.asarray(score.values, dtype=np.float64).reshape(-1, 2)
-    loading = np.asarray(
-        components["loading"].transpose("class", "component").values[:, :2], dtype=np.float64
-    )
     if sensitivity is None:
         ax.plot(*points.T, "o", ms=3.0, mew=0.0, color=BLUE, alpha=0.6, label="settings")
     else:
         text, colormap = COLORS[color]
         dots = ax.scatter(
-            points[:, 0], points[:, 1], c=_colour_values(sensitivity, color, score), s=10.0,
-            lw=0, cmap=colormap, label="settings",
+            points[:, 0], points[:, 1], s=10.0, lw=0, cmap=colormap, label="settings",
+            c=_colour_values(sensitivity, color, components["score"]),
         )  # fmt: skip
         add_colorbar(dots, ax, text)
-    share = 100.0 * np.asarray(components["explained_variance_ratio"].values, dtype=np.float64)
-    factor = _arrow_factor(points, loading)
-    ax.set_xlabel(f"component 1 ({share[0]:.3g} % of the variance)")
-    ax.set_ylabel(f"component 2 ({share[1]:.3g} % of the variance)")
-    ax.set_title(f"dots: settings; arrows: loadings × {factor:.2g}", loc="left", size=TITLE_PT)
-    tips = factor * loading
-    _set_limits(ax, np.vstack([points, tips, np.zeros((1, 2))]))
-    _draw_arrows(ax, tips, class_names(components), points)
+    shares = 100.0 * found.shares
+    ax.set_xlabel(f"component 1 ({shares[0]:.3g} % of the variance)")
+    ax.set_ylabel(f"component 2 ({shares[1]:.3g} % of the variance)")
+    title = f"dots: settings; arrows: loadings × {found.factor:.2g}"
+    ax.set_title(title, loc="left", size=TITLE_PT)
+    _set_limits(ax, np.vstack([points, found.tips, np.zeros((1, 2))]))
+    _draw_arrows(ax, found.tips, found.names, points)
     return ax
 
 
-def _colour_values(sensitivity: xr.Dataset, color: str, score: xr.DataArray) -> Array:
+class Biplot(NamedTuple):
+    """Settings and classes on two principal components, drawn by matplotlib and by a page."""
+
+    points: Floats
+    """The scores of the settings on the first two components, shape (settings, 2)."""
+    tips: Floats
+    """The loadings of the classes, lengthened, shape (classes, 2)."""
+    names: list[str]
+    """The classes."""
+    factor: float
+    """By what the loadings are lengthened."""
+    shares: Floats
+    """The share of the variance that each component explains."""
+
+
+def biplot_of(components: xr.Dataset) -> Biplot:
+    """Return the first two principal components of a study, or raise `InputError`."""
+    check_kind(components, "components", "score", "loading", "explained_variance_ratio", "class")
+    if components.sizes["component"] < 2:
+        raise InputError("a biplot needs two components, the dataset has one")
+    score, loading, shares = (
+        np.asarray(components[name].transpose(..., "component").values, dtype=np.float64)[..., :2]
+        for name in ("score", "loading", "explained_variance_ratio")
+    )
+    points = score.reshape(-1, 2)
+    factor = _arrow_factor(points, loading)
+    return Biplot(points, factor * loading, class_names(components), factor, shares)
+
+
+def _colour_values(sensitivity: xr.Dataset, color: str, score: xr.DataArray) -> Floats:
     """Return the colour of every setting, in the order of the scores."""
     check_kind(sensitivity, "sensitivity", color)
     dims = [dim for dim in score.dims if dim != "component"]
@@ -139,7 +160,7 @@ def _colour_values(sensitivity: xr.Dataset, color: str, score: xr.DataArray) -> 
     return np.asarray(values.transpose(*dims).values, dtype=np.float64).ravel()
 
 
-def _arrow_factor(points: Array, loading: Array) -> float:
+def _arrow_factor(points: Floats, loading: Floats) -> float:
     """Return by what the loadings are lengthened, rounded to two digits."""
     longest = float(np.nanmax(np.hypot(*loading.T)))
     reach = float(np.nanmax(np.hypot(*points.T), initial=0.0))
@@ -148,7 +169,7 @@ def _arrow_factor(points: Array, loading: Array) -> float:
     return float(f"{LONGEST_ARROW * reach / longest:.2g}")
 
 
-def _set_limits(ax: Axes, drawn: Array) -> None:
+def _set_limits(ax: Axes, drawn: Floats) -> None:
     """Set limits with room for labels around all that is drawn, one scale for both axes."""
     low, high = np.nanmin(drawn, axis=0), np.nanmax(drawn, axis=0)
     middle, span = (low + high) / 2.0, (high - low) * (1.0 + 2.0 * MARGIN)
@@ -160,7 +181,7 @@ def _set_limits(ax: Axes, drawn: Array) -> None:
     ax.set_box_aspect(size[1] / size[0])
 
 
-def _draw_arrows(ax: Axes, tips: Array, names: list[str], points: Array) -> None:
+def _draw_arrows(ax: Axes, tips: Floats, names: list[str], points: Floats) -> None:
     length = np.hypot(*tips.T)
     order = np.argsort(-length, kind="stable")[:MOST_LABELS]
     labelled = [i for i in order if length[i] > SHORTEST_LABELLED * length.max()]
@@ -187,7 +208,7 @@ def _draw_arrows(ax: Axes, tips: Array, names: list[str], points: Array) -> None
         _draw_label(ax, names[index], tips[index], low + place * per_point)
 
 
-def _label_size(name: str) -> Array:
+def _label_size(name: str) -> Floats:
     """Return width and height of the label of a class [pt]."""
     size = sketch_size(class_cells(name)) * SKETCH_CELL_PT
     if name_text(name):
@@ -195,7 +216,7 @@ def _label_size(name: str) -> Array:
     return size
 
 
-def _draw_label(ax: Axes, name: str, tip: Array, place: Array) -> None:
+def _draw_label(ax: Axes, name: str, tip: Floats, place: Floats) -> None:
     from matplotlib.offsetbox import AnnotationBbox, TextArea, VPacker
 
     parts: list[Any] = [sketch_box(name, cell_pt=SKETCH_CELL_PT, color=INK)]
@@ -212,8 +233,8 @@ def _draw_label(ax: Axes, name: str, tip: Array, place: Array) -> None:
 
 
 def place_labels(
-    tips: Array, boxes: Array, *, origin: Array, room: Array, dots: Array | None = None
-) -> Array:
+    tips: Floats, boxes: Floats, *, origin: Floats, room: Floats, dots: Floats | None = None
+) -> Floats:
     """Place one label near the tip of every arrow so that labels do not overlap.
 
     One after the other, every label takes the best of many places around its tip: free of other
@@ -269,24 +290,24 @@ def place_labels(
     return place
 
 
-def _places_around(tip: Array, half: Array) -> Array:
+def _places_around(tip: Floats, half: Floats) -> Floats:
     """Return places for the middle of a label whose edge is some distances from a tip."""
     angle = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
     direction = np.column_stack([np.cos(angle), np.sin(angle)])
     # Distance from the middle of a box to its edge in that direction.
     reach = (half / np.maximum(np.abs(direction), 1e-9)).min(axis=1)
     away = np.concatenate([direction * (reach + more)[:, None] for more in DISTANCES_PT])
-    places: Array = tip + away
+    places: Floats = tip + away
     return places
 
 
-def _covered(places: Array, half: Array, points: Array) -> Array:
+def _covered(places: Floats, half: Floats, points: Floats) -> Floats:
     """Return how many points a label covers at each of these places."""
     inside = (np.abs(places[:, None] - points[None]) < half).all(axis=2)
     return np.asarray(inside.sum(axis=1), dtype=np.float64)
 
 
-def _push_apart(place: Array, half: Array, i: int, j: int) -> bool:
+def _push_apart(place: Floats, half: Floats, i: int, j: int) -> bool:
     gap = place[i] - place[j]
     depth = half[i] + half[j] - np.abs(gap)
     if (depth <= 1e-6).any():

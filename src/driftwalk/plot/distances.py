@@ -5,11 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import numpy.typing as npt
 
-from driftwalk.plot.parts.labels import interval_of, number_fact, require_variables
-from driftwalk.plot.parts.parameters import PlotParameter, plane_of
-from driftwalk.plot.parts.style import INK, SCORE_COLORMAP, add_colorbar, axes_or_new
+from driftwalk.core.arrays import Bools, Floats, Integers
+from driftwalk.plot.parts.labels import (
+    interval_of,
+    number_fact,
+    plane_of,
+    require_variables,
+)
+from driftwalk.plot.parts.style import INK, SCORE_COLORMAP, add_colorbar, axes_or_new, outlined
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -17,7 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.collections import QuadMesh
     from matplotlib.colorbar import Colorbar
 
-Array = npt.NDArray[np.float64]
 # CF flag of `status` -> what the legend says, and the hatch of its cells.
 CAUSES: dict[int, tuple[str, str]] = {
     1: ("no motion (D = 1)", "//////"),
@@ -77,7 +80,10 @@ def plot_ks_map(
     status = _status(calibration, "status", dims)
     ax = axes_or_new(ax)
     edges = edges_of(calibration, prefix="")
-    mesh = _score_mesh(ax, edges, score, bottom=0.0, top=1.0)
+    mesh = ax.pcolormesh(
+        *edges, np.ma.masked_invalid(score), cmap=SCORE_COLORMAP, vmin=0.0, vmax=1.0
+    )
+    mesh.set_rasterized(True)
     _hatch_causes(ax, edges, status, np.isfinite(score))
     _draw_region(ax, calibration)
     draw_optimum(ax, calibration)
@@ -128,7 +134,8 @@ def plot_refined_map(
     )
     ax = axes_or_new(ax)
     edges = edges_of(calibration, prefix="refined_")
-    mesh = _score_mesh(ax, edges, score, bottom=None, top=None)
+    mesh = ax.pcolormesh(*edges, np.ma.masked_invalid(score), cmap=SCORE_COLORMAP)
+    mesh.set_rasterized(True)
     if np.isfinite(score).any():
         low, high = np.nanquantile(score, [0.02, 1.0])
         floor = 1.0 - number_fact(calibration, "noise_floor")
@@ -150,21 +157,17 @@ def plot_refined_map(
     return ax
 
 
-def edges_of(calibration: xr.Dataset, *, prefix: str) -> tuple[Array, Array]:
+def edges_of(calibration: xr.Dataset, *, prefix: str) -> tuple[Floats, Floats]:
     """Return the edges of the cells of the coarse or refined map, in the figure's units."""
-    across, up = (
-        _parameter_edges(one, one.values(calibration, prefix)) for one in plane_of(calibration)
-    )
-    return across, up
+    edges = []
+    for one in plane_of(calibration):
+        center = one.values(calibration, prefix)
+        is_log = one.stored.is_log
+        edges.append(10.0 ** cell_edges(np.log10(center)) if is_log else cell_edges(center))
+    return edges[0], edges[1]
 
 
-def _parameter_edges(parameter: PlotParameter, center: Array) -> Array:
-    if parameter.stored.is_log:
-        return np.power(10.0, cell_edges(np.log10(center)))
-    return cell_edges(center)
-
-
-def cell_edges(center: Array) -> Array:
+def cell_edges(center: Floats) -> Floats:
     """Return the edges of the cells around grid points: midpoints, and as far out at the ends.
 
     Examples
@@ -182,8 +185,6 @@ def cell_edges(center: Array) -> Array:
 
 def draw_optimum(ax: Axes, calibration: xr.Dataset, *, color: str = "white") -> None:
     """Mark the estimate with bars of its intervals in the plane of the parameters."""
-    from matplotlib.patheffects import Normal, Stroke
-
     places, bars = [], []
     for parameter in plane_of(calibration):
         best, factor = parameter.best(calibration), parameter.factor
@@ -195,7 +196,7 @@ def draw_optimum(ax: Axes, calibration: xr.Dataset, *, color: str = "white") -> 
             if ends is None
             else [[max(best - factor * ends[0], 0.0)], [max(factor * ends[1] - best, 0.0)]]
         )
-    outline = [Stroke(linewidth=2.2, foreground=INK if color == "white" else "white"), Normal()]
+    outline = outlined(2.2, INK if color == "white" else "white")
     ax.errorbar(
         places[0], places[1], xerr=bars[0], yerr=bars[1], fmt="o", ms=3.5, color=color,
         elinewidth=1.0, capsize=0.0, zorder=6, label=OPTIMUM_LABEL, path_effects=outline,
@@ -205,7 +206,6 @@ def draw_optimum(ax: Axes, calibration: xr.Dataset, *, color: str = "white") -> 
 def _draw_region(ax: Axes, calibration: xr.Dataset) -> None:
     """Outline the 90 % region of the estimate."""
     from matplotlib.patches import Polygon
-    from matplotlib.patheffects import Normal, Stroke
 
     outline = region_of(calibration)
     if outline is None:
@@ -213,12 +213,12 @@ def _draw_region(ax: Axes, calibration: xr.Dataset) -> None:
     ax.add_patch(
         Polygon(
             outline, closed=True, facecolor="none", edgecolor=INK, linewidth=0.9, zorder=5,
-            label=REGION_LABEL, path_effects=[Stroke(linewidth=2.0, foreground="white"), Normal()],
+            label=REGION_LABEL, path_effects=outlined(2.0),
         )
     )  # fmt: skip
 
 
-def region_of(calibration: xr.Dataset) -> Array | None:
+def region_of(calibration: xr.Dataset) -> Floats | None:
     """Return the vertices of the 90 % region in the figure's units, None when there is none."""
     plane = plane_of(calibration)
     if any(f"region_{one.name}" not in calibration for one in plane):
@@ -228,7 +228,7 @@ def region_of(calibration: xr.Dataset) -> Array | None:
     return vertices if len(vertices) >= 3 else None
 
 
-def _status(calibration: xr.Dataset, name: str, dims: tuple[str, str]) -> npt.NDArray[np.int64]:
+def _status(calibration: xr.Dataset, name: str, dims: tuple[str, str]) -> Integers:
     """Return the status bits as whole numbers, 0 throughout when the map has none."""
     if name not in calibration:
         return np.zeros([calibration.sizes[dim] for dim in dims], dtype=np.int64)
@@ -236,45 +236,39 @@ def _status(calibration: xr.Dataset, name: str, dims: tuple[str, str]) -> npt.ND
     return np.asarray(np.nan_to_num(stored), dtype=np.int64)
 
 
-def _score_mesh(
-    ax: Axes,
-    edges: tuple[Array, Array],
-    score: Array,
-    *,
-    bottom: float | None,
-    top: float | None,
-) -> QuadMesh:
-    mesh = ax.pcolormesh(
-        *edges, np.ma.masked_invalid(score), cmap=SCORE_COLORMAP, vmin=bottom, vmax=top
-    )
-    mesh.set_rasterized(True)
-    return mesh
-
-
 def _hatch_causes(
     ax: Axes,
-    edges: tuple[Array, Array],
-    status: npt.NDArray[np.int64],
-    known: npt.NDArray[np.bool_],
+    edges: tuple[Floats, Floats],
+    status: Integers,
+    known: Bools,
 ) -> None:
-    """Cover every cell that has a cause, or no distance, by a hatched rectangle."""
-    from matplotlib.patches import Rectangle
-
-    across, up = edges
+    """Hatch every cell that has a cause, or no distance."""
     named: set[str] = set()
     for row, column in zip(*np.nonzero((status != 0) | ~known), strict=True):
         causes = [cause for bit, cause in CAUSES.items() if status[row, column] & bit]
-        name, hatch = causes[0] if causes else UNKNOWN_CAUSE
-        ax.add_patch(
-            Rectangle(
-                (across[column], up[row]),
-                across[column + 1] - across[column],
-                up[row + 1] - up[row],
-                facecolor="white", edgecolor=INK, linewidth=0.0, hatch=hatch,
-                label="" if name in named else name, gid=name,
-            )
-        )  # fmt: skip
-        named.add(name)
+        hatch_cell(ax, edges, (column, row), cause=(*causes, UNKNOWN_CAUSE)[0], named=named)
+
+
+def hatch_cell(
+    ax: Axes,
+    edges: tuple[Floats, Floats],
+    cell: tuple[int, int],
+    *,
+    cause: tuple[str, str],
+    named: set[str],
+) -> None:
+    """Cover a cell (column, row) by a hatched rectangle; a cause is named once, for the legend."""
+    from matplotlib.patches import Rectangle
+
+    (left, right), (low, high) = (edge[at : at + 2] for edge, at in zip(edges, cell, strict=True))
+    name, hatch = cause
+    ax.add_patch(
+        Rectangle(
+            (left, low), right - left, high - low, facecolor="white", edgecolor=INK, linewidth=0.0,
+            hatch=hatch, label="" if name in named else name, gid=name,
+        )
+    )  # fmt: skip
+    named.add(name)
 
 
 def _finish(ax: Axes, calibration: xr.Dataset, mesh: QuadMesh, colorbar: str) -> Colorbar | None:

@@ -8,14 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.atomic import atomic_path, require_target
-from driftwalk.plot.parts.arena import CM_PER_M, arena_of, draw_arena
+from driftwalk.plot.parts.arena import CM_PER_M, arena_of, draw_arena, draw_scale_bar
 from driftwalk.plot.parts.assembly_labels import PALETTE
 from driftwalk.plot.parts.film_file import FRAMES_PER_S, Frame, require_film_writer, write_frames
-from driftwalk.plot.parts.scale_bar import draw_scale_bar
 from driftwalk.plot.parts.style import INK, MUTED, new_figure, print_style
 from driftwalk.schema.check import kind_name
 
@@ -24,7 +23,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = npt.NDArray[np.float64]
 FILM_MM: Final = 101.6
 """Width and height of a film [mm]: an even number of dots, as encoders ask."""
 DOTS_PER_INCH: Final = {".gif": 100, ".mp4": 200}
@@ -43,11 +41,11 @@ DISC_SHARE: Final = 0.015
 class _Scene:
     """The bodies of a film, in cm and s."""
 
-    time: Array
-    x: Array
-    y: Array
-    theta: Array
-    color: npt.NDArray[np.int64]
+    time: Floats
+    x: Floats
+    y: Floats
+    theta: Floats
+    color: Integers
     side: float | None
     arena: dict[str, Any]
 
@@ -162,8 +160,8 @@ def _scene(motion: xr.Dataset, run: int) -> _Scene:
 
 
 def _moments(
-    time: Array, per_second: float, seconds: float | None, speed: float | None
-) -> tuple[Array, float]:
+    time: Floats, per_second: float, seconds: float | None, speed: float | None
+) -> tuple[Floats, float]:
     """Return the time of every frame [s], and how much faster than real time that is."""
     lasts = float(time[-1] - time[0])
     if speed is None:
@@ -189,7 +187,7 @@ def _moments(
     return time[0] + np.arange(int(count)) * (speed / per_second), rate
 
 
-def _frames(scene: _Scene, moments: Array, rate: float, dots: int) -> Iterator[Frame]:
+def _frames(scene: _Scene, moments: Floats, rate: float, dots: int) -> Iterator[Frame]:
     """Draw what stays once, and what moves on top of it for every frame."""
     from matplotlib.collections import LineCollection, PolyCollection
 
@@ -258,7 +256,7 @@ def _size(scene: _Scene, ax: Axes) -> float:
     return DISC_SHARE * (high - low)
 
 
-def _last_seen(scene: _Scene) -> npt.NDArray[np.int64]:
+def _last_seen(scene: _Scene) -> Integers:
     """Return the sample that shows each body at each time, -1 while it is not seen."""
     present = np.isfinite(scene.x) & np.isfinite(scene.y)
     rows = np.arange(scene.time.size, dtype=np.int64)[:, None]
@@ -273,7 +271,7 @@ def _last_seen(scene: _Scene) -> npt.NDArray[np.int64]:
 
 def _trails(
     scene: _Scene, moment: float, until: int, shown: list[tuple[Any, int]], lasts: float
-) -> list[Array]:
+) -> list[Floats]:
     """Return the way of each body that is shown; NaN in it breaks the line."""
     first = int(np.searchsorted(scene.time, moment - lasts))
     return [
@@ -282,7 +280,7 @@ def _trails(
     ]
 
 
-def _outline(scene: _Scene, sample: int, body: int, size: float) -> Array:
+def _outline(scene: _Scene, sample: int, body: int, size: float) -> Floats:
     """Return the corners of a block, or a disc where side or orientation are unknown."""
     theta = scene.theta[sample, body]
     square = scene.side is not None and np.isfinite(theta)

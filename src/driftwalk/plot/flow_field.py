@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
 from driftwalk.plot.parts.arena import arena_of, draw_arena, label_position
 from driftwalk.plot.parts.labels import in_unit
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Field = Literal["water", "block"]
-Array = npt.NDArray[np.float64]
 COMPONENTS: dict[str, tuple[str, str]] = {"water": ("u", "v"), "block": ("u_block", "v_block")}
 ARROWS_ACROSS = 17
 SPEED_LABEL = "speed (cm/s)"
@@ -101,7 +101,7 @@ def plot_flow(
     return ax
 
 
-def velocity_of(flow: xr.Dataset, field: Field) -> tuple[Array, Array, npt.NDArray[np.int8]]:
+def velocity_of(flow: xr.Dataset, field: Field) -> tuple[Floats, Floats, npt.NDArray[np.int8]]:
     """Return u, v [cm/s], NaN where nothing is to be drawn, and the flag, shapes (ny, nx)."""
     check_flow_field(flow)
     if field not in COMPONENTS:
@@ -123,7 +123,7 @@ def velocity_of(flow: xr.Dataset, field: Field) -> tuple[Array, Array, npt.NDArr
     return np.where(outside, np.nan, u), np.where(outside, np.nan, v), flags
 
 
-def _hatch_cells(ax: Axes, x: Array, y: Array, chosen: npt.NDArray[np.bool_]) -> list[Artist]:
+def _hatch_cells(ax: Axes, x: Floats, y: Floats, chosen: Bools) -> list[Artist]:
     """Hatch the chosen cells as one patch, so that the pattern runs on across cells."""
     from matplotlib.patches import PathPatch
     from matplotlib.path import Path
@@ -148,7 +148,7 @@ def _hatch_cells(ax: Axes, x: Array, y: Array, chosen: npt.NDArray[np.bool_]) ->
 
 
 def _draw_arrows(
-    ax: Axes, x: Array, y: Array, u: Array, v: Array, filled: npt.NDArray[np.bool_]
+    ax: Axes, x: Floats, y: Floats, u: Floats, v: Floats, filled: Bools
 ) -> list[Artist]:
     """Draw every n-th arrow, the longest about one and a half arrow spacings."""
     stride = max(1, round(max(x.size, y.size) / ARROWS_ACROSS))

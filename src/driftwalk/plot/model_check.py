@@ -1,15 +1,15 @@
-"""Pictures of a model check: whiteness, residuals in the tank and over time, predicted steps."""
+"""Pictures of model checks: whiteness, residuals, predicted steps; facts that were not fitted."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.plot.parts.arena import arena_of, draw_arena, label_position
-from driftwalk.plot.parts.labels import ANGLE_LABEL, LENGTH_LABEL, in_unit
+from driftwalk.plot.parts.labels import ANGLE_LABEL, LENGTH_LABEL, in_unit, ratio_axis
 from driftwalk.plot.parts.style import (
     BLUE,
     INK,
@@ -20,14 +20,14 @@ from driftwalk.plot.parts.style import (
     axes_or_new,
     speed_colormap,
 )
-from driftwalk.schema.answers.verdict import residuals_of
+from driftwalk.schema.answers.fit import residuals_of
+from driftwalk.schema.answers.model_comparison import ASPECT_WORDS, CHECK_LABELS
 from driftwalk.schema.check import require_kind
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-Array = npt.NDArray[np.float64]
 
 BAND_STDS = 1.96
 """95 % of a normal."""
@@ -166,7 +166,7 @@ def plot_residual_time(
     """
     _require(check)
     ax = axes_or_new(ax)
-    start, end = _running_time(check)
+    start, end = running_time(check)
     middle, half = 0.5 * (start + end) / 60.0, 0.5 * (end - start) / 60.0
     name, shift = ("flow_change", 0.0) if show == "flow" else ("part_noise_ratio", 1.0)
     value = 100.0 * (check[name].values - shift)
@@ -292,7 +292,7 @@ def _draw_noise(ax: Axes, check: xr.Dataset) -> None:
     add_colorbar(mesh, ax, "mean square of the errors,\nagainst that of all (sd)")
 
 
-def _running_time(check: xr.Dataset) -> tuple[Array, Array]:
+def running_time(check: xr.Dataset) -> tuple[Floats, Floats]:
     """Return start and end of the parts [s], recordings one after the other."""
     recording = check["part_recording"].values
     start, end = check["part_start"].values, check["part_end"].values
@@ -301,7 +301,7 @@ def _running_time(check: xr.Dataset) -> tuple[Array, Array]:
     return start + before, end + before
 
 
-def _shown(density: Array, edge: Array) -> tuple[float, float]:
+def _shown(density: Floats, edge: Floats) -> tuple[float, float]:
     """Return the range that holds nearly all."""
     share = np.cumsum(density * np.diff(edge))
     share = share / share[-1]
@@ -313,3 +313,40 @@ def legend_of(ax: Axes) -> dict[str, Any]:
     """Return handles and labels, for a legend of the whole figure."""
     handles, labels = ax.get_legend_handles_labels()
     return {"handles": handles, "labels": labels}
+
+
+def plot_own_aspects(found: xr.Dataset, ax: Axes, *, label: str) -> None:
+    """Draw how far the parts of the recording are from each other, and name the aspects."""
+    aspects = [str(name) for name in found["aspect"].values]
+    place = np.arange(len(aspects))
+    ax.plot(found["own_distance"].values, place, "|", ms=9.0, mew=1.4, color=INK, label=label)
+    ax.set_yticks(place, [ASPECT_WORDS.get(name, name) for name in aspects])
+    ax.invert_yaxis()
+    ax.set_xlim(left=0.0)
+    ax.set_xlabel("KS distance D")
+
+
+def plot_check_ratios(
+    one: xr.Dataset, ax: Axes, *, color: str, marker: str = "o", shift: float = 0.0
+) -> None:
+    """Draw the facts of one model's worlds over those of the recording."""
+    recorded = one["check_recorded"].values
+    place = np.arange(recorded.size, dtype=np.float64)
+    low, middle, high = (one[f"check_{name}"].values for name in ("low", "median", "high"))
+    # On a logarithmic axis there is no place for what is 0.
+    known = (low > 0.0) & (recorded > 0.0) & np.isfinite(low + middle + high)
+    low, middle, high = (part[known] / recorded[known] for part in (low, middle, high))
+    ax.errorbar(
+        middle, place[known] + shift, xerr=[middle - low, high - middle], fmt=marker, ms=3.0,
+        lw=0.9, color=color,
+    )  # fmt: skip
+
+
+def label_checks(found: xr.Dataset, ax: Axes) -> None:
+    """Name the facts, and draw the line on which model and recording agree."""
+    names = [str(name) for name in found["check"].values]
+    ax.axvline(1.0, color=INK, lw=0.6)
+    ratio_axis(ax)
+    ax.set_yticks(np.arange(len(names)), [CHECK_LABELS.get(name, name) for name in names])
+    ax.invert_yaxis()
+    ax.set_xlabel("model / recording")

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.plot.parts.assembly_labels import (
     OTHER,
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-Array = npt.NDArray[np.float64]
 BAR_WIDTH = 0.76
 # So many classes have room in one column of a page; a legend needs so much for two columns [pt].
 NARROW_CLASSES = 12
@@ -43,9 +42,9 @@ WIDE_LEGEND_PT = 380.0
 class Bars(NamedTuple):
     """One distribution on the classes that are drawn, shapes (shown,)."""
 
-    proportion: Array
-    low: Array
-    high: Array
+    proportion: Floats
+    low: Floats
+    high: Floats
 
 
 def plot_outcomes(
@@ -135,7 +134,7 @@ def _new_axes(*, wide: bool) -> Axes:
     return figure.add_subplot()
 
 
-def _on_classes(proportion: xr.DataArray, names: list[str]) -> Array:
+def _on_classes(proportion: xr.DataArray, names: list[str]) -> Floats:
     """Return proportions in the order of `names`, zero for a class that the dataset lacks."""
     aligned = proportion.reindex({"class": np.array(names, dtype=object)}, fill_value=0.0)
     return np.asarray(aligned.values, dtype=np.float64)
@@ -160,7 +159,7 @@ def _bars(dataset: xr.Dataset, names: list[str], shown: list[int]) -> Bars:
 _ENDS = ("low", "high")
 
 
-def _draw_bars(ax: Axes, at: Array, bars: Bars, *, width: float, color: str, label: str) -> None:
+def _draw_bars(ax: Axes, at: Floats, bars: Bars, *, width: float, color: str, label: str) -> None:
     ax.bar(at, bars.proportion, width=0.94 * width, color=color, alpha=0.75, label=label)
     known = np.isfinite(bars.low) & np.isfinite(bars.high)
     # A proportion lies within its interval; rounding must not make a length negative.
@@ -173,7 +172,7 @@ def _draw_bars(ax: Axes, at: Array, bars: Bars, *, width: float, color: str, lab
 
 
 def _draw_realisations(
-    ax: Axes, at: Array, realisations: xr.Dataset, names: list[str], shown: list[int]
+    ax: Axes, at: Floats, realisations: xr.Dataset, names: list[str], shown: list[int]
 ) -> None:
     """Draw mean ± standard deviation over the realisations, "other" among them."""
     if "proportion" not in realisations or set(realisations["proportion"].dims) != {

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
-from driftwalk.plot.distances import cell_edges
+from driftwalk.plot.distances import cell_edges, hatch_cell
 from driftwalk.plot.parts.assembly_labels import (
     PALETTE,
     SweepAxis,
@@ -34,7 +34,6 @@ from driftwalk.plot.parts.polyomino_sketch import (
 )
 from driftwalk.plot.parts.style import (
     BLUE,
-    DOUBLE_COLUMN_MM,
     INK,
     MM_PER_INCH,
     MUTED,
@@ -43,8 +42,9 @@ from driftwalk.plot.parts.style import (
     SINGLE_COLUMN_MM,
     STYLE,
     add_colorbar,
+    axes_grid_or_new,
     axes_or_new,
-    new_figure,
+    outlined,
 )
 
 if TYPE_CHECKING:
@@ -52,7 +52,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.collections import QuadMesh
 
-Array = npt.NDArray[np.float64]
 # Bright is close to the reference, as bright is a good score in the map of the calibration.
 DISTANCE_COLORMAP: Final = "viridis_r"
 PROPORTION_COLORMAP: Final = "viridis"
@@ -175,7 +174,11 @@ def plot_class_panels(
     unknown = [name for name in shown if name not in class_names(sensitivity)]
     if unknown or not shown:
         raise InputError(f"the study has no class {', '.join(unknown) or '(none was asked for)'}")
-    panels, edge = _panel_grid(axes, len(shown), columns)
+    columns = min(columns, len(shown))
+    panels = axes_grid_or_new(
+        axes, count=len(shown), columns=columns, height_mm=20.0 + 40.0 * -(-len(shown) // columns),
+        sharex=True, sharey=True,
+    )  # fmt: skip
     mapped = len(sweep) == 2 and not any(axis.words for axis in sweep)
     row = {name: index for index, name in enumerate(class_names(sensitivity))}
     every = [_values(sensitivity["proportion"].isel({"class": row[name]}), sweep) for name in shown]
@@ -192,9 +195,11 @@ def plot_class_panels(
             ax.set_ylabel("proportion")
             _turn_words(ax, sweep)
         _title_panel(ax, name)
-    if edge is not None:
-        _label_outside(panels, edge)
-        _legend_of_figure(panels[0])
+    if axes is None:
+        _label_outside(panels, columns)
+        handles, labels = panels[0].get_legend_handles_labels()
+        if labels:
+            figure_of(panels[0]).legend(handles, labels, loc="outside upper center", ncols=4)
     if mapped:
         add_colorbar(panels[0].collections[0], panels, "proportion of runs")
     return panels
@@ -275,28 +280,19 @@ def _one_or_two(sensitivity: xr.Dataset, variable: xr.DataArray) -> list[SweepAx
     return sweep
 
 
-def _values(variable: xr.DataArray, sweep: list[SweepAxis]) -> Array:
+def _values(variable: xr.DataArray, sweep: list[SweepAxis]) -> Floats:
     """Return the values with the first axis of the figure first."""
     return np.asarray(variable.transpose(*(axis.name for axis in sweep)).values, dtype=np.float64)
 
 
-def _draw_map(ax: Axes, sweep: list[SweepAxis], values: Array, *, colormap: str) -> QuadMesh:
+def _draw_map(ax: Axes, sweep: list[SweepAxis], values: Floats, *, colormap: str) -> QuadMesh:
     """Draw values (x, y) as a map, and hatch the cells that have none."""
-    from matplotlib.patches import Rectangle
-
     x_edge, y_edge = (cell_edges(axis.values) for axis in sweep)
     mesh = ax.pcolormesh(x_edge, y_edge, np.ma.masked_invalid(values.T), cmap=colormap)
     mesh.set_rasterized(True)
-    named = False
-    for i, j in zip(*np.nonzero(~np.isfinite(values)), strict=True):
-        ax.add_patch(
-            Rectangle(
-                (x_edge[i], y_edge[j]), x_edge[i + 1] - x_edge[i], y_edge[j + 1] - y_edge[j],
-                facecolor="white", edgecolor=INK, linewidth=0.0, hatch="//////",
-                label="" if named else "not computed",
-            )
-        )  # fmt: skip
-        named = True
+    named: set[str] = set()
+    for cell in zip(*np.nonzero(~np.isfinite(values)), strict=True):
+        hatch_cell(ax, (x_edge, y_edge), cell, cause=("not computed", "//////"), named=named)
     ax.set_xlim(*x_edge[[0, -1]])
     ax.set_ylim(*y_edge[[0, -1]])
     ax.set_xlabel(sweep[0].label)
@@ -304,10 +300,8 @@ def _draw_map(ax: Axes, sweep: list[SweepAxis], values: Array, *, colormap: str)
     return mesh
 
 
-def _draw_floor_contour(ax: Axes, sweep: list[SweepAxis], values: Array, floor: float) -> bool:
+def _draw_floor_contour(ax: Axes, sweep: list[SweepAxis], values: Floats, floor: float) -> bool:
     """Draw the line of the noise floor; False when the map does not cross it."""
-    from matplotlib.patheffects import Normal, Stroke
-
     known = values[np.isfinite(values)]
     crossed = known.size and known.min() < floor < known.max()
     if min(values.shape) < 2 or not crossed:
@@ -316,8 +310,7 @@ def _draw_floor_contour(ax: Axes, sweep: list[SweepAxis], values: Array, floor: 
         sweep[0].values, sweep[1].values, np.ma.masked_invalid(values.T), levels=[floor],
         colors=INK, linewidths=1.2,
     )  # fmt: skip
-    outline = [Stroke(linewidth=2.6, foreground="white"), Normal()]
-    lines.set_path_effects(outline)
+    lines.set_path_effects(outlined(2.6))
     ax.plot([], [], color=INK, lw=1.2, label=f"{FLOOR_LABEL} ({floor:.3g})")
     return True
 
@@ -342,7 +335,7 @@ def _draw_floor_band(ax: Axes, sensitivity: xr.Dataset) -> None:
         ax.axhline(mean, color=INK, lw=0.8, dashes=(4, 2.5), label="mean noise floor")
 
 
-def _draw_lines(ax: Axes, sweep: list[SweepAxis], values: Array, *, color: str) -> None:
+def _draw_lines(ax: Axes, sweep: list[SweepAxis], values: Floats, *, color: str) -> None:
     """Draw values over one axis, one line per value of the other; words are not joined."""
     along, *others = sweep
     if others and along.words and not others[0].words:
@@ -375,22 +368,6 @@ def _mark_on_line(ax: Axes, sensitivity: xr.Dataset, sweep: list[SweepAxis]) -> 
         ax.axvline(at, color=ORANGE, lw=0.9, zorder=1, label=REFERENCE_LABEL)
 
 
-def _panel_grid(axes: Any, count: int, columns: int) -> tuple[list[Axes], int | None]:
-    """Return the axes of the panels, and the columns of a new figure (None for axes given)."""
-    if axes is not None:
-        given: list[Axes] = list(np.ravel(np.asarray(axes, dtype=object)))
-        if len(given) != count:
-            raise InputError(f"got {len(given)} axes, expected {count}: pass them as axes=[...]")
-        return given, None
-    columns = min(columns, count)
-    rows = -(-count // columns)
-    figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=20.0 + 40.0 * rows)
-    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
-    for spare in grid.ravel()[count:]:
-        spare.remove()
-    return list(grid.ravel()[:count]), columns
-
-
 def _label_outside(panels: list[Axes], columns: int) -> None:
     """Keep the labels of the leftmost and of the lowest panel of every column only."""
     for index, ax in enumerate(panels):
@@ -417,13 +394,6 @@ def _turn_words(ax: Axes, sweep: list[SweepAxis]) -> None:
     """Turn the tick labels of a small panel when they are words, which would not fit abreast."""
     if all(axis.words for axis in sweep):
         ax.tick_params(axis="x", labelrotation=90.0)
-
-
-def _legend_of_figure(ax: Axes) -> None:
-    """Put the legend of one panel, which holds for all, above the figure."""
-    handles, labels = ax.get_legend_handles_labels()
-    if labels:
-        figure_of(ax).legend(handles, labels, loc="outside upper center", ncols=4)
 
 
 def _legend_above(ax: Axes) -> None:

@@ -1,26 +1,137 @@
-"""The blocks in the tank: one moment, and a strip of moments."""
+"""The tank: the path of one body (Fig. 5a), and its blocks at one or several moments."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
-from driftwalk.plot.parts.arena import CM_PER_M, arena_of, draw_arena, label_position
+from driftwalk.plot.parts.arena import (
+    CM_PER_M,
+    arena_of,
+    draw_arena,
+    draw_scale_bar,
+    label_position,
+)
 from driftwalk.plot.parts.assembly_labels import PALETTE
-from driftwalk.plot.parts.scale_bar import draw_scale_bar
-from driftwalk.plot.parts.style import DOUBLE_COLUMN_MM, INK, axes_or_new, new_figure
+from driftwalk.plot.parts.style import (
+    DOUBLE_COLUMN_MM,
+    INK,
+    TIME_COLORMAP,
+    add_colorbar,
+    axes_grid_or_new,
+    axes_or_new,
+)
+from driftwalk.schema import Track, body_track
 from driftwalk.schema.check import kind_name
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-Array = npt.NDArray[np.float64]
 STRIP_COLUMNS: Final = 6
 POSES: Final = ("x", "y", "theta", "assembly")
+
+# Neighbours further apart than this many usual intervals have a gap between them.
+GAP_INTERVALS = 1.5
+# Beyond this many segments a vector file holds a picture of the path, not its every segment.
+VECTOR_SEGMENTS = 3000
+
+
+def plot_trajectory(
+    trajectory: xr.Dataset,
+    ax: Axes | None = None,
+    *,
+    body: str | None = None,
+    start: float | None = None,
+    stop: float | None = None,
+    arena: Mapping[str, Any] | str | None = None,
+    colorbar: Literal["beside", "none"] = "beside",
+) -> Axes:
+    """Draw the path of one body in cm, coloured by time, with its first position marked.
+
+    A gap in the recording stays a gap: positions further apart in time than 1.5 usual intervals
+    are not joined.
+
+    Parameters
+    ----------
+    trajectory : xarray.Dataset
+        A `trajectory`.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure when left out.
+    body : str, optional
+        Which body; may be left out when there is only one.
+    start, stop : float, optional
+        Times [s] between which the path is drawn, both included; default: all of it.
+    arena : mapping or str, optional
+        Outline of the tank; default: the dataset's own.
+    colorbar : {"beside", "none"}
+        Whether to add a colour bar of the time.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+
+    Raises
+    ------
+    InputError
+        When there are fewer than 2 positions between `start` and `stop`.
+
+    Examples
+    --------
+    >>> from driftwalk.schema import build_trajectory
+    >>> plot_trajectory(build_trajectory([0, 0.1, 0.2], [0, 0.01, 0.02], [0, 0, 0])).get_ylabel()
+    'y (cm)'
+    """
+    from matplotlib.collections import LineCollection
+
+    track = _excerpt(body_track(trajectory, body), start, stop)
+    ax = axes_or_new(ax, layout="compressed")
+    points = CM_PER_M * np.column_stack([track.x, track.y])
+    joined = joined_neighbours(track.time)
+    segments = np.stack([points[:-1][joined], points[1:][joined]], axis=1)
+    path = LineCollection(
+        list(segments), cmap=TIME_COLORMAP, linewidths=0.9, capstyle="round", label="path"
+    )
+    path.set_array(track.time[:-1][joined])
+    path.set_clim(track.time[0], track.time[-1])
+    path.set_rasterized(len(segments) > VECTOR_SEGMENTS)
+    ax.add_collection(path)
+    ax.plot(*points[0], "o", ms=4.5, mfc="white", mec=INK, mew=1.0, zorder=5, label="start")
+    if draw_arena(ax, arena_of(trajectory, arena)) is None:
+        ax.autoscale_view()
+    label_position(ax)
+    if colorbar == "beside":
+        add_colorbar(path, ax, "time (s)")
+    return ax
+
+
+def joined_neighbours(time: npt.NDArray[np.float64]) -> Bools:
+    """Return, for samples i and i + 1, whether no gap lies between them; shape (n - 1,)."""
+    interval = np.diff(time)
+    joined: Bools = interval <= GAP_INTERVALS * np.median(interval)
+    return joined
+
+
+def _excerpt(track: Track, start: float | None, stop: float | None) -> Track:
+    first = -np.inf if start is None else start
+    last = np.inf if stop is None else stop
+    inside = (track.time >= first) & (track.time <= last)
+    if inside.sum() < 2:
+        raise InputError(
+            f"fewer than 2 positions between start={first:g} s and stop={last:g} s: the body was "
+            + (
+                f"seen from {track.time[0]:g} s to {track.time[-1]:g} s"
+                if track.time.size
+                else "never seen"
+            )
+        )
+    return Track(*(values[inside] for values in track))
 
 
 def plot_blocks(
@@ -102,7 +213,10 @@ def plot_film_strip(
     one = _one_run(path, run, kind="assembly_path")
     if count < 2:
         raise InputError(f"a strip has at least 2 moments, got {count}")
-    panels = _strip_axes(axes, count)
+    rows = -(-count // STRIP_COLUMNS)
+    columns = -(-count // rows)
+    height_mm = rows * (DOUBLE_COLUMN_MM / columns + 5.0)
+    panels = axes_grid_or_new(axes, count=count, columns=columns, height_mm=height_mm)
     times = one["time"].values
     for ax, moment in zip(panels, np.linspace(times[0], times[-1], count), strict=True):
         plot_blocks(path, ax, run=run, time=float(moment))
@@ -111,7 +225,7 @@ def plot_film_strip(
     return panels
 
 
-def block_corners(dataset: xr.Dataset) -> Array:
+def block_corners(dataset: xr.Dataset) -> Floats:
     """Return the corners of every block.
 
     Parameters
@@ -180,20 +294,3 @@ def _draw_blocks(ax: Axes, moment: xr.Dataset) -> None:
         list(block_corners(moment)), facecolors=colors, edgecolors=INK, linewidths=0.6, zorder=3
     )
     ax.add_collection(blocks)
-
-
-def _strip_axes(axes: Any, count: int) -> list[Axes]:
-    if axes is None:
-        rows = -(-count // STRIP_COLUMNS)
-        columns = -(-count // rows)
-        figure = new_figure(
-            width_mm=DOUBLE_COLUMN_MM, height_mm=rows * (DOUBLE_COLUMN_MM / columns + 5.0)
-        )
-        axes = figure.subplots(rows, columns, squeeze=False)
-        for spare in axes.ravel()[count:]:
-            spare.remove()
-        axes = axes.ravel()[:count]
-    panels: list[Axes] = list(np.ravel(np.asarray(axes, dtype=object)))
-    if len(panels) != count:
-        raise InputError(f"got {len(panels)} axes, expected {count}: pass them as axes=[...]")
-    return panels

@@ -5,23 +5,23 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.plot.distances import REGION_LABEL, draw_optimum, region_of
-from driftwalk.plot.parts.labels import interval_of, number_fact, require_variables
-from driftwalk.plot.parts.parameters import (
+from driftwalk.plot.parts.labels import (
     PlotParameter,
+    interval_of,
+    number_fact,
     parameter_named,
     plane_of,
     plot_parameters,
+    require_variables,
 )
-from driftwalk.plot.parts.style import BLUE, INK, MUTED, ORANGE, PALE, axes_or_new, axes_row_or_new
+from driftwalk.plot.parts.style import BLUE, INK, MUTED, ORANGE, PALE, axes_grid_or_new, axes_or_new
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-Array = npt.NDArray[np.float64]
 ESTIMATES_LABEL = "bootstrap estimates"
 
 
@@ -51,7 +51,7 @@ def plot_validation(calibration: xr.Dataset, axes: Any = None) -> list[Axes]:
     ``plot_validation(calibration)[0].figure.savefig("validation.png")``
     """
     parameters = plot_parameters(calibration)
-    row = axes_row_or_new(axes, count=len(parameters) + 1)
+    row = axes_grid_or_new(axes, count=len(parameters) + 1)
     for parameter, ax in zip(parameters, row, strict=False):
         plot_distance_profile(calibration, ax, parameter=parameter.name)
     plot_bootstrap(calibration, row[-1])

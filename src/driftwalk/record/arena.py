@@ -10,8 +10,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.core.errors import FormatError, InputError
-from driftwalk.core.text.argument_text import argument_text
+from driftwalk.core.errors import FormatError, InputError, argument_text
 from driftwalk.record.circle import CIRCLE, fit_circle, tank_radius_bound
 from driftwalk.record.raw import Array
 

@@ -6,8 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from driftwalk.core.errors import InputError
-from driftwalk.core.text.argument_text import argument_text
+from driftwalk.core.errors import InputError, argument_text
 from driftwalk.record.circle import implied_scale
 from driftwalk.record.cleaning.clock import CLOCK
 from driftwalk.record.cleaning.extent import refuse_far

@@ -1,13 +1,11 @@
 """Run directories: long work that resumes, with its figures and its manifest."""
 
-from driftwalk.runs.assembly import AssemblyResult, AssemblyWork
-from driftwalk.runs.calibration import CalibrationWork
+from driftwalk.runs.assembly import AssemblyResult, AssemblyWork, SensitivityResult, SensitivityWork
+from driftwalk.runs.calibration import CalibrationWork, ModelComparisonWork
 from driftwalk.runs.finished_run import FoundRun, flow_of_result, read_found, run_folder
 from driftwalk.runs.fit import Fitted, FitWork
-from driftwalk.runs.model_comparison import ModelComparisonWork
 from driftwalk.runs.recovery import RecoveryWork
 from driftwalk.runs.resumable_run import Progress, Run, Work, run_work
-from driftwalk.runs.sensitivity import SensitivityResult, SensitivityWork
 from driftwalk.schema.stores.netcdf import netcdf_bytes
 
 __all__ = [

@@ -1,16 +1,15 @@
-"""The run of a calibration."""
+"""The runs of a calibration and of a comparison of motion models."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from driftwalk.core.errors import ConfigurationError
-from driftwalk.core.run_stages import CALIBRATION_STAGES
-from driftwalk.runs.dataset_hash import dataset_hash
-from driftwalk.runs.resumable_run import naming_recording
+from driftwalk.core.run_stages import CALIBRATION_STAGES, tell_nobody
+from driftwalk.runs.resumable_run import dataset_hash, naming_recording
 from driftwalk.schema.parameters import unit_suffix
 from driftwalk.schema.runs import run_kind
 
@@ -106,13 +105,8 @@ class CalibrationWork:
 
     def specification(self) -> dict[str, Any]:
         """Return what determines the numbers of the calibration."""
-        return {
-            "study": self.study.to_dict(),
-            "body": self.body,
-            "recording_sha256": dataset_hash(self.recording, ("x", "y", "theta")),
-            "flow_sha256": None if self.flow is None else dataset_hash(self.flow, ("u", "v")),
-            **({} if self.model is None else {"model": self.model.describe()}),
-        }
+        about_model = {} if self.model is None else {"model": self.model.describe()}
+        return {**_specification(self), **about_model}
 
     def compute(self, run: Run) -> xr.Dataset:
         """Calibrate; return a `calibration`, or of many parameters a `model_calibration`."""
@@ -155,3 +149,91 @@ def _posterior_table(found: xr.Dataset) -> bytes:
 def _overall(name: str, done: int, total: int) -> tuple[float, int, str]:
     stage = CALIBRATION_STAGES[name]
     return stage.percent(done / total if total else 1.0), 100, stage.words
+
+
+@dataclass(frozen=True)
+class ModelComparisonWork:
+    """A comparison of motion models.
+
+    Attributes
+    ----------
+    recording : xarray.Dataset
+        A `trajectory`.
+    models : sequence of str or MotionModel
+        The models, or their names.
+    study : Study
+        Tank, camera, step interval and seed.
+    flow : xarray.Dataset or None
+        A given flow field; None takes it from the recording, for the block.
+    body : str or None
+        The body.
+    inputs : mapping of str to Path
+        The files that were read, by their role.
+    threads : int or None
+        Threads; the result does not depend on them.
+    finished : callable
+        Called with each model's name, its distance, the standard error of that and the number of
+        models, as soon as it is judged.
+    """
+
+    recording: xr.Dataset
+    models: Sequence[str | MotionModel]
+    study: Study
+    flow: xr.Dataset | None
+    body: str | None
+    inputs: Mapping[str, Path]
+    threads: int | None = None
+    finished: Callable[[str, float, float, int], None] = tell_nobody
+
+    kind: ClassVar = "model_comparison"
+
+    @property
+    def seeds(self) -> dict[str, int]:
+        """The seed of the searches."""
+        return {"calibration": self.study.calibration.seed}
+
+    def checked(self) -> Self:
+        """Return the work with the models of the names; refuse a recording that does not do."""
+        from driftwalk.calibration import check_models
+
+        with naming_recording(self.inputs):
+            models = check_models(
+                self.recording, self.models, study=self.study, flow=self.flow, body=self.body
+            )
+        return replace(self, models=models)
+
+    def specification(self) -> dict[str, Any]:
+        """Return what determines the numbers of the comparison, once it is checked."""
+        models = [one.describe() for one in self.models if not isinstance(one, str)]
+        return {**_specification(self), "models": models}
+
+    def compute(self, run: Run) -> xr.Dataset:
+        """Search and judge every model; return a `model_comparison`."""
+        from driftwalk.calibration import compare_models
+
+        run.keep("recording.nc", self.recording)
+        if self.flow is not None:
+            run.keep("flow.nc", self.flow)
+        found = compare_models(
+            self.recording,
+            self.models,
+            study=self.study,
+            flow=self.flow,
+            body=self.body,
+            threads=self.threads,
+            executor=run.executor,
+            stores=run.store,
+            tell=run.progress,
+            finished=self.finished,
+        )
+        return run.keep("comparison.nc", found)
+
+
+def _specification(work: CalibrationWork | ModelComparisonWork) -> dict[str, Any]:
+    """Return what determines the numbers of either, but for the models."""
+    return {
+        "study": work.study.to_dict(),
+        "body": work.body,
+        "recording_sha256": dataset_hash(work.recording, ("x", "y", "theta")),
+        "flow_sha256": dataset_hash(work.flow, ("u", "v")),
+    }

@@ -16,10 +16,9 @@ from driftwalk.core.files.run_layout import MANIFEST_FILE, faults_of, run_file, 
 from driftwalk.core.provenance import read_manifest
 from driftwalk.motion import MotionModel, estimated_values
 from driftwalk.schema.answers.facts import sentences
-from driftwalk.schema.calibration import is_block
-from driftwalk.schema.check import refuse_other_version, require_kind
+from driftwalk.schema.check import check_contents, refuse_other_version, require_kind
+from driftwalk.schema.parameters import is_block
 from driftwalk.schema.runs import RUN_KINDS, RunKind, kind_of, load_maker
-from driftwalk.schema.stores.contents import check_contents
 from driftwalk.schema.stores.netcdf import is_netcdf, open_netcdf
 
 if TYPE_CHECKING:
@@ -143,11 +142,11 @@ class FoundRun:
 
         if "study" in self.found.attrs:
             return parse_study(self.found.attrs["study"], source=f"{self.file}: its study")
-        stored = {} if self.folder is None else read_manifest(self.folder / MANIFEST_FILE)
-        if not isinstance(stored.get("study"), Mapping):
+        stored = self._manifest.get("study")
+        if not isinstance(stored, Mapping):
             raise InputError(f"{self.name} does not hold the study that it used")
         try:
-            return Study(**stored["study"])
+            return Study(**stored)
         except (ConfigurationError, ValueError, TypeError) as error:
             raise InputError(f"{self.name}: its manifest holds no study of this version") from error
 
@@ -288,10 +287,13 @@ class FoundRun:
         return None if self.folder is None else run_file(self.folder, name)
 
     @property
+    def _manifest(self) -> Mapping[str, Any]:
+        return {} if self.folder is None else read_manifest(self.folder / MANIFEST_FILE)
+
+    @property
     def _specification(self) -> dict[str, Any]:
         """Everything that determined the numbers of the run; empty where nothing says it."""
-        stored = {} if self.folder is None else read_manifest(self.folder / MANIFEST_FILE)
-        found = stored.get("specification")
+        found = self._manifest.get("specification")
         return dict(found) if isinstance(found, Mapping) else {}
 
 

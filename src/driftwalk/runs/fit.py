@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 from driftwalk.core.run_stages import tell_nobody
-from driftwalk.runs.dataset_hash import dataset_hash
+from driftwalk.runs.resumable_run import dataset_hash
 
 if TYPE_CHECKING:
     import xarray as xr

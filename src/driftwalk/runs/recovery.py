@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from driftwalk.core.processors import default_threads
-from driftwalk.runs.dataset_hash import dataset_hash
+from driftwalk.runs.resumable_run import dataset_hash
 from driftwalk.schema.runs import run_kind
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ class RecoveryWork:
         method, flow = self.method, self.method.flow
         said: dict[str, Any] = {
             "study": self.study.to_dict(),
-            "flow_sha256": None if flow is None else dataset_hash(flow, ("u", "v")),
+            "flow_sha256": dataset_hash(flow, ("u", "v")),
         }
         if not isinstance(method, ModelRecovery):
             return said
@@ -75,7 +75,7 @@ class RecoveryWork:
             "truth": dict(method.truth),
             "body": method.body,
             "noise": method.noise,
-            "like_sha256": None if like is None else dataset_hash(like, ("x", "y", "theta")),
+            "like_sha256": dataset_hash(like, ("x", "y", "theta")),
         }
 
     def compute(self, run: Run) -> xr.Dataset:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
@@ -212,3 +213,16 @@ def naming_recording(inputs: Mapping[str, Path]) -> Iterator[None]:
         if "recording" not in inputs:
             raise
         raise InputError(f"{inputs['recording']}: {error}") from error
+
+
+def dataset_hash(dataset: xr.Dataset | None, names: tuple[str, ...]) -> str | None:
+    """Return a hash of the coordinates and the named variables of a dataset, None without one."""
+    if dataset is None:
+        return None
+    digest = hashlib.sha256()
+    for name in (*sorted(str(name) for name in dataset.indexes), *names):
+        values = dataset[name].values
+        digest.update(
+            repr(values.tolist()).encode() if values.dtype == object else values.tobytes()
+        )
+    return digest.hexdigest()

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.schema.description import Kind, Variable
+from driftwalk.core.text.json_text import parse_json
+from driftwalk.schema.description import Attribute, Kind, Variable
 from driftwalk.schema.kinds import KINDS, find_kind
 
 if TYPE_CHECKING:
@@ -227,3 +229,71 @@ def _check_variable(dataset: xr.Dataset, variable: Variable, kind: Kind) -> None
             f"not of the kind {kind.name}: '{variable.name}' has the units {units!r}, expected "
             f"{variable.units!r}"
         )
+
+
+def check_contents(dataset: xr.Dataset, path: Path) -> xr.Dataset:
+    """Return a dataset that holds what its kind needs; one of no kind of driftwalk's as it is.
+
+    For the readers that need all of it. A page makes do with what there is, section by section; a
+    recording, a flow field or a calibration that work goes on with has no such way out. Files that
+    other programs write in this form hold less than `check_dataset` asks for: here only what a
+    reader relies on is needed, and the rest has to be what its name says where it is there.
+
+    Raises
+    ------
+    FormatError
+        When it is of another schema version, a variable or attribute is missing, lies on other
+        dimensions, or is text for numbers or numbers for text.
+    """
+    kind = find_kind(dataset)
+    if kind is None:
+        return dataset
+    refuse_other_version(dataset, path)
+    for fault in _faults(dataset, kind):
+        raise FormatError(f"is damaged: {fault}", path=path)
+    return dataset
+
+
+def _faults(dataset: xr.Dataset, kind: Kind) -> Iterator[str]:
+    """Yield what is missing, or is not what its name says."""
+    for name in kind.read.split():
+        if name not in dataset.variables:
+            yield f"its {kind.name} lacks the variable '{name}'"
+    for variable in kind.variables:
+        if variable.name in dataset.variables:
+            yield from _variable_faults(dataset.variables[variable.name], variable)
+    for name in kind.read_attributes.split():
+        if name not in dataset.attrs:
+            yield f"its {kind.name} lacks the attribute '{name}'"
+    for attribute in kind.attributes:
+        if attribute.name in dataset.attrs:
+            yield from _attribute_faults(dataset.attrs[attribute.name], attribute)
+
+
+def _variable_faults(held: xr.Variable, variable: Variable) -> Iterator[str]:
+    dims = tuple(str(dim) for dim in held.dims)
+    if not variable.lies_on(dims):
+        expected = ", ".join(variable.fixed_dims)
+        yield f"'{variable.name}' lies on ({', '.join(dims)}), expected ({expected})"
+    if variable.holds == "text":
+        if not all(isinstance(value, str) for value in held.values.flat):
+            yield f"'{variable.name}' holds no text"
+    elif held.dtype.kind not in "fiub":
+        yield f"'{variable.name}' holds no numbers"
+
+
+def _attribute_faults(value: Any, attribute: Attribute) -> Iterator[str]:
+    name, says = f"its attribute '{attribute.name}'", attribute.says
+    if says == "number":
+        if not isinstance(value, (int, float, np.number)):
+            yield f"{name} is not a number"
+    elif says != "numbers" and not isinstance(value, str):
+        yield f"{name} is not text"
+    elif says in ("object", "list") and value:
+        try:
+            found = parse_json(value)
+        except FormatError as error:
+            yield f"{name} is not JSON ({error})"
+        else:
+            if not isinstance(found, dict if says == "object" else list):
+                yield f"{name} holds no JSON {says}"

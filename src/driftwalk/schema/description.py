@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, Final, Literal
 
@@ -201,10 +202,135 @@ class Kind:
         return {one.name: one for one in self.variables}[name]
 
 
-KIND: Final = Attribute("kind", "text", "what kind of dataset it is")
-VERSION: Final = Attribute("schema_version", "number", "version of its kind's schema")
-SOURCE: Final = Attribute("source", "text", "name of the file that it was made from")
-STUDY: Final = Attribute("study", "text", "the whole study, as TOML")
-ARENA: Final = Attribute("arena", "object", "the tank: a circle, rectangle or polygon in m")
-WARNINGS: Final = Attribute("warnings", "list", "sentences")
-SIMULATED: Final = Attribute("simulated_recording", "yes or no", "whether a model made the motion")
+COMMON: Final = {
+    one.name: one
+    for one in (
+        Attribute("source", "text", "name of the file that it was made from"),
+        Attribute("study", "text", "the whole study, as TOML"),
+        Attribute("arena", "object", "the tank: a circle, rectangle or polygon in m"),
+        Attribute("warnings", "list", "sentences"),
+        Attribute("simulated_recording", "yes or no", "whether a model made the motion"),
+        Attribute("seed", "number", "seed of the random numbers"),
+    )
+}
+"""Attributes of many kinds, by the name under which their texts list them."""
+
+_HEAD: Final = re.compile(r"(dimensions|variables|attributes)(?: \((.+)\))?:")
+_VARIABLE: Final = re.compile(
+    r"(?P<name>\w+)(?:\((?P<dims>.*?)\))?(?: \[(?P<units>.*?)\])?"
+    r"(?: (?P<holds>int|bool|text|flags|bits))?(?:: (?P<words>.*))?"
+)
+_ATTRIBUTE: Final = re.compile(r"(\w+) (numbers?|text|yes or no|object|list): (.*)")
+
+
+def kind(
+    text: str,
+    *more: Variable | Attribute,
+    flags: Mapping[str, Mapping[str, int]] = MappingProxyType({}),
+) -> Kind:
+    """Return the kind that a text describes, in a notation like the CDL of NetCDF.
+
+    Parameters
+    ----------
+    text : str
+        On each line a fact (``kind``, ``version``, ``read``, ``read_attributes``), or under the
+        heads ``dimensions:``, ``variables:`` and ``attributes:`` rows such as::
+
+            name(dimensions) [units] int: long name; note
+            name number: meaning
+
+        A head may say in brackets when its rows are there. A variable with its name alone is a
+        coordinate that is called as it is named; an attribute with its name alone is one of
+        `COMMON`.
+    *more : Variable or Attribute
+        Further ones.
+    flags : mapping
+        By name the meanings of variables that hold ``flags``, or ``bits`` of which several may be
+        set.
+    """
+    rows = _rows_of(text)
+    facts = dict(row.split(": ", 1) for section, _, row in rows if not section)
+    found = [*_parsed(rows, flags), *more]
+    return Kind(
+        name=facts["kind"],
+        version=int(facts["version"]),
+        dimensions=dict(row.split(": ", 1) for section, _, row in rows if section == "dimensions"),
+        variables=tuple(one for one in found if isinstance(one, Variable)),
+        attributes=tuple(one for one in found if isinstance(one, Attribute)),
+        read=facts.get("read", ""),
+        read_attributes=facts.get("read_attributes", ""),
+    )
+
+
+def variables(
+    text: str, flags: Mapping[str, Mapping[str, int]] = MappingProxyType({})
+) -> tuple[Variable, ...]:
+    """Return the variables of a part of a kind's text; without a head they are always there.
+
+    Examples
+    --------
+    >>> [one] = variables("position(time) [m]: place of the body; NaN is a gap")
+    >>> one.dims, one.units, one.long_name, one.note
+    ('time', 'm', 'place of the body', 'NaN is a gap')
+    """
+    found = _parsed(_rows_of(f"variables:\n{text}"), flags)
+    return tuple(one for one in found if isinstance(one, Variable))
+
+
+def attributes(text: str) -> tuple[Attribute, ...]:
+    """Return the attributes of a part of a kind's text; without a head they are always there."""
+    found = _parsed(_rows_of(f"attributes:\n{text}"), {})
+    return tuple(one for one in found if isinstance(one, Attribute))
+
+
+def _rows_of(text: str) -> list[tuple[str, str, str]]:
+    """Return each row with its section and when it is there, one space between words."""
+    rows, section, when = [], "", ""
+    for line in text.splitlines():
+        row = " ".join(line.split())
+        if head := _HEAD.fullmatch(row):
+            section, when = head[1], head[2] or ""
+        elif row:
+            rows.append((section, when, row))
+    return rows
+
+
+def _parsed(
+    rows: Iterable[tuple[str, str, str]], flags: Mapping[str, Mapping[str, int]]
+) -> Iterator[Variable | Attribute]:
+    for section, when, row in rows:
+        if section == "variables":
+            yield _variable(row, when, flags)
+        elif section == "attributes":
+            yield _attribute(row, when)
+
+
+def _variable(row: str, when: str, flags: Mapping[str, Mapping[str, int]]) -> Variable:
+    match = _VARIABLE.fullmatch(row)
+    if match is None:
+        raise ValueError(f"not a row of a variable: {row}")
+    name, holds, words = match["name"], match["holds"] or "float", match["words"]
+    dims = match["dims"] or ("" if words else name)
+    long_name, _, note = (words or name.replace("_", " ")).partition("; ")
+    meanings = flags[name] if holds in ("flags", "bits") else {}
+    kept: Any = "int" if meanings else holds
+    return Variable(
+        name, dims, match["units"], long_name, kept, when, note, meanings, holds == "bits"
+    )
+
+
+def _attribute(row: str, when: str) -> Attribute:
+    if row in COMMON:
+        return replace(COMMON[row], when=when)
+    match = _ATTRIBUTE.fullmatch(row)
+    if match is None:
+        raise ValueError(f"not a row of an attribute: {row}")
+    says: Any = match[2]
+    return Attribute(match[1], says, match[3], when)
+
+
+def limited(given: Iterable[Attribute], when: str, *, without: str = "") -> Iterator[Attribute]:
+    """Yield attributes that are there in some cases alone, but for those of the names."""
+    for one in given:
+        if one.name not in without.split():
+            yield replace(one, when=one.when or when)

@@ -1,14 +1,9 @@
-"""The `trajectory` dataset: poses of one or more bodies over time.
+"""The `trajectory` dataset, poses of one or more bodies over time, and the `steps` cut from it.
 
-Dimensions ``(time, body)``; coordinates ``time`` [s] (strictly increasing) and ``body`` (names).
-Variables ``x``, ``y`` [m] and ``theta`` [rad, in (-pi, pi], NaN when unknown], float64. A missing
-sample is NaN in ``x`` and ``y``: gaps are real and are never filled. Bodies with clocks of their
-own share the union of their time stamps, each with NaN where it has no sample.
-
-``attrs`` describes the set-up: ``kind`` = "trajectory", ``schema_version``,
-``source`` (file name), ``format`` (loader), ``sample_rate_Hz``, ``arena`` (JSON text, see
-`driftwalk.model.tank`), ``position_quantum_m`` (resolution of the file, 0 when unknown),
-``y_axis`` (what the loader did), ``counts`` (JSON text: what cleaning found).
+A missing sample is NaN in ``x`` and ``y``: gaps are real and are never filled. Bodies with clocks
+of their own share the union of their time stamps, each with NaN where it has no sample. A turning
+angle is the signed angle from the step before to this one (the paper's step angle).
+`driftwalk.schema.kinds.motion` lists the variables and attributes of both.
 """
 
 from __future__ import annotations
@@ -18,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.schema.check import build_dataset
 
@@ -30,13 +26,13 @@ POSE: Final = ("x", "y", "theta")
 class Track(NamedTuple):
     """The samples of one body that are present, shapes (n,), in time order."""
 
-    time: npt.NDArray[np.float64]
+    time: Floats
     """Time [s]."""
-    x: npt.NDArray[np.float64]
+    x: Floats
     """Position x [m]."""
-    y: npt.NDArray[np.float64]
+    y: Floats
     """Position y [m]."""
-    theta: npt.NDArray[np.float64]
+    theta: Floats
     """Orientation [rad]; all NaN when the recording has none."""
 
     @property
@@ -111,9 +107,9 @@ def build_trajectory(
     return check_trajectory(dataset)
 
 
-def wrap_angle(theta: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+def wrap_angle(theta: Floats) -> Floats:
     """Wrap angles [rad] into (-pi, pi]."""
-    wrapped: npt.NDArray[np.float64] = np.pi - theta
+    wrapped: Floats = np.pi - theta
     # In place: a long recording is not to be held four times.
     np.mod(wrapped, 2.0 * np.pi, out=wrapped)
     np.subtract(np.pi, wrapped, out=wrapped)
@@ -177,6 +173,67 @@ def body_track(dataset: xr.Dataset, body: str | None = None) -> Track:
     return Track(time[present], x[present], y[present], theta[present])
 
 
-def _columns(values: npt.ArrayLike) -> npt.NDArray[np.float64]:
+def _columns(values: npt.ArrayLike) -> Floats:
     array = np.asarray(values, dtype=np.float64)
     return array[:, None] if array.ndim == 1 else array
+
+
+STEP: Final = ("step_length", "turning_angle")
+
+
+def build_steps(
+    step_length: npt.ArrayLike,
+    turning_angle: npt.ArrayLike,
+    *,
+    time: npt.ArrayLike,
+    attrs: dict[str, Any] | None = None,
+) -> xr.Dataset:
+    """Build a `steps` dataset.
+
+    Parameters
+    ----------
+    step_length : array_like, shape (n,)
+        Step lengths [m], > 0.
+    turning_angle : array_like, shape (n,)
+        Turning angles [rad], in (-pi, pi].
+    time : array_like, shape (n,)
+        When each step begins [s].
+    attrs : dict, optional
+        Attributes to add.
+
+    Raises
+    ------
+    InputError
+        When the shapes disagree or a value is out of range.
+
+    Examples
+    --------
+    >>> build_steps([0.01], [0.2], time=[0.1]).sizes["step"]
+    1
+    """
+    values = {"step_length": step_length, "turning_angle": turning_angle}
+    try:
+        dataset = build_dataset(
+            "steps",
+            {name: ("step", np.asarray(array, dtype=np.float64)) for name, array in values.items()},
+            {"time": ("step", np.asarray(time, dtype=np.float64))},
+            attrs or {},
+        )
+    except ValueError as error:
+        raise InputError(f"not a steps dataset: {error}") from error
+    return check_steps(dataset)
+
+
+def check_steps(dataset: xr.Dataset) -> xr.Dataset:
+    """Return the dataset if it is a valid `steps` dataset, else raise `InputError`."""
+    for name in STEP:
+        if name not in dataset or dataset[name].dims != ("step",):
+            raise InputError(
+                f"not a steps dataset: variable '{name}' with dimension (step) is missing"
+            )
+    length, angle = (dataset[name].values for name in STEP)
+    if not (np.isfinite(length) & (length > 0)).all():
+        raise InputError("not a steps dataset: a step_length is not a positive number")
+    if not ((angle > -np.pi) & (angle <= np.pi)).all():
+        raise InputError("not a steps dataset: a turning_angle lies outside (-pi, pi]")
+    return dataset

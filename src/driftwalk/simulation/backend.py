@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.schema import check_flow_field
 from driftwalk.schema.kinds.motion import WORLD_STATUS
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
 
     from driftwalk.model import FieldOfView, Study, Tank
     from driftwalk.model.tank import Outline
-
-Floats = npt.NDArray[np.float64]
 
 STATUS: Final[dict[str, int]] = WORLD_STATUS
 """Bits of a world's status; 0 is sound."""
@@ -192,7 +191,6 @@ def _surroundings(
     accelerating: bool,
 ) -> dict[str, Any]:
     """Return wall, flow, samples and camera in the words of the native core."""
-    check_sample_time(sample_time)
     return {
         **(_still_water(tank) if flow is None else _water(flow, tank, accelerating=accelerating)),
         "radius": tank.radius_m or 0.0,

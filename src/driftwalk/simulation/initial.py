@@ -10,11 +10,17 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.random_streams import Purpose
 
 if TYPE_CHECKING:
     from driftwalk.model import Study, Tank
+
+Keys = npt.NDArray[np.uint64]
+"""Address of the random numbers of every world."""
+Fits = Callable[[float, float, float], bool]
+"""Whether there is room for a pose x, y [m], theta [rad]."""
 
 
 class Start(NamedTuple):
@@ -34,7 +40,7 @@ class Start(NamedTuple):
     """Angular velocity [rad/s]."""
 
 
-def random_start(study: Study, keys: npt.NDArray[np.uint64]) -> Start:
+def random_start(study: Study, keys: Keys) -> Start:
     """Draw one start pose at rest per world: uniform over the poses that fit into the tank.
 
     Rejection sampling from the tank's bounding box with the world's own random stream.
@@ -56,7 +62,7 @@ def random_start(study: Study, keys: npt.NDArray[np.uint64]) -> Start:
     return _draw_poses(tank, keys, fits, what=f"a block of {side:g} m")
 
 
-def random_place(tank: Tank, keys: npt.NDArray[np.uint64], *, clearance: float = 0.0) -> Start:
+def random_place(tank: Tank, keys: Keys, *, clearance: float = 0.0) -> Start:
     """Draw one place per world, at rest: uniform over the tank, with a direction uniform too.
 
     As `random_start`, for a point that stays a distance from the wall, the clearance [m].
@@ -78,43 +84,33 @@ def random_place(tank: Tank, keys: npt.NDArray[np.uint64], *, clearance: float =
     return _draw_poses(tank, keys, fits, what=f"a body {clearance:g} m from the wall")
 
 
-def _draw_poses(
-    tank: Tank,
-    keys: npt.NDArray[np.uint64],
-    fits: Callable[[float, float, float], bool],
-    *,
-    what: str,
-) -> Start:
-    poses = np.array([_draw_pose(tank, int(key), fits, what=what) for key in keys])
-    return Start(poses[:, 0], poses[:, 1], poses[:, 2])
-
-
-def _draw_pose(
-    tank: Tank, key: int, fits: Callable[[float, float, float], bool], *, what: str
-) -> tuple[float, float, float]:
+def _draw_poses(tank: Tank, keys: Keys, fits: Fits, *, what: str) -> Start:
     corners = np.asarray(
         tank.corners_m or [(-tank.extent_m[0] / 2,) * 2, (tank.extent_m[0] / 2,) * 2]
     )
     low, high = corners.min(axis=0), corners.max(axis=0)
-    for draw in range(1000):
-        words = np.array(_core.philox(key, [0, draw, 0, Purpose.START]), dtype=np.float64)
-        across, up, turn = words[:3] * 2.0**-32
-        pose = (
-            low[0] + across * (high[0] - low[0]),
-            low[1] + up * (high[1] - low[1]),
-            (2.0 * turn - 1.0) * np.pi,
+
+    def drawn(key: int) -> tuple[float, float, float]:
+        for draw in range(1000):
+            words = np.array(_core.philox(key, [0, draw, 0, Purpose.START]), dtype=np.float64)
+            across, up, turn = words[:3] * 2.0**-32
+            pose = (
+                low[0] + across * (high[0] - low[0]),
+                low[1] + up * (high[1] - low[1]),
+                (2.0 * turn - 1.0) * np.pi,
+            )
+            if fits(*pose):
+                return pose
+        raise InputError(
+            f"no start pose was found for {what} in a {tank.describe()}: "
+            "give one ([simulation] start) or a larger tank"
         )
-        if fits(*pose):
-            return pose
-    raise InputError(
-        f"no start pose was found for {what} in a {tank.describe()}: "
-        "give one ([simulation] start) or a larger tank"
-    )
+
+    poses = np.array([drawn(int(key)) for key in keys])
+    return Start(poses[:, 0], poses[:, 1], poses[:, 2])
 
 
-def world_orientations(
-    theta: npt.ArrayLike, keys: npt.NDArray[np.uint64]
-) -> npt.NDArray[np.float64]:
+def world_orientations(theta: npt.ArrayLike, keys: Keys) -> Floats:
     """Return the start orientation of every world [rad]: the given one, or a random one for NaN."""
     given = np.broadcast_to(np.asarray(theta, dtype=np.float64), keys.shape).copy()
     for index in np.flatnonzero(np.isnan(given)):

@@ -98,6 +98,7 @@ def simulate(
     check_sample_time(times)
     water = continued_flow(flow, study, duration=float(times[-1]), begin=flow_start)
     starts = flow_starts(water, study, keys, duration=float(times[-1]))
+    # Replicates that share a clock with a recording all begin with it.
     if starts is not None and flow_start is not None:
         starts = np.full(count, float(flow_start))
     model = native_model(study, water, times, plain_camera(study))

@@ -9,16 +9,15 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.random_streams import Purpose
-from driftwalk.schema.kinds.flow_series import flow_series_words
+from driftwalk.schema.kinds.flow import flow_series_words
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
-
-Floats = npt.NDArray[np.float64]
 
 
 class SeriesPolicy(NamedTuple):

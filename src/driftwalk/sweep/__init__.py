@@ -2,11 +2,9 @@
 
 from driftwalk.core.files.shards import ShardStore
 from driftwalk.sweep.design import Design, WorkUnit, grid, settings_per_unit
-from driftwalk.sweep.remote import refuse_others, this_worker
-from driftwalk.sweep.run import SweepError, run_sweep
+from driftwalk.sweep.run import MemoryStore, Store, SweepError, collect, run_sweep
 from driftwalk.sweep.scheduling import threads_of_unit
-from driftwalk.sweep.store import MemoryStore, Store, collect
-from driftwalk.sweep.workers import WorkerExecutor
+from driftwalk.sweep.workers import WorkerExecutor, refuse_others, this_worker
 
 __all__ = [
     "Design",

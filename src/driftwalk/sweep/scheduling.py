@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from concurrent.futures import Executor, Future
 from statistics import median
-from typing import Any, Final, NamedTuple, Protocol
+from typing import Any, Final, NamedTuple
 
 import numpy.typing as npt
 
@@ -35,32 +35,6 @@ class HandoutPolicy(NamedTuple):
 HANDOUT: Final = HandoutPolicy()
 
 
-class Handout(Protocol):
-    """Hands units to workers."""
-
-    def submit(self, unit: WorkUnit) -> UnitFuture:
-        """Have a unit computed."""
-
-    def result(self, future: UnitFuture, /) -> Found:
-        """Return what a unit gave, or raise what it failed by."""
-
-    def lost(self, future: UnitFuture, /) -> bool:
-        """Whether a unit was with several workers that ended, so that none takes it."""
-
-    @property
-    def width(self) -> int:
-        """How many units are handed out at a time."""
-
-    def slow(self, age_s: float, /) -> bool:
-        """Return whether a unit of this age should be handed out again."""
-
-    def again(self) -> None:
-        """Hear that a unit was."""
-
-    def tell(self, done: int, total: int, /) -> None:
-        """Hear how many units of the sweep are done, and how many there are."""
-
-
 def threads_of_unit(threads: int | None, executor: Executor | None) -> int | None:
     """Return the threads of a work unit: one where an executor has units at the same time.
 
@@ -86,6 +60,81 @@ def is_lost(error: BaseException | None) -> bool:
     return type(error).__name__ == "KilledWorker"
 
 
+class Handout:
+    """Hands units to threads or processes of this machine: none is slower than the others."""
+
+    def __init__(self, executor: Executor, function: UnitFunction) -> None:
+        self._executor, self._function = executor, function
+
+    @property
+    def width(self) -> int:
+        """How many units are handed out at a time."""
+        workers = getattr(self._executor, "_max_workers", 0)
+        return max(HANDOUT.for_each_worker * workers, HANDOUT.fewest)
+
+    def submit(self, unit: WorkUnit) -> UnitFuture:
+        """Have a unit computed."""
+        return self._executor.submit(self._function, unit)
+
+    def result(self, future: UnitFuture) -> Found:
+        """Return what a unit gave, or raise what it failed by."""
+        found: Found = future.result()
+        return found
+
+    def lost(self, future: UnitFuture) -> bool:  # noqa: ARG002
+        """Whether a unit was with several workers that ended, so that none takes it."""
+        return False
+
+    def slow(self, age_s: float) -> bool:  # noqa: ARG002
+        """Return whether a unit of this age should be handed out again."""
+        return False
+
+    def again(self) -> None:
+        """Hear that a unit was handed out again."""
+
+    def tell(self, done: int, total: int) -> None:
+        """Hear how many units of the sweep are done, and how many there are."""
+
+
+class _OnWorkers(Handout):
+    """Hands units to workers elsewhere: they may be slow, go and come."""
+
+    def __init__(self, executor: WorkerExecutor, function: UnitFunction) -> None:
+        self._workers = executor
+        self._parcel = executor.sent(function)
+        self._seconds: list[float] = []
+
+    @property
+    def width(self) -> int:
+        return max(HANDOUT.for_each_worker * self._workers.workers, HANDOUT.for_each_worker)
+
+    def submit(self, unit: WorkUnit) -> UnitFuture:
+        return self._workers.run(self._parcel, unit)
+
+    def result(self, future: UnitFuture) -> Found:
+        answer = future.result()
+        self._seconds.append(answer.seconds)
+        found: Found = answer.arrays
+        return found
+
+    def lost(self, future: UnitFuture) -> bool:
+        return not future.cancelled() and is_lost(future.exception())
+
+    def slow(self, age_s: float) -> bool:
+        if not self._seconds:
+            return False
+        # It may have waited for those that its worker got before.
+        return age_s > max(
+            (HANDOUT.for_each_worker - 1 + HANDOUT.slow) * median(self._seconds), HANDOUT.slow_s
+        )
+
+    def again(self) -> None:
+        self._workers.units.again += 1
+
+    def tell(self, done: int, total: int) -> None:
+        self._workers.units.done, self._workers.units.total = done, total
+
+
 def handout(executor: Executor, function: UnitFunction) -> Handout:
     """Return how an executor gets the units of a sweep.
 
@@ -101,71 +150,4 @@ def handout(executor: Executor, function: UnitFunction) -> Handout:
     client = getattr(executor, "_client", None)
     if client is not None and type(executor).__module__.startswith("distributed"):
         return _OnWorkers(WorkerExecutor(client), function)
-    return _OnExecutor(executor, function)
-
-
-class _OnExecutor:
-    """Threads or processes of this machine: none is slower than the others."""
-
-    def __init__(self, executor: Executor, function: UnitFunction) -> None:
-        self._executor, self._function = executor, function
-        workers = getattr(executor, "_max_workers", 0)
-        self.width = max(HANDOUT.for_each_worker * workers, HANDOUT.fewest)
-
-    def submit(self, unit: WorkUnit) -> UnitFuture:
-        return self._executor.submit(self._function, unit)
-
-    def result(self, future: UnitFuture, /) -> Found:
-        found: Found = future.result()
-        return found
-
-    def lost(self, _future: UnitFuture, /) -> bool:
-        return False
-
-    def slow(self, _age_s: float, /) -> bool:
-        return False
-
-    def again(self) -> None:
-        """Do nothing."""
-
-    def tell(self, _done: int, _total: int, /) -> None:
-        """Do nothing."""
-
-
-class _OnWorkers:
-    """Workers elsewhere: they may be slow, go and come."""
-
-    def __init__(self, executor: WorkerExecutor, function: UnitFunction) -> None:
-        self._executor = executor
-        self._parcel = executor.sent(function)
-        self._seconds: list[float] = []
-
-    @property
-    def width(self) -> int:
-        return max(HANDOUT.for_each_worker * self._executor.workers, HANDOUT.for_each_worker)
-
-    def submit(self, unit: WorkUnit) -> UnitFuture:
-        return self._executor.run(self._parcel, unit)
-
-    def result(self, future: UnitFuture, /) -> Found:
-        answer = future.result()
-        self._seconds.append(answer.seconds)
-        found: Found = answer.arrays
-        return found
-
-    def lost(self, future: UnitFuture, /) -> bool:
-        return not future.cancelled() and is_lost(future.exception())
-
-    def slow(self, age_s: float, /) -> bool:
-        if not self._seconds:
-            return False
-        # It may have waited for those that its worker got before.
-        return age_s > max(
-            (HANDOUT.for_each_worker - 1 + HANDOUT.slow) * median(self._seconds), HANDOUT.slow_s
-        )
-
-    def again(self) -> None:
-        self._executor.units.again += 1
-
-    def tell(self, done: int, total: int, /) -> None:
-        self._executor.units.done, self._executor.units.total = done, total
+    return Handout(executor, function)

@@ -17,7 +17,6 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from functools import reduce
-from types import TracebackType
 from typing import Any, Final, NamedTuple, Self
 
 from driftwalk.core.errors import FormatError, InputError
@@ -100,12 +99,7 @@ class LiveServer:
         """Return the server."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         """Close the server."""
         self.close()
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,7 +12,9 @@ import numpy as np
 from driftwalk.core.errors import InputError
 from driftwalk.core.extras import require_opencv
 from driftwalk.track.follow.tracker import TrackState
-from driftwalk.track.types import Image, PixelToWorld
+from driftwalk.track.types import Detection, Image, PixelToWorld, Rejected
+
+Pixel = tuple[int, int]
 
 # Blue, green, red; of Okabe and Ito, distinguishable with any kind of colour vision.
 _COLOURS: Final = (
@@ -25,6 +27,7 @@ _COLOURS: Final = (
     (66, 228, 240),
 )
 _DARK, _LIGHT, _WARNING = (0, 0, 0), (255, 255, 255), (0, 0, 255)
+_ACCEPTED, _REJECTED = (80, 220, 80), (60, 60, 240)
 _CODECS: Final = {".mp4": "mp4v", ".avi": "MJPG", ".mkv": "FFV1"}
 
 
@@ -69,7 +72,61 @@ def draw_states(image: Image, states: Iterable[TrackState], camera: PixelToWorld
             cv2.line(picture, at, tip, colour, 2, cv2.LINE_AA)
         if state.ambiguous > 0:
             cv2.circle(picture, at, 18, _WARNING, 2, cv2.LINE_AA)
-        _write(cv2, picture, state.id, (at[0] + 6, at[1] - 6))
+        _write(picture, state.id, (at[0] + 6, at[1] - 6), _LIGHT, size=0.45)
+    return picture
+
+
+def explain_frame(
+    image: Image,
+    detections: Sequence[Detection],
+    rejected: Sequence[Rejected] = (),
+    *,
+    camera: PixelToWorld | None = None,
+    names: Sequence[str] | None = None,
+) -> Image:
+    """Draw detections in green and rejected candidates in red, with their reasons.
+
+    Parameters
+    ----------
+    image : array, shape (rows, columns, 3)
+        The frame.
+    detections : sequence of Detection
+        The accepted candidates.
+    rejected : sequence of Rejected
+        The rejected candidates.
+    camera : PixelToWorld, optional
+        How the world lies in the image, for the arrows of orientations.
+    names : sequence of str, optional
+        Label of each detection; its key or number when left out.
+
+    Returns
+    -------
+    array, shape (rows, columns, 3)
+        A picture of the same size.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> image = np.zeros((60, 120, 3), np.uint8)
+    >>> turned_down = Rejected(30.0, 30.0, 20.0, "too small: 20 px²", "too small")
+    >>> bool((explain_frame(image, [], [turned_down])[..., 2] > 100).any())
+    True
+    """
+    cv2 = require_opencv()
+    picture = image.copy()
+    for number, found in enumerate(detections):
+        centre = (round(found.column), round(found.row))
+        radius = max(1.3 * math.sqrt(found.area_px / math.pi), 5.0)
+        cv2.circle(picture, centre, round(radius), _ACCEPTED, 1, cv2.LINE_AA)
+        if math.isfinite(found.theta):
+            end = _arrow_end(found, radius, camera)
+            cv2.arrowedLine(picture, centre, end, _ACCEPTED, 1, cv2.LINE_AA, 0, 0.25)
+        name = names[number] if names is not None else found.key or str(number)
+        _write(picture, name, (centre[0] + round(radius), centre[1] - round(radius)), _ACCEPTED)
+    for item in rejected:
+        centre = (round(item.column), round(item.row))
+        cv2.drawMarker(picture, centre, _REJECTED, cv2.MARKER_TILTED_CROSS, 9, 1, cv2.LINE_AA)
+        _write(picture, item.reason, (centre[0] + 7, centre[1] + 4), _REJECTED)
     return picture
 
 
@@ -191,11 +248,32 @@ def save_picture(path: str | Path, picture: Image) -> Path:
     return Path(path)
 
 
-def _whole(point: Any) -> tuple[int, int]:
+def _arrow_end(found: Detection, radius: float, camera: PixelToWorld | None) -> Pixel:
+    """Return the pixel at which the arrow of an orientation ends."""
+    direction = np.array([math.cos(found.theta), -math.sin(found.theta)])
+    if camera is not None and found.x is not None and found.y is not None:
+        pixel = np.array([[found.column, found.row]])
+        along = np.array([math.cos(found.theta), math.sin(found.theta)])
+        direction = np.linalg.solve(camera.jacobian(pixel)[0], along)
+        direction = direction / np.hypot(*direction)
+    end = np.array([found.column, found.row]) + 1.6 * radius * direction
+    return _whole(end)
+
+
+def _whole(point: Any) -> Pixel:
     return round(float(point[0])), round(float(point[1]))
 
 
-def _write(cv2: Any, picture: Image, text: str, at: tuple[int, int]) -> None:
-    """Write light letters on a dark rim, readable on any ground."""
-    for colour, width in ((_DARK, 3), (_LIGHT, 1)):
-        cv2.putText(picture, text, at, cv2.FONT_HERSHEY_SIMPLEX, 0.45, colour, width, cv2.LINE_AA)
+def _write(
+    picture: Image, text: str, at: Pixel, colour: tuple[int, int, int], *, size: float = 0.35
+) -> None:
+    """Write a line on a dark rim so that it stays in the picture and can be read on any ground."""
+    cv2 = require_opencv()
+    font = cv2.FONT_HERSHEY_SIMPLEX
+    # The fonts of OpenCV know ASCII only.
+    plain = text.replace("²", "2").encode("ascii", "replace").decode()
+    (width, height), _ = cv2.getTextSize(plain, font, size, 1)
+    column = max(min(at[0], picture.shape[1] - width - 2), 0)
+    row = max(min(at[1], picture.shape[0] - 3), height)
+    for shade, thickness in ((_DARK, 3), (colour, 1)):
+        cv2.putText(picture, plain, (column, row), font, size, shade, thickness, cv2.LINE_AA)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from driftwalk.core.errors import ConfigurationError, FormatError
 from driftwalk.core.files.atomic import atomic_path
 from driftwalk.core.text.toml_text import read_toml
-from driftwalk.model.section import Section
+from driftwalk.model.section import Section, toml_text
 
 Kind = TypeVar("Kind", bound=Section)
 
@@ -50,20 +49,10 @@ def to_toml(section: Section, *, head: str) -> str:
         if value is None:
             continue
         if isinstance(value, Section):
-            nested.append(to_toml(value, head=field.description or "").rstrip())
-            nested[-1] = _with_header(nested[-1], key)
+            text = to_toml(value, head=field.description or "")
+            # The section's name stands under the comment that says what it is.
+            comment, _, keys = text.partition("\n")
+            nested.append(f"{comment}\n[{key}]\n{keys.strip()}")
         else:
-            plain += ["", f"# {field.description}", f"{key} = {_value(value)}"]
+            plain += ["", f"# {field.description}", f"{key} = {toml_text(value)}"]
     return "\n\n".join(["\n".join(plain).strip(), *nested]) + "\n"
-
-
-def _with_header(text: str, key: str) -> str:
-    """Put the section's name under the comment that says what it is."""
-    first, _, rest = text.partition("\n")
-    return f"{first}\n[{key}]\n{rest.strip()}"
-
-
-def _value(value: Any) -> str:
-    if isinstance(value, (tuple, list)):
-        return "[" + ", ".join(_value(item) for item in value) + "]"
-    return json.dumps(value)

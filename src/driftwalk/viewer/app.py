@@ -17,12 +17,9 @@ from starlette.types import ASGIApp, Message as AsgiMessage, Receive, Scope, Sen
 from starlette.websockets import WebSocket, WebSocketDisconnect
 from uvicorn.protocols.http.auto import AutoHTTPProtocol
 
-from driftwalk.core.errors import FormatError
-from driftwalk.core.text.json_text import parse_json
-from driftwalk.viewer.hub import Content, Hub, Source
-from driftwalk.viewer.messages import Outbox, make_message
+from driftwalk.page.html import BUNDLE, bundle_file, html_shell, page_frame
+from driftwalk.viewer.hub import Content, Hub, Outbox, Source, make_message, parsed
 from driftwalk.viewer.security import HEADERS, Gate
-from driftwalk.viewer.shell import BUNDLE, bundle_file, html_shell, page_frame
 
 TRY_LATER: Final = 1013
 """Close code of a WebSocket: too many browsers."""
@@ -148,21 +145,6 @@ async def _listen(websocket: WebSocket, box: Outbox, source: Source) -> None:
             await asyncio.sleep(0)
     finally:
         await source.leave(reply)
-
-
-def parsed(text: str) -> dict[str, Any] | None:
-    """Return the object that a message holds, None when it holds none.
-
-    Examples
-    --------
-    >>> parsed('{"type": "ready"}'), parsed("[1]"), parsed("{")
-    ({'type': 'ready'}, None, None)
-    """
-    try:
-        content = parse_json(text)
-    except FormatError:
-        return None
-    return content if isinstance(content, dict) else None
 
 
 class PatientHTTP(AutoHTTPProtocol):  # type: ignore[misc, valid-type]

@@ -9,11 +9,11 @@ import time as clock
 from collections.abc import Sequence
 from typing import Any, Final
 
-from driftwalk.core.errors import FormatError, InputError
-from driftwalk.core.text.json_text import parse_json
+from driftwalk.core.errors import InputError
+from driftwalk.page.html import page_frame
+from driftwalk.page.parts import section
 from driftwalk.viewer.frame_filter import SoundFrames
-from driftwalk.viewer.hub import Content, Publish, Source
-from driftwalk.viewer.shell import page_frame
+from driftwalk.viewer.hub import Content, Publish, Source, parsed
 
 FORMAT: Final = "driftwalk live"
 VERSION: Final = 1
@@ -185,10 +185,8 @@ class LiveSource(Source):
                 await self._writer.drain()
 
     def _page(self) -> dict[str, Any]:
-        tank = {"id": "live", "kind": "live", "title": "The tank", "note": None}
-        return page_frame(
-            self.view, "Live", subtitle=f"the stream of {self.title}", sections=[tank]
-        )
+        subtitle, tank = f"the stream of {self.title}", section("live", "live", "The tank")
+        return page_frame(self.view, "Live", subtitle=subtitle, sections=[tank])
 
 
 def stream_line(line: bytes) -> dict[str, Any] | None:
@@ -199,8 +197,5 @@ def stream_line(line: bytes) -> dict[str, Any] | None:
     >>> stream_line(b'{"type": "end"}'), stream_line(b"$STEP_START*0D")
     ({'type': 'end'}, None)
     """
-    try:
-        content = parse_json(line)
-    except FormatError:
-        return None
-    return content if isinstance(content, dict) and isinstance(content.get("type"), str) else None
+    content = parsed(line)
+    return None if content is None or not isinstance(content.get("type"), str) else content

@@ -12,7 +12,7 @@ from redrawn import assert_drawn_alike
 from self_propelled import moving
 
 import driftwalk as dw
-from driftwalk.cli.terminal.answer import print_result
+from driftwalk.cli.terminal.output import print_result
 from driftwalk.record import save_trajectory
 from driftwalk.schema.stores.netcdf import open_netcdf
 

@@ -202,7 +202,7 @@ def dask(part: str, *words: object, **environment: str) -> Iterator[subprocess.P
 # Loaded by a worker before it begins: its simulations end a last bit away from those of others.
 OTHER_BITS = """
 import driftwalk.simulation.run as run
-import driftwalk.cluster.probe as probe
+import driftwalk.cluster.connect as probe
 
 def off(*study, **options):
     found = run.simulate(*study, **options)

@@ -13,7 +13,7 @@ from redrawn import assert_drawn_alike
 
 import driftwalk as dw
 from driftwalk.calibration import DEFAULT_MODELS
-from driftwalk.cli.terminal.answer import print_result
+from driftwalk.cli.terminal.output import print_result
 from driftwalk.runs import read_found
 from driftwalk.schema.stores.netcdf import open_netcdf
 

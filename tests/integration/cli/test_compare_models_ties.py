@@ -10,7 +10,7 @@ from command_line import here
 from self_propelled import moving
 
 import driftwalk as dw
-from driftwalk.cli.terminal.answer import print_result
+from driftwalk.cli.terminal.output import print_result
 from driftwalk.schema.stores.netcdf import netcdf_bytes, open_netcdf
 
 RESTING = {

@@ -12,7 +12,7 @@ import pytest
 from command_line import Done, apart, contents, here, refusal, start
 from page_reading import page_in
 
-from driftwalk.cli.terminal.demo_answer import print_next
+from driftwalk.cli.demo import print_next
 
 TRUTH = {
     "drag_coefficient": 0.3948,

@@ -11,7 +11,7 @@ import pytest
 from command_line import RECORDING
 
 import driftwalk as dw
-from driftwalk.cli.inputs.study_recording import opening_note
+from driftwalk.cli.inputs.recordings import opening_note
 from driftwalk.cli.options.study import StudyOptions
 from driftwalk.conditions import read_recordings, unstated_warning
 from driftwalk.core.study_keys import FIT_KEYS

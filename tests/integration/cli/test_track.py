@@ -19,8 +19,8 @@ from matroska import give_times
 from ports import held_port
 
 import driftwalk as dw
+from driftwalk.cli.recordings.track import tell_progress
 from driftwalk.cli.terminal.progress import ProgressReporter
-from driftwalk.cli.tracking.run import tell_progress
 from driftwalk.schema import build_trajectory
 from driftwalk.track.live import LiveServer
 

@@ -224,7 +224,7 @@ def test_a_killed_run_leaves_a_recording_that_can_be_read(
     out = tmp_path / "r.nc"
     before = """
 import os
-import driftwalk.cli.tracking.run as tracking
+import driftwalk.cli.recordings.track as tracking
 from driftwalk.track import TwoColourDetector
 tracking._SAVE_EVERY_S = 0.0
 tracking._SAVING_SHARE = 1e9

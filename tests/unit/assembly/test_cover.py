@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 import driftwalk as dw
-from driftwalk.assembly.runs.cover import inward_depth, require_cover
+from driftwalk.assembly.runs.start import inward_depth, require_cover
 from driftwalk.core.errors import InputError
 from driftwalk.model import Tank
 from driftwalk.schema import FLAGS, build_flow_field

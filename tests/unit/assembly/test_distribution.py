@@ -11,9 +11,9 @@ from scipy.stats import binom, binomtest
 
 from driftwalk.assembly.outcomes.classes import outcome_classes
 from driftwalk.assembly.outcomes.distribution import (
+    class_at,
     class_names,
     outcome_distribution,
-    outcomes_at,
     proportion_interval,
     sampling_variance,
 )
@@ -131,8 +131,8 @@ def test_outcomes_of_an_assembly_are_counted_and_broken_runs_left_out() -> None:
         (60.0, [SQUARE, PAIRS, SINGLE, -1]),
     ],
 )
-def test_outcomes_at_an_earlier_time(time: float, expected: list[int]) -> None:
-    assert outcomes_at(assembly(), time).tolist() == expected
+def test_class_at_an_earlier_time(time: float, expected: list[int]) -> None:
+    assert class_at(assembly(), time).tolist() == expected
     found = outcome_distribution(assembly(), time=time)
     np.testing.assert_array_equal(found["count"], np.bincount(expected[:3], minlength=10))
     assert found.attrs["time_s"] == time

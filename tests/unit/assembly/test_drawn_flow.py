@@ -10,7 +10,7 @@ import xarray as xr
 from scipy.stats import kstest
 
 import driftwalk as dw
-from driftwalk.assembly.runs.drawn_flow import draw_flow, has_standard_error
+from driftwalk.assembly.runs.draws import draw_flow, has_standard_error
 
 ERROR = 2e-3
 

@@ -10,8 +10,9 @@ import xarray as xr
 from hypothesis import given, settings, strategies as st
 from lattice_runs import Run, random_run, raw_arrays, small_name
 
-from driftwalk.assembly.lattice.events import ReplayedEvents, class_at, replay_events
+from driftwalk.assembly.lattice.events import ReplayedEvents, replay_events
 from driftwalk.assembly.outcomes.classes import outcome_classes, sort_classes
+from driftwalk.assembly.outcomes.distribution import class_at
 from driftwalk.core.errors import InputError
 
 Chirality = Literal["merged", "distinct"]
@@ -191,7 +192,7 @@ def assembly() -> xr.Dataset:
             "theta": (("run", "block"), np.zeros((3, 2))),
         },
         coords={"class": np.array(["2", "1+1"], dtype=object)},
-        attrs={"kind": "assembly", "duration_s": 10.0},
+        attrs={"kind": "assembly", "blocks": 2, "duration_s": 10.0},
     )
 
 
@@ -214,7 +215,7 @@ def test_class_at_a_time_of_random_runs() -> None:
             "theta": (("run", "block"), np.zeros((50, 4))),
         },
         coords={"class": np.array(made.classes, dtype=object)},
-        attrs={"kind": "assembly", "duration_s": 10.0},
+        attrs={"kind": "assembly", "blocks": 4, "duration_s": 10.0},
     )
     times = np.linspace(0, 10, 7)
     found = class_at(dataset, times)
@@ -226,7 +227,7 @@ def test_class_at_a_time_of_random_runs() -> None:
 
 @pytest.mark.parametrize("time", [-1.0, 10.1, np.nan])
 def test_times_outside_the_runs_are_refused(assembly: xr.Dataset, time: float) -> None:
-    with pytest.raises(InputError, match="outside the runs, 0 to 10 s"):
+    with pytest.raises(InputError, match="outside the runs, which last 10 s"):
         class_at(assembly, time)
 
 

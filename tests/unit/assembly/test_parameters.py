@@ -11,7 +11,7 @@ from matplotlib.path import Path
 from quadratic_calibration import CENTER, LEVEL, LOW, WIDTH, quadratic, region_calibration
 from scipy.stats import kstest
 
-from driftwalk.assembly.runs.parameters import _inside, draw_parameters, has_region
+from driftwalk.assembly.runs.draws import _inside, draw_parameters, has_region
 from driftwalk.core.errors import InputError
 
 

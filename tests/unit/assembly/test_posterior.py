@@ -14,8 +14,7 @@ from scipy.stats import kstest
 
 import driftwalk as dw
 from driftwalk.assembly import assemble_drawn, draw_parameters, has_uncertainty
-from driftwalk.assembly.runs.drawn_flow import RUNS_PER_FLOW, draw_flow
-from driftwalk.assembly.runs.posterior import draw_posterior
+from driftwalk.assembly.runs.draws import RUNS_PER_FLOW, draw_flow, draw_posterior
 from driftwalk.core.errors import InputError
 
 DRAG, FORCE = 0.39, 6e-4

@@ -11,8 +11,7 @@ from command_line import assert_same_bits
 from quadratic_calibration import quadratic
 
 import driftwalk as dw
-from driftwalk.assembly.runs.drawn_flow import RUNS_PER_FLOW, draw_flow
-from driftwalk.assembly.runs.parameters import draw_parameters
+from driftwalk.assembly.runs.draws import RUNS_PER_FLOW, draw_flow, draw_parameters
 from driftwalk.assembly.runs.plan import make_plan
 from driftwalk.assembly.runs.run import (
     assemble,

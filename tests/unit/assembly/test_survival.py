@@ -10,7 +10,7 @@ import xarray as xr
 from scipy.stats import binom, binomtest, norm
 
 from driftwalk.assembly.outcomes.classes import outcome_classes
-from driftwalk.assembly.outcomes.distribution import outcomes_at
+from driftwalk.assembly.outcomes.distribution import class_at
 from driftwalk.assembly.outcomes.survival import class_times, survival_curve
 from driftwalk.core.errors import InputError
 
@@ -149,7 +149,7 @@ def test_class_proportions_are_those_of_a_plain_count() -> None:
     times = np.array([0.0, 0.7, 10.0, 33.3, 99.0, 100.0])
     found = class_times(runs, times=times)
     for i, time in enumerate(times):
-        outcome = outcomes_at(runs, time)
+        outcome = class_at(runs, time)
         for j, name in enumerate(CLASSES):
             count = int((outcome == j).sum())
             one = found.sel({"class": name}).isel(time=i)
@@ -157,7 +157,7 @@ def test_class_proportions_are_those_of_a_plain_count() -> None:
             assert float(one["proportion"]) == pytest.approx(count / 293)
             limits = float(one["proportion_low"]), float(one["proportion_high"])
             assert limits == pytest.approx((exact.low, exact.high), abs=1e-12)
-    np.testing.assert_array_equal(outcomes_at(runs, DURATION), runs["outcome"])
+    np.testing.assert_array_equal(class_at(runs, DURATION), runs["outcome"])
     attrs = found.attrs
     assert (attrs["runs"], attrs["left_out"], attrs["confidence"]) == (293, 7, 0.9)
     assert (attrs["kind"], attrs["schema_version"], attrs["seed"]) == ("class_times", 1, 1)
@@ -167,7 +167,7 @@ def test_an_event_at_a_time_counts_at_that_time() -> None:
     runs = assembly(50)
     times = np.sort(runs["event_time"].values[np.isfinite(runs["event_time"].values)])
     found = class_times(runs, times=times)
-    expected = [(outcomes_at(runs, t) == CLASSES.index("1+1+1+1")).mean() for t in times]
+    expected = [(class_at(runs, t) == CLASSES.index("1+1+1+1")).mean() for t in times]
     np.testing.assert_allclose(found["proportion"].sel({"class": "1+1+1+1"}), expected)
 
 

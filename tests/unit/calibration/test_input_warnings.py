@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import driftwalk as dw
-from driftwalk.calibration.input_warnings import WALL_WARNING, wall_warning
+from driftwalk.calibration.warnings import WALL_WARNING, wall_warning
 from driftwalk.schema import Track, build_trajectory
 
 TOUCHING_M = 0.15 - 0.015 * np.sqrt(2.0) - WALL_WARNING.reach_m

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from driftwalk.cli.terminal.answer import print_parts, print_row
+from driftwalk.cli.terminal.output import print_parts, print_row
 from driftwalk.schema.answers.parts import Row, Table, estimates, origin
 
 

@@ -16,8 +16,7 @@ from driftwalk.cli.options.recording import parse_columns
 from driftwalk.cli.terminal.argument_names import OPTIONS, WHOLE, in_options, to_options
 from driftwalk.cli.terminal.errors import one_line
 from driftwalk.cli.terminal.output import print_json, print_note
-from driftwalk.core.errors import InputError
-from driftwalk.core.text.argument_text import argument_text
+from driftwalk.core.errors import InputError, argument_text
 from driftwalk.model import Study
 
 

@@ -126,7 +126,7 @@ def test_damaged_simulation_is_refused(
 
 
 def test_replicates_of_a_simulation_are_trajectories(synthetic: dict[str, Path]) -> None:
-    from driftwalk.cli.inputs.motion import load_motion
+    from driftwalk.cli.inputs.recordings import load_motion
     from driftwalk.cli.options.recording import RecordingOptions
 
     motion = load_motion(synthetic["simulation"], RecordingOptions(replicate=1))

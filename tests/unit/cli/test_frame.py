@@ -42,7 +42,7 @@ def add_command(monkeypatch: pytest.MonkeyPatch) -> AddCommand:
         module = ModuleType("driftwalk.cli.probe")
         module.probe = function  # type: ignore[attr-defined]
         monkeypatch.setitem(sys.modules, "driftwalk.cli.probe", module)
-        monkeypatch.setitem(cli_main.COMMANDS, "probe", Command("Fit", "Probe.", "probe", "probe"))
+        monkeypatch.setitem(cli_main.COMMANDS, "probe", Command("Fit", "Probe.", "probe"))
 
     return add
 

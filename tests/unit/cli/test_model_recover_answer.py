@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from model_recovery_worlds import lost, made_up, made_up_recovery
 
-from driftwalk.cli.terminal.answer import print_result
+from driftwalk.cli.terminal.output import print_result
 from driftwalk.schema.answers.recovery import model_recovery_answer
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from recovery_worlds import synthetic_recovery
 
-from driftwalk.likelihood.recover.summary import add_summary
+from driftwalk.likelihood.score import add_summary
 from driftwalk.schema.answers.parts import length_text
 from driftwalk.schema.answers.recovery import recovery_answer
 

@@ -43,7 +43,7 @@ def probe() -> Any:
         module = ModuleType("driftwalk.cli.probe")
         module.probe = command  # type: ignore[attr-defined]
         patch.setitem(sys.modules, "driftwalk.cli.probe", module)
-        patch.setitem(cli_main.COMMANDS, "probe", Command("Fit", "Probe.", "probe", "probe"))
+        patch.setitem(cli_main.COMMANDS, "probe", Command("Fit", "Probe.", "probe"))
         assert main(["probe", *words]) == (0 if seen else 2)
         return seen[0] if seen else StudyOptions(None, {}, keys)
 

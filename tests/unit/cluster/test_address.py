@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from driftwalk.cluster import parse_address
-from driftwalk.cluster.address import JOB_SYSTEMS
-from driftwalk.cluster.jobs import job_options
+from driftwalk.cluster.address import JOB_SYSTEMS, job_options
 from driftwalk.core.errors import ConfigurationError
 
 

@@ -15,8 +15,7 @@ from typing import Any
 import pytest
 
 from driftwalk.cluster import parse_address
-from driftwalk.cluster.address import JOB_SYSTEMS
-from driftwalk.cluster.jobs import job_class, job_options
+from driftwalk.cluster.address import JOB_SYSTEMS, job_class, job_options
 
 pytest.importorskip("dask_jobqueue", reason="jobs need driftwalk[cluster]")
 

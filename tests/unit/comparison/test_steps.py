@@ -12,7 +12,7 @@ from hypothesis import given, reject, settings, strategies as st
 from driftwalk.comparison import ComparisonWarning, apply_steps, plan_steps, steps
 from driftwalk.core.errors import InputError
 from driftwalk.schema import build_trajectory
-from driftwalk.schema.steps import check_steps
+from driftwalk.schema.trajectory import check_steps
 
 
 def pairs_by_loop(x: np.ndarray, y: np.ndarray, triples: list[tuple[int, int, int]]) -> np.ndarray:

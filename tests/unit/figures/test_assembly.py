@@ -15,7 +15,7 @@ from synthetic_assembly import (
 )
 
 from driftwalk.core.errors import InputError
-from driftwalk.figures import assembly, sensitivity as maps, sensitivity_figures
+from driftwalk.figures import assembly, sensitivity_figures
 from driftwalk.figures.write import write_figures
 from driftwalk.plot.parts.style import print_style
 
@@ -78,8 +78,8 @@ def two_drags():
 
 
 FIGURES = {
-    "map of words": lambda: maps.l1_map_figure(two_drags()),
-    "panels of words": lambda: maps.class_panels_figure(two_drags()),
+    "map of words": lambda: assembly.l1_map_figure(two_drags()),
+    "panels of words": lambda: assembly.class_panels_figure(two_drags()),
     "outcomes": lambda: assembly.outcomes_figure(distribution()),
     "outcomes of 12": lambda: assembly.outcomes_figure(distribution(4, "distinct")),
     "outcomes of 68": lambda: assembly.outcomes_figure(distribution(6)),
@@ -88,9 +88,9 @@ FIGURES = {
     ),
     "class times": lambda: assembly.class_times_figure(class_times()),
     "class times of 68": lambda: assembly.class_times_figure(class_times(6)),
-    "map": lambda: maps.l1_map_figure(sensitivity(points=(8, 7))),
-    "map of 68": lambda: maps.l1_map_figure(sensitivity(6, points=(5, 5))),
-    "panels": lambda: maps.class_panels_figure(sensitivity(points=(5, 5))),
+    "map": lambda: assembly.l1_map_figure(sensitivity(points=(8, 7))),
+    "map of 68": lambda: assembly.l1_map_figure(sensitivity(6, points=(5, 5))),
+    "panels": lambda: assembly.class_panels_figure(sensitivity(points=(5, 5))),
 }
 
 

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 
-from driftwalk.figures.drawn_data import write_drawn_data
-from driftwalk.figures.write import write_figures
+from driftwalk.figures.write import write_drawn_data, write_figures
 from driftwalk.plot.parts.style import new_figure
 
 X = np.array([0.0, 1.0, 3.0])

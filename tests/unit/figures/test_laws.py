@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 
 from driftwalk.figures import laws_figures, write_figures
-from driftwalk.figures.laws import plot_laws
+from driftwalk.figures.fit import plot_laws
 from driftwalk.plot.parts.style import new_figure
 
 

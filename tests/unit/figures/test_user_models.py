@@ -21,9 +21,9 @@ from driftwalk.plot import (
     map as plot_ks_map,
     refined_map as plot_refined_map,
 )
-from driftwalk.plot.panels import shared_setting_text
 from driftwalk.plot.parts.style import new_figure
-from driftwalk.schema.calibration import stored_parameters
+from driftwalk.plot.step_densities import shared_setting_text
+from driftwalk.schema.parameters import stored_parameters
 
 BLOCK_WORDS = re.compile("drag|force|C_d|σ_F|mN", re.IGNORECASE)
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from driftwalk.likelihood.angle import smooth_angle
+from driftwalk.likelihood.filter.series import smooth_angle
 
 
 def wrapped(angle: np.ndarray) -> np.ndarray:
@@ -18,7 +18,7 @@ def test_a_parabola_is_returned_on_any_clock() -> None:
     time = np.cumsum(np.random.default_rng(2).uniform(0.03, 0.3, 300))
     time = np.concatenate([time, 200.0 + time])
     true = 0.3 + 0.4 * (time % 200.0) - 0.01 * (time % 200.0) ** 2
-    found = smooth_angle(time, wrapped(true), longest_gap=1.0)
+    found = smooth_angle(time, wrapped(true))
     rate = 0.4 - 0.02 * (time % 200.0)
     assert found.known.all()
     assert np.cos(found.theta - true) == pytest.approx(1.0, abs=1e-12)
@@ -33,7 +33,7 @@ def test_noise_shrinks_as_the_filter_of_five_points(fresh_seed: Callable[[int], 
     """
     time = 0.1 * np.arange(10_000)
     noise = np.random.default_rng(fresh_seed(4)).normal(0.0, 0.01, time.size)
-    found = smooth_angle(time, noise, longest_gap=1.0)
+    found = smooth_angle(time, noise)
     inner = slice(2, -2)
     assert found.theta[inner].std() == pytest.approx(0.01 * np.sqrt(17 / 35), rel=0.05)
     assert found.omega[inner].std() == pytest.approx(0.01 * np.sqrt(0.1) / 0.1, rel=0.05)
@@ -47,7 +47,7 @@ def test_an_angle_between_neighbours_is_interpolated_and_one_far_away_unknown() 
     theta = 0.5 * time
     theta[20] = np.nan
     theta[40:75] = np.nan
-    found = smooth_angle(time, theta, longest_gap=1.0)
+    found = smooth_angle(time, theta)
     assert found.theta[20] == pytest.approx(1.0)
     assert found.omega[20] == pytest.approx(0.5)
     # The last angle before the hole is at 3.9 s, the first after it at 7.5 s.
@@ -57,7 +57,7 @@ def test_an_angle_between_neighbours_is_interpolated_and_one_far_away_unknown() 
 def test_no_window_reaches_over_a_long_gap() -> None:
     time = np.concatenate([0.1 * np.arange(10), 50.0 + 0.1 * np.arange(10)])
     theta = np.where(time < 25.0, 0.2 * time, 1.0 - 0.3 * time)
-    found = smooth_angle(time, theta, longest_gap=1.0)
+    found = smooth_angle(time, theta)
     assert found.omega == pytest.approx(np.where(time < 25.0, 0.2, -0.3), abs=1e-9)
 
 
@@ -65,6 +65,6 @@ def test_no_window_reaches_over_a_long_gap() -> None:
 def test_too_few_angles_tell_nothing(seen: int) -> None:
     theta = np.full(50, np.nan)
     theta[:seen] = 0.1
-    found = smooth_angle(0.1 * np.arange(50), theta, longest_gap=1.0)
+    found = smooth_angle(0.1 * np.arange(50), theta)
     assert not found.known.any()
     assert np.isfinite(found.theta).all()

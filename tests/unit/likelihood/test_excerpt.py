@@ -10,9 +10,9 @@ from fit_worlds import coarse_study, driven
 
 from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood import newton
-from driftwalk.likelihood.filter.excerpt import EXCERPT, pieces
 from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.fit import fit_motion
+from driftwalk.likelihood.newton import EXCERPT, pieces
 from driftwalk.likelihood.preparation import body_of, series_of
 from driftwalk.likelihood.spline import lay_spline
 from driftwalk.schema import body_track
@@ -22,7 +22,7 @@ def _passes(seconds: float) -> Passes:
     study = coarse_study()
     outline = outline_of(study.tank.to_arena())
     track = body_track(driven(1, seconds, {}))
-    series = series_of([track], study, outline, "state")
+    series = series_of([track], study, "state")
     return Passes(series, body_of(study, "state"), lay_spline(outline, side=0.03, spacing=0.03))
 
 

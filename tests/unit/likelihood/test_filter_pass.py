@@ -10,13 +10,12 @@ import pytest
 from fit_worlds import coarse_study, driven, recording
 
 from driftwalk.flow.arena import outline_of
-from driftwalk.likelihood.estimate import estimate_of
 from driftwalk.likelihood.filter.difference_pairs import Pair
 from driftwalk.likelihood.filter.filter_pass import Passes, Sums
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.fit import fit_motion
 from driftwalk.likelihood.newton import inverse, limited, newton_step
-from driftwalk.likelihood.preparation import body_of, series_of
+from driftwalk.likelihood.preparation import body_of, estimate_of, series_of
 from driftwalk.likelihood.prior import Prior, Weights
 from driftwalk.likelihood.spline import lay_spline
 from driftwalk.schema import body_track
@@ -27,7 +26,7 @@ def passes(request: pytest.FixtureRequest) -> Passes:
     study = coarse_study()
     outline = outline_of(study.tank.to_arena())
     tracks = [body_track(recording(60.0, name)) for name in ("first", "second")]
-    series = series_of(tracks, study, outline, request.param)
+    series = series_of(tracks, study, request.param)
     spline = lay_spline(outline, side=0.03, spacing=0.03)
     return Passes(series, body_of(study, request.param), spline)
 
@@ -200,11 +199,10 @@ def test_the_first_errors_of_a_stretch_are_small_and_are_not_counted() -> None:
     correlated, it has a standard deviation of sqrt(2 / 3 n); the bound is five of those.
     """
     study = coarse_study()
-    outline = outline_of(study.tank.to_arena())
     track = body_track(driven(3, 300.0, {}))
     late = np.arange(track.time.size) >= 1500
     track = track._replace(time=track.time + 5.0 * late)
-    (series,) = series_of([track], study, outline, "state")
+    (series,) = series_of([track], study, "state")
     assert series.near_wall > 20
     fit = fit_motion(driven(3, 300.0, {}), study)
     estimate = estimate_of(fit, [driven(3, 300.0, {})], body=None)

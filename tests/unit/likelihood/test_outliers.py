@@ -135,8 +135,8 @@ def test_samples_beyond_the_greatest_speed_are_counted(tmp_path: Path) -> None:
     read = dw.load(path, max_speed=0.3, tank="circle:0.3")
     ready = prepare([read], coarse_study(), None, None)
     wrong = int((film["x"].values != recording(SECONDS)["x"].values).sum())
-    assert ready.jumps_removed == wrong
+    assert ready.facts["jumps_removed"] == wrong
     assert ready.mistakes == 0
     assert ready.samples == 3001 - wrong
     damaged = read.assign_attrs(counts='{"per_body": [1]}')
-    assert prepare([damaged], coarse_study(), None, None).jumps_removed == 0
+    assert prepare([damaged], coarse_study(), None, None).facts["jumps_removed"] == 0

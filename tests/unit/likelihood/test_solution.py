@@ -14,7 +14,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.likelihood.check.errors import used_pairs
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.interval_inflation import parameter_facts
-from driftwalk.likelihood.solution import cholesky, require_noise_below_motion, solved
+from driftwalk.likelihood.refuse import cholesky, require_noise_below_motion, solved
 from driftwalk.model import Study, apply_overrides
 from driftwalk.schema import Track, build_trajectory
 from driftwalk.schema.answers.facts import facts_of

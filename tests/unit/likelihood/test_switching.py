@@ -23,14 +23,12 @@ from switching_worlds import (
 import driftwalk as dw
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.flow import bilinear
-from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.filter.parameters import Point
-from driftwalk.likelihood.intervals import Intervals, cut_track, intervals_of, switched_frames
-from driftwalk.likelihood.length import in_words, length_advice, needed_duration
+from driftwalk.likelihood.flow_intervals import Intervals, cut_track, intervals_of, switched_frames
 from driftwalk.likelihood.preparation import body_of, prepare, spline_of
 from driftwalk.likelihood.prior import Prior, Weights
-from driftwalk.likelihood.result import Whiteness
+from driftwalk.likelihood.refuse import in_words, length_advice, needed_duration
 from driftwalk.likelihood.warnings import precision_facts, warnings_of
 from driftwalk.schema import Track, body_track, build_trajectory
 from driftwalk.schema.answers.facts import facts_of
@@ -125,7 +123,7 @@ def prepared(**settings: object) -> tuple[Passes, Point]:
     """Return the filter over the recording and a point with different flows."""
     study = coarse_study(**settings)
     ready = prepare([two_flows()], study, None, None)
-    spline = spline_of(study, outline_of(study.tank.to_arena()))
+    spline = spline_of(study)
     flows = len(ready.intervals.labels)
     passes = Passes(ready.series, body_of(study, ready.angle), spline, flows)
     generator = np.random.default_rng(2)
@@ -369,6 +367,7 @@ def facts(std: float, duration: float, study_settings: dict[str, object]) -> dic
     found = {"wall_share": 0.0, "converged": "yes", "restricted": "yes", "angle": "given"}
     found |= {"samples_used": 1000, "intervals_usable": 1000, "mistakes": 0}
     found |= {"dropped_frames": 0, "jumps_removed": 0}
+    found |= {"autocorrelation": 0.0, "autocorrelation_std": 0.01}
     return {**found, "duration_s": duration, **precision_facts(std, duration, study)}
 
 
@@ -386,7 +385,6 @@ def test_a_vague_answer_says_how_long_to_record(
 ) -> None:
     found = warnings_of(
         facts(std, 600.0, wanted),
-        Whiteness(1.0, 0.0, 0.01),
         [0.5],
         Intervals((), (0,), ("A",)),
         side_m=0.03,

@@ -14,7 +14,8 @@ from driftwalk import _core
 from driftwalk.conditions import Neighbours
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.seeds import world_keys
-from driftwalk.motion.family import MEMBERS, PARTS, family_model
+from driftwalk.motion.choose import family_model
+from driftwalk.motion.family import MEMBERS, PARTS
 from driftwalk.motion.family.columns import (
     INERTIAL,
     SHARED,

@@ -7,15 +7,18 @@ from typing import Any, get_type_hints
 
 import pytest
 
-from driftwalk.core.study_keys import ASSEMBLY_KEYS, CALIBRATION_KEYS, FIT_KEYS, STUDY_KEYS
-from driftwalk.model import declared
-from driftwalk.notebook.settings import (
+from driftwalk.core.study_keys import (
+    ASSEMBLY_KEYS,
+    CALIBRATION_KEYS,
+    FIT_KEYS,
+    STUDY_KEYS,
     AssemblySettings,
     CalibrationSettings,
     FitSettings,
     Number,
     StudySettings,
 )
+from driftwalk.model import declared
 
 
 @pytest.mark.parametrize(

@@ -20,10 +20,10 @@ from synthetic_assembly import (
 )
 
 from driftwalk.page import assembly_sections, sensitivity_sections
-from driftwalk.page.sections.assemblies.assembly import l1_and_chance
-from driftwalk.page.sections.assemblies.assembly_sizes import sizes_section
-from driftwalk.page.sections.assemblies.classes import cells_of
-from driftwalk.page.sections.assemblies.replay import MOST_POSES
+from driftwalk.page.sections.assembly import l1_and_chance
+from driftwalk.page.sections.outcomes import cells_of, sizes_section
+from driftwalk.page.sections.replay import MOST_POSES
+from driftwalk.plot.parts.polyomino_sketch import class_cells
 
 
 def made_up_assembly(path: xr.Dataset) -> xr.Dataset:
@@ -85,16 +85,16 @@ def test_shares_and_intervals_are_those_of_both_distributions(
 
 
 def test_sketches_are_the_cells_of_the_shapes() -> None:
-    assert cells_of("T") == [[[0, 1], [1, 0], [1, 1], [2, 1]]]
-    assert cells_of("L3+1") == [[[0, 0], [0, 1], [1, 0]], [[0, 0]]]
+    assert cells_of("T") == [[0, 1], [1, 0], [1, 1], [2, 1]]
+    assert cells_of("L3+1") == class_cells("L3+1").tolist()
     assert cells_of("xx/xx") == cells_of("O")
     assert cells_of("<script>") == []
 
 
 def test_every_block_of_a_class_has_its_cell(sections: list[dict[str, Any]]) -> None:
     for item in part_of(sections, "classes")["series"][0]["items"]:
-        assert sum(len(shape) for shape in item["cells"]) == 4
-        assert len(item["cells"]) == item["class"].count("+") + 1
+        assert len(item["cells"]) == 4
+        assert item["cells"] == class_cells(item["class"]).tolist()
 
 
 def test_of_many_classes_the_rare_ones_are_summed() -> None:
@@ -168,7 +168,7 @@ def test_the_replay_has_the_poses_and_what_joined_when(sections: list[dict[str, 
         assert run["name"] == f"run {index}"
         for name in "xy":
             np.testing.assert_allclose(
-                values(run[name]), one[name].values, rtol=0, atol=0.5001 * run[name]["scale"]
+                values(run[name]), one[name].values, rtol=0, atol=0.5001 * run[name]["step"]
             )
         turned = np.angle(np.exp(1j * (values(run["theta"]) - one["theta"].values)))
         assert np.abs(turned).max() < 1.01e-3
@@ -204,7 +204,7 @@ def test_a_long_path_of_many_blocks_is_thinned() -> None:
     assert 0.5 * MOST_POSES < poses <= 1.1 * MOST_POSES
     every = round(3000 / (run["x"]["shape"][1] - 1))
     np.testing.assert_allclose(
-        values(run["x"]), path["x"].values[0, ::every].T, atol=0.5001 * run["x"]["scale"]
+        values(run["x"]), path["x"].values[0, ::every].T, atol=0.5001 * run["x"]["step"]
     )
     assert run["events"] == []
 
@@ -254,6 +254,9 @@ def test_the_biplot_keeps_scores_and_the_direction_of_loadings() -> None:
         arrow["x"] / loading[k, 0] for k, arrow in enumerate(part["arrows"]) if loading[k, 0]
     ]
     np.testing.assert_allclose(factors, factors[0])
+    assert [arrow["cells"] for arrow in part["arrows"]] == [
+        cells_of(arrow["name"]) for arrow in part["arrows"]
+    ]
     drag, force = float(study["drag_coefficient"][2]), 1e3 * float(study["force_std"][1])
     name = part["points"]["names"][2 * 4 + 1]
     assert name == f"drag coefficient {drag:.4g}, stochastic force {force:.4g} mN"

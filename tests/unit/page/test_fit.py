@@ -150,14 +150,17 @@ def test_a_recovery_study_beside_its_truth() -> None:
         np.testing.assert_allclose(values(out["y"])[0], exact[0])
         np.testing.assert_allclose(values(kept["low"])[1:], study[f"{name}_low"].values[0, 0, 1:])
     rows = part_of(made, "errors")["rows"]
-    assert len(rows) == 3 * 2 * 2
+    assert len(rows) == (3 + 1) * 2 * 2, "three parameters and the flow"
     first = study.sel(parameter="drag_coefficient", duration=600.0, angle="given")
-    assert rows[0][:3] == ["drag coefficient C_d", "10 min", "given"]
-    assert rows[0][3] == float(first["median_absolute_error"])
-    assert rows[0][6] == float(first["coverage"])
-    assert part_of(made, "warnings")["items"] == [
-        "4 recordings left out of the summary: too long at the wall"
-    ]
+    assert rows[0][:3] == ["10 min", "given", "C_d"]
+    assert rows[0][3] == f"{100 * float(first['median_absolute_error']):.1f} %"
+    used = int(first["used"].sum())
+    assert rows[0][7].startswith(f"{round(float(first['coverage']) * used)} of {used} (")
+    assert {len(row) for row in rows} == {8}
+    warnings = part_of(made, "warnings")["items"]
+    at_the_wall = [text for text in warnings if "1 of 6 recordings have more than" in text]
+    assert len(at_the_wall) == 4
+    assert all("left out of the summary" in text for text in at_the_wall)
     shown = numbers_of(part_of(made, "summary"))
     assert shown["length needed, angle given"]["value"] == float(
         study["needed_duration"].sel(angle="given")

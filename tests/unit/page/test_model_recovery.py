@@ -37,9 +37,15 @@ def test_the_table_has_a_row_for_each_parameter(
     found: xr.Dataset, sections: dict[str, dict[str, Any]]
 ) -> None:
     rows = sections["errors"]["rows"]
-    assert [row[0] for row in rows] == list(VALUES)
-    for column, name in ((2, "median_error"), (3, "determined_share"), (4, "coverage")):
-        assert [row[column] for row in rows] == found[name].values.tolist()
+    assert [row[0] for row in rows] == [name.replace("_", " ") for name in VALUES]
+    medians = [f"{100 * one:.1f} %" for one in found["median_error"].values]
+    assert [row[2] for row in rows] == medians
+    calibrated = int((found["status"] == 0).sum())
+    shares = found["determined_share"].values
+    assert [row[3] for row in rows] == [
+        f"{round(share * calibrated)} of {calibrated}" for share in shares
+    ]
+    assert [row[5] for row in rows] == found["meaning"].values.tolist()
 
 
 def test_every_estimate_is_drawn_once(
@@ -62,4 +68,6 @@ def test_what_is_missing_is_said() -> None:
     assert [part["kind"] for part in model_recovery_sections(xr.Dataset())] == ["empty"]
     found = made_up_recovery().drop_vars("interval")
     kinds = {part["id"]: part["kind"] for part in model_recovery_sections(found)}
-    assert (kinds["estimates-1"], kinds["errors"]) == ("empty", "table")
+    assert (kinds["estimates-1"], kinds["errors"], kinds["summary"]) == (
+        *("empty", "empty", "summary"),
+    )

@@ -10,7 +10,7 @@ import xarray as xr
 from every_kind import every_kind
 
 from driftwalk.page.run_page import dataset_page
-from driftwalk.page.sections.models import model_sections
+from driftwalk.page.sections.motion_models import model_sections
 
 
 @pytest.fixture(scope="module")

@@ -13,8 +13,8 @@ from synthetic_assembly import one_axis, outcome_classes, sensitivity, with_cour
 
 import driftwalk as dw
 from driftwalk.page import sensitivity_sections
-from driftwalk.page.sections.assemblies import sensitivity_times as page_sensitivity_times
-from driftwalk.page.sections.assemblies.classes import cells_of
+from driftwalk.page.sections import sensitivity_maps as page_sensitivity_times
+from driftwalk.page.sections.outcomes import cells_of
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from scipy.optimize import minimize
 from synthetic_assembly import class_times, outcome_classes
 
 from driftwalk.core.errors import InputError
-from driftwalk.plot.class_courses import plot_class_times, plot_survival, spread_apart
+from driftwalk.plot.assembly_courses import plot_class_times, plot_survival, spread_apart
 from driftwalk.plot.parts.assembly_labels import class_colors
 from driftwalk.plot.parts.style import print_style
 

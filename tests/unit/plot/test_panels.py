@@ -10,8 +10,8 @@ from synthetic_calibration import answered, synthetic_calibration
 
 from driftwalk.core.errors import InputError
 from driftwalk.plot import density_panels as plot_density_panels
-from driftwalk.plot.panels import choose_settings, shared_setting_text
 from driftwalk.plot.parts.style import new_figure
+from driftwalk.plot.step_densities import choose_settings, shared_setting_text
 
 
 @pytest.fixture(scope="module")

@@ -102,7 +102,7 @@ def test_every_file_is_read_or_refused_in_one_line(shared_data: SharedData, fold
         begin = time.process_time()
         refusal = refusal_of(path)
         if refusal is not None:
-            assert time.process_time() - begin < 1.0, path
+            assert time.process_time() - begin < 10.0, path
             assert "\n" not in refusal
             assert len(refusal) > len(str(path)) + 10
 

@@ -15,8 +15,8 @@ from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.provenance import MANIFEST_KIND
 from driftwalk.model import Study
 from driftwalk.runs import read_found
-from driftwalk.schema.calibration import is_block, stored_parameters
-from driftwalk.schema.stores.contents import check_contents
+from driftwalk.schema.check import check_contents
+from driftwalk.schema.parameters import is_block, stored_parameters
 
 PLACE = Path("run/calibration.nc")
 

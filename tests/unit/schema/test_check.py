@@ -11,11 +11,10 @@ import xarray as xr
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.schema import build_dataset, check_dataset, described
-from driftwalk.schema.check import unknown_names
+from driftwalk.schema.check import check_contents, unknown_names
 from driftwalk.schema.description import Variable
-from driftwalk.schema.steps import build_steps
-from driftwalk.schema.stores.contents import check_contents
 from driftwalk.schema.stores.netcdf import netcdf_bytes, open_netcdf
+from driftwalk.schema.trajectory import build_steps
 
 
 def steps() -> xr.Dataset:

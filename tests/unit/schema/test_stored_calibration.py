@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 from every_kind import every_kind
 
-from driftwalk.calibration.refuse import require_searchable
+from driftwalk.calibration.check import require_searchable
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.motion import motion_model
 from driftwalk.schema.answers.facts import (
@@ -17,7 +17,7 @@ from driftwalk.schema.answers.facts import (
     facts_of,
     fitted_value,
 )
-from driftwalk.schema.calibration import is_block, stored_parameters
+from driftwalk.schema.parameters import is_block, stored_parameters
 from driftwalk.schema.stores.netcdf import open_netcdf
 
 FORMS = ("calibration", "calibration of one parameter", "calibration of two parameters")

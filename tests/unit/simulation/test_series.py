@@ -11,7 +11,7 @@ import xarray as xr
 import driftwalk as dw
 from driftwalk.core.errors import InputError
 from driftwalk.core.seeds import world_keys
-from driftwalk.schema.kinds.flow_series import flow_series_words
+from driftwalk.schema.kinds.flow import flow_series_words
 from driftwalk.simulation import simulate
 from driftwalk.simulation.series import (
     continued_flow,

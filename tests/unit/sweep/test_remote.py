@@ -10,7 +10,7 @@ import pytest
 
 from driftwalk.core.errors import ClusterError
 from driftwalk.sweep import WorkUnit
-from driftwalk.sweep.remote import packed, refuse_others, run_unit
+from driftwalk.sweep.workers import packed, refuse_others, run_unit
 
 UNIT = WorkUnit(0, 2, {"a": np.array([2.0, 3.0])})
 

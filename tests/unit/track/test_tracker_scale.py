@@ -7,7 +7,7 @@ import pytest
 
 import driftwalk as dw
 from driftwalk.cli.options.tracking import TrackingOptions
-from driftwalk.cli.tracking.parts import tracker_for
+from driftwalk.cli.recordings.tracking_parts import tracker_for
 from driftwalk.track.types import Detection
 
 FRAMES = 400

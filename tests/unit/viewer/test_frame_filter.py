@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from driftwalk.viewer.frame_filter import SAID_EVERY_S, SoundFrames
-from driftwalk.viewer.messages import to_json
+from driftwalk.viewer.hub import to_json
 
 BODY = {"id": "a", "seen": True, "x_m": 0.1, "y_m": -0.1, "theta_rad": None}
 

@@ -14,8 +14,8 @@ from ports import held_port
 
 from driftwalk.core.errors import InputError
 from driftwalk.track import LiveServer
+from driftwalk.viewer.hub import make_message
 from driftwalk.viewer.live_client import LiveSource, stream_line
-from driftwalk.viewer.messages import make_message
 
 HELLO = {"type": "hello", "format": "driftwalk live", "version": 1, "source": "test"}
 

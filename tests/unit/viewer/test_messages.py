@@ -11,9 +11,8 @@ from typing import Any
 import pytest
 from hypothesis import given, strategies as st
 
-from driftwalk.viewer.app import _listen, parsed
-from driftwalk.viewer.hub import Source
-from driftwalk.viewer.messages import Outbox, make_message, to_json
+from driftwalk.viewer.app import _listen
+from driftwalk.viewer.hub import Outbox, Source, make_message, parsed, to_json
 
 loop: asyncio.Runner
 

@@ -18,7 +18,8 @@ from driftwalk.core.errors import InputError
 from driftwalk.model import Study
 from driftwalk.schema import build_trajectory
 from driftwalk.viewer.play.motion import MotionWindow, beside
-from driftwalk.viewer.play.playground import PlaySource, flow_arrows
+from driftwalk.viewer.play.playground import PlaySource
+from driftwalk.viewer.play.playground_base import flow_arrows
 from driftwalk.viewer.play.settings import FILLED, KNOBS
 from driftwalk.viewer.play.stream import frame_line, hello_line, joined_faces
 

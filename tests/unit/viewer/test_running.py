@@ -19,9 +19,9 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.files.rundir import RunDirectory
 from driftwalk.core.files.shards import ShardStore
 from driftwalk.model import Study
+from driftwalk.page.html import page_frame
 from driftwalk.schema import Parameter
 from driftwalk.sweep import grid
-from driftwalk.viewer.shell import page_frame
 from driftwalk.viewer.watch.run_page import RunSource
 from driftwalk.viewer.watch.sensitivity import RunningSensitivity
 from driftwalk.viewer.watch.shards import StoreReader
@@ -310,7 +310,7 @@ def test_assembly_counts_the_classes_of_finished_runs(tmp_path: Path) -> None:
         low, high = dw.assembly.proportion_interval(3, 7, confidence=1 - 0.1 / 3)
         first = section["series"][0]["items"][0]
         assert (first["low"], first["high"]) == pytest.approx((float(low), float(high)))
-        assert first["cells"] == [[[0, 0], [1, 0], [2, 0]]]
+        assert first["cells"] == [[0, 0], [1, 0], [2, 0]]
 
 
 def kept(counts: list[dict[str, int]]) -> dict[str, np.ndarray]:
@@ -406,7 +406,7 @@ def test_a_setting_of_a_running_sensitivity_has_its_classes_over_time(tmp_path: 
             found = running.cell(row, column)["over_time"]
             json.dumps(found, allow_nan=False)
             assert found["classes"] == ["2", "1+1"]
-            assert found["cells"][0] == [[[0, 0], [1, 0]]]
+            assert found["cells"][0] == [[0, 0], [1, 0]]
             time = dw.page.decode_array(found["time"])
             np.testing.assert_allclose(time, 0.5 * np.arange(101))
             expected = np.where(np.arange(101) >= at, runs, 0)

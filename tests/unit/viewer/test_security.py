@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from hypothesis import given, strategies as st
 
+from driftwalk.page.html import html_shell, page_frame
 from driftwalk.viewer.security import Gate, host_name, is_loopback, make_gate
-from driftwalk.viewer.shell import html_shell, page_frame
 from driftwalk.viewer.watch.run_page import file_in
 
 HERE = Gate("127.0.0.1", 8765)

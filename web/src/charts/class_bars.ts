@@ -2,8 +2,7 @@
 
 import { isComplete } from "../colours";
 import { svg } from "../dom";
-import type { Polyominoes } from "../page";
-import { cellsOfName, drawSketch, sketchOf, writtenName } from "../polyomino";
+import { type Square, drawSketch, sizeOf, writtenName } from "../polyomino";
 import { linearScale, linearTicks } from "../scale";
 import { percent } from "../units";
 
@@ -17,7 +16,7 @@ export interface ClassBar {
 
 export interface ClassRow {
   readonly name: string;
-  readonly cells: Polyominoes;
+  readonly cells: readonly Square[];
   readonly note: string | null;
   /** One bar per series; null where a series does not have the class. */
   readonly bars: readonly (ClassBar | null)[];
@@ -34,8 +33,8 @@ const NARROW_TEXT = 50;
 /** Draws one row per class; `label` says what the picture shows. */
 export function drawClassBars(width: number, rows: readonly ClassRow[], label: string): SVGSVGElement {
   const wide = width > 520;
-  const sketches = rows.map((row) => sketchOf(row.cells.length > 0 ? row.cells : cellsOfName(row.name)));
-  const sketchWidth = Math.max(0, ...sketches.map((sketch) => sketch.width * SQUARE));
+  const sizes = rows.map((row) => sizeOf(row.cells));
+  const sketchWidth = Math.max(0, ...sizes.map((size) => size.width * SQUARE));
   const nameWidth = Math.max(0, ...rows.map((row) => writtenName(row.name).length * LETTER));
   const left = sketchWidth + nameWidth + 24;
   const text = wide ? TEXT : NARROW_TEXT;
@@ -55,11 +54,11 @@ export function drawClassBars(width: number, rows: readonly ClassRow[], label: s
       picture.append(svg("line", { class: "divide", x1: 0, x2: width, y1: top, y2: top }));
       top += GAP / 2 + 2;
     }
-    const sketch = sketches[index] ?? { squares: [], width: 0, height: 0 };
+    const sketch = sizes[index] ?? { width: 0, height: 0 };
     const height = Math.max(row.bars.length * BAR, sketch.height * SQUARE);
     const middle = top + height / 2;
     picture.append(
-      drawSketch(sketch, sketchWidth - sketch.width * SQUARE, middle - (sketch.height * SQUARE) / 2, SQUARE),
+      drawSketch(row.cells, sketchWidth - sketch.width * SQUARE, middle - (sketch.height * SQUARE) / 2, SQUARE),
     );
     picture.append(svg("text", { x: sketchWidth + 9, y: middle + 4 }, writtenName(row.name)));
     const first = middle - (row.bars.length * BAR) / 2;

@@ -2,14 +2,14 @@
 
 import { type Grid, at, extent } from "../arrays";
 import { svg } from "../dom";
-import type { Polyominoes } from "../page";
+import type { Square } from "../polyomino";
 import { displayFor, percent } from "../units";
 import { type Frame, makeFrame } from "./frame";
 import { bandPath, linePath } from "./paths";
 
 export interface Course {
   readonly name: string;
-  readonly cells: Polyominoes;
+  readonly cells: readonly Square[];
   readonly colour: string;
   readonly share: Float64Array;
   readonly low: Grid | null;

@@ -10,7 +10,7 @@ import { type Context, remembered } from "../context";
 import { el, svg } from "../dom";
 import type { BiplotSection } from "../page";
 import { choices, readout } from "../parts";
-import { cellsOfName, drawSketch, sketchOf, writtenName } from "../polyomino";
+import { drawSketch, sizeOf, writtenName } from "../polyomino";
 import { percent, short } from "../units";
 
 interface Points {
@@ -18,6 +18,8 @@ interface Points {
   readonly y: Float64Array;
   readonly values: ReadonlyMap<string, Float64Array>;
 }
+
+type Arrow = BiplotSection["arrows"][number];
 
 const NEAR = 14;
 const WORDS: Readonly<Record<string, string>> = {
@@ -140,7 +142,7 @@ function drawAxes(frame: Frame): void {
   );
 }
 
-function drawArrow(frame: Frame, arrow: BiplotSection["arrows"][number]): void {
+function drawArrow(frame: Frame, arrow: Arrow): void {
   const [x0, y0, x1, y1] = [frame.x.px(0), frame.y.px(0), frame.x.px(arrow.x), frame.y.px(arrow.y)];
   const length = Math.hypot(x1 - x0, y1 - y0);
   if (length < 1) return;
@@ -153,10 +155,10 @@ function drawArrow(frame: Frame, arrow: BiplotSection["arrows"][number]): void {
   );
   // Short arrows lie in a heap whose labels nobody could read.
   if (length < 22) return;
-  drawArrowName(frame, arrow.name, x1 + 8 * cos, y1 + 8 * sin, cos, sin);
+  drawArrowName(frame, arrow, x1 + 8 * cos, y1 + 8 * sin, cos, sin);
 }
 
-function drawArrowName(frame: Frame, name: string, x: number, y: number, cos: number, sin: number): void {
+function drawArrowName(frame: Frame, { name, cells }: Arrow, x: number, y: number, cos: number, sin: number): void {
   const written = writtenName(name);
   const anchor = cos > 0.3 ? "start" : cos < -0.3 ? "end" : "middle";
   if (written !== "") {
@@ -165,9 +167,9 @@ function drawArrowName(frame: Frame, name: string, x: number, y: number, cos: nu
     return;
   }
   const side = 4;
-  const sketch = sketchOf(cellsOfName(name));
+  const sketch = sizeOf(cells);
   const left = x - (anchor === "start" ? 0 : anchor === "end" ? 1 : 0.5) * sketch.width * side;
-  frame.front.append(drawSketch(sketch, left, y - ((1 - sin) / 2) * sketch.height * side, side));
+  frame.front.append(drawSketch(cells, left, y - ((1 - sin) / 2) * sketch.height * side, side));
 }
 
 function nearestPoint(frame: Frame, points: Points, x: number, y: number): number {

@@ -108,7 +108,7 @@ class Player {
     this.tank = new TankCanvas(canvas, "Blocks in the tank, coloured by assembly");
     this.tank.setTank(section.arena, section.side, boxAround(section.arena, this.run.x, this.run.y));
     beside.append(this.controls(), this.outcome);
-    this.addStrip(beside);
+    this.addStrip(beside, section.cells);
     this.useKeys(canvas);
     onThemeChange(() => this.root.isConnected && this.show(this.sample));
     this.show(0);
@@ -208,12 +208,14 @@ class Player {
   }
 
   /** Adds a band that shows which class the blocks were when; a click goes there. */
-  private addStrip(beside: HTMLElement): void {
+  private addStrip(beside: HTMLElement, cells: ReplaySection["cells"]): void {
     const names = [...new Set(this.runs.flatMap((run) => run.classes.map((change) => change.class)))];
     if (names.length === 0) return;
     this.strip = figure(beside, "strip", (width) => this.drawStrip(width));
     beside.append(
-      classLegend(names.map((name) => ({ name, cells: [], colour: this.colours.of(name) }))),
+      classLegend(
+        names.map((name) => ({ name, cells: cells.get(name) ?? [], colour: this.colours.of(name) })),
+      ),
       el(
         "p",
         { class: "note" },

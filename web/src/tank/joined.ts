@@ -1,14 +1,11 @@
 /** Which blocks are joined, and the shapes that they make. */
 
-import type { Polyominoes } from "../page";
-import { cellsOfName } from "../polyomino";
+import { type Square, cellsOfShape } from "../polyomino";
 
 /** A block, its face, another block, its face; face 0 is a block's +x side, 1 +y, 2 -x, 3 -y. */
 export type Join = readonly [block: string, face: number, other: string, otherFace: number];
 
-type Cell = readonly [number, number];
-
-const STEPS: readonly Cell[] = [
+const STEPS: readonly Square[] = [
   [1, 0],
   [0, 1],
   [-1, 0],
@@ -33,20 +30,20 @@ export function shapeName(blocks: readonly string[], joins: readonly Join[]): st
   const cells = latticeCells(blocks, joins);
   if (cells.length !== blocks.length) return `${blocks.length} blocks`;
   const turned = turns(cells);
-  const mirrored = turns(cells.map(([x, y]): Cell => [-x, y]));
+  const mirrored = turns(cells.map(([x, y]): Square => [-x, y]));
   // As it is first: S and Z differ, where mirror images are distinct.
   for (const looks of [turned, mirrored]) {
-    const found = NAMES.find((name) => looks.includes(code(cellsOfName(name)[0] ?? [])));
+    const found = NAMES.find((name) => looks.includes(code(cellsOfShape(name))));
     if (found !== undefined) return found;
   }
   return [...turned, ...mirrored].sort()[0] ?? "";
 }
 
 /** Returns the lattice cells of joined blocks, one after the other from the first. */
-function latticeCells(blocks: readonly string[], joins: readonly Join[]): Cell[] {
+function latticeCells(blocks: readonly string[], joins: readonly Join[]): Square[] {
   const first = blocks[0];
   if (first === undefined) return [];
-  const known = new Map<string, { cell: Cell; quarter: number }>([[first, { cell: [0, 0], quarter: 0 }]]);
+  const known = new Map<string, { cell: Square; quarter: number }>([[first, { cell: [0, 0], quarter: 0 }]]);
   const inside = new Set(blocks);
   const both = joins
     .filter(([one, , other]) => inside.has(one) && inside.has(other))
@@ -73,18 +70,18 @@ function latticeCells(blocks: readonly string[], joins: readonly Join[]): Cell[]
 }
 
 /** Returns the codes of a shape in its four orientations. */
-function turns(cells: readonly Cell[]): string[] {
+function turns(cells: readonly Square[]): string[] {
   const looks: string[] = [];
   let now = cells;
   for (let quarter = 0; quarter < 4; quarter += 1) {
     looks.push(code(now));
-    now = now.map(([x, y]): Cell => [-y, x]);
+    now = now.map(([x, y]): Square => [-y, x]);
   }
   return looks;
 }
 
 /** Returns rows from top to bottom, x for a cell, joined by "/". */
-export function code(cells: Polyominoes[number] | readonly Cell[]): string {
+export function code(cells: readonly Square[]): string {
   const [xs, ys] = [cells.map((cell) => cell[0]), cells.map((cell) => cell[1])];
   const [left, right, low, high] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
   const filled = new Set(cells.map(([x, y]) => `${x},${y}`));

@@ -7,7 +7,7 @@ import { PALETTE } from "../colours";
 import { el, svg } from "../dom";
 import { linearTicks } from "../scale";
 import { styleColour } from "../theme";
-import { cellsOfName, sketchPicture, writtenName } from "../polyomino";
+import { cellsOfShape, sketchPicture, writtenName } from "../polyomino";
 
 const KNOWN = ["2", "I3", "L3", "I", "O", "T", "S", "L", "Z", "J"];
 const MOST_CHANGES = 4000;
@@ -69,7 +69,7 @@ export class ShapeCounts {
         el(
           "li",
           {},
-          sketchPicture(cellsOfName(name), 7, shapeColour(name)),
+          sketchPicture(cellsOfShape(name), 7, shapeColour(name)),
           el("span", {}, writtenName(name)),
         ),
       ),

@@ -1,7 +1,7 @@
 /** A list of how many assemblies of each shape there are. */
 
 import { el } from "../dom";
-import { cellsOfName, sketchPicture, writtenName } from "../polyomino";
+import { cellsOfShape, sketchPicture, writtenName } from "../polyomino";
 
 /** Shapes that are listed; of more, the most frequent. */
 const MOST = 12;
@@ -24,7 +24,7 @@ export class ShapeList {
   }
 
   private item(name: string, count: number): HTMLElement {
-    const picture = sketchPicture(cellsOfName(name), 7, this.colourOf?.(name));
+    const picture = sketchPicture(cellsOfShape(name), 7, this.colourOf?.(name));
     return el(
       "li",
       { "aria-label": `${count} ${name}` },

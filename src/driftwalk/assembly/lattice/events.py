@@ -6,28 +6,21 @@ follows: which assemblies they were, what shapes these had, and the outcome clas
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.lattice.polyomino import (
-    Chirality,
-    name_of,
-    require_chirality,
+from driftwalk.assembly.lattice.polyomino import STEPS, Chirality, name_of, require_chirality
+from driftwalk.assembly.outcomes.classes import (
+    all_single,
+    class_name,
+    listed_classes,
+    listed_shapes,
 )
-from driftwalk.assembly.outcomes.classes import class_name, listed_classes, listed_shapes
+from driftwalk.core.arrays import Bools, Integers
 from driftwalk.core.errors import InputError
-from driftwalk.schema.check import require_kind
 from driftwalk.schema.shapes import moved_to_origin
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-Integers = npt.NDArray[np.int64]
-
-STEP: Final = np.array([(1, 0), (0, 1), (-1, 0), (0, -1)])
-"""From a cell to its neighbour at each face."""
 
 
 class ReplayedEvents(NamedTuple):
@@ -107,55 +100,6 @@ def replay_events(
     return replay.result()
 
 
-def class_at(assembly: xr.Dataset, time: npt.ArrayLike) -> npt.NDArray[np.int32]:
-    """Return the outcome class that runs had at earlier times.
-
-    Parameters
-    ----------
-    assembly : xarray.Dataset
-        Kind "assembly".
-    time : array_like
-        Times [s], 0 to the duration of the runs; an event at that very time has happened.
-
-    Returns
-    -------
-    numpy.ndarray of int32, shape (..., runs)
-        Indices into the coordinate ``class``, for each time and run. A run that ended early, as
-        one assembly, keeps its class; one without an outcome has -1.
-
-    Raises
-    ------
-    InputError
-        When the dataset is of another kind or a time is out of range.
-
-    Examples
-    --------
-    >>> class_at(runs, [0.0, 60.0, 300.0]).shape  # doctest: +SKIP
-    (3, 1000)
-    """
-    times = _checked_times(assembly, time)
-    names = [str(name) for name in assembly["class"].values]
-    apart = class_name(["1"] * assembly.sizes["block"])
-    rows = classes_at(assembly, times.ravel(), start=names.index(apart))
-    return rows.reshape(*times.shape, rows.shape[1])
-
-
-def classes_at(
-    assembly: xr.Dataset, times: npt.NDArray[np.float64], *, start: int
-) -> npt.NDArray[np.int32]:
-    """Return what `class_at` does for times in a row, unchecked: (time, run).
-
-    `start` is the index of the class in which every block is alone.
-    """
-    events = assembly["event_class"].values
-    begin = np.full((len(events), 1), start)
-    history = np.concatenate([begin, events], axis=1).astype(np.int32)
-    clock, run = assembly["event_time"].values, np.arange(len(events))
-    history[assembly["outcome"].values < 0] = -1
-    rows = [history[run, (clock <= moment).sum(axis=1)] for moment in times]
-    return np.array(rows, dtype=np.int32).reshape(len(times), len(events))
-
-
 class _Events(NamedTuple):
     number: Integers
     block: Integers
@@ -196,7 +140,7 @@ class _Replay:
             np.zeros((runs, blocks), dtype=np.int64),
             np.tile(np.arange(blocks), (runs, 1)),
         )
-        self.shapes, self.classes = _Names("1"), _Names(class_name(["1"] * blocks))
+        self.shapes, self.classes = _Names("1"), _Names(all_single(blocks))
         # The number of the shape at the lowest block of each assembly, -1 at the other blocks.
         self.shape_of = np.zeros((runs, blocks), dtype=np.int64)
         self.event_assembly = np.full((runs, slots, 2), -1, dtype=np.int32)
@@ -222,13 +166,9 @@ class _Replay:
         self.outcome[at] = self.event_class[at, event] = self._class_numbers(at)
 
     def result(self) -> ReplayedEvents:
-        listing: dict[str, Any] = {"chirality": self.chirality}
-        shapes = listed_shapes(self.shapes.known, self.blocks, **listing)
-        classes = listed_classes(self.classes.known, self.blocks, **listing)
-        shape_index, class_index = (
-            self.shapes.index_into(shapes),
-            self.classes.index_into(classes),
-        )
+        shapes = listed_shapes(self.shapes.known, self.blocks, chirality=self.chirality)
+        classes = listed_classes(self.classes.known, self.blocks, chirality=self.chirality)
+        shape_index, class_index = self.shapes.index_into(shapes), self.classes.index_into(classes)
         return ReplayedEvents(
             self.event_assembly,
             shape_index[self.event_shape],
@@ -247,11 +187,11 @@ class _Replay:
         turn = outward + 2 - face[:, 1] - quarter[row, moves]
         moved = labels == labels[row, moves][:, None]
         arm = rotate(cell - cell[row, moves][:, None], turn[:, None])
-        there = arm + (cell[row, stays] + STEP[outward])[:, None]
+        there = arm + (cell[row, stays] + np.array(STEPS)[outward])[:, None]
         self.lattice.cell[at] = np.where(moved[..., None], there, cell)
         self.lattice.quarter[at] = np.where(moved, (quarter + turn[:, None]) % 4, quarter)
 
-    def _shape_numbers(self, at: Integers, event: int, member: npt.NDArray[np.bool_]) -> Integers:
+    def _shape_numbers(self, at: Integers, event: int, member: Bools) -> Integers:
         """Return the numbers of the shapes that the members of each run make up."""
         cell, far = self.lattice.cell[at], 2 * self.blocks
         lowest = np.where(member[..., None], cell, cell.max(initial=0) + 1).min(axis=1)
@@ -332,16 +272,6 @@ def _from_lowest(lattice: _Lattice) -> tuple[Integers, Integers]:
     return rotate(lattice.cell - origin, -turned), (lattice.quarter - turned) % 4
 
 
-def _refuse(wrong: npt.NDArray[np.bool_], at: Integers, event: int, what: str) -> None:
+def _refuse(wrong: Bools, at: Integers, event: int, what: str) -> None:
     if wrong.any():
         raise InputError(f"run {at[int(np.argmax(wrong))]}, event {event}: {what}")
-
-
-def _checked_times(assembly: xr.Dataset, time: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    require_kind(assembly, "assembly", "assemble makes one")
-    times = np.asarray(time, dtype=np.float64)
-    last = float(assembly.attrs["duration_s"])
-    wrong = ~((times >= 0) & (times <= last))
-    if wrong.any():
-        raise InputError(f"time {times[wrong].flat[0]:g} s is outside the runs, 0 to {last:g} s")
-    return times

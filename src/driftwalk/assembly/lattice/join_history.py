@@ -1,15 +1,17 @@
-"""Join history of a recorded world: its states and events."""
+"""Join history of a recorded world: its states and events, and the lattice of its assemblies."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from driftwalk.assembly.lattice.joined_faces import Join
-from driftwalk.assembly.lattice.polyomino import Chirality
-from driftwalk.assembly.lattice.world import LatticeWorld, Partition
+from driftwalk.assembly.lattice.polyomino import STEPS, Chirality, name_of
+from driftwalk.assembly.outcomes.classes import class_name
+from driftwalk.schema.shapes import Cell, moved_to_origin
 
 
 class Event(NamedTuple):
@@ -60,8 +62,7 @@ class JoinHistory:
             self._tell_apart(sample, before, world)
             self.dropped.update(world.dropped)
             self.assembly[sample:following] = world.partition.labels
-            outcome = world.outcome(world.partition, chirality)
-            self.outcome += [outcome] * (following - sample)
+            self.outcome += [world.outcome(chirality)] * (following - sample)
 
     def _tell_apart(self, sample: int, before: LatticeWorld, after: LatticeWorld) -> None:
         """Add the events that lead from one world to the next."""
@@ -84,7 +85,7 @@ class JoinHistory:
         parts = Partition(common.labels)
         events = []
         for join in gone:
-            outcome = world.outcome(parts, self.chirality)
+            outcome = world.outcome(self.chirality, parts)
             if parts.unite(join.blocks):
                 events.append(Event(sample, join.blocks, join.faces, outcome))
         return events[::-1]
@@ -106,7 +107,109 @@ class JoinHistory:
                 sample,
                 (join.blocks[first], join.blocks[second]),
                 (join.faces[first], join.faces[second]),
-                world.outcome(parts, self.chirality),
+                world.outcome(self.chirality, parts),
                 (labels[first], labels[second]),
                 (shapes[first], shapes[second], became),
             )
+
+
+class Partition:
+    """Which blocks are together: the lowest block of each block's assembly."""
+
+    def __init__(self, labels: Iterable[int]) -> None:
+        self.labels = list(labels)
+
+    def unite(self, blocks: tuple[int, int]) -> bool:
+        """Make the assemblies of two blocks one; False when they are one already."""
+        one, other = (self.labels[block] for block in blocks)
+        low, high = min(one, other), max(one, other)
+        self.labels = [low if label == high else label for label in self.labels]
+        return low != high
+
+    def members(self, label: int) -> list[int]:
+        """Return the blocks of an assembly."""
+        return [block for block, own in enumerate(self.labels) if own == label]
+
+    def moves(self, blocks: tuple[int, int]) -> int:
+        """Return which of two blocks (0 or 1) is in the assembly that moves into line.
+
+        It is that with fewer blocks; of equal ones that whose lowest block is the higher.
+        """
+        labels = [self.labels[block] for block in blocks]
+        weights = [(-self.labels.count(label), label) for label in labels]
+        return weights.index(max(weights))
+
+
+class LatticeWorld:
+    """Blocks on the lattices of their assemblies.
+
+    Parameters
+    ----------
+    blocks : int
+        Number of blocks; at first each is alone.
+    joins : iterable of Join
+        Joins to apply; those that fit best count first, and one that contradicts them is dropped.
+    """
+
+    def __init__(self, blocks: int, joins: Iterable[Join] = ()) -> None:
+        self.partition = Partition(range(blocks))
+        self.cell: list[Cell] = [(0, 0)] * blocks
+        self.quarter = [0] * blocks
+        self.accepted: list[Join] = []
+        self.dropped: list[Join] = []
+        # The tightest joins first: they are the most certain.
+        for join in sorted(joins, key=lambda one: (one.looseness, one.blocks, one.start)):
+            fits = self.join(join.blocks, join.faces)
+            (self.accepted if fits else self.dropped).append(join)
+
+    @classmethod
+    def of(cls, state: dict[str, npt.NDArray[Any]]) -> LatticeWorld:
+        """Return the lattice of a world of the native core."""
+        labels = state["assembly"].tolist()
+        world = cls(len(labels))
+        world.partition, world.quarter = Partition(labels), state["quarter"].tolist()
+        world.cell = [(x, y) for x, y in state["cell"].tolist()]
+        return world
+
+    def shape(self, members: Sequence[int], chirality: Chirality) -> str:
+        """Name the shape of some blocks of one assembly."""
+        return name_of(moved_to_origin(tuple(self.cell[block] for block in members)), chirality)
+
+    def outcome(self, chirality: Chirality, parts: Partition | None = None) -> str:
+        """Name the outcome class of the blocks, parted as they are or as said."""
+        members: dict[int, list[int]] = {}
+        for block, label in enumerate((parts or self.partition).labels):
+            members.setdefault(label, []).append(block)
+        return class_name(self.shape(blocks, chirality) for blocks in members.values())
+
+    def join(self, blocks: tuple[int, int], faces: tuple[int, int]) -> bool:
+        """Join two faces; False when that contradicts the joins that there are."""
+        moving = self.partition.moves(blocks)
+        stays, moves = blocks[1 - moving], blocks[moving]
+        outward = (faces[1 - moving] + self.quarter[stays]) % 4
+        place = _sum(self.cell[stays], STEPS[outward])
+        turn = (outward + 2 - faces[moving] - self.quarter[moves]) % 4
+        label, other = (self.partition.labels[block] for block in (stays, moves))
+        if label == other:
+            return place == self.cell[moves] and turn == 0
+        moved = self.partition.members(other)
+        x, y = self.cell[moves]
+        cells = [
+            _sum(place, _turned((self.cell[block][0] - x, self.cell[block][1] - y), turn))
+            for block in moved
+        ]
+        if set(cells) & {self.cell[block] for block in self.partition.members(label)}:
+            return False
+        for block, cell in zip(moved, cells, strict=True):
+            self.cell[block] = cell
+            self.quarter[block] = (self.quarter[block] + turn) % 4
+        return self.partition.unite(blocks)
+
+
+def _sum(one: Cell, other: Cell) -> Cell:
+    return one[0] + other[0], one[1] + other[1]
+
+
+def _turned(cell: Cell, quarters: int) -> Cell:
+    x, y = cell
+    return ((x, y), (-y, x), (-x, -y), (y, -x))[quarters]

@@ -14,17 +14,34 @@ from itertools import combinations
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import ConfigurationError
-
-Floats = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
-Booleans = npt.NDArray[np.bool_]
 
 QUARTER: Final = math.pi / 2
 # Time stamps are decimal numbers: 0.8 - 0.3 must count as half a second.
 ROUNDING: Final = 1e-9
+
+
+class JoinPolicy(NamedTuple):
+    """When blocks of a recording are joined, unless stated otherwise."""
+
+    join_distance: float = 0.1
+    """Distance of faces that are joined, in sides; chosen by hand."""
+    looser: float = 2.0
+    """Tolerances to let go, in units of those to join; chosen by hand."""
+    min_duration_s: float = 0.5
+    """Shortest duration that counts [s]; chosen by hand."""
+    hold_s: float = 1.0
+    """Time for which a block that is not seen keeps its joins [s]; chosen by hand."""
+    frames_held: float = 3.0
+    """The same in frames, where they are so rare that it is longer; chosen by hand."""
+
+
+JOIN_POLICY: Final = JoinPolicy()
+
+JOIN_ANGLE: Final = math.radians(10.0)
+"""Default angle between faces that are joined [rad]; chosen by hand."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +74,28 @@ class JoinRules:
                 f"{math.degrees(self.release_angle):g} deg must come in this order, below 45 deg"
             )
 
+    @classmethod
+    def completed(
+        cls,
+        side: float,
+        join_distance: float | None,
+        join_angle: float,
+        release_distance: float | None,
+        release_angle: float | None,
+        min_duration: float,
+        hold: float,
+    ) -> JoinRules:
+        """Return criteria of which some are left out: those of `JOIN_POLICY` stand in for them."""
+        if join_distance is None:
+            join_distance = JOIN_POLICY.join_distance * side
+        if release_distance is None:
+            release_distance = JOIN_POLICY.looser * join_distance
+        if release_angle is None:
+            release_angle = JOIN_POLICY.looser * join_angle
+        return cls(
+            side, join_distance, join_angle, release_distance, release_angle, min_duration, hold
+        )
+
 
 class Join(NamedTuple):
     """Two faces that were joined for a while."""
@@ -83,7 +122,7 @@ class Poses(NamedTuple):
     theta: Floats
 
     @property
-    def seen(self) -> Booleans:
+    def seen(self) -> Bools:
         """Where the pose of a block is known."""
         return np.isfinite(self.x) & np.isfinite(self.y) & np.isfinite(self.theta)
 
@@ -134,7 +173,7 @@ class PairPoses(NamedTuple):
 
 
 def _joins_of_pair(
-    poses: Poses, blocks: tuple[int, int], both: Booleans, rules: JoinRules
+    poses: Poses, blocks: tuple[int, int], both: Bools, rules: JoinRules
 ) -> list[Join]:
     at = np.flatnonzero(both)
     i, j = blocks

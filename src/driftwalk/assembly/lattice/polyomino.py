@@ -24,6 +24,8 @@ Chirality = Literal["merged", "distinct"]
 LARGEST: Final = 10
 """Largest size of which all shapes are listed: there are 4655, and four times more per cell."""
 
+STEPS: Final = ((1, 0), (0, 1), (-1, 0), (0, -1))
+"""From a cell to its neighbour at each face."""
 _MIRRORED: Final = frozenset({"Z", "J"})
 # Cells before gaps, and wide shapes before narrow ones.
 _BY_CELLS: Final = str.maketrans("x/.", "012")
@@ -137,7 +139,7 @@ def polyominoes(size: int, *, chirality: Chirality = "merged") -> tuple[str, ...
         name_of(moved_to_origin((*cells, new)), chirality)
         for name in polyominoes(size - 1, chirality=chirality)
         for cells in [cells_of_shape(name)]
-        for new in _neighbours(cells)
+        for new in neighbours(cells)
     }
     return tuple(sorted(found, key=shape_order))
 
@@ -215,9 +217,9 @@ def _code(cells: Cells) -> str:
     return "/".join(map("".join, rows))
 
 
-def _neighbours(cells: Cells) -> set[Cell]:
-    around = {(x + dx, y + dy) for x, y in cells for dx, dy in ((1, 0), (0, 1), (-1, 0), (0, -1))}
-    return around - set(cells)
+def neighbours(cells: Cells) -> set[Cell]:
+    """Return the cells that share an edge with some cells and are none of them."""
+    return {(x + dx, y + dy) for x, y in cells for dx, dy in STEPS} - set(cells)
 
 
 def _is_connected(cells: Cells) -> bool:
@@ -226,5 +228,5 @@ def _is_connected(cells: Cells) -> bool:
         cell = ahead.pop()
         if cell in left:
             left.remove(cell)
-            ahead += _neighbours((cell,)) & left
+            ahead += neighbours((cell,)) & left
     return bool(cells) and not left

@@ -96,6 +96,11 @@ def class_name(shapes: Iterable[str]) -> str:
     return "+".join(sorted(shapes, key=lambda one: (-shape_size(one), shape_order(one))))
 
 
+def all_single(blocks: int) -> str:
+    """Name the class in which every block is alone."""
+    return "+".join(["1"] * blocks)
+
+
 def class_shapes(name: str) -> tuple[str, ...]:
     """Return the names of the shapes in a class, the largest first.
 

@@ -14,13 +14,13 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.outcomes.distribution import is_complete, sampling_variance
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.schema.check import build_dataset, require_kind
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Floats = npt.NDArray[np.float64]
 
 # Singular values below this part of the largest are rounding.
 RANK_TOLERANCE = 1e-9
@@ -97,11 +97,23 @@ def principal_components(
     score = np.full((len(table), found.ratio.size), np.nan)
     score[used] = found.score
     complete = table[used][:, is_complete([str(name) for name in proportion["class"].values])]
-    return _dataset(
-        proportion,
-        found,
-        score,
-        _correlation(found.score, complete.sum(axis=1)),
+    shape = (*proportion.shape[:-1], found.ratio.size)
+    return build_dataset(
+        "components",
+        {
+            "score": ((*proportion.dims[:-1], "component"), score.reshape(shape)),
+            "loading": (("class", "component"), found.loading),
+            "explained_variance_ratio": ("component", found.ratio),
+            "complete_correlation": (
+                "component",
+                _correlation(found.score, complete.sum(axis=1)),
+            ),
+            "mean": ("class", found.mean),
+        },
+        {
+            **{str(name): one for name, one in proportion.coords.items()},
+            "component": ("component", np.arange(1, found.ratio.size + 1)),
+        },
         {
             **attrs,
             "settings": int(used.sum()),
@@ -201,7 +213,9 @@ def _as_proportions(
             f"dimensions {given.dims}"
         )
     proportion = given.transpose(..., "class")
-    _check_range(proportion.values)
+    present = proportion.values[np.isfinite(proportion.values)]
+    if ((present < 0) | (present > 1 + RANK_TOLERANCE)).any():
+        raise InputError("proportions must lie between 0 and 1: divide counts by the runs")
     axes = proportion.dims[:-1]
     if runs is None:
         return proportion, np.full(math.prod(proportion.shape[:-1]), np.nan), attrs
@@ -221,12 +235,6 @@ def _named_array(values: Floats, classes: Sequence[str] | None) -> xr.DataArray:
     return xr.DataArray(
         values, dims=(*axes, "class"), coords={"class": np.array(names, dtype=object)}
     )
-
-
-def _check_range(values: Floats) -> None:
-    present = values[np.isfinite(values)]
-    if ((present < 0) | (present > 1 + RANK_TOLERANCE)).any():
-        raise InputError("proportions must lie between 0 and 1: divide counts by the runs")
 
 
 def _decompose(table: Floats, components: int | None) -> _Decomposition:
@@ -275,29 +283,3 @@ def _noise_variance(table: Floats, runs: Floats) -> float:
     if not (runs >= 2).all():
         return float("nan")
     return float(sampling_variance(np.minimum(table, 1.0), runs[:, None]).sum(axis=1).mean())
-
-
-def _dataset(
-    proportion: xr.DataArray,
-    found: _Decomposition,
-    score: Floats,
-    correlation: Floats,
-    attrs: dict[str, Any],
-) -> xr.Dataset:
-    axes = proportion.dims[:-1]
-    shape = (*proportion.shape[:-1], found.ratio.size)
-    return build_dataset(
-        "components",
-        {
-            "score": ((*axes, "component"), score.reshape(shape)),
-            "loading": (("class", "component"), found.loading),
-            "explained_variance_ratio": ("component", found.ratio),
-            "complete_correlation": ("component", correlation),
-            "mean": ("class", found.mean),
-        },
-        {
-            **{str(name): one for name, one in proportion.coords.items()},
-            "component": ("component", np.arange(1, found.ratio.size + 1)),
-        },
-        attrs,
-    )

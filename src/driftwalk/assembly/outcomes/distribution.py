@@ -12,17 +12,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.lattice.events import classes_at
 from driftwalk.assembly.lattice.polyomino import shape_size
-from driftwalk.assembly.outcomes.classes import class_shapes
+from driftwalk.assembly.outcomes.classes import all_single, class_shapes
+from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.schema.check import build_dataset, require_kind
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Floats = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 METHOD = "Clopper-Pearson, Bonferroni over the classes; `complete` on its own"
 NOT_COPIED = ("kind", "schema_version", "runs")
@@ -92,7 +90,7 @@ def outcome_distribution(
             outcome = assembly_or_counts["outcome"].values
             attrs["time_s"] = duration(assembly_or_counts)
         else:
-            outcome = outcomes_at(assembly_or_counts, time)
+            outcome = class_at(assembly_or_counts, time)
             attrs["time_s"] = float(time)
         attrs["left_out"] = int((outcome < 0).sum())
         count = np.bincount(outcome[outcome >= 0], minlength=len(names)).astype(np.int64)
@@ -104,50 +102,43 @@ def outcome_distribution(
     return _dataset(names, count, confidence, attrs)
 
 
-def outcomes_at(assembly: xr.Dataset, time: float) -> Integers:
-    """Return the outcome class of every run as it stood at a time.
-
-    That is the class after the last event at or before this time; before the first event all blocks
-    are single.
+def class_at(assembly: xr.Dataset, time: npt.ArrayLike) -> npt.NDArray[np.int32]:
+    """Return the outcome class that runs had at earlier times.
 
     Parameters
     ----------
     assembly : xarray.Dataset
-        An `assembly` dataset.
-    time : float
-        Time from the start of the runs [s], from 0 to their duration.
+        Kind "assembly".
+    time : array_like
+        Times [s], 0 to the duration of the runs; an event at that very time has happened.
 
     Returns
     -------
-    ndarray of int, shape (run,)
-        Indices into `class_names`; -1 for a run without an outcome.
+    numpy.ndarray of int32, shape (..., runs)
+        Indices into the coordinate ``class``, for each time and run. A run that ended early, as
+        one assembly, keeps its class; one without an outcome has -1.
 
     Raises
     ------
     InputError
-        When it is no `assembly` dataset or the time lies outside the runs.
+        When the dataset is of another kind or a time is out of range.
 
     Examples
     --------
-    >>> import xarray as xr
-    >>> two_blocks = xr.Dataset(
-    ...     {
-    ...         "event_time": (("run", "event"), [[20.0], [np.nan]]),
-    ...         "event_class": (("run", "event"), [[0], [-1]]),
-    ...         "outcome": ("run", [0, 1]),
-    ...     },
-    ...     coords={"class": ["2", "1+1"]},
-    ...     attrs={"kind": "assembly", "blocks": 2, "duration_s": 60.0},
-    ... )
-    >>> outcomes_at(two_blocks, 10.0).tolist(), outcomes_at(two_blocks, 20.0).tolist()
-    ([1, 1], [0, 1])
+    >>> class_at(runs, [0.0, 60.0, 300.0]).shape  # doctest: +SKIP
+    (3, 1000)
     """
     require_assembly(assembly, "outcome", "event_time", "event_class")
-    moment = np.array([time])
-    check_times(moment, duration(assembly))
-    start = class_names(assembly).index(all_single(assembly))
-    index: Integers = classes_at(assembly, moment, start=start)[0].astype(np.int64)
-    return index
+    times = np.asarray(time, dtype=np.float64)
+    check_times(times, duration(assembly))
+    events, clock = assembly["event_class"].values, assembly["event_time"].values
+    start = class_names(assembly).index(all_single(int(assembly.attrs["blocks"])))
+    begin = np.full((len(events), 1), start)
+    history = np.concatenate([begin, events], axis=1).astype(np.int32)
+    history[assembly["outcome"].values < 0] = -1
+    run = np.arange(len(events))
+    rows = [history[run, (clock <= moment).sum(axis=1)] for moment in times.flat]
+    return np.array(rows, dtype=np.int32).reshape(*times.shape, len(events))
 
 
 def proportion_interval(
@@ -233,16 +224,11 @@ def class_names(assembly: xr.Dataset) -> list[str]:
     then added at the end, where the order has it.
     """
     names = [str(name) for name in assembly["class"].values]
-    start = all_single(assembly)
+    start = all_single(int(assembly.attrs["blocks"]))
     return names if start in names else [*names, start]
 
 
-def all_single(assembly: xr.Dataset) -> str:
-    """Return the name of the class in which every block is alone."""
-    return "+".join(["1"] * int(assembly.attrs["blocks"]))
-
-
-def is_complete(names: list[str]) -> npt.NDArray[np.bool_]:
+def is_complete(names: list[str]) -> Bools:
     """Return which classes are one single assembly."""
     return np.array(["+" not in name for name in names], dtype=bool)
 
@@ -259,6 +245,14 @@ def require_assembly(dataset: xr.Dataset, *variables: str) -> None:
     missing += [name for name in ("blocks", "duration_s") if name not in dataset.attrs]
     if missing:
         raise InputError(f"not an assembly dataset: '{missing[0]}' is missing")
+
+
+def runs_with_outcome(assembly: xr.Dataset) -> Bools:
+    """Return which runs have an outcome; raise `InputError` when none has."""
+    sound: Bools = assembly["outcome"].values >= 0
+    if not sound.any():
+        raise InputError("there is no run with an outcome: at least one is needed")
+    return sound
 
 
 def check_times(time: Floats, longest: float) -> None:

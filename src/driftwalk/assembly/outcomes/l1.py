@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -16,9 +17,9 @@ if TYPE_CHECKING:
 
     Distribution: TypeAlias = xr.Dataset | xr.DataArray | Mapping[str, float] | npt.ArrayLike
 
-Floats = npt.NDArray[np.float64]
 
-ENTRIES_AT_ONCE = 1 << 22
+ENTRIES_AT_ONCE: Final = 1 << 22
+"""Random numbers of one draw: 32 MB."""
 
 
 class L1NoiseFloor(NamedTuple):
@@ -45,10 +46,7 @@ class PairwiseL1(NamedTuple):
     """Distance of every two, shape (n, n)."""
 
 
-def l1_distance(
-    a: Distribution,
-    b: Distribution,
-) -> float:
+def l1_distance(a: Distribution, b: Distribution) -> float:
     """Return the l1 distance between two distributions of outcomes (Eq. 5), from 0 to 2.
 
     The sum over the classes of ``|x_a - x_b|``. Half of it is the share of runs that would have to
@@ -80,9 +78,7 @@ def l1_distance(
     return float(np.abs(first - second).sum())
 
 
-def pairwise_l1(
-    distributions: Sequence[Distribution],
-) -> PairwiseL1:
+def pairwise_l1(distributions: Sequence[Distribution]) -> PairwiseL1:
     """Return the l1 distances between all pairs of several distributions.
 
     With realisations of one setting the mean is its noise floor as measured: the paper has 0.065
@@ -246,23 +242,18 @@ def l1_in_floors(
     if (n < 0).any():
         raise InputError("runs: a number of runs is negative")
     present = np.isfinite(p).all(axis=-1) & (n > 0)
-    floors = np.full(p.shape[:-1], np.nan)
-    floors[present] = _in_floors(p[present], known, n[present], reference_runs)
-    return floors
-
-
-def _in_floors(p: Floats, reference: Floats, runs: Floats, reference_runs: int | None) -> Floats:
-    """Return distances in floors of distributions that are all there, shape (setting, class)."""
-    distance = np.abs(p - reference).sum(axis=1)
+    p, n = p[present], n[present]
+    distance = np.abs(p - known).sum(axis=1)
     if reference_runs is None:
-        pooled, per_run = np.broadcast_to(reference, p.shape), 1.0 / runs
+        pooled, per_run = np.broadcast_to(known, p.shape), 1.0 / n
     else:
-        weight = (runs / (runs + reference_runs))[:, None]
-        pooled = weight * p + (1 - weight) * reference
-        per_run = 1.0 / runs + 1.0 / reference_runs
-    floor = _normal_mean(pooled, per_run)
+        weight = (n / (n + reference_runs))[:, None]
+        pooled = weight * p + (1 - weight) * known
+        per_run = 1.0 / n + 1.0 / reference_runs
+    floors = np.full(present.shape, np.nan)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(distance > 0, distance / floor, 0.0)
+        floors[present] = np.where(distance > 0, distance / _normal_mean(pooled, per_run), 0.0)
+    return floors
 
 
 def _normal_mean(p: Floats, per_run: Floats) -> Floats:
@@ -284,10 +275,7 @@ def _drawn_distances(p: Floats, runs_a: int, runs_b: int | None, samples: int, s
     return np.concatenate(parts)
 
 
-def _aligned(
-    a: Distribution,
-    b: Distribution,
-) -> tuple[Floats, Floats]:
+def _aligned(a: Distribution, b: Distribution) -> tuple[Floats, Floats]:
     """Return the proportions of two distributions over the same classes."""
     (names_a, first), (names_b, second) = _proportions(a), _proportions(b)
     if (names_a is None) != (names_b is None):
@@ -324,9 +312,7 @@ def _check_same_naming(a: object, b: object, names_a: list[str], names_b: list[s
         )
 
 
-def _proportions(
-    distribution: Distribution,
-) -> tuple[list[str] | None, Floats]:
+def _proportions(distribution: Distribution) -> tuple[list[str] | None, Floats]:
     """Return the class names, None for a plain array, and the proportions, checked."""
     import xarray as xr
 
@@ -342,19 +328,13 @@ def _proportions(
                 f"{distribution.dims}"
             )
         names = [str(name) for name in distribution["class"].values]
-        values = np.asarray(distribution.values, dtype=np.float64)
+        distribution = distribution.values
     elif isinstance(distribution, Mapping):
         names = [str(name) for name in distribution]
-        values = np.array(list(distribution.values()), dtype=np.float64)
-    else:
-        values = np.asarray(distribution, dtype=np.float64)
+        distribution = [float(share) for share in distribution.values()]
+    values = np.asarray(distribution, dtype=np.float64)
     if names is not None and len(set(names)) < len(names):
         raise InputError("a distribution names a class twice")
-    _check_proportions(values)
-    return names, values
-
-
-def _check_proportions(values: Floats) -> None:
     if values.ndim != 1 or values.size == 0:
         raise InputError(f"a distribution is a row of proportions, got shape {values.shape}")
     if not (np.isfinite(values) & (values >= 0)).all():
@@ -365,3 +345,4 @@ def _check_proportions(values: Floats) -> None:
             f"proportions must sum to 1, these sum to {values.sum():g}: divide counts by the "
             "number of runs"
         )
+    return names, values

@@ -15,29 +15,25 @@ from driftwalk.assembly.lattice.polyomino import shape_size
 from driftwalk.assembly.outcomes.classes import MOST_BLOCKS
 from driftwalk.assembly.outcomes.distribution import (
     NOT_COPIED,
-    Integers,
     check_confidence,
     duration,
     require_assembly,
+    runs_with_outcome,
 )
 from driftwalk.assembly.outcomes.survival import checked_times
-from driftwalk.core.errors import InputError
+from driftwalk.core.arrays import Floats, Integers
 from driftwalk.schema.check import build_dataset
 from driftwalk.schema.shapes import cells_of_shape
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Floats = npt.NDArray[np.float64]
 
 METHOD: Final = "Student's t over runs, each interval on its own"
 
 
 def assembly_sizes(
-    assembly: xr.Dataset,
-    *,
-    times: npt.ArrayLike | None = None,
-    confidence: float = 0.9,
+    assembly: xr.Dataset, *, times: npt.ArrayLike | None = None, confidence: float = 0.9
 ) -> xr.Dataset:
     """Return the sizes of the assemblies at the end of the runs, and how they grow.
 
@@ -102,10 +98,7 @@ def assembly_sizes(
     require_assembly(assembly, "outcome", "event_time", "event_shape", "shape")
     check_confidence(confidence)
     time = checked_times(times, duration(assembly))
-    sound = assembly["outcome"].values >= 0
-    runs = int(sound.sum())
-    if runs == 0:
-        raise InputError("there is no run with an outcome: sizes need at least one")
+    sound = runs_with_outcome(assembly)
     blocks = int(assembly.attrs["blocks"])
     shapes = [str(name) for name in assembly["shape"].values]
     size = np.array([shape_size(name) for name in shapes], dtype=np.int64)
@@ -138,7 +131,7 @@ def assembly_sizes(
             **{key: value for key, value in assembly.attrs.items() if key not in NOT_COPIED},
             **attrs,
             "compactness_runs": compact.size,
-            "runs": runs,
+            "runs": int(sound.sum()),
             "left_out": int((~sound).sum()),
             "confidence": confidence,
             "method": METHOD,

@@ -12,22 +12,22 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.assembly.outcomes.classes import all_single
 from driftwalk.assembly.outcomes.distribution import (
-    Integers,
-    all_single,
     check_times,
     class_names,
     duration,
     proportion_interval,
     require_assembly,
+    runs_with_outcome,
 )
+from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Floats = npt.NDArray[np.float64]
 
 EVENTS = ("first_contact", "completion")
 
@@ -48,10 +48,7 @@ class SurvivalCurve(NamedTuple):
 
 
 def class_times(
-    assembly: xr.Dataset,
-    *,
-    times: npt.ArrayLike | None = None,
-    confidence: float = 0.9,
+    assembly: xr.Dataset, *, times: npt.ArrayLike | None = None, confidence: float = 0.9
 ) -> xr.Dataset:
     """Return how the outcome classes, first contact and completion develop over time.
 
@@ -107,25 +104,19 @@ def class_times(
     )
     time = checked_times(times, duration(assembly))
     names = class_names(assembly)
-    sound = assembly["outcome"].values >= 0
     # Runs that failed have no outcome and count neither as events nor as censored.
+    sound = runs_with_outcome(assembly)
     runs = int(sound.sum())
-    if runs == 0:
-        raise InputError("there is no run with an outcome: times need at least one")
     count = class_counts(
         assembly["event_time"].values[sound],
         assembly["event_class"].values[sound],
-        start=names.index(all_single(assembly)),
+        start=names.index(all_single(int(assembly.attrs["blocks"]))),
         time=time,
         classes=len(names),
     )
     low, high = proportion_interval(count, runs, confidence=confidence)
-    by_class = ("time", "class")
-    data: dict[str, Any] = {
-        "proportion": (by_class, count / runs),
-        "proportion_low": (by_class, low),
-        "proportion_high": (by_class, high),
-    }
+    shares = {"proportion": count / runs, "proportion_low": low, "proportion_high": high}
+    data: dict[str, Any] = {name: (("time", "class"), share) for name, share in shares.items()}
     attrs: dict[str, Any] = {}
     end_time = assembly["end_time"].values[sound]
     for event in EVENTS:
@@ -142,10 +133,10 @@ def class_times(
             f"{event}_median_low_s": curve.median_low,
             f"{event}_median_high_s": curve.median_high,
         }
-    return _dataset(
+    return build_dataset(
+        "class_times",
         data,
-        time,
-        names,
+        {"time": ("time", time), "class": ("class", np.array(names, dtype=object))},
         {
             **assembly.attrs,
             **attrs,
@@ -301,14 +292,3 @@ def checked_times(times: npt.ArrayLike | None, longest: float) -> Floats:
         raise InputError("times: expected a row of increasing numbers")
     check_times(time, longest)
     return time
-
-
-def _dataset(
-    data: dict[str, Any], time: Floats, names: list[str], attrs: dict[str, Any]
-) -> xr.Dataset:
-    return build_dataset(
-        "class_times",
-        data,
-        {"time": ("time", time), "class": ("class", np.array(names, dtype=object))},
-        attrs,
-    )

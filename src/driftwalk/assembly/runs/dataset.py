@@ -1,6 +1,6 @@
-"""Build the `assembly` dataset from the runs of the native core.
+"""Build the datasets of the runs of the native core: `assembly`, `assembly_path`, a recording.
 
-Dimensions ``run``, ``event`` (one less than there are blocks, at least one), ``side`` (of the
+Of `assembly`: dimensions ``run``, ``event`` (one less than blocks, at least one), ``side`` (of the
 assembly that stayed, of the one that was moved), ``part`` (stayed, moved, became), ``block``,
 ``axis``; coordinates ``class`` (outcome classes) and ``shape`` (polyominoes). Indices of what
 is not there are -1, its times NaN.
@@ -14,7 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.lattice.events import ReplayedEvents, replay_events
-from driftwalk.schema.check import build_dataset
+from driftwalk.core.arrays import Floats
+from driftwalk.core.errors import InputError
+from driftwalk.core.files.shards import Arrays
+from driftwalk.schema.check import build_dataset, require_kind
 from driftwalk.schema.trajectory import POSE
 from driftwalk.simulation.backend import BROKEN
 from driftwalk.simulation.series import series_facts
@@ -24,8 +27,6 @@ if TYPE_CHECKING:
 
     from driftwalk.assembly.runs.plan import Plan
 
-Arrays = dict[str, npt.NDArray[Any]]
-Floats = npt.NDArray[np.float64]
 
 LAW_NAMES: Final = {
     "linear_drag_kg_s": "linear_drag",
@@ -50,22 +51,36 @@ def build_assembly(plan: Plan, arrays: Arrays, *, attrs: dict[str, Any]) -> xr.D
         Further attributes.
     """
     study = plan.study
-    replayed = replay_events(
-        *(arrays[f"event_{name}"] for name in ("count", "block", "face")),
-        **{name: arrays[name] for name in ("cell", "quarter", "assembly")},
-        chirality=study.assembly.chirality,
-    )
+    replayed = replay_of(plan, arrays)
     broken = (arrays["status"].astype(np.int64) & BROKEN) != 0
     outcome = np.where(broken, np.int32(-1), replayed.outcome)
+    by_event, by_side, by_block = ("run", "event"), ("run", "event", "side"), ("run", "block")
+    whole = {name: array.astype(np.int32) for name, array in arrays.items() if "pose" not in name}
     step = study.time_step_s
     data: dict[str, Any] = {
-        **_events(arrays, replayed, step),
-        **_times(arrays, step),
-        **_poses(arrays),
-        **_parameters(plan),
-        "outcome": ("run", outcome),
-        "status": ("run", arrays["status"].astype(np.int32)),
+        "event_count": ("run", whole["event_count"]),
+        "event_time": (by_event, times_of(whole["event_step"], time_step=step)),
+        "event_block": (by_side, whole["event_block"]),
+        "event_face": (by_side, whole["event_face"]),
+        "event_assembly": (by_side, replayed.event_assembly),
+        "event_shape": ((*by_event, "part"), replayed.event_shape),
+        "event_class": (by_event, replayed.event_class),
+        "first_contact_time": ("run", times_of(whole["first_contact_step"], time_step=step)),
+        "completion_time": ("run", times_of(completion_step(arrays), time_step=step)),
+        "end_time": ("run", times_of(whole["end_step"], time_step=step)),
+        **_poses(arrays["pose"], by_block),
+        "cell": ((*by_block, "axis"), whole["cell"]),
+        "quarter": (by_block, whole["quarter"]),
+        "assembly": (by_block, whole["assembly"]),
+        "drag_coefficient": ("run", plan.drag_coefficient),
+        "force_std": ("run", plan.force_std),
     }
+    if plan.flow_draw is not None:
+        data["flow_draw"] = ("run", plan.flow_draw.astype(np.int32))
+    if plan.flow_start is not None:
+        data["flow_start"] = ("run", plan.flow_start)
+    data |= {LAW_NAMES[key]: ("run", values) for key, values in plan.law.items()}
+    data |= {"outcome": ("run", outcome), "status": ("run", whole["status"])}
     return build_dataset(
         "assembly",
         data,
@@ -76,6 +91,15 @@ def build_assembly(plan: Plan, arrays: Arrays, *, attrs: dict[str, Any]) -> xr.D
             "shape": ("shape", np.array(replayed.shapes, dtype=object)),
         },
         {**assembly_attrs(plan), **attrs},
+    )
+
+
+def replay_of(plan: Plan, arrays: Arrays) -> ReplayedEvents:
+    """Return what the events of runs of the native core did on the lattice."""
+    return replay_events(
+        *(arrays[f"event_{name}"] for name in ("count", "block", "face")),
+        **{name: arrays[name] for name in ("cell", "quarter", "assembly")},
+        chirality=plan.study.assembly.chirality,
     )
 
 
@@ -94,13 +118,10 @@ def build_path(plan: Plan, samples: Arrays, *, every: int) -> xr.Dataset:
     dims = ("run", "time", "block")
     pose, step = samples["sample_pose"], plan.study.time_step_s
     time = times_of(np.arange(pose.shape[1]) * every, time_step=step)
-    data: dict[str, Any] = {
-        name: (dims, np.ascontiguousarray(pose[..., part])) for part, name in enumerate(POSE)
-    }
-    data["assembly"] = (dims, samples["sample_assembly"].astype(np.int32))
+    assembly = samples["sample_assembly"].astype(np.int32)
     return build_dataset(
         "assembly_path",
-        data,
+        {**_poses(pose, dims), "assembly": (dims, assembly)},
         {
             "run": ("run", plan.index),
             "time": ("time", time),
@@ -169,48 +190,64 @@ def times_of(step: npt.NDArray[Any], *, time_step: float) -> Floats:
     return np.where(step < 0, np.nan, np.round(step * time_step, DECIMALS))
 
 
-def _events(arrays: Arrays, replayed: ReplayedEvents, step: float) -> dict[str, Any]:
-    sides = ("run", "event", "side")
-    return {
-        "event_count": ("run", arrays["event_count"].astype(np.int32)),
-        "event_time": (("run", "event"), times_of(arrays["event_step"], time_step=step)),
-        "event_block": (sides, arrays["event_block"].astype(np.int32)),
-        "event_face": (sides, arrays["event_face"].astype(np.int32)),
-        "event_assembly": (sides, replayed.event_assembly),
-        "event_shape": (("run", "event", "part"), replayed.event_shape),
-        "event_class": (("run", "event"), replayed.event_class),
-    }
+def _poses(pose: Floats, dims: tuple[str, ...]) -> dict[str, Any]:
+    """Return poses as variables: x, y, theta."""
+    return {name: (dims, np.ascontiguousarray(pose[..., i])) for i, name in enumerate(POSE)}
 
 
-def _times(arrays: Arrays, step: float) -> dict[str, Any]:
-    known = {
-        "first_contact_time": arrays["first_contact_step"],
-        "completion_time": completion_step(arrays),
-        "end_time": arrays["end_step"],
-    }
-    return {name: ("run", times_of(steps, time_step=step)) for name, steps in known.items()}
+def path_recording(path: xr.Dataset, *, run: int = 0) -> xr.Dataset:
+    """Return one simulated run as a recording of all its blocks.
 
+    Functions that read recordings can then be tried on motion whose events are known: `classify`
+    above all.
 
-def _poses(arrays: Arrays) -> dict[str, Any]:
-    dims = ("run", "block")
-    return {
-        **{
-            name: (dims, np.ascontiguousarray(arrays["pose"][..., part]))
-            for part, name in enumerate(POSE)
+    Parameters
+    ----------
+    path : xarray.Dataset
+        An `assembly_path`.
+    run : int
+        The run's index, as in its coordinate ``run``.
+
+    Returns
+    -------
+    xarray.Dataset
+        A `trajectory`: ``x``, ``y`` [m], ``theta`` [rad] on (time, body), bodies named by their
+        index.
+
+    Raises
+    ------
+    InputError
+        When the dataset is of another kind, or has no such run.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> still = dw.uniform_flow(0.0, 0.0)
+    >>> path = dw.assembly_path(dw.Study(), still, blocks=2, duration=1.0)
+    >>> dw.classify(dw.path_recording(path), side=0.03)["outcome"].sizes["time"]
+    11
+    """
+    from driftwalk.schema import build_trajectory
+
+    require_kind(path, "assembly_path", "assembly_path makes one")
+    runs = path["run"].values.tolist()
+    if run not in runs:
+        raise InputError(f"there is no run {run}: the path holds {', '.join(map(str, runs))}")
+    one = path.sel(run=run)
+    x, y, theta = (
+        np.asarray(one[name].transpose("time", "block").values, dtype=np.float64)
+        for name in ("x", "y", "theta")
+    )
+    return build_trajectory(
+        one["time"].values,
+        x,
+        y,
+        theta,
+        body=[str(block) for block in one["block"].values],
+        attrs={
+            "source": f"simulated run {run}",
+            "format": "driftwalk",
+            "arena": path.attrs["arena"],
+            "sample_rate_Hz": 1.0 / float(path.attrs["sample_interval_s"]),
         },
-        "cell": ((*dims, "axis"), arrays["cell"].astype(np.int32)),
-        "quarter": (dims, arrays["quarter"].astype(np.int32)),
-        "assembly": (dims, arrays["assembly"].astype(np.int32)),
-    }
-
-
-def _parameters(plan: Plan) -> dict[str, Any]:
-    known: dict[str, Any] = {
-        "drag_coefficient": ("run", plan.drag_coefficient),
-        "force_std": ("run", plan.force_std),
-    }
-    if plan.flow_draw is not None:
-        known["flow_draw"] = ("run", plan.flow_draw.astype(np.int32))
-    if plan.flow_start is not None:
-        known["flow_start"] = ("run", plan.flow_start)
-    return known | {LAW_NAMES[key]: ("run", values) for key, values in plan.law.items()}
+    )

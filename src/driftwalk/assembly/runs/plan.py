@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
-from driftwalk.assembly.runs.cover import require_cover
-from driftwalk.assembly.runs.start import given_start, place_blocks, require_room
+from driftwalk.assembly.runs.start import given_start, place_blocks, require_cover, require_room
+from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
+from driftwalk.core.files.shards import Arrays
 from driftwalk.core.processors import default_threads
 from driftwalk.core.random_streams import trial_in
 from driftwalk.core.seeds import world_keys
@@ -26,11 +27,9 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 Backend = Literal["cpu", "reference"]
-Arrays = dict[str, npt.NDArray[Any]]
-Floats = npt.NDArray[np.float64]
-Indices = npt.NDArray[np.int64]
 
 MOST_STEPS: Final = 2**31 - 1
+"""The native core counts steps in 32 bits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,24 +40,36 @@ class Plan:
     flow: xr.Dataset
     steps: int
     trial: int
-    index: Indices
+    index: Integers
     keys: npt.NDArray[np.uint64]
     drag_coefficient: Floats
     force_std: Floats
-    flow_start: Floats | None
-    """When each run begins in a flow that changes [s]; None: the flow is steady."""
-    flow_draw: Indices | None
-    """Which drawn flow a run has; None: the flow as it is."""
-    flow_correlated_over: float | None
-    """Distance over which the errors of a drawn flow go together [m]; None: each node alone."""
-    law: Mapping[str, Floats]
-    """Drawn numbers of the force law by their keys in [forces]; the study has the others."""
     threads: int
     backend: Backend
+    flow_start: Floats | None
+    """When each run begins in a flow that changes [s]; None: the flow is steady."""
+    flow_draw: Integers | None = None
+    """Which drawn flow a run has; None: the flow as it is."""
+    flow_correlated_over: float | None = None
+    """Distance over which the errors of a drawn flow go together [m]; None: each node alone."""
+    law: Mapping[str, Floats] = field(default_factory=dict)
+    """Drawn numbers of the force law by their keys in [forces]; the study has the others."""
 
-    def model(self, flow: xr.Dataset) -> _core.Model:
-        """Return the native core's form of the model in one flow."""
-        return native_model(self.study, flow, np.zeros(1), Camera())
+    def model(self) -> _core.Model:
+        """Return the native core's form of the model in this flow."""
+        return native_model(self.study, self.flow, np.zeros(1), Camera())
+
+    def rules(self) -> dict[str, Any]:
+        """Return how blocks collide and latch, by the names of the native core."""
+        rules = self.study.assembly
+        return {
+            "latching": rules.latching,
+            "connector_distance": rules.connector_distance_m,
+            "connector_axis": rules.connector_axis_rad,
+            "hidden_face_drag": rules.hidden_face_drag,
+            "block_restitution": rules.block_restitution,
+            "block_friction": rules.block_friction,
+        }
 
 
 def make_plan(
@@ -66,7 +77,7 @@ def make_plan(
     flow: xr.Dataset,
     *,
     settings: dict[str, Any],
-    index: Indices | None = None,
+    index: Integers | None = None,
     drag_coefficient: npt.ArrayLike | None = None,
     force_std: npt.ArrayLike | None = None,
     trial: int = 0,
@@ -122,12 +133,9 @@ def make_plan(
             "drag_coefficient", drag_coefficient, forces.drag_coefficient, runs.size
         ),
         force_std=_of_each("force_std", force_std, forces.force_std_N, runs.size),
-        flow_start=flow_starts(flow, chosen, keys, duration=lasts),
-        flow_draw=None,
-        flow_correlated_over=None,
-        law={},
         threads=threads or default_threads(),
         backend=backend,
+        flow_start=flow_starts(flow, chosen, keys, duration=lasts),
     )
 
 
@@ -153,27 +161,21 @@ def start_poses(plan: Plan, start: npt.ArrayLike | None = None) -> Floats:
     """Return the start poses of all runs: the given ones, or random ones that do not overlap."""
     if start is not None:
         return given_start(plan.study, start, runs=plan.index.size)
-    return place_blocks(plan.study, plan.model(plan.flow), plan.keys, threads=plan.threads)
+    return place_blocks(plan.study, plan.model(), plan.keys, threads=plan.threads)
 
 
 def simulate_rows(
-    plan: Plan, start: Floats, rows: slice, flow: xr.Dataset, *, sample_every: int = 0
+    plan: Plan, start: Floats, rows: slice = slice(None), *, sample_every: int = 0
 ) -> Arrays:
-    """Simulate some of the runs in one flow; one entry per run in every array."""
-    rules = plan.study.assembly
+    """Simulate some of the runs; one entry per run in every array."""
     found = _core.assemble(
-        plan.model(flow),
+        plan.model(),
         start=np.ascontiguousarray(start[rows]),
         key=np.ascontiguousarray(plan.keys[rows]),
         drag_coefficient=np.ascontiguousarray(plan.drag_coefficient[rows]),
         force_std=np.ascontiguousarray(plan.force_std[rows]),
         steps=plan.steps,
-        latching=rules.latching,
-        connector_distance=rules.connector_distance_m,
-        connector_axis=rules.connector_axis_rad,
-        hidden_face_drag=rules.hidden_face_drag,
-        block_restitution=rules.block_restitution,
-        block_friction=rules.block_friction,
+        **plan.rules(),
         sample_every=sample_every,
         threads=plan.threads,
         precision="double" if plan.backend == "reference" else "single",

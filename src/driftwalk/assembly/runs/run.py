@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final, Literal, get_args
 
@@ -12,28 +13,19 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.runs.dataset import LAW_NAMES, build_assembly, build_path
-from driftwalk.assembly.runs.drawn_flow import RUNS_PER_FLOW, draw_flow, has_standard_error
-from driftwalk.assembly.runs.parameters import draw_parameters
-from driftwalk.assembly.runs.plan import (
-    Arrays,
-    Backend,
-    Floats,
-    Plan,
-    make_plan,
-    simulate_rows,
-    start_poses,
+from driftwalk.assembly.runs.draws import (
+    RUNS_PER_FLOW,
+    draw_flow,
+    draw_parameters,
+    draw_posterior,
+    has_standard_error,
 )
-from driftwalk.assembly.runs.posterior import draw_posterior
+from driftwalk.assembly.runs.plan import Backend, Plan, make_plan, simulate_rows, start_poses
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
+from driftwalk.core.files.shards import Arrays
 from driftwalk.schema.check import kind_name
-from driftwalk.sweep import (
-    Store,
-    WorkUnit,
-    grid,
-    run_sweep,
-    settings_per_unit,
-    threads_of_unit,
-)
+from driftwalk.sweep import Store, WorkUnit, grid, run_sweep, settings_per_unit, threads_of_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -288,18 +280,12 @@ def assembly_path(
     if not sample_interval > 0:
         raise InputError(f"sample_interval must be above 0 s, got {sample_interval}")
     every = min(max(round(sample_interval / plan.study.time_step_s), 1), plan.steps)
-    found = simulate_rows(
-        plan, start_poses(plan, start), slice(None), plan.flow, sample_every=every
-    )
+    found = simulate_rows(plan, start_poses(plan, start), sample_every=every)
     return build_path(plan, found, every=every)
 
 
 def check_assembly(
-    study: Study,
-    flow: xr.Dataset,
-    *,
-    trial: int = 0,
-    threads: int | None = None,
+    study: Study, flow: xr.Dataset, *, trial: int = 0, threads: int | None = None
 ) -> None:
     """Raise the errors that `assemble` would raise, before any run is simulated.
 
@@ -338,25 +324,17 @@ def _run(
 ) -> xr.Dataset:
     """Simulate the runs unit by unit, and put them into one dataset."""
     units = grid(run=plan.index).units(runs_per_unit(plan))
-    function = _Runs(plan, start_poses(plan, start))
+    function = partial(_simulate_unit, plan, start_poses(plan, start))
     arrays = run_sweep(function, units, store=store, executor=executor, progress=progress)
     return build_assembly(plan, arrays, attrs={"drawn": drawn})
 
 
-@dataclass(frozen=True, eq=False)
-class _Runs:
-    """The function of the sweep: the runs of a unit, simulated by a worker."""
-
-    plan: Plan
-    poses: Floats
-    """At the start, shape (runs, blocks, 3)."""
-
-    def __call__(self, unit: WorkUnit) -> Arrays:
-        parts = [
-            simulate_rows(plan, self.poses, rows, plan.flow)
-            for rows, plan in _by_draw(self.plan, unit.start, unit.stop)
-        ]
-        return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+def _simulate_unit(plan: Plan, poses: Floats, unit: WorkUnit) -> Arrays:
+    """Return the runs of a unit, simulated by a worker; `poses` are those at the start."""
+    parts = [
+        simulate_rows(drawn, poses, rows) for rows, drawn in _by_draw(plan, unit.start, unit.stop)
+    ]
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 def runs_per_unit(plan: Plan) -> int:
@@ -384,12 +362,11 @@ def _drawn(plan: Plan, row: int) -> Plan:
     law = {f"forces.{key}": float(values[row]) for key, values in plan.law.items()}
     study, flow = apply_overrides(plan.study, law) if law else plan.study, plan.flow
     if plan.flow_draw is not None:
-        draw, seed = int(plan.flow_draw[row]), plan.study.assembly.seed
         flow = draw_flow(
             plan.flow,
-            seed=seed,
+            seed=plan.study.assembly.seed,
             trial=plan.trial,
-            draw=draw,
+            draw=int(plan.flow_draw[row]),
             correlated_over=plan.flow_correlated_over,
         )
     return replace(plan, study=study, flow=flow)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -12,21 +11,18 @@ from driftwalk.assembly.outcomes.classes import listed_classes, sort_classes
 from driftwalk.assembly.outcomes.distribution import is_complete, outcome_distribution
 from driftwalk.assembly.outcomes.l1 import l1_in_floors, l1_noise_floor, pairwise_l1
 from driftwalk.assembly.runs.dataset import assembly_attrs
-from driftwalk.assembly.sensitivity.axes import Axes
-from driftwalk.assembly.sensitivity.settings import Outcomes, Settings
+from driftwalk.assembly.sensitivity.settings import Axes, Outcomes, Settings
 from driftwalk.assembly.sensitivity.times import map_courses, reference_courses
 from driftwalk.core.errors import InputError
 from driftwalk.core.text.json_text import parse_json
 from driftwalk.schema.check import build_dataset, described
-from driftwalk.schema.kinds.flow_series import FLOW_SERIES
+from driftwalk.schema.kinds.flow import FLOW_SERIES
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.assembly.runs.plan import Plan
 
-Floats = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 
 NOT_COMMON: Final[dict[str, tuple[str, ...]]] = {
     "tank_diameter": ("arena",),
@@ -44,9 +40,8 @@ NOT_COMMON: Final[dict[str, tuple[str, ...]]] = {
 def reference_dataset(plan: Plan, outcomes: Outcomes) -> xr.Dataset:
     """Return the `outcome_distribution` of all realisations, with that of each."""
     assembly = plan.study.assembly
-    occurred = {name for count in outcomes.count for name in count}
-    names = listed_classes(occurred, assembly.blocks, chirality=assembly.chirality)
-    count = count_table(outcomes.count, names)
+    names = listed_classes(outcomes.occurred(), assembly.blocks, chirality=assembly.chirality)
+    count = outcomes.table(names)
     runs = count.sum(axis=1)
     if not runs.all():
         raise InputError(
@@ -82,14 +77,20 @@ def map_dataset(
 ) -> xr.Dataset:
     """Return the `sensitivity` dataset of a map."""
     names = _map_classes(settings, outcomes, reference)
-    count = count_table(outcomes.count, names)
+    count = outcomes.table(names)
     runs = count.sum(axis=1)
     with np.errstate(invalid="ignore"):
         share = count / runs[:, None]
         # Whole numbers first: shares that are rounded one by one do not add up to 1.
         complete = count[:, is_complete(list(names))].sum(axis=1) / runs
     known = reference.reindex({"class": list(names)}, fill_value=0.0)["proportion"].values
-    distance, in_floors = _distances(settings, share, runs, known, reference)
+    blocks = np.array([world.study.assembly.blocks for world in settings.worlds])[settings.world]
+    reference_runs = int(reference.attrs["runs"])
+    # Outcomes of other numbers of blocks have no class in common: there is nothing to compare.
+    same = blocks == int(reference.attrs["blocks"])
+    distance = np.abs(share - known).sum(axis=1)
+    in_floors = l1_in_floors(share, known, runs=runs, reference_runs=reference_runs)
+    floor = l1_noise_floor(reference, axes.study.sensitivity.runs, reference_runs)
     dims = tuple(axes.values)
     sizes = dict(zip(dims, axes.shape, strict=True))
     courses, times = map_courses(settings.worlds[0], outcomes.courses, reference, dims=sizes)
@@ -99,8 +100,8 @@ def map_dataset(
         "complete": complete,
         "first_contact_median": outcomes.first_contact_median,
         "completion_median": outcomes.completion_median,
-        "l1_distance": distance,
-        "l1_in_floors": in_floors,
+        "l1_distance": np.where(same, distance, np.nan),
+        "l1_in_floors": np.where(same, in_floors, np.nan),
         "trial": settings.trial,
     }
     of_class = {"count": count, "proportion": share}
@@ -123,7 +124,8 @@ def map_dataset(
         {
             **_common_attrs(axes, settings.worlds[0]),
             **_reference_attrs(reference),
-            **_floor(reference, axes.study.sensitivity.runs),
+            "noise_floor_mean": floor.mean,
+            "noise_floor_95": floor.quantile,
         },
     )
 
@@ -137,36 +139,13 @@ def _map_classes(settings: Settings, outcomes: Outcomes, reference: xr.Dataset) 
             f"the reference counts mirror images differently (chirality '{other}', the study has "
             f"'{first.chirality}'): make both in the same way"
         )
-    occurred = [name for count in outcomes.count for name in count]
     listed = [
         name
         for blocks in {world.study.assembly.blocks for world in settings.worlds}
         # Beyond 8 blocks those that occurred are all there is to list.
         for name in listed_classes((), blocks, chirality=first.chirality)
     ]
-    return sort_classes([*listed, *occurred, *map(str, reference["class"].values)])
-
-
-def count_table(counts: Sequence[Mapping[str, int]], names: Sequence[str]) -> Integers:
-    """Return the numbers of runs by setting and class, shape (setting, class)."""
-    return np.array([[count.get(name, 0) for name in names] for count in counts], dtype=np.int64)
-
-
-def _distances(
-    settings: Settings, share: Floats, runs: Integers, known: Floats, reference: xr.Dataset
-) -> tuple[Floats, Floats]:
-    """Return l1 distances to the reference, plain and in floors; NaN where blocks differ."""
-    blocks = np.array([world.study.assembly.blocks for world in settings.worlds])[settings.world]
-    # Outcomes of other numbers of blocks have no class in common: there is nothing to compare.
-    same = blocks == int(reference.attrs["blocks"])
-    distance = np.where(same, np.abs(share - known).sum(axis=1), np.nan)
-    floors = l1_in_floors(share, known, runs=runs, reference_runs=int(reference.attrs["runs"]))
-    return distance, np.where(same, floors, np.nan)
-
-
-def _floor(reference: xr.Dataset, runs: int) -> dict[str, float]:
-    floor = l1_noise_floor(reference, runs, int(reference.attrs["runs"]))
-    return {"noise_floor_mean": floor.mean, "noise_floor_95": floor.quantile}
+    return sort_classes([*listed, *outcomes.occurred(), *map(str, reference["class"].values)])
 
 
 def _common_attrs(axes: Axes, plan: Plan) -> dict[str, Any]:

@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from driftwalk.assembly.sensitivity.axes import Axes, make_axes
 from driftwalk.assembly.sensitivity.dataset import map_dataset, reference_dataset
 from driftwalk.assembly.sensitivity.settings import (
     FIRST_TRIALS,
+    Axes,
     Progress,
     Settings,
+    make_axes,
+    make_settings,
     place_first,
     simulate_settings,
     world_plan,
@@ -200,11 +202,6 @@ def _map_settings(axes: Axes, flow: xr.Dataset, threads: int | None) -> Settings
 
 
 def _reference_settings(study: Study, flow: xr.Dataset, threads: int | None) -> Settings:
-    number, forces = study.sensitivity.reference_realisations, study.forces
-    return Settings(
-        worlds=[world_plan(study, flow, threads=threads)],
-        world=np.zeros(number, dtype=np.int64),
-        drag_coefficient=np.full(number, forces.drag_coefficient),
-        force_std=np.full(number, forces.force_std_N),
-        trial=FIRST_TRIALS.reference + np.arange(number),
-    )
+    worlds = [world_plan(study, flow, threads=threads)]
+    world = np.zeros(study.sensitivity.reference_realisations, dtype=np.int64)
+    return make_settings(worlds, world, first_trial=FIRST_TRIALS.reference)

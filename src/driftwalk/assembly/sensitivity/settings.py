@@ -1,4 +1,4 @@
-"""Outcomes of many settings, each of many runs: the engine under a sensitivity analysis.
+"""Settings of a sensitivity analysis, from its axes, and the outcomes of their runs.
 
 Every setting has its own random numbers, by its trial: what comes out depends neither on the
 order of the settings nor on how they are cut into work units.
@@ -7,23 +7,25 @@ order of the settings nor on how they are cut into work units.
 from __future__ import annotations
 
 import json
+import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import product
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.lattice.events import replay_events
-from driftwalk.assembly.runs.dataset import completion_step, times_of
-from driftwalk.assembly.runs.plan import Arrays, Plan, make_plan, simulate_rows, stream_keys
+from driftwalk.assembly.runs.dataset import completion_step, replay_of, times_of
+from driftwalk.assembly.runs.plan import Plan, make_plan, simulate_rows, stream_keys
 from driftwalk.assembly.runs.start import place_blocks
 from driftwalk.assembly.sensitivity.times import Courses, added, courses_of, courses_to_text
-from driftwalk.core.errors import DriftwalkError
-from driftwalk.core.files.shards import Unit, UnitT
+from driftwalk.core.arrays import Floats, Integers
+from driftwalk.core.errors import ConfigurationError, DriftwalkError, InputError
+from driftwalk.core.files.shards import Arrays, Unit, UnitT
 from driftwalk.simulation.backend import BROKEN
 from driftwalk.simulation.series import flow_starts
 from driftwalk.sweep import (
@@ -41,12 +43,7 @@ if TYPE_CHECKING:
 
     from driftwalk.model import Study
 
-Floats = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 Progress = Callable[[int, int], None]
-
-NUMBERS: Final = ("left_out", "first_contact_median", "completion_median")
-"""Variables with one number per setting."""
 
 
 class TrialPolicy(NamedTuple):
@@ -92,10 +89,23 @@ class Settings:
         """Number of settings."""
         return self.trial.size
 
-    def per_unit(self) -> int:
-        """Return the settings of a work unit."""
-        longest = max(w.index.size * w.steps * w.study.assembly.blocks for w in self.worlds)
-        return settings_per_unit(self.size, longest)
+
+def make_settings(
+    worlds: Sequence[Plan],
+    world: Integers,
+    *,
+    first_trial: int,
+    drag_coefficient: Floats | None = None,
+    force_std: Floats | None = None,
+) -> Settings:
+    """Return settings with trials in a row; C_d and sigma_F are those of the study if left out."""
+    forces = worlds[0].study.forces
+    if drag_coefficient is None:
+        drag_coefficient = np.full(world.size, forces.drag_coefficient)
+    if force_std is None:
+        force_std = np.full(world.size, forces.force_std_N)
+    trial = first_trial + np.arange(world.size)
+    return Settings(worlds, world, drag_coefficient, force_std, trial)
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +129,15 @@ class Outcomes:
     first_contact_median: Floats
     completion_median: Floats
     courses: list[str]
+
+    def occurred(self) -> set[str]:
+        """Return the classes that occurred in any setting."""
+        return {name for count in self.count for name in count}
+
+    def table(self, names: Sequence[str]) -> Integers:
+        """Return the numbers of runs by setting and class, shape (setting, class)."""
+        rows = [[count.get(name, 0) for name in names] for count in self.count]
+        return np.array(rows, dtype=np.int64)
 
 
 def world_plan(study: Study, flow: xr.Dataset, *, threads: int | None) -> Plan:
@@ -151,7 +170,9 @@ def simulate_settings(
     InputError
         When the blocks of a run find no place in the tank.
     """
-    units = grid(setting=np.arange(settings.size)).units(settings.per_unit())
+    longest = max(w.index.size * w.steps * w.study.assembly.blocks for w in settings.worlds)
+    design = grid(setting=np.arange(settings.size))
+    units = design.units(settings_per_unit(settings.size, longest))
     kept = _TextStore(MemoryStore() if store is None else store)
     try:
         function = partial(_compute, settings)
@@ -163,8 +184,10 @@ def simulate_settings(
         raise
     return Outcomes(
         [json.loads(text) for text in found["count"]],
-        **{name: found[name] for name in NUMBERS},
-        courses=found["courses"].tolist(),
+        found["left_out"],
+        found["first_contact_median"],
+        found["completion_median"],
+        found["courses"].tolist(),
     )
 
 
@@ -179,7 +202,7 @@ def place_first(settings: Settings) -> None:
     for world, plan in enumerate(settings.worlds):
         first = int(settings.trial[np.flatnonzero(settings.world == world)[0]])
         keys = _keys(plan, first, range(plan.index.size))
-        place_blocks(plan.study, plan.model(plan.flow), keys, threads=plan.threads)
+        place_blocks(plan.study, plan.model(), keys, threads=plan.threads)
 
 
 class _Tally:
@@ -220,7 +243,15 @@ def _compute(settings: Settings, unit: WorkUnit) -> Arrays:
                 mine = {name: values[part] for name, values in found.items()}
                 tally[piece.setting].add(mine, classes, plan)
                 begin = part.stop
-    return _arrays(list(tally.values()), settings.worlds[0].study.time_step_s)
+    time_step, tallies = settings.worlds[0].study.time_step_s, tally.values()
+    texts = [courses_to_text(added(one.courses)) for one in tallies]
+    return {
+        "count": np.array([json.dumps(one.count) for one in tallies], dtype=object),
+        "left_out": np.array([one.left_out for one in tallies]),
+        "first_contact_median": np.array([_median(t.first_contact, time_step) for t in tallies]),
+        "completion_median": np.array([_median(t.completion, time_step) for t in tallies]),
+        "courses": np.array(texts, dtype=object),
+    }
 
 
 class _Piece(NamedTuple):
@@ -257,7 +288,7 @@ def _simulate(
     classes : tuple of str
         Names of the classes, into which these are indices.
     """
-    model = plan.model(plan.flow)
+    model = plan.model()
     keys = [_keys(plan, int(settings.trial[piece.setting]), piece.runs) for piece in pieces]
     start = [place_blocks(plan.study, model, own, threads=plan.threads) for own in keys]
     length = [len(piece.runs) for piece in pieces]
@@ -271,32 +302,14 @@ def _simulate(
         drag_coefficient=np.repeat(settings.drag_coefficient[chosen], length),
         force_std=np.repeat(settings.force_std[chosen], length),
     )
-    found = simulate_rows(filled, np.concatenate(start), slice(None), plan.flow)
-    replayed = replay_events(
-        *(found[f"event_{name}"] for name in ("count", "block", "face")),
-        **{name: found[name] for name in ("cell", "quarter", "assembly")},
-        chirality=plan.study.assembly.chirality,
-    )
+    found = simulate_rows(filled, np.concatenate(start))
+    replayed = replay_of(plan, found)
     made = {"event_class": replayed.event_class, "outcome": replayed.outcome}
     return found | made, replayed.classes
 
 
 def _keys(plan: Plan, trial: int, runs: range) -> npt.NDArray[np.uint64]:
     return stream_keys("run", seed=plan.study.assembly.seed, trial=trial, index=runs)
-
-
-def _arrays(tallies: list[_Tally], time_step: float) -> Arrays:
-    """Return what a work unit gives: one entry per setting."""
-    medians = {
-        name: np.array([_median(getattr(tally, name), time_step) for tally in tallies])
-        for name in ("first_contact", "completion")
-    }
-    return {
-        "count": np.array([json.dumps(tally.count) for tally in tallies], dtype=object),
-        "left_out": np.array([tally.left_out for tally in tallies]),
-        **{f"{name}_median": values for name, values in medians.items()},
-        "courses": np.array([courses_to_text(added(t.courses)) for t in tallies], dtype=object),
-    }
 
 
 def _median(steps: list[Integers], time_step: float) -> float:
@@ -321,19 +334,155 @@ class _TextStore:
 
     def write(self, unit: Unit, arrays: Mapping[str, npt.NDArray[Any]]) -> None:
         """Keep what a unit gave, text as arrays of bytes."""
-        self._inner.write(
-            unit,
-            {
-                name: np.array([text.encode() for text in values]) if values.dtype == object
-                else values
-                for name, values in arrays.items()
-            },
-        )  # fmt: skip
+        encoded = {
+            name: np.char.encode(values.astype(str)) if values.dtype == object else values
+            for name, values in arrays.items()
+        }
+        self._inner.write(unit, encoded)
 
     def read(self, unit: Unit) -> Arrays:
         """Return what was kept for a unit."""
         return {
-            name: np.array([text.decode() for text in values], dtype=object)
-            if values.dtype.kind == "S" else values
+            name: np.char.decode(values).astype(object) if values.dtype.kind == "S" else values
             for name, values in self._inner.read(unit).items()
-        }  # fmt: skip
+        }
+
+
+KEYS: Final[dict[str, str]] = {
+    "tank_diameter": "tank.diameter_m",
+    "blocks": "assembly.blocks",
+    "flow": "",
+    "latching": "assembly.latching",
+    "hidden_face_drag": "assembly.hidden_face_drag",
+    "drag_coefficient": "forces.drag_coefficient",
+    "force_std": "forces.force_std_N",
+}
+"""From the name of an axis to the parameter of the study that it varies."""
+OF_EACH_RUN: Final = ("drag_coefficient", "force_std")
+"""The axes along which runs can be simulated side by side."""
+
+
+@dataclass(frozen=True, eq=False)
+class Axes:
+    """The axes of a map, and what the settings along them are.
+
+    Attributes
+    ----------
+    study : Study
+        With the values of the axes in its [sensitivity].
+    values : dict of str to tuple
+        The values of each axis, in the order of the dimensions.
+    flows : dict of str to xarray.Dataset
+        The flow fields of the axis ``flow``.
+    """
+
+    study: Study
+    values: dict[str, tuple[Any, ...]]
+    flows: dict[str, xr.Dataset]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of values of each axis."""
+        return tuple(len(values) for values in self.values.values())
+
+    def coordinates(self) -> dict[str, tuple[str, npt.NDArray[Any]]]:
+        """Return the coordinates of the axes for a dataset."""
+        return {name: (name, _array(values)) for name, values in self.values.items()}
+
+    def settings(self, flow: xr.Dataset, *, first_trial: int, threads: int | None) -> Settings:
+        """Return every combination of the values, the last axis fastest.
+
+        Raises
+        ------
+        InputError
+            When the blocks of a setting have no room, or its flow does not cover its tank.
+        """
+        apart = [name for name in self.values if name not in OF_EACH_RUN]
+        along = [name for name in self.values if name in OF_EACH_RUN]
+        worlds = [
+            self._world(dict(zip(apart, chosen, strict=True)), flow, threads)
+            for chosen in product(*(self.values[name] for name in apart))
+        ]
+        size = math.prod(self.shape)
+        inner = np.meshgrid(*(np.array(self.values[name]) for name in along), indexing="ij")
+        return make_settings(
+            worlds,
+            np.repeat(np.arange(len(worlds)), size // len(worlds)),
+            first_trial=first_trial,
+            **{
+                name: np.tile(values.ravel(), len(worlds))
+                for name, values in zip(along, inner, strict=True)
+            },
+        )
+
+    def _world(self, chosen: dict[str, Any], flow: xr.Dataset, threads: int | None) -> Plan:
+        from driftwalk.model import apply_overrides
+
+        changes = {KEYS[name]: value for name, value in chosen.items() if KEYS[name]}
+        field = self.flows[chosen["flow"]] if "flow" in chosen else flow
+        try:
+            return world_plan(apply_overrides(self.study, changes), field, threads=threads)
+        except InputError as error:
+            if not chosen:
+                raise
+            where = ", ".join(f"{name} = {value}" for name, value in chosen.items())
+            raise InputError(f"at {where}: {error}") from error
+
+
+def make_axes(study: Study, axes: Mapping[str, Any] | None) -> Axes:
+    """Return the axes that a study names, or the given ones in their place.
+
+    Parameters
+    ----------
+    study : Study
+        Its [sensitivity] holds when `axes` is left out.
+    axes : mapping, optional
+        Values by the name of an axis; for ``flow`` the datasets by name, or files.
+
+    Raises
+    ------
+    InputError
+        When there is no such axis, or a value is out of range.
+    """
+    from driftwalk.model import apply_overrides
+    from driftwalk.model.sensitivity import AXES
+
+    flows: dict[str, xr.Dataset] = {}
+    if axes is not None:
+        unknown = [name for name in axes if name not in KEYS]
+        if unknown or not axes:
+            raise InputError(
+                f"axes: there is no {', '.join(map(repr, unknown)) or '(none was named)'}; "
+                f"choose from {', '.join(KEYS)}"
+            )
+        if isinstance(axes.get("flow"), Mapping):
+            flows = dict(axes["flow"])
+        given = {
+            f"sensitivity.{key}": _plain(axes[name]) if name in axes else None
+            for name, key in AXES.items()
+        }
+        try:
+            study = apply_overrides(study, given)
+        except ConfigurationError as error:
+            raise InputError(f"axes: {error}") from error
+    values = study.sensitivity.axes
+    missing = [name for name in values.get("flow", ()) if name not in flows]
+    return Axes(study, values, flows | {name: _load(name, study) for name in missing})
+
+
+def _load(path: str, study: Study) -> xr.Dataset:
+    from driftwalk.flow import load_flow
+
+    return load_flow(path, arena=study.tank.to_arena(), own_flags="keep")
+
+
+def _plain(values: Any) -> list[Any]:
+    if isinstance(values, Mapping):
+        return [str(name) for name in values]
+    if isinstance(values, str):
+        raise InputError(f"axes: expected a list of values, got '{values}'")
+    return list(np.asarray(values).tolist())
+
+
+def _array(values: tuple[Any, ...]) -> npt.NDArray[Any]:
+    return np.array(values, dtype=object if isinstance(values[0], str) else None)

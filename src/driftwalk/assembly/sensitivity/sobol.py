@@ -9,18 +9,42 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from concurrent.futures import Executor
+from statistics import NormalDist
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.assembly.outcomes.classes import listed_classes
+from driftwalk.assembly.outcomes.distribution import (
+    check_confidence,
+    is_complete,
+    sampling_variance,
+)
+from driftwalk.assembly.sensitivity.settings import (
+    FIRST_TRIALS,
+    KEYS,
+    Outcomes,
+    Progress,
+    Settings,
+    make_settings,
+    place_first,
+    simulate_settings,
+    world_plan,
+)
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
-from driftwalk.schema.check import build_dataset, require_kind
+from driftwalk.schema.check import build_dataset, described, require_kind
+from driftwalk.schema.kinds import KINDS
+from driftwalk.sweep import threads_of_unit
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Floats = npt.NDArray[np.float64]
+    from driftwalk.model import Study
+    from driftwalk.sweep import Store
+
 
 MEASURES = (
     "first_order",
@@ -151,12 +175,12 @@ def sobol_indices(
     >>> found["first_order"].values.round(2).tolist(), found["total_order"].values.round(2).tolist()
     ([0.8, 0.2], [0.8, 0.2])
     """
-    inputs, samples = _size_of(design)
+    require_kind(design, "sobol_design", "sobol_design makes one")
+    inputs, samples = design.sizes["input"], int(design.attrs["samples"])
     settings = samples * (inputs + 2)
     table, other = _checked_outputs(outputs, settings)
     noise = _checked_noise(noise_variance, np.shape(outputs)).reshape(table.shape)
-    if not 0 < confidence < 1:
-        raise InputError(f"confidence must lie between 0 and 1, got {confidence}")
+    check_confidence(confidence)
     _check_seed(seed)
     # The first and last of each group of settings are independent draws: Saltelli's A and B.
     place = np.arange(settings) % (inputs + 2)
@@ -167,33 +191,37 @@ def sobol_indices(
         share = np.where(varies, noise[independent].mean(axis=0) / variance, np.nan)
     # The seed itself is usually that of the design; the two draws stay apart.
     drawn = np.random.default_rng(seed + 1).integers(samples, size=(samples, 200)).T
-    sigmas = _normal_quantile(confidence)
+    # Half the width of a normal interval, in standard deviations.
+    sigmas = NormalDist().inv_cdf(0.5 + confidence / 2)
     indices = np.full((len(MEASURES), table.shape[1], inputs), np.nan)
     for i in np.flatnonzero(varies):
         groups = table[:, i].reshape(samples, inputs + 2)
         found = _estimates(groups[np.vstack([np.arange(samples), drawn])])
         indices[0::2, i] = found[:, 0]
         indices[1::2, i] = sigmas * found[:, 1:].std(axis=1, ddof=1)
-    by_name = dict(zip(MEASURES, indices, strict=True)) | _corrected(indices, share)
-    return _dataset(
-        by_name,
-        {"variance": variance, "noise_share": share},
-        coords={"input": design["input"], **other},
-        attrs={
+    by_input = dict(zip(MEASURES, indices, strict=True))
+    # What the outputs would show without noise.
+    signal = np.where(share < 1, 1 - share, np.nan)[:, None]
+    by_input["first_order_corrected"] = by_input["first_order"] / signal
+    by_input["total_order_corrected"] = (by_input["total_order"] - share[:, None]) / signal
+    by_output = {"variance": variance, "noise_share": share}
+    one_output = np.ndim(outputs) == 1
+    data: dict[str, Any] = {}
+    for measures, dims in ((by_input, (*other, "input")), (by_output, (*other,))):
+        for name, values in measures.items():
+            data[name] = (dims, values[0] if one_output else values)
+    return build_dataset(
+        "sobol_indices",
+        data,
+        {"input": design["input"], **other},
+        {
             "samples": samples,
             "confidence": confidence,
             "seed": seed,
             "pure_noise_first_order_half_width": sigmas * math.sqrt(2 / samples),
             "pure_noise_total_order": 1.0,
         },
-        one_output=np.ndim(outputs) == 1,
     )
-
-
-def _size_of(design: xr.Dataset) -> tuple[int, int]:
-    """Return the numbers of inputs and of base samples."""
-    require_kind(design, "sobol_design", "sobol_design makes one")
-    return design.sizes["input"], int(design.attrs["samples"])
 
 
 def _checked_bounds(bounds: Mapping[str, tuple[float, float]]) -> tuple[Floats, Floats]:
@@ -272,36 +300,184 @@ def _estimates(groups: Floats) -> Floats:
     return np.stack([found.first_order, found.total_order])
 
 
-def _corrected(indices: Floats, noise_share: Floats) -> dict[str, Floats]:
-    """Return the indices that the outputs would show without noise."""
-    measure = dict(zip(MEASURES, indices, strict=True))
-    share = noise_share[:, None]
-    signal = np.where(share < 1, 1 - share, np.nan)
+INPUTS: Final = ("drag_coefficient", "force_std", "tank_diameter")
+
+
+def sensitivity_indices(
+    study: Study,
+    flow: xr.Dataset,
+    *,
+    samples: int,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    store: Store | None = None,
+    progress: Progress | None = None,
+    threads: int | None = None,
+    executor: Executor | None = None,
+) -> xr.Dataset:
+    """Return the Sobol' indices of the outcomes of self-assembly, with the share of noise.
+
+    Parameters
+    ----------
+    study, flow, store, threads, executor
+        As in `sensitivity_map`.
+    samples : int
+        Base samples, a power of two of at least 8; ``samples * (inputs + 2)`` settings are
+        simulated.
+    bounds : mapping of str to (float, float), optional
+        Lowest and highest value of ``drag_coefficient``, ``force_std`` [N], ``tank_diameter`` [m];
+        default: those of the study's map, with the tank's diameter where that is a list of at least
+        two.
+    progress : callable, optional
+        Called with the number of finished settings and the total.
+
+    Returns
+    -------
+    xarray.Dataset
+        Kind "sobol_indices", see the function of that name, by ``output`` and ``input``: "complete"
+        (share of runs with one assembly) and the proportion of every outcome class. With them, by
+        ``setting``, ``value`` of the inputs and ``proportion`` of the outputs.
+
+    Raises
+    ------
+    InputError
+        When an input is not known, a bound is out of range, a setting has fewer than two runs with
+        an outcome, or as `sensitivity_map`.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> quick = dw.Study(assembly={"blocks": 2, "duration_s": 1.0}, sensitivity={"runs": 4})
+    >>> found = dw.sensitivity_indices(quick, dw.uniform_flow(0.0, 0.0), samples=8)
+    >>> found["output"].values.tolist(), found["input"].values.tolist()
+    (['complete', '2', '1+1'], ['drag_coefficient', 'force_std'])
+    """
+    design = _design(study, samples, bounds)
+    settings = _settings(study, flow, design, threads_of_unit(threads, executor))
+    outcomes = simulate_settings(settings, store=store, progress=progress, executor=executor)
+    return _indices(study, design, outcomes)
+
+
+def check_indices(
+    study: Study,
+    flow: xr.Dataset,
+    *,
+    samples: int,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    threads: int | None = None,
+) -> int:
+    """Raise the errors that `sensitivity_indices` would raise, before any run is simulated.
+
+    Parameters
+    ----------
+    study, flow, samples, bounds, threads
+        As in `sensitivity_indices`.
+
+    Returns
+    -------
+    int
+        Number of settings.
+
+    Raises
+    ------
+    InputError
+        As `sensitivity_indices`.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> dw.assembly.check_indices(dw.Study(), dw.uniform_flow(0.0, 0.0), samples=8)
+    32
+    """
+    settings = _settings(study, flow, _design(study, samples, bounds), threads)
+    if study.sensitivity.runs < 2:
+        raise InputError(
+            "Sobol' indices need at least 2 runs of each setting, got 1 (`sensitivity.runs`)"
+        )
+    place_first(settings)
+    return settings.size
+
+
+def _design(
+    study: Study, samples: int, bounds: Mapping[str, tuple[float, float]] | None
+) -> xr.Dataset:
+    chosen = _bounds_of(study) if bounds is None else bounds
+    unknown = [name for name in chosen if name not in INPUTS]
+    if unknown:
+        raise InputError(f"bounds: there is no '{unknown[0]}'; choose from {', '.join(INPUTS)}")
+    # The seed of the study may be larger than what the scrambling takes.
+    seed = study.sensitivity.seed % 2**31
+    return sobol_design(chosen, samples=samples, seed=seed)
+
+
+def _bounds_of(study: Study) -> dict[str, tuple[float, float]]:
+    """Return the ends of the study's map."""
+    chosen = study.sensitivity
+    values = {
+        "drag_coefficient": chosen.drag_coefficient or chosen.drag_coefficients,
+        "force_std": chosen.force_std_N or chosen.force_stds_N,
+        "tank_diameter": chosen.tank_diameter_m or (),
+    }
     return {
-        "first_order_corrected": measure["first_order"] / signal,
-        "total_order_corrected": (measure["total_order"] - share) / signal,
+        name: (min(row), max(row))
+        for name, row in values.items()
+        if len(row) > 1 or name != "tank_diameter"
     }
 
 
-def _normal_quantile(confidence: float) -> float:
-    """Return half the width, in standard deviations, of a normal interval."""
-    from statistics import NormalDist
+def _settings(study: Study, flow: xr.Dataset, design: xr.Dataset, threads: int | None) -> Settings:
+    """Return the settings of a design; those of one tank share a world."""
+    from driftwalk.model import apply_overrides
 
-    return NormalDist().inv_cdf(0.5 + confidence / 2)
+    names = [str(name) for name in design["input"].values]
+    column = dict(zip(names, design["value"].values.T, strict=True))
+    studies, world = [study], np.zeros(design.sizes["setting"], dtype=np.int64)
+    if "tank_diameter" in column:
+        diameters, world = np.unique(column.pop("tank_diameter"), return_inverse=True)
+        studies = [
+            apply_overrides(study, {KEYS["tank_diameter"]: diameter})
+            for diameter in diameters.tolist()
+        ]
+    worlds = [world_plan(one, flow, threads=threads) for one in studies]
+    return make_settings(worlds, world, first_trial=FIRST_TRIALS.sobol, **column)
 
 
-def _dataset(
-    by_input: dict[str, Floats],
-    by_output: dict[str, Floats],
-    *,
-    coords: dict[str, Any],
-    attrs: dict[str, Any],
-    one_output: bool,
-) -> xr.Dataset:
+def _indices(study: Study, design: xr.Dataset, outcomes: Outcomes) -> xr.Dataset:
+    import xarray as xr
 
-    dims = tuple(name for name in coords if name != "input")
-    data: dict[str, Any] = {}
-    for table, axes in ((by_input, (*dims, "input")), (by_output, dims)):
-        for name, values in table.items():
-            data[name] = (axes, values[0] if one_output else values)
-    return build_dataset("sobol_indices", data, coords, attrs)
+    assembly = study.assembly
+    names = listed_classes(outcomes.occurred(), assembly.blocks, chirality=assembly.chirality)
+    count = outcomes.table(names)
+    runs = count.sum(axis=1)
+    short = np.flatnonzero(runs < 2)
+    if short.size:
+        raise InputError(
+            f"setting {int(short[0])} of the Sobol' design has {int(runs[short[0]])} runs with an "
+            "outcome, at least 2 are needed; use more runs (`sensitivity.runs`) or a "
+            "smaller time step"
+        )
+    share = count / runs[:, None]
+    complete = share[:, is_complete(list(names))].sum(axis=1)
+    # Sums of shares may exceed one by a hair.
+    table = np.minimum(np.column_stack([complete, share]), 1.0)
+    outputs = xr.DataArray(
+        table,
+        dims=("setting", "output"),
+        coords={"output": np.array(["complete", *names], dtype=object)},
+    )
+    noise = sampling_variance(table, runs[:, None])
+    found = sobol_indices(design, outputs, noise_variance=noise, seed=design.attrs["seed"])
+    facts: dict[str, Any] = {
+        "runs": study.sensitivity.runs,
+        "left_out": int(outcomes.left_out.sum()),
+        "blocks": assembly.blocks,
+        "study": study.to_toml(),
+        # As the axes of a map have them.
+        "input_units": " ".join(
+            str(KINDS["sensitivity"].variable(str(name)).units) for name in design["input"].values
+        ),
+    }
+    return described(
+        found.assign(
+            proportion=outputs, value=design["value"], low=design["low"], high=design["high"]
+        ).assign_attrs(facts)
+    )

@@ -9,18 +9,17 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.outcomes.classes import class_name, sort_classes
+from driftwalk.assembly.outcomes.classes import all_single, sort_classes
 from driftwalk.assembly.outcomes.survival import class_counts
 from driftwalk.assembly.runs.dataset import DECIMALS, times_of
 from driftwalk.assembly.runs.plan import Plan, whole_steps
+from driftwalk.core.arrays import Floats, Integers
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
 
-Floats = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
 Courses = dict[str, Integers]
 """By class, the number of runs that are in it at each of the times; classes that occur."""
 
@@ -37,10 +36,7 @@ def kept_times(study: Study) -> Floats:
 
 
 def courses_of(
-    event_step: npt.ArrayLike,
-    event_class: npt.NDArray[Any],
-    classes: Sequence[str],
-    plan: Plan,
+    event_step: npt.ArrayLike, event_class: npt.NDArray[Any], classes: Sequence[str], plan: Plan
 ) -> Courses:
     """Return how many of some runs are in each class over time.
 
@@ -58,7 +54,7 @@ def courses_of(
     count = class_counts(
         times_of(np.asarray(event_step), time_step=plan.study.time_step_s),
         event_class.astype(np.int64),
-        start=list(classes).index(_all_single(plan)),
+        start=list(classes).index(all_single(plan.study.assembly.blocks)),
         time=kept_times(plan.study),
         classes=len(classes),
     )
@@ -133,7 +129,7 @@ def map_courses(
     """
     known = _known_courses(plan, reference)
     # There is a class even where no run of any setting has an outcome.
-    largest = {_all_single(plan): 0.0}
+    largest = {all_single(plan.study.assembly.blocks): 0.0}
     for courses in (known, *map(courses_from_text, texts)):
         runs = sum(int(row[0]) for row in courses.values())
         for name, row in courses.items():
@@ -152,10 +148,6 @@ def map_courses(
         table = course_table(known, listed)
         variables["reference_over_time"] = (DIMS, table / table.sum(axis=1, keepdims=True))
     return variables, time_coordinates(plan, listed)
-
-
-def _all_single(plan: Plan) -> str:
-    return class_name(["1"] * plan.study.assembly.blocks)
 
 
 def course_table(courses: Courses, listed: Sequence[str]) -> Integers:

@@ -3,8 +3,3 @@
 Two stages: a search by six two-dimensional KS distances (`driftwalk.calibration.evolution`), and
 summaries of the motion, matched by their synthetic likelihood.
 """
-
-from driftwalk.calibration.estimation.calibrate import calibrate_many
-from driftwalk.calibration.estimation.run import Stores, Tell
-
-__all__ = ["Stores", "Tell", "calibrate_many"]

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from driftwalk.calibration.estimation.gauss_newton import rounded
 from driftwalk.calibration.estimation.posterior import POSTERIOR, Posterior
+from driftwalk.calibration.evolution import rounded
 from driftwalk.core.arrays import Floats
 
 

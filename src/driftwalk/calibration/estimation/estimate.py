@@ -7,20 +7,21 @@ from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 
-from driftwalk.calibration.estimation import gauss_newton, regression_abc
-from driftwalk.calibration.estimation.bootstrap_correction import (
-    BootstrapEstimates,
-    bootstrap_estimates,
-)
+from driftwalk.calibration.estimation.bootstrap_correction import bootstrap_estimates
 from driftwalk.calibration.estimation.gauss_newton import (
     GAUSS_NEWTON,
     LocalOptimum,
     Simulate,
     minimise_discrepancy,
+    simulations_of,
 )
-from driftwalk.calibration.estimation.modes import Modes, find_modes
-from driftwalk.calibration.estimation.posterior import POSTERIOR, Posterior, sample_posterior
-from driftwalk.calibration.estimation.profile import Profiles, discrepancy_profiles
+from driftwalk.calibration.estimation.identifiability import Profiles, discrepancy_profiles
+from driftwalk.calibration.estimation.posterior import (
+    POSTERIOR,
+    Posterior,
+    find_modes,
+    sample_posterior,
+)
 from driftwalk.calibration.estimation.regression_abc import REGRESSION, Order, sequential_regression
 from driftwalk.core.arrays import Bools, Floats
 
@@ -88,7 +89,6 @@ class Matched(NamedTuple):
     """Parameters for which another place, which fits as well, has other values,"""
     unsettled: Bools
     """and those whose draws still moved when the last simulations were made."""
-    rounds: int
 
     @property
     def usual(self) -> bool:
@@ -103,13 +103,11 @@ class Matched(NamedTuple):
 
 def most_simulations(parameters: int, replicates: int) -> int:
     """Return how many settings `match_summaries` simulates at most."""
-    each, last = gauss_newton.simulations_of(parameters)
-    narrow = each * gauss_newton.GAUSS_NEWTON.most_rounds
+    each, last = simulations_of(parameters)
+    narrow = each * GAUSS_NEWTON.most_rounds
     regions = POSTERIOR.most_rounds * last // 2
     return (
-        regression_abc.REGRESSION.most_simulations
-        + (1 + MATCHING.most_starts) * (narrow + regions)
-        + replicates
+        REGRESSION.most_simulations + (1 + MATCHING.most_starts) * (narrow + regions) + replicates
     )
 
 
@@ -128,17 +126,31 @@ def match_summaries(
     modes = find_modes(
         optima,
         lambda optimum, number: sample_posterior(
-            objective,
-            recorded,
-            optimum.emulator,
-            optimum.solution,
-            seed=seed + 10_000 * (1 + number),
+            objective, recorded, optimum, seed=seed + 10_000 * (1 + number)
         ),
     )
     bootstrap = bootstrap_estimates(
         lambda one: objective(one, parts=1)[:, 0], modes.best, replicates
     )
-    return _matched(order, modes, recorded[0], bootstrap, optima[0].rounds)
+    best, usual = modes.best, bootstrap.discrepancies
+    middle, most = float(np.median(usual)), float(np.quantile(usual, MATCHING.typical_quantile))
+    discrepancy = best.solution.discrepancy
+    # What the model leaves unexplained widens the draws, as a reduced chi-square above one does.
+    stretch = float(np.sqrt(discrepancy / middle)) if discrepancy > most else 1.0
+    wider = stretch * bootstrap.spread
+    each = [order(_corrected(one.sample, bootstrap.bias, wider)) for one in modes.places]
+    return Matched(
+        point=np.median(each[0], axis=0),
+        sample=modes.mixed(each),
+        discrepancy=discrepancy,
+        median_discrepancy=middle,
+        upper_discrepancy=most,
+        stretch=stretch,
+        even_point=np.clip(best.others[0].setting, 0.0, 1.0),
+        profiles=_profiles(order, best, recorded[0], bootstrap.bias, wider),
+        ambiguous=modes.apart(each),
+        unsettled=np.abs(best.moved) > MATCHING.unsettled,
+    )
 
 
 def find_optima(
@@ -172,47 +184,13 @@ def find_optima(
         )
 
     found = [search(1, regression.centre, width)]
-    if _matches(found[0]) or _discrepancy(found[0]) > hopeless:
+    if found[0].discrepancy < MATCHING.matches or found[0].discrepancy > hopeless:
         return found
     wide = np.full(parameters, GAUSS_NEWTON.widest)
     for number, start in enumerate(_distinct(order(starts()))[: MATCHING.most_starts], 2):
         found.append(search(number, start, wide))
     found.sort(key=lambda optimum: optimum.deviance)
-    return found[:1] + [optimum for optimum in found[1:] if _matches(optimum)]
-
-
-def _matches(found: LocalOptimum) -> bool:
-    return _discrepancy(found) < MATCHING.matches
-
-
-def _discrepancy(found: LocalOptimum) -> float:
-    """Return the discrepancy in summaries; there may be none that vary."""
-    return found.solution.discrepancy / max(found.emulator.summaries, 1)
-
-
-def _matched(
-    order: Order, modes: Modes, recorded: Floats, bootstrap: BootstrapEstimates, rounds: int
-) -> Matched:
-    best = modes.best
-    usual = bootstrap.discrepancies
-    middle, most = float(np.median(usual)), float(np.quantile(usual, MATCHING.typical_quantile))
-    discrepancy = best.solution.discrepancy
-    stretch = float(np.sqrt(discrepancy / middle)) if discrepancy > most else 1.0
-    wider = stretch * bootstrap.spread
-    each = [order(_corrected(one.sample, bootstrap.bias, wider)) for one in modes.places]
-    return Matched(
-        point=np.median(each[0], axis=0),
-        sample=modes.mixed(each),
-        discrepancy=discrepancy,
-        median_discrepancy=middle,
-        upper_discrepancy=most,
-        stretch=stretch,
-        even_point=np.clip(best.others[0].setting, 0.0, 1.0),
-        profiles=_profiles(order, best, recorded, bootstrap.bias, wider),
-        ambiguous=modes.apart(each),
-        unsettled=np.abs(best.moved) > MATCHING.unsettled,
-        rounds=rounds,
-    )
+    return found[:1] + [one for one in found[1:] if one.discrepancy < MATCHING.matches]
 
 
 def _corrected(sample: Floats, bias: Floats, wider: Floats) -> Floats:

@@ -6,8 +6,12 @@ from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 
-from driftwalk.calibration.estimation.emulator import LocalEmulator, Solution, fit_emulator
-from driftwalk.calibration.evolution.search import RESOLUTION
+from driftwalk.calibration.estimation.synthetic_likelihood import (
+    LocalEmulator,
+    Solution,
+    fit_emulator,
+)
+from driftwalk.calibration.evolution import rounded
 from driftwalk.core.arrays import Floats
 
 
@@ -66,6 +70,11 @@ class LocalOptimum(NamedTuple):
     rounds: int
 
     @property
+    def discrepancy(self) -> float:
+        """Discrepancy in summaries; there may be none that vary."""
+        return self.solution.discrepancy / max(self.emulator.summaries, 1)
+
+    @property
     def deviance(self) -> float:
         """-2 log of the likelihood, but for a constant: ends of other searches compare by it."""
         return self.solution.discrepancy + self.emulator.log_variance
@@ -96,9 +105,9 @@ def minimise_discrepancy(
         summaries = simulate(settings, parts=1)[:, 0]
         emulator = fit_emulator(settings, summaries, centre=centre, width=width)
         solution = emulator.solve(recorded, reach=policy.reach)
-        discrepancy = solution.discrepancy / max(emulator.summaries, 1)
-        least = min(least, discrepancy)
-        excess = np.sqrt(max(1.0, discrepancy))
+        optimum = LocalOptimum(emulator, solution, number + 1)
+        least = min(least, optimum.discrepancy)
+        excess = np.sqrt(max(1.0, optimum.discrepancy))
         far = np.abs(solution.place).max()
         wanted = np.clip(policy.wide_stds * excess * solution.std, policy.narrowest, policy.widest)
         following = np.clip(wanted, policy.shrinks[int(far > 1.0)] * width, policy.grows * width)
@@ -110,13 +119,13 @@ def minimise_discrepancy(
             and solution.discrepancy < policy.typical * emulator.summaries
         )
         # A quadratic that holds badly leaves much, and then a large discrepancy looks small.
-        deviance = solution.discrepancy + emulator.log_variance
-        lowest, since = min(lowest, deviance), 0 if deviance < lowest else since + 1
+        since = 0 if optimum.deviance < lowest else since + 1
+        lowest = min(lowest, optimum.deviance)
         hopeless = number + 1 >= policy.fewest_rounds and least > give_up
         if settled or hopeless or since == policy.most_in_vain:
             break
         centre, width = rounded(np.clip(solution.setting, 0.0, 1.0)), rounded(following)
-    return LocalOptimum(emulator, solution, number + 1)
+    return optimum
 
 
 def simulations_of(parameters: int) -> tuple[int, int]:
@@ -144,8 +153,3 @@ def drawn_settings(centre: Floats, width: Floats, count: int, seed: int) -> Floa
 
     low, high = np.maximum(centre - width, 0.0), np.minimum(centre + width, 1.0)
     return rounded(low + (high - low) * qmc.Sobol(centre.size, seed=seed).random(count))
-
-
-def rounded(values: Floats) -> Floats:
-    """Return multiples of a small number: last bits of linear algebra differ between machines."""
-    return np.asarray(np.round(values / RESOLUTION) * RESOLUTION)

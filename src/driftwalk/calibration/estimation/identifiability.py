@@ -1,4 +1,9 @@
-"""Which parameters a recording determines, from settings that could have given it."""
+"""Identifiability: which parameters a recording determines, and their profile likelihoods.
+
+A profile shows how the discrepancy rises along one parameter, with all others where they fit best.
+Where it is a parabola, its curvature gives the same interval as the draws; where it is flat, or
+rises on one side only, the recording does not determine the parameter.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +12,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from driftwalk.calibration.estimation.synthetic_likelihood import LocalEmulator, Solution
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.schema import Parameter
 
@@ -70,3 +76,41 @@ def _half_width(column: Floats, parameter: Parameter) -> float:
         return 0.5 * float(np.log(end / start))
     size = max(abs(value), DETERMINED.small_part * (parameter.high - parameter.low))
     return 0.5 * (end - start) / size
+
+
+class Profiles(NamedTuple):
+    """The least discrepancy along each parameter."""
+
+    place: Floats
+    """Values of the parameter in the unit cube, shape (parameters, 21)."""
+    rise: Floats
+    """The discrepancy less its least value, same shape."""
+
+
+def discrepancy_profiles(
+    emulator: LocalEmulator, summaries: Floats, solution: Solution, std: Floats, *, reach: float
+) -> Profiles:
+    """Return the profile of the discrepancy of each parameter."""
+    points, span = 21, 3.0
+    low = np.maximum(emulator.centre - reach * emulator.width, 0.0)
+    high = np.minimum(emulator.centre + reach * emulator.width, 1.0)
+
+    def rise(index: int, place: Floats) -> Floats:
+        """Return the discrepancy along one parameter less the least, out from the solution."""
+        discrepancy = np.empty(place.size)
+        middle = int(np.abs(place - solution.setting[index]).argmin())
+        for way in (range(middle, place.size), range(middle - 1, -1, -1)):
+            start = solution.setting
+            for number in way:
+                held = (index, float(place[number]))
+                found = emulator.solve(summaries, reach=reach, start=start, held=held)
+                discrepancy[number], start = found.discrepancy, found.setting
+        return np.asarray(np.maximum(discrepancy - solution.discrepancy, 0.0))
+
+    places = []
+    for index, middle in enumerate(solution.setting):
+        first = max(middle - span * std[index], low[index])
+        last = min(middle + span * std[index], high[index])
+        places.append(np.linspace(first, last, points))
+    rises = [rise(index, place) for index, place in enumerate(places)]
+    return Profiles(np.array(places), np.array(rises))

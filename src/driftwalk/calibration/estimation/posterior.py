@@ -5,18 +5,108 @@ discrepancy: exp(-discrepancy / 2) (Wood, Nature 466 (2010) 1102). Within the re
 that costs nothing to evaluate, and a Markov chain of many walkers samples it, with an even prior
 over the ranges on their scales (emcee; Foreman-Mackey et al., Publ. Astron. Soc. Pac. 125 (2013)
 306). Simulations follow the draws: the next ones fill a region about them, until the draws stay.
+
+The region is an ellipsoid about the draws, along their own axes: parameters that make up for each
+other lie on a narrow ridge, and a box about it is mostly empty of draws. A chain that begins at one
+place that fits does not find the others, so every search that ends at a match has a posterior of
+its own; these modes are weighed by their evidence, the likelihood there times the volume that the
+draws fill.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.calibration.estimation.emulator import LocalEmulator, Solution, fit_emulator
-from driftwalk.calibration.estimation.gauss_newton import Simulate, simulations_of
-from driftwalk.calibration.estimation.region import REGION, Region, region_about
-from driftwalk.core.arrays import Floats
+from driftwalk.calibration.estimation.gauss_newton import LocalOptimum, Simulate, simulations_of
+from driftwalk.calibration.estimation.synthetic_likelihood import (
+    LocalEmulator,
+    Solution,
+    fit_emulator,
+)
+from driftwalk.calibration.evolution import rounded
+from driftwalk.core.arrays import Bools, Floats
+
+
+class RegionPolicy(NamedTuple):
+    """How large the region is that is simulated for a posterior sample. Chosen by hand."""
+
+    spread: float = 1.5
+    """Standard deviation of the settings along every axis, in those of the sample."""
+    widest: float = 0.3
+    """Largest half-width, in parts of the ranges: an emulator does not hold in more."""
+    narrowest: float = 0.003
+    """Smallest standard deviation, in parts of the ranges: keeps the covariance regular."""
+
+
+REGION: Final = RegionPolicy()
+
+
+class Region(NamedTuple):
+    """An ellipsoid in the unit cube."""
+
+    centre: Floats
+    """Shape (parameters,)."""
+    root: Floats
+    """Lower triangle whose product with its transpose is the covariance of the draws."""
+
+    @property
+    def std(self) -> Floats:
+        """Standard deviations of the draws that it is made for."""
+        return np.asarray(np.sqrt((self.root**2).sum(axis=1)))
+
+    @property
+    def radius(self) -> float:
+        """How far it reaches along every axis, in standard deviations of the draws."""
+        return radius_of(self.centre.size)
+
+    @property
+    def width(self) -> Floats:
+        """Half-widths of the box about it."""
+        return self.radius * self.std
+
+    def distances(self, settings: Floats) -> Floats:
+        """Return how far settings are from the centre: 1 is the end, shape (settings,)."""
+        axes = np.linalg.solve(self.root, (settings - self.centre).T)
+        return np.asarray(np.sqrt((axes**2).sum(axis=0)) / self.radius)
+
+    def filled(self, count: int, seed: int) -> Floats:
+        """Return settings that fill the region evenly; those beyond an end are mirrored at it."""
+        from scipy.special import ndtri
+        from scipy.stats import qmc
+
+        parameters = self.centre.size
+        drawn = qmc.Sobol(parameters + 1, seed=seed).random(count)
+        way = ndtri(np.clip(drawn[:, :-1], 1e-12, 1.0 - 1e-12))
+        way /= np.maximum(np.sqrt((way**2).sum(axis=1, keepdims=True)), 1e-12)
+        place = self.radius * drawn[:, -1:] ** (1.0 / parameters) * way
+        settings = self.centre + place @ self.root.T
+        return rounded(np.clip(1.0 - np.abs(1.0 - np.abs(settings)), 0.0, 1.0))
+
+
+def radius_of(parameters: int) -> float:
+    """Return the radius of an even ball with the standard deviation 1.5 along every axis.
+
+    Examples
+    --------
+    >>> round(radius_of(2), 3)
+    3.0
+    """
+    return REGION.spread * float(np.sqrt(parameters + 2.0))
+
+
+def region_about(sample: Floats) -> Region:
+    """Return the region of draws."""
+    parameters = sample.shape[1]
+    covariance = np.atleast_2d(np.cov(sample.T))
+    covariance += REGION.narrowest**2 * np.eye(parameters)
+    most = REGION.widest / radius_of(parameters)
+    shrink = np.minimum(1.0, most / np.sqrt(np.diag(covariance)))
+    covariance *= np.outer(shrink, shrink)
+    root = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
+    return Region(rounded(np.clip(sample.mean(axis=0), 0.0, 1.0)), root)
 
 
 class PosteriorPolicy(NamedTuple):
@@ -69,9 +159,10 @@ class Posterior(NamedTuple):
 
 
 def sample_posterior(
-    simulate: Simulate, recorded: Floats, emulator: LocalEmulator, solution: Solution, *, seed: int
+    simulate: Simulate, recorded: Floats, optimum: LocalOptimum, *, seed: int
 ) -> Posterior:
-    """Return settings that could have given a recording."""
+    """Return settings that could have given a recording, from the end of a search on."""
+    emulator, solution = optimum.emulator, optimum.solution
     count = emulator.centre.size
     half = simulations_of(count)[1] // 2
     sample = _chain(emulator, None, recorded[0], solution, seed)
@@ -146,3 +237,62 @@ def _chain(
     return np.asarray(
         steps[np.linspace(0, len(steps) - 1, POSTERIOR.size).round().astype(np.int64)]
     )
+
+
+class Modes(NamedTuple):
+    """Posteriors at different places."""
+
+    places: tuple[Posterior, ...]
+    """The likeliest first."""
+    weights: Floats
+    """Shares of the evidence, shape (places,)."""
+
+    @property
+    def best(self) -> Posterior:
+        """The likeliest."""
+        return self.places[0]
+
+    def mixed(self, sample: Sequence[Floats]) -> Floats:
+        """Return 512 draws of all places, each with as many as its share of the evidence."""
+        upper = np.round(POSTERIOR.size * np.cumsum(self.weights)).astype(np.int64)
+        counts = np.diff(upper, prepend=0)
+        taken = [
+            one[np.linspace(0, len(one) - 1, count).round().astype(np.int64)]
+            for one, count in zip(sample, counts, strict=True)
+        ]
+        return np.concatenate(taken)
+
+    def apart(self, sample: Sequence[Floats]) -> Bools:
+        """Return for which parameters a place has an interval that does not meet the first's."""
+        low, high = np.quantile(np.array(sample), (0.05, 0.95), axis=1)
+        return np.asarray(((low > high[0]) | (high < low[0])).any(axis=0))
+
+
+def find_modes(
+    optima: Sequence[LocalOptimum], sample_about: Callable[[LocalOptimum, int], Posterior]
+) -> Modes:
+    """Return the posteriors at the ends of searches, those alone that the recording allows."""
+    found: list[Posterior] = []
+    for number, optimum in enumerate(optima):
+        if any(_reaches(one, optimum.solution.setting) for one in found):
+            continue
+        posterior = sample_about(optimum, number)
+        if not any(_reaches(one, posterior.sample.mean(axis=0)) for one in found):
+            found.append(posterior)
+    deviance = np.array([_deviance(one) for one in found])
+    # The covariances come from simulations: a discrepancy of a hundred has an error of some 5. So
+    # a place is ruled out only where it is behind by 10.
+    order = [k for k in np.argsort(deviance, kind="stable") if deviance[k] - deviance.min() < 10.0]
+    weights = np.exp(-0.5 * (deviance[order] - deviance.min()))
+    return Modes(tuple(found[place] for place in order), weights / weights.sum())
+
+
+def _reaches(posterior: Posterior, setting: Floats) -> bool:
+    """Return whether a setting lies where a posterior has been simulated."""
+    return bool(posterior.region.distances(setting[None])[0] < 1.0)
+
+
+def _deviance(posterior: Posterior) -> float:
+    """Return -2 log of the evidence, but for a constant: of a normal law as wide as the draws."""
+    volume = np.linalg.slogdet(np.atleast_2d(np.cov(posterior.sample.T)))[1]
+    return posterior.solution.discrepancy + posterior.emulator.log_variance - float(volume)

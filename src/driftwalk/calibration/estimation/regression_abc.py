@@ -13,8 +13,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.calibration.estimation.emulator import CONSTANT
-from driftwalk.calibration.estimation.gauss_newton import rounded
+from driftwalk.calibration.estimation.synthetic_likelihood import CONSTANT
+from driftwalk.calibration.evolution import rounded
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 

@@ -1,47 +1,74 @@
-"""The `model_calibration` dataset: the estimate, what it is worth, and how good the model is."""
+"""The `model_calibration` dataset: the estimate, how well it is known, how good the model is."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from driftwalk.calibration.estimation.estimate import Matched
-from driftwalk.calibration.estimation.identifiability import DETERMINED
-from driftwalk.calibration.estimation.run import Estimation
+from driftwalk.calibration.estimation.identifiability import Determination
 from driftwalk.calibration.held_out.candidates import Candidate
-from driftwalk.calibration.held_out.checks import CHECKS, UNITS
-from driftwalk.calibration.held_out.held_out_score import HELD_OUT_REPLICATES, without_error
+from driftwalk.calibration.held_out.held_out_score import HeldOutScore, recording_parts, verdict_of
 from driftwalk.calibration.held_out.recorded import RecordedMotion
-from driftwalk.calibration.ranking.result import motion_warnings
-from driftwalk.calibration.ranking.verdict import verdict_of
+from driftwalk.calibration.stationarity import motion_warnings
 from driftwalk.core.arrays import Floats
 from driftwalk.motion import ParticleModel
-from driftwalk.schema.answers.facts import BOUNDS, texts
+from driftwalk.schema import Parameter
+from driftwalk.schema.answers.facts import BOUNDS, AnswerParts, texts
 from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.model import Study
+
+@dataclass(frozen=True)
+class Estimation:
+    """Everything that was found of a model's parameters.
+
+    Attributes
+    ----------
+    point : ndarray, shape (parameters,)
+        The estimate, in the unit cube.
+    searched : ndarray or None
+        The answer of the first stage; None where it was not needed.
+    matched : Matched or None
+        That of the second stage; None where it was not asked for.
+    scores : mapping of str to float
+        Mean of distance over floor in the even blocks of time, of each answer.
+    known : Determination or None
+        How well the parameters are determined; None where the second stage does not count.
+    held_out : HeldOutScore
+        The answer for the even blocks, judged on the odd ones.
+    """
+
+    point: Floats
+    searched: Floats | None
+    matched: Matched | None
+    scores: Mapping[str, float]
+    known: Determination | None
+    held_out: HeldOutScore
 
 
 def build_model_calibration(
     found: Estimation,
     entry: Candidate,
     motion: RecordedMotion,
-    study: Study,
-    recording: xr.Dataset,
     warnings: Sequence[str],
 ) -> xr.Dataset:
     """Return the dataset of a calibration of many parameters."""
     ranges, held_out = entry.ranges, found.held_out
     verdict = verdict_of(held_out, motion, baseline=False)
     count = len(ranges)
+    # None where the summaries' answer does not count: nothing is known of the intervals then.
     known = found.known
+    about, named = recording_parts(motion), parameter_parts(ranges)
     data: dict[str, Any] = {
+        **about.data,
+        **named.data,
         "estimate": ("parameter", _values(entry, found.point[None])[0]),
         "interval": (
             ("parameter", "bound"),
@@ -52,47 +79,44 @@ def build_model_calibration(
         ),
         "half_width": ("parameter", np.full(count, np.nan) if known is None else known.half_width),
         "range": (("parameter", "bound"), np.array([(one.low, one.high) for one in ranges])),
-        "unit": ("parameter", texts([one.unit for one in ranges])),
-        "scale": ("parameter", texts([one.scale for one in ranges])),
-        "meaning": ("parameter", texts([one.meaning or one.label for one in ranges])),
         "held_out_distance": ("aspect", held_out.held),
         "trained_distance": ("aspect", held_out.trained),
-        "own_distance": ("aspect", motion.own),
-        "floor": ("aspect", motion.held.floor),
-        "check_recorded": ("check", motion.recorded_checks),
         "check_median": ("check", np.median(held_out.checks, axis=0)),
         "check_low": ("check", held_out.checks.min(axis=0)),
         "check_high": ("check", held_out.checks.max(axis=0)),
-        "check_unit": ("check", texts(UNITS)),
         "score": ((), held_out.score),
-        "score_std": ((), without_error(held_out.without)),
+        "score_std": ((), held_out.score_std),
         "explained": ((), verdict.explained),
         "verdict": ((), np.array(verdict.text)),
         **_stages(found, entry),
     }  # fmt: skip
     said = [*warnings, *_said(found, entry, verdict.explained), *motion_warnings(motion)]
     coords: dict[str, Any] = {
-        "parameter": ("parameter", texts([one.name for one in ranges])),
-        "bound": ("bound", texts(BOUNDS)),
-        "aspect": ("aspect", texts(motion.held.names)),
-        "check": ("check", texts(CHECKS)),
+        **named.coords,
+        **about.coords,
         "warning": ("warning", texts(said)),
     }
     attrs: dict[str, Any] = {
         "model": entry.model.name,
         "estimate_from": "search" if known is None else "summaries",
         "fixed": json.dumps(_fixed(entry)),
-        "confidence": study.calibration.confidence,
-        "step_interval_s": float(motion.plan.short.step_interval),
-        "duration_s": motion.duration,
+        "confidence": motion.study.calibration.confidence,
         "position_noise_m": motion.like.camera.position_noise,
-        "worlds": HELD_OUT_REPLICATES,
-        "seed": study.calibration.seed,
-        "arena": study.tank.to_arena_json(),
-        "source": str(recording.attrs.get("source", "")),
-        "simulated_recording": str(recording.attrs.get("simulated", "no")),
+        **about.attrs,
     }
     return build_dataset("model_calibration", data, coords, attrs)
+
+
+def parameter_parts(parameters: Sequence[Parameter]) -> AnswerParts:
+    """Return what a dataset of estimates says of their parameters."""
+    data = {
+        "unit": ("parameter", texts([one.unit for one in parameters])),
+        "scale": ("parameter", texts([one.scale for one in parameters])),
+        "meaning": ("parameter", texts([one.meaning or one.label for one in parameters])),
+    }
+    names = texts([one.name for one in parameters])
+    coords = {"parameter": ("parameter", names), "bound": ("bound", texts(BOUNDS))}
+    return AnswerParts(data, coords, {})
 
 
 def _stages(found: Estimation, entry: Candidate) -> dict[str, Any]:
@@ -155,16 +179,8 @@ def _said(found: Estimation, entry: Candidate, explained: bool) -> list[str]:
         said.append(
             "the model does not explain the recording; its parameters are the best of bad fits"
         )
-    ended = [
-        one.name
-        for one, share in zip(entry.ranges, found.point, strict=True)
-        if min(share, 1.0 - share) < DETERMINED.range_end
-    ]
-    if ended:
-        said.append(
-            f"at the end of its range: {', '.join(ended)}; extend the range, or doubt the model"
-        )
-    return said
+    ended = entry.at_range_end(found.point)
+    return said if ended is None else [*said, ended]
 
 
 def _open(matched: Matched, entry: Candidate) -> list[str]:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from concurrent.futures import Executor
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -15,82 +13,36 @@ from driftwalk.calibration.estimation.estimate import (
     match_summaries,
     most_simulations,
 )
-from driftwalk.calibration.estimation.identifiability import Determination, determination
-from driftwalk.calibration.estimation.label_switching import Order, label_order
-from driftwalk.calibration.evolution import (
-    AspectObjective,
-    Budget,
-    CachedObjective,
-    SearchResult,
-    search_minimum,
+from driftwalk.calibration.estimation.identifiability import determination
+from driftwalk.calibration.estimation.label_switching import label_order
+from driftwalk.calibration.estimation.result import Estimation, build_model_calibration
+from driftwalk.calibration.estimation.summary_objective import SummaryObjective
+from driftwalk.calibration.evolution import Budget, CachedObjective, SearchResult, search_minimum
+from driftwalk.calibration.held_out.candidates import (
+    Candidate,
+    prepare_candidates,
+    with_contact_clearance,
 )
-from driftwalk.calibration.held_out.candidates import Candidate
 from driftwalk.calibration.held_out.held_out_score import (
-    HeldOutScore,
     even_blocks,
     require_numbers,
     score_setting,
 )
 from driftwalk.calibration.held_out.recorded import RecordedMotion
-from driftwalk.calibration.summaries.simulated import SummaryObjective
+from driftwalk.calibration.problem import Execution
 from driftwalk.core.arrays import Floats
 from driftwalk.core.processors import one_blas_thread
+from driftwalk.motion import MotionModel
 
 if TYPE_CHECKING:
-    from driftwalk.sweep import Store
+    import xarray as xr
 
-Tell = Callable[[str, int, int], None]
 
 SEARCH: Final = Budget(design=256, starts=3, short=20, long=30, replicates=2, retest=8)
 
 
-class Stores(Protocol):
-    """Gives the store in which a stage keeps its finished work units."""
-
-    def __call__(self, name: str, fingerprint: dict[str, Any]) -> Store | None:
-        """Return the store of a stage; None keeps results in memory."""
-
-
-@dataclass(frozen=True)
-class Estimation:
-    """Everything that was found of a model's parameters.
-
-    Attributes
-    ----------
-    point : ndarray, shape (parameters,)
-        The estimate, in the unit cube.
-    searched : ndarray or None
-        The answer of the first stage; None where it was not needed.
-    matched : Matched or None
-        That of the second stage; None where it was not asked for.
-    scores : mapping of str to float
-        Mean of distance over floor in the even blocks of time, of each answer.
-    known : Determination or None
-        How well the parameters are determined; None where the second stage does not count.
-    held_out : Judged
-        The answer for the even blocks, judged on the odd ones.
-    """
-
-    point: Floats
-    searched: Floats | None
-    matched: Matched | None
-    scores: Mapping[str, float]
-    known: Determination | None
-    held_out: HeldOutScore
-
-
 @one_blas_thread()
-def estimate(
-    entry: Candidate,
-    motion: RecordedMotion,
-    *,
-    seed: int,
-    replicates: int,
-    confidence: float,
-    executor: Executor | None = None,
-    stores: Stores,
-    tell: Tell,
-) -> Estimation:
+def estimate(entry: Candidate, motion: RecordedMotion, how: Execution) -> Estimation:
     """Estimate the parameters of a model, and judge it on blocks of time that it has not seen.
 
     Two stages. One searches the even blocks of time by six two-dimensional KS distances. The other
@@ -100,45 +52,41 @@ def estimate(
     at once pull it away from the motion. It determines parameters only if the discrepancy is not
     more than four times the usual one: values of another model are no measurement.
     """
-    even = even_blocks(entry, motion, seed)
-    require_numbers(even)
-    order = label_order(entry)
-    search = _Search(even, stores, tell)
-    matched = (
-        _matched(even, motion, search, order, replicates, executor, stores, tell)
-        if replicates > 1
-        else None
-    )
+    stages = _Stages(entry, motion, how)
+    require_numbers(stages.even)
+    order = stages.order
+    matched = stages.matched() if motion.replicates > 1 else None
     if matched is None or not matched.usual:
-        search.optima()
+        stages.optima()
     answers = {
-        **({} if search.best is None else {"searched": order(search.best[None])[0]}),
+        **({} if stages.best is None else {"searched": order(stages.best[None])[0]}),
         **({} if matched is None else {"matched": matched.point, "even": matched.even_point}),
     }
-    scores = _weighed(even, answers)
+    scores = stages.weighed(answers)
     counts = _counts(matched, scores)
     if not counts and matched is not None:
         # The search's answer will stay: it is worth the usual search of a comparison.
-        longer = {"longer": order(search.longer()[None])[0]}
-        score = _weighed(even, longer)["longer"]
+        longer = {"longer": order(stages.longer()[None])[0]}
+        score = stages.weighed(longer)["longer"]
         if score < scores["searched"]:
             answers["searched"], scores["searched"] = longer["longer"], score
     known = None
     if matched is not None and counts:
+        confidence = motion.study.calibration.confidence
         known = determination(matched.sample, entry.ranges, confidence=confidence)
         open_ones = matched.ambiguous | matched.unsettled | matched.unlike
         known = known._replace(determined=known.determined & ~open_ones)
     # The odd blocks judge the better answer that has not seen them.
     unseen = [name for name in ("searched", "even")[: 1 + counts] if name in answers]
     best = min(unseen, key=scores.__getitem__)
-    tell("judged", 0, 1)
+    how.tell("judged", 0, 1)
     return Estimation(
         point=answers["matched" if counts else "searched"],
         searched=answers.get("searched"),
         matched=matched,
         scores=scores,
         known=known,
-        held_out=score_setting(even, motion, answers[best]),
+        held_out=score_setting(stages.even, motion, answers[best]),
     )
 
 
@@ -153,13 +101,34 @@ def _counts(matched: Matched | None, scores: Mapping[str, float]) -> bool:
     return matched.usual or scores["matched"] <= MATCHING.as_close * scores["searched"]
 
 
-class _Search:
-    """The first stage, made when it is asked for."""
+class _Stages:
+    """Both stages, each made when it is asked for."""
 
-    def __init__(self, even: AspectObjective, stores: Stores, tell: Tell) -> None:
+    def __init__(self, entry: Candidate, motion: RecordedMotion, how: Execution) -> None:
+        self.even, self.order = even_blocks(entry, motion), label_order(entry)
         self.best: Floats | None = None
-        self._even, self._stores, self._tell = even, stores, tell
+        self._motion, self._how = motion, how
         self._optima: Floats | None = None
+
+    def matched(self) -> Matched:
+        """Return the setting whose summaries match; searches where it has no other start."""
+        count, replicates = len(self.even.ranges), self._motion.replicates
+        objective = SummaryObjective(
+            self.even,
+            self._motion,
+            store=self._how.stores("summaries", {"worlds": replicates}),
+            executor=self._how.executor,
+            tell=lambda done, most: self._how.tell("summaries", done, most),
+            most=most_simulations(count, replicates),
+        )
+        return match_summaries(
+            objective,
+            count,
+            self.optima,
+            order=self.order,
+            replicates=replicates,
+            seed=self.even.seed,
+        )
 
     def optima(self) -> Floats:
         """Return the ends of the searches, the best first."""
@@ -174,46 +143,30 @@ class _Search:
         return self._search("longer-search", Budget()).best
 
     def _search(self, stage: str, budget: Budget) -> SearchResult:
-        count = len(self._even.ranges)
+        count = len(self.even.ranges)
         most = budget.evaluations(count)
         return search_minimum(
-            CachedObjective(self._even, self._stores(stage, {"budget": vars(budget)})),
+            CachedObjective(self.even, self._how.stores(stage, {"budget": vars(budget)})),
             count,
             budget=budget,
-            seed=self._even.seed,
-            tell=lambda done, _: self._tell(stage, done, most),
+            seed=self.even.seed,
+            tell=lambda done, _: self._how.tell(stage, done, most),
         )
 
-
-def _matched(
-    even: AspectObjective,
-    motion: RecordedMotion,
-    search: _Search,
-    order: Order,
-    replicates: int,
-    executor: Executor | None,
-    stores: Stores,
-    tell: Tell,
-) -> Matched:
-    count = len(even.ranges)
-    objective = SummaryObjective(
-        even,
-        motion,
-        store=stores("summaries", {"worlds": replicates}),
-        executor=executor,
-        tell=lambda done, most: tell("summaries", done, most),
-        most=most_simulations(count, replicates),
-    )
-    return match_summaries(
-        objective, count, search.optima, order=order, replicates=replicates, seed=even.seed
-    )
+    def weighed(self, answers: Mapping[str, Floats]) -> dict[str, float]:
+        """Return scores in the even blocks, of 20 replicates with common random numbers."""
+        overall, distances = self.even.reference.overall, self.even.distances
+        return {
+            name: float(overall(distances(point[None], 20, stage="weighed")[0]).mean())
+            for name, point in answers.items()
+        }
 
 
-def _weighed(even: AspectObjective, answers: Mapping[str, Floats]) -> dict[str, float]:
-    """Return scores in the even blocks, of 20 replicates with common random numbers."""
-    return {
-        name: float(
-            even.reference.overall(even.distances(point[None], 20, stage="weighed")[0]).mean()
-        )
-        for name, point in answers.items()
-    }
+def calibrate_many(motion: RecordedMotion, model: MotionModel, how: Execution) -> xr.Dataset:
+    """Return the `model_calibration` of a model with any number of parameters.
+
+    A self-propelled body without a clearance has that of the recording. The search runs in this
+    process, whatever the executor.
+    """
+    (entry,), warnings = prepare_candidates([with_contact_clearance(model, motion)], motion)
+    return build_model_calibration(estimate(entry, motion, how), entry, motion, warnings)

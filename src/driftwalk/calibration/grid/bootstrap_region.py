@@ -24,10 +24,8 @@ from typing import Any, ClassVar, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.calibration.grid.grid_map import Progress
-from driftwalk.calibration.grid.grid_refinement import RefinedMap
-from driftwalk.calibration.grid.surface import (
-    Optimum,
+from driftwalk.calibration.grid.energy_score import (
+    EnergyScore,
     Smoother,
     at_settings,
     lattice_of,
@@ -35,6 +33,8 @@ from driftwalk.calibration.grid.surface import (
     make_smoother,
     nearest_point,
 )
+from driftwalk.calibration.grid.grid_map import Progress
+from driftwalk.calibration.grid.grid_refinement import RefinedMap
 from driftwalk.calibration.problem import Axes, Problem, score_settings
 from driftwalk.comparison import Statistic, StepTable
 from driftwalk.comparison.statistic import distances_among
@@ -91,7 +91,8 @@ class StoredSurface:
 
         It is infinite where nothing is kept.
         """
-        met = _replicate(self.replicates, self.apart.size, replicate % BOOTSTRAP.surface_replicates)
+        settings, number = self.apart.size, replicate % BOOTSTRAP.surface_replicates
+        met = self.replicates.rows(slice(number * settings, (number + 1) * settings))
         distance = self.statistic.matrix(recordings, met, threads=self.threads)
         score = (distance - 0.5 * self.apart) @ self.matrix.T
         surface = np.full((len(distance), *self.retained.shape), np.inf)
@@ -163,11 +164,6 @@ def _between(axes: Axes, values: Floats, lattice: Axes) -> Floats:
     return np.asarray(found.reshape([axis.size for axis in lattice]))
 
 
-def _replicate(table: StepTable, settings: int, replicate: int) -> StepTable:
-    """Return one replicate of every setting."""
-    return table.rows(slice(replicate * settings, (replicate + 1) * settings))
-
-
 def _apart(problem: Problem, table: StepTable, settings: int) -> Floats:
     """Return the mean distance between the replicates of each setting."""
 
@@ -210,23 +206,21 @@ class Bootstrap(NamedTuple):
 
 def run_bootstrap(
     problem: Problem,
-    optimum: Optimum,
+    energy_score: EnergyScore,
     surface: StoredSurface,
     *,
-    floor: float,
     count: int,
     store: Store | None = None,
     executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> Bootstrap:
     """Simulate recordings at the optimum and estimate each again."""
-    recordings, to_recording = simulated_steps(
-        problem, optimum.point, stage="bootstrap", replicates=count
-    )
+    point = energy_score.optimum.point
+    recordings, to_recording = simulated_steps(problem, point, stage="bootstrap", replicates=count)
     names = tuple(parameter.name for parameter in problem.parameters)
     alone = surface if executor is None else replace(surface, threads=1)
-    truth = nearest_point(surface.axes, optimum.point)
-    function = _Estimates(recordings, alone, names, truth, floor)
+    truth = nearest_point(surface.axes, point)
+    function = _Estimates(recordings, alone, names, truth, energy_score.floor_at_optimum)
     units = grid(recording=np.arange(count)).units(BOOTSTRAP.recordings_per_unit)
     estimates = run_sweep(function, units, store=store, executor=executor, progress=progress)
     few = min(BOOTSTRAP.floor_references, count // 2)

@@ -10,8 +10,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.calibration.estimation import Stores
-from driftwalk.calibration.problem import Axes, Problem, score_settings
+from driftwalk.calibration.problem import Axes, Problem, Stores, in_memory, score_settings
 from driftwalk.comparison import StepTable
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.processors import map_in_threads
@@ -106,7 +105,7 @@ class MapSimulator:
     stage: str
     details: Details = "none"
     apart: bool = True
-    stores: Stores | None = None
+    stores: Stores = in_memory
     executor: Executor | None = None
     progress: Progress | None = None
 
@@ -179,8 +178,6 @@ class MapSimulator:
         return grid(**dict(zip(names, axes, strict=True)))
 
     def _store(self, name: str, axes: Axes, facts: dict[str, object]) -> Store | None:
-        if self.stores is None:
-            return None
         fingerprint = {"axes": [axis.tolist() for axis in axes], **facts}
         return self.stores(f"{name}-{window_id(axes)}", fingerprint)
 
@@ -269,8 +266,6 @@ class _Cells:
 
 def _spread(values: npt.NDArray[Any], cells: Integers, design: Design) -> npt.NDArray[Any]:
     """Return the rows of some settings as rows of all; those of the others are 0."""
-    if cells.size == design.size:
-        return values
     spread = np.zeros((design.size, *values.shape[1:]), dtype=values.dtype)
     spread[cells] = values
     return spread

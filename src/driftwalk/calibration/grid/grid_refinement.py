@@ -14,9 +14,8 @@ from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 
-from driftwalk.calibration.grid.energy_score import EnergyScore, smooth_energy_score
+from driftwalk.calibration.grid.energy_score import EnergyScore, at_settings, smooth_energy_score
 from driftwalk.calibration.grid.grid_map import Map
-from driftwalk.calibration.grid.surface import at_settings
 from driftwalk.calibration.problem import Axes
 from driftwalk.core.arrays import Bools, Floats
 
@@ -176,20 +175,14 @@ def next_window(found: RefinedMap, limits: Window) -> Window:
     cell = better_cell(found.map, found.energy_score)
     if cell is not None:
         return _half_around(found.map.point(cell), found.map.axes)
+    grown = padded(found, limits, beyond=0.5)
     following = []
-    for axis, (low, high), ends, window in zip(
-        found.map.axes, found.plausible, limits, found.window, strict=True
+    for axis, ends, window, other in zip(
+        found.map.axes, found.plausible, found.window, grown, strict=True
     ):
-        step, extent = _step(axis), float(np.ptp(axis))
-        cut = math.isinf(low), math.isinf(high)
-        first, last = (axis[0] if cut[0] else low), (axis[-1] if cut[1] else high)
-        pad = max(REFINEMENT.padding * (last - first), step)
-        first = max(first - (max(pad, 0.5 * extent) if cut[0] else pad), ends[0])
-        last = min(last + (max(pad, 0.5 * extent) if cut[1] else pad), ends[1])
-        if not any(cut) and last - first > REFINEMENT.smaller * extent:
-            following.append(window)
-        else:
-            following.append((float(first), float(last)))
+        # A valley that the window cuts off has an infinite end: the window moves there.
+        fills = REFINEMENT.smaller * float(np.ptp(axis)) < other[1] - other[0]
+        following.append(window if fills and np.isfinite(ends).all() else other)
     return tuple(following)
 
 
@@ -269,13 +262,20 @@ def _intervals(located: RefinedMap, steps: Sequence[float]) -> list[float] | Non
     return None if enough else wanted
 
 
-def padded(found: RefinedMap, limits: Window) -> Window:
-    """Return the extent of the plausible settings with some around."""
+def padded(found: RefinedMap, limits: Window, *, beyond: float = 0.0) -> Window:
+    """Return the extent of the plausible settings with some around.
+
+    Where they reach the end of the window, it goes on by at least this share of its extent.
+    """
     bounds = []
     for axis, (low, high), ends in zip(found.map.axes, found.plausible, limits, strict=True):
         first, last = (axis[at] if math.isinf(end) else end for at, end in ((0, low), (-1, high)))
         pad = max(REFINEMENT.padding * (last - first), _step(axis))
-        bounds.append((float(max(first - pad, ends[0])), float(min(last + pad, ends[1]))))
+        before, after = (
+            max(pad, beyond * float(np.ptp(axis))) if math.isinf(end) else pad
+            for end in (low, high)
+        )
+        bounds.append((float(max(first - before, ends[0])), float(min(last + after, ends[1]))))
     return tuple(bounds)
 
 

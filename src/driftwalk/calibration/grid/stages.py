@@ -3,20 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Sequence
-from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from driftwalk.calibration.estimation import Stores, Tell
-from driftwalk.calibration.goodness_of_fit import (
-    GoodnessOfFit,
-    Halves,
-    goodness_of_fit,
-    noise_floor_at,
-)
+from driftwalk.calibration.goodness_of_fit import GoodnessOfFit, goodness_of_fit, noise_floor_at
 from driftwalk.calibration.grid.bootstrap_region import (
     Bootstrap,
     Region,
@@ -24,17 +17,8 @@ from driftwalk.calibration.grid.bootstrap_region import (
     confidence_region,
     run_bootstrap,
 )
-from driftwalk.calibration.grid.boundary_warnings import (
-    Boundary,
-    interval_warnings,
-    optimum_warnings,
-)
-from driftwalk.calibration.grid.grid_map import (
-    Map,
-    MapSimulator,
-    SweepProgress,
-    window_id,
-)
+from driftwalk.calibration.grid.energy_score import Optimum
+from driftwalk.calibration.grid.grid_map import Map, MapSimulator, SweepProgress, window_id
 from driftwalk.calibration.grid.grid_refinement import (
     RefinedMap,
     better_cell,
@@ -42,41 +26,27 @@ from driftwalk.calibration.grid.grid_refinement import (
     locate_minimum,
     refine,
 )
-from driftwalk.calibration.grid.surface import Optimum, at_settings
-from driftwalk.calibration.problem import Problem, limits_of
-from driftwalk.calibration.result import (
-    CalibrationParts,
-    answer_facts,
-    build_calibration,
-    estimate_facts,
-    interval_facts,
-)
-from driftwalk.calibration.stationarity import Stationarity
+from driftwalk.calibration.problem import Execution, Problem, limits_of
+from driftwalk.calibration.warnings import Boundary, interval_warnings, optimum_warnings
 from driftwalk.core.errors import InputError
 from driftwalk.core.run_stages import share_of_map, share_of_windows
 from driftwalk.motion.batches import no_numbers
 from driftwalk.motion.score import broken_worlds
-from driftwalk.schema.answers.facts import FAR_ABOVE_FLOOR
 
 if TYPE_CHECKING:
-    import xarray as xr
+    pass
 
 
 class GridCalibration:
     """The stages in their order, and what each leaves for the next."""
 
-    def __init__(
-        self, problem: Problem, keep: Stores, say: Tell, executor: Executor | None
-    ) -> None:
+    def __init__(self, problem: Problem, how: Execution) -> None:
         self.problem = problem
         self.warnings: list[str] = []
         self.bootstrap: Bootstrap | None = None
         self.quality: GoodnessOfFit | None = None
         self.region: Region | None = None
-        self._keep = keep
-        self._executor = executor
-        self._say = say
-        self._steps = problem.refined_steps
+        self._how = how
 
     def run(self) -> GridCalibration:
         """Run every stage that the study asks for."""
@@ -114,16 +84,20 @@ class GridCalibration:
         raise InputError(no_numbers(self.problem.model.name, setting))
 
     def _maps(self, stage: str, share_of: Callable[[Sequence[float]], float]) -> MapSimulator:
-        progress = SweepProgress(partial(self._say, stage), share_of)
+        progress = SweepProgress(partial(self._how.tell, stage), share_of)
         return MapSimulator(
-            self.problem, stage, stores=self._keep, executor=self._executor, progress=progress
+            self.problem,
+            stage,
+            stores=self._how.stores,
+            executor=self._how.executor,
+            progress=progress,
         )
 
     def _refine(self, wanted: int) -> None:
         limits = limits_of(self.problem)
         maps = self._maps("refined", share_of_windows)
         located = locate_minimum(maps, first_window(self.coarse, self.floor), limits)
-        self.refined = refine(maps, located, limits, self._steps, wanted)
+        self.refined = refine(maps, located, limits, self.problem.refined_steps, wanted)
         self.optimum = self.refined.energy_score.optimum
         cell = better_cell(self.refined.map, self.refined.energy_score)
         if cell is not None:
@@ -144,6 +118,7 @@ class GridCalibration:
     def _bootstrap(self, refined: RefinedMap, count: int, known: Container[Boundary]) -> None:
         surface = build_surface(self.problem, refined)
         energy_score = refined.energy_score
+        # A moved optimum, window or surface makes other recordings: finished ones do not count.
         fingerprint = {
             "optimum": [*self.optimum.point, self.optimum.distance],
             "axes": [axis.tolist() for axis in surface.axes],
@@ -152,14 +127,14 @@ class GridCalibration:
         }
         self.bootstrap = run_bootstrap(
             self.problem,
-            self.optimum,
+            energy_score,
             surface,
-            floor=energy_score.floor_at_optimum,
             count=count,
-            store=self._keep(f"bootstrap-{window_id(refined.map.axes)}", fingerprint),
-            executor=self._executor,
-            progress=partial(self._say, "bootstrap"),
+            store=self._how.stores(f"bootstrap-{window_id(refined.map.axes)}", fingerprint),
+            executor=self._how.executor,
+            progress=partial(self._how.tell, "bootstrap"),
         )
+        # From here on the floor is that of recordings as long as the real one, at the optimum.
         self.quality = goodness_of_fit(self.bootstrap)
         self.floor = self.quality.floor
         self.region = confidence_region(
@@ -176,7 +151,7 @@ class GridCalibration:
             search=self.coarse.axes,
             window=refined.map.axes,
             lattice=surface.axes,
-            steps=self._steps,
+            steps=self.problem.refined_steps,
             known=known,
         )
         if not self.quality.explained:
@@ -185,53 +160,3 @@ class GridCalibration:
                 f"optimum is {self.quality.distance / self.quality.floor:.1f} times the noise "
                 f"floor {self.quality.floor:.3f}; the parameters are the best of bad fits"
             )
-
-    def dataset(
-        self,
-        halves: Halves | None,
-        stationarity: Stationarity | None,
-        recording: xr.Dataset,
-    ) -> xr.Dataset:
-        """Put the pieces into one dataset and state the answer."""
-        lowest = self.coarse.point(self.coarse.cell_of_minimum())
-        facts: dict[str, Any] = {
-            **answer_facts(self.problem, self.optimum.point),
-            **estimate_facts(self.problem, lowest, "coarse_"),
-            "ks_distance": self.optimum.distance,
-            "noise_floor": self.floor,
-            "warnings": self.warnings,
-            "recording_name": str(recording.attrs.get("source", "")),
-            "simulated_recording": str(recording.attrs.get("simulated", "no")),
-            "study": self.problem.study.to_toml(),
-        }
-        if self.quality is not None and self.region is not None:
-            facts |= _quality_facts(self.quality, self.region, self.problem)
-        if halves is not None:
-            facts |= estimate_facts(self.problem, halves.point, "first_half_")
-            facts["second_half_ks_distance"] = halves.distance
-            facts["second_half_noise_floor"] = halves.floor
-        if stationarity is not None:
-            facts["halves_ks_distance"] = stationarity.distance
-            facts["halves_ks_distance_expected"] = stationarity.expected
-            facts["halves_p_value"] = stationarity.p_value
-        refined, surface = None, None
-        if self.refined is not None:
-            refined, surface = self.refined.map, at_settings(self.refined.energy_score.surface)
-        pieces = CalibrationParts(self.coarse, refined, surface, self.bootstrap, self.region)
-        return build_calibration(self.problem, pieces, facts)
-
-
-def _quality_facts(quality: GoodnessOfFit, region: Region, problem: Problem) -> dict[str, Any]:
-    """Return what only a bootstrap tells: how sure the answer is, and how good."""
-    return {
-        **interval_facts(problem, region),
-        "confidence": problem.study.calibration.confidence,
-        "ks_distance": quality.distance,
-        "ks_distance_standard_error": quality.standard_error,
-        "noise_floor_upper": quality.floor_upper,
-        "distance_to_floor_ratio": quality.distance / quality.floor,
-        "far_above_floor": FAR_ABOVE_FLOOR,
-        "explained": quality.explained,
-        "region_level": region.level,
-        "interval_stretch": quality.stretch,
-    }

@@ -16,7 +16,8 @@ from driftwalk.motion.random import WorldRandom
 
 if TYPE_CHECKING:
     from driftwalk.conditions import Conditions
-    from driftwalk.motion.protocol import Floats, Keys, Values
+    from driftwalk.core.arrays import Keys
+    from driftwalk.motion.protocol import Values
     from driftwalk.schema import Parameter
 
 

@@ -4,30 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.calibration.evolution import recorded_ranges, wall_distance
+from driftwalk.calibration.estimation.identifiability import DETERMINED
+from driftwalk.calibration.evolution import wall_distance
 from driftwalk.calibration.held_out.baselines import HiddenMarkovWalk, ResampledSteps, runs_of
 from driftwalk.calibration.held_out.hidden_markov import fit_hidden_markov_model
-from driftwalk.calibration.held_out.recorded import RecordedMotion
+from driftwalk.calibration.held_out.recorded import RecordedMotion, recorded_ranges
 from driftwalk.comparison.aspects import block_of, interleaved
 from driftwalk.conditions import Conditions, unstated_warning
-from driftwalk.conditions.own_flow import flow_from_track
+from driftwalk.conditions.recorded import flow_from_track
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import ConfigurationError, InputError
-from driftwalk.motion import (
-    BlockModel,
-    MotionModel,
-    ParticleModel,
-    motion_model,
-)
+from driftwalk.motion import BlockModel, MotionModel, ParticleModel, motion_model
 from driftwalk.schema import Parameter, Track
-
-if TYPE_CHECKING:
-    from driftwalk.model import Study
-
 
 BLOCK: Final = "block"
 
@@ -45,12 +37,21 @@ class Candidate(NamedTuple):
     """That are fitted."""
     baseline: bool
 
+    def at_range_end(self, point: Floats) -> str | None:
+        """Return a warning where a point of the unit cube is at the end of a range."""
+        ended = [
+            one.name
+            for one, share in zip(self.ranges, point, strict=True)
+            if min(share, 1.0 - share) < DETERMINED.range_end
+        ]
+        if not ended:
+            return None
+        return f"at the end of its range: {', '.join(ended)}; extend the range, or doubt the model"
 
-def made_models(
-    models: Sequence[Chosen], motion: RecordedMotion, study: Study
-) -> list[MotionModel]:
+
+def made_models(models: Sequence[Chosen], motion: RecordedMotion) -> list[MotionModel]:
     """Return the models, made of their names."""
-    found = [_made(one, motion, study) for one in models]
+    found = [_made(one, motion) for one in models]
     names = [model.name for model in found]
     if not names:
         raise ConfigurationError("no motion model is given to compare")
@@ -61,9 +62,9 @@ def made_models(
 
 
 def prepare_candidates(
-    models: Sequence[MotionModel], motion: RecordedMotion, study: Study
+    models: Sequence[MotionModel], motion: RecordedMotion
 ) -> tuple[list[Candidate], list[str]]:
-    """Return the models with their conditions and ranges, and warnings.
+    """Return the models with their conditions and ranges, and warnings of the recording.
 
     Where the flow is not known, models that need one get that of the even blocks of time. Where
     none can be extracted they are left out, with a warning, and so is a model that feels other
@@ -73,7 +74,7 @@ def prepare_candidates(
     warnings: list[str] = []
     for model in models:
         try:
-            found.append(_prepare_candidate(model, motion, study))
+            found.append(_prepare_candidate(model, motion))
         except InputError as error:
             if len(models) == 1:
                 raise
@@ -82,9 +83,10 @@ def prepare_candidates(
     if not found:
         raise InputError("; ".join(warnings))
     unstated = unstated_warning(
-        study, about="block" if any(one.name == BLOCK for one in models) else "tank"
+        motion.study, about="block" if any(one.name == BLOCK for one in models) else "tank"
     )
-    return found, warnings if unstated is None else [unstated, *warnings]
+    said = [] if unstated is None else [unstated]
+    return found, [*said, *warnings, *motion.warnings]
 
 
 def resampling_baselines(motion: RecordedMotion) -> list[Candidate]:
@@ -100,9 +102,9 @@ def resampling_baselines(motion: RecordedMotion) -> list[Candidate]:
     ]
 
 
-def _made(one: Chosen, motion: RecordedMotion, study: Study) -> MotionModel:
+def _made(one: Chosen, motion: RecordedMotion) -> MotionModel:
     if one == BLOCK:
-        return BlockModel(study)
+        return BlockModel(motion.study)
     model = motion_model(one) if isinstance(one, str) else one
     # Only the family leaves its distance from the wall to the recording.
     if isinstance(model, ParticleModel) and not model.states_clearance:
@@ -122,7 +124,7 @@ def _within_reach(parameter: Parameter, motion: RecordedMotion) -> Parameter:
     return replace(parameter, low=low, step=0.0)
 
 
-def _prepare_candidate(model: MotionModel, motion: RecordedMotion, study: Study) -> Candidate:
+def _prepare_candidate(model: MotionModel, motion: RecordedMotion) -> Candidate:
     ranges = model.parameters
     if isinstance(model, ParticleModel):
         model.require_others(motion.like)
@@ -133,7 +135,7 @@ def _prepare_candidate(model: MotionModel, motion: RecordedMotion, study: Study)
     if model.needs_flow and like.flow is None:
         even = block_of(motion.track.time, motion.duration) % 2 == 0
         track = Track(*(part[even] for part in motion.track))
-        like = replace(like, flow=flow_from_track(track, study))
+        like = replace(like, flow=flow_from_track(track, motion.study))
     return Candidate(model, like, ranges, len(ranges), baseline=False)
 
 

@@ -1,4 +1,4 @@
-"""Held-out score: a model searched on the even blocks of time and scored on the odd ones."""
+"""Held-out score: a model is searched on the even blocks of time and judged on the odd ones."""
 
 from __future__ import annotations
 
@@ -7,18 +7,16 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.calibration.evolution import (
-    AspectObjective,
-    Budget,
-    search_minimum,
-)
+from driftwalk.calibration.evolution import AspectObjective, Budget, search_minimum
 from driftwalk.calibration.held_out.candidates import Candidate
-from driftwalk.calibration.held_out.recorded import RecordedMotion
+from driftwalk.calibration.held_out.recorded import CHECKS, UNITS, RecordedMotion
 from driftwalk.comparison.aspects import AspectReference
-from driftwalk.core.arrays import Floats
+from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
 from driftwalk.motion.batches import no_numbers
 from driftwalk.motion.score import broken_worlds
+from driftwalk.schema.answers.facts import AnswerParts, texts
+from driftwalk.schema.answers.model_comparison import ASPECT_WORDS, CHECK_WORDS
 
 Tell = Callable[[int, int], None]
 
@@ -45,23 +43,46 @@ class HeldOutScore(NamedTuple):
     """Scores at the ends of the searches."""
     evaluations: int
 
+    @property
+    def score_std(self) -> float:
+        """Standard error of the score."""
+        return without_error(self.without)
+
+    def behind(self, other: HeldOutScore) -> tuple[float, float]:
+        """Return how far the score is behind another one, and the standard error of that."""
+        return self.score - other.score, without_error(self.without - other.without)
+
 
 def score_candidate(
-    entry: Candidate, motion: RecordedMotion, *, budget: Budget, seed: int, tell: Tell | None
+    entry: Candidate, motion: RecordedMotion, *, budget: Budget, tell: Tell | None
 ) -> HeldOutScore:
     """Search a model on the even blocks of a recording, and judge it on the odd ones."""
-    objective = even_blocks(entry, motion, seed)
+    objective = even_blocks(entry, motion)
     if not entry.ranges:
         return score_setting(objective, motion, np.empty(0))
     require_numbers(objective)
-    found = search_minimum(objective, len(entry.ranges), budget=budget, seed=seed, tell=tell)
+    found = search_minimum(objective, len(entry.ranges), budget=budget, seed=motion.seed, tell=tell)
     held_out = score_setting(objective, motion, found.best)
     return held_out._replace(optimum_scores=found.optimum_scores, evaluations=found.evaluations)
 
 
-def even_blocks(entry: Candidate, motion: RecordedMotion, seed: int) -> AspectObjective:
+def recording_parts(motion: RecordedMotion) -> AnswerParts:
+    """Return what each dataset of held-out scores says of its recording."""
+    data = {
+        "own_distance": ("aspect", motion.own),
+        "floor": ("aspect", motion.held.floor),
+        "check_recorded": ("check", motion.recorded_checks),
+        "check_unit": ("check", texts(UNITS)),
+    }
+    coords = {"aspect": ("aspect", texts(motion.held.names)), "check": ("check", texts(CHECKS))}
+    return AnswerParts(data, coords, {**motion.attrs, "worlds": HELD_OUT_REPLICATES})
+
+
+def even_blocks(entry: Candidate, motion: RecordedMotion) -> AspectObjective:
     """Return how far a model's settings are from the even blocks of a recording."""
-    return AspectObjective(entry.model, entry.ranges, entry.like, motion.plan, motion.fitted, seed)
+    return AspectObjective(
+        entry.model, entry.ranges, entry.like, motion.plan, motion.fitted, motion.seed
+    )
 
 
 def score_setting(
@@ -107,3 +128,72 @@ def without_error(without: Floats) -> float:
     """Return the standard error of a mean from what is left without each block (jackknife)."""
     count = without.size
     return float(np.sqrt((count - 1) / count * ((without - without.mean()) ** 2).sum()))
+
+
+class VerdictPolicy(NamedTuple):
+    """When a model explains a recording."""
+
+    most_over_own: float = 2.0
+    """Distance in distances of the recording's own parts. Simulated recordings of the right model
+    have 0.8 to 1.9: the parts of one recording share slow changes."""
+    most_ratio: float = 1.5
+    """A fact is far off when it exceeds those of all replicates by this factor. Chosen by hand."""
+    most_share_apart: float = 0.1
+    """A share of the time is far off when it exceeds those of all replicates by this. Chosen by
+    hand."""
+    most_checks_off: int = 1
+    """Facts that may be far off: a KS distance hardly sees tails, which the right model may
+    miss."""
+    tied_sigmas: float = 2.0
+    """Models tie within this many standard errors of their difference: the usual 95 %."""
+
+
+VERDICT: Final = VerdictPolicy()
+
+
+class Verdict(NamedTuple):
+    """Whether a model explains a recording."""
+
+    explained: bool
+    text: str
+    """Where it does not, the worst first; empty where it does."""
+
+
+def verdict_of(
+    held_out: HeldOutScore,
+    motion: RecordedMotion,
+    *,
+    baseline: bool,
+    clearly_behind: str | None = None,
+    unlike: str | None = None,
+) -> Verdict:
+    """Compare a model with the recording's own differences, and with facts that are not fitted."""
+    over = held_out.held / motion.own
+    off = checks_off(held_out.checks, motion.recorded_checks)
+    parts = [
+        f"{ASPECT_WORDS[motion.held.names[k]]}: D = {held_out.held[k]:.3f}, "
+        f"the recording's own parts {motion.own[k]:.3f}"
+        for k in np.argsort(-over)
+        if over[k] > VERDICT.most_over_own
+    ]
+    if np.count_nonzero(off) > VERDICT.most_checks_off:
+        names = [words for words, is_off in zip(CHECK_WORDS.values(), off, strict=True) if is_off]
+        parts.append(f"far beyond all its worlds: {', '.join(names)}")
+    if unlike is not None:
+        parts.append(unlike)
+    if not parts and clearly_behind is not None:
+        parts.append(f"{clearly_behind} is clearly closer")
+    if baseline:
+        parts.insert(0, "it repeats recorded steps and knows no arena")
+    return Verdict(not parts, "; ".join(parts))
+
+
+def checks_off(worlds: Floats, recorded: Floats) -> Bools:
+    """Return which facts of a recording are far beyond those of all worlds, shape (checks,)."""
+    low, high = worlds.min(axis=0), worlds.max(axis=0)
+    share = np.array([name.endswith("_share") for name in CHECKS])
+    lowest = np.where(share, low - VERDICT.most_share_apart, low / VERDICT.most_ratio)
+    highest = np.where(share, high + VERDICT.most_share_apart, high * VERDICT.most_ratio)
+    with np.errstate(invalid="ignore"):
+        near = (lowest <= recorded) & (recorded <= highest)
+    return np.asarray(np.isfinite(recorded) & ~near)

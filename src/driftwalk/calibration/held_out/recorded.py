@@ -1,17 +1,17 @@
-"""A recording as motion models are compared on it: its blocks of time, aspects and scales."""
+"""A recording as motion models are compared on it: blocks of time, aspects, scales and checks."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.calibration.evolution import Scales, scales_of, wall_distance
-from driftwalk.calibration.held_out.checks import motion_checks
-from driftwalk.calibration.refuse import require_samples
+from driftwalk.calibration.evolution import wall_distance
+from driftwalk.calibration.problem import require_samples
 from driftwalk.comparison import KsReference
 from driftwalk.comparison.aspects import (
     BLOCKS,
@@ -19,30 +19,187 @@ from driftwalk.comparison.aspects import (
     Aspect,
     AspectPlan,
     AspectReference,
+    WallDistance,
     aspect_reference,
     block_of,
     form_aspects,
     interleaved,
     own_distance,
     plan_aspects,
+    resampled,
 )
 from driftwalk.conditions import (
     Conditions,
-    Neighbours,
+    jump_warnings,
     neighbours_of,
     possible_noises,
     recorded_camera,
     recorded_conditions,
     require_travel,
 )
-from driftwalk.core.arrays import Floats
+from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
-from driftwalk.schema import Track, body_track
+from driftwalk.schema import Parameter, Track, body_track
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
+
+
+LAGS: Final = (1, 3, 10, 30, 100)
+"""Of the mean squared displacement, in step intervals."""
+CHECKS: Final = (*(f"displacement_{lag}" for lag in LAGS), "speed_time", "wall_share", "rest_share")
+UNITS: Final = (*("m2" for _ in LAGS), "s", "1", "1")
+
+
+def motion_checks(
+    plan: AspectPlan,
+    x: npt.ArrayLike,
+    y: npt.ArrayLike,
+    *,
+    wall: WallDistance,
+    depth: float,
+    usual_step: float,
+) -> Floats:
+    """Return facts of a motion, shape (checks,); NaN where it is too short for one."""
+    px, py = resampled(plan.short, x), resampled(plan.short, y)
+    there = np.zeros(px.size - 1, dtype=bool)
+    there[plan.step] = True
+    there &= np.isfinite(np.diff(px)) & np.isfinite(np.diff(py))
+    broken = np.concatenate([[0], np.cumsum(~there)])
+    length = np.hypot(np.diff(px), np.diff(py))
+    found = [_squared_displacement(px, py, broken, lag) for lag in LAGS]
+    found.append(_memory(length, there) * plan.short.step_interval)
+    steps = length[there]
+    if not steps.size:
+        return np.full(len(CHECKS), np.nan)
+    near = wall(px, py)[:-1][there] < 0.2 * depth
+    found += [float(near.mean()), float((steps < 0.2 * usual_step).mean())]
+    return np.array(found)
+
+
+def _squared_displacement(x: Floats, y: Floats, broken: Integers, lag: int) -> float:
+    """Return the mean over all stretches without a gap."""
+    whole = broken[lag:] == broken[:-lag]
+    if not whole.any():
+        return float("nan")
+    squares = (x[lag:] - x[:-lag]) ** 2 + (y[lag:] - y[:-lag]) ** 2
+    return float(squares[whole].mean())
+
+
+def _memory(length: Floats, there: Bools) -> float:
+    """Return after how many intervals the autocorrelation of the step lengths falls below 1/e."""
+    if np.count_nonzero(there) < LAGS[-1]:
+        return float("nan")
+    apart = np.where(there, length, 0.0)
+    apart = np.where(there, apart - apart[there].mean(), 0.0)
+    variance = float((apart**2).sum()) / np.count_nonzero(there)
+    # A speed that is the same all along differs by rounding alone.
+    if variance <= (1e-9 * float(length[there].mean())) ** 2:
+        return float("nan")
+    before, longest = 1.0, 500
+    for lag in range(1, min(longest, length.size // 4)):
+        pairs = int(np.count_nonzero(there[lag:] & there[:-lag]))
+        if not pairs:
+            break
+        now = float((apart[lag:] * apart[:-lag]).sum()) / pairs / variance
+        if now < np.exp(-1.0):
+            return float(lag - 1 + (before - np.exp(-1.0)) / (before - now))
+        before = now
+    return float(min(longest, length.size // 4))
+
+
+@dataclass(frozen=True)
+class Scales:
+    """The scales of a recorded motion.
+
+    Attributes
+    ----------
+    speed : float
+        Mean speed over a step interval [m/s].
+    fastest : float
+        Its 99.9 % quantile [m/s].
+    interval : float
+        Step interval [s].
+    duration : float
+        From the first to the last sample [s].
+    size : float
+        Half the longer side of what the recording covers [m].
+    """
+
+    speed: float
+    fastest: float
+    interval: float
+    duration: float
+    size: float
+
+
+def scales_of(track: Track, *, step_interval: float, steps: Floats) -> Scales:
+    """Return the scales of a track with these step lengths [m].
+
+    Raises
+    ------
+    InputError
+        When the track does not move.
+
+    Examples
+    --------
+    >>> time = np.arange(100) / 10.0
+    >>> track = Track(time, 0.02 * time, 0 * time, 0 * time)
+    >>> round(scales_of(track, step_interval=0.1, steps=np.full(99, 0.002)).speed, 6)
+    0.02
+    """
+    speed = float(np.mean(steps)) / step_interval
+    if not speed > 0.0:
+        raise InputError("the recording does not move: no step has a length")
+    size = 0.5 * max(float(np.ptp(track.x)), float(np.ptp(track.y)))
+    return Scales(
+        speed=speed,
+        fastest=float(np.quantile(steps, 0.999)) / step_interval,
+        interval=step_interval,
+        duration=float(track.time[-1] - track.time[0]),
+        size=size,
+    )
+
+
+def recorded_ranges(parameters: Sequence[Parameter], scales: Scales) -> tuple[Parameter, ...]:
+    """Return the parameters with ranges that a recording of these scales can tell apart.
+
+    Speeds lie about the recorded one, times between half a step interval and a part of the
+    recording, rates below a turn per step, lengths below the size of what was covered. A range is
+    the part of the parameter's own that lies there; where they do not meet, its own stays.
+
+    Examples
+    --------
+    >>> speed = Parameter("speed", "m/s", 1e-6, 10.0, scale="log")
+    >>> scales = Scales(speed=0.1, fastest=0.5, interval=0.1, duration=600.0, size=0.2)
+    >>> found = recorded_ranges([speed], scales)[0]
+    >>> round(found.low, 6), found.high
+    (0.005, 1.0)
+    """
+    return tuple(_ranged(one, scales) for one in parameters)
+
+
+def _ranged(parameter: Parameter, scales: Scales) -> Parameter:
+    per_step = 1.0 / scales.interval
+    usual = {
+        "m/s": (0.05 * scales.speed, max(2.0 * scales.fastest, 2.0 * scales.speed)),
+        "s": (0.5 * scales.interval, 0.1 * scales.duration),
+        "rad2/s": (1e-3 * per_step, 3.0 * per_step),
+        "rad/s": (0.02 * per_step, 5.0 * per_step),
+        "m": (0.01 * scales.size, scales.size),
+        "m2/s": (1e-4 * scales.speed**2 * scales.interval, scales.speed**2 * scales.interval),
+        "Hz": (0.02 * per_step, 2.0 * per_step),
+    }
+    if parameter.unit not in usual:
+        return parameter
+    low, high = usual[parameter.unit]
+    if parameter.low < 0.0:
+        low = -high if parameter.unit != "rad/s" else -0.3 * per_step
+        high = -low
+    low, high = max(low, parameter.low), min(high, parameter.high)
+    return replace(parameter, low=low, high=high, step=0.0) if low < high else parameter
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,8 +236,12 @@ class RecordedMotion:
         Median step [m].
     noises : tuple of float
         Noises of positions that the camera may have, each as likely [m]; one where it is stated.
-    recorded_checks : ndarray, shape (checks,)
-        Facts of the recording that are not fitted, see `motion_checks`.
+    study : Study
+        Tank, camera, step interval, seed and search.
+    attrs : mapping
+        Attributes of each dataset of scores on this recording.
+    warnings : list of str
+        Jumps of the body.
     """
 
     track: Track
@@ -97,7 +258,9 @@ class RecordedMotion:
     depth: float
     usual_step: float
     noises: tuple[float, ...]
-    recorded_checks: Floats
+    study: Study
+    attrs: Mapping[str, Any]
+    warnings: list[str]
 
     @cached_property
     def without_each_block(self) -> tuple[AspectReference, ...]:
@@ -116,16 +279,18 @@ class RecordedMotion:
             found.append(AspectReference(self.held.names, self.held.floor, natives))
         return tuple(found)
 
+    @cached_property
+    def recorded_checks(self) -> Floats:
+        """Facts of the recording that are not fitted, see `motion_checks`."""
+        return self._checks(self.own_plan, self.track.x, self.track.y)
+
     def checks(self, x: npt.ArrayLike, y: npt.ArrayLike) -> Floats:
         """Return the facts of a simulated world, see `motion_checks`."""
-        return motion_checks(
-            self.plan,
-            x,
-            y,
-            wall=wall_distance(self.like),
-            depth=self.depth,
-            usual_step=self.usual_step,
-        )
+        return self._checks(self.plan, x, y)
+
+    def _checks(self, plan: AspectPlan, x: npt.ArrayLike, y: npt.ArrayLike) -> Floats:
+        wall = wall_distance(self.like)
+        return motion_checks(plan, x, y, wall=wall, depth=self.depth, usual_step=self.usual_step)
 
     @cached_property
     def usual_distance(self) -> float:
@@ -144,6 +309,17 @@ class RecordedMotion:
         return next(one for one in self.aspects if one.name == "steps")
 
     @property
+    def seed(self) -> int:
+        """Seed of all searches."""
+        return self.study.calibration.seed
+
+    @property
+    def replicates(self) -> int:
+        """Simulated recordings that judge a discrepancy; below 2 the summaries are left out."""
+        search = self.study.calibration
+        return search.bootstrap if search.refine == "auto" else 0
+
+    @property
     def duration(self) -> float:
         """From the first to the last sample [s]."""
         return float(self.track.time[-1])
@@ -157,35 +333,16 @@ def body_motion(
     body: str | None,
     threads: int | None = None,
 ) -> RecordedMotion:
-    """Prepare a body of a recording for motion models; see `recorded_motion`."""
+    """Prepare a body of a recording for the comparison of motion models."""
     track = body_track(recording, body)
     require_samples(track)
     require_travel(track, study, of_block=False)
     quantum = float(recording.attrs.get("position_quantum_m", 0.0))
-    return recorded_motion(
-        track,
-        study,
-        position_quantum=quantum,
-        flow=flow,
-        neighbours=neighbours_of(recording, body, study.tank),
-        threads=threads,
-    )
-
-
-def recorded_motion(
-    track: Track,
-    study: Study,
-    *,
-    position_quantum: float = 0.0,
-    flow: xr.Dataset | None = None,
-    neighbours: Neighbours | None = None,
-    threads: int | None = None,
-) -> RecordedMotion:
-    """Prepare a recorded track for the comparison of motion models."""
+    neighbours = neighbours_of(recording, body, study.tank)
     if neighbours is not None:
         neighbours = neighbours.since(float(track.time[0]))
     track = track._replace(time=track.time - track.time[0])
-    camera = recorded_camera(track, study, position_quantum=position_quantum)
+    camera = recorded_camera(track, study, position_quantum=quantum)
     noises = possible_noises(track, study, camera)
     if not min(noises) <= camera.position_noise <= max(noises):
         # An estimate of zero: bodies that rest would rest to the last digit.
@@ -235,7 +392,14 @@ def recorded_motion(
         depth=depth,
         usual_step=usual_step,
         noises=noises,
-        recorded_checks=motion_checks(
-            plan, track.x, track.y, wall=wall, depth=depth, usual_step=usual_step
-        ),
+        study=study,
+        attrs={
+            "step_interval_s": float(plan.short.step_interval),
+            "duration_s": duration,
+            "seed": study.calibration.seed,
+            "arena": study.tank.to_arena_json(),
+            "source": str(recording.attrs.get("source", "")),
+            "simulated_recording": str(recording.attrs.get("simulated", "no")),
+        },
+        warnings=jump_warnings(recording, body),
     )

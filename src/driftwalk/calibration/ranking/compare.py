@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from concurrent.futures import Executor
 from typing import TYPE_CHECKING, Final
 
-from driftwalk.calibration.estimation import Stores
 from driftwalk.calibration.evolution import Budget
 from driftwalk.calibration.held_out.candidates import (
     BLOCK,
@@ -17,9 +16,10 @@ from driftwalk.calibration.held_out.candidates import (
 )
 from driftwalk.calibration.held_out.recorded import body_motion
 from driftwalk.calibration.parallel_search import thread_pool
+from driftwalk.calibration.problem import Stores, in_memory
 from driftwalk.calibration.ranking.comparison_stages import Finished, Searches, Stages, Tell
 from driftwalk.calibration.ranking.result import build_comparison
-from driftwalk.conditions import jump_warnings, study_in_arena
+from driftwalk.conditions import study_in_arena
 from driftwalk.core.run_stages import tell_nobody
 from driftwalk.motion import MotionModel, ParticleModel
 from driftwalk.sweep import threads_of_unit
@@ -127,18 +127,18 @@ def compare_models(
     motion = body_motion(
         recording, chosen, flow=flow, body=body, threads=threads_of_unit(threads, executor)
     )
-    entries, warnings = prepare_candidates(made_models(models, motion, chosen), motion, chosen)
+    entries, warnings = prepare_candidates(made_models(models, motion), motion)
     entries += resampling_baselines(motion)
-    warnings += jump_warnings(recording, body)
-    search = chosen.calibration
-    replicates = search.bootstrap if search.refine == "auto" else 0
-    work = Searches(entries, motion, search.seed, budget or Budget())
+    work = Searches(entries, motion, budget or Budget())
     with thread_pool(motion.like.threads if executor is None else 1) as pool:
-        stages = Stages(work, replicates, stores, executor, tell or tell_nobody, pool, finished)
+        stages = Stages(
+            work, motion.replicates, stores or in_memory, executor, tell or tell_nobody, pool,
+            finished,
+        )  # fmt: skip
         held_out = stages.held_out()
         evidence = stages.evidence(held_out)
-    stages.finish()
-    return build_comparison(entries, held_out, motion, chosen, recording, warnings, evidence)
+    stages.course.begin("figures")
+    return build_comparison(entries, held_out, motion, warnings, evidence)
 
 
 def check_models(
@@ -182,7 +182,7 @@ def check_models(
     """
     chosen = _study(recording, study)
     motion = body_motion(recording, chosen, flow=flow, body=body)
-    made = made_models(models, motion, chosen)
+    made = made_models(models, motion)
     if len(made) == 1 and isinstance(made[0], ParticleModel):
         made[0].require_others(motion.like)
     return made

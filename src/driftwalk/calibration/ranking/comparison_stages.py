@@ -11,15 +11,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from driftwalk.calibration.estimation import Stores
-from driftwalk.calibration.estimation.model_evidence import estimate_evidence, most_settings
 from driftwalk.calibration.evolution import Budget
 from driftwalk.calibration.held_out.candidates import Candidate
-from driftwalk.calibration.held_out.held_out_score import (
-    HeldOutScore,
-    score_candidate,
-    without_error,
-)
+from driftwalk.calibration.held_out.held_out_score import HeldOutScore, score_candidate
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.calibration.parallel_search import (
     SearchProgress,
@@ -27,7 +21,13 @@ from driftwalk.calibration.parallel_search import (
     runs_in_threads,
     with_thread_share,
 )
-from driftwalk.calibration.ranking.evidence_ranking import Evidence, Shortlist, shortlist_models
+from driftwalk.calibration.problem import Stores
+from driftwalk.calibration.ranking.model_evidence import (
+    Evidence,
+    estimate_evidence,
+    most_settings,
+    shortlist_models,
+)
 from driftwalk.core.files.shards import Arrays
 from driftwalk.core.processors import one_blas_thread
 from driftwalk.core.run_stages import Course, tell_nobody
@@ -45,7 +45,6 @@ class Searches:
 
     entries: Sequence[Candidate]
     motion: RecordedMotion
-    seed: int
     budget: Budget
     within: Callable[[int, int], None] | None = None
     """Called with the model and the settings done; with all of them when it is finished."""
@@ -62,9 +61,7 @@ class Searches:
 
         say(0, 0)
         with one_blas_thread():
-            found = score_candidate(
-                self.entries[index], self.motion, budget=self.budget, seed=self.seed, tell=say
-            )
+            found = score_candidate(self.entries[index], self.motion, budget=self.budget, tell=say)
         say(self.costs()[index], 0)
         most = max(len(entry.ranges) for entry in self.entries)
         return _packed(found, most, self.budget.starts + 1)
@@ -79,7 +76,7 @@ class Searches:
         return {
             "models": [entry.model.describe() for entry in self.entries],
             "ranges": [[one.describe() for one in entry.ranges] for entry in self.entries],
-            "seed": self.seed,
+            "seed": self.motion.seed,
             "budget": vars(self.budget),
             "aspects": list(self.motion.held.names),
         }
@@ -92,7 +89,7 @@ class Stages:
     work: Searches
     replicates: int
     """Recordings by which a discrepancy is judged; below 2 the second stage is left out."""
-    stores: Stores | None
+    stores: Stores
     executor: Executor | None
     """Elsewhere."""
     tell: Tell
@@ -105,7 +102,7 @@ class Stages:
         """Judge every model, one work unit each."""
         entries = self.work.entries
         units = grid(model=np.arange(len(entries))).units(1)
-        retained = self._store("models", self.work.fingerprint())
+        retained = self.stores("models", self.work.fingerprint())
         retained = MemoryStore() if retained is None else retained
         searched = self._searched_here if self.executor is None else self._searched_elsewhere
         arrays = searched(units, retained, self._each_once(units, retained))
@@ -116,34 +113,29 @@ class Stages:
 
     def evidence(self, held_out: Sequence[HeldOutScore]) -> dict[int, Evidence]:
         """Ask the summaries of those that tie, and of others while none of them gives them."""
-        shortlist = (
-            shortlist_models(self.work.entries, held_out)
-            if self.replicates > 1
-            else Shortlist((), 0)
-        )
+        if self.replicates < 2:
+            return {}
+        shortlist = shortlist_models(self.work.entries, held_out)
         found: dict[int, Evidence] = {}
         for number, index in enumerate(shortlist.models):
             if number >= shortlist.tied and any(one.usual for one in found.values()):
                 break
-            found[index] = self._matched(
-                number, index, held_out[index].point, max(shortlist.tied, 1)
-            )
+            planned = max(shortlist.tied, 1)
+            found[index] = self._matched(number, index, held_out[index].point, planned)
         return found
-
-    def finish(self) -> None:
-        """Say that all is done but the figures."""
-        self.course.begin("figures")
 
     @cached_property
     def course(self) -> Course:
         """How far all stages are together."""
         able = [one for one in self.work.entries if one.ranges and not one.baseline]
         asks = self.replicates > 1 and len(able) > 1
-        # Three models are usually matched.
-        usual = sorted(map(self._usual, able))[-3:] if asks else []
+        # Most searches are given up after a few rounds, or find their optimum soon.
+        usual = sorted(most_settings(len(one.ranges), self.replicates) // 4 for one in able)
         # A setting takes three times as long as one of the first stage (5 minutes of the bundled
         # recording): all blocks of time are simulated.
-        parts = {"models": sum(self.work.costs()), "summaries": 3.0 * sum(usual)}
+        # Three models are usually matched.
+        summaries = 3.0 * sum(usual[-3:]) if asks else 0.0
+        parts = {"models": sum(self.work.costs()), "summaries": summaries}
         return Course(self.tell, {**parts, "figures": 0.0})
 
     def _each_once(self, units: Sequence[WorkUnit], retained: Store) -> Callable[[int, int], None]:
@@ -160,8 +152,7 @@ class Stages:
                 entry = self.work.entries[index]
                 arrays = {name: values[0] for name, values in retained.read(unit).items()}
                 one = _unpacked(arrays, entry)
-                std = without_error(one.without)
-                self.finished(entry.model.name, one.score, std, len(units))
+                self.finished(entry.model.name, one.score, one.score_std, len(units))
 
         return look
 
@@ -229,20 +220,10 @@ class Stages:
             entry,
             self.work.motion,
             answer,
-            seed=self.work.seed,
-            replicates=self.replicates,
             executor=self.executor or (self.pool if runs_in_threads(entry) else None),
-            store=self._store(f"summaries-{number}", fingerprint),
+            store=self.stores(f"summaries-{number}", fingerprint),
             tell=say,
         )
-
-    def _store(self, name: str, fingerprint: dict[str, Any]) -> Store | None:
-        return None if self.stores is None else self.stores(name, fingerprint)
-
-    def _usual(self, entry: Candidate) -> int:
-        """Return how many settings the summaries of a model usually need."""
-        # Most searches are given up after a few rounds, or find their optimum soon.
-        return most_settings(len(entry.ranges), self.replicates) // 4
 
 
 def _packed(held_out: HeldOutScore, most: int, searches: int) -> dict[str, np.ndarray]:
@@ -256,13 +237,12 @@ def _packed(held_out: HeldOutScore, most: int, searches: int) -> dict[str, np.nd
 
 
 def _unpacked(arrays: Mapping[str, np.ndarray], entry: Candidate) -> HeldOutScore:
-    return HeldOutScore(
-        point=arrays["point"][: len(entry.ranges)],
-        trained=arrays["trained"],
-        held=arrays["held"],
-        score=float(arrays["score"]),
-        without=arrays["without"],
-        checks=arrays["checks"],
-        optimum_scores=arrays["optimum_scores"][np.isfinite(arrays["optimum_scores"])],
-        evaluations=int(arrays["evaluations"]),
-    )
+    optimum_scores = arrays["optimum_scores"]
+    found = {
+        **arrays,
+        "point": arrays["point"][: len(entry.ranges)],
+        "score": float(arrays["score"]),
+        "optimum_scores": optimum_scores[np.isfinite(optimum_scores)],
+        "evaluations": int(arrays["evaluations"]),
+    }
+    return HeldOutScore(**found)

@@ -7,43 +7,35 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from driftwalk.calibration.estimation.identifiability import DETERMINED
 from driftwalk.calibration.held_out.candidates import Candidate
-from driftwalk.calibration.held_out.checks import CHECKS, UNITS
 from driftwalk.calibration.held_out.held_out_score import (
-    HELD_OUT_REPLICATES,
+    VERDICT,
     HeldOutScore,
-    without_error,
+    Verdict,
+    recording_parts,
+    verdict_of,
 )
 from driftwalk.calibration.held_out.recorded import RecordedMotion
-from driftwalk.calibration.ranking.evidence_ranking import (
+from driftwalk.calibration.ranking.model_evidence import (
     Evidence,
     EvidenceRanking,
     discrepancy_sentence,
     rank_by_evidence,
     ranking_sentence,
 )
-from driftwalk.calibration.ranking.verdict import VERDICT, Verdict, verdict_of
-from driftwalk.calibration.stationarity import Stationarity, stationarity_of_steps
-from driftwalk.comparison import KsReference
-from driftwalk.comparison.aspects import points_distance
+from driftwalk.calibration.stationarity import motion_warnings, stationarity_of_motion
 from driftwalk.core.arrays import Floats
 from driftwalk.schema.answers.facts import texts
 from driftwalk.schema.check import build_dataset
-from driftwalk.simulation.series import series_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from driftwalk.model import Study
 
 
 def build_comparison(
     entries: Sequence[Candidate],
     held_out: Sequence[HeldOutScore],
     motion: RecordedMotion,
-    study: Study,
-    recording: xr.Dataset,
     warnings: Sequence[str],
     evidence_by_model: Mapping[int, Evidence],
 ) -> xr.Dataset:
@@ -55,42 +47,49 @@ def build_comparison(
     entries, held_out = [entries[k] for k in order], [held_out[k] for k in order]
     evidence = {at: evidence_by_model[k] for at, k in enumerate(order) if k in evidence_by_model}
     answer = rank_by_evidence(entries, evidence)
-    behind = np.array([one.score - held_out[0].score for one in held_out])
-    behind_std = np.array([without_error(one.without - held_out[0].without) for one in held_out])
     names = [entry.model.name for entry in entries]
+    behind, behind_std = np.array([one.behind(held_out[0]) for one in held_out]).T
+    # The first model is closest; the one that the summaries name stands beside it all the same.
+    clearly_behind = behind > VERDICT.tied_sigmas * behind_std
+    # Where no model gives the summaries, they speak against none in particular.
+    asked = {} if answer.best is None else evidence
+    unlike = {k: discrepancy_sentence(one) for k, one in asked.items()}
     verdicts = [
         verdict_of(
             one,
             motion,
             baseline=entry.baseline,
-            clearly_behind=names[0]
-            if behind[k] > VERDICT.tied_sigmas * behind_std[k] and k != answer.best
-            else None,
-            unlike=None
-            if answer.best is None or k not in evidence
-            else discrepancy_sentence(evidence[k]),
+            clearly_behind=names[0] if clearly_behind[k] and k != answer.best else None,
+            unlike=unlike.get(k),
         )
         for k, (entry, one) in enumerate(zip(entries, held_out, strict=True))
     ]
+    # Walks of recorded steps are no answer, however close they are.
     closest = next((k for k, entry in enumerate(entries) if not entry.baseline), 0)
+    apart = [one.behind(held_out[closest]) for one in held_out]
     tied = [
         k
-        for k, one in enumerate(held_out)
-        if k > closest
-        and one.score - held_out[closest].score
-        < VERDICT.tied_sigmas * without_error(one.without - held_out[closest].without)
+        for k, (difference, error) in enumerate(apart)
+        if k > closest and difference < VERDICT.tied_sigmas * error
     ]
     units, values = _estimates(entries, held_out)
-    stationarity = _stationarity(motion)
-    said = [*warnings, *_edge_warnings(entries, held_out), *motion_warnings(motion)]
+    stationarity = stationarity_of_motion(motion)
+    ended = [
+        f"{name}: {text}"
+        for name, entry, one in zip(names, entries, held_out, strict=True)
+        if (text := entry.at_range_end(one.point)) is not None
+    ]
+    said = [*warnings, *ended, *motion_warnings(motion)]
     why = _findings(names, entries, verdicts, closest, tied)
     if evidence:
         why.insert(0 if answer.best is not None else 1, ranking_sentence(names, evidence, answer))
     best = answer_sentence(names, verdicts, closest, answer)
     findings = [best, *(one for one in why if one != best)]
+    about = recording_parts(motion)
     data: dict[str, Any] = {
+        **about.data,
         "score": ("model", [one.score for one in held_out]),
-        "score_std": ("model", [without_error(one.without) for one in held_out]),
+        "score_std": ("model", [one.score_std for one in held_out]),
         "behind": ("model", behind),
         "behind_std": ("model", behind_std),
         "free_numbers": ("model", [entry.numbers for entry in entries]),
@@ -99,13 +98,9 @@ def build_comparison(
         "verdict": ("model", texts([one.text for one in verdicts])),
         "held_out_distance": (("model", "aspect"), [one.held for one in held_out]),
         "trained_distance": (("model", "aspect"), [one.trained for one in held_out]),
-        "own_distance": ("aspect", motion.own),
-        "floor": ("aspect", motion.held.floor),
-        "check_recorded": ("check", motion.recorded_checks),
         "check_median": (("model", "check"), [np.median(one.checks, axis=0) for one in held_out]),
         "check_low": (("model", "check"), [one.checks.min(axis=0) for one in held_out]),
         "check_high": (("model", "check"), [one.checks.max(axis=0) for one in held_out]),
-        "check_unit": ("check", texts(UNITS)),
         "estimate": (("model", "parameter"), values),
         "parameter_unit": ("parameter", texts(list(units.values()))),
         "end_score": (("model", "end"), _padded([one.optimum_scores for one in held_out])),
@@ -114,26 +109,15 @@ def build_comparison(
     }
     coords = {
         "model": ("model", texts(names)),
-        "aspect": ("aspect", texts(motion.held.names)),
-        "check": ("check", texts(CHECKS)),
+        **about.coords,
         "parameter": ("parameter", texts(list(units))),
         "finding": ("finding", texts(findings)),
         "warning": ("warning", texts(said)),
     }
-    attrs: dict[str, Any] = {
-        "step_interval_s": float(motion.plan.short.step_interval),
-        "duration_s": motion.duration,
-        "worlds": HELD_OUT_REPLICATES,
-        "seed": study.calibration.seed,
-        "arena": study.tank.to_arena_json(),
-        "source": str(recording.attrs.get("source", "")),
-        "simulated_recording": str(recording.attrs.get("simulated", "no")),
-    }
+    attrs = dict(about.attrs)
     if stationarity is not None:
-        attrs |= {
-            "halves_ks_distance": stationarity.distance,
-            "halves_p_value": stationarity.p_value,
-        }
+        attrs["halves_ks_distance"] = stationarity.distance
+        attrs["halves_p_value"] = stationarity.p_value
     return build_dataset("model_comparison", data, coords, attrs)
 
 
@@ -172,65 +156,10 @@ def _estimates(
             known = units.get(parameter.name, parameter.unit)
             name = parameter.name if known == parameter.unit else parameter.key
             units[name] = parameter.unit
-            low, high = (
-                float(parameter.to_coordinate(end)) for end in (parameter.low, parameter.high)
-            )
-            answer[name] = float(parameter.to_value(low + (high - low) * share))
+            answer[name] = float(parameter.value_at(share))
         answers.append(answer)
     values = np.array([[answer.get(name, np.nan) for name in units] for answer in answers])
     return units, values.reshape(len(entries), len(units))
-
-
-def _edge_warnings(entries: Sequence[Candidate], held_out: Sequence[HeldOutScore]) -> list[str]:
-    """Return a sentence for each model of which a parameter is at the end of its range."""
-    found = []
-    for entry, one in zip(entries, held_out, strict=True):
-        at_end = [
-            parameter.name
-            for parameter, share in zip(entry.ranges, one.point, strict=True)
-            if min(share, 1.0 - share) < DETERMINED.range_end
-        ]
-        if at_end:
-            found.append(
-                f"{entry.model.name}: at the end of its range: {', '.join(at_end)}; extend the "
-                "range, or doubt the model"
-            )
-    return found
-
-
-def _stationarity(motion: RecordedMotion) -> Stationarity | None:
-    steps = next(one for one in motion.aspects if one.name == "steps").points
-    return stationarity_of_steps(steps, lambda one, other: points_distance(KsReference(one), other))
-
-
-def motion_warnings(motion: RecordedMotion) -> list[str]:
-    """Return sentences on a recording and its flow.
-
-    Where its halves differ, with the moment at which its speed changed, and where the flow is a
-    series that goes on beyond its frames.
-    """
-    said = series_warnings(motion.like.flow, duration=motion.duration)
-    stationarity = _stationarity(motion)
-    if stationarity is None or stationarity.warning is None:
-        return said
-    return [stationarity.warning + _change(motion), *said]
-
-
-def _change(motion: RecordedMotion) -> str:
-    """Return when the mean speed changed most, and from what to what."""
-    steps = motion.steps
-    speed = steps.points[:, 0] / motion.plan.short.step_interval
-    share = steps.time / motion.duration
-    splits = np.arange(0.05, 0.96, 0.05)
-    early = np.array([speed[share < split].mean() for split in splits])
-    late = np.array([speed[share >= split].mean() for split in splits])
-    # Of two means with equal variances: their difference in standard errors goes with this weight.
-    weight = np.sqrt(splits * (1.0 - splits))
-    best = int(np.nanargmax(np.abs(late - early) * weight))
-    return (
-        f"; the mean speed changed most at {splits[best] * motion.duration:.0f} s, from "
-        f"{1e3 * early[best]:.3g} to {1e3 * late[best]:.3g} mm/s"
-    )
 
 
 def answer_sentence(

@@ -12,9 +12,13 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 import numpy as np
 
 from driftwalk.calibration.check import check_recording
-from driftwalk.calibration.recover.calibrated import calibrated_parameters
+from driftwalk.calibration.estimation.result import parameter_parts
 from driftwalk.calibration.recover.study import BrokenSimulation, EstimationMethod, Tell
-from driftwalk.calibration.recover.summary import relative_errors, summary_by_parameter
+from driftwalk.calibration.recover.summary import (
+    calibrated_parameters,
+    relative_errors,
+    summary_by_parameter,
+)
 from driftwalk.calibration.run import calibrate
 from driftwalk.conditions import study_in_arena
 from driftwalk.conditions.camera import study_as_seen
@@ -25,7 +29,7 @@ from driftwalk.core.run_stages import CALIBRATION_STAGES, tell_nobody
 from driftwalk.model import Study, apply_overrides
 from driftwalk.motion import BlockModel, MotionModel, ParticleModel, known_values, simulate_motion
 from driftwalk.schema import body_track, build_trajectory
-from driftwalk.schema.answers.facts import BOUNDS, texts
+from driftwalk.schema.answers.facts import texts
 from driftwalk.schema.check import build_dataset
 from driftwalk.sweep import Design, Store, grid, threads_of_unit
 
@@ -156,9 +160,10 @@ class ModelRecovery(EstimationMethod["xr.Dataset"]):
     def dataset(self, found: Mapping[str, Any]) -> xr.Dataset:
         """Return the `model_recovery`."""
         parameters, study = self.model.parameters, self.study
-        exact, names = self.values, [one.name for one in parameters]
-        truth = np.array([exact[name] for name in names])
+        exact = self.values
+        truth = np.array([exact[one.name] for one in parameters])
         scales = [one.scale for one in parameters]
+        # Ends of the intervals in the measure of the errors, so that a figure shows them together.
         error, *ends = (
             relative_errors(values, truth, found["range"], scales)
             for values in (found["estimate"], *np.moveaxis(found["interval"], -1, 0))
@@ -168,7 +173,9 @@ class ModelRecovery(EstimationMethod["xr.Dataset"]):
         summary = summary_by_parameter(
             error, found["interval"], found["determined"], truth, confidence=confidence
         )
+        named = parameter_parts(parameters)
         data: dict[str, Any] = {
+            **named.data,
             "truth": ("parameter", truth),
             **{name: (each, found[name]) for name in ("estimate", "determined", "half_width")},
             **{name: ((*each, "bound"), found[name]) for name in ("interval", "range")},
@@ -177,15 +184,8 @@ class ModelRecovery(EstimationMethod["xr.Dataset"]):
             "status": ("recording", found["status"].astype(np.int8)),
             "message": ("recording", texts([str(one) for one in found["message"]])),
             **{name: ("parameter", values) for name, values in summary.items()},
-            "unit": ("parameter", texts([one.unit for one in parameters])),
-            "scale": ("parameter", texts(scales)),
-            "meaning": ("parameter", texts([one.meaning or one.label for one in parameters])),
         }
-        coords = {
-            "recording": ("recording", np.arange(len(error))),
-            "parameter": ("parameter", texts(names)),
-            "bound": ("bound", texts(BOUNDS)),
-        }
+        coords = {**named.coords, "recording": ("recording", np.arange(len(error)))}
         time = self.times
         attrs = {
             "model": self.model.name,

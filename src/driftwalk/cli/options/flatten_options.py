@@ -19,10 +19,7 @@ class Part(NamedTuple):
 
 
 def spread(
-    function: Command,
-    kind: type,
-    parts: Mapping[str, Part],
-    make: Callable[[dict[str, Any]], Any],
+    function: Command, kind: type, parts: Mapping[str, Part], make: Callable[[dict[str, Any]], Any]
 ) -> Command:
     """Return a command with options in the place of its parameter of a type.
 
@@ -58,6 +55,9 @@ def spread(
             )
             for part, (annotation, default) in (parts if key == name else own).items()
         ]
+    # An option that is required stands first in the help, as it does in a signature.
+    required = {part for part, (_, default) in parts.items() if default is inspect.Parameter.empty}
+    parameters.sort(key=lambda one: one.name not in required)
 
     @functools.wraps(function)
     def command(**values: Any) -> Any:

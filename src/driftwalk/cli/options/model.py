@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
 
-import typer
-
+from driftwalk.cli.options.shared import option
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.text.did_you_mean import did_you_mean
 
@@ -19,61 +18,48 @@ GIVE_VALUES: Final = "give the directory of a finished calibration"
 
 ModelName = Annotated[
     str | None,
-    typer.Option(
-        "--model",
-        metavar="MODEL",
-        help="Motion model: a name of driftwalk models, mine.py:NAME, or command:PROGRAM. Default: "
+    option(
+        "--model MODEL",
+        "Motion model: a name of driftwalk models, mine.py:NAME, or command:PROGRAM. Default: "
         "the block in stirred water.",
-        show_default=False,
     ),
 ]
 ParameterChoices = Annotated[
     list[str] | None,
-    typer.Option(
-        "--parameter",
-        metavar="NAME=VALUE|LOW,HIGH",
-        help="Known value, or range of the search, of a parameter of --model; repeat for others.",
-        show_default=False,
+    option(
+        "--parameter NAME=VALUE|LOW,HIGH",
+        "Known value, or range of the search, of a parameter of --model; repeat for others.",
     ),
 ]
 ComparedParameters = Annotated[
     list[str] | None,
-    typer.Option(
-        "--parameter",
-        metavar="NAME=VALUE|LOW,HIGH",
-        help="Known value, or range of the search, of a parameter of each of the --models that has "
+    option(
+        "--parameter NAME=VALUE|LOW,HIGH",
+        "Known value, or range of the search, of a parameter of each of the --models that has "
         "it; repeat for others.",
-        show_default=False,
     ),
 ]
 
 ParameterValues = Annotated[
     list[str] | None,
-    typer.Option(
-        "--parameter",
-        metavar="NAME=VALUE",
-        help="Value of a parameter of --model, in its SI unit; repeat for others.",
-        show_default=False,
+    option(
+        "--parameter NAME=VALUE",
+        "Value of a parameter of --model, in its SI unit; repeat for others.",
     ),
 ]
 PlayedParameters = Annotated[
     list[str] | None,
-    typer.Option(
-        "--parameter",
-        metavar="NAME=VALUE|LOW,HIGH",
-        help="Value to begin with, or range of the slider, of a parameter of --model; repeat for "
+    option(
+        "--parameter NAME=VALUE|LOW,HIGH",
+        "Value to begin with, or range of the slider, of a parameter of --model; repeat for "
         "others.",
-        show_default=False,
     ),
 ]
 KnownParameters = Annotated[
     list[str] | None,
-    typer.Option(
-        "--known",
-        metavar="NAME",
-        help="Parameter of --model, or position_noise, that the calibrations know; repeat for "
-        "others.",
-        show_default=False,
+    option(
+        "--known NAME",
+        "Parameter of --model, or position_noise, that the calibrations know; repeat for others.",
     ),
 ]
 
@@ -84,6 +70,15 @@ class KnownModel(NamedTuple):
     model: MotionModel
     values: dict[str, float]
     warnings: list[str]
+
+    def made_with(self, name: str | None, options: dict[str, Any]) -> MotionModel:
+        """Return the model made again, with values or ranges for parameters that it then has."""
+        from driftwalk.motion import is_family_name, motion_model
+
+        name = name or self.model.name
+        clearance = getattr(self.model, "clearance", 0.0)
+        kept = {"clearance": clearance} if clearance and is_family_name(name) else {}
+        return motion_model(name, **{**kept, **options})
 
 
 def known_model(name: str | None, choices: Sequence[str] | None, place: Path | None) -> KnownModel:
@@ -152,13 +147,7 @@ def playable_model(
     known = known_model(name, values, place)
     if not ranges:
         return known
-    name = name or known.model.name
-    from driftwalk.motion import is_family_name, motion_model
-
-    clearance = getattr(known.model, "clearance", 0.0)
-    options: dict[str, Any] = {"clearance": clearance} if is_family_name(name) else {}
-    options |= parameter_choices(ranges)
-    return known._replace(model=motion_model(name, **options))
+    return known._replace(model=known.made_with(name, parameter_choices(ranges)))
 
 
 def partly_known_model(
@@ -173,7 +162,7 @@ def partly_known_model(
     ConfigurationError
         As `known_model`, and when a known parameter is none of the model's or has no value.
     """
-    from driftwalk.motion import known_values, motion_model
+    from driftwalk.motion import known_values
 
     found = known_model(name, choices, place)
     if not known:
@@ -185,11 +174,9 @@ def partly_known_model(
             f"--known {strangers[0]}: the model {found.model.name} has {', '.join(values)}"
             f"{did_you_mean(strangers[0], values)}"
         )
-    clearance = getattr(found.model, "clearance", 0.0)
-    options: dict[str, Any] = {"clearance": clearance} if clearance else {}
-    options |= {one: values[one] for one in known}
+    model = found.made_with(name, {one: values[one] for one in known})
     left = {one: value for one, value in values.items() if one not in known}
-    return KnownModel(motion_model(name or found.model.name, **options), left, found.warnings)
+    return KnownModel(model, left, found.warnings)
 
 
 def chosen_model(name: str | None, choices: Sequence[str] | None) -> MotionModel | None:

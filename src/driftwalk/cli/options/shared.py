@@ -44,18 +44,33 @@ def quantity_parser(unit: str, *words: str) -> Callable[[str], Any]:
 
 
 def option(
-    *names: str, help: str, panel: str = PANEL, metavar: str = "", unit: str = "", **more: Any
+    names: str,
+    help: str,
+    *,
+    panel: str | None = None,
+    metavar: str = "",
+    unit: str = "",
+    **more: Any,
 ) -> Any:
-    """Return the declaration of an option; with a unit, of one that takes a quantity."""
+    """Return the declaration of an option; with a unit, of one that takes a quantity.
+
+    The names stand with the placeholder of the value as in the help: ``"--out -o FILE"``.
+    """
+    words = names.split()
+    placeholders = [word for word in words if not word.startswith("-")]
     return typer.Option(
-        *names,
+        *(word for word in words if word.startswith("-")),
         help=help,
-        metavar=metavar or (f"<{unit}>" if unit else None),
+        metavar=metavar or (f"<{unit}>" if unit else "".join(placeholders) or None),
         parser=quantity_parser(unit) if unit else None,
         rich_help_panel=panel,
-        show_default=False,
         **more,
     )
+
+
+def argument(placeholder: str, help: str) -> Any:
+    """Return the declaration of an argument."""
+    return typer.Argument(metavar=placeholder, help=help)
 
 
 def quantity_option(name: str, unit: str, help: str, *, panel: str = PANEL) -> Any:
@@ -75,13 +90,9 @@ def parse_scale(text: Any) -> Any:
 
 def scale_option(panel: str) -> Any:
     """Return the declaration of the option for the scale of an image."""
+    said = "Size of a pixel, such as 0.5mm or 2000px/m."
     return typer.Option(
-        "--scale",
-        help="Size of a pixel, such as 0.5mm or 2000px/m.",
-        metavar="<m>",
-        parser=parse_scale,
-        rich_help_panel=panel,
-        show_default=False,
+        "--scale", help=said, metavar="<m>", parser=parse_scale, rich_help_panel=panel
     )
 
 
@@ -100,14 +111,16 @@ def flow_of_run(path: Path | None) -> Path | None:
     return stored
 
 
+Run = Annotated[
+    Path | None,
+    argument(
+        "RUN",
+        "Run directory of a finished fit, calibration or comparison of models, or its dataset.",
+    ),
+]
 StudyFile = Annotated[
     Path | None,
-    typer.Option(
-        "--study",
-        metavar="FILE",
-        help="Study file with the parameters (see: driftwalk study new).",
-        show_default=False,
-    ),
+    option("--study FILE", "Study file with the parameters (see: driftwalk study new)."),
 ]
 FlowFile = Annotated[
     Path | None,
@@ -138,21 +151,10 @@ FlowVariables = Annotated[
         show_default=False,
     ),
 ]
-Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")]
-RunFolder = Annotated[
-    Path, typer.Option("--out", "-o", metavar="DIR", help="Run directory to make or continue.")
-]
+Json = Annotated[bool, option("--json", "Print the result as JSON on stdout.")]
 Threads = Annotated[
-    int | None,
-    typer.Option(
-        "--threads",
-        min=1,
-        metavar="N",
-        help="Worker threads (default: all cores).",
-        show_default=False,
-    ),
+    int | None, option("--threads N", "Worker threads (default: all cores).", min=1)
 ]
-Overwrite = Annotated[
-    bool, typer.Option("--overwrite", help="Move a finished run aside and start a new one.")
-]
-Replace = Annotated[bool, typer.Option("--overwrite", help="Replace a file that exists.")]
+BodyOfLike = Annotated[str | None, option("--body NAME", "Body of --like.")]
+Overwrite = Annotated[bool, option("--overwrite", "Move a finished run aside and start a new one.")]
+Replace = Annotated[bool, option("--overwrite", "Replace a file that exists.")]

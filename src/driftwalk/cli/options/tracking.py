@@ -7,9 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Final
 
-import typer
-
-from driftwalk.cli.options.shared import option, scale_option
+from driftwalk.cli.options.shared import argument, option, scale_option
 from driftwalk.core.errors import InputError
 
 _FINDING: Final = "How objects are found"
@@ -26,97 +24,72 @@ _sent = partial(option, panel=_LIVE)
 class TrackingOptions:
     """How to track; the fields are the arguments and options of the commands that do."""
 
-    source: Annotated[
-        str,
-        typer.Argument(metavar="VIDEO|FOLDER|camera:N", help="Video, folder of images, or camera."),
-    ]
+    source: Annotated[str, argument("VIDEO|FOLDER|camera:N", "Video, folder of images, or camera.")]
     markers: Annotated[
         str,
         _found(
-            "--markers",
-            metavar="FILE|aruco:DICT|blob",
-            help="Two-colour markers, coded tags, or single dark or bright objects.",
+            "--markers FILE|aruco:DICT|blob",
+            "Two-colour markers, coded tags, or single dark or bright objects.",
         ),
     ]
     camera: Annotated[
         Path | None,
-        _found(
-            "--camera",
-            metavar="FILE.toml",
-            help="Lens and scale (from driftwalk camera calibrate).",
-        ),
+        _found("--camera FILE.toml", "Lens and scale (from driftwalk camera calibrate)."),
     ] = None
     tank: Annotated[
         float | None,
-        _found("--tank", unit="m", help="Inner diameter of the tank, whose rim gives the scale."),
+        _found("--tank", "Inner diameter of the tank, whose rim gives the scale.", unit="m"),
     ] = None
     scale: Annotated[float | None, scale_option(_FINDING)] = None
     polarity: Annotated[
         str | None,
-        _found(
-            "--polarity",
-            metavar="dark|bright|both",
-            help="Objects for --markers blob (default: detected).",
-        ),
+        _found("--polarity dark|bright|both", "Objects for --markers blob (default: detected)."),
     ] = None
     min_area_px: Annotated[
-        float | None,
-        _found("--min-area-px", metavar="<px2>", help="Smallest area for --markers blob."),
+        float | None, _found("--min-area-px <px2>", "Smallest area for --markers blob.")
     ] = None
     max_area_px: Annotated[
-        float | None,
-        _found("--max-area-px", metavar="<px2>", help="Largest area for --markers blob."),
+        float | None, _found("--max-area-px <px2>", "Largest area for --markers blob.")
     ] = None
     fps: Annotated[
-        float | None,
-        _found("--fps", unit="Hz", help="Frames per second of a folder without times.csv."),
+        float | None, _found("--fps", "Frames per second of a folder without times.csv.", unit="Hz")
     ] = None
-    bodies: Annotated[
-        int | None, _moving("--bodies", metavar="N", help="Largest number of bodies.")
-    ] = None
+    bodies: Annotated[int | None, _moving("--bodies N", "Largest number of bodies.")] = None
     max_speed: Annotated[
         float | None,
         _moving(
             "--max-speed",
-            unit="m/s",
-            help="Fastest plausible speed; a faster jump starts a new track (default: tank width "
+            "Fastest plausible speed; a faster jump starts a new track (default: tank width "
             "in 1 s).",
+            unit="m/s",
         ),
     ] = None
     lost_after: Annotated[
         float | None,
         _moving(
             "--lost-after",
+            "End a track after this long without a detection (default: 1s).",
             unit="s",
-            help="End a track after this long without a detection (default: 1s).",
         ),
     ] = None
     side: Annotated[
         float | None,
-        _moving("--side", unit="m", help="Side of a block, to report which blocks are joined."),
+        _moving("--side", "Side of a block, to report which blocks are joined.", unit="m"),
     ] = None
     live: Annotated[
-        int | None,
-        _sent("--live", metavar="PORT", help="Port that sends JSON lines to TCP clients."),
+        int | None, _sent("--live PORT", "Port that sends JSON lines to TCP clients.")
     ] = None
     live_nmea: Annotated[
-        int | None,
-        _sent(
-            "--live-nmea", metavar="PORT", help="Port that sends SwisTrack's NMEA to TCP clients."
-        ),
+        int | None, _sent("--live-nmea PORT", "Port that sends SwisTrack's NMEA to TCP clients.")
     ] = None
     live_host: Annotated[
         str,
-        _sent("--live-host", metavar="ADDRESS", help="Address to listen on (default: loopback)."),
+        _sent(
+            "--live-host ADDRESS", "Address to listen on (default: loopback).", show_default=False
+        ),
     ] = "127.0.0.1"
     overlay: Annotated[
-        Path | None,
-        typer.Option(
-            "--overlay",
-            metavar="OUT.mp4",
-            help="Video to write, with the bodies drawn in.",
-            show_default=False,
-        ),
+        Path | None, option("--overlay OUT.mp4", "Video to write, with the bodies drawn in.")
     ] = None
 
     @property

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 import typer
 
 from driftwalk.cli.main import paragraphs
-from driftwalk.cli.options.shared import Json, Replace, quantity_option
+from driftwalk.cli.options.shared import Json, Replace, argument, option, quantity_option
 from driftwalk.cli.terminal.help import HelpCommand, HelpGroup
 from driftwalk.cli.terminal.output import print_json, print_next, print_note, print_table
 from driftwalk.core.errors import FormatError, InputError
@@ -25,33 +25,26 @@ camera_app = typer.Typer(add_completion=False, cls=HelpGroup)
 def calibrate(
     images: Annotated[
         list[Path],
-        typer.Argument(
-            metavar="BOARD_IMAGES...",
-            help="Images of the board; in the first, the board lies at the height of the markers.",
+        argument(
+            "BOARD_IMAGES...",
+            "Images of the board; in the first, the board lies at the height of the markers.",
         ),
     ],
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.toml", help="File to write.")],
-    squares: Annotated[
-        str,
-        typer.Option(
-            "--squares", metavar="COLUMNSxROWS", help="Squares of the board, such as 9x7."
-        ),
-    ],
+    out: Annotated[Path, option("--out -o FILE.toml", "File to write.")],
+    squares: Annotated[str, option("--squares COLUMNSxROWS", "Squares of the board, such as 9x7.")],
     square: Annotated[float, quantity_option("--square", "m", "Side of a square.")],
     board: Annotated[
-        Literal["chessboard", "charuco"], typer.Option("--board", help="Kind of the board.")
+        Literal["chessboard", "charuco"], option("--board", "Kind of the board.")
     ] = "chessboard",
     tag: Annotated[
         float | None, quantity_option("--tag", "m", "Side of a ChArUco board's tags.")
     ] = None,
     dictionary: Annotated[
-        str, typer.Option("--dictionary", metavar="DICT", help="Dictionary of these tags.")
+        str, option("--dictionary DICT", "Dictionary of these tags.")
     ] = "DICT_4X4_50",
     no_lens: Annotated[
         bool,
-        typer.Option(
-            "--no-lens", help="Find only the plane; one image is enough, and lines stay straight."
-        ),
+        option("--no-lens", "Find only the plane; one image is enough, and lines stay straight."),
     ] = False,
     overwrite: Replace = False,
     json: Json = False,

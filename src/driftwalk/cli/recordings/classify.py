@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import typer
-
 from driftwalk.cli.inputs.other_files import explained
+from driftwalk.cli.inputs.recordings import open_kind
+from driftwalk.cli.options.flatten_options import with_options
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import Json, Replace, quantity_option
+from driftwalk.cli.options.shared import Json, Replace, argument, option, quantity_option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import (
     print_json,
     print_next,
     print_note,
     print_table,
+    print_warnings,
     save_dataset,
 )
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.files.run_layout import MANIFEST_FILE
 from driftwalk.core.study_keys import STUDY_KEYS
 from driftwalk.schema.shapes import short_class
-from driftwalk.schema.stores.contents import check_contents
-from driftwalk.schema.stores.netcdf import kind_of_file, open_netcdf
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,55 +37,54 @@ def _tolerance(name: str, unit: str, help: str) -> Any:
     return quantity_option(name, unit, help, panel=_PANEL)
 
 
-@with_recording_options
-@with_study_options(STUDY_KEYS, "side")
-def classify(
-    poses: Annotated[
-        Path,
-        typer.Argument(metavar="POSES", help="Recording of all blocks with their orientations."),
-    ],
-    given: StudyOptions,
-    how: RecordingOptions,
-    chirality: Annotated[
-        Literal["merged", "distinct"],
-        typer.Option("--chirality", help="Mirror images as one shape or two."),
-    ] = "merged",
+@dataclass(frozen=True)
+class JoinCriteria:
+    """When faces join and part; the fields are the options."""
+
     join_distance: Annotated[
         float | None,
         _tolerance(
             "--join-distance", "m", "Distance of face centres that join (default: side / 10)."
         ),
-    ] = None,
+    ] = None
     join_angle: Annotated[
         float | None,
         _tolerance("--join-angle", "rad", "Angle between faces that join (default: 10deg)."),
-    ] = None,
+    ] = None
     release_distance: Annotated[
         float | None,
         _tolerance(
             "--release-distance", "m", "Distance that parts them (default: twice that to join)."
         ),
-    ] = None,
+    ] = None
     release_angle: Annotated[
         float | None,
         _tolerance(
             "--release-angle", "rad", "Angle that parts them (default: twice that to join)."
         ),
-    ] = None,
+    ] = None
     min_duration: Annotated[
         float | None,
         _tolerance("--min-duration", "s", "Shortest join or parting that counts (default: 0.5s)."),
-    ] = None,
+    ] = None
     hold: Annotated[
         float | None,
         _tolerance("--hold", "s", "Time for which an unseen block keeps its joins (default: 1s)."),
-    ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out", "-o", metavar="FILE.nc", help="File for the result.", show_default=False
-        ),
-    ] = None,
+    ] = None
+
+
+@with_options(JoinCriteria)
+@with_recording_options
+@with_study_options(STUDY_KEYS, "side")
+def classify(
+    poses: Annotated[Path, argument("POSES", "Recording of all blocks with their orientations.")],
+    given: StudyOptions,
+    how: RecordingOptions,
+    criteria: JoinCriteria,
+    chirality: Annotated[
+        Literal["merged", "distinct"], option("--chirality", "Mirror images as one shape or two.")
+    ] = "merged",
+    out: Annotated[Path | None, option("--out -o FILE.nc", "File for the result.")] = None,
     overwrite: Replace = False,
     json: Json = False,
 ) -> None:
@@ -101,15 +100,7 @@ def classify(
     if out is not None:
         require_target(out, existing="replace" if overwrite else "error", endings=(".nc",))
     recording, block_side, is_default = _load(poses, how, given)
-    tolerances = {
-        "join_distance": join_distance,
-        "join_angle": join_angle,
-        "release_distance": release_distance,
-        "release_angle": release_angle,
-        "min_duration": min_duration,
-        "hold": hold,
-    }
-    stated: dict[str, Any] = {key: value for key, value in tolerances.items() if value is not None}
+    stated = {name: value for name, value in vars(criteria).items() if value is not None}
     try:
         found = classify_recording(recording, side=block_side, chirality=chirality, **stated)
     except ConfigurationError:
@@ -123,8 +114,7 @@ def classify(
         print_json({"poses": poses, **summary})
         return
     _print(summary)
-    for warning in summary["warnings"]:
-        print_note(f"warning: {warning}")
+    print_warnings(summary["warnings"])
     if is_default:
         print_note(f"the side of the blocks is the default, {100 * block_side:g} cm (--side)")
     # A file of a run is shown with its run.
@@ -164,7 +154,7 @@ def _load(path: Path, how: RecordingOptions, given: StudyOptions) -> tuple[xr.Da
     from driftwalk.conditions import load_with_study
     from driftwalk.model import Block
 
-    simulated = _simulated_path(path)
+    simulated = open_kind(path, "assembly_path")
     if simulated is not None:
         chosen = int(simulated["run"][0]) if how.replicate is None else how.replicate
         return path_recording(simulated, run=chosen), float(simulated.attrs["block_side_m"]), False
@@ -180,16 +170,6 @@ def _load(path: Path, how: RecordingOptions, given: StudyOptions) -> tuple[xr.Da
     resolved = given.study()
     with explained():
         return load_with_study(path, resolved, how.arguments()), resolved.block.side_m, False
-
-
-def _simulated_path(path: Path) -> xr.Dataset | None:
-    """Return the dataset of a file that `driftwalk assemble` wrote; None for a recording."""
-    if path.suffix != ".nc" or not path.is_file():
-        return None
-    # Whatever else it is, the loaders say what is wrong with it.
-    return (
-        check_contents(open_netcdf(path), path) if kind_of_file(path) == "assembly_path" else None
-    )
 
 
 def _name(names: list[str], index: int) -> str:

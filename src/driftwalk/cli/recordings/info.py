@@ -8,7 +8,7 @@ from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, wit
 from driftwalk.cli.options.shared import FlowVariables, FrameInterval, Json
 from driftwalk.cli.options.study import Side
 from driftwalk.cli.terminal.argument_names import to_options
-from driftwalk.cli.terminal.output import print_json, print_next, print_note, print_table
+from driftwalk.cli.terminal.output import print_json, print_next, print_table, print_warnings
 
 SIDE_BY_SIDE = 5
 """Bodies shown as columns; more are shown as rows, with fewer numbers."""
@@ -94,7 +94,7 @@ def info(
     centres, speed, and the tracking noise estimated from the recording itself. For a finished run,
     prints its answer; `driftwalk report` shows the outcomes of self-assembly.
     """
-    from driftwalk.cli.terminal.answer import print_run
+    from driftwalk.cli.terminal.output import print_run
     from driftwalk.core.files.run_layout import state_of
 
     if recording.is_dir() and state_of(recording) != "new":
@@ -102,7 +102,7 @@ def info(
         print_run(recording, json=json)
         return
     from driftwalk.cli.inputs.flow_file import describe_field, read_flow_file
-    from driftwalk.cli.inputs.study_recording import words_to_fit
+    from driftwalk.cli.inputs.recordings import words_to_fit
     from driftwalk.record import describe
 
     field = read_flow_file(
@@ -130,8 +130,7 @@ def info(
         _print_tracking(described["tracking"])
         print()
     _print_counts(described["counts"])
-    for warning in described["warnings"]:
-        print_note(f"warning: {warning}")
+    print_warnings(described["warnings"])
     block = [] if side is None else ["--side", f"{side:.12g}"]
     words = [*how.words(), *block, *words_to_fit(trajectory, described)]
     # A body that never moves cannot be fitted.
@@ -165,8 +164,7 @@ def _print_field(described: dict[str, Any], *, json: bool) -> None:
             ),
         ]
     )
-    for warning in described["warnings"]:
-        print_note(f"warning: {to_options(warning)}")
+    print_warnings(described["warnings"])
 
 
 def _print_file(described: dict[str, Any]) -> None:

@@ -9,7 +9,7 @@ import typer
 
 from driftwalk.cli.main import paragraphs
 from driftwalk.cli.options.flatten_options import with_options
-from driftwalk.cli.options.shared import Replace
+from driftwalk.cli.options.shared import Replace, option
 from driftwalk.cli.options.tracking import TrackingOptions
 from driftwalk.cli.terminal.help import HelpCommand, HelpGroup
 from driftwalk.cli.terminal.output import print_next, print_note, print_table
@@ -25,14 +25,14 @@ markers_app = typer.Typer(add_completion=False, cls=HelpGroup)
 @with_options(TrackingOptions, "source", "camera", "tank", "scale", "fps", "side")
 def teach(
     options: TrackingOptions,
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE.toml", help="File to write.")],
+    out: Annotated[Path, option("--out -o FILE.toml", "File to write.")],
     overwrite: Replace = False,
 ) -> None:
     """Propose the two colours and the size of the markers from a few frames.
 
     A picture with the same name and the suffix .png shows the detections: look at it.
     """
-    from driftwalk.cli.tracking.parts import find_camera
+    from driftwalk.cli.recordings.tracking_parts import find_camera
     from driftwalk.core.files.atomic import require_free, require_target
     from driftwalk.track import propose_markers, sample_images, save_markers, save_picture
 

@@ -6,12 +6,16 @@ import json as json_module
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import Json, Replace
+from driftwalk.cli.options.shared import Json, Replace, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal.output import print_json, print_next, print_note, sibling
+from driftwalk.cli.terminal.output import (
+    print_json,
+    print_next,
+    print_note,
+    print_warnings,
+    sibling,
+)
 from driftwalk.core.study_keys import STUDY_KEYS
 
 
@@ -19,10 +23,7 @@ from driftwalk.core.study_keys import STUDY_KEYS
 @with_study_options(STUDY_KEYS, "side", "mass", "depth", file="none")
 def read(
     recording: RecordingFile,
-    out: Annotated[
-        Path,
-        typer.Option("--out", "-o", metavar="FILE", help="File to write; ends in .nc or .csv."),
-    ],
+    out: Annotated[Path, option("--out -o FILE", "File to write; ends in .nc or .csv.")],
     how: RecordingOptions,
     given: StudyOptions,
     overwrite: Replace = False,
@@ -35,7 +36,7 @@ def read(
     them. If the name ends in .csv, the file is a plain table with the columns t_s, x_m, y_m,
     theta_rad and body, without tank and block.
     """
-    from driftwalk.cli.inputs.study_recording import words_to_fit
+    from driftwalk.cli.inputs.recordings import words_to_fit
     from driftwalk.conditions import block_attributes
     from driftwalk.record import save_trajectory
 
@@ -62,8 +63,7 @@ def read(
             }
         )
         return
-    for warning in warnings:
-        print_note(f"warning: {warning}")
+    print_warnings(warnings)
     bodies = trajectory.sizes["body"]
     print_note(
         f"wrote {out}: {counts['samples']} samples of {bodies} bod{'y' if bodies == 1 else 'ies'}; "

@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from driftwalk.cli.options.flatten_options import with_options
-from driftwalk.cli.options.shared import Replace
+from driftwalk.cli.options.shared import Replace, option
 from driftwalk.cli.options.tracking import TrackingOptions
-from driftwalk.cli.terminal.output import print_note, printable
+from driftwalk.cli.terminal.output import print_note, print_warnings, printable
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -27,12 +25,7 @@ _MOST_CLASSES = 6
 )
 def watch(
     options: TrackingOptions,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out", "-o", metavar="FILE.nc", help="Recording to write as well.", show_default=False
-        ),
-    ] = None,
+    out: Annotated[Path | None, option("--out -o FILE.nc", "Recording to write as well.")] = None,
     overwrite: Replace = False,
 ) -> None:
     """Watch blocks assemble: poses, joins and the outcome class, as they happen.
@@ -40,8 +33,8 @@ def watch(
     Prints a line for each join, parting or change of the class, and one line per second with the
     poses. While a block is hidden, lists the classes that are still possible.
     """
-    from driftwalk.cli.tracking.parts import build_parts
-    from driftwalk.cli.tracking.run import TrackingRun
+    from driftwalk.cli.recordings.track import TrackingRun
+    from driftwalk.cli.recordings.tracking_parts import build_parts
     from driftwalk.core.files.atomic import require_free, require_target
 
     existing = "replace" if overwrite else "error"
@@ -62,8 +55,7 @@ def watch(
         run.recording()  # Says that nothing was tracked, and what was there instead.
     if run.saved:
         print_note(f"wrote {out}")
-    if run.interrupted is not None:
-        print_note(f"warning: {run.interrupted}")
+    print_warnings([run.interrupted])
 
 
 class _Printer:

@@ -121,28 +121,22 @@ class ProgressReporter:
             self._ends = now + (now - began) * (1.0 - share) / (share - before)
 
     def _start_bar(self) -> None:
+        from rich import progress as bar
         from rich.console import Console
-        from rich.progress import (
-            BarColumn,
-            Progress,
-            ProgressColumn,
-            Task,
-            TextColumn,
-        )
         from rich.text import Text
 
         reporter = self
 
-        class Left(ProgressColumn):
+        class Left(bar.ProgressColumn):
             """The time left, which runs down between two calls."""
 
-            def render(self, _task: Task) -> Text:
+            def render(self, _task: bar.Task) -> Text:
                 return Text(reporter.left)
 
-        self._bar = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TextColumn("{task.fields[count]}"),
+        self._bar = bar.Progress(
+            bar.TextColumn("{task.description}"),
+            bar.BarColumn(),
+            bar.TextColumn("{task.fields[count]}"),
             Left(),
             console=Console(file=self._stream),
             transient=True,

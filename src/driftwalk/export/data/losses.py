@@ -10,8 +10,7 @@ import numpy as np
 
 from driftwalk.core.files.atomic import write_atomic
 from driftwalk.core.text.json_text import parse_json
-from driftwalk.export.data.clock import frame_rate
-from driftwalk.export.data.motion import Motion
+from driftwalk.export.data.motion import Motion, frame_rate
 from driftwalk.export.data.ros import first_stamp, topics
 from driftwalk.export.data.tables import particle_numbers
 from driftwalk.schema import body_names

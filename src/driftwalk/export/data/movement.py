@@ -10,8 +10,7 @@ import numpy as np
 
 from driftwalk.core.files.atomic import require_free, write_atomic
 from driftwalk.core.text.json_text import json_value
-from driftwalk.export.data.clock import frame_rate
-from driftwalk.export.data.motion import Motion
+from driftwalk.export.data.motion import Motion, frame_rate
 from driftwalk.schema import body_names
 from driftwalk.schema.stores.netcdf import netcdf_bytes
 

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Integers
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.atomic import require_free
 from driftwalk.export.data.motion import Motion
@@ -108,7 +108,7 @@ def first_stamp(recording: xr.Dataset) -> int:
     return max(0, 1 - int(np.floor(float(recording["time"].values[0]))))
 
 
-def stamps(recording: xr.Dataset) -> npt.NDArray[np.int64]:
+def stamps(recording: xr.Dataset) -> Integers:
     """Return the stamp of each time [ns].
 
     Parameters

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.arrays import Integers
 from driftwalk.core.files.atomic import atomic_path, require_free
-from driftwalk.export.data.clock import frame_numbers
-from driftwalk.export.data.motion import Motion
+from driftwalk.export.data.motion import Motion, frame_numbers
 from driftwalk.schema import body_names
 
 if TYPE_CHECKING:
@@ -108,7 +108,7 @@ def write_trackpy(motion: Motion, folder: Path) -> list[Path]:
     return [target]
 
 
-def particle_numbers(recording: xr.Dataset) -> npt.NDArray[np.int64]:
+def particle_numbers(recording: xr.Dataset) -> Integers:
     """Return the whole number that names each body for trackpy.
 
     Bodies whose names are such numbers keep them; others are counted from 0.

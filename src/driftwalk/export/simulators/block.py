@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.export.target import Source
 
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from driftwalk.model import Study
 
-Floats = npt.NDArray[np.float64]
 
 TAKEN: Final = (
     "give the run directory of `driftwalk calibrate` or `driftwalk fit`, or a study file with a "

@@ -12,8 +12,9 @@ from typing import Any, Final
 
 import numpy as np
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
-from driftwalk.export.simulators.block import Block, Floats
+from driftwalk.export.simulators.block import Block
 from driftwalk.export.simulators.parts import Folder, stored_text, wall_pieces, write_numbers
 from driftwalk.export.simulators.reference import NO_PATH, PathSet, forces_of, reference_of
 from driftwalk.export.target import Verification

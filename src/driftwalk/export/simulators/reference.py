@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.core.seeds import world_keys
-from driftwalk.export.simulators.block import Block, Floats
+from driftwalk.export.simulators.block import Block
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
@@ -32,7 +32,7 @@ NO_PATH: Final = "no path stays clear of the wall of this tank for a second: not
 class PathSet:
     """Some paths: which replicates they are, and their poses, shape (paths, samples)."""
 
-    replicate: npt.NDArray[np.int64]
+    replicate: Integers
     x: Floats
     y: Floats
     theta: Floats
@@ -122,7 +122,7 @@ def _clear_paths(study: Study, block: Block, time: Floats) -> PathSet:
     return PathSet(kept, x[kept], y[kept], theta[kept])
 
 
-def _is_clear(study: Study, x: Floats, y: Floats) -> npt.NDArray[np.bool_]:
+def _is_clear(study: Study, x: Floats, y: Floats) -> Bools:
     """Return which paths have no corner near the wall, at any angle of the block."""
     from driftwalk.model.tank import edges
 

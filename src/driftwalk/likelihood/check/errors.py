@@ -12,23 +12,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from driftwalk.likelihood.estimate import Estimate
+from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.likelihood.filter.filter_pass import Place, Sums
-from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import Series
+from driftwalk.likelihood.preparation import Estimate
 from driftwalk.likelihood.prior import Prior
-from driftwalk.likelihood.spline import DEGREE, Floats, Spline, basis
-
-if TYPE_CHECKING:
-    pass
-
-Integers = npt.NDArray[np.int64]
-Flags = npt.NDArray[np.bool_]
+from driftwalk.likelihood.spline import DEGREE, Spline, basis
 
 SAMPLES_AT_ONCE: Final = 2048
 """Rows of derivatives that are held at a time: some 20 MB."""
@@ -45,9 +38,9 @@ class Innovations:
     series: Series
     white: Floats
     """Shape (n, D); zero where not used."""
-    used: Flags
+    used: Bools
     """Samples whose errors count: not the first ones of a stretch."""
-    outlier: Flags
+    outlier: Bools
     """Samples that the filter did not take, so far were they from where it had predicted them."""
     speed: Floats
     """Speed of the water past the block at the sample before [m/s], NaN where unknown; (n,)."""
@@ -67,19 +60,16 @@ def innovations_of(estimate: Estimate) -> list[Innovations]:
         states = estimate.passes.states(series, point)
         speed = np.full(series.time.size, np.nan)
         # The state before the sample: to sort errors by what they caused would bias them.
-        speed[1:] = _relative_speed(states[:-1], estimate.passes.spline, point)
+        before = states[:-1]
+        flow = velocity_at(estimate.passes.spline, point.coefficients, before[:, 0], before[:, 1])
+        # Coordinates come first, as many as velocities.
+        velocity = before[:, before.shape[1] // 2 :]
+        speed[1:] = np.hypot(flow[0] - velocity[:, 0], flow[1] - velocity[:, 1])
         outlier = np.isfinite(white).all(axis=1) & ~used & (series.excluded == 0)
         counted = used & series.settled
         white = np.where(counted[:, None], white, 0.0)
         found.append(Innovations(series, white, counted, outlier, speed))
     return found
-
-
-def _relative_speed(states: Floats, spline: Spline, point: Point) -> Floats:
-    flow = velocity_at(spline, point.coefficients, states[:, 0], states[:, 1])
-    # Coordinates come first, as many as velocities.
-    velocity = states[:, states.shape[1] // 2 :]
-    return np.asarray(np.hypot(flow[0] - velocity[:, 0], flow[1] - velocity[:, 1]))
 
 
 def velocity_at(spline: Spline, coefficients: Floats, x: Floats, y: Floats) -> Floats:
@@ -229,11 +219,8 @@ def collect(
     sums = Sums(0.0, np.zeros(len(data)), data, 0)
     full = prior.add(sums, estimate.point, estimate.weights).information
     spread = solve_triangular(np.linalg.cholesky(full), np.eye(len(full)), lower=True).T
-    return Leverage(
-        spread,
-        float(((data @ spread) * spread).sum()),
-        _autocovariance(spread, errors, retained, lags),
-    )
+    parameters = float(((data @ spread) * spread).sum())
+    return Leverage(spread, parameters, _autocovariance(spread, errors, retained, lags))
 
 
 def _parts(estimate: Estimate, errors: Sequence[Innovations]) -> Iterator[_Part]:
@@ -249,7 +236,7 @@ def _parts(estimate: Estimate, errors: Sequence[Innovations]) -> Iterator[_Part]
             yield _Part(index, flow, start, np.asarray(found["jacobian"]), white, places)
 
 
-def used_pairs(used: Flags, lags: int) -> Iterator[tuple[int, Flags]]:
+def used_pairs(used: Bools, lags: int) -> Iterator[tuple[int, Bools]]:
     """Yield each lag, and by the earlier sample whether both samples of a pair count."""
     for lag in range(min(lags, used.size - 1) + 1):
         yield lag, used[lag:] & used[: used.size - lag]

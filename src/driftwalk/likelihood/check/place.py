@@ -12,15 +12,12 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.flow.arena import outline_of
-from driftwalk.likelihood.check.errors import Contrast, Innovations, Integers, Leverage, collect
+from driftwalk.likelihood.check.errors import Contrast, Innovations, Leverage, collect
 from driftwalk.likelihood.check.whiteness import LAGS, WhitenessTests, whiteness_tests
-from driftwalk.likelihood.estimate import Estimate
-from driftwalk.likelihood.spline import Floats
-
-Flags = npt.NDArray[np.bool_]
+from driftwalk.likelihood.preparation import Estimate
 
 
 class GroupPolicy(NamedTuple):
@@ -77,10 +74,18 @@ class Layout:
         """Return the flow that a part is in."""
         return self.sources[int(self.series[part])][1] if self.sources else 0
 
-    @property
-    def recordings(self) -> int:
-        """Number of recordings."""
-        return len({self.recording(part) for part in range(self.parts)})
+    def place_of(self, cell: int) -> str:
+        """Return "x = 0.060 m, y = -0.100 m"."""
+        row, column = divmod(cell, self.x.size)
+        return f"x = {self.x[column]:.3f} m, y = {self.y[row]:.3f} m"
+
+    def time_of(self, part: int, last: int | None = None) -> str:
+        """Return "between 600 s and 1200 s", from the start of a part to its or another's end."""
+        end = self.end[part if last is None else last]
+        found = f"between {self.start[part]:.0f} s and {end:.0f} s"
+        if len({self.recording(one) for one in range(self.parts)}) > 1:
+            found += f" of recording {self.recording(part) + 1}"
+        return found
 
     @property
     def cells(self) -> int:
@@ -118,11 +123,8 @@ def lay_out(
         end += edges[1:].tolist()
     speeds = np.concatenate([one.speed[one.used] for one in errors])
     speeds = speeds[np.isfinite(speeds)]
-    edges = (
-        np.quantile(speeds, np.linspace(0.0, 1.0, GROUP.speed_bins + 1))
-        if speeds.size
-        else np.zeros(0)
-    )
+    shares = np.linspace(0.0, 1.0, GROUP.speed_bins + 1)
+    edges = np.quantile(speeds, shares) if speeds.size else np.zeros(0)
     return Layout(
         axes[0],
         axes[1],
@@ -153,13 +155,8 @@ def groups_of(layout: Layout, errors: Sequence[Innovations]) -> list[Groups]:
         part = parts[0] + np.searchsorted(layout.start[parts][1:], one.series.time, side="right")
         speed = np.searchsorted(layout.speed[1:-1], np.nan_to_num(one.speed), side="right")
         known = one.used & np.isfinite(one.speed) & (layout.speed.size > 1)
-        found.append(
-            Groups(
-                np.where(one.used, cell_of(layout, x, y), -1),
-                np.where(one.used, part, -1),
-                np.where(known, speed, -1),
-            )
-        )
+        cell = np.where(one.used, cell_of(layout, x, y), -1)
+        found.append(Groups(cell, np.where(one.used, part, -1), np.where(known, speed, -1)))
     return found
 
 
@@ -170,32 +167,6 @@ def cell_of(layout: Layout, x: Floats, y: Floats) -> Integers:
         share = np.floor((values - axis[0]) / layout.size + 0.5)
         found.append(np.clip(share.astype(np.int64), 0, axis.size - 1))
     return np.asarray(found[1] * layout.x.size + found[0])
-
-
-class Contrasts(NamedTuple):
-    """Sums of the pass with derivatives."""
-
-    place: Contrast
-    """By part of the recording, cell and component, in that order."""
-    strength: Contrast
-    """By part of the recording, weighted with what a stronger flow would do."""
-    drag: Contrast
-    """By range of speed, weighted with what a stronger drag would do."""
-
-
-def contrasts_of(layout: Layout, groups: Sequence[Groups], components: int) -> Contrasts:
-    """Return the empty sums."""
-    place, part, speed = [], [], []
-    for one in groups:
-        both = np.where(one.cell >= 0, one.part * layout.cells + one.cell, -1)[:, None]
-        place.append(np.where(both >= 0, both * components + np.arange(components), -1))
-        part.append(np.repeat(one.part[:, None], components, axis=1))
-        speed.append(np.repeat(one.speed[:, None], components, axis=1))
-    return Contrasts(
-        Contrast(place, layout.parts * layout.cells * components),
-        Contrast(part, layout.parts, by="flow"),
-        Contrast(speed, max(layout.speed.size - 1, 1), by="drag"),
-    )
 
 
 class LocalMeans(NamedTuple):
@@ -232,7 +203,7 @@ class Trend(NamedTuple):
     """Its standard deviation."""
     chi_squared: float
     dof: int
-    visible: Flags
+    visible: Bools
     """Whether most of a change in a group could be seen: the fit may have absorbed it."""
 
 
@@ -313,12 +284,22 @@ def residuals_of(estimate: Estimate, errors: Sequence[Innovations]) -> Residuals
     layout = lay_out(errors, bounds, side=study.block.side_m)
     groups = groups_of(layout, errors)
     components = errors[0].components
-    sums = contrasts_of(layout, groups, components)
-    leverage = collect(estimate, errors, sums, lags=LAGS)
+    at_place, at_time, at_speed = [], [], []
+    for one in groups:
+        both = np.where(one.cell >= 0, one.part * layout.cells + one.cell, -1)[:, None]
+        at_place.append(np.where(both >= 0, both * components + np.arange(components), -1))
+        at_time.append(np.repeat(one.part[:, None], components, axis=1))
+        at_speed.append(np.repeat(one.speed[:, None], components, axis=1))
+    # By part of the recording, cell and component, in that order.
+    place = Contrast(at_place, layout.parts * layout.cells * components)
+    # Weighted with what a stronger flow would do, and with what a stronger drag would do.
+    strength = Contrast(at_time, layout.parts, by="flow")
+    drag = Contrast(at_speed, max(layout.speed.size - 1, 1), by="drag")
+    leverage = collect(estimate, errors, [place, strength, drag], lags=LAGS)
     covariance = leverage.covariance
     shape = (layout.parts, layout.cells, components)
-    score, power = sums.place.score.reshape(shape), sums.place.power.reshape(shape)[:, :, 0]
-    slope = sums.place.slope.reshape(*shape, -1)
+    score, power = place.score.reshape(shape), place.power.reshape(shape)[:, :, 0]
+    slope = place.slope.reshape(*shape, -1)
     by_part = (layout.parts * layout.cells, components)
     return Residuals(
         layout=layout,
@@ -328,8 +309,8 @@ def residuals_of(estimate: Estimate, errors: Sequence[Innovations]) -> Residuals
         part=local_scores(
             score.reshape(by_part), power.ravel(), slope.reshape(*by_part, -1), covariance
         ),
-        strength=trend_of(sums.strength, covariance),
-        drag=trend_of(sums.drag, covariance),
+        strength=trend_of(strength, covariance),
+        drag=trend_of(drag, covariance),
         noise_by_part=spread_of(errors, [one.part for one in groups], layout.parts),
         noise_by_place=spread_of(errors, [one.cell for one in groups], layout.cells),
     )

@@ -1,4 +1,4 @@
-"""Does the model explain the recording? The check of a likelihood fit."""
+"""Does the model explain the recording? The check of a likelihood fit, and its `model_check`."""
 
 from __future__ import annotations
 
@@ -10,31 +10,129 @@ import numpy as np
 from driftwalk.core.errors import InputError, reason_of
 from driftwalk.core.processors import one_blas_thread
 from driftwalk.likelihood.check.errors import Innovations, innovations_of
-from driftwalk.likelihood.check.motion import FEWEST_REPLICATES, compare_motion
-from driftwalk.likelihood.check.place import residuals_of
+from driftwalk.likelihood.check.place import Residuals, residuals_of
 from driftwalk.likelihood.check.posterior_predictive import (
+    BAND,
+    FEWEST_REPLICATES,
+    MotionComparison,
+    compare_motion,
     posterior_replicates,
     problems_of,
     replicates_at_estimate,
 )
-from driftwalk.likelihood.check.result import (
-    criterion_variables,
-    motion_variables,
-    place_variables,
-    white_variables,
-)
 from driftwalk.likelihood.check.scan import scan_of
-from driftwalk.likelihood.check.verdict import VERDICT, criteria_of, findings_of
-from driftwalk.likelihood.estimate import estimate_of
-from driftwalk.likelihood.flow_of_fit import require_fit
-from driftwalk.likelihood.preparation import as_list
-from driftwalk.likelihood.solution import BREAKDOWN
+from driftwalk.likelihood.check.verdict import (
+    VERDICT,
+    components_of,
+    criteria_of,
+    distance_limit,
+    findings_of,
+)
+from driftwalk.likelihood.flow_intervals import require_fit
+from driftwalk.likelihood.preparation import as_list, estimate_of
+from driftwalk.likelihood.refuse import BREAKDOWN
 from driftwalk.schema.answers.facts import texts
-from driftwalk.schema.answers.verdict import with_verdict
+from driftwalk.schema.answers.fit import with_verdict
 from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+Parts = tuple[dict[str, Any], dict[str, Any]]
+
+
+def white_variables(found: Residuals) -> Parts:
+    """Return the variables of whiteness and their coordinates."""
+    white = found.white
+    by_lag, by_component = ("component", "lag"), ("component",)
+    data = {
+        "autocorrelation": (by_lag, white.autocorrelation),
+        "autocorrelation_expected": (by_lag, white.expected),
+        "autocorrelation_std": (by_lag, white.std),
+        "chi_squared_per_dof": (by_component, white.chi_squared),
+        "chi_squared_expected": (by_component, white.expected_chi_squared),
+        "excess_kurtosis": (by_component, white.excess_kurtosis),
+        "tail_share": (by_component, white.tail_share),
+    }
+    names = np.array(components_of(len(white.chi_squared)), dtype=object)
+    lags = np.arange(1, white.autocorrelation.shape[1] + 1)
+    return data, {"component": ("component", names), "lag": ("lag", lags)}
+
+
+def place_variables(found: Residuals) -> Parts:
+    """Return the variables by cell, by part of the recording and by speed."""
+    layout = found.layout
+    shape = (layout.y.size, layout.x.size)
+    plane = ("y", "x")
+    place, part = found.place, found.part
+    table = part.chi_squared.reshape(layout.parts, -1)
+    known = np.isfinite(table)
+    samples = part.samples.reshape(layout.parts, -1).sum(axis=1)
+    sums = (part.mean * part.samples[:, None]).reshape(layout.parts, layout.cells, -1).sum(axis=1)
+    mean = np.where(place.samples[:, None] > 0, place.mean, np.nan).T.reshape(-1, *shape)
+    # What the largest distance of all cells exceeds once in twenty.
+    cells = int(np.isfinite(place.chi_squared).sum())
+    limit = {"limit": distance_limit(max(cells, 1), place.mean.shape[1])}
+    data = {
+        "residual": (("component", *plane), mean),
+        "residual_count": (plane, place.samples.reshape(shape)),
+        "residual_distance": (plane, np.sqrt(place.chi_squared).reshape(shape), limit),
+        "noise_ratio": (plane, found.noise_by_place.ratio.reshape(shape)),
+        "noise_ratio_std": (plane, found.noise_by_place.std.reshape(shape)),
+        "part_residual": (("part", "component"), sums / np.maximum(samples, 1.0)[:, None]),
+        "part_count": ("part", samples),
+        "part_chi_squared": ("part", np.nansum(table, axis=1)),
+        "part_dof": ("part", place.mean.shape[1] * known.sum(axis=1)),
+        "part_noise_ratio": ("part", found.noise_by_part.ratio),
+        "part_noise_ratio_std": ("part", found.noise_by_part.std),
+        "flow_change": ("part", np.where(found.strength.visible, found.strength.change, np.nan)),
+        "flow_change_std": ("part", np.where(found.strength.visible, found.strength.std, np.nan)),
+        "drag_change": ("speed_range", found.drag.change),
+        "drag_change_std": ("speed_range", found.drag.std),
+    }
+    edges = layout.speed if layout.speed.size > 1 else np.array([np.nan, np.nan])
+    coords = {
+        "x": ("x", layout.x),
+        "y": ("y", layout.y),
+        "part_recording": ("part", [layout.recording(part) for part in range(layout.parts)]),
+        "part_start": ("part", layout.start),
+        "part_end": ("part", layout.end),
+        "speed_low": ("speed_range", edges[:-1]),
+        "speed_high": ("speed_range", edges[1:]),
+    }
+    return data, coords
+
+
+def motion_variables(motion: MotionComparison) -> Parts:
+    """Return distances and densities, and their coordinates."""
+    data: dict[str, Any] = {
+        "ks_to_estimate": ("replicate", motion.distance),
+        "ks_floor": ("pair", motion.floor),
+        "ks_to_drawn": ("drawn_replicate", motion.drawn_distance),
+        "ks_between_drawn": ("drawn_replicate", motion.drawn_between),
+    }
+    coords: dict[str, Any] = {}
+    for name in ("step_length", "turning_angle"):
+        density = getattr(motion, name)
+        for part in ("recording", "median", "low", "high"):
+            data[f"{name}_density_{part}"] = (f"{name}_bin", getattr(density, part))
+        coords[f"{name}_edge"] = (f"{name}_edge", density.edge)
+    return data, coords
+
+
+def motion_facts(motion: MotionComparison) -> dict[str, Any]:
+    """Return the numbers of the comparison."""
+    low, high = np.quantile(motion.distance, [0.5 * (1 - BAND), 0.5 * (1 + BAND)])
+    return {
+        "ks_distance": float(np.median(motion.distance)),
+        "ks_distance_interval": [float(low), float(high)],
+        "ks_noise_floor": float(np.median(motion.floor)),
+        "ks_noise_floor_upper": float(np.quantile(motion.floor, 0.95)),
+        "ks_p_value": motion.p_value,
+        "ks_rank_p_value": motion.rank_p_value,
+        "band": BAND,
+    }
 
 
 @one_blas_thread()
@@ -118,8 +216,7 @@ def check_model(
         "source": fit.attrs["source"],
         "simulated_recording": fit.attrs["simulated_recording"],
     }
-    data, coords = white_variables(found)
-    parts = [place_variables(found)]
+    parts = [white_variables(found), place_variables(found)]
     try:
         problems = problems_of(fit, estimate, many)
         drawn = posterior_replicates(
@@ -133,30 +230,30 @@ def check_model(
         )
         paths = [(one.series.time, one.series.x, one.series.y) for one in errors]
         scan = scan_of(paths, drawn.paths, found.layout)
-        more, at, facts = motion_variables(motion)
-        parts.append((more, at))
-        attrs |= facts
+        parts.append(motion_variables(motion))
+        attrs |= motion_facts(motion)
     except InputError as error:
         # If the steps of a recording cannot be compared, the check still tests whether its errors
         # are white.
         motion, scan = None, None
         attrs |= {"ks_distance": np.nan, "ks_noise_floor": np.nan, "ks_left_out": str(error)}
-    criteria = criteria_of(
-        errors,
-        found,
-        motion,
-        scan,
-        angle=fit.attrs["angle"],
-        mistakes=int(fit["mistakes"]),
-    )
-    parts.append(criterion_variables(criteria))
-    for more, at in parts:
-        data |= more
-        coords |= at
+    criteria = criteria_of(errors, found, motion, scan, fit=fit)
     findings = findings_of(criteria)
-    data["explained"] = ((), np.bool_(not findings))
-    coords["finding"] = ("finding", texts(findings))
-    return build_dataset("model_check", data, coords, attrs)
+    data = {
+        "p_value": ("criterion", [one.p_value for one in criteria]),
+        "failed": ("criterion", np.array([one.failed for one in criteria], dtype=np.int8)),
+        "explained": ((), np.bool_(not findings)),
+    }
+    names = np.array([one.name for one in criteria], dtype=object)
+    parts.append(
+        (data, {"criterion": ("criterion", names), "finding": ("finding", texts(findings))})
+    )
+    variables: dict[str, Any] = {}
+    coords: dict[str, Any] = {}
+    for some, places in parts:
+        variables |= some
+        coords |= places
+    return build_dataset("model_check", variables, coords, attrs)
 
 
 def _require_used(errors: Sequence[Innovations]) -> None:

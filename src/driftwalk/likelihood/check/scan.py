@@ -14,9 +14,9 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from driftwalk.core.arrays import Floats
 from driftwalk.likelihood.check.place import Layout, cell_of
 from driftwalk.likelihood.check.posterior_predictive import Path
-from driftwalk.likelihood.spline import Floats
 
 
 class ScanPolicy(NamedTuple):
@@ -76,14 +76,8 @@ def scan_of(
     p_value = float(gumbel_r.sf(off[best], largest.mean() - np.euler_gamma * scale, scale))
     first, last = stretches[int(np.flatnonzero(known)[best])]
     chosen = np.exp(theirs[:, best])
-    return Scan(
-        first,
-        last,
-        float(np.exp(mine[best])),
-        float(np.median(chosen)),
-        float(chosen.std(ddof=1)),
-        p_value,
-    )
+    median, std = float(np.median(chosen)), float(chosen.std(ddof=1))
+    return Scan(first, last, float(np.exp(mine[best])), median, std, p_value)
 
 
 def _stretches(layout: Layout) -> list[tuple[int, int]]:

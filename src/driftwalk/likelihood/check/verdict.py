@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from driftwalk.core.arrays import Floats
 from driftwalk.likelihood.check.errors import Innovations
-from driftwalk.likelihood.check.motion import MotionComparison
 from driftwalk.likelihood.check.place import Layout, LocalMeans, Residuals, Spread, Trend
+from driftwalk.likelihood.check.posterior_predictive import MotionComparison
 from driftwalk.likelihood.check.scan import Scan
 from driftwalk.likelihood.check.whiteness import WhitenessTests
-from driftwalk.likelihood.spline import Floats
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 class VerdictPolicy(NamedTuple):
@@ -68,28 +71,23 @@ def criteria_of(
     motion: MotionComparison | None,
     scan: Scan | None,
     *,
-    angle: str,
-    mistakes: int,
+    fit: xr.Dataset,
 ) -> list[Criterion]:
-    """Ask everything of a fit with this use of the angle, after the mistakes were left out."""
-    where = Places(found.layout)
+    """Ask everything of a fit."""
+    layout = found.layout
     names = components_of(errors[0].components)
     return [
         autocorrelation_criterion(found.white, names),
         tail_criterion(found.white, names),
-        outlier_criterion(
-            sum(int(one.outlier.sum()) for one in errors),
-            sum(one.used.size for one in errors),
-            mistakes,
-        ),
-        place_criterion(found.place, where),
-        time_and_place_criterion(found.part, where),
-        strength_criterion(found.strength, where),
-        drag_criterion(found.drag, found.layout.speed),
-        noise_criterion(found.noise_by_place, where, by="place"),
-        noise_criterion(found.noise_by_part, where, by="time"),
-        change_criterion(scan, where),
-        motion_criterion(motion, angle=angle),
+        outlier_criterion(errors, int(fit["mistakes"])),
+        place_criterion(found.place, layout),
+        time_and_place_criterion(found.part, layout),
+        strength_criterion(found.strength, layout),
+        drag_criterion(found.drag, layout.speed),
+        noise_criterion(found.noise_by_place, layout, by="place"),
+        noise_criterion(found.noise_by_part, layout, by="time"),
+        change_criterion(scan, layout),
+        motion_criterion(motion, angle=fit.attrs["angle"]),
     ]
 
 
@@ -97,25 +95,6 @@ def findings_of(criteria: Sequence[Criterion]) -> list[str]:
     """Return the sentences of the criteria that failed, the worst first."""
     failed = [one for one in criteria if one.failed]
     return [one.sentence for one in sorted(failed, key=lambda one: one.p_value)]
-
-
-class Places(NamedTuple):
-    """All that is needed to name places and times."""
-
-    layout: Layout
-
-    def place(self, cell: int) -> str:
-        """Return "x = 0.060 m, y = -0.100 m"."""
-        row, column = divmod(cell, self.layout.x.size)
-        return f"x = {self.layout.x[column]:.3f} m, y = {self.layout.y[row]:.3f} m"
-
-    def time(self, part: int, last: int | None = None) -> str:
-        """Return "between 600 s and 1200 s", from the start of a part to its or another's end."""
-        end = self.layout.end[part if last is None else last]
-        found = f"between {self.layout.start[part]:.0f} s and {end:.0f} s"
-        if self.layout.recordings > 1:
-            found += f" of recording {self.layout.recording(part) + 1}"
-        return found
 
 
 def autocorrelation_criterion(white: WhitenessTests, components: tuple[str, ...]) -> Criterion:
@@ -147,12 +126,14 @@ def tail_criterion(white: WhitenessTests, components: tuple[str, ...]) -> Criter
     )
 
 
-def outlier_criterion(outliers: int, samples: int, mistakes: int) -> Criterion:
+def outlier_criterion(errors: Sequence[Innovations], mistakes: int) -> Criterion:
     """Ask whether samples were left out because they are far from every prediction.
 
     `mistakes` of the tracker were left out before, as far from both of their neighbours.
     """
     expected = round(VERDICT.missed_outliers * mistakes)
+    outliers = sum(int(one.outlier.sum()) for one in errors)
+    samples = sum(one.used.size for one in errors)
     share = outliers / max(samples, 1)
     return Criterion(
         "outliers",
@@ -163,7 +144,7 @@ def outlier_criterion(outliers: int, samples: int, mistakes: int) -> Criterion:
     )
 
 
-def place_criterion(local: LocalMeans, where: Places) -> Criterion:
+def place_criterion(local: LocalMeans, layout: Layout) -> Criterion:
     """Ask whether the mean error of prediction is zero in every cell."""
     from scipy.stats import chi2
 
@@ -178,7 +159,7 @@ def place_criterion(local: LocalMeans, where: Places) -> Criterion:
     return Criterion(
         "place",
         p_value,
-        f"the mean error of prediction is {off:.1f} sd from zero at {where.place(worst)} "
+        f"the mean error of prediction is {off:.1f} sd from zero at {layout.place_of(worst)} "
         f"({local.samples[worst]:.0f} samples), expected below {limit:.1f} in all "
         f"{cells.size} cells in 95 % of recordings: the fitted flow is wrong there",
     )
@@ -191,33 +172,31 @@ def distance_limit(cells: int, dof: int) -> float:
     return math.sqrt(float(chi2.isf(0.05 / cells, dof)))
 
 
-def time_and_place_criterion(local: LocalMeans, where: Places) -> Criterion:
+def time_and_place_criterion(local: LocalMeans, layout: Layout) -> Criterion:
     """Ask whether the flow is the same in every part of the recording: means by cell and part."""
     from scipy.stats import chi2
 
     dof = local.mean.shape[1]
-    table = local.chi_squared.reshape(where.layout.parts, -1)
+    table = local.chi_squared.reshape(layout.parts, -1)
     total, degrees = np.nansum(table, axis=1), dof * np.isfinite(table).sum(axis=1)
-    if not degrees.any() or where.layout.parts < 2:
+    if not degrees.any() or layout.parts < 2:
         return Criterion("time and place", math.nan, "")
     p_values = np.where(degrees > 0, chi2.sf(total, np.maximum(degrees, 1)), 1.0)
-    worst = (
-        int(p_values.argmin())
-        if p_values.min() > 0
-        else int((total / np.maximum(degrees, 1)).argmax())
-    )
+    # Where p is zero in double precision, the largest chi squared per degree of freedom is worst.
+    ratio = total / np.maximum(degrees, 1)
+    worst = int(p_values.argmin() if p_values.min() > 0 else ratio.argmax())
     cell = int(np.nanargmax(table[worst])) if degrees[worst] else 0
     return Criterion(
         "time and place",
         min(1.0, np.count_nonzero(degrees) * float(p_values[worst])),
-        f"the flow is not the same all the time: {where.time(worst)} the squared mean errors of "
-        f"prediction of the cells add up to {total[worst]:.0f}, expected {degrees[worst]} ± "
-        f"{math.sqrt(2 * degrees[worst]):.0f}; most at {where.place(cell)} "
+        f"the flow is not the same all the time: {layout.time_of(worst)} the squared mean errors "
+        f"of prediction of the cells add up to {total[worst]:.0f}, expected {degrees[worst]} ± "
+        f"{math.sqrt(2 * degrees[worst]):.0f}; most at {layout.place_of(cell)} "
         f"({math.sqrt(table[worst, cell]):.1f} sd)",
     )
 
 
-def strength_criterion(trend: Trend, where: Places) -> Criterion:
+def strength_criterion(trend: Trend, layout: Layout) -> Criterion:
     """Ask whether the flow is as strong in every part of the recording."""
     if trend.dof == 0:
         return Criterion("flow strength", math.nan, "")
@@ -228,9 +207,10 @@ def strength_criterion(trend: Trend, where: Places) -> Criterion:
     return Criterion(
         "flow strength",
         float(chi2.sf(trend.chi_squared, trend.dof)),
-        f"the strength of the flow changes: {where.time(worst)} it is {trend.change[worst]:+.1%} "
-        f"off its mean, expected 0 ± {trend.std[worst]:.1%} (chi squared {trend.chi_squared:.0f}, "
-        f"expected {trend.dof} ± {math.sqrt(2 * trend.dof):.0f})",
+        f"the strength of the flow changes: {layout.time_of(worst)} it is "
+        f"{trend.change[worst]:+.1%} off its mean, expected 0 ± {trend.std[worst]:.1%} "
+        f"(chi squared {trend.chi_squared:.0f}, expected {trend.dof} ± "
+        f"{math.sqrt(2 * trend.dof):.0f})",
     )
 
 
@@ -252,7 +232,7 @@ def drag_criterion(trend: Trend, edges: Floats) -> Criterion:
     )
 
 
-def noise_criterion(spread: Spread, where: Places, *, by: str) -> Criterion:
+def noise_criterion(spread: Spread, layout: Layout, *, by: str) -> Criterion:
     """Ask whether the noise is the same in every cell (by "place") or part (by "time")."""
     from scipy.stats import gamma
 
@@ -266,7 +246,7 @@ def noise_criterion(spread: Spread, where: Places, *, by: str) -> Criterion:
     above, below = (tail(ratio, shape, scale=1.0 / shape) for tail in (gamma.sf, gamma.cdf))
     p_values = 2.0 * np.minimum(np.asarray(above), np.asarray(below))
     worst = int(known[p_values.argmin()])
-    at = f"at {where.place(worst)}" if by == "place" else where.time(worst)
+    at = f"at {layout.place_of(worst)}" if by == "place" else layout.time_of(worst)
     return Criterion(
         name,
         min(1.0, known.size * float(p_values.min())),
@@ -295,14 +275,14 @@ def motion_criterion(motion: MotionComparison | None, *, angle: str) -> Criterio
     )
 
 
-def change_criterion(scan: Scan | None, where: Places) -> Criterion:
+def change_criterion(scan: Scan | None, layout: Layout) -> Criterion:
     """Ask whether the body moves alike in the same cells at all times."""
     if scan is None:
         return Criterion("change", math.nan, "")
     return Criterion(
         "change",
         scan.p_value,
-        f"the motion changes: {where.time(scan.first, scan.last)} the velocities differ by "
+        f"the motion changes: {layout.time_of(scan.first, scan.last)} the velocities differ by "
         f"{scan.difference:.3g} m/s (rms) from those in the same cells at other times, expected "
         f"{scan.expected:.2g} ± {scan.expected_std:.1g} m/s: the flow is not steady",
     )

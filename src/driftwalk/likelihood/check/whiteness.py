@@ -8,8 +8,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from driftwalk.core.arrays import Floats
 from driftwalk.likelihood.check.errors import Innovations, Leverage, used_pairs
-from driftwalk.likelihood.spline import Floats
 
 LAGS: Final = 20
 """Lags of the portmanteau statistic: two seconds at 10 Hz. Chosen by hand."""

@@ -1,8 +1,9 @@
 """Particle filter of the passages along the wall: the likelihood of a wall.
 
-They get the fitted flow, drag and force, and the impacts of a wall of given restitution and
-friction. The likelihood (Gordon, Salmond and Smith 1993) is the product of the mean densities of
-the recorded poses. All walls get the same random numbers.
+Passages are the parts of a recording near the wall, which the fit leaves out. The particles get the
+fitted flow, drag and force, and the impacts of a wall of given restitution and friction. The
+likelihood (Gordon, Salmond and Smith 1993) is the product of the mean densities of the recorded
+poses. All walls get the same random numbers.
 """
 
 from __future__ import annotations
@@ -15,11 +16,12 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
+from driftwalk.core.arrays import Floats
 from driftwalk.core.processors import default_threads
 from driftwalk.core.seeds import world_keys
-from driftwalk.likelihood.contacts.passages import Passages
 from driftwalk.likelihood.filter.parameters import Point
-from driftwalk.likelihood.spline import Floats
+from driftwalk.likelihood.filter.series import Series, corrected
+from driftwalk.likelihood.preparation import Estimate
 from driftwalk.schema.trajectory import wrap_angle
 from driftwalk.simulation.backend import Camera, native_model, world_table
 
@@ -27,6 +29,74 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
+
+
+class PassagePolicy(NamedTuple):
+    """Samples of a passage along the wall."""
+
+    before: int = 3
+    """Samples that a passage begins before the wall. Chosen by hand, as what follows."""
+    after: int = 4
+    """Samples that it ends after the wall."""
+    longest: int = 25
+    """Most samples from the wall on."""
+    uneven: float = 0.2
+    """Largest relative difference of an interval from the usual one."""
+
+
+PASSAGE: Final = PassagePolicy()
+
+
+class Passages(NamedTuple):
+    """Passages of the block along the wall; shapes (passages, samples)."""
+
+    x: Floats
+    y: Floats
+    theta: Floats
+    """Recorded poses, NaN after the end of a passage."""
+    state: Floats
+    """x, y, theta and their rates at the first sample, shape (passages, 6)."""
+
+
+def passages_of(estimate: Estimate, series: Series) -> Passages:
+    """Return the passages along the wall of one series."""
+    point = estimate.point.in_flow(series.flow)
+    x, y, theta = corrected(series, point)
+    states = estimate.passes.states(series, point)
+    usual = float(np.median(np.diff(series.time)))
+    even = np.concatenate([[False], np.abs(np.diff(series.time) - usual) < PASSAGE.uneven * usual])
+    whole = np.isfinite(x) & np.isfinite(y) & np.isfinite(theta)
+    rows = []
+    at = 0
+    places = np.flatnonzero(series.excluded)
+    while places.size:
+        first = int(places[0])
+        last = first
+        while last + 1 < x.size and series.excluded[last + 1 : last + 1 + PASSAGE.after].any():
+            last += 1
+        begin = first - 1 - PASSAGE.before
+        end = min(last + 1 + PASSAGE.after, first + PASSAGE.longest)
+        places = places[places > max(last, end)]
+        inside = slice(begin + 1, end)
+        if begin <= at or end >= x.size or series.excluded[begin - 1 : first].any():
+            continue
+        if not (whole[begin:end].all() and even[inside].all() and np.isfinite(states[begin]).all()):
+            continue
+        at = end
+        pad = PASSAGE.longest + PASSAGE.before + 1 - (end - begin - 1)
+        poses = (np.pad(one[inside], (0, pad), constant_values=np.nan) for one in (x, y, theta))
+        rows.append((*poses, states[begin]))
+    if not rows:
+        empty = np.zeros((0, PASSAGE.longest + PASSAGE.before + 1))
+        return Passages(empty, empty, empty, np.zeros((0, 6)))
+    return Passages(*(np.array(column) for column in zip(*rows, strict=True)))
+
+
+def thinned(passages: Passages, share: float) -> Passages:
+    """Return a share of the passages, evenly taken; one at least."""
+    count = len(passages.x)
+    retained = np.unique(np.linspace(0, count - 1, max(round(share * count), 1)).astype(np.intp))
+    return Passages(*(part[retained] for part in passages))
 
 
 class ParticlePolicy(NamedTuple):
@@ -73,6 +143,7 @@ class WallLikelihood:
         self.study, self.parts, self.seed = study, parts, seed
         self.noise = PARTICLE.wider * math.exp(point.log_noise)
         self.angle_noise = PARTICLE.wider * math.exp(point.log_angle_noise)
+        self.noises = (self.noise, self.noise, self.angle_noise)
         intensity = math.exp(point.log_intensity)
         turning = 6.0 * math.exp(point.log_lever) / study.block.side_m**2
         self.intensity = np.array([intensity, intensity, intensity * turning**2])
@@ -106,11 +177,10 @@ class WallLikelihood:
             weight = np.exp(logs - top)
             total += float((np.log(weight.mean(axis=1)) + top[:, 0])[running].sum())
             state = _resampled([*pose, *motion], weight, uniform)
-            for a, noise in enumerate((self.noise, self.noise, self.angle_noise)):
-                state[a] += PARTICLE.rough * noise * generator.normal(size=weight.shape)
-                state[a + 3] += (
-                    PARTICLE.rough * noise / part.interval * generator.normal(size=weight.shape)
-                )
+            for a, noise in enumerate(self.noises):
+                rough = PARTICLE.rough * noise
+                state[a] += rough * generator.normal(size=weight.shape)
+                state[a + 3] += rough / part.interval * generator.normal(size=weight.shape)
         return total
 
     def _first(
@@ -119,11 +189,9 @@ class WallLikelihood:
         """Return the first states of the particles, six of shape (passages, particles)."""
         shape = (len(passages.x), PARTICLE.particles)
         state = [np.empty(shape) for _ in range(6)]
-        noises = (self.noise, self.noise, self.angle_noise)
-        for a, (noise, intensity) in enumerate(zip(noises, self.intensity, strict=True)):
-            root = PARTICLE.spread * np.linalg.cholesky(
-                filtered_covariance(noise, intensity, interval)
-            )
+        for a, (noise, intensity) in enumerate(zip(self.noises, self.intensity, strict=True)):
+            covariance = filtered_covariance(noise, intensity, interval)
+            root = PARTICLE.spread * np.linalg.cholesky(covariance)
             drawn = np.einsum("ab,bij->aij", root, generator.normal(size=(2, *shape)))
             state[a] = passages.state[:, a, None] + drawn[0]
             state[a + 3] = passages.state[:, a + 3, None] + drawn[1]
@@ -135,9 +203,8 @@ class WallLikelihood:
         apart = [one - own for one, own in zip(seen, pose, strict=True)]
         turned = wrap_angle(apart[2])
         squares = (apart[0] ** 2 + apart[1] ** 2) / self.noise**2 + (turned / self.angle_noise) ** 2
-        size = (
-            math.log(2.0 * math.pi) * 1.5 + 2.0 * math.log(self.noise) + math.log(self.angle_noise)
-        )
+        size = math.log(2.0 * math.pi) * 1.5 + 2.0 * math.log(self.noise)
+        size += math.log(self.angle_noise)
         anywhere = math.log(PARTICLE.mistake / (self.study.tank.extent_m[0] ** 2 * 2.0 * math.pi))
         # Of a passage that has ended all particles are alike.
         squares = np.where(np.isfinite(squares), squares, 0.0)
@@ -178,11 +245,9 @@ def _propagated(
     )
     found = _core.simulate(model, worlds, keys, threads=default_threads(), precision="single")
     pose, motion = [], []
-    for index, part in enumerate(found[:3]):
+    for name, part in zip(names, found[:3], strict=False):
         now, then = part[:, 0].astype(np.float64), part[:, 1].astype(np.float64)
-        change = then - now
-        if index == 2:
-            change = wrap_angle(change)
+        change = wrap_angle(then - now) if name == "theta" else then - now
         pose.append(now.reshape(shape))
         motion.append((change / step).reshape(shape))
     return pose, motion

@@ -1,4 +1,7 @@
-"""Derivatives by differences: pairs of passes that differ in one parameter alone."""
+"""Derivatives by differences: pairs of passes that differ in one parameter alone.
+
+The covariances of the innovations are many 2 x 2 or 3 x 3 matrices, factored all at once.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +10,39 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.likelihood.filter.departures import NUMBERS
-from driftwalk.likelihood.filter.parameters import Point
-from driftwalk.likelihood.filter.series import Flags
-from driftwalk.likelihood.filter.small_matrices import factor, forward, unpacked
-from driftwalk.likelihood.spline import Floats
+from driftwalk.core.arrays import Bools, Floats
+from driftwalk.likelihood.filter.parameters import NUMBERS, Point
+
+
+def unpacked(lower: Floats) -> Floats:
+    """Return symmetric matrices (D, D, n) from their lower parts (n, D (D + 1) / 2), row by row."""
+    count = {3: 2, 6: 3}[lower.shape[1]]
+    full = np.empty((count, count, lower.shape[0]))
+    for column, (a, b) in enumerate(zip(*np.tril_indices(count), strict=True)):
+        full[a, b] = full[b, a] = lower[:, column]
+    return full
+
+
+def factor(lower: Floats) -> Floats:
+    """Return the Cholesky factors L (D, D, n), L L' the matrices of which these are lower parts."""
+    full = unpacked(lower)
+    root = np.zeros_like(full)
+    for a in range(len(full)):
+        for b in range(a + 1):
+            rest = full[a, b] - (root[a, :b] * root[b, :b]).sum(axis=0)
+            root[a, b] = np.sqrt(rest) if a == b else rest / root[b, b]
+    return root
+
+
+def forward(root: Floats, right: Floats) -> Floats:
+    """Return L^-1 b for n triangular L (D, D, n) and b (D, n), or (D, m, n)."""
+    found = np.empty_like(right)
+    for a in range(len(root)):
+        rest = right[a].copy()
+        for b in range(a):
+            rest -= root[a, b] * found[b]
+        found[a] = rest / root[a, a]
+    return found
 
 
 class DifferencePolicy(NamedTuple):
@@ -73,7 +104,7 @@ class Pair(NamedTuple):
     """How much of the difference counts at each sample, shape (n,); all of it by default."""
 
     @property
-    def comparable(self) -> Flags:
+    def comparable(self) -> Bools:
         """Return which samples both passes have used, with nearly the same variances."""
         # A change that is not a number is not a near one.
         near = variance_changes(self.one, self.other) <= self.most_change
@@ -89,7 +120,7 @@ class Pair(NamedTuple):
         return max(1.0, DIFFERENCE.largest_over_median * median / self.most_change)
 
 
-def used_of(found: dict[str, Any]) -> Flags:
+def used_of(found: dict[str, Any]) -> Bools:
     """Return which samples a pass has used."""
     return np.asarray(found["used"], dtype=bool)
 
@@ -102,7 +133,7 @@ def variance_changes(base: dict[str, Any], other: dict[str, Any]) -> Floats:
 
 
 def noise_derivatives(
-    base: dict[str, Any], pairs: Sequence[Pair], used: Flags
+    base: dict[str, Any], pairs: Sequence[Pair], used: Bools
 ) -> tuple[Floats, list[Floats], list[Floats]]:
     """Return whitened innovations (n, D), and the derivatives of them and of S by the noises.
 

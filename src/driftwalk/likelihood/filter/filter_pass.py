@@ -21,25 +21,25 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from driftwalk import _core
-from driftwalk.likelihood.filter.departures import STRENGTHS
+from driftwalk.core.arrays import Bools, Floats
 from driftwalk.likelihood.filter.difference_pairs import (
     Pair,
     difference_of,
+    factor,
+    forward,
     noise_derivatives,
     used_of,
 )
-from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.filter.parameters import STRENGTHS, Point
 from driftwalk.likelihood.filter.series import (
     FILTER,
     Body,
-    Flags,
     Series,
     corrected,
     cosine_of,
     strength_of,
 )
-from driftwalk.likelihood.filter.small_matrices import factor, forward
-from driftwalk.likelihood.spline import Floats, Spline
+from driftwalk.likelihood.spline import Spline
 
 Place = tuple[slice, slice]
 
@@ -172,7 +172,7 @@ class Passes:
                 ).sum()
         return Sums(deviance, score, information, int(used.sum()))
 
-    def innovations(self, point: Point) -> list[tuple[Floats, Flags]]:
+    def innovations(self, point: Point) -> list[tuple[Floats, Bools]]:
         """Return each recording's whitened innovations, shape (n, D), and which were used.
 
         D is 3 with the angle in the state, else 2. The innovation of a missing angle is 0.
@@ -205,10 +205,11 @@ class Passes:
     def kernel(self, series: Series, point: Point, *, sensitivities: bool = False) -> Any:
         """Return the native filter, before the first sample of a series."""
         body, spline = self.body, self.spline
-        pose: dict[str, float] = {}
+        plain = ("water_acceleration", "water_spin", "drag_power", "force_memory")
+        numbers: dict[str, Any] = {name: point.number(name) for name in plain}
         if point.log_lever is not None and point.log_angle_noise is not None:
-            pose["force_lever"] = math.exp(point.log_lever)
-            pose["angle_noise"] = math.exp(point.log_angle_noise)
+            numbers["force_lever"] = math.exp(point.log_lever)
+            numbers["angle_noise"] = math.exp(point.log_angle_noise)
         # Offsets of marker and angle move the data and not the model: the core knows the centre of
         # mass and the angle of the faces only.
         x, y, theta = corrected(series, point)
@@ -220,35 +221,22 @@ class Passes:
             theta,
             series.omega,
             series.excluded,
-            side=body.side,
-            mass=body.mass,
-            depth=body.depth,
-            strips=body.strips,
-            water_density=body.water_density,
-            origin_x=spline.origin_x,
-            origin_y=spline.origin_y,
-            spacing=spline.spacing,
-            columns=spline.columns,
-            rows=spline.rows,
+            **vars(body),
+            **vars(spline),
             coefficients=np.ascontiguousarray(point.coefficients),
             drag_coefficient=math.exp(point.log_drag),
             noise_intensity=math.exp(point.log_intensity),
             position_noise=math.exp(point.log_noise),
             largest_step=FILTER.largest_step_s,
             longest_gap=FILTER.longest_gap_s,
-            orientation=body.orientation,
             sensitivities=sensitivities,
             strength=strength_of(series, point),
             quadratic=1.0 - share,
-            # Linear drag acts on all four faces, windward or not: a quarter on each.
-            linear=0.25 * share * body.linear_speed,
-            water_acceleration=point.number("water_acceleration"),
-            water_spin=point.number("water_spin"),
-            drag_power=point.number("drag_power"),
-            drag_speed=body.drag_speed,
+            # Linear drag acts on all four faces, windward or not: a quarter on each. At a speed of
+            # one side of the block a second it is as strong as the quadratic one in its place.
+            linear=0.25 * share * body.side,
             time_noise=math.sqrt(point.number("time_variance")),
-            force_memory=point.number("force_memory"),
-            **pose,
+            **numbers,
         )
 
 

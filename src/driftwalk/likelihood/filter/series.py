@@ -1,18 +1,26 @@
-"""Tracks and the block as the filter takes them."""
+"""Tracks and the block as the filter takes them: angles smoothed, contacts with the wall left out.
+
+The rule for contacts looks at the past only. To leave out an interval because of where the body is
+at its end would select among the forces that brought it there, and bias what is estimated.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.likelihood.filter.departures import STRENGTH_TERMS
-from driftwalk.likelihood.filter.parameters import Point
-from driftwalk.likelihood.spline import Floats
+from driftwalk.core.arrays import Bools, Floats
+from driftwalk.flow.arena import Outline, outline_of
+from driftwalk.likelihood.filter.parameters import STRENGTH_TERMS, Point
 
-Flags = npt.NDArray[np.bool_]
+if TYPE_CHECKING:
+    from driftwalk.model import Study
+    from driftwalk.schema import Track
 
 
 class FilterPolicy(NamedTuple):
@@ -55,7 +63,7 @@ class Series:
     """Time of the recording's last sample, counted from its first [s]."""
 
     @property
-    def settled(self) -> Flags:
+    def settled(self) -> Bools:
         """Which samples are not the first ones of a stretch, shape (n,).
 
         Where the filter begins, and after a contact with the wall, it allows for any velocity. So
@@ -77,15 +85,13 @@ class Series:
 
 @dataclass(frozen=True)
 class Body:
-    """The block and the water."""
+    """The block and the water, as arguments of the native filter."""
 
     side: float
     mass: float
     depth: float
     strips: int
     water_density: float
-    linear_speed: float
-    """Speed [m/s] at which linear drag is as strong as the quadratic one in its place."""
     drag_speed: float
     """Speed [m/s] at which C_d holds, whatever the power of the drag."""
     orientation: str
@@ -123,3 +129,194 @@ def strength_of(series: Series, point: Point) -> Floats | None:
 def cosine_of(series: Series, number: int) -> Floats:
     """Return one of the cosines over the recording, at the samples."""
     return np.asarray(np.cos(number * np.pi * series.time / max(series.span, 1e-300)))
+
+
+ORIENTED_SHARE: Final = 0.5
+"""Share of the samples with an orientation from which on the fit uses orientations by default, and
+the search for dropped frames does. Chosen by hand: the majority."""
+WINDOW: Final = 5
+"""Samples of a parabola: the five nearest in time, so that gaps and uneven clocks are no case."""
+
+
+class Angle(NamedTuple):
+    """Smoothed orientation at every sample of a track, shapes (n,)."""
+
+    theta: Floats
+    """Orientation [rad], unwrapped."""
+    omega: Floats
+    """Turning rate [rad/s]."""
+    known: Bools
+    """Where orientations are near enough in time to tell."""
+
+
+def smooth_angle(time: Floats, theta: Floats) -> Angle:
+    """Fit a parabola to the five orientations nearest in time to each sample.
+
+    Examples
+    --------
+    >>> time = np.arange(20) * 0.1
+    >>> smooth_angle(time, np.angle(np.exp(2j * time))).omega.round(6)[[0, 10]]
+    array([2., 2.])
+    """
+    seen = np.isfinite(theta)
+    if np.count_nonzero(seen) < WINDOW:
+        return Angle(np.zeros(time.size), np.zeros(time.size), np.zeros(time.size, dtype=bool))
+    at, turned = time[seen], np.unwrap(theta[seen])
+    first, reach = _windows(at)
+    value, rate = _parabolas(at, turned, first)
+    near = reach <= FILTER.longest_gap_s
+    known = np.zeros(time.size, dtype=bool)
+    if near.any():
+        known = _distance(time, at[near]) <= FILTER.longest_gap_s
+        at, value, rate = at[near], value[near], rate[near]
+    return Angle(np.interp(time, at, value), np.interp(time, at, rate), known)
+
+
+def _windows(time: Floats) -> tuple[npt.NDArray[np.intp], Floats]:
+    """Return for each sample the window of five that reaches least far from it, and how far."""
+    index = np.arange(time.size)
+    # The centred window comes first, so that it is taken among equals.
+    firsts = np.stack([index + offset for offset in (-2, -1, -3, 0, -4)])
+    whole = (firsts >= 0) & (firsts <= time.size - WINDOW)
+    inside = np.where(whole, firsts, 0)
+    reach = np.maximum(time - time[inside], time[inside + WINDOW - 1] - time)
+    # 1e-9: rounding of the clock is no reason to leave the middle.
+    reach = np.where(whole, np.round(reach, 9), np.inf)
+    best = reach.argmin(axis=0)
+    return firsts[best, index], reach[best, index]
+
+
+def _parabolas(time: Floats, values: Floats, first: npt.NDArray[np.intp]) -> tuple[Floats, Floats]:
+    """Return value and slope at each sample of the parabola through its window."""
+    members = first[:, None] + np.arange(WINDOW)
+    apart = time[members] - time[:, None]
+    scale = np.abs(apart).max(axis=1)
+    tau = apart / scale[:, None]
+    terms = np.stack([np.ones_like(tau), tau, tau**2], axis=-1)
+    rise = values[members] - values[:, None]
+    normal = np.einsum("nwa,nwb->nab", terms, terms)
+    moments = np.einsum("nwa,nw->na", terms, rise)
+    found = np.linalg.solve(normal, moments[..., None])[..., 0]
+    return values + found[:, 0], found[:, 1] / scale
+
+
+def _distance(time: Floats, others: Floats) -> Floats:
+    """Return the time from each sample to the nearest of the others."""
+    after = np.clip(np.searchsorted(others, time), 1, max(others.size - 1, 1))
+    right = others[np.minimum(after, others.size - 1)]
+    return np.minimum(np.abs(time - others[after - 1]), np.abs(right - time))
+
+
+MARGIN = 0.002
+"""A corner nearer to the wall than this [m] may touch it within a sampling interval. Chosen by
+hand."""
+
+
+def wall_intervals(
+    time: Floats, x: Floats, y: Floats, theta: Floats | None, *, outline: Outline, side: float
+) -> Bools:
+    """Return which intervals, by the sample at their end, may hold a contact with the wall, (n,).
+
+    In the one from k - 1 to k a corner comes within 2 mm of the wall: at k - 1, or where the motion
+    and the turning from k - 3 to k - 1 lead by k. Without orientations the circle around the block
+    replaces its corners.
+    """
+    turned = None if theta is None else np.unwrap(theta)
+    ahead_x, ahead_y = (_continued(time, axis) for axis in (x, y))
+    ahead = None if turned is None else _continued(time, turned)
+    here = _least_depth(x[:-1], y[:-1], None if turned is None else turned[:-1], outline, side)
+    there = _least_depth(ahead_x, ahead_y, ahead, outline, side)
+    near = np.zeros(time.size, dtype=bool)
+    near[1:] = np.minimum(here, there) < MARGIN
+    return near
+
+
+def _continued(time: Floats, values: Floats) -> Floats:
+    """Return where the change over the last two intervals leads in the next, shape (n - 1,)."""
+    onward = np.zeros(time.size - 1)
+    past = time[2:-1] - time[:-3]
+    rate = (values[2:-1] - values[:-3]) / past
+    onward[2:] = np.where(past <= FILTER.longest_gap_s, rate * (time[3:] - time[2:-1]), 0.0)
+    return np.asarray(values[:-1] + np.where(np.diff(time) <= FILTER.longest_gap_s, onward, 0.0))
+
+
+def _least_depth(
+    x: Floats, y: Floats, theta: Floats | None, outline: Outline, side: float
+) -> Floats:
+    """Return the distance of the nearest corner to the wall [m], negative beyond it."""
+    reach = side / math.sqrt(2.0)
+    if theta is None:
+        return outline.depth(x, y) - reach
+    quarters = theta + math.pi * (0.25 + 0.5 * np.arange(4))[:, None]
+    corners_x, corners_y = x + reach * np.cos(quarters), y + reach * np.sin(quarters)
+    depths = [outline.depth(*corner) for corner in zip(corners_x, corners_y, strict=True)]
+    return np.asarray(np.min(depths, axis=0))
+
+
+def series_of(
+    tracks: Sequence[Track],
+    study: Study,
+    used_angle: str,
+    places: Sequence[tuple[int, int]] | None = None,
+) -> list[Series]:
+    """Return the tracks as the filter takes them.
+
+    `places` are the flow and the recording of each, by default one flow and recording after
+    recording. Times begin with the recording's first sample.
+    """
+    outline, side = outline_of(study.tank.to_arena()), study.block.side_m
+    where = places or [(0, number) for number in range(len(tracks))]
+    found: list[Series] = []
+    first = 0.0
+    ends = {place[1]: float(track.time[-1]) for place, track in zip(where, tracks, strict=True)}
+    for (flow, recording), track in zip(where, tracks, strict=True):
+        # All parts of a recording count time from its first sample: the cosines of the flow's
+        # strength run over the whole of it.
+        if not found or found[-1].recording != recording:
+            first = float(track.time[0])
+        time = track.time - first
+        # Without orientations the filter gets zeros, and none of them is unknown.
+        smooth = Angle(np.zeros(time.size), np.zeros(time.size), np.ones(time.size, dtype=bool))
+        corners = None
+        if used_angle != "none":
+            smooth = smooth_angle(time, track.theta)
+            # A corner is where the recorded angle puts it; the smooth one only fills its holes.
+            corners = np.where(np.isfinite(track.theta), track.theta, smooth.theta)
+        wall = wall_intervals(time, track.x, track.y, corners, outline=outline, side=side)
+        found.append(
+            Series(
+                time,
+                np.ascontiguousarray(track.x),
+                np.ascontiguousarray(track.y),
+                np.ascontiguousarray(track.theta) if used_angle == "state" else smooth.theta,
+                smooth.omega,
+                (wall | ~smooth.known).astype(np.uint8),
+                flow,
+                recording,
+                near_wall=int(wall.sum()),
+                angle=smooth.theta,
+                span=ends[recording] - first,
+            )
+        )
+    return found
+
+
+def usable_intervals(series: Sequence[Series]) -> int:
+    """Return the number of intervals that are not left out and not longer than a gap."""
+    return sum(
+        int(np.count_nonzero((one.excluded[1:] == 0) & (np.diff(one.time) <= FILTER.longest_gap_s)))
+        for one in series
+    )
+
+
+def body_of(study: Study, used_angle: str) -> Body:
+    """Return the block of a study as the filter takes it."""
+    return Body(
+        side=study.block.side_m,
+        mass=study.block.mass_kg,
+        depth=study.wetted_depth_m,
+        strips=study.block.strips_per_face,
+        water_density=study.water.density_kg_m3,
+        drag_speed=study.forces.drag_speed_m_s,
+        orientation=used_angle,
+    )

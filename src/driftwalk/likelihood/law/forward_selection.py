@@ -11,9 +11,8 @@ from collections.abc import Mapping, Set
 from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
-from driftwalk.likelihood.filter.departures import DRAG_SHAPES, NUMBERS, PULSES, STRENGTHS
-from driftwalk.likelihood.filter.parameters import Point
-from driftwalk.likelihood.law.assumptions import FLOATING, Assumptions
+from driftwalk.likelihood.filter.parameters import DRAG_SHAPES, NUMBERS, PULSES, STRENGTHS, Point
+from driftwalk.likelihood.law.force_law import FLOATING, Assumptions
 from driftwalk.likelihood.law.score_tests import Pulses, ScoreTests, find_pulses, score_tests
 from driftwalk.likelihood.newton import FROM_NEAR, Mode, ModeSearch
 from driftwalk.likelihood.prior import Weights
@@ -137,13 +136,11 @@ class ForwardSelection:
 
     def _closed_names(self, mode: Mode, closed: Set[str]) -> list[str]:
         """Return the numbers that may still be opened."""
-        names = [
-            name
-            for name in self.assumptions.tried
-            if name not in mode.point.opened and name not in closed
-        ]
-        shaped = bool(set(DRAG_SHAPES) & set(mode.point.opened))
-        return [name for name in names if not (shaped and name in DRAG_SHAPES)]
+        gone = {*mode.point.opened, *closed}
+        # One shape of the drag at most is opened.
+        if set(DRAG_SHAPES) & set(mode.point.opened):
+            gone.update(DRAG_SHAPES)
+        return [name for name in self.assumptions.tried if name not in gone]
 
     def _open_together_or_singly(
         self, mode: Mode, candidates: Mapping[str, float], tests: ScoreTests | None
@@ -173,10 +170,8 @@ class ForwardSelection:
             estimate, _ = tests.of(name)
             if name not in (*STRENGTHS, *FLOATING) and self._is_candidate(name, sigmas, estimate):
                 candidates[name] = _within(name, NUMBERS[name].model + estimate)
-        rivals = sorted(
-            set(DRAG_SHAPES) & set(candidates), key=lambda name: abs(tests.sigmas[name])
-        )
-        for name in rivals[:-1]:
+        rivals = set(DRAG_SHAPES) & set(candidates)
+        for name in sorted(rivals, key=lambda name: abs(tests.sigmas[name]))[:-1]:
             del candidates[name]
         strengths = [name for name in STRENGTHS if name in tests.names]
         if strengths:
@@ -203,7 +198,6 @@ class ForwardSelection:
         frequency = candidates.pop("pulse_frequency", None)
         if frequency is not None:
             fixed["pulse_frequency"] = frequency
-        before = mode
         point = replace(mode.point, opened={**mode.point.opened, **candidates}, fixed=fixed)
         found = self._near(point, mode.weights)
         if found is not None and frequency is not None:
@@ -213,12 +207,11 @@ class ForwardSelection:
             point = replace(found.point, opened=opened, fixed=fixed)
             found = self._near(point, found.weights)
         if found is None:
-            return before, set(candidates)
-        mode = found
-        idle = self._idle(mode, set(candidates))
+            return mode, set(candidates)
+        idle = self._idle(found, set(candidates))
         if idle >= set(candidates):
-            return before, idle
-        return self._without(mode, idle) or before, idle
+            return mode, idle
+        return self._without(found, idle) or mode, idle
 
     def _idle(self, mode: Mode, names: Set[str]) -> set[str]:
         """Return which of some opened numbers are too near the model to stay open."""

@@ -5,29 +5,28 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.processors import one_blas_thread
 from driftwalk.core.run_stages import Course, tell_nobody
-from driftwalk.likelihood.estimate import Estimate, estimate_of
-from driftwalk.likelihood.filter.departures import DRAG_SHAPES, DRAGS
-from driftwalk.likelihood.filter.filter_pass import Passes, log_densities
-from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.filter.filter_pass import log_densities
+from driftwalk.likelihood.filter.parameters import DRAG_SHAPES, DRAGS, Point
 from driftwalk.likelihood.filter.series import Series
-from driftwalk.likelihood.law.assumptions import FLOATING
+from driftwalk.likelihood.law.force_law import FLOATING
 from driftwalk.likelihood.law.search import evidence_of
 from driftwalk.likelihood.newton import ModeSearch, Passed, Tell
+from driftwalk.likelihood.preparation import Estimate, estimate_of
 from driftwalk.likelihood.prior import Prior
-from driftwalk.likelihood.solution import BREAKDOWN
+from driftwalk.likelihood.refuse import BREAKDOWN
 from driftwalk.schema.answers.parts import undetermined
 from driftwalk.schema.check import described
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.likelihood.spline import Floats
 
 LAWS: Final[dict[str, tuple[bool, str]]] = {
     "paper": (False, "quadratic"),
@@ -95,23 +94,26 @@ def compare_laws(
     'paper'
     """
     found: dict[str, _Compared | None] = dict.fromkeys(LAWS)
-    if undetermined(fit):
-        # There is nothing to begin a search from.
-        return _with_laws(fit, found)
-    estimate = estimate_of(fit, recordings, body=body)
-    course = Course(tell or tell_nobody, _usual_parts(estimate.point))
-    for name, law in LAWS.items():
-        course.begin(name)
-        found[name] = _under(estimate, *law, passed=_counted(course, name, estimate))
-    return _with_laws(fit, found)
-
-
-def _with_laws(fit: xr.Dataset, found: dict[str, _Compared | None]) -> xr.Dataset:
-    """Return a fit with what was found of each law."""
+    # Without the numbers of the fit there is nothing to begin a search from.
+    if not undetermined(fit):
+        estimate = estimate_of(fit, recordings, body=body)
+        course = Course(tell or tell_nobody, _usual_parts(estimate.point))
+        for name, law in LAWS.items():
+            course.begin(name)
+            found[name] = _under(estimate, *law, passed=_counted(course, name, estimate))
+    means = {name: float(np.nanmean(one.scores)) for name, one in found.items() if one is not None}
+    best = max(means, key=means.__getitem__) if means else None
+    columns = {
+        "compared_log_evidence": [one.evidence if one else math.nan for one in found.values()],
+        "compared_log_score": [means.get(name, math.nan) for name in found],
+        "compared_log_score_std": [_difference_std(found, name, best) for name in found],
+        "compared_filter_drag_coefficient": [
+            one.drag if one else math.nan for one in found.values()
+        ],
+    }
+    data = {name: ("compared_law", np.array(values)) for name, values in columns.items()}
     names = np.array(list(found), dtype=np.str_)
-    return described(
-        fit.assign(_variables(found)).assign_coords(compared_law=("compared_law", names))
-    )
+    return described(fit.assign(data).assign_coords(compared_law=("compared_law", names)))
 
 
 def _usual_parts(point: Point) -> dict[str, float]:
@@ -144,7 +146,13 @@ def _under(estimate: Estimate, floating: bool, drag: str, *, passed: Passed) -> 
         return None
     try:
         with np.errstate(all="ignore"):
-            scores = _scores(passes, mode.point)
+            # Logarithms of the densities of the held out samples; NaN where not predicted.
+            scores = np.concatenate(
+                [
+                    log_densities(passes, one, mode.point.in_flow(one.flow))[_training(one) :]
+                    for one in passes.series
+                ]
+            )
             if not np.isfinite(scores).any():
                 return None
             return _Compared(evidence_of(mode, prior), scores, math.exp(mode.point.log_drag))
@@ -165,32 +173,6 @@ def _training(series: Series) -> int:
     """Return how many samples of a series a law is fitted to."""
     # Chosen by hand: 70 % from the beginning of each recording; the rest is predicted.
     return int(0.7 * series.time.size)
-
-
-def _scores(passes: Passes, point: Point) -> Floats:
-    """Return the logarithms of the densities of the held out samples; NaN where not predicted."""
-    parts = []
-    for series in passes.series:
-        densities = log_densities(passes, series, point.in_flow(series.flow))
-        parts.append(densities[_training(series) :])
-    return np.concatenate(parts)
-
-
-def _variables(found: dict[str, _Compared | None]) -> dict[str, Any]:
-    """Return the variables of a comparison."""
-    means = {name: float(np.nanmean(one.scores)) for name, one in found.items() if one is not None}
-    best = max(means, key=means.__getitem__) if means else None
-    columns = {
-        "compared_log_evidence": [
-            math.nan if one is None else one.evidence for one in found.values()
-        ],
-        "compared_log_score": [means.get(name, math.nan) for name in found],
-        "compared_log_score_std": [_difference_std(found, name, best) for name in found],
-        "compared_filter_drag_coefficient": [
-            math.nan if one is None else one.drag for one in found.values()
-        ],
-    }
-    return {name: ("compared_law", np.array(values)) for name, values in columns.items()}
 
 
 def _difference_std(found: dict[str, _Compared | None], name: str, best: str | None) -> float:

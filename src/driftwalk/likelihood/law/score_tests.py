@@ -14,11 +14,11 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from driftwalk.core.arrays import Floats
 from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.filter.series import Series
 from driftwalk.likelihood.newton import WORK, Mode, ModeSearch, work_of_pass
-from driftwalk.likelihood.solution import BREAKDOWN, cholesky
-from driftwalk.likelihood.spline import Floats
+from driftwalk.likelihood.refuse import BREAKDOWN, cholesky
 
 
 class PulsePolicy(NamedTuple):
@@ -91,19 +91,27 @@ def score_tests(search: ModeSearch, mode: Mode, names: Sequence[str]) -> ScoreTe
 
 
 class Pulses(NamedTuple):
-    """The strongest pulse of the flow's strength that the errors show."""
+    """The highest line in the spectrum of the flow's strength, which may be a pulse."""
 
     frequency: float
     """[Hz]"""
     cosine: float
     sine: float
     """Amplitudes of its parts, as of `PULSES`; too small while the flow is fitted without them."""
-    significant: bool
+    height: float
+    """Of chi squared with two degrees of freedom."""
+    frequencies: int
+    """How many were looked at."""
 
     @property
     def amplitude(self) -> float:
         """Return the amplitude of the pulse."""
         return math.hypot(self.cosine, self.sine)
+
+    @property
+    def significant(self) -> bool:
+        """Return whether a steady flow hardly has such a line."""
+        return self.height > 2.0 * float(np.log(self.frequencies / PULSE.false_alarms))
 
 
 def find_pulses(passes: Passes, mode: Mode) -> Pulses | None:
@@ -113,31 +121,12 @@ def find_pulses(passes: Passes, mode: Mode) -> Pulses | None:
     nearly that by a change then. So the products of errors and derivatives have a line in their
     spectrum where the strength pulses. The median of the spectrum is its height without pulses.
     """
-    lines = []
-    for series in passes.series:
-        line = _highest_line(passes, mode, series)
-        if line is not None:
-            lines.append(line)
-    if not lines:
-        return None
-    line = max(lines, key=lambda one: one.height)
-    least = 2.0 * float(np.log(line.frequencies / PULSE.false_alarms))
-    return Pulses(line.frequency, line.cosine, line.sine, line.height > least)
+    found = [_highest_line(passes, mode, series) for series in passes.series]
+    lines = [line for line in found if line is not None]
+    return max(lines, key=lambda one: one.height) if lines else None
 
 
-class _Line(NamedTuple):
-    """The highest line of a spectrum."""
-
-    height: float
-    """Of chi squared with two degrees of freedom."""
-    frequency: float
-    cosine: float
-    sine: float
-    frequencies: int
-    """How many were looked at."""
-
-
-def _highest_line(passes: Passes, mode: Mode, series: Series) -> _Line | None:
+def _highest_line(passes: Passes, mode: Mode, series: Series) -> Pulses | None:
     """Return the highest line of one series; nothing where it is too short."""
     products, squares = passes.strength_products(series, mode.point.in_flow(series.flow))
     time = series.time - series.time[0]
@@ -156,12 +145,8 @@ def _highest_line(passes: Passes, mode: Mode, series: Series) -> _Line | None:
     # 1.3863 is the median of chi squared with two degrees of freedom.
     heights *= 1.3863 / float(np.median(heights))
     best = int(heights.argmax())
+    frequency = float(frequencies[best])
     # The spectrum counts time from the first sample, the numbers of a pulse from time 0.
     turned = 2.0 * wave[best] / total * np.exp(-2j * np.pi * frequencies[best] * series.time[0])
-    return _Line(
-        float(heights[best]),
-        float(frequencies[best]),
-        float(turned.real),
-        float(-turned.imag),
-        frequencies.size,
-    )
+    height = float(heights[best])
+    return Pulses(frequency, float(turned.real), float(-turned.imag), height, frequencies.size)

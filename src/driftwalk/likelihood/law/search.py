@@ -15,13 +15,18 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.likelihood.filter.departures import DRAG_SHAPES, DRAGS, NUMBERS
-from driftwalk.likelihood.filter.excerpt import beginning
-from driftwalk.likelihood.filter.parameters import Point
-from driftwalk.likelihood.law.assumptions import FLOATING, Assumptions
+from driftwalk.likelihood.filter.parameters import DRAG_SHAPES, DRAGS, NUMBERS, Point
+from driftwalk.likelihood.law.force_law import FLOATING, Assumptions
 from driftwalk.likelihood.law.forward_selection import ForwardSelection, LawResult, is_retained
 from driftwalk.likelihood.law.score_tests import ScoreTests, score_tests
-from driftwalk.likelihood.newton import FROM_ANOTHER, FROM_NEAR, Mode, ModeSearch, require_mode
+from driftwalk.likelihood.newton import (
+    FROM_ANOTHER,
+    FROM_NEAR,
+    Mode,
+    ModeSearch,
+    beginning,
+    require_mode,
+)
 from driftwalk.likelihood.prior import Prior, Weights
 from driftwalk.schema.answers.force_law import LEAST_EVIDENCE, OPENED_SIGMAS
 
@@ -84,12 +89,10 @@ class LawSearch:
 
     def _base(self, start: Point, weights: Weights) -> LawResult:
         floating = replace(start, fixed={**start.fixed, **FLOATING})
-        if self.assumptions.pressure_gradient == "on":
-            mode = require_mode(self.search.find_from_afar(floating, weights))
-            return self._alone(mode, floating=True)
-        if self.assumptions.pressure_gradient == "off":
-            mode = require_mode(self.search.find_from_afar(start, weights))
-            return self._alone(mode, floating=False)
+        if self.assumptions.pressure_gradient != "auto":
+            on = self.assumptions.pressure_gradient == "on"
+            mode = require_mode(self.search.find_from_afar(floating if on else start, weights))
+            return self._alone(mode, floating=on)
         paper = self.search.find_from_afar(start, weights)
         if paper is not None and paper.converged:
             tests = score_tests(self.search, paper, (*FLOATING, *self.assumptions.tried))
@@ -105,9 +108,8 @@ class LawSearch:
         sigmas = tests.sigmas
         if tests.chi_squared(dict.fromkeys(self._floating_names, 0.0)) > LAW.doubted_chi_squared:
             return True
-        if sigmas.get("linear_share", 0.0) > LAW.doubted_linear_sigmas:
-            return True
-        if sigmas.get("drag_power", 0.0) < -LAW.doubted_linear_sigmas:
+        linear = max(sigmas.get("linear_share", 0.0), -sigmas.get("drag_power", 0.0))
+        if linear > LAW.doubted_linear_sigmas:
             return True
         numbers = set(sigmas) - set(FLOATING) - set(DRAG_SHAPES)
         return any(abs(sigmas[name]) > OPENED_SIGMAS for name in numbers)
@@ -115,11 +117,8 @@ class LawSearch:
     @property
     def _floating_names(self) -> tuple[str, ...]:
         """The numbers of a floating body that the recording can test."""
-        return (
-            tuple(FLOATING)
-            if self.search.passes.body.orientation == "state"
-            else ("water_acceleration",)
-        )
+        oriented = self.search.passes.body.orientation == "state"
+        return tuple(FLOATING) if oriented else ("water_acceleration",)
 
     def _undoubted(self, paper: Mode, tests: ScoreTests) -> LawResult:
         """Return the paper's law, and whether a floating body's would do as well."""
@@ -127,10 +126,8 @@ class LawSearch:
         own = tests.chi_squared(dict.fromkeys(names, 0.0))
         other = tests.chi_squared({name: FLOATING[name] for name in names})
         apart = 0.5 * (other - own)
-        found = self._alone(paper, floating=False)
-        return replace(
-            found, settled_by=max(apart, 0.0) if apart < LEAST_EVIDENCE else math.inf, tests=tests
-        )
+        settled_by = max(apart, 0.0) if apart < LEAST_EVIDENCE else math.inf
+        return replace(self._alone(paper, floating=False), settled_by=settled_by, tests=tests)
 
     def _compared(
         self, starts: Mapping[str, Point], weights: Weights, paper: Mode | None
@@ -163,10 +160,8 @@ class LawSearch:
         return LawResult(paper, paper, False, evidence, -ahead, None)
 
     def _alone(self, mode: Mode, *, floating: bool) -> LawResult:
-        name = "floating" if floating else "paper"
-        return LawResult(
-            mode, mode, floating, {name: evidence_of(mode, self.search.prior)}, math.inf, None
-        )
+        evidence = {"floating" if floating else "paper": evidence_of(mode, self.search.prior)}
+        return LawResult(mode, mode, floating, evidence, math.inf, None)
 
     def _turns_by_itself(self, mode: Mode) -> bool:
         """Return whether the stochastic force seems to turn the block."""
@@ -203,9 +198,8 @@ class LawSearch:
         decided for the wrong one.
         """
         mode = found.mode
-        if self.assumptions.pressure_gradient != "auto" or set(mode.point.opened) <= set(
-            self.assumptions.opened
-        ):
+        unchanged = set(mode.point.opened) <= set(self.assumptions.opened)
+        if self.assumptions.pressure_gradient != "auto" or unchanged:
             return found
         if found.settled_by > LAW.decisive_evidence and not self._is_challenged(mode):
             return found

@@ -2,41 +2,173 @@
 
 Where a block moves, its step across a missing frame is twice as long as its neighbours', in x, y
 and orientation together. Every interval is compared with what its neighbours predict, once for each
-number of missing frames (see `interval_windows`). How often frames are missing is estimated along
-with it, by expectation and maximisation over the whole recording. Intervals of half, one and a
-half and two and a half times the length are a control: no dropped frame makes those.
+number of missing frames. How often frames are missing is estimated along with it, by expectation
+and maximisation over the whole recording. Intervals of half, one and a half and two and a half
+times the length are a control: no dropped frame makes those.
+
+A window has four samples on either side of the interval in question. Its path is a parabola, which
+the window itself has to tell, plus an integrated Wiener process (the velocity under random
+accelerations), plus white tracking noise. A longer interval stretches the path: that is the only
+thing it does, in x, y and the orientation alike. The alternatives are what else may happen there: a
+sample that is wrong, a bounce (another velocity from one moment on), a jump to another place.
+
+The parabola's coefficients have a flat prior in units of the displacement over the window: where
+the block does not move, no length of an interval is more likely than another.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.memoize import remembered
-from driftwalk.likelihood.angle import ORIENTED_SHARE
-from driftwalk.likelihood.spline import Floats
-from driftwalk.likelihood.tracker_errors.interval_windows import (
-    AT_MIDDLE,
-    CLASSES,
-    CLEAN,
-    CONTROL,
-    CONTROL_LENGTHS,
-    DROPS,
-    HERE,
-    KIND,
-    MIDDLE,
-    MOST_MISSING,
-    WIDTH,
-    Axis,
-    log_likelihoods,
-)
+from driftwalk.likelihood.filter.series import ORIENTED_SHARE
 from driftwalk.record import estimate_tracking_noise
 from driftwalk.schema import Track
 
-Integers = npt.NDArray[np.int64]
+WIDTH: Final = 8
+"""Samples of a window, four on either side of the interval in question."""
+MIDDLE: Final = 3
+"""Which of the window's intervals is the one in question."""
+MOST_MISSING: Final = 3
+"""Missing frames in one interval that are looked for."""
+CONTROL_LENGTHS: Final = (0.5, 1.5, 2.5)
+"""Lengths that no dropped frame makes. Quick movements of an animal, or a clock that is not
+regular, make them as often as double ones."""
+DROPS: Final = tuple(range(1, MOST_MISSING + 1))
+CONTROL, WRONG, BOUNCE, JUMP = range(MOST_MISSING + 1, MOST_MISSING + 5)
+CLEAN: Final = 0
+CLASSES: Final = JUMP + 1
+
+
+class Axis(NamedTuple):
+    """One coordinate of a track, and what its noise and its accelerations are."""
+
+    values: Floats
+    """Shape (n,); NaN where missing."""
+    noise: float
+    """Standard deviation of the tracking noise."""
+    intensity: float
+    """Of the white acceleration [1/s^3 times the unit squared]."""
+    step: float
+    """Root mean square of the change from sample to sample."""
+
+
+class Pattern(NamedTuple):
+    """One thing that may have happened in a window."""
+
+    kind: int
+    at: int
+    """Interval, or sample of a wrong one."""
+    lengths: Floats
+    """Of the window's intervals, in intervals of the clock."""
+    shift: Floats | None
+    """Shape of what is added to the path, whose size is unknown; None for nothing."""
+
+
+def patterns_of(lengths: Floats, stamped: float) -> list[Pattern]:
+    """Return what may have happened in a window."""
+    plain = lengths.copy()
+    plain[MIDDLE] = stamped
+    found = [Pattern(CLEAN, MIDDLE, plain, None)]
+
+    def longer(at: int, by: float) -> Floats:
+        other = plain.copy()
+        other[at] += by
+        return other
+
+    found += [Pattern(DROPS[0], at, longer(at, 1.0), None) for at in range(WIDTH - 1)]
+    # The number of a class of dropped frames is that of the frames.
+    others = [(kind, float(kind)) for kind in DROPS[1:]]
+    others += [(CONTROL, length - 1.0) for length in CONTROL_LENGTHS]
+    found += [Pattern(kind, MIDDLE, longer(MIDDLE, by), None) for kind, by in others]
+    number = np.arange(WIDTH)
+    time = np.concatenate([[0.0], np.cumsum(plain)])
+    found += [Pattern(WRONG, at, plain, (number == at).astype(np.float64)) for at in range(WIDTH)]
+    for at in range(WIDTH - 1):
+        since = np.maximum(time - 0.5 * (time[at] + time[at + 1]), 0.0)
+        found.append(Pattern(BOUNCE, at, plain, since))
+        found.append(Pattern(JUMP, at, plain, (number > at).astype(np.float64)))
+    return found
+
+
+_USUAL: Final = patterns_of(np.ones(WIDTH - 1), 1.0)
+KIND: Final = np.array([one.kind for one in _USUAL])
+"""Of each pattern; the same for every window."""
+AT_MIDDLE: Final = np.array([one.at == MIDDLE for one in _USUAL])
+HERE: Final = np.bincount(KIND[AT_MIDDLE], minlength=CLASSES)
+"""Number of patterns of each kind at the middle interval."""
+
+
+def log_likelihoods(
+    axes: Sequence[Axis],
+    starts: npt.NDArray[np.intp],
+    lengths: Floats,
+    stamped: Floats,
+    *,
+    dt: float,
+) -> Floats:
+    """Return the log likelihood of every window under every pattern, relative to the first."""
+    around = starts[:, None] + np.arange(WIDTH - 1)
+    key = lengths[around]
+    key[:, MIDDLE] = stamped[starts + MIDDLE]
+    unique, group = np.unique(key, axis=0, return_inverse=True)
+    chi = np.zeros((starts.size, KIND.size))
+    constant = np.zeros((starts.size, KIND.size))
+    dof = np.zeros(starts.size)
+    for number, one in enumerate(unique):
+        rows = np.flatnonzero(group.ravel() == number)
+        patterns = patterns_of(one, one[MIDDLE])
+        members = starts[rows, None] + np.arange(WIDTH)
+        for axis in axes:
+            factor, half = _factors(patterns, axis, dt)
+            values = axis.values[members]
+            known = np.isfinite(values).all(axis=1)
+            values = np.where(known[:, None], values - values[:, :1], 0.0)
+            chi[rows] += (np.tensordot(values, factor, axes=(1, 1)) ** 2).sum(axis=2)
+            constant[rows] += np.where(known[:, None], half, 0.0)
+            dof[rows] += np.where(known, WIDTH - 3, 0)
+    # Where the model of the path is too narrow, as in a flow with sharp bends, so are all of these.
+    usual = max(float(np.median(chi[:, CLEAN])) / max(float(np.median(dof)) - 2.0 / 3.0, 1.0), 1.0)
+    # Student's law with 6 degrees of freedom, chosen by hand, in place of the normal one:
+    # accelerations are not the same everywhere.
+    found: Floats = constant - 0.5 * (6.0 + dof[:, None]) * np.log1p(chi / (usual * 6.0))
+    return found - found[:, :1]
+
+
+def _factors(patterns: Sequence[Pattern], axis: Axis, dt: float) -> tuple[Floats, Floats]:
+    """Return for each pattern the matrix whose product with a window is white, and a constant.
+
+    Shapes (p, WIDTH, WIDTH - 3) and (p,): the matrix is blind for parabolas, and the
+    constant is the logarithm of its normalisation.
+    """
+    time = dt * np.array([np.concatenate([[0.0], np.cumsum(one.lengths)]) for one in patterns])
+    early = np.minimum(time[:, :, None], time[:, None, :])
+    late = np.maximum(time[:, :, None], time[:, None, :])
+    covariance = axis.intensity * early**2 * (late / 2.0 - early / 6.0)
+    covariance += axis.noise**2 * np.eye(WIDTH)
+    # A wrong sample and a jump may be many times the noise, a bounce turns the velocity round.
+    size = {
+        WRONG: 10.0 * axis.noise + 2.0 * axis.step,
+        BOUNCE: 2.0 * axis.step,
+        JUMP: 10.0 * axis.noise + 3.0 * axis.step,
+    }
+    for number, one in enumerate(patterns):
+        if one.shift is not None:
+            covariance[number] += size[one.kind] ** 2 * np.outer(one.shift, one.shift)
+    span = time[:, -1:, None]
+    basis = (time[:, :, None] / span) ** np.arange(3)
+    root = np.linalg.cholesky(covariance)
+    q, r = np.linalg.qr(np.linalg.solve(root, basis), mode="complete")
+    blind = q[:, :, 3:]
+    half = np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
+    half += np.log(np.abs(np.diagonal(r, axis1=1, axis2=2))).sum(axis=1)
+    return np.linalg.solve(np.swapaxes(root, 1, 2), blind), -half
 
 
 class DroppedFramesPolicy(NamedTuple):
@@ -129,15 +261,14 @@ def find_dropped_frames(track: Track, clock: Floats) -> DroppedFrames:
         starts = _windows(lengths)
         if starts.size < DROPPED.fewest_windows:
             return nothing
-        axes = _axes(track, _time_of(lengths, interval))
+        axes = _axes(track, interval * np.concatenate([[0.0], np.cumsum(lengths)]))
         likelihood = log_likelihoods(axes, starts, lengths, stamped, dt=interval)
         rates, value = _rates(likelihood)
         # The evidence comes from the first round: later ones have fitted the lengths to the track.
         if number == 0:
             evidence = value - _rates(likelihood, without=DROPS)[1]
-            if evidence < DROPPED.evidence or not _are_dropped_frames(
-                rates, DROPPED.most_control_before
-            ):
+            seem = _are_dropped_frames(rates, DROPPED.most_control_before)
+            if evidence < DROPPED.evidence or not seem:
                 return nothing._replace(evidence=evidence)
         share = _posterior(likelihood, rates)
         some = share.sum(axis=1)
@@ -198,11 +329,6 @@ def _windows(lengths: Floats) -> npt.NDArray[np.intp]:
     return np.flatnonzero(total[WIDTH - 1 :] - total[: 1 - WIDTH] <= DROPPED.longest_span)
 
 
-def _time_of(lengths: Floats, interval: float) -> Floats:
-    time: Floats = interval * np.concatenate([[0.0], np.cumsum(lengths)])
-    return time
-
-
 def _axes(track: Track, time: Floats) -> list[Axis]:
     """Return x and y, and the orientation where most samples have one."""
     unknown = np.full(time.size, np.nan)
@@ -225,9 +351,8 @@ def _alike(track: Track) -> list[Axis]:
     axes = []
     for values in (track.x, track.y):
         steps = np.abs(np.diff(values))
-        usual = math.sqrt(
-            float((np.minimum(steps, np.quantile(steps, DROPPED.fast_quantile)) ** 2).mean())
-        )
+        slow = np.minimum(steps, np.quantile(steps, DROPPED.fast_quantile))
+        usual = math.sqrt(float((slow**2).mean()))
         # Neither is exactly zero: a covariance has to be one.
         least = max(1e-2 * usual, 1e-12)
         std = max(np.nan_to_num(noise.position_noise_m), least)

@@ -16,8 +16,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.likelihood.filter.series import Flags
-from driftwalk.likelihood.spline import Floats
+from driftwalk.core.arrays import Bools, Floats
 from driftwalk.schema import Track
 
 
@@ -40,7 +39,7 @@ class OutlierPolicy(NamedTuple):
 OUTLIER: Final = OutlierPolicy()
 
 
-def outliers_in(track: Track) -> Flags:
+def outliers_in(track: Track) -> Bools:
     """Return which samples of a track are mistakes of the tracker, shape (n,).
 
     Examples
@@ -87,10 +86,8 @@ def _off_the_line(track: Track) -> Floats:
     off = np.full((2, time.size), math.nan)
     for row, axis in zip(off, (track.x, track.y), strict=True):
         row[1:-1] = axis[1:-1] - (axis[:-2] + share * (axis[2:] - axis[:-2]))
-    apart = np.maximum(interval[:-1], interval[1:]) > OUTLIER.longest_gap * float(
-        np.median(interval)
-    )
-    off[:, 1:-1][:, apart] = math.nan
+    longest = OUTLIER.longest_gap * float(np.median(interval))
+    off[:, 1:-1][:, np.maximum(interval[:-1], interval[1:]) > longest] = math.nan
     return off
 
 
@@ -99,5 +96,4 @@ def without_outliers(track: Track) -> Track:
     wrong = outliers_in(track)
     if not wrong.any():
         return track
-    retained = ~wrong
-    return Track(track.time[retained], track.x[retained], track.y[retained], track.theta[retained])
+    return Track(*(column[~wrong] for column in track))

@@ -18,8 +18,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
-from driftwalk.likelihood.spline import Floats
 from driftwalk.schema import Track
 
 
@@ -49,6 +49,11 @@ class SmoothingPolicy(NamedTuple):
 SMOOTHING: Final = SmoothingPolicy()
 FREQUENCIES: Final = 1024
 """Frequencies of a spectrum before the taper, all around the circle."""
+TURN: Final = 2.0 * np.pi * np.arange(FREQUENCIES) / FREQUENCIES
+HANN: Final = np.hanning(SMOOTHING.segment + 2)[1:-1]
+TAPER: Final = HANN / np.sqrt((HANN**2).sum())
+BAND: Final = slice(int(np.ceil(SMOOTHING.lowest_frequency * SMOOTHING.segment)), None)
+"""Where a segment's spectrum is compared."""
 
 
 class Smoothing(NamedTuple):
@@ -87,9 +92,8 @@ def find_smoothing(track: Track) -> Smoothing | None:
     found = {way: _likelihood(seen, parts, weight) - plain for way, parts in _expected().items()}
     way, *others = sorted(found, key=lambda name: -found[name])
     evidence = found[way]
-    if evidence < SMOOTHING.evidence or best - plain - evidence > SMOOTHING.most_deviance_left * (
-        best - plain
-    ):
+    left = best - plain - evidence
+    if evidence < SMOOTHING.evidence or left > SMOOTHING.most_deviance_left * (best - plain):
         return None
     clear = evidence - found[others[0]] > SMOOTHING.clearly
     return Smoothing(way if clear else "averages over some frames", evidence)
@@ -109,7 +113,6 @@ def require_raw(track: Track, *, where: str) -> None:
 def _spectrum(track: Track) -> tuple[Floats, int]:
     """Return the mean spectrum of second differences in the band, and its number of segments."""
     interval = np.diff(track.time)
-    taper = _taper()
     if interval.size < SMOOTHING.segment + 1:
         return np.zeros(0), 0
     usual = float(np.median(interval))
@@ -120,32 +123,17 @@ def _spectrum(track: Track) -> tuple[Floats, int]:
             change = np.diff(axis[first:last], 2)
             if change.size < SMOOTHING.segment:
                 continue
-            parts = np.lib.stride_tricks.sliding_window_view(change, SMOOTHING.segment)[
-                :: SMOOTHING.segment // 2
-            ]
-            total += (np.abs(np.fft.rfft(parts * taper, axis=1)) ** 2).sum(axis=0)
+            windows = np.lib.stride_tricks.sliding_window_view(change, SMOOTHING.segment)
+            parts = windows[:: SMOOTHING.segment // 2]
+            total += (np.abs(np.fft.rfft(parts * TAPER, axis=1)) ** 2).sum(axis=0)
             count += len(parts)
     mean: Floats = total / max(count, 1)
-    return mean[_band()], count
-
-
-def _taper() -> Floats:
-    taper: Floats = np.hanning(SMOOTHING.segment + 2)[1:-1]
-    taper /= np.sqrt((taper**2).sum())
-    return taper
-
-
-def _band() -> slice:
-    return slice(int(np.ceil(SMOOTHING.lowest_frequency * SMOOTHING.segment)), None)
-
-
-def _turn() -> Floats:
-    return 2.0 * np.pi * np.arange(FREQUENCIES) / FREQUENCIES
+    return mean[BAND], count
 
 
 def _parts() -> Floats:
     """Return what spectra are made of without smoothing, shape (parts, FREQUENCIES)."""
-    turn = _turn()
+    turn = TURN
     difference = np.abs(1.0 - np.exp(1j * turn)) ** 2
     motion = (2.0 + np.cos(turn)) / 3.0
     # A force that remembers, by its correlation from one sample to the next.
@@ -166,10 +154,10 @@ def _plain() -> Floats:
 @cache
 def _expected() -> Mapping[str, Floats]:
     """Return what spectra are made of, by the way of smoothing. Shapes (f, parts)."""
-    turn, parts = _turn(), _parts()
+    parts = _parts()
     found = {}
     for way, weights in _ways().items():
-        gain = np.abs(np.exp(-1j * np.outer(turn, np.arange(weights.size))) @ weights) ** 2
+        gain = np.abs(np.exp(-1j * np.outer(TURN, np.arange(weights.size))) @ weights) ** 2
         # Rounding comes after the smoothing.
         found[way] = _tapered(np.concatenate([gain * parts, parts[:1]]))
     return found
@@ -191,13 +179,12 @@ def _ways() -> dict[str, Floats]:
 
 def _tapered(spectra: Floats) -> Floats:
     """Return the mean of tapered spectra of a segment whose true ones are given, (f, parts)."""
-    taper = _taper()
     covariance = np.fft.ifft(spectra, axis=1).real[:, : SMOOTHING.segment]
-    covariance *= np.correlate(taper, taper, mode="full")[SMOOTHING.segment - 1 :]
+    covariance *= np.correlate(TAPER, TAPER, mode="full")[SMOOTHING.segment - 1 :]
     covariance[:, 1:] *= 2.0
     turn = 2.0 * np.pi * np.arange(SMOOTHING.segment // 2 + 1) / SMOOTHING.segment
     found: Floats = np.cos(np.outer(turn, np.arange(SMOOTHING.segment))) @ covariance.T
-    return found[_band()]
+    return found[BAND]
 
 
 def _likelihood(seen: Floats, parts: Floats, weight: Floats) -> float:

@@ -5,34 +5,94 @@ from __future__ import annotations
 import math
 import os
 import shlex
-from collections.abc import Mapping
+import shutil
+import tempfile
+import weakref
+from collections import deque
+from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
 from threading import Event, Lock
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import numpy as np
 
 from driftwalk.conditions.recorded import Conditions
-from driftwalk.core.errors import ConfigurationError
+from driftwalk.core.arrays import Keys
+from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.files.file_names import text_of_name
 from driftwalk.core.provenance import file_sha256
 from driftwalk.core.text.did_you_mean import did_you_mean
 from driftwalk.motion.batches import in_words, world_batches
 from driftwalk.motion.camera import observe_worlds
-from driftwalk.motion.external_program.flow import FlowFile
 from driftwalk.motion.external_program.lines import (
+    PARAMETERS_REQUEST,
     Positions,
     read_parameters,
     read_positions,
     world_request,
 )
-from driftwalk.motion.external_program.pool import ProgramPool
-from driftwalk.motion.external_program.process import Program, ProgramFault
-from driftwalk.motion.protocol import Keys, Values, Worlds
+from driftwalk.motion.external_program.process import (
+    Program,
+    ProgramEnded,
+    ProgramFault,
+    Request,
+    close_programs,
+)
+from driftwalk.motion.protocol import Values, Worlds
 from driftwalk.motion.ranges import Given, with_given
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+FLOW_KEYS: Final = {"x_m": "x", "y_m": "y", "u_m_s": "u", "v_m_s": "v"}
+"""From the arrays of the file to the variables of a `flow_field`."""
+
+
+class FlowFile:
+    """A file with the flow that programs read, in a temporary folder that ends with this object.
+
+    It is written when it is first asked for, and again when the flow is another one.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> flow, flow_file = dw.tank30_flow(), FlowFile()
+    >>> with np.load(flow_file.path_of(flow)) as stored:
+    ...     sorted(stored)
+    ['u_m_s', 'v_m_s', 'x_m', 'y_m']
+    >>> flow_file.path_of(flow) == flow_file.path_of(flow)
+    True
+    """
+
+    def __init__(self) -> None:
+        self._folder: str | None = None
+        self._written: list[tuple[xr.Dataset, str]] = []
+        self._lock = Lock()
+
+    def path_of(self, flow: xr.Dataset) -> str:
+        """Return the path of the file with a flow.
+
+        Parameters
+        ----------
+        flow : xarray.Dataset
+            A `flow_field`.
+        """
+        with self._lock:
+            for known, path in self._written:
+                if known is flow:
+                    return path
+            if self._folder is None:
+                self._folder = tempfile.mkdtemp(prefix="driftwalk-flow-")
+                weakref.finalize(self, shutil.rmtree, self._folder, ignore_errors=True)
+            path = str(Path(self._folder) / f"flow-{len(self._written) + 1}.npz")
+            arrays = {key: flow[name].to_numpy() for key, name in FLOW_KEYS.items()}
+            np.savez(path, allow_pickle=False, **arrays)
+            self._written.append((flow, path))
+            return path
+
 
 TIMEOUT_S = 60.0
 
@@ -262,3 +322,87 @@ def _same(one: Positions, other: Positions) -> bool:
         return False
     pairs = zip(one, other, strict=True)
     return all(a is None or b is None or np.array_equal(a, b, equal_nan=True) for a, b in pairs)
+
+
+T = TypeVar("T")
+
+
+class ProgramPool:
+    """Running copies of a program, each used by one thread at a time.
+
+    They end with the pool, and at the latest with this process.
+
+    Parameters
+    ----------
+    command : str
+        The command as the user wrote it, for messages.
+    words : tuple of str
+        The command.
+    folder : str
+        The folder that it runs in.
+    timeout : float
+        Longest time that an answer may take [s].
+    """
+
+    def __init__(self, command: str, words: tuple[str, ...], folder: str, timeout: float) -> None:
+        self.command = command
+        self.words = words
+        self.folder = folder
+        self.timeout = timeout
+        # Its ends are safe for several threads: `append` and `pop` are one operation each.
+        self._idle: deque[Program] = deque()
+        weakref.finalize(self, close_programs, self._idle)
+
+    def use(self, work: Callable[[Program], T], stop: Event) -> T:
+        """Return the result of some requests to one copy; if it dies, another one gets them.
+
+        Parameters
+        ----------
+        work : callable
+            Makes the requests.
+        stop : Event
+            Ends the requests when it is set.
+
+        Raises
+        ------
+        InputError
+            When a request fails, or two copies died.
+        """
+        try:
+            try:
+                return self._use(work, stop)
+            except ProgramEnded:
+                return self._use(work, stop)
+        except ProgramFault as fault:
+            twice = ", twice" if isinstance(fault, ProgramEnded) else ""
+            raise InputError(
+                f"the program {self.command!r} failed {fault.where}{twice}: {fault.reason}"
+            ) from fault
+
+    def ask(self, program: Program, request: Request, stop: Event) -> bytes:
+        """Return the answer of one copy to a request."""
+        return program.ask(request, timeout=self.timeout, stop=stop)
+
+    def _use(self, work: Callable[[Program], T], stop: Event) -> T:
+        program = self._waiting() or Program(self.words, self.folder)
+        try:
+            if not program.greeting:
+                program.greeting = self.ask(program, PARAMETERS_REQUEST, stop)
+            result = work(program)
+        except BaseException:
+            # Nobody knows what it would write next.
+            program.close()
+            raise
+        self._idle.append(program)
+        return result
+
+    def _waiting(self) -> Program | None:
+        while self._idle:
+            try:
+                program = self._idle.pop()
+            except IndexError:
+                return None
+            # A copy of this process by fork shares the pipes of its parent's programs.
+            if program.is_own:
+                return program
+        return None

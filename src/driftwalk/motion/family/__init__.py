@@ -1,8 +1,7 @@
 """Which bodies move by themselves? The family of self-propelled motion models."""
 
-from driftwalk.motion.family.chosen import family_model, models
 from driftwalk.motion.family.members import MEMBERS, Member
 from driftwalk.motion.family.particle import ParticleModel
 from driftwalk.motion.family.parts import PARTS, Part
 
-__all__ = ["MEMBERS", "PARTS", "Member", "Part", "ParticleModel", "family_model", "models"]
+__all__ = ["MEMBERS", "PARTS", "Member", "Part", "ParticleModel"]

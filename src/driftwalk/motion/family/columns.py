@@ -12,7 +12,8 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
+from driftwalk.core.arrays import Floats
+
 Numbers = Mapping[str, npt.ArrayLike]
 
 SHARED: Final = (

@@ -11,6 +11,7 @@ import numpy as np
 from driftwalk import _core
 from driftwalk.comparison import StepReference
 from driftwalk.conditions.recorded import Conditions
+from driftwalk.core.arrays import Floats, Keys
 from driftwalk.core.errors import InputError
 from driftwalk.motion.family.columns import (
     STATE,
@@ -22,8 +23,8 @@ from driftwalk.motion.family.columns import (
 )
 from driftwalk.motion.family.members import Member
 from driftwalk.motion.family.parts import Part
-from driftwalk.motion.native import scored
-from driftwalk.motion.protocol import Details, Floats, Keys, Scores, Values, Worlds
+from driftwalk.motion.protocol import Details, Scores, Values, Worlds
+from driftwalk.motion.score import scored
 from driftwalk.schema import Parameter
 from driftwalk.simulation.backend import native_scene
 from driftwalk.simulation.initial import world_orientations
@@ -60,7 +61,7 @@ class ParticleModel:
 
     Examples
     --------
-    >>> from driftwalk.motion.family import family_model
+    >>> from driftwalk.motion.choose import family_model
     >>> [parameter.key for parameter in family_model("active").parameters]
     ['speed_m_s', 'rotational_diffusion_rad2_s', 'turn_rate_rad_s']
     """

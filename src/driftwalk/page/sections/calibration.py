@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -9,29 +10,35 @@ import numpy as np
 from driftwalk.page.arrays import number
 from driftwalk.page.chart import chart, label, mark, series
 from driftwalk.page.number_words import count, quantity, with_interval
-from driftwalk.page.parameters import FORCE, PageParameter, page_parameters
 from driftwalk.page.parts import (
     SIMULATED,
+    Maker,
     Section,
     attempt,
     card,
-    empty_head,
     empty_section,
     figure,
-    head_sections,
     is_simulated,
     require,
     required,
-    section,
+    sections_of,
+    summary_section,
+    table_section,
     value_of,
 )
 from driftwalk.page.sections.flow import flow_sections
-from driftwalk.page.sections.map import map_section, region_part
+from driftwalk.page.sections.map import (
+    FORCE,
+    PageParameter,
+    map_section,
+    page_parameters,
+    region_part,
+)
 from driftwalk.page.sections.recording import Noise, recording_sections
 from driftwalk.plot.parts.labels import interval_of
 from driftwalk.schema.answers.facts import sentences
 from driftwalk.schema.answers.parts import estimates
-from driftwalk.schema.calibration import is_block
+from driftwalk.schema.parameters import is_block
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -71,26 +78,30 @@ def calibration_sections(
     >>> [part["kind"] for part in calibration_sections(None)]
     ['empty']
     """
-    noise = None
-    if calibration is None:
-        made = empty_head("There is no calibration yet.")
-    else:
-        made = head_sections(
-            lambda: calibration_summary(calibration), lambda: sentences(calibration, "warning")
-        )
-        noise = _noise(calibration)
+    nothing = "There is no calibration yet."
+    made = sections_of(calibration, nothing, calibration_summary, _warnings)
     if recording is not None:
+        noise = None if calibration is None else _noise(calibration)
         made += recording_sections(recording, body=body, noise=noise)
     if flow is not None:
         made += flow_sections(flow)
-    if calibration is not None:
+    if calibration is None:
+        return made
+    parts: list[tuple[str, str, Maker]] = [
+        ("profiles", "Along the optimum", profile_sections),
+        ("bootstrap", "The bootstrap", bootstrap_section),
+        ("validation", "Validation", validation_section),
+    ]
+    if len(page_parameters(calibration)) != 1:
         one = _one_body(recording, body)
-        if len(page_parameters(calibration)) != 1:
-            made += attempt("map", "The map", lambda: map_section(calibration, one))
-        made += attempt("profiles", "Along the optimum", lambda: profile_sections(calibration))
-        made += attempt("bootstrap", "The bootstrap", lambda: bootstrap_section(calibration))
-        made += attempt("validation", "Validation", lambda: validation_section(calibration))
+        parts.insert(0, ("map", "The map", lambda found: map_section(found, one)))
+    for id, title, make in parts:
+        made += attempt(id, title, partial(make, calibration))
     return made
+
+
+def _warnings(calibration: xr.Dataset) -> list[str]:
+    return sentences(calibration, "warning")
 
 
 def calibration_summary(calibration: xr.Dataset) -> Section:
@@ -106,8 +117,7 @@ def calibration_summary(calibration: xr.Dataset) -> Section:
             note="distance between two runs of the same model",
         ),
     ]  # fmt: skip
-    paragraphs += _how_good(calibration)
-    return section("summary", "summary", "Method and results", paragraphs=paragraphs, numbers=shown)
+    return summary_section([*paragraphs, *_how_good(calibration)], shown)
 
 
 def _estimates(calibration: xr.Dataset) -> list[dict[str, Any]]:
@@ -224,7 +234,7 @@ def validation_section(calibration: xr.Dataset) -> Section:
         [label, None if (value := value_of(calibration, key)) is None else scale * value]
         for label, key, scale in keys
     ]
-    return section("validation", "table", title, columns=["", "value"], rows=rows)
+    return table_section("validation", title, ["", "value"], rows)
 
 
 def _with_unit(one: PageParameter) -> str:
@@ -315,13 +325,12 @@ def _how_good(calibration: xr.Dataset) -> list[str]:
 
 def _profile(calibration: xr.Dataset, along: PageParameter) -> Section:
     others = [one for one in page_parameters(calibration) if one.name != along.name]
-    line, fixed = calibration, []
-    for other in others:
-        best = float(required(calibration, other.key))
-        nearest = int(np.argmin(np.abs(calibration[other.name].values - best)))
-        line = line.isel({other.name: nearest})
-        at = quantity(float(line[other.name]), other.unit)
-        fixed.append(f"{other.short_symbol} = {at}")
+    best = {other.name: float(required(calibration, other.key)) for other in others}
+    line = calibration.sel(best, method="nearest")
+    fixed = [
+        f"{other.short_symbol} = {quantity(float(line[other.name]), other.unit)}"
+        for other in others
+    ]
     marks = [
         mark("optimum", value_of(calibration, along.key), value_of(calibration, "ks_distance"))
     ]

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats
 from driftwalk.page.arrays import encode_array, number
 from driftwalk.page.chart import chart, label, mark, series
 from driftwalk.page.number_words import percent
 from driftwalk.page.parts import (
+    Maker,
     Section,
     arena_part,
     attempt,
@@ -19,18 +20,13 @@ from driftwalk.page.parts import (
     empty_section,
     require,
     section,
+    table_section,
     value_of,
 )
+from driftwalk.plot.model_check import BAND_STDS, LEAST_TOP, running_time
 
 if TYPE_CHECKING:
     import xarray as xr
-
-Floats = npt.NDArray[np.float64]
-
-BAND_STDS: Final = 1.96
-"""95 % of a normal."""
-LEAST_TOP: Final = 4.0
-"""Least upper end of the colours of a residual map [sd], so that chance looks pale."""
 
 ABSORBED: Final = "A tenth without a point: the fitted flow has absorbed what would be seen there."
 
@@ -43,7 +39,7 @@ def check_sections(check: xr.Dataset) -> list[Section]:
     check : xarray.Dataset
         A `model_check`.
     """
-    makers: tuple[tuple[str, str, Callable[[xr.Dataset], Section]], ...] = (
+    makers: tuple[tuple[str, str, Maker], ...] = (
         ("check", "Does the model explain the recording?", _criteria),
         ("check-innovations", "Are the errors of prediction white?", _innovations),
         ("check-place", "Errors of prediction in the tank", _mean_errors),
@@ -56,7 +52,7 @@ def check_sections(check: xr.Dataset) -> list[Section]:
     )
     made: list[Section] = []
     for id, title, make in makers:
-        parts = attempt(id, title, lambda make=make: make(check))  # type: ignore[misc]
+        parts = attempt(id, title, partial(make, check))
         made += [{**part, "id": id, "title": title} for part in parts]
     return made
 
@@ -70,8 +66,8 @@ def _criteria(check: xr.Dataset) -> Section:
         )
     ]
     level = value_of(check, "level")
-    note = None if level is None else f"A p value below {level:.3g} is a finding."
-    return section("", "table", "", note, columns=["criterion", "p value", ""], rows=rows)
+    note = "" if level is None else f"A p value below {level:.3g} is a finding."
+    return table_section("", "", ["criterion", "p value", ""], rows, note)
 
 
 def _innovations(check: xr.Dataset) -> Section:
@@ -167,15 +163,6 @@ def _over_time(
 
 def _with_bars(name: str, x: Floats, value: Floats, reach: Floats) -> dict[str, Any]:
     return series(name, x, value, ends=(value - reach, value + reach), style="points")
-
-
-def running_time(check: xr.Dataset) -> tuple[Floats, Floats]:
-    """Return start and end of the parts [s], recordings one after the other."""
-    recording = check["part_recording"].values.astype(int)
-    start, end = check["part_start"].values, check["part_end"].values
-    lengths = [float(end[recording == k].max(initial=0.0)) for k in range(int(recording.max()) + 1)]
-    before = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])[recording]
-    return start + before, end + before
 
 
 def _drag_by_speed(check: xr.Dataset) -> Section:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -38,11 +39,7 @@ def flow_sections(flow: xr.Dataset) -> list[Section]:
         where = str(flow[dimension].values[index]) if dimension in flow.coords else str(index + 1)
         title = f"The flow {where}" if dimension == "flow" else f"The flow at {where} s"
         id = f"flow-{index + 1}"
-        made += attempt(
-            id,
-            title,
-            lambda part=part, id=id, title=title: flow_section(part, id=id, title=title),  # type: ignore[misc]
-        )
+        made += attempt(id, title, partial(flow_section, part, id=id, title=title))
     if frames > MOST_FRAMES:
         made[-1]["note"] = f"{made[-1]['note'] or ''} {frames - MOST_FRAMES} more are in the file."
     return made
@@ -93,7 +90,7 @@ def flow_section(flow: xr.Dataset, *, id: str = "flow", title: str = "The flow")
         u=encode_array(flow["u"].values),
         v=encode_array(flow["v"].values),
         # In a file as in a page, "kind" of a section is its own: this one is of the nodes.
-        origin=encode_array(kind, dtype="u1"),
+        origin=encode_array(kind),
         count=encode_array(flow["count"].values) if "count" in flow else None,
         standard_error=error,
     )  # fmt: skip

@@ -1,24 +1,25 @@
-"""The part of a page on the map of KS distances: values, causes, what a click on a cell shows."""
+"""The part of a page on the map of KS distances: its parameters, values, causes, excerpts."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
-from driftwalk.page.arrays import encode_array, nice_step, numbers, plain_list
+from driftwalk.page.arrays import binary_step, encode_array, numbers, plain_list
+from driftwalk.page.chart import label as chart_label
 from driftwalk.page.number_words import percent, quantity
-from driftwalk.page.parameters import PageParameter, page_parameters
-from driftwalk.page.parts import Section, arena_part, require, section, value_of
+from driftwalk.page.parts import Section, arena_part, axis, require, section, value_of
 from driftwalk.plot.distances import CAUSES, UNKNOWN_CAUSE
+from driftwalk.plot.parts.labels import force_interval_text
 from driftwalk.schema import body_track
+from driftwalk.schema.answers.facts import facts_of
+from driftwalk.schema.parameters import BLOCK, is_block, stored_parameters
 
 if TYPE_CHECKING:
     import xarray as xr
-
-Floats = npt.NDArray[np.float64]
 
 NOT_COMPUTED: Final = 8
 """Status of a setting without a distance and without a cause."""
@@ -26,6 +27,59 @@ EXCERPT_PARTS: Final = 5000
 """Extent of the excerpts in steps of their resolution, at least."""
 DENSITY_PARTS: Final = 2000
 """The largest share of all bins in steps of their resolution, at least."""
+
+
+class PageParameter(NamedTuple):
+    """A parameter as a page names it."""
+
+    name: str
+    """Dimension of the dataset."""
+    key: str
+    """Flat name of its estimate."""
+    unit: str
+    label: str
+    symbol: str
+    """Symbol in formulas; empty for a model of the user."""
+    scale: str
+    short: str
+    """Name in a sentence on the search."""
+
+    @property
+    def words(self) -> str:
+        """Label and symbol: "drag coefficient C_d"."""
+        return f"{self.label} {self.symbol}".rstrip()
+
+    @property
+    def short_symbol(self) -> str:
+        """The symbol, or the label where there is none."""
+        return self.symbol or self.label
+
+    def axis(self, dataset: xr.Dataset, prefix: str = "") -> dict[str, Any]:
+        """Return the axis of a map or a chart; the force means nothing without its interval."""
+        every = ""
+        if self.symbol == FORCE.symbol and "force_interval_s" in facts_of(dataset):
+            every = f", {force_interval_text(dataset)}"
+        words = f"{self.words}{every}"
+        found = axis(self.name, words, self.unit, dataset[f"{prefix}{self.name}"].values)
+        if self.scale == "log":
+            found |= {"log": chart_label(words, self.unit, log=True)["log"]}
+        return found
+
+
+DRAG = PageParameter(BLOCK[0], "drag_coefficient", "1", "drag coefficient", "C_d", "linear", "drag")
+FORCE = PageParameter(
+    BLOCK[1], "force_std_N", "N", "stochastic force", "σ_F", "linear", "stochastic force"
+)
+
+
+def page_parameters(calibration: xr.Dataset) -> tuple[PageParameter, ...]:
+    """Return the parameters of a calibration, in the order of its dimensions."""
+    if is_block(calibration):
+        return DRAG, FORCE
+    return tuple(
+        PageParameter(one.name, one.key, one.unit, one.label, "", one.scale, one.label)
+        for one in stored_parameters(calibration)
+    )
 
 
 def map_section(calibration: xr.Dataset, recording: xr.Dataset | None = None) -> Section:
@@ -63,11 +117,11 @@ def map_section(calibration: xr.Dataset, recording: xr.Dataset | None = None) ->
         "map", "map", "How well each setting explains the recording", _note(calibration, cells),
         x=across.axis(calibration),
         y=up.axis(calibration),
-        value=encode_array(distance, dtype="f8"),
+        value=encode_array(distance),
         standard_error=encode_array(_plane(calibration, "ks_distance_standard_error"))
         if "ks_distance_standard_error" in calibration
         else None,
-        status=encode_array(status, dtype="i2"),
+        status=encode_array(status),
         statuses=causes,
         best=_lowest(calibration, distance, status),
         found=_found(calibration),
@@ -122,9 +176,7 @@ def _plane(calibration: xr.Dataset, name: str, prefix: str = "") -> Floats:
     return np.asarray(calibration[name].transpose(*rows, ...).values, dtype=np.float64)
 
 
-def _status(
-    calibration: xr.Dataset, distance: Floats
-) -> tuple[npt.NDArray[np.int64], dict[str, str]]:
+def _status(calibration: xr.Dataset, distance: Floats) -> tuple[Integers, dict[str, str]]:
     """Return the reason of every cell, 0 where it is sound, and what the reasons mean."""
     status = np.zeros(distance.shape, dtype=np.int64)
     if "status" in calibration:
@@ -138,9 +190,7 @@ def _cause(status: int) -> str:
     return ", ".join(words) or UNKNOWN_CAUSE[0]
 
 
-def _lowest(
-    calibration: xr.Dataset, distance: Floats, status: npt.NDArray[np.int64]
-) -> dict[str, float] | None:
+def _lowest(calibration: xr.Dataset, distance: Floats, status: Integers) -> dict[str, float] | None:
     """Return the lowest cell of the map."""
     sound = np.where(status == 0, distance, np.nan)
     if not np.isfinite(sound).any():
@@ -178,13 +228,13 @@ def _cells(calibration: xr.Dataset) -> dict[str, Any] | None:
     if _has(calibration, "excerpt_x", "excerpt_y", "excerpt_time"):
         x, y = (_plane(calibration, f"excerpt_{name}") for name in "xy")
         step = _excerpt_step(x, y)
-        kept["excerpt_x"] = encode_array(x, dtype="i2", resolution=step, delta=True)
-        kept["excerpt_y"] = encode_array(y, dtype="i2", resolution=step, delta=True)
+        kept["excerpt_x"] = encode_array(x, step=step)
+        kept["excerpt_y"] = encode_array(y, step=step)
         kept["excerpt_time"] = plain_list(calibration["excerpt_time"].values)
     if "step_density" in calibration:
         density = _plane(calibration, "step_density")
         kept["density"] = encode_array(
-            density, dtype="i2", resolution=nice_step(float(np.nanmax(density)), DENSITY_PARTS)
+            density, step=binary_step(float(np.nanmax(density)), DENSITY_PARTS)
         )
     for name in ("ks_step_length", "ks_turning_angle"):
         if name in calibration:
@@ -194,7 +244,7 @@ def _cells(calibration: xr.Dataset) -> dict[str, Any] | None:
 
 def _excerpt_step(x: Floats, y: Floats) -> float:
     extents = [float(np.nanmax(v) - np.nanmin(v)) for v in (x, y) if np.isfinite(v).any()]
-    return nice_step(max(extents, default=0.0), EXCERPT_PARTS)
+    return binary_step(max(extents, default=0.0), EXCERPT_PARTS)
 
 
 def _typical(calibration: xr.Dataset, name: str) -> Floats:
@@ -242,6 +292,6 @@ def _note(calibration: xr.Dataset, cells: dict[str, Any] | None) -> str:
     if region is not None and region["confidence"] is not None:
         words.append(f"The line encloses the joint {percent(region['confidence'])} region.")
     if cells is not None and cells["excerpt_x"] is not None:
-        step = quantity(cells["excerpt_x"]["scale"], "m")
+        step = quantity(cells["excerpt_x"]["step"], "m", digits=2)
         words.append(f"Click a setting to see its motion (positions to {step}).")
     return " ".join(words)

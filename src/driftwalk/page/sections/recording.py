@@ -1,15 +1,16 @@
-"""The part of a page on a recording: where the block was, how fast, gaps and noise."""
+"""The part of a page on a recording: path, speeds, gaps and noise, and how it was tracked."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
-from driftwalk.page.arrays import encode_array, nice_step, number, plain_list
+from driftwalk.page.arrays import binary_step, encode_array, number, plain_list
 from driftwalk.page.number_words import count, percent, quantity
 from driftwalk.page.parts import (
     SIMULATED,
@@ -19,14 +20,13 @@ from driftwalk.page.parts import (
     figure,
     is_simulated,
     section,
+    summary_section,
 )
-from driftwalk.plot.path import GAP_INTERVALS
+from driftwalk.plot.tank import GAP_INTERVALS
 from driftwalk.schema import Track, body_names, body_track, check_trajectory
 
 if TYPE_CHECKING:
     import xarray as xr
-
-Floats = npt.NDArray[np.float64]
 
 MOST_SAMPLES: Final = 20_000
 MOST_GAPS: Final = 1000
@@ -37,8 +37,16 @@ FAR_SPEED: Final = 2.0
 """How many times the 99th percentile a speed may be and still be in the histogram."""
 POSITION_PARTS: Final = 20_000
 """The extent of a path in steps of its resolution, at least."""
-ANGLE_STEP: Final = 1e-3
-TIME_STEP: Final = 1e-4
+ANGLE_STEP: Final = 2.0**-10
+TIME_STEP: Final = 2.0**-14
+
+COUNTED: Final = {
+    "frames": ("frames tracked", None),
+    "dropped": ("frames dropped", "lost before processing"),
+    "duplicates": ("frames doubled", "no later than the one before, left out"),
+    "stale": ("frames stale", "the same image as the one before, left out"),
+    "taken_back": ("positions taken back", "rejected as something else"),
+}
 
 
 class Noise(NamedTuple):
@@ -77,7 +85,8 @@ def recording_sections(
         made += attempt(
             f"recording-{number_of}",
             "The recording" if len(names) == 1 else f"The recording, body {name}",
-            lambda name=name, number_of=number_of: trajectory_section(  # type: ignore[misc]
+            partial(
+                trajectory_section,
                 trajectory,
                 body=name,
                 noise=noises.get(name),
@@ -133,20 +142,18 @@ def trajectory_section(
     interval = np.diff(track.time)
     gap = interval > GAP_INTERVALS * np.median(interval)
     shown, every = _shown(track, interval, gap)
-    step = nice_step(max(float(np.ptp(track.x)), float(np.ptp(track.y))), POSITION_PARTS)
+    step = binary_step(max(float(np.ptp(track.x)), float(np.ptp(track.y))), POSITION_PARTS)
     path: dict[str, Any] = {
-        "time": encode_array(shown.time, dtype="i4", resolution=TIME_STEP, delta=True),
-        "x": encode_array(shown.x, dtype="i2", resolution=step, delta=True),
-        "y": encode_array(shown.y, dtype="i2", resolution=step, delta=True),
-        "theta": encode_array(shown.theta, dtype="i2", resolution=ANGLE_STEP, delta=True)
-        if track.has_orientation
-        else None,
+        "time": encode_array(shown.time, step=TIME_STEP, offset=float(shown.time[0])),
+        "x": encode_array(shown.x, step=step),
+        "y": encode_array(shown.y, step=step),
+        "theta": encode_array(shown.theta, step=ANGLE_STEP) if track.has_orientation else None,
     }
     speed = np.hypot(np.diff(track.x), np.diff(track.y))[~gap] / interval[~gap]
     notes = [SIMULATED] if is_simulated(trajectory) else []
     if every > 1:
         notes.append(f"One position in {every} is shown.")
-    notes.append(f"Positions are shown to {quantity(step, 'm')}.")
+    notes.append(f"Positions are shown to {quantity(step, 'm', digits=2)}.")
     top = _top_speed(speed)
     beyond = speed[speed > top]
     if beyond.size:
@@ -199,7 +206,7 @@ def _by_body(
     return {chosen[0]: noise} if len(chosen) == 1 else {}
 
 
-def _shown(track: Track, interval: Floats, gap: npt.NDArray[np.bool_]) -> tuple[Track, int]:
+def _shown(track: Track, interval: Floats, gap: Bools) -> tuple[Track, int]:
     """Return what is shown of a track, broken by NaN at gaps, and every how manyth sample it is."""
     size = track.time.size
     ends = np.flatnonzero(gap)
@@ -217,7 +224,7 @@ def _shown(track: Track, interval: Floats, gap: npt.NDArray[np.bool_]) -> tuple[
     return Track(time, x, y, theta), every
 
 
-def _gaps(track: Track, interval: Floats, gap: npt.NDArray[np.bool_]) -> list[list[float]]:
+def _gaps(track: Track, interval: Floats, gap: Bools) -> list[list[float]]:
     ends = np.flatnonzero(gap)
     longest = np.sort(ends[np.argsort(-interval[ends], kind="stable")[:MOST_GAPS]])
     return [[float(track.time[i]), float(track.time[i + 1])] for i in longest]
@@ -240,7 +247,7 @@ def _speed_density(speed: Floats, top: float) -> dict[str, Any]:
 def _facts(
     track: Track,
     interval: Floats,
-    gap: npt.NDArray[np.bool_],
+    gap: Bools,
     speed: Floats,
     noise: Noise | None,
 ) -> list[dict[str, Any]]:
@@ -258,10 +265,8 @@ def _facts(
         ),
     ]
     if noise is not None:
-        facts.append(
-            figure("tracking noise", noise.position, "m", note=noise.source)
-            | {"low": noise.low, "high": noise.high}
-        )
+        ends = (noise.low, noise.high)
+        facts.append(figure("tracking noise", noise.position, "m", note=noise.source, ends=ends))
     return facts
 
 
@@ -273,3 +278,51 @@ def _ambiguity(trajectory: xr.Dataset, body: str | None) -> list[dict[str, Any]]
     which = 0 if body is None else body_names(trajectory).index(body)
     share = 100.0 * float((scores[:, which] > 0.0).mean())
     return [figure("identity ambiguous", share, "%", note="share of the time")]
+
+
+def tracking_sections(tracking: Mapping[str, Any] | None) -> list[Section]:
+    """Return the section on the tracking of a recording, none of one that was not tracked here.
+
+    Parameters
+    ----------
+    tracking : mapping or None
+        ``tracking`` of what `driftwalk.describe` returns.
+
+    Examples
+    --------
+    >>> tracking_sections(None)
+    []
+    >>> (part,) = tracking_sections({"tracked_from": "v.mp4", "complete": True, "frames": 9})
+    >>> part["numbers"][0]["value"]
+    9.0
+    """
+    if tracking is None:
+        return []
+    words = [f"Tracked from {tracking.get('tracked_from') or 'an unnamed source'}."]
+    rejected = tracking.get("rejected") or {}
+    if rejected:
+        listed = ", ".join(f"{reason} {number}" for reason, number in rejected.items())
+        words.append(f"Candidates rejected, over all frames: {listed}.")
+    numbers = [
+        figure(label, tracking[key], note=note)
+        for key, (label, note) in COUNTED.items()
+        if key in tracking
+    ]
+    return [summary_section(words, numbers, id="tracking", title="Tracking")]
+
+
+def tracking_warnings(tracking: Mapping[str, Any] | None) -> list[str]:
+    """Return what a reader has to know of the tracking: that it ended early.
+
+    Examples
+    --------
+    >>> tracking_warnings({"complete": False, "interrupted": "the disk is full"})
+    ['the tracking broke off: the disk is full']
+    >>> tracking_warnings({"complete": True, "interrupted": None}), tracking_warnings(None)
+    ([], [])
+    """
+    if tracking is None or tracking.get("complete", True):
+        return []
+    reason = tracking.get("interrupted")
+    ending = "" if reason is None else f": {reason}"
+    return [f"the tracking broke off{ending}"]

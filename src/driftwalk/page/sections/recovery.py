@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from functools import partial
 from itertools import product
 from typing import TYPE_CHECKING, Any, Final
 
@@ -13,34 +14,26 @@ from driftwalk.page.arrays import number
 from driftwalk.page.chart import chart, label, mark, series
 from driftwalk.page.number_words import count, percent, quantity
 from driftwalk.page.parts import (
+    Maker,
     Section,
-    attempt,
-    empty_head,
+    answer_table,
     figure,
-    head_sections,
     require,
     required,
-    section,
+    sections_of,
+    summary_section,
+    table_section,
     value_of,
 )
-from driftwalk.schema.answers.recovery import model_warnings
+from driftwalk.schema.answers.parts import each
+from driftwalk.schema.answers.recovery import model_recovery_answer, model_warnings, recovery_answer
 from driftwalk.schema.kinds.recovery import RECOVERED
 
 if TYPE_CHECKING:
     import xarray as xr
 
-SUMMARY: Final = {
-    "median_absolute_error": "median error",
-    "absolute_error_90": "90 % of errors below",
-    "bias": "bias",
-    "coverage": "intervals that hold the truth",
-    "coverage_low": "at least",
-    "coverage_high": "at most",
-}
-COORDINATES: Final = ("duration", "angle", "parameter")
 MOST_WAYS: Final = 1000
-"""Combinations of these, a row of the table each."""
-MODEL_SUMMARY: Final = ("median_error", "determined_share", "coverage", "coverage_standard_error")
+"""Combinations of length, angle and parameter, a row of the table each."""
 MOST_PARAMETERS: Final = 100
 """Parameters of a model that a page shows, with a chart each."""
 
@@ -63,25 +56,37 @@ def recovery_sections(recovery: xr.Dataset | None) -> list[Section]:
     >>> [part["kind"] for part in recovery_sections(None)]
     ['empty']
     """
+    parts: tuple[tuple[str, str, Maker], ...] = (
+        ("errors", "Errors and intervals", errors_section),
+        ("by-length", "Error by length", by_length_section),
+        *(
+            (_id_of(name), f"Estimates: {one.words}", partial(estimates_section, name=name))
+            for name, one in RECOVERED.items()
+        ),
+        ("flow-error", "Error of the flow", flow_error_section),
+    )
+    reason = _obstacle(recovery, MOST_WAYS, "duration", "angle", "parameter")
+    found = None if reason else recovery
+    return sections_of(found, reason, recovery_summary, _warnings, parts)
+
+
+def _obstacle(recovery: xr.Dataset | None, most: int, *coordinates: str) -> str:
+    """Return why a study cannot be shown: a damaged file may declare an axis of any length."""
     if recovery is None:
-        return empty_head("There are no estimates yet.")
-    missing = [name for name in COORDINATES if name not in recovery.variables]
+        return "There are no estimates yet."
+    missing = [name for name in coordinates if name not in recovery.variables]
     if missing:
-        return empty_head(f"the recovery holds no {', '.join(missing)}")
-    ways = math.prod(recovery[name].size for name in COORDINATES)
-    if ways > MOST_WAYS:
-        return empty_head(f"{ways} rows of estimates are more than the {MOST_WAYS} of a page")
-    made = head_sections(lambda: recovery_summary(recovery), lambda: _warnings(recovery))
-    made += attempt("errors", "Errors and intervals", lambda: errors_section(recovery))
-    made += attempt("by-length", "Error by length", lambda: by_length_section(recovery))
-    for name, one in RECOVERED.items():
-        made += attempt(
-            f"estimates-{name.replace('_', '-')}",
-            f"Estimates: {one.words}",
-            lambda name=name: estimates_section(recovery, name),  # type: ignore[misc]
-        )
-    made += attempt("flow-error", "Error of the flow", lambda: flow_error_section(recovery))
-    return made
+        return f"the recovery holds no {', '.join(missing)}"
+    rows = math.prod(recovery[name].size for name in coordinates)
+    return f"{rows} rows of estimates are more than the {most} of a page" if rows > most else ""
+
+
+def _id_of(name: str) -> str:
+    return f"estimates-{name.replace('_', '-')}"
+
+
+def _warnings(recovery: xr.Dataset) -> list[str]:
+    return recovery_answer(recovery).warnings
 
 
 def recovery_summary(recovery: xr.Dataset) -> Section:
@@ -89,57 +94,54 @@ def recovery_summary(recovery: xr.Dataset) -> Section:
     ends = [f"needed_duration{end}" for end in ("", "_low", "_high")]
     require(recovery, "used", "median_absolute_error", "coverage", *ends)
     lengths = ", ".join(quantity(float(value), "s") for value in recovery["duration"].values)
-    confidence = value_of(recovery, "confidence")
-    done = (
-        f"{count(recovery.sizes['recording'], 'recording')} of each length ({lengths}) were "
-        "simulated with known parameters and fitted. All of this is simulated: it "
-        "shows how well the fit would do if the model were right."
-    )
     truth = ", ".join(
         f"{one.words} = {quantity(float(required(recovery, one.key)), one.unit)}"
         for one in RECOVERED.values()
     )
     every = quantity(float(required(recovery, "force_interval_s")), "s")
-    paragraphs = [done, f"The truth: {truth}; the force is redrawn every {every}."]
-    paragraphs += _found(recovery, confidence)
+    paragraphs = [
+        f"{count(recovery.sizes['recording'], 'recording')} of each length ({lengths}) were "
+        "simulated with known parameters and fitted. All of this is simulated: it "
+        "shows how well the fit would do if the model were right.",
+        f"The truth: {truth}; the force is redrawn every {every}.",
+        *_found(recovery),
+    ]
     shown = [
         figure(one.words, required(recovery, one.key), one.unit, note="truth")
         for one in RECOVERED.values()
     ]
-    for angle in recovery["angle"].values:
-        part = recovery.sel(angle=angle)
-        needed = number(part["needed_duration"])
-        if needed is None:
-            continue
-        wanted = value_of(recovery, "drag_coefficient_precision")
-        note = None if wanted is None else f"for an error of C_d of {percent(wanted)} (rms)"
-        shown.append(
-            figure(f"length needed, angle {angle}", needed, "s", note=note)
-            | {
-                "low": number(part["needed_duration_low"]),
-                "high": number(part["needed_duration_high"]),
-                "confidence": value_of(recovery, "needed_confidence"),
-            }
-        )
-    return section("summary", "summary", "Method and results", paragraphs=paragraphs, numbers=shown)
+    wanted = value_of(recovery, "drag_coefficient_precision")
+    note = None if wanted is None else f"for an error of C_d of {percent(wanted)} (rms)"
+    for part in each(recovery, "angle"):
+        needed, low, high = (number(part[end]) for end in ends)
+        if needed is not None:
+            words, within = f"length needed, angle {part['angle'].item()}", (low, high)
+            confidence = value_of(recovery, "needed_confidence")
+            shown.append(figure(words, needed, "s", note=note, ends=within, confidence=confidence))
+    return summary_section(paragraphs, shown)
+
+
+def _found(recovery: xr.Dataset) -> list[str]:
+    """Return how well the longest recordings give C_d, in a sentence for each use of the angle."""
+    confidence = value_of(recovery, "confidence")
+    words = "" if confidence is None else f"{percent(confidence)} "
+    told = []
+    for part in each(recovery.sel(parameter="drag_coefficient").isel(duration=-1), "angle"):
+        error, held = number(part["median_absolute_error"]), number(part["coverage"])
+        if error is not None and held is not None:
+            told.append(
+                f"With {quantity(float(part['duration']), 's')} and the angle "
+                f"{part['angle'].item()}, the median error of C_d is {percent(error)}; "
+                f"{percent(held)} of the {words}intervals hold the truth."
+            )
+    return told
 
 
 def errors_section(recovery: xr.Dataset) -> Section:
     """Return the table of errors and coverage."""
-    require(recovery, *SUMMARY)
-    rows: list[list[Any]] = []
-    names = [str(name) for name in recovery["parameter"].values]
-    for name, duration, angle in product(
-        names, recovery["duration"].values, recovery["angle"].values
-    ):
-        part = recovery.sel(parameter=name, duration=duration, angle=angle)
-        words = RECOVERED[name].words if name in RECOVERED else name
-        found = [number(part[key]) for key in SUMMARY]
-        rows.append([words, quantity(float(duration), "s"), str(angle), *found])
-    return section(
-        "errors", "table", "Errors and intervals", "Errors are relative to the truth.",
-        columns=["parameter", "length", "angle", *SUMMARY.values()], rows=rows,
-    )  # fmt: skip
+    table = answer_table(recovery_answer(recovery))
+    note = "Errors are relative to the truth."
+    return table_section("errors", "Errors and intervals", table.columns, table.rows, note)
 
 
 def by_length_section(recovery: xr.Dataset) -> Section:
@@ -159,7 +161,7 @@ def by_length_section(recovery: xr.Dataset) -> Section:
     )  # fmt: skip
 
 
-def estimates_section(recovery: xr.Dataset, name: str) -> Section:
+def estimates_section(recovery: xr.Dataset, *, name: str) -> Section:
     """Return the estimates of a parameter with their intervals next to the truth."""
     parameter = RECOVERED[name]
     ends = [f"{name}{end}" for end in ("", "_low", "_high")]
@@ -195,15 +197,10 @@ def _estimates_chart(
 def flow_error_section(recovery: xr.Dataset) -> Section:
     """Return the error of the flow in every recording."""
     require(recovery, "flow_error", "used")
-    drawn = [
-        series(
-            words,
-            at,
-            np.where(part["used"].values == 1, part["flow_error"].values, np.nan),
-            style="points",
-        )
-        for at, words, part in _groups(recovery)
-    ]
+    drawn = []
+    for at, words, part in _groups(recovery):
+        error = np.where(part["used"].values == 1, part["flow_error"].values, np.nan)
+        drawn.append(series(words, at, error, style="points"))
     return chart(
         "flow-error", "Error of the flow", "Rms error over rms speed, averaged over the block.",
         x=label("recording"), y=label("relative error"), series=drawn,
@@ -221,37 +218,6 @@ def _groups(recovery: xr.Dataset) -> list[tuple[Any, str, xr.Dataset]]:
         # Side by side, so that intervals do not hide each other.
         groups.append((at + 0.6 * ((index + 0.5) / len(pairs) - 0.5), words, part))
     return groups
-
-
-def _found(recovery: xr.Dataset, confidence: float | None) -> list[str]:
-    drag = recovery.sel(parameter="drag_coefficient")
-    told = []
-    for angle in recovery["angle"].values:
-        part = drag.sel(angle=angle).isel(duration=-1)
-        error, held = number(part["median_absolute_error"]), number(part["coverage"])
-        if error is None or held is None:
-            continue
-        words = "" if confidence is None else f"{percent(confidence)} "
-        told.append(
-            f"With {quantity(float(part['duration']), 's')} and the angle {angle}, the median "
-            f"error of C_d is {percent(error)}; {percent(held)} of the {words}intervals hold the "
-            "truth."
-        )
-    return told
-
-
-def _warnings(recovery: xr.Dataset) -> list[str]:
-    require(recovery, "status", "used")
-    status, used = recovery["status"].values, recovery["used"].values
-    refused, broken, left = (
-        int(found.sum()) for found in (status == 1, status == 2, (status == 0) & (used == 0))
-    )
-    said = (
-        (refused, f"the fit refused {count(refused, 'recording')}"),
-        (broken, f"{count(broken, 'simulation')} broke down"),
-        (left, f"{count(left, 'recording')} left out of the summary: too long at the wall"),
-    )
-    return [text for number_of, text in said if number_of]
 
 
 def model_recovery_sections(model_recovery: xr.Dataset | None) -> list[Section]:
@@ -272,82 +238,58 @@ def model_recovery_sections(model_recovery: xr.Dataset | None) -> list[Section]:
     >>> [part["kind"] for part in model_recovery_sections(None)]
     ['empty']
     """
-    if model_recovery is None:
-        return empty_head("There are no estimates yet.")
-    if "parameter" not in model_recovery.variables:
-        return empty_head("the recovery holds no parameter")
-    if model_recovery["parameter"].size > MOST_PARAMETERS:
-        return empty_head(
-            f"{model_recovery['parameter'].size} parameters are more than the {MOST_PARAMETERS} of "
-            "a page"
-        )
-    made = head_sections(
-        lambda: model_summary_section(model_recovery), lambda: model_warnings(model_recovery)
+    reason = _obstacle(model_recovery, MOST_PARAMETERS, "parameter")
+    found = None if reason else model_recovery
+    names = [] if found is None else list(map(str, found["parameter"].values))
+    parts: tuple[tuple[str, str, Maker], ...] = (
+        ("errors", "Errors and intervals", model_errors_section),
+        *(
+            (
+                f"estimates-{at}",
+                f"Estimates: {name}",
+                partial(model_estimates_section, index=at - 1),
+            )
+            for at, name in enumerate(names, start=1)
+        ),
     )
-    made += attempt("errors", "Errors and intervals", lambda: model_errors_section(model_recovery))
-    for index, name in enumerate(model_recovery["parameter"].values):
-        made += attempt(
-            f"estimates-{index + 1}",
-            f"Estimates: {name}",
-            lambda index=index: model_estimates_section(model_recovery, index),  # type: ignore[misc]
-        )
-    return made
+    return sections_of(found, reason, model_summary_section, model_warnings, parts)
 
 
 def model_summary_section(recovery: xr.Dataset) -> Section:
     """Return a recovery study in words and numbers."""
     require(recovery, "determined_share", "status")
     model, length = required(recovery, "model"), float(required(recovery, "duration_s"))
-    share = recovery["determined_share"].values
-    names = [str(name) for name in recovery["parameter"].values]
-    always = [name for name, one in zip(names, share, strict=True) if one == 1.0]
-    never = [name for name, one in zip(names, share, strict=True) if one == 0.0]
     paragraphs = [
         f"{count(recovery.sizes['recording'], 'recording')} of {quantity(length, 's')} were "
         f"simulated by the model {model} with known parameters, and calibrated. All of this is "
         "simulated: it shows how well a calibration would do if the model were right.",
     ]
-    if always:
-        paragraphs.append(f"Every recording determines {', '.join(always)}.")
-    if never:
-        paragraphs.append(f"No recording determines {', '.join(never)}.")
+    names, share = recovery["parameter"].values.astype(str), recovery["determined_share"].values
+    for words, chosen in (("Every", names[share == 1.0]), ("No", names[share == 0.0])):
+        if chosen.size:
+            paragraphs.append(f"{words} recording determines {', '.join(chosen)}.")
     shown = [
         figure("length of a recording", length, "s"),
         figure("samples per second", required(recovery, "sample_rate_Hz"), "Hz"),
         figure("position noise", required(recovery, "position_noise_m"), "m"),
     ]
-    return section("summary", "summary", "Method and results", paragraphs=paragraphs, numbers=shown)
+    return summary_section(paragraphs, shown)
 
 
 def model_errors_section(recovery: xr.Dataset) -> Section:
     """Return the table of errors, of what is determined, and of coverage."""
-    require(recovery, "truth", "unit", "meaning", *MODEL_SUMMARY)
-    rows: list[list[Any]] = []
-    for index, name in enumerate(recovery["parameter"].values):
-        one = recovery.isel(parameter=index)
-        rows.append(
-            [
-                str(name),
-                quantity(float(one["truth"]), str(one["unit"].values)),
-                *(number(one[key]) for key in MODEL_SUMMARY),
-                str(one["meaning"].values),
-            ]
-        )
-    confidence = percent(float(required(recovery, "confidence")))
-    return section(
-        "errors", "table", "Errors and intervals",
+    require(recovery, "meaning")
+    table = answer_table(model_recovery_answer(recovery))
+    meanings = map(str, recovery["meaning"].values)
+    return table_section(
+        "errors", "Errors and intervals", [*table.columns, "meaning"],
+        [[*row, words] for row, words in zip(table.rows, meanings, strict=True)],
         "Errors are relative to the truth. A parameter is determined where its 90 % interval ends "
-        f"within 15 % of its value. {confidence} of the intervals should hold the truth, give "
-        "or take the standard error.",
-        columns=[
-            "parameter", "truth", "median error", "share determined",
-            "intervals that hold the truth", "standard error", "meaning",
-        ],
-        rows=rows,
+        "within 15 % of its value.",
     )  # fmt: skip
 
 
-def model_estimates_section(recovery: xr.Dataset, index: int) -> Section:
+def model_estimates_section(recovery: xr.Dataset, *, index: int) -> Section:
     """Return the estimates of a parameter with their intervals next to the truth."""
     require(recovery, "estimate", "interval", "determined", "truth", "unit")
     one = recovery.isel(parameter=index)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.plot.parts.labels import DRAG_LABEL, force_interval_text, in_unit
 from driftwalk.plot.parts.style import BLUE, ORANGE
@@ -15,7 +15,6 @@ from driftwalk.schema.check import kind_name
 if TYPE_CHECKING:
     import xarray as xr
 
-Array = npt.NDArray[np.float64]
 
 # Okabe and Ito's palette for colour-blind readers, without black and the pale yellow.
 PALETTE: Final = (BLUE, ORANGE, "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7A4B9A")
@@ -35,7 +34,7 @@ class SweepAxis(NamedTuple):
     """Dimension of the dataset."""
     label: str
     """Label with unit."""
-    values: Array
+    values: Floats
     """Places along the axis, in the unit of the label; 0, 1, ... for words."""
     words: list[str]
     """The words of a categorical axis; empty for numbers."""
@@ -81,7 +80,7 @@ def is_complete(name: str) -> bool:
     return "+" not in name and name not in ("", OTHER)
 
 
-def classes_to_show(names: list[str], largest: Array) -> list[int]:
+def classes_to_show(names: list[str], largest: Floats) -> list[int]:
     """Choose the classes that a figure shows one by one; the rest is summed as "other".
 
     Up to 16 classes are all shown. Of more, those that reach 1 % somewhere, and of these at most

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.plot.parts.style import BLUE, INK
 from driftwalk.schema.shapes import NAMED_SHAPES, cells_of_shape
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.offsetbox import AnnotationBbox, DrawingArea
 
-Array = npt.NDArray[np.float64]
 Orientation = Literal["wide", "tall"]
 
 # Empty space between the shapes of a class, in sides of a block.
@@ -30,7 +29,7 @@ NAME_GAP_PT: Final = 2.0
 MAX_CELL_PT: Final = 6.0
 
 
-def shape_cells(shape: str) -> npt.NDArray[np.int64]:
+def shape_cells(shape: str) -> Integers:
     """Return the cells of a shape from its name.
 
     Parameters
@@ -63,7 +62,7 @@ def shape_cells(shape: str) -> npt.NDArray[np.int64]:
     return np.array(cells, dtype=np.int64)
 
 
-def class_cells(name: str, *, orientation: Orientation = "wide") -> Array:
+def class_cells(name: str, *, orientation: Orientation = "wide") -> Floats:
     """Return the positions of the squares in the sketch of an outcome class, in sides of a block.
 
     The shapes keep the order of the name and are packed into a compact picture, 0.6 sides apart.
@@ -104,9 +103,9 @@ def class_cells(name: str, *, orientation: Orientation = "wide") -> Array:
     return np.round(np.concatenate(placed), 9) + 0.0
 
 
-def sketch_size(cells: Array) -> Array:
+def sketch_size(cells: Floats) -> Floats:
     """Return width and height of a sketch, in sides of a block."""
-    size: Array = cells.max(axis=0) + 1.0
+    size: Floats = cells.max(axis=0) + 1.0
     return size
 
 
@@ -248,6 +247,8 @@ def draw_sketches_below(
     --------
     ``ax.set_xlabel("outcome", labelpad=draw_sketches_below(ax, range(2), ["2", "1+1"]))``
     """
+    from matplotlib.offsetbox import TextArea, VPacker
+
     if len(positions) != len(names):
         raise InputError(f"{len(positions)} positions for {len(names)} classes")
     slot_pt = _slot_points(ax, positions)
@@ -271,9 +272,11 @@ def draw_sketches_below(
             )
         if text:
             depth += NAME_GAP_PT + (len(text) * LETTER_PT if upright else NAME_SIZE_PT)
-            parts.append(_name_box(text, upright=upright))
+            style = {"size": NAME_SIZE_PT, "color": INK, "rotation": 90.0 if upright else 0.0}
+            parts.append(TextArea(text, textprops=style))
+        stacked = VPacker(children=parts, align="center", pad=0.0, sep=NAME_GAP_PT)
         _pinned(
-            ax, _stacked(parts), (position, 0.0), transform=ax.get_xaxis_transform(),
+            ax, stacked, (position, 0.0), transform=ax.get_xaxis_transform(),
             alignment=(0.5, 1.0), below_pt=pad_pt,
         )  # fmt: skip
         deepest = max(deepest, depth)
@@ -302,7 +305,7 @@ def is_class(name: str) -> bool:
     return all(cells_of_shape(shape) for shape in name.split("+"))
 
 
-def _turned(cells: npt.NDArray[np.int64], orientation: Orientation) -> npt.NDArray[np.int64]:
+def _turned(cells: Integers, orientation: Orientation) -> Integers:
     """Turn a shape by a quarter when its longer side does not lie as asked."""
     width, height = cells.max(axis=0) + 1
     if (width >= height) if orientation == "wide" else (height >= width):
@@ -310,7 +313,7 @@ def _turned(cells: npt.NDArray[np.int64], orientation: Orientation) -> npt.NDArr
     return np.column_stack([cells[:, 1].max() - cells[:, 1], cells[:, 0]])
 
 
-def _packed(sizes: Array) -> Array:
+def _packed(sizes: Floats) -> Floats:
     """Return left and top of every box, packed on shelves into the most compact picture.
 
     Every sensible width of the shelves is tried; the picture with the smallest longer side is
@@ -324,14 +327,14 @@ def _packed(sizes: Array) -> Array:
     }
     tried = [_shelves(sizes, limit) for limit in sorted(limits) if limit >= widths.max() - 1e-9]
 
-    def badness(offsets: Array) -> tuple[float, float, float]:
+    def badness(offsets: Floats) -> tuple[float, float, float]:
         width, height = np.round((offsets + sizes).max(axis=0), 9)
         return max(width, height), width * height, height
 
     return min(tried, key=badness)
 
 
-def _shelves(sizes: Array, limit: float) -> Array:
+def _shelves(sizes: Floats, limit: float) -> Floats:
     """Return left and top of boxes put one after the other on shelves no wider than `limit`."""
     offsets = np.zeros_like(sizes)
     left = top = deepest = 0.0
@@ -352,9 +355,9 @@ def figure_of(ax: Axes) -> Figure:
     return figure
 
 
-def axes_points(ax: Axes) -> Array:
+def axes_points(ax: Axes) -> Floats:
     """Return width and height of axes as they lie now [pt]."""
-    size: Array = np.array([ax.bbox.width, ax.bbox.height]) / figure_of(ax).dpi * 72.0
+    size: Floats = np.array([ax.bbox.width, ax.bbox.height]) / figure_of(ax).dpi * 72.0
     return size
 
 
@@ -371,21 +374,6 @@ def _slot_points(ax: Axes, positions: Sequence[float]) -> float:
     low, high = ax.get_xlim()
     step = float(np.min(np.diff(positions))) if len(positions) > 1 else high - low
     return float(axes_points(ax)[0] * step / (high - low))
-
-
-def _name_box(name: str, *, upright: bool) -> Any:
-    from matplotlib.offsetbox import TextArea
-
-    return TextArea(
-        name,
-        textprops={"size": NAME_SIZE_PT, "color": INK, "rotation": 90.0 if upright else 0.0},
-    )
-
-
-def _stacked(parts: list[Any]) -> Any:
-    from matplotlib.offsetbox import VPacker
-
-    return VPacker(children=parts, align="center", pad=0.0, sep=NAME_GAP_PT)
 
 
 def _pinned(

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.colorbar import Colorbar
     from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
+    from matplotlib.patheffects import AbstractPathEffect
 
 SINGLE_COLUMN_MM = 90.0
 DOUBLE_COLUMN_MM = 180.0
@@ -120,15 +121,16 @@ def axes_or_new(
     return figure.add_subplot()
 
 
-def axes_row_or_new(
+def axes_grid_or_new(
     axes: Any,
     *,
     count: int,
+    columns: int | None = None,
     width_mm: float = DOUBLE_COLUMN_MM,
     height_mm: float = 62.0,
     **options: Any,
 ) -> list[Axes]:
-    """Return `axes` as a list of `count` axes, or those of a new figure with one row of them.
+    """Return `axes` as a list of `count` axes, or those of a new figure, one row without `columns`.
 
     Raises
     ------
@@ -140,12 +142,23 @@ def axes_row_or_new(
     from driftwalk.core.errors import InputError
 
     if axes is None:
+        columns = columns or count
         figure = new_figure(width_mm=width_mm, height_mm=height_mm)
-        axes = figure.subplots(1, count, squeeze=False, **options)
-    row: list[Axes] = list(np.ravel(np.asarray(axes, dtype=object)))
-    if len(row) != count:
-        raise InputError(f"got {len(row)} axes, expected {count}: pass them as axes=[...]")
-    return row
+        grid = figure.subplots(-(-count // columns), columns, squeeze=False, **options).ravel()
+        for spare in grid[count:]:
+            spare.remove()
+        axes = grid[:count]
+    panels: list[Axes] = list(np.ravel(np.asarray(axes, dtype=object)))
+    if len(panels) != count:
+        raise InputError(f"got {len(panels)} axes, expected {count}: pass them as axes=[...]")
+    return panels
+
+
+def outlined(width: float, color: str = "white") -> list[AbstractPathEffect]:
+    """Return the effects that draw a line of that width [pt] behind a line."""
+    from matplotlib.patheffects import Normal, Stroke
+
+    return [Stroke(linewidth=width, foreground=color), Normal()]
 
 
 def speed_colormap() -> Colormap:

@@ -7,8 +7,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.errors import InputError
-from driftwalk.core.text.argument_text import argument_text
+from driftwalk.core.errors import InputError, argument_text
 from driftwalk.record.raw import Array, RawBody, RawRecording
 
 HELD: Final = "held"

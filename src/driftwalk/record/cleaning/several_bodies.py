@@ -6,8 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from driftwalk.core.errors import InputError
-from driftwalk.core.text.argument_text import argument_text
+from driftwalk.core.errors import InputError, argument_text
 from driftwalk.record.raw import Array, RawBody
 
 LARGEST_SHARE = 0.01

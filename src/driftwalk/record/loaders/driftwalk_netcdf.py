@@ -10,9 +10,8 @@ import numpy as np
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.raw import Extra, RawBody, RawRecording, ReadOptions
 from driftwalk.schema import body_names, check_trajectory
-from driftwalk.schema.check import kind_name
+from driftwalk.schema.check import check_contents, kind_name
 from driftwalk.schema.kinds import KINDS
-from driftwalk.schema.stores.contents import check_contents
 from driftwalk.schema.stores.netcdf import MAGIC, kind_of_file, open_netcdf
 from driftwalk.schema.trajectory import POSE
 

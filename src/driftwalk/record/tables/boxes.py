@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.errors import InputError
-from driftwalk.core.text.argument_text import argument_text
+from driftwalk.core.errors import InputError, argument_text
 from driftwalk.core.text.did_you_mean import listed
 from driftwalk.record.column_names import ColumnMeaning, words_of
 from driftwalk.record.raw import Array, ReadOptions, TableLayout

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from driftwalk.core.errors import FormatError, InputError
-from driftwalk.core.text.argument_text import argument_text
+from driftwalk.core.errors import FormatError, InputError, argument_text
 from driftwalk.core.text.did_you_mean import listed
 from driftwalk.record.raw import ReadOptions
 from driftwalk.record.tables.rows import columns_of

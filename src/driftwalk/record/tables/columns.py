@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from driftwalk.core.errors import InputError
-from driftwalk.core.text.argument_text import argument_text
+from driftwalk.core.errors import InputError, argument_text
 from driftwalk.core.text.did_you_mean import listed
 from driftwalk.record.column_names import OF_BODY, QUATERNION, unit_of_name
 from driftwalk.record.raw import MISSING, ReadOptions

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
-from driftwalk.core.errors import InputError
-from driftwalk.core.text.argument_text import argument_text
+from driftwalk.core.errors import InputError, argument_text
 from driftwalk.core.text.did_you_mean import listed
 from driftwalk.record.column_names import ColumnMeaning, column_meaning, unit_of_name
 from driftwalk.record.raw import ReadOptions

@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.text.argument_text import argument_text
+from driftwalk.core.errors import argument_text
 from driftwalk.record.bad_row import is_number
 from driftwalk.record.cleaning.several_bodies import LARGEST_SHARE
 from driftwalk.record.column_names import column_meaning

@@ -7,8 +7,7 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.errors import FormatError, InputError
-from driftwalk.core.text.argument_text import argument_text
+from driftwalk.core.errors import FormatError, InputError, argument_text
 from driftwalk.record.cleaning.stacked import order_in_body, split_bodies
 from driftwalk.record.convert_units import scale_wanted
 from driftwalk.record.pose.keypoints import angle_between

@@ -18,9 +18,8 @@ from driftwalk.schema.answers.parts import (
     intensity_row,
     origin,
 )
-from driftwalk.schema.calibration import is_block, stored_parameters
 from driftwalk.schema.kinds.calibration import CALIBRATION
-from driftwalk.schema.parameters import flat_name
+from driftwalk.schema.parameters import flat_name, is_block, stored_parameters
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -15,12 +15,16 @@ import numpy as np
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.text.json_text import parse_json
-from driftwalk.schema.calibration import BLOCK, StoredParameter, stored_parameters
 from driftwalk.schema.description import Kind, Number, Variable
 from driftwalk.schema.kinds.calibration import CALIBRATION, OPTIMUM, calibration_of
-from driftwalk.schema.kinds.fit import FIT
-from driftwalk.schema.kinds.fit_numbers import PARAMETERS
-from driftwalk.schema.parameters import Parameter, flat_name
+from driftwalk.schema.kinds.fit import FIT, PARAMETERS
+from driftwalk.schema.parameters import (
+    BLOCK,
+    Parameter,
+    StoredParameter,
+    flat_name,
+    stored_parameters,
+)
 
 if TYPE_CHECKING:
     import xarray as xr

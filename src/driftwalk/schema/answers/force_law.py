@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from driftwalk.schema.answers.parts import Estimate, estimates
-from driftwalk.schema.kinds.fit_numbers import LAW_NUMBERS, WALL_NUMBERS
+from driftwalk.schema.kinds.fit import LAW_NUMBERS, WALL_NUMBERS
 
 if TYPE_CHECKING:
     import xarray as xr

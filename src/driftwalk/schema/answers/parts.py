@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 from driftwalk.schema.description import Number
-from driftwalk.schema.kinds.fit_numbers import PARAMETERS
+from driftwalk.schema.kinds.fit import PARAMETERS
 
 if TYPE_CHECKING:
     import xarray as xr

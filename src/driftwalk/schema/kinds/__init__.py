@@ -4,27 +4,25 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from driftwalk.schema.calibration import is_block, stored_parameters
 from driftwalk.schema.description import Kind
 from driftwalk.schema.kinds import (
     assembly,
     calibration,
     fit,
     flow,
-    model_calibration,
     model_check,
-    model_comparison,
+    models,
     motion,
     recovery,
     sensitivity,
 )
+from driftwalk.schema.parameters import is_block, stored_parameters
 
 if TYPE_CHECKING:
     import xarray as xr
 
 _FILES: Final = (
-    motion, flow, calibration, model_calibration, model_comparison, fit, recovery,
-    model_check, assembly, sensitivity,
+    motion, flow, calibration, models, fit, recovery, model_check, assembly, sensitivity
 )  # fmt: skip
 
 KINDS: Final[dict[str, Kind]] = {kind.name: kind for file in _FILES for kind in file.KINDS}

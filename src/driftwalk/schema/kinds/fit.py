@@ -1,319 +1,226 @@
-"""The dataset of a likelihood fit."""
+"""The dataset of a likelihood fit, and what its answer calls its numbers."""
 
 from __future__ import annotations
 
 from typing import Final
 
-from driftwalk.schema.description import (
-    ARENA,
-    SIMULATED,
-    SOURCE,
-    STUDY,
-    Attribute,
-    Kind,
-    Variable,
-)
+from driftwalk.schema.description import Number, kind
 from driftwalk.schema.kinds.flow import ORIGIN
 
 _ON: Final = "[flow] y x"
-_TESTED: Final = "numbers of departures were tested"
-_SWITCHED: Final = "with switching times"
-_TURNING: Final = "the angle is in the state"
-_ASKED: Final = "a precision of C_d is asked for"
-_CHECKED: Final = "the model was checked"
-_WALL: Final = "contacts with the wall were looked for"
-_WALL_FOUND: Final = "the wall was estimated, from eight passages or more"
-_COMPARED_LAWS: Final = "two laws were fitted"
-_NO_ADDED_MASS: Final = "no added mass was stated, and the paper's law was found"
-_TABLE: Final = "laws were compared"
-_COMPARED: Final = "the angle is in the state, and the second fit has a solution"
 
-FIT: Final = Kind(
-    name="fit",
-    version=2,
-    dimensions={
-        "flow": "flows, by name, with switching times",
-        "y": "nodes of the flow",
-        "x": "nodes of the flow",
-        "component": "u, v",
-        "knot_y": "knots of the spline",
-        "knot_x": "knots of the spline",
-        "parameter": "fitted parameters, by name",
-        "bound": "lower, upper",
-        "warning": "sentences",
-        "finding": "sentences",
-        "criterion": "criteria of the check, by name",
-        "residual_component": "errors in x, in y, and in the angle where it is in the state",
-        "cell_y": "centres of the cells of the check",
-        "cell_x": "centres of the cells of the check",
-        "log_parameter": "logarithms of the fitted parameters",
-        "other_log_parameter": "the same",
-        "axis": "x, y",
-        "switch": "switching times",
-        "profile": "values of C_d, by their value",
-        "flow_interval": "between the switching times",
-        "compared_law": "force laws that were compared, by name",
-        "number": "numbers of departures from the model, by name",
-        "law": "force laws that were fitted, by name",
-        "departure": "numbers of departures that were tested, by name",
-    },
-    variables=(
-        Variable(
-            "estimate", "parameter", None, "estimates of the parameters",
-            note="drag_coefficient C_d, force_std σ_F, force_noise_intensity σ_F² times the force "
-            "interval, tracking_noise; with the angle in the state also force_lever and "
-            "orientation_noise; where they were estimated or stated, the numbers of the force law "
-            "and of the camera; in the units of the coordinate unit",
-        ),
-        Variable(
-            "interval", "parameter bound", None, "intervals of the parameters",
-            note="at the confidence; infinite where the recording leaves an end open",
-        ),
-        Variable("warning", "warning", None, "evidence against the fit", "text"),
-        Variable(
-            "explained", "", None, "whether the model explains the recordings", "bool",
-            when=_CHECKED,
-        ),
-        Variable(
-            "finding", "finding", None, "evidence against the model", "text", when=_CHECKED
-        ),
-        Variable("p_value", "criterion", "1", "p value of the criterion", when=_CHECKED),
-        Variable("converged", "", None, "whether the search came to its end", "bool"),
-        Variable(
-            "restricted", "", None, "whether the restricted likelihood has a minimum", "bool"
-        ),
-        Variable("confidence", "", "1", "confidence of the intervals"),
-        Variable(
-            "force_interval", "", "s", "time after which a force is redrawn",
-            note="σ_F depends on it",
-        ),
-        Variable(
-            "maximum_likelihood_drag_coefficient", "", "1", "C_d of the plain likelihood"
-        ),
-        Variable("drag_coefficient_relative_std", "", "1", "standard deviation of ln C_d"),
-        Variable(
-            "drag_coefficient_precision", "", "1", "precision of C_d that is asked for",
-            when=_ASKED,
-        ),
-        Variable(
-            "needed_duration", "", "s", "length of a recording like this for that precision",
-            note="for 0.1 if none is asked for",
-        ),
-        Variable("wetted_depth", "", "m", "depth of the block in the water"),
-        Variable("wall_share", "", "1", "share of the intervals at the wall, left out"),
-        Variable(
-            "visited_share", "", "1", "share of the tank's nodes that the block has been over",
-            note="the smallest of all flows",
-        ),
-        Variable("samples", "", "1", "samples of the recordings", "int"),
-        Variable(
-            "samples_used", "", "1", "samples that were near enough to their prediction", "int"
-        ),
-        Variable(
-            "mistakes", "", "1", "samples left out as mistakes of the tracker", "int"
-        ),
-        Variable(
-            "jumps_removed", "", "1", "samples left out when the recordings were read, as too far "
-            "away for the greatest speed", "int",
-        ),
-        Variable(
-            "dropped_frames", "", "1", "frames that the recording lacks although its stamps do not "
-            "say so", "int", note="their time is put in",
-        ),
-        Variable("intervals_usable", "", "1", "intervals that might have been used", "int"),
-        Variable("duration", "", "s", "length of the recordings together"),
-        Variable("recordings", "", "1", "recordings", "int"),
-        Variable(
-            "chi_squared_per_dof", "", "1", "mean square of the whitened innovations",
-            note="1 if the model is right",
-        ),
-        Variable(
-            "autocorrelation", "", "1", "correlation of whitened innovations one sample apart",
-            note="0 if the model is right",
-        ),
-        Variable("autocorrelation_std", "", "1", "its standard deviation if the model is right"),
-        Variable("iterations", "", "1", "steps of the search", "int"),
-        Variable("roughness_weight", "", "1", "weight of the flow's roughness"),
-        Variable("size_weight", "", "1", "weight of the flow's size"),
-        Variable(
-            "drag_coefficient_angle_given", "", "1", "C_d with the angle as an input",
-            when=_COMPARED,
-        ),
-        Variable(
-            "drag_coefficient_angle_given_interval", "bound", "1", "its interval", when=_COMPARED
-        ),
-        Variable(
-            "angle_disagreement_std", "", "1",
-            "difference of the two ln C_d in combined standard deviations", when=_TURNING,
-            note="NaN where the second fit has no solution",
-        ),
-        Variable(
-            "law_settled_by", "", "1",
-            "difference of the logarithms of the evidence for the law and for the other one",
-            when=_COMPARED_LAWS, note="below 3 the recording cannot tell them apart",
-        ),
-        Variable(
-            "law_log_evidence", "law", "1", "logarithm of the evidence for each law",
-            note="without its constant, in the beginning of the recordings",
-        ),
-        Variable(
-            "filter_drag_coefficient", "", "1", "C_d of the filter, without added mass"
-        ),
-        Variable(
-            "number_value", "number", None, "numbers of departures from the model",
-            note="as the filter takes them, in SI units",
-        ),
-        Variable(
-            "number_opened", "number", None, "whether the number was estimated", "bool"
-        ),
-        Variable(
-            "departure_estimate", "departure", None,
-            "estimates of closed numbers by score tests at the end of the search",
-            when=_TESTED, note="in SI units; the model is 0",
-        ),
-        Variable(
-            "departure_std", "departure", None, "their standard deviations", when=_TESTED
-        ),
-        Variable(
-            "drag_coefficient_any_added_mass_interval", "bound", "1",
-            "interval of C_d if the block may carry the usual added mass", when=_NO_ADDED_MASS,
-        ),
-        Variable(
-            "force_std_any_added_mass_interval", "bound", "N",
-            "the same of σ_F", when=_NO_ADDED_MASS,
-        ),
-        Variable(
-            "compared_log_evidence", "compared_law", "1",
-            "logarithm of the evidence in the first 70 % of the recordings", when=_TABLE,
-        ),
-        Variable(
-            "compared_log_score", "compared_law", "1",
-            "mean logarithm of the predicted density of a held out sample", when=_TABLE,
-            note="in SI units; NaN where the law has no solution",
-        ),
-        Variable(
-            "compared_log_score_std", "compared_law", "1",
-            "standard error of its difference from the best law's", when=_TABLE,
-        ),
-        Variable(
-            "compared_filter_drag_coefficient", "compared_law", "1",
-            "C_d of the filter under the law, without added mass", when=_TABLE,
-        ),
-        Variable("compared_law", "compared_law", None, "force law", "text", when=_TABLE),
-        Variable(
-            "wall_contacts", "", "1", "passages of the block along the wall", "int", when=_WALL
-        ),
-        Variable(
-            "wall_restitution", "", "1", "restitution of the wall", when=_WALL_FOUND
-        ),
-        Variable("wall_restitution_interval", "bound", "1", "its interval", when=_WALL_FOUND),
-        Variable("wall_friction", "", "1", "friction of the wall", when=_WALL_FOUND),
-        Variable(
-            "wall_friction_interval", "bound", "1", "its interval", when=_WALL_FOUND,
-            note="infinite where every contact may stick",
-        ),
-        Variable("number", "number", None, "number", "text"),
-        Variable("law", "law", None, "force law", "text"),
-        Variable("departure", "departure", None, "number that was tested", "text", when=_TESTED),
-        Variable("parameter", "parameter", None, "parameter", "text"),
-        Variable("unit", "parameter", None, "unit of the parameter", "text"),
-        Variable("bound", "bound", None, "end of an interval", "text"),
-        Variable("u", _ON, "m s-1", "flow velocity x"),
-        Variable("v", _ON, "m s-1", "flow velocity y"),
-        Variable(
-            "u_standard_error", _ON, "m s-1", "standard error of flow velocity x",
-            note="at every node, filled ones too",
-        ),
-        Variable("v_standard_error", _ON, "m s-1", "standard error of flow velocity y"),
-        Variable("count", _ON, "1", "samples with the block over the node"),
-        Variable("flag", _ON, None, "origin of the node's value", "int", flags=ORIGIN),
-        Variable(
-            "coefficient", "[flow] component knot_y knot_x", "m s-1",
-            "coefficients of the bicubic splines",
-        ),
-        Variable(
-            "covariance", "log_parameter other_log_parameter", "1",
-            "covariance of the logarithms of the parameters",
-        ),
-        Variable("profile_deviance", "profile", "1", "deviance along C_d"),
-        Variable(
-            "profile_half_log_determinant", "profile", "1",
-            "half the logarithm of the determinant along C_d",
-        ),
-        Variable(
-            "residual", "residual_component cell_y cell_x", "1", "mean error in its sd",
-            when=_CHECKED, note="by cell",
-        ),
-        Variable("residual_count", "cell_y cell_x", "1", "samples", when=_CHECKED),
-        Variable(
-            "residual_distance", "cell_y cell_x", "1",
-            "distance of the mean error from zero, in its sd after fitting", when=_CHECKED,
-            note="the largest exceeds its attribute limit once in twenty",
-        ),
-        Variable(
-            "noise_ratio", "cell_y cell_x", "1", "mean square against that of all", when=_CHECKED
-        ),
-        Variable(
-            "noise_ratio_std", "cell_y cell_x", "1", "its standard deviation", when=_CHECKED
-        ),
-        Variable("residual_cell_size", "", "m", "size of a cell of the check", when=_CHECKED),
-        Variable("criterion", "criterion", None, "criterion", "text", when=_CHECKED),
-        Variable(
-            "residual_component", "residual_component", None, "component", "text", when=_CHECKED
-        ),
-        Variable("cell_x", "cell_x", "m", "x", when=_CHECKED),
-        Variable("cell_y", "cell_y", "m", "y", when=_CHECKED),
-        Variable("x", "x", "m", "x"),
-        Variable("y", "y", "m", "y"),
-        Variable("component", "component", None, "component", "text"),
-        Variable("spline_origin", "axis", "m", "first knot of the splines"),
-        Variable("spline_spacing", "", "m", "distance between knots"),
-        Variable("cell_size", "", "m", "distance between nodes"),
-        Variable("log_parameter", "log_parameter", None, "logarithm of a parameter", "text"),
-        Variable(
-            "other_log_parameter", "other_log_parameter", None, "logarithm of a parameter", "text"
-        ),
-        Variable("axis", "axis", None, "axis", "text"),
-        Variable("profile", "profile", "1", "C_d"),
-        Variable("flow", "flow", None, "flow", "text", when=_SWITCHED),
-        Variable(
-            "interval_flow", "flow_interval", "1",
-            "number of the flow in each interval between the switching times", "int",
-            when=_SWITCHED,
-        ),
-        Variable(
-            "switching_time", "switch", "s", "when the flow changes", when=_SWITCHED,
-            note="on the clock of the recordings",
-        ),
-        Variable(
-            "recording_start", "", "s", "first sample of the first recording", when=_SWITCHED
-        ),
-    ),
-    attributes=(
-        Attribute("angle", "text", 'how the orientation was used: "state", "given" or "none"'),
-        Attribute(
-            "force_law", "text", 'force law, found or stated: "paper" or "floating body"',
-        ),
-        Attribute(
-            "force_law_stated", "text", '"yes" where the fit tried no other, else "no"'
-        ),
-        Attribute(
-            "drag_law", "text", 'how the drag goes with the speed: "quadratic", "linear", "mixed" '
-            'of both, or "power"',
-        ),
-        Attribute(
-            "drag_law_stated", "text", '"yes" where the fit tried no other, else "no"'
-        ),
-        Attribute("check_left_out", "text", "reason why the model was not checked", "it was not"),
-        Attribute(
-            "wall_left_out", "text", "reason why the wall was not estimated",
-            "asked for, and it was not",
-        ),
-        SIMULATED,
-        ARENA,
-        SOURCE,
-        STUDY,
-    ),
+FIT: Final = kind(
+    f"""
+kind: fit
+version: 2
+dimensions:
+    flow: flows, by name, with switching times
+    y: nodes of the flow
+    x: nodes of the flow
+    component: u, v
+    knot_y: knots of the spline
+    knot_x: knots of the spline
+    parameter: fitted parameters, by name
+    bound: lower, upper
+    warning: sentences
+    finding: sentences
+    criterion: criteria of the check, by name
+    residual_component: errors in x, in y, and in the angle where it is in the state
+    cell_y: centres of the cells of the check
+    cell_x: centres of the cells of the check
+    log_parameter: logarithms of the fitted parameters
+    other_log_parameter: the same
+    axis: x, y
+    switch: switching times
+    profile: values of C_d, by their value
+    flow_interval: between the switching times
+    compared_law: force laws that were compared, by name
+    number: numbers of departures from the model, by name
+    law: force laws that were fitted, by name
+    departure: numbers of departures that were tested, by name
+variables:
+    estimate(parameter): estimates of the parameters; drag_coefficient C_d, force_std σ_F, \
+        force_noise_intensity σ_F² times the force interval, tracking_noise; with the angle in the \
+        state also force_lever and orientation_noise; where they were estimated or stated, the \
+        numbers of the force law and of the camera; in the units of the coordinate unit
+    interval(parameter bound): intervals of the parameters; at the confidence; infinite where the \
+        recording leaves an end open
+    warning(warning) text: evidence against the fit
+    converged bool: whether the search came to its end
+    restricted bool: whether the restricted likelihood has a minimum
+    confidence [1]: confidence of the intervals
+    force_interval [s]: time after which a force is redrawn; σ_F depends on it
+    maximum_likelihood_drag_coefficient [1]: C_d of the plain likelihood
+    drag_coefficient_relative_std [1]: standard deviation of ln C_d
+    needed_duration [s]: length of a recording like this for that precision; for 0.1 if none is \
+        asked for
+    wetted_depth [m]: depth of the block in the water
+    wall_share [1]: share of the intervals at the wall, left out
+    visited_share [1]: share of the tank's nodes that the block has been over; the smallest of all \
+        flows
+    samples [1] int: samples of the recordings
+    samples_used [1] int: samples that were near enough to their prediction
+    mistakes [1] int: samples left out as mistakes of the tracker
+    jumps_removed [1] int: samples left out when the recordings were read, as too far away for the \
+        greatest speed
+    dropped_frames [1] int: frames that the recording lacks although its stamps do not say so; \
+        their time is put in
+    intervals_usable [1] int: intervals that might have been used
+    duration [s]: length of the recordings together
+    recordings [1] int: recordings
+    chi_squared_per_dof [1]: mean square of the whitened innovations; 1 if the model is right
+    autocorrelation [1]: correlation of whitened innovations one sample apart; 0 if the model is \
+        right
+    autocorrelation_std [1]: its standard deviation if the model is right
+    iterations [1] int: steps of the search
+    roughness_weight [1]: weight of the flow's roughness
+    size_weight [1]: weight of the flow's size
+    law_log_evidence(law) [1]: logarithm of the evidence for each law; without its constant, in \
+        the beginning of the recordings
+    filter_drag_coefficient [1]: C_d of the filter, without added mass
+    number_value(number): numbers of departures from the model; as the filter takes them, in SI \
+        units
+    number_opened(number) bool: whether the number was estimated
+    number text
+    law(law) text: force law
+    parameter text
+    unit(parameter) text: unit of the parameter
+    bound(bound) text: end of an interval
+    u({_ON}) [m s-1]: flow velocity x
+    v({_ON}) [m s-1]: flow velocity y
+    u_standard_error({_ON}) [m s-1]: standard error of flow velocity x; at every node, filled ones \
+        too
+    v_standard_error({_ON}) [m s-1]: standard error of flow velocity y
+    count({_ON}) [1]: samples with the block over the node
+    flag({_ON}) flags: origin of the node's value
+    coefficient([flow] component knot_y knot_x) [m s-1]: coefficients of the bicubic splines
+    covariance(log_parameter other_log_parameter) [1]: covariance of the logarithms of the \
+        parameters
+    profile_deviance(profile) [1]: deviance along C_d
+    profile_half_log_determinant(profile) [1]: half the logarithm of the determinant along C_d
+    x [m]
+    y [m]
+    component text
+    spline_origin(axis) [m]: first knot of the splines
+    spline_spacing [m]: distance between knots
+    cell_size [m]: distance between nodes
+    log_parameter(log_parameter) text: logarithm of a parameter
+    other_log_parameter(other_log_parameter) text: logarithm of a parameter
+    axis text
+    profile(profile) [1]: C_d
+variables (the model was checked):
+    explained bool: whether the model explains the recordings
+    finding(finding) text: evidence against the model
+    p_value(criterion) [1]: p value of the criterion
+    residual(residual_component cell_y cell_x) [1]: mean error in its sd; by cell
+    residual_count(cell_y cell_x) [1]: samples
+    residual_distance(cell_y cell_x) [1]: distance of the mean error from zero, in its sd after \
+        fitting; the largest exceeds its attribute limit once in twenty
+    noise_ratio(cell_y cell_x) [1]: mean square against that of all
+    noise_ratio_std(cell_y cell_x) [1]: its standard deviation
+    residual_cell_size [m]: size of a cell of the check
+    criterion text
+    residual_component(residual_component) text: component
+    cell_x(cell_x) [m]: x
+    cell_y(cell_y) [m]: y
+variables (a precision of C_d is asked for):
+    drag_coefficient_precision [1]: precision of C_d that is asked for
+variables (the angle is in the state, and the second fit has a solution):
+    drag_coefficient_angle_given [1]: C_d with the angle as an input
+    drag_coefficient_angle_given_interval(bound) [1]: its interval
+variables (the angle is in the state):
+    angle_disagreement_std [1]: difference of the two ln C_d in combined standard deviations; NaN \
+        where the second fit has no solution
+variables (two laws were fitted):
+    law_settled_by [1]: difference of the logarithms of the evidence for the law and for the other \
+        one; below 3 the recording cannot tell them apart
+variables (numbers of departures were tested):
+    departure_estimate(departure): estimates of closed numbers by score tests at the end of the \
+        search; in SI units; the model is 0
+    departure_std(departure): their standard deviations
+    departure(departure) text: number that was tested
+variables (no added mass was stated, and the paper's law was found):
+    drag_coefficient_any_added_mass_interval(bound) [1]: interval of C_d if the block may carry \
+        the usual added mass
+    force_std_any_added_mass_interval(bound) [N]: the same of σ_F
+variables (laws were compared):
+    compared_log_evidence(compared_law) [1]: logarithm of the evidence in the first 70 % of the \
+        recordings
+    compared_log_score(compared_law) [1]: mean logarithm of the predicted density of a held out \
+        sample; in SI units; NaN where the law has no solution
+    compared_log_score_std(compared_law) [1]: standard error of its difference from the best law's
+    compared_filter_drag_coefficient(compared_law) [1]: C_d of the filter under the law, without \
+        added mass
+    compared_law(compared_law) text: force law
+variables (contacts with the wall were looked for):
+    wall_contacts [1] int: passages of the block along the wall
+variables (the wall was estimated, from eight passages or more):
+    wall_restitution [1]: restitution of the wall
+    wall_restitution_interval(bound) [1]: its interval
+    wall_friction [1]: friction of the wall
+    wall_friction_interval(bound) [1]: its interval; infinite where every contact may stick
+variables (with switching times):
+    flow text
+    interval_flow(flow_interval) [1] int: number of the flow in each interval between the \
+        switching times
+    switching_time(switch) [s]: when the flow changes; on the clock of the recordings
+    recording_start [s]: first sample of the first recording
+attributes:
+    angle text: how the orientation was used: "state", "given" or "none"
+    force_law text: force law, found or stated: "paper" or "floating body"
+    force_law_stated text: "yes" where the fit tried no other, else "no"
+    drag_law text: how the drag goes with the speed: "quadratic", "linear", "mixed" of both, or \
+        "power"
+    drag_law_stated text: "yes" where the fit tried no other, else "no"
+    simulated_recording
+    arena
+    source
+    study
+attributes (it was not):
+    check_left_out text: reason why the model was not checked
+attributes (asked for, and it was not):
+    wall_left_out text: reason why the wall was not estimated
+""",
+    flags={"flag": ORIGIN},
+)
+
+_CORRECTED: Final = "corrected"
+BLOCK_NUMBERS: Final = (
+    Number("drag_coefficient", "1", "drag coefficient", "C_d"),
+    Number("force_std", "N", "stochastic force", "σ_F"),
+    Number("force_noise_intensity", "N2 s", "noise intensity", "σ_F²·τ", "N² s"),
+    Number("tracking_noise", "m"),
+    Number("force_lever", "m"),
+    Number("orientation_noise", "rad", shown="°"),
+)
+"""Numbers of every fit; lever and noise of the orientation with the angle in the state."""
+LAW_NUMBERS: Final = (
+    Number("added_mass_share", label="added mass / mass",
+           note="stated or assumed: no recording tells it"),
+    Number("effective_drag_coefficient", label="C_d per effective mass",
+           note="C_d over 1 + added mass / mass"),
+    Number("effective_force_std", "N", "σ_F per effective mass", shown="mN",
+           note="σ_F over 1 + added mass / mass"),
+    Number("linear_drag", "kg s-1", shown="g/s", note="C_d is that of the quadratic part alone"),
+    Number("drag_power", label="power of the drag", note="C_d holds at 3 cm/s"),
+    Number("force_memory", "s", "memory of the force", shown="s",
+           note="correlation time; σ_F is that of a white force, as strong at low frequencies"),
+    Number("time_stamp_noise", "s", "jitter of the stamps", shown="ms",
+           note="standard deviation of the time stamps; corrected"),
+    Number("orientation_offset", "rad", shown="°", note="between marker and faces; corrected"),
+    Number("marker_x", "m", "marker off by, x", shown="mm", note=_CORRECTED),
+    Number("marker_y", "m", "marker off by, y", shown="mm", note=_CORRECTED),
+    Number("flow_strength_change", "1", "change of the flow", shown="%",
+           note="from the beginning to the end; corrected"),
+    Number("pulse_amplitude", "1", "pulses of the flow", shown="%", note="amplitude; corrected"),
+    Number("pulse_frequency", "Hz", "frequency of pulses", shown="Hz", note=_CORRECTED),
 )  # fmt: skip
+"""Numbers of a fit where the recording asks for it, or the user states it."""
+WALL_NUMBERS: Final = (
+    Number("wall_restitution", note="1: the wall takes no energy"),
+    Number("wall_friction", note="0: the wall is smooth"),
+)
+PARAMETERS: Final = {one.name: one for one in (*BLOCK_NUMBERS, *LAW_NUMBERS)}
+"""In the order in which a fit holds them."""
 
 KINDS: Final = (FIT,)

@@ -1,10 +1,11 @@
-"""The dataset of the water's velocity."""
+"""The dataset of the water's velocity, and what a result says of a flow that changes in time."""
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Mapping
+from typing import Any, Final
 
-from driftwalk.schema.description import ARENA, SOURCE, Attribute, Kind, Variable
+from driftwalk.schema.description import Variable, attributes, kind
 
 ORIGIN: Final = {"outside": 0, "measured": 1, "filled": 2}
 """Where the value of a node comes from."""
@@ -13,66 +14,154 @@ _RECORDED: Final = "made from a recording"
 _BODY: Final = "made from the track of a body"
 _TRACERS: Final = "made from tracers"
 
-FLOW_FIELD: Final = Kind(
-    name="flow_field",
-    version=1,
-    dimensions={"time": "frames of a flow that changes", "y": "nodes", "x": "nodes"},
-    variables=(
-        Variable("u", _ON, "m s-1", "flow velocity x", note="finite; bilinear between nodes"),
-        Variable("v", _ON, "m s-1", "flow velocity y"),
-        Variable("flag", _ON, None, "origin of the node's value", "int", flags=ORIGIN),
-        Variable(
-            "u_block", _ON, "m s-1", "mean block velocity x", when=_BODY,
-            note="before the correction; NaN where the body never was",
-        ),
-        Variable("v_block", _ON, "m s-1", "mean block velocity y", when=_BODY),
-        Variable("count", _ON, "1", "samples in the cell", when=_RECORDED),
-        Variable("tracks", _ON, "1", "tracks in the cell", when=_TRACERS),
-        Variable(
-            "u_standard_error", _ON, "m s-1", "standard error of flow velocity x",
-            when=_RECORDED,
-            note="of the scatter: [how good it is](../explanation/flow.md#how-good-is-it)",
-        ),
-        Variable(
-            "v_standard_error", _ON, "m s-1", "standard error of flow velocity y", when=_RECORDED
-        ),
-        Variable("x", "x", "m", "x", note="evenly spaced"),
-        Variable("y", "y", "m", "y", note="evenly spaced"),
-        Variable("time", "time", "s", "time", when="the flow changes"),
-    ),
-    attributes=(
-        Attribute("method", "text", "how it was made", "made by a stage"),
-        Attribute("cell_size_m", "number", "distance between nodes", "made by a stage"),
-        Attribute("arena", "object", ARENA.meaning, "the tank is known"),
-        Attribute("parameters", "object", "parameters of the formula", "made from a formula"),
-        Attribute("source", "text", SOURCE.meaning, "made from a file or a recording"),
-        Attribute("inertia", "text", "how the body's inertia was corrected", _BODY),
-        Attribute("window_s", "number", "time over which derivatives are taken", _BODY),
-        Attribute("min_count", "number", "samples that make a cell a measured one", _RECORDED),
-        Attribute("mass_kg", "number", "mass of the body", _BODY),
-        Attribute("area_m2", "number", "area that the water pushes on", _BODY),
-        Attribute("water_density_kg_m3", "number", "density of the water", _BODY),
-        Attribute("flow_drag_coefficient", "number", "drag coefficient of Eq. 4", _BODY),
-        Attribute("bodies", "list", "names of the bodies", _BODY),
-        Attribute("samples_used", "number", "samples in the cells", _RECORDED),
-        Attribute("samples_without_derivative", "number", "samples too near a gap", _BODY),
-        Attribute("tracks_used", "number", "tracks in the cells", _TRACERS),
-        Attribute("position_noise_m", "number", "noise for the test of links", _TRACERS),
-        Attribute("outlier_threshold", "number", "deviation of a false link", _TRACERS),
-        Attribute("samples_rejected", "number", "steps that are false links", _TRACERS),
-        Attribute("samples_unjudged", "number", "steps with too few neighbours", _TRACERS),
-        Attribute("samples_across_gaps", "number", "pairs with a gap between", _TRACERS),
-        Attribute("samples_ambiguous", "number", "pairs of unsure identity", _TRACERS),
-        Attribute("samples_outside_tank", "number", "samples beyond the wall", _RECORDED),
-        Attribute("measured_share", "number", "share of the tank's cells", _RECORDED),
-        Attribute("filled_share", "number", "share of the tank's cells", _RECORDED),
-        Attribute("warning", "text", "what to know about it", "there is something"),
-        Attribute(
-            "repeat", "text", "how it goes on beyond its frames: loop, mirror or hold",
-            "it changes, and says so",
-        ),
-    ),
-    read="u v x y",
-)  # fmt: skip
+FLOW_FIELD: Final = kind(
+    f"""
+kind: flow_field
+version: 1
+read: u v x y
+dimensions:
+    time: frames of a flow that changes
+    y: nodes
+    x: nodes
+variables:
+    u({_ON}) [m s-1]: flow velocity x; finite; bilinear between nodes
+    v({_ON}) [m s-1]: flow velocity y
+    flag({_ON}) flags: origin of the node's value
+    x(x) [m]: x; evenly spaced
+    y(y) [m]: y; evenly spaced
+variables ({_BODY}):
+    u_block({_ON}) [m s-1]: mean block velocity x; before the correction; NaN where the body never \
+        was
+    v_block({_ON}) [m s-1]: mean block velocity y
+variables ({_RECORDED}):
+    count({_ON}) [1]: samples in the cell
+    u_standard_error({_ON}) [m s-1]: standard error of flow velocity x; of the scatter: [how good \
+        it is](../explanation/flow.md#how-good-is-it)
+    v_standard_error({_ON}) [m s-1]: standard error of flow velocity y
+variables ({_TRACERS}):
+    tracks({_ON}) [1]: tracks in the cell
+variables (the flow changes):
+    time [s]
+attributes (made by a stage):
+    method text: how it was made
+    cell_size_m number: distance between nodes
+attributes (the tank is known):
+    arena
+attributes (made from a formula):
+    parameters object: parameters of the formula
+attributes (made from a file or a recording):
+    source
+attributes ({_BODY}):
+    inertia text: how the body's inertia was corrected
+    window_s number: time over which derivatives are taken
+    mass_kg number: mass of the body
+    area_m2 number: area that the water pushes on
+    water_density_kg_m3 number: density of the water
+    flow_drag_coefficient number: drag coefficient of Eq. 4
+    bodies list: names of the bodies
+    samples_without_derivative number: samples too near a gap
+attributes ({_RECORDED}):
+    min_count number: samples that make a cell a measured one
+    samples_used number: samples in the cells
+    samples_outside_tank number: samples beyond the wall
+    measured_share number: share of the tank's cells
+    filled_share number: share of the tank's cells
+attributes ({_TRACERS}):
+    tracks_used number: tracks in the cells
+    position_noise_m number: noise for the test of links
+    outlier_threshold number: deviation of a false link
+    samples_rejected number: steps that are false links
+    samples_unjudged number: steps with too few neighbours
+    samples_across_gaps number: pairs with a gap between
+    samples_ambiguous number: pairs of unsure identity
+attributes (there is something):
+    warning text: what to know about it
+attributes (it changes, and says so):
+    repeat text: how it goes on beyond its frames: loop, mirror or hold
+""",
+    flags={"flag": ORIGIN},
+)
 
 KINDS: Final = (FLOW_FIELD,)
+
+_CHANGES: Final = "the flow changes in time"
+
+FLOW_SERIES: Final = attributes(f"""
+attributes ({_CHANGES}):
+    flow_span_s number: time from the first frame to the last
+    flow_repeat text: how the flow went on: none, loop, mirror or hold
+    flow_begins text: when runs began in it: random, together or recorded
+attributes (it was repeated):
+    flow_period_s number: time after which it was as before
+attributes (they did, and it was not repeated):
+    flow_slack_s number: time within which runs began at random
+attributes (it began again):
+    flow_join number: change from the last frame to the first, over that between frames
+""")
+"""Attributes of whatever was simulated in a flow."""
+
+SUDDEN: Final = 3.0
+"""Times the usual change between frames from which on a loop is said not to close."""
+
+_GOES_ON: Final = {
+    "none": "changes in time",
+    "loop": "begins again after its last frame",
+    "mirror": "runs backwards and forwards in turns",
+    "hold": "stands still after its last frame",
+}
+
+
+def began_in_flow(dimension: str) -> Variable:
+    """Return the variable that says when each world began in a flow that changes."""
+    words = "time on the clock of the flow at which it began"
+    return Variable("flow_start", dimension, "s", words, when=_CHANGES)
+
+
+def flow_series_words(attrs: Mapping[str, Any], *, holds: str = "") -> list[str]:
+    """Return sentences on a flow that changed in time, and on what the result holds for.
+
+    Parameters
+    ----------
+    attrs : mapping
+        Attributes of a result; without those of `FLOW_SERIES` there is nothing to say.
+    holds : str
+        What the result is: "the intervals hold", "the paths hold". Without it, for motion with
+        nothing to be read from it, no word is said of when it began.
+
+    Examples
+    --------
+    >>> facts = {"flow_span_s": 10.0, "flow_repeat": "hold", "flow_begins": "together"}
+    >>> flow_series_words(facts, holds="the shares hold")[0][:55]
+    'the flow series of 10 s stands still after its last fra'
+    """
+    repeat = attrs.get("flow_repeat")
+    if repeat is None or (attrs["flow_begins"] == "recorded" and repeat == "none"):
+        return []
+    what = f"the flow series of {attrs['flow_span_s']:g} s {_GOES_ON[str(repeat)]}"
+    if attrs["flow_begins"] == "recorded":
+        begins = "; it keeps the clock of the recording, from its first sample on"
+    elif not holds:
+        begins = ""
+    elif attrs["flow_begins"] == "random":
+        within = (
+            "its period"
+            if "flow_period_s" in attrs
+            else f"the first {attrs['flow_slack_s']:.3g} s that leave it time to end"
+        )
+        begins = (
+            f"; each run begins at its own moment of {within}; {holds} for water that goes on as "
+            "in this series, and not for what it does not show"
+        )
+    else:
+        begins = (
+            f"; all runs begin at one moment of it; {holds} for this one course of the water, by "
+            "the chance of starts and forces alone"
+        )
+    words = [what + begins]
+    if float(attrs.get("flow_join", 0.0)) > SUDDEN:
+        words.append(
+            "the flow series does not close: from its last frame to its first the water changes "
+            f'{attrs["flow_join"]:.3g} times as much as between frames; `flow.repeat="mirror"` '
+            "has no such jump"
+        )
+    return words

@@ -1,12 +1,13 @@
 """Kinds of runs: the one table of them, and the contents of a run directory."""
 
 from driftwalk.schema.runs.contents import RunContents, StoredRun, open_run_folder
-from driftwalk.schema.runs.kind import RunKind, load_maker
 from driftwalk.schema.runs.registry import (
     RUN_KINDS,
+    RunKind,
     answer_of,
     kind_of,
     kind_of_folder,
+    load_maker,
     register,
     run_kind,
 )

@@ -2,21 +2,229 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.core.errors import InputError
 from driftwalk.schema.check import kind_name
-from driftwalk.schema.runs.built_in import BUILT_IN
-from driftwalk.schema.runs.kind import RunKind, load_maker
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     import xarray as xr
 
     from driftwalk.schema.answers.parts import Answer
+
+Maker = str | Callable[..., Any]
+"""A callable, or where it stands, "module:name": its module is imported when it is used."""
+
+
+@dataclass(frozen=True)
+class RunKind:
+    """A kind of run, declared once for every command, page and file that deals with its runs.
+
+    The makers of figures and sections name, as their parameters, the datasets of the run that they
+    use: ``check`` for ``check.nc``, ``recordings`` for all recordings, ``body`` for the name of the
+    body. A dataset that is not there is None.
+
+    Attributes
+    ----------
+    name : str
+        Attribute ``kind`` of its result, and the key ``kind`` of its specification.
+    title : str
+        Title of its page.
+    under_way : str
+        Title of its live page before the run has finished.
+    words : str
+        Name of its result in a sentence.
+    command : str
+        The command that makes such a run.
+    file : str
+        The file of its result; a finished run without a specification is known by it.
+    datasets : tuple of str
+        The other datasets that it may hold, without the ending of their files.
+    page : callable or str
+        Returns the sections of its page.
+    figures : callable or str, optional
+        Returns its figures, a table from their names to functions that draw them.
+    live : callable or str, optional
+        View of a run under way, see `driftwalk.viewer.watch.run_page.Running`; without one the
+        page counts the finished work units.
+    answer : callable or str, optional
+        Returns the `driftwalk.schema.answers.parts.Answer` of its result.
+    places : mapping
+        Files and folders of a run that its command names, by their labels.
+    flow : callable or str, optional
+        Returns the flow field that its result holds.
+    gives_model : bool
+        Whether later commands take a motion model with its values from it.
+    no_draws : str
+        What is missing where no parameters can be drawn from its result.
+    """
+
+    name: str
+    title: str
+    under_way: str
+    words: str
+    command: str
+    file: str
+    page: Maker
+    datasets: tuple[str, ...] = ()
+    figures: Maker | None = None
+    live: Maker | None = None
+    answer: Maker | None = None
+    places: Mapping[str, str] = field(default_factory=dict)
+    flow: Maker | None = None
+    gives_model: bool = False
+    no_draws: str = "no uncertainty of its values, as a fit or a calibration has"
+
+
+def load_maker(maker: Maker) -> Callable[..., Any]:
+    """Return a maker; one that is given by name is imported.
+
+    Parameters
+    ----------
+    maker : callable or str
+        The callable, or "module:name".
+
+    Examples
+    --------
+    >>> load_maker("math:floor")(1.5)
+    1
+    """
+    if not isinstance(maker, str):
+        return maker
+    module, _, name = maker.partition(":")
+    found: Callable[..., Any] = getattr(import_module(module), name)
+    return found
+
+
+_ANSWERS: Final = "driftwalk.schema.answers"
+_SECTIONS: Final = "driftwalk.page.sections"
+_WATCH: Final = "driftwalk.viewer.watch"
+
+BUILT_IN: Final = (
+    RunKind(
+        name="calibration",
+        title="Calibration",
+        under_way="A calibration under way",
+        words="calibration",
+        command="calibrate",
+        file="calibration.nc",
+        datasets=("flow", "recording"),
+        figures="driftwalk.figures.calibration:calibration_figures",
+        page=f"{_SECTIONS}.calibration:calibration_sections",
+        live=f"{_WATCH}.calibration:RunningCalibration",
+        gives_model=True,
+        no_draws="no joint region to draw parameters from (`calibration.bootstrap` of 0)",
+        answer=f"{_ANSWERS}.calibration:calibration_answer",
+        places={"figures": "figures"},
+    ),
+    RunKind(
+        name="fit",
+        title="Likelihood fit",
+        under_way="A fit under way",
+        words="fit",
+        command="fit",
+        file="fit.nc",
+        datasets=("flow", "recording", "check"),
+        figures="driftwalk.runs.fit:figures_of_fit",
+        page=f"{_SECTIONS}.fit:fit_sections",
+        flow="driftwalk.likelihood:fitted_flow",
+        gives_model=True,
+        no_draws="no covariance to draw parameters from",
+        answer=f"{_ANSWERS}.fit:fit_answer",
+        places={"flow": "flow.nc"},
+    ),
+    RunKind(
+        name="assembly",
+        title="Self-assembly",
+        under_way="Self-assembly under way",
+        words="self-assembly",
+        command="assemble",
+        file="assembly.nc",
+        datasets=(
+            "distribution",
+            "class_times",
+            "path",
+            "sizes",
+            "assembly_drawn",
+            "distribution_drawn",
+            "sizes_drawn",
+        ),
+        figures="driftwalk.figures.assembly:assembly_figures",
+        page=f"{_SECTIONS}.assembly:assembly_sections",
+        live=f"{_WATCH}.assembly:RunningAssembly",
+    ),
+    RunKind(
+        name="sensitivity",
+        title="Sensitivity of self-assembly",
+        under_way="A sensitivity analysis under way",
+        words="sensitivity analysis",
+        command="sensitivity",
+        file="sensitivity.nc",
+        datasets=("reference", "components", "sobol"),
+        figures="driftwalk.figures.assembly:sensitivity_figures",
+        page=f"{_SECTIONS}.sensitivity:sensitivity_sections",
+        live=f"{_WATCH}.sensitivity:RunningSensitivity",
+        answer=f"{_ANSWERS}.sensitivity:sensitivity_answer",
+    ),
+    RunKind(
+        name="recovery",
+        title="Recovery study",
+        under_way="A recovery study under way",
+        words="recovery study",
+        command="study recover",
+        file="recovery.nc",
+        figures="driftwalk.figures.recovery:recovery_figures",
+        page=f"{_SECTIONS}.recovery:recovery_sections",
+        answer=f"{_ANSWERS}.recovery:recovery_answer",
+        places={"every recording": "recovery.nc"},
+    ),
+    RunKind(
+        name="model_comparison",
+        title="Comparison of motion models",
+        under_way="A comparison of motion models under way",
+        words="comparison of models",
+        command="compare-models",
+        file="comparison.nc",
+        datasets=("recording", "flow"),
+        figures="driftwalk.figures.model_comparison:comparison_figures",
+        page=f"{_SECTIONS}.motion_models:model_sections",
+        gives_model=True,
+        answer=f"{_ANSWERS}.model_comparison:comparison_answer",
+        places={"comparison": "comparison.nc", "figures": "figures"},
+    ),
+    RunKind(
+        name="model_calibration",
+        title="Calibration of a motion model",
+        under_way="A calibration under way",
+        words="calibration",
+        command="calibrate",
+        file="model_calibration.nc",
+        datasets=("recording", "flow"),
+        figures="driftwalk.figures.model_calibration:model_calibration_figures",
+        page=f"{_SECTIONS}.motion_models:model_calibration_sections",
+        gives_model=True,
+        answer=f"{_ANSWERS}.calibration:model_calibration_answer",
+        places={"figures": "figures"},
+    ),
+    RunKind(
+        name="model_recovery",
+        title="Recovery study of a motion model",
+        under_way="A recovery study under way",
+        words="recovery study",
+        command="study recover",
+        file="model_recovery.nc",
+        figures="driftwalk.figures.recovery:model_recovery_figures",
+        page=f"{_SECTIONS}.recovery:model_recovery_sections",
+        answer=f"{_ANSWERS}.recovery:model_recovery_answer",
+        places={"every recording": "model_recovery.nc"},
+    ),
+)
+
 
 _KINDS: Final[dict[str, RunKind]] = {kind.name: kind for kind in BUILT_IN}
 RUN_KINDS: Final[Mapping[str, RunKind]] = MappingProxyType(_KINDS)

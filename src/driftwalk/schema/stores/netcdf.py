@@ -42,7 +42,7 @@ def open_netcdf(path: Path) -> xr.Dataset:
     """Read a NetCDF file into memory and close it.
 
     Numbers stay as they are stored: a time in "s" does not become a date. Each reader checks the
-    required contents, by `driftwalk.schema.stores.contents.check_contents` where work goes on with
+    required contents, by `driftwalk.schema.check.check_contents` where work goes on with
     it.
 
     Raises

@@ -186,9 +186,12 @@ class BlobDetector:
             if area < _BLOBS.speck_px:
                 continue
             column, row = _centre(difference, label, index, box)
-            reason = self._fault(area)
-            if reason is not None:
-                rejected.append(Rejected(column, row, area, *reason))
+            if area < self._least:
+                text = f"too small: {area:.0f} px², at least {self._least:.0f}"
+                rejected.append(Rejected(column, row, area, text, "too small"))
+            elif self._most is not None and area > self._most:
+                text = f"too large: {area:.0f} px², at most {self._most:.0f}"
+                rejected.append(Rejected(column, row, area, text, "too large"))
             else:
                 kept.append((area, column, row))
         kept.sort(reverse=True)
@@ -226,13 +229,6 @@ class BlobDetector:
         peak = float(np.searchsorted(total, total[-1] - max(self._least / 32.0, 1.0)))
         return max(_BLOBS.least_contrast, _BLOBS.noise_factor * noise, _BLOBS.share_of_peak * peak)
 
-    def _fault(self, area: float) -> tuple[str, str] | None:
-        if area < self._least:
-            return f"too small: {area:.0f} px², at least {self._least:.0f}", "too small"
-        if self._most is not None and area > self._most:
-            return f"too large: {area:.0f} px², at most {self._most:.0f}", "too large"
-        return None
-
     def _place(self, kept: list[tuple[float, float, float]]) -> list[Detection]:
         if not kept:
             return []
@@ -253,10 +249,7 @@ class BlobDetector:
 
 
 def _centre(
-    difference: npt.NDArray[np.uint8],
-    label: npt.NDArray[np.int32],
-    index: int,
-    box: tuple[int, ...],
+    difference: Image, label: npt.NDArray[np.int32], index: int, box: tuple[int, ...]
 ) -> tuple[float, float]:
     """Return the mean place of a region, weighted by its contrast."""
     left, top, width, height = box

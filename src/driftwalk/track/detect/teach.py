@@ -12,8 +12,12 @@ import numpy as np
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.extras import require_opencv
-from driftwalk.track.detect.chroma import ChromaTables
-from driftwalk.track.detect.markers import MarkerColour, TwoColourMarker, hue_difference
+from driftwalk.track.detect.markers import (
+    ChromaTables,
+    MarkerColour,
+    TwoColourMarker,
+    hue_difference,
+)
 from driftwalk.track.detect.two_colour.discs import Disc, find_regions
 from driftwalk.track.types import Array, Image, PixelToWorld
 
@@ -278,8 +282,9 @@ def _measure(
     if number * 2 < len(pairs) or spacing < 0.8 * size or spacing > 6.0 * size:
         return None
     marker = TwoColourMarker(
-        spacing_m=_round(float(np.mean(np.array(distances)[agree]))),
-        size_m=_round(float(np.mean(np.array(diameters)[agree]))),
+        # To a hundredth of a millimetre.
+        spacing_m=round(float(np.mean(np.array(distances)[agree])), 5),
+        size_m=round(float(np.mean(np.array(diameters)[agree])), 5),
         block_side_m=block_side,
         colour_1=colours[0],
         colour_2=colours[1],
@@ -347,11 +352,6 @@ def _name(hue_rad: float) -> str:
         return abs(math.remainder(hue_rad - math.radians(degrees), 2 * math.pi))
 
     return min(_NAMES, key=lambda item: off(item[1]))[0]
-
-
-def _round(length: float) -> float:
-    """Return a length to a hundredth of a millimetre."""
-    return round(length, 5)
 
 
 def _picture(cv2: Any, image: Image, pairs: list[tuple[int, Disc, Disc]]) -> Image:

@@ -12,10 +12,8 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
-Integers = npt.NDArray[np.int64]
+from driftwalk.core.arrays import Bools, Floats, Integers
 
 
 class ExchangePolicy(NamedTuple):
@@ -87,7 +85,7 @@ def assign(cost: Floats) -> Assignment:
     return Assignment(detection, score, exchanges)
 
 
-def connected_groups(edges: npt.NDArray[np.bool_]) -> list[tuple[list[int], list[int]]]:
+def connected_groups(edges: Bools) -> list[tuple[list[int], list[int]]]:
     """Return the tracks and the detections of each connected group that has a track.
 
     Parameters

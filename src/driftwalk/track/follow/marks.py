@@ -6,12 +6,10 @@ from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats
 from driftwalk.track.follow.settings import TrackerSettings
 from driftwalk.track.follow.tracks import Track
-
-Floats = npt.NDArray[np.float64]
 
 
 class MarkPolicy(NamedTuple):

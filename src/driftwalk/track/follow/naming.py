@@ -6,15 +6,13 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats
 from driftwalk.track.follow.assign import assign
-from driftwalk.track.follow.gate import reach
+from driftwalk.track.follow.kalman import reach
 from driftwalk.track.follow.marks import MARKS, Marks
 from driftwalk.track.follow.settings import TrackerSettings
 from driftwalk.track.follow.tracks import Track
-
-Floats = npt.NDArray[np.float64]
 
 
 class Naming:

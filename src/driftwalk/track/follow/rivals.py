@@ -14,14 +14,12 @@ from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
-from driftwalk.track.follow.gate import Measured, Predicted, edge_costs
+from driftwalk.core.arrays import Floats, Integers
+from driftwalk.track.follow.kalman import Measured, edge_costs
 from driftwalk.track.follow.marks import Marks
 from driftwalk.track.follow.settings import TrackerSettings
-from driftwalk.track.follow.tracks import Rival, Track
-
-Floats = npt.NDArray[np.float64]
+from driftwalk.track.follow.tracks import Rival, Track, predicted_of
 
 
 class Rivals:
@@ -56,13 +54,7 @@ class Rivals:
         having = [(row, track.rival) for row, track in enumerate(tracks) if track.rival is not None]
         if having and len(measured.pose):
             rivals = [rival for _, rival in having]
-            predicted = Predicted(
-                np.array([rival.mean for rival in rivals]),
-                np.array([rival.covariance for rival in rivals]),
-                np.array([rival.seen_at for rival in rivals]),
-                np.array([time - rival.seen for rival in rivals]),
-                np.ones(len(rivals), dtype=bool),
-            )
+            predicted = predicted_of(rivals, time, [True] * len(rivals))
             lead = np.array([self._lead(tracks[row], rival, frame) for row, rival in having])
             cost[[row for row, _ in having]] = (
                 edge_costs(predicted, measured, self._settings) + lead[:, None]
@@ -70,12 +62,7 @@ class Rivals:
         return cost
 
     def settle(
-        self,
-        tracks: Sequence[Track],
-        detection: npt.NDArray[np.int64],
-        own: Floats,
-        rival: Floats,
-        frame: int,
+        self, tracks: Sequence[Track], detection: Integers, own: Floats, rival: Floats, frame: int
     ) -> None:
         """Settle what can be settled, before the tracks take what was assigned to them.
 
@@ -104,7 +91,7 @@ class Rivals:
                 self._seen(track, track.rival, lead, frame)
             doubtful = taken >= 0 and cost > -self._beyond_doubt
             if track.rival is None and doubtful and track.body is not None and track.key is None:
-                track.rival = _without(track, frame, -cost)
+                track.rival = track.without(frame, -cost)
 
     def _lead(self, track: Track, rival: Rival, frame: int) -> float:
         """Return the lead of a track if it is missed now."""
@@ -133,30 +120,10 @@ class Rivals:
                 self._leave_open(track, rival, frame)
 
     def _go_back(self, track: Track, rival: Rival) -> None:
-        """Make a track what it was before the measurements in doubt."""
         self._counts["taken_back"] += len(track.samples) - rival.samples
-        track.samples.keep_first(rival.samples)
-        track.mean, track.covariance, track.time = rival.mean, rival.covariance, rival.time
-        track.seen_at, track.seen, track.oriented = rival.seen_at, rival.seen, rival.oriented
-        track.lost_beside, track.rival = rival.lost_beside, None
+        track.go_back(rival)
 
     def _leave_open(self, track: Track, rival: Rival, frame: int) -> None:
         """Mark what was not settled in the time in which a body is given up."""
         self._marks.add(track, rival.since, frame, rival.score)
         track.rival = None
-
-
-def _without(track: Track, frame: int, lead: float) -> Rival:
-    """Return a track as it is before it takes a measurement."""
-    return Rival(
-        track.mean,
-        track.covariance,
-        track.time,
-        track.seen_at,
-        track.seen,
-        track.oriented,
-        dict(track.lost_beside),
-        len(track.samples),
-        frame,
-        max(lead, 0.0),
-    )

@@ -6,7 +6,16 @@ import math
 from dataclasses import dataclass
 
 from driftwalk.core.errors import ConfigurationError
-from driftwalk.track.follow.kalman import Motion
+
+
+@dataclass(frozen=True)
+class Motion:
+    """How fast velocities wander: spectral densities of the white accelerations."""
+
+    acceleration_density: float
+    """Of both directions [m^2/s^3]."""
+    angular_acceleration_density: float
+    """Of the turning [rad^2/s^3]."""
 
 
 @dataclass(frozen=True)

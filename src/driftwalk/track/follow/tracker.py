@@ -7,24 +7,32 @@ filter's state: smoothing is for later.
 
 from __future__ import annotations
 
+import json
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
+from driftwalk.schema.check import described
 from driftwalk.track.follow.assign import assign
-from driftwalk.track.follow.gate import Measured, Predicted, edge_costs
-from driftwalk.track.follow.kalman import predict, start_state, update
+from driftwalk.track.follow.kalman import STATES, Measured, edge_costs, predict, start_state, update
 from driftwalk.track.follow.marks import Marks
 from driftwalk.track.follow.naming import Naming
 from driftwalk.track.follow.rivals import Rivals
 from driftwalk.track.follow.settings import TrackerSettings
-from driftwalk.track.follow.tracks import Rival, Track, TrackState, measured_of, stacked
-from driftwalk.track.recorded import recording_of
+from driftwalk.track.follow.tracks import (
+    COVARIANCE,
+    Followed,
+    Track,
+    TrackState,
+    measured_of,
+    predicted_of,
+    stacked,
+)
 from driftwalk.track.types import Detection
 
 if TYPE_CHECKING:
@@ -32,7 +40,14 @@ if TYPE_CHECKING:
 
 __all__ = ["TrackState", "Tracker"]
 
-Floats = npt.NDArray[np.float64]
+
+class _Frame(NamedTuple):
+    """The detections of a frame, as they are and as arrays."""
+
+    number: int
+    time: float
+    found: list[Detection]
+    measured: Measured
 
 
 class Tracker:
@@ -85,14 +100,18 @@ class Tracker:
         InputError
             When time does not increase, or a detection has no position in metres.
         """
-        self._check_time(time)
+        if not math.isfinite(time):
+            raise InputError(f"the time of a frame is not a finite number: {time}")
+        if self._times and time <= self._times[-1]:
+            raise InputError(
+                f"time does not increase: a frame at {time:g} s follows one at "
+                f"{self._times[-1]:g} s; leave duplicates out"
+            )
         found = self._unique_keys(list(detections))
         self._times.append(time)
-        frame = len(self._times) - 1
-        measured = measured_of(found)
+        now = _Frame(len(self._times) - 1, time, found, measured_of(found))
         self._predict(time)
-        taken = self._assign(time, frame, found, measured)
-        self._begin(time, frame, found, measured, taken)
+        self._begin(now, self._assign(now))
         self._end(time)
         replaced = self._naming.name_new(self._tracks, self._times)
         self._over += [track for track in self._tracks if track in replaced]
@@ -124,6 +143,8 @@ class Tracker:
         InputError
             When no body was ever followed.
         """
+        from driftwalk.schema import build_trajectory
+
         names = self._naming.names
         if not names:
             raise InputError(
@@ -131,23 +152,28 @@ class Tracker:
                 f"{self.settings.confirm_after} frames in a row"
             )
         tracks = [*self._over, *self._tracks]
-        return recording_of(
+        values = np.full((len(self._times), len(names), 3 + len(COVARIANCE)), np.nan)
+        for track in tracks:
+            if track.body is not None:
+                values[track.samples.frames, track.body] = track.samples.values
+        intervals = np.diff(self._times)
+        recording = build_trajectory(
             self._times,
-            names,
-            tracks,
-            self._marks.scores(len(self._times), len(names), tracks),
-            attrs=attrs or {},
-            counts={**self.counts, **(counts or {})},
+            *(values[..., part] for part in range(3)),
+            body=list(names),
+            attrs={
+                "format": "driftwalk track",
+                "sample_rate_Hz": 1.0 / float(np.median(intervals)) if intervals.size else 0.0,
+                "position_quantum_m": 0.0,
+                "y_axis": "up",
+                **(attrs or {}),
+                "counts": json.dumps({"frames": len(self._times), **self.counts, **(counts or {})}),
+            },
         )
-
-    def _check_time(self, time: float) -> None:
-        if not math.isfinite(time):
-            raise InputError(f"the time of a frame is not a finite number: {time}")
-        if self._times and time <= self._times[-1]:
-            raise InputError(
-                f"time does not increase: a frame at {time:g} s follows one at "
-                f"{self._times[-1]:g} s; leave duplicates out"
-            )
+        ambiguous = self._marks.scores(len(self._times), len(names), tracks)
+        recording["ambiguous"] = (("time", "body"), ambiguous)
+        recording["covariance"] = (("time", "body", "part"), values[..., 3:])
+        return described(recording.assign_coords(part=("part", np.array(COVARIANCE, dtype=object))))
 
     def _unique_keys(self, found: list[Detection]) -> list[Detection]:
         """Keep the best of several detections with the same tag."""
@@ -164,7 +190,7 @@ class Tracker:
         if not self._tracks:
             return
         rivals = [track.rival for track in self._tracks if track.rival is not None]
-        both: list[Track | Rival] = [*self._tracks, *rivals]
+        both: list[Followed] = [*self._tracks, *rivals]
         elapsed = np.array([time - one.time for one in both])
         mean, covariance = predict(*stacked(both), elapsed, self.settings.motion)
         speed = np.hypot(mean[:, 3], mean[:, 4])
@@ -175,22 +201,22 @@ class Tracker:
         for track in self._tracks:
             track.measured, track.score = None, 0.0
 
-    def _assign(
-        self, time: float, frame: int, found: Sequence[Detection], measured: Measured
-    ) -> set[int]:
+    def _assign(self, now: _Frame) -> set[int]:
         """Give detections to tracks; return those that are taken."""
         if not self._tracks:
             return set()
-        tracks = self._tracks
-        cost = edge_costs(self._predicted(time, frame), measured, self.settings)
-        rival = self._rivals.costs(tracks, measured, time, frame)
-        _obey_keys(cost, tracks, found)
-        _obey_keys(rival, tracks, found)
+        tracks, frame = self._tracks, now.number
+        missed = [track.samples.last_frame < frame - 1 for track in tracks]
+        predicted = predicted_of(tracks, now.time, missed)
+        cost = edge_costs(predicted, now.measured, self.settings)
+        rival = self._rivals.costs(tracks, now.measured, now.time, frame)
+        _obey_keys(cost, tracks, now.found)
+        _obey_keys(rival, tracks, now.found)
         chosen = assign(np.minimum(cost, rival))
         self._rivals.settle(tracks, chosen.detection, cost, rival, frame)
         pairs = [(track, int(j)) for track, j in zip(tracks, chosen.detection, strict=True)]
         parted = [t for t, j in pairs if j >= 0 and t.samples.last_frame < frame - 1]
-        self._update(time, frame, [(t, j) for t, j in pairs if j >= 0], found, measured)
+        self._update(now, [(t, j) for t, j in pairs if j >= 0])
         self._marks.note_company(tracks, frame, chosen.exchanges)
         for track, score in zip(tracks, chosen.score, strict=True):
             track.score = float(score) if track.key is None else 0.0
@@ -200,94 +226,68 @@ class Tracker:
                 track.score = max(track.score, track.rival.score)
         return {j for _, j in pairs if j >= 0}
 
-    def _predicted(self, time: float, frame: int) -> Predicted:
-        return Predicted(
-            *stacked(self._tracks),
-            np.array([track.seen_at for track in self._tracks]),
-            np.array([time - track.seen for track in self._tracks]),
-            np.array([track.samples.last_frame < frame - 1 for track in self._tracks]),
-        )
-
-    def _update(
-        self,
-        time: float,
-        frame: int,
-        pairs: Sequence[tuple[Track, int]],
-        found: Sequence[Detection],
-        measured: Measured,
-    ) -> None:
+    def _update(self, now: _Frame, pairs: Sequence[tuple[Track, int]]) -> None:
         if not pairs:
             return
         tracks, at = [track for track, _ in pairs], [j for _, j in pairs]
+        measured = now.measured
         pose, noise = measured.pose[at].copy(), measured.covariance[at]
         mean, covariance = stacked(tracks)
         # An angle that cannot be is kept as it was measured, but the filter does not follow it.
         turned = np.abs(np.remainder(pose[:, 2] - mean[:, 2] + math.pi, 2 * math.pi) - math.pi)
         allowed = self.settings.gate * np.sqrt(covariance[:, 2, 2] + noise[:, 2, 2])
         pose[turned > np.maximum(allowed, 0.1), 2] = np.nan
-        covariance += self._bounced(mean, covariance, pose, noise, time, tracks)
+        elapsed = np.array([now.time - track.seen for track in tracks])
+        off, total = pose[:, :2] - mean[:, :2], covariance[:, :2, :2] + noise[:, :2, :2]
+        covariance += self._bounced(off, total, elapsed)
         mean, covariance = update(mean, covariance, pose, noise)
         for place, (track, j) in enumerate(pairs):
             track.mean, track.covariance = mean[place], covariance[place]
-            track.seen_at, track.seen = measured.pose[j, :2], time
-            track.measured = found[j]
+            track.seen_at, track.seen = measured.pose[j, :2], now.time
+            track.measured = now.found[j]
             track.oriented |= bool(np.isfinite(measured.pose[j, 2]))
-            track.samples.append(frame, measured.pose[j], measured.covariance[j])
+            track.samples.append(now.number, measured.pose[j], measured.covariance[j])
 
-    def _bounced(
-        self,
-        mean: Floats,
-        covariance: Floats,
-        pose: Floats,
-        noise: Floats,
-        time: float,
-        tracks: Sequence[Track],
-    ) -> Floats:
-        """Return what to add to the covariance of tracks that were pushed: any velocity."""
-        total = covariance[:, :2, :2] + noise[:, :2, :2]
-        off = pose[:, :2] - mean[:, :2]
+    def _bounced(self, off: Floats, total: Floats, elapsed: Floats) -> Floats:
+        """Return what to add to the covariance of tracks that were pushed: any velocity.
+
+        They are `off` their predictions, which have the covariance `total`.
+        """
         square = np.einsum("ni,ni->n", off, np.linalg.solve(total, off[..., None])[..., 0])
         # This far from the prediction [standard deviations], a body was pushed.
         std = self.settings.speed_std * (square > 3.5**2)
-        elapsed = np.array([time - track.seen for track in tracks])
-        added = np.zeros_like(covariance)
+        added = np.zeros((len(off), STATES, STATES))
         for axis in range(2):
             added[:, axis, axis] = (std * elapsed) ** 2
             added[:, axis, axis + 3] = added[:, axis + 3, axis] = std**2 * elapsed
             added[:, axis + 3, axis + 3] = std**2
         return added
 
-    def _begin(
-        self,
-        time: float,
-        frame: int,
-        found: Sequence[Detection],
-        measured: Measured,
-        taken: set[int],
-    ) -> None:
+    def _begin(self, now: _Frame, taken: set[int]) -> None:
         """Begin a track at each detection that is left."""
-        left = [j for j in range(len(found)) if j not in taken]
+        left = [j for j in range(len(now.found)) if j not in taken]
         if not left:
             return
+        poses, covariances = now.measured.pose[left], now.measured.covariance[left]
         mean, covariance = start_state(
-            measured.pose[left],
-            measured.covariance[left],
+            poses,
+            covariances,
             speed_std=self.settings.speed_std,
             turn_rate_std=self.settings.turn_rate_std,
         )
         for place, j in enumerate(left):
             track = Track(
-                mean[place],
-                covariance[place],
-                time,
-                measured.pose[j, :2],
-                time,
-                frame,
-                found[j].key,
-                measured=found[j],
-                oriented=bool(np.isfinite(measured.pose[j, 2])),
+                mean=mean[place],
+                covariance=covariance[place],
+                time=now.time,
+                seen_at=poses[place, :2],
+                seen=now.time,
+                began=now.number,
+                key=now.found[j].key,
+                measured=now.found[j],
+                oriented=bool(np.isfinite(poses[place, 2])),
             )
-            track.samples.append(frame, measured.pose[j], measured.covariance[j])
+            track.samples.append(now.number, poses[place], covariances[place])
             self._tracks.append(track)
 
     def _end(self, time: float) -> None:

@@ -1,20 +1,22 @@
-"""Track state of each body."""
+"""Tracks: the state and the samples of each body, and what it may go back to."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Final, NamedTuple
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
-from driftwalk.track.follow.gate import Measured
+from driftwalk.track.follow.kalman import Measured, Predicted
 from driftwalk.track.types import Detection
 
-Floats = npt.NDArray[np.float64]
+if TYPE_CHECKING:
+    pass
+
 
 COVARIANCE: Final = ("xx", "xy", "yy", "xtheta", "ytheta", "thetatheta")
 """The parts of the covariance of a measurement, in the order in which they are kept."""
@@ -62,7 +64,7 @@ class Samples:
         return self._count
 
     @property
-    def frames(self) -> npt.NDArray[np.int64]:
+    def frames(self) -> Integers:
         """Their frames, shape (n,)."""
         return self._frames[: self._count]
 
@@ -102,18 +104,30 @@ class Samples:
         self._count -= count
 
 
-@dataclass
-class Rival:
-    """State of a track without its last measurements."""
+@dataclass(eq=False, kw_only=True)
+class Followed:
+    """State of a body; a track goes back to an earlier one where a measurement was wrong."""
 
     mean: Floats
+    """The filter's x, y [m], theta [rad] and their rates [m/s, rad/s], shape (6,)."""
     covariance: Floats
+    """Its covariance, shape (6, 6)."""
     time: float
-    """Of mean and covariance."""
+    """Of mean and covariance [s]."""
     seen_at: Floats
+    """Position last measured [m], shape (2,)."""
     seen: float
+    """When that was [s]."""
     oriented: bool
-    lost_beside: dict[Track, int]
+    """Whether its angle was ever measured."""
+    lost_beside: dict[Track, int] = field(default_factory=dict)
+    """Tracks that were near when it was seen last, each with the frame since when."""
+
+
+@dataclass(eq=False, kw_only=True)
+class Rival(Followed):
+    """State of a track without its last measurements."""
+
     samples: int
     """How many samples of the track are its own."""
     since: int
@@ -127,25 +141,14 @@ class Rival:
         return math.exp(-max(self.lead, 0.0))
 
 
-@dataclass(eq=False)
-class Track:
+@dataclass(eq=False, kw_only=True)
+class Track(Followed):
     """A body that is followed, or a candidate for one."""
 
-    mean: Floats
-    """The filter's x, y [m], theta [rad] and their rates [m/s, rad/s], shape (6,)."""
-    covariance: Floats
-    """Its covariance, shape (6, 6)."""
-    time: float
-    """Of mean and covariance [s]."""
-    seen_at: Floats
-    """Position last measured [m], shape (2,)."""
-    seen: float
-    """When that was [s]."""
     began: int
     """Frame of the first sample."""
     key: str | None = None
     body: int | None = None
-    oriented: bool = False
     score: float = 0.0
     measured: Detection | None = None
     samples: Samples = field(default_factory=Samples)
@@ -155,17 +158,35 @@ class Track:
     """Measurements after which an assignment that was in doubt has settled."""
     company: dict[Track, int] = field(default_factory=dict)
     """Tracks that are near now, each with the frame since when."""
-    lost_beside: dict[Track, int] = field(default_factory=dict)
-    """Tracks that were near when it was seen last."""
     rival: Rival | None = None
     """State before a measurement that is in doubt."""
 
+    def without(self, frame: int, lead: float) -> Rival:
+        """Return the track as it is before it takes a measurement."""
+        state: dict[str, Any] = {one.name: getattr(self, one.name) for one in fields(Followed)}
+        state["lost_beside"] = dict(self.lost_beside)
+        return Rival(**state, samples=len(self.samples), since=frame, lead=max(lead, 0.0))
 
-def stacked(tracks: Sequence[Track | Rival]) -> tuple[Floats, Floats]:
+    def go_back(self, rival: Rival) -> None:
+        """Make the track what it was before the measurements in doubt."""
+        for one in fields(Followed):
+            setattr(self, one.name, getattr(rival, one.name))
+        self.samples.keep_first(rival.samples)
+        self.rival = None
+
+
+def stacked(bodies: Sequence[Followed]) -> tuple[Floats, Floats]:
     """Return means (n, 6) and covariances (n, 6, 6)."""
-    return (
-        np.array([track.mean for track in tracks]),
-        np.array([track.covariance for track in tracks]),
+    return np.array([one.mean for one in bodies]), np.array([one.covariance for one in bodies])
+
+
+def predicted_of(bodies: Sequence[Followed], time: float, missed: Sequence[bool]) -> Predicted:
+    """Return bodies as arrays, at a time; `missed` says which were not in the frame before."""
+    return Predicted(
+        *stacked(bodies),
+        np.array([one.seen_at for one in bodies]),
+        np.array([time - one.seen for one in bodies]),
+        np.array(missed),
     )
 
 

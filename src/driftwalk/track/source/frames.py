@@ -10,16 +10,19 @@ import csv
 import dataclasses
 import math
 import os
-from collections.abc import Iterator
+import threading
+import time as clock
+from bisect import bisect_right, insort
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import Any, Final, NamedTuple, Protocol
+from urllib.parse import urlsplit, urlunsplit
 
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.extras import read_image, require_opencv
-from driftwalk.track.source.gaps import FrameGaps
 from driftwalk.track.types import Frame, Image
 
 _IMAGES: Final = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
@@ -75,6 +78,70 @@ class FrameSource(Protocol):
 
     def close(self) -> None:
         """Let go of the file or the camera."""
+
+
+class FrameGapPolicy(NamedTuple):
+    """When a frame is missing between two."""
+
+    long: float = 1.5
+    """Usual gaps that one has to last for a frame to be missing in it; chosen by hand."""
+    learnt: int = 8
+    """Gaps that teach the usual one; before them no frame is missing; chosen by hand."""
+    same: float = 0.01
+    """Relative change of the usual gap above which all gaps are counted again; chosen by hand."""
+
+
+_GAPS: Final = FrameGapPolicy()
+
+
+class FrameGaps:
+    """The times between frames.
+
+    Frames that are missing are counted with each gap, by the usual gap up to then. When the usual
+    gap turns out to be another one, all are counted again; ``settle`` does so at the end.
+
+    Examples
+    --------
+    >>> gaps = FrameGaps()
+    >>> for gap in [0.1] * 8 + [0.3]:
+    ...     gaps.add(gap)
+    >>> gaps.missing
+    2
+    """
+
+    def __init__(self) -> None:
+        self._sorted: list[float] = []
+        self._counted_by = 0.0
+        self.missing = 0
+
+    @property
+    def usual(self) -> float:
+        """The median of the gaps [s]; 0 where there is none."""
+        number = len(self._sorted)
+        if not number:
+            return 0.0
+        return (self._sorted[(number - 1) // 2] + self._sorted[number // 2]) / 2
+
+    def add(self, gap: float) -> None:
+        """Take in the time between a frame and the one before [s], above zero."""
+        insort(self._sorted, gap)
+        if len(self._sorted) < _GAPS.learnt:
+            return
+        usual = self.usual
+        if abs(usual - self._counted_by) > _GAPS.same * self._counted_by:
+            self._count_anew(usual)
+        elif gap > _GAPS.long * self._counted_by:
+            self.missing += round(gap / self._counted_by) - 1
+
+    def settle(self) -> None:
+        """Count by the usual one of all gaps; one gap alone says nothing."""
+        if len(self._sorted) > 1:
+            self._count_anew(self.usual)
+
+    def _count_anew(self, usual: float) -> None:
+        long = self._sorted[bisect_right(self._sorted, _GAPS.long * usual) :]
+        self.missing = sum(round(gap / usual) - 1 for gap in long)
+        self._counted_by = usual
 
 
 class FrameFilter:
@@ -139,7 +206,16 @@ class FrameFilter:
             self._counts.dropped = self._gaps.missing
 
 
-class VideoFile:
+class _Source:
+    """The fields of every source."""
+
+    def __init__(self, name: str) -> None:
+        self.name, self.counts = name, FrameCounts()
+        self.interrupted: str | None = None
+        self.waited_s = 0.0
+
+
+class VideoFile(_Source):
     """A video file, read once from its start.
 
     Parameters
@@ -157,10 +233,7 @@ class VideoFile:
 
     def __init__(self, path: str | Path, *, keep_stale: bool = False) -> None:
         cv2 = require_opencv()
-        self.name = str(path)
-        self.counts = FrameCounts()
-        self.interrupted: str | None = None
-        self.waited_s = 0.0
+        super().__init__(str(path))
         self._keep_stale = keep_stale
         if not Path(path).exists():
             raise FormatError("no such video", path=path)
@@ -224,7 +297,7 @@ class VideoFile:
         return f"{self.name} ends after {frames} frames, at {end:.1f} s of {duration:.1f} s"
 
 
-class ImageSequence:
+class ImageSequence(_Source):
     """Images in a folder, in the order of their names.
 
     Parameters
@@ -246,10 +319,7 @@ class ImageSequence:
         self, folder: str | Path, *, rate: float | None = None, keep_stale: bool = False
     ) -> None:
         require_opencv()
-        self.name = str(folder)
-        self.counts = FrameCounts()
-        self.interrupted: str | None = None
-        self.waited_s = 0.0
+        super().__init__(str(folder))
         self._keep_stale = keep_stale
         self._files = _timed_images(Path(folder), rate)
 
@@ -267,6 +337,141 @@ class ImageSequence:
 
     def close(self) -> None:
         """Do nothing: no file stays open."""
+
+
+class LiveCamera(_Source):
+    """Frames of a camera as they come; the newest one when the work takes longer than a frame.
+
+    A frame's time is counted from the first frame. When the camera disappears, the iteration ends,
+    and ``interrupted`` says so: what came before is complete.
+
+    Parameters
+    ----------
+    capture : object
+        Has ``read()`` as `cv2.VideoCapture` has it, and ``release()``.
+    name : str
+        For messages.
+    patience : float
+        How long to wait for a frame before the camera counts as gone [s].
+    now : callable
+        The clock [s].
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> class OneFrame:
+    ...     left = [np.zeros((4, 6, 3), np.uint8)]
+    ...     def read(self):
+    ...         return (True, self.left.pop()) if self.left else (False, None)
+    ...     def release(self):
+    ...         pass
+    >>> camera = LiveCamera(OneFrame(), "camera:0")
+    >>> [frame.image.shape for frame in camera], camera.interrupted
+    ([(4, 6, 3)], 'camera:0 stopped after 1 frame')
+    """
+
+    def __init__(
+        self,
+        capture: Any,
+        name: str,
+        *,
+        patience: float = 5.0,
+        now: Callable[[], float] = clock.monotonic,
+    ) -> None:
+        super().__init__(name)
+        self._capture, self._patience, self._now = capture, patience, now
+        self._changed = threading.Condition()
+        self._newest: tuple[int, float, Any] | None = None
+        self._taken = self._read = 0
+        self._gone = self._stop = False
+        self._thread = threading.Thread(target=self._reading, name=f"reads {name}", daemon=True)
+
+    @classmethod
+    def open(cls, text: str) -> LiveCamera:
+        """Open a camera by number, ``camera:0``, or by address, ``camera:rtsp://...``.
+
+        Raises
+        ------
+        InputError
+            When there is none.
+        """
+        cv2 = require_opencv()
+        _, _, which = text.partition(":")
+        capture = open_capture(int(which) if which.isdigit() else which)
+        if not capture.isOpened():
+            raise InputError(f"{public_name(text)}: no such camera, or another program uses it")
+        # A queue in the driver would hand out old frames.
+        capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
+        return cls(capture, public_name(text))
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Yield the newest frame each time."""
+        keep = FrameFilter(self.name, self.counts)
+        first: float | None = None
+        self._thread.start()
+        try:
+            while (newest := self._next()) is not None:
+                index, time, image = newest
+                first = time if first is None else first
+                frame = keep.accept(index, time - first, image)
+                if frame is not None:
+                    self.waited_s = self._now() - time
+                    yield frame
+        finally:
+            self.close()
+        number = f"{self._read} frame{'' if self._read == 1 else 's'}"
+        self.interrupted = f"{self.name} stopped after {number}"
+
+    def close(self) -> None:
+        """Let go of the camera."""
+        self._stop = True
+        if self._thread.is_alive():
+            self._thread.join(timeout=self._patience)
+        # To release a camera that a thread still reads from could end the whole program.
+        if not self._thread.is_alive():
+            self._capture.release()
+
+    def _reading(self) -> None:
+        while not self._stop:
+            read, image = self._capture.read()
+            time = self._now()
+            with self._changed:
+                if not read:
+                    self._gone = True
+                    self._changed.notify()
+                    return
+                if self._newest is not None:
+                    self.counts.dropped += 1
+                self._newest = (self._read, time, image)
+                self._read += 1
+                self._changed.notify()
+
+    def _next(self) -> tuple[int, float, Any] | None:
+        """Return the newest frame, waiting for it; None when the camera is gone."""
+        with self._changed:
+            self._changed.wait_for(
+                lambda: self._newest is not None or self._gone, timeout=self._patience
+            )
+            newest, self._newest = self._newest, None
+            return newest
+
+
+def public_name(text: str) -> str:
+    """Return the name of a camera without the password that its address may hold.
+
+    Examples
+    --------
+    >>> public_name("camera:rtsp://me:secret@192.0.2.7:554/stream?key=1")
+    'camera:rtsp://192.0.2.7:554/stream'
+    >>> public_name("camera:0")
+    'camera:0'
+    """
+    kind, _, address = text.partition(":")
+    parts = urlsplit(address)
+    if not parts.netloc:
+        return text
+    host = parts.netloc.rpartition("@")[2]
+    return f"{kind}:{urlunsplit((parts.scheme, host, parts.path, '', ''))}"
 
 
 def open_capture(source: str | int) -> Any:
@@ -336,6 +541,6 @@ def _three_channels(image: Any) -> Image:
 
 
 def _same(first: Image, second: Image) -> bool:
-    # Every sixteenth pixel is enough to see that a frame is repeated.
+    # Every sixteenth pixel is enough to see that most frames are not repeated.
     coarse = np.s_[::16, ::16]
     return np.array_equal(first[coarse], second[coarse]) and np.array_equal(first, second)

@@ -11,11 +11,11 @@ from driftwalk.core.extras import require_opencv
 from driftwalk.track.source.frames import (
     FrameSource,
     ImageSequence,
+    LiveCamera,
     VideoFile,
     images_in,
     open_capture,
 )
-from driftwalk.track.source.live_camera import LiveCamera
 from driftwalk.track.types import Image
 
 
@@ -49,19 +49,14 @@ def sample_images(
     Traceback (most recent call last):
     driftwalk.core.errors.FormatError: no/such/video.mp4: no such video
     """
-    total = frame_count(source)
-    if str(source).startswith("camera:"):
-        stride = 5
-    elif total is None or total <= number:
-        stride = 1
+    total = frame_count(source) or 0
+    # Of a camera every fifth frame: those in between show much the same.
+    stride = 5 if str(source).startswith("camera:") else max(1, total // number)
     # Seeking is quicker than reading 50 frames between two samples.
-    elif Path(source).is_file() and total > 50 * number:
+    if total > 50 * number and Path(source).is_file():
         found = _by_seeking(source, total, number)
         if found:
             return found
-        stride = total // number
-    else:
-        stride = total // number
     opened = open_source(source, rate=rate)
     with contextlib.closing(opened):
         images = [frame.image for frame in islice(iter(opened), 0, stride * number, stride)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time as clock
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
@@ -12,11 +11,9 @@ import numpy as np
 from driftwalk.motion import MotionModel, known_values
 from driftwalk.schema import Parameter
 from driftwalk.viewer.play.bodies import MovingBodies
-from driftwalk.viewer.play.motion import INTERVAL_S, MotionWindow, beside
-from driftwalk.viewer.play.playground import ANGLE_DIGITS, POSITION_DIGITS, flow_arrows
+from driftwalk.viewer.play.motion import INTERVAL_S
 from driftwalk.viewer.play.playground_base import Playground
 from driftwalk.viewer.play.settings import SPEED, Knob
-from driftwalk.viewer.shell import page_frame
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -68,6 +65,12 @@ class ModelPlaySource(Playground):
     ['speed', 'rotational diffusion', 'turn rate', 'bodies', 'speed of the clock']
     """
 
+    controls_note = (
+        "After a change the bodies go on from where they are. A bout of the motion, such as a "
+        "rest, begins again then."
+    )
+    density_note = "Under the present settings."
+
     def __init__(
         self,
         model: MotionModel,
@@ -79,15 +82,13 @@ class ModelPlaySource(Playground):
         body: str | None = None,
         seed: int = 1,
     ) -> None:
-        self.model, self._study = model, study
-        self._arrows = None if flow is None else flow_arrows(flow)
-        self._recording = None if recording is None else beside(recording, study, body=body)
+        self.model = model
         middle = {one.name: float(one.value_at(0.5)) for one in model.parameters}
         begin = known_values(model, {**middle, **values})
         knobs = {PARAMETER + one.name: _knob(one, begin[one.name]) for one in model.parameters}
         knobs["bodies"] = Knob("bodies", "bodies", "1", 1, MOST_BODIES, 1, whole=True)
         knobs["speed"] = Knob(**{**vars(SPEED), "label": "speed of the clock"})
-        super().__init__(MotionWindow(self._recording, seed=seed), knobs, seed=seed)
+        super().__init__(study, flow, knobs, recording=recording, body=body, seed=seed)
         interval = INTERVAL_S if self._recording is None else self._motion.interval
         self.bodies = MovingBodies(
             model, begin, study, flow, bodies=BODIES, interval=interval, seed=seed
@@ -133,61 +134,31 @@ class ModelPlaySource(Playground):
 
     def _tank_message(self) -> dict[str, Any]:
         x, y, theta = self.bodies.place(self._left / self.bodies.sample_s)
-        known = np.round(theta, ANGLE_DIGITS).tolist()
-        return {
-            "type": "tank",
-            "time_s": self.time,
-            "speed": self._pace_now(),
-            "paused": self._paused,
-            "x": np.round(x, POSITION_DIGITS).tolist(),
-            "y": np.round(y, POSITION_DIGITS).tolist(),
-            "theta": [angle if math.isfinite(angle) else None for angle in known],
-            "assembly": list(range(x.size)),
-            "waiting": 0,
-            "outcome": None,
-            "counts": {},
-            "flow_scale": 1.0,
-        }
+        return self._tank_now(
+            x,
+            y,
+            theta,
+            assembly=list(range(x.size)),
+            waiting=0,
+            outcome=None,
+            counts={},
+            flow_scale=1.0,
+        )
 
-    def _controls(self) -> dict[str, Any]:
+    def _values(self) -> Mapping[str, Any]:
         values = {PARAMETER + name: one for name, one in self.bodies.values.items()}
-        values |= {"bodies": self.bodies.count, "speed": self._speed}
-        return {
-            "id": "controls",
-            "kind": "controls",
-            "title": "Settings",
-            "note": "After a change the bodies go on from where they are. A bout of the motion, "
-            "such as a rest, begins again then.",
-            "items": [knob.item(values[name]) for name, knob in self._knobs.items()],
-        }
+        return values | {"bodies": self.bodies.count, "speed": self._speed}
 
-    def _page(self) -> dict[str, Any]:
-        study, recording = self._study, self._recording
-        tank = {
-            "id": "tank",
-            "kind": "tank",
-            "title": "The tank",
-            "note": None,
-            "arena": study.tank.to_arena(),
-            "side": DOT_SHARE * max(study.tank.extent_m),
+    def _subtitle(self) -> str:
+        return f"{self.model.name} in a {self._study.tank.describe()}"
+
+    def _bodies(self) -> dict[str, Any]:
+        return {
+            "side": DOT_SHARE * max(self._study.tank.extent_m),
             "blocks": self.bodies.count,
-            "flow": self._arrows,
             "shape": "dot",
             "trail_s": TRAIL_S,
         }
-        density = {
-            "id": "density",
-            "kind": "density",
-            "title": "Step length and turning angle",
-            "note": "Under the present settings.",
-            "recording": None if recording is None else recording.steps.name,
-        }
-        return page_frame(
-            self.view,
-            self.title,
-            subtitle=f"{self.model.name} in a {study.tank.describe()}",
-            sections=[tank, self._controls(), density],
-        )
 
 
 def _knob(one: Parameter, value: float) -> Knob:

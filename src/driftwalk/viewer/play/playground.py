@@ -8,16 +8,11 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
-import numpy as np
-import numpy.typing as npt
-
 from driftwalk.assembly import LiveTank
-from driftwalk.page import encode_array
-from driftwalk.viewer.play.motion import MotionWindow, beside
+from driftwalk.core.arrays import Floats
 from driftwalk.viewer.play.playground_base import Playground
-from driftwalk.viewer.play.settings import controls_section, knobs_for, most_blocks_in, values_of
+from driftwalk.viewer.play.settings import knobs_for, most_blocks_in, values_of
 from driftwalk.viewer.play.stream import frame_line
-from driftwalk.viewer.shell import page_frame
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,15 +20,10 @@ if TYPE_CHECKING:
     from driftwalk.assembly.live_world import LiveEvent
     from driftwalk.model import Study
 
-Floats = npt.NDArray[np.float64]
-
 STREAM_FRAME_S: Final = 1.0 / 30.0
 """Time between two lines of the stream [s]."""
 ROUNDING: Final = 1e-6
 """Share of a time step within which an instant is that of the step's end."""
-FLOW_ARROWS: Final = 25
-POSITION_DIGITS: Final = 5
-ANGLE_DIGITS: Final = 4
 
 
 class Stream(Protocol):
@@ -75,6 +65,12 @@ class PlaySource(Playground):
     ['tank', 'controls', 'density']
     """
 
+    controls_note = (
+        "A change takes effect at the next draw of the stochastic force. Without latching, joined "
+        "blocks separate too."
+    )
+    density_note = "For single blocks, under the present settings."
+
     def __init__(
         self,
         study: Study,
@@ -86,10 +82,8 @@ class PlaySource(Playground):
         seed: int = 1,
     ) -> None:
         self.tank = LiveTank(study, flow, blocks=blocks, seed=seed)
-        self._arrows = flow_arrows(flow)
-        self._recording = None if recording is None else beside(recording, study, body=body)
         knobs = knobs_for(self.tank, most_blocks=most_blocks_in(self.tank))
-        super().__init__(MotionWindow(self._recording, seed=seed), knobs, seed=seed)
+        super().__init__(study, flow, knobs, recording=recording, body=body, seed=seed)
         self._stream: Stream | None = None
         self._frames = 0
         self._next_line = 0.0
@@ -171,78 +165,25 @@ class PlaySource(Playground):
             self._next_line = now + STREAM_FRAME_S
 
     def _tank_message(self) -> dict[str, Any]:
-        tank = self.tank
-        outcome = tank.outcome
-        return {
-            "type": "tank",
-            "time_s": tank.time,
-            "speed": self._pace_now(),
-            "paused": self._paused,
-            "x": np.round(tank.x, POSITION_DIGITS).tolist(),
-            "y": np.round(tank.y, POSITION_DIGITS).tolist(),
-            "theta": np.round(tank.theta, ANGLE_DIGITS).tolist(),
-            "assembly": tank.assembly.tolist(),
-            "waiting": tank.waiting,
-            "outcome": outcome,
-            "counts": Counter(outcome.split("+")),
-            "flow_scale": tank.flow_scale,
-        }
-
-    def _controls(self) -> dict[str, Any]:
-        return controls_section(self._knobs, values_of(self.tank, speed=self._speed))
-
-    def _page(self) -> dict[str, Any]:
-        study = self.tank.study
-        recording = self._recording
-        tank = {
-            "id": "tank",
-            "kind": "tank",
-            "title": "The tank",
-            "note": None,
-            "arena": study.tank.to_arena(),
-            "side": study.block.side_m,
-            "blocks": study.assembly.blocks,
-            "flow": self._arrows,
-        }
-        density = {
-            "id": "density",
-            "kind": "density",
-            "title": "Step length and turning angle",
-            "note": "For single blocks, under the present settings.",
-            "recording": None if recording is None else recording.steps.name,
-        }
-        return page_frame(
-            self.view,
-            self.title,
-            subtitle=f"{study.tank.describe()}, blocks of {100.0 * study.block.side_m:g} cm",
-            sections=[tank, self._controls(), density],
+        tank, outcome = self.tank, self.tank.outcome
+        return self._tank_now(
+            tank.x,
+            tank.y,
+            tank.theta,
+            assembly=tank.assembly.tolist(),
+            waiting=tank.waiting,
+            outcome=outcome,
+            counts=Counter(outcome.split("+")),
+            flow_scale=tank.flow_scale,
         )
 
+    def _values(self) -> Mapping[str, Any]:
+        return values_of(self.tank, speed=self._speed)
 
-def flow_arrows(flow: xr.Dataset) -> dict[str, Any] | None:
-    """Return a flow as arrows for the tank, thinned to 25 x 25; None for one that changes in time.
+    def _subtitle(self) -> str:
+        study = self.tank.study
+        return f"{study.tank.describe()}, blocks of {100.0 * study.block.side_m:g} cm"
 
-    Parameters
-    ----------
-    flow : xarray.Dataset
-        A `flow_field`.
-
-    Examples
-    --------
-    >>> from driftwalk.flow import uniform_flow
-    >>> len(flow_arrows(uniform_flow(0.1, 0.0))["x"])
-    25
-    """
-    if flow["u"].dims != ("y", "x"):
-        return None
-    thin: Mapping[str, Any] = {
-        name: np.unique(np.linspace(0, flow.sizes[name] - 1, FLOW_ARROWS).round().astype(int))
-        for name in ("x", "y")
-    }
-    part = flow.isel(thin)
-    return {
-        "x": part["x"].values.tolist(),
-        "y": part["y"].values.tolist(),
-        "u": encode_array(part["u"].values),
-        "v": encode_array(part["v"].values),
-    }
+    def _bodies(self) -> dict[str, Any]:
+        study = self.tank.study
+        return {"side": study.block.side_m, "blocks": study.assembly.blocks}

@@ -12,16 +12,31 @@ import threading
 import time as clock
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
+
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import DriftwalkError, InputError
+from driftwalk.core.text.json_text import json_value
+from driftwalk.page import encode_array
+from driftwalk.page.html import page_frame
+from driftwalk.page.parts import section
 from driftwalk.viewer.hub import Content, Publish, Source
-from driftwalk.viewer.play.motion import MotionWindow
+from driftwalk.viewer.play.motion import MotionWindow, beside
 from driftwalk.viewer.play.settings import Knob
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
 
 FRAME_S: Final = 1.0 / 60.0
 """Time between two pictures of the tank [s]."""
 DENSITY_S: Final = 0.5
+FLOW_ARROWS: Final = 25
+POSITION_DIGITS: Final = 5
+ANGLE_DIGITS: Final = 4
 SETTLED_S: Final = 0.3
 """Time after the last change of a setting at which all browsers receive the values in force [s]."""
 LONGEST_ADVANCE_S: Final = 0.1
@@ -42,19 +57,39 @@ class Playground(Source):
 
     Parameters
     ----------
-    motion : MotionWindow
-        Takes the positions, and compares their steps.
+    study : Study
+        Tank, start and observation.
+    flow : xarray.Dataset or None
+        The water's velocity, drawn as arrows.
     knobs : mapping of str to Knob
         The settings, among them the speed.
+    recording : xarray.Dataset or None
+        A `trajectory` whose steps those of the bodies are compared with.
+    body : str or None
+        Its body, where it has several.
     seed : int
         Of the first world; each restart takes the next.
     """
 
     view = "play"
     title = "Playground"
+    controls_note: str
+    density_note: str
 
-    def __init__(self, motion: MotionWindow, knobs: Mapping[str, Knob], *, seed: int) -> None:
-        self._motion, self._knobs = motion, dict(knobs)
+    def __init__(
+        self,
+        study: Study,
+        flow: xr.Dataset | None,
+        knobs: Mapping[str, Knob],
+        *,
+        recording: xr.Dataset | None,
+        body: str | None,
+        seed: int,
+    ) -> None:
+        self._study, self._knobs = study, dict(knobs)
+        self._arrows = None if flow is None else flow_arrows(flow)
+        self._recording = None if recording is None else beside(recording, study, body=body)
+        self._motion = MotionWindow(self._recording, seed=seed)
         self._seed, self._speed, self._paused = seed, 1.0, False
         self._settled = math.inf
         self._pace: deque[tuple[float, float]] = deque()
@@ -204,13 +239,87 @@ class Playground(Source):
         """Do what there is to do after a picture, at a time of the clock."""
 
     def _tank_message(self) -> dict[str, Any]:
-        """Return the world as it is now."""
+        """Return the world as it is now, see `_tank_now`."""
+        raise NotImplementedError
+
+    def _tank_now(self, x: Floats, y: Floats, theta: Floats, **more: Any) -> dict[str, Any]:
+        """Return the message on poses [m, m, rad]; `more` holds what else the page shows."""
+        return {
+            "type": "tank",
+            "time_s": self.time,
+            "speed": self._pace_now(),
+            "paused": self._paused,
+            "x": np.round(x, POSITION_DIGITS).tolist(),
+            "y": np.round(y, POSITION_DIGITS).tolist(),
+            "theta": json_value(np.round(theta, ANGLE_DIGITS)),
+            **more,
+        }
+
+    def _values(self) -> Mapping[str, Any]:
+        """Return what every knob stands at."""
         raise NotImplementedError
 
     def _controls(self) -> dict[str, Any]:
         """Return the section with the knobs and what they stand at."""
-        raise NotImplementedError
+        values = self._values()
+        items = [knob.item(values[name]) for name, knob in self._knobs.items()]
+        return section("controls", "controls", "Settings", self.controls_note, items=items)
 
     def _page(self) -> dict[str, Any]:
         """Return the whole page."""
+        recording = None if self._recording is None else self._recording.steps.name
+        title = "Step length and turning angle"
+        return page_frame(
+            self.view,
+            self.title,
+            subtitle=self._subtitle(),
+            sections=[
+                section(
+                    "tank",
+                    "tank",
+                    "The tank",
+                    arena=self._study.tank.to_arena(),
+                    flow=self._arrows,
+                    **self._bodies(),
+                ),
+                self._controls(),
+                section("density", "density", title, self.density_note, recording=recording),
+            ],
+        )
+
+    def _subtitle(self) -> str:
+        """Return what moves where."""
         raise NotImplementedError
+
+    def _bodies(self) -> dict[str, Any]:
+        """Return how many bodies of which size and look the section on the tank has."""
+        raise NotImplementedError
+
+
+def flow_arrows(flow: xr.Dataset) -> dict[str, Any] | None:
+    """Return a flow as arrows for the tank, thinned to 25 x 25; None for one that changes in time.
+
+    Parameters
+    ----------
+    flow : xarray.Dataset
+        A `flow_field`.
+
+    Examples
+    --------
+    >>> from driftwalk.flow import uniform_flow
+    >>> len(flow_arrows(uniform_flow(0.1, 0.0))["x"])
+    25
+    """
+    if flow["u"].dims != ("y", "x"):
+        return None
+    thin: Mapping[str, Any] = {
+        name: np.unique(np.linspace(0, flow.sizes[name] - 1, FLOW_ARROWS).round().astype(int))
+        for name in ("x", "y")
+    }
+    part = flow.isel(thin)
+    return {
+        "x": part["x"].values.tolist(),
+        "y": part["y"].values.tolist(),
+        "u": encode_array(part["u"].values),
+        "v": encode_array(part["v"].values),
+    }

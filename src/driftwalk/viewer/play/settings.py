@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, Self
 
@@ -139,18 +138,6 @@ def values_of(tank: LiveTank, *, speed: float) -> dict[str, Any]:
         "latching": rules.latching,
         "hidden_face_drag": rules.hidden_face_drag,
         "speed": speed,
-    }
-
-
-def controls_section(knobs: Mapping[str, Knob], values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the section with the knobs."""
-    return {
-        "id": "controls",
-        "kind": "controls",
-        "title": "Settings",
-        "note": "A change takes effect at the next draw of the stochastic force. "
-        "Without latching, joined blocks separate too.",
-        "items": [knob.item(values[name]) for name, knob in knobs.items()],
     }
 
 

@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from driftwalk.assembly import class_cells, outcome_distribution, world_class
+from driftwalk.assembly import outcome_distribution, world_class
+from driftwalk.page.parts import section
+from driftwalk.page.sections.outcomes import cells_of
 from driftwalk.simulation.backend import BROKEN
-from driftwalk.viewer.watch.live_run_page import NO_CELL, Section
+from driftwalk.viewer.watch.run_page import NO_CELL, Section
 from driftwalk.viewer.watch.shards import FinishedUnit, RunReader
 
 if TYPE_CHECKING:
@@ -56,20 +58,20 @@ class RunningAssembly:
         """Return the proportions of the classes up to now."""
         confidence = self._study.assembly.confidence
         return [
-            {
-                "id": "classes",
-                "kind": "classes",
-                "title": "Structures built so far",
-                "note": "For the runs that have ended; the bars are simultaneous intervals with "
+            section(
+                "classes",
+                "classes",
+                "Structures built so far",
+                "For the runs that have ended; the bars are simultaneous intervals with "
                 f"{100.0 * confidence:g} % confidence.",
-                "confidence": confidence,
-                "runs": self._runs["fixed"],
-                "series": [
+                confidence=confidence,
+                runs=self._runs["fixed"],
+                series=[
                     {"name": self._names[name], "items": _items(count, confidence)}
                     for name, count in self._count.items()
                     if count
                 ],
-            }
+            )
         ]
 
     def state(self) -> tuple[float | None, str]:
@@ -108,7 +110,7 @@ def _items(count: Mapping[str, int], confidence: float) -> list[dict[str, Any]]:
     items = [
         {
             "class": name,
-            "cells": [cells.tolist() for cells in class_cells(name)],
+            "cells": cells_of(name),
             "count": number,
             "share": share,
             "low": low,

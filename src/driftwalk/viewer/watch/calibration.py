@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -15,8 +16,8 @@ from driftwalk.core.files.run_layout import run_file
 from driftwalk.core.run_stages import CALIBRATION_STAGES, MORE, share_of_map, share_of_windows
 from driftwalk.page import bootstrap_section, encode_array, map_section, profile_sections
 from driftwalk.schema import Parameter
-from driftwalk.schema.calibration import BLOCK
-from driftwalk.viewer.watch.live_run_page import NO_CELL, Section
+from driftwalk.schema.parameters import BLOCK
+from driftwalk.viewer.watch.run_page import NO_CELL, Section
 from driftwalk.viewer.watch.shards import FinishedUnit, RunReader
 
 if TYPE_CHECKING:
@@ -68,28 +69,6 @@ class SettingsMap:
             self.details[unit.start + row] = {name: kept[name][row] for name in kept}
 
 
-class MoreReplicates:
-    """How many of the settings that get more replicates have them.
-
-    Parameters
-    ----------
-    settings : int
-        The settings that get more.
-    """
-
-    def __init__(self, settings: int) -> None:
-        self._settings, self._finished = settings, 0
-
-    @property
-    def done(self) -> float:
-        """Share of the settings that have them."""
-        return self._finished / max(self._settings, 1)
-
-    def add(self, unit: FinishedUnit) -> None:
-        """Count the settings of a work unit."""
-        self._finished += unit.stop - unit.start
-
-
 class RunningCalibration:
     """A calibration under way.
 
@@ -112,8 +91,9 @@ class RunningCalibration:
         self._parameters = _parameters(specification, self._study)
         self._reader = RunReader(folder)
         self._maps: dict[str, SettingsMap] = {}
-        self._more: dict[str, MoreReplicates] = {}
-        """Settings of a map that are simulated more often, by the stage of the map."""
+        self._more: dict[str, int] = {}
+        """How many settings of a map are simulated more often, by the stage of the map."""
+        self._more_done: Counter[str] = Counter()
         self._bootstrap: list[FinishedUnit] = []
         self._loaded: xr.Dataset | None = None
         self._steps: RecordedSteps | None = None
@@ -132,7 +112,7 @@ class RunningCalibration:
                 continue
             self._stage = stage
             if of_map != name and stage not in self._more:
-                self._more[stage] = MoreReplicates(len(reader.sweep["chosen"]))
+                self._more[stage] = len(reader.sweep["chosen"])
             elif of_map == name and stage != "bootstrap" and name not in self._maps:
                 self._maps[name] = SettingsMap(reader.sweep["axes"])
                 changed.add("map")
@@ -182,7 +162,7 @@ class RunningCalibration:
     def _take(self, name: str, stage: str, unit: FinishedUnit) -> set[str]:
         """Take a work unit, and return the sections that it changes."""
         if name.startswith(MORE):
-            self._more[stage].add(unit)
+            self._more_done[stage] += unit.stop - unit.start
             return set()
         if stage == "bootstrap":
             self._bootstrap.append(unit)
@@ -194,7 +174,7 @@ class RunningCalibration:
         if self._stage == "bootstrap":
             done = sum(unit.stop - unit.start for unit in self._bootstrap)
             return done / max(self._study.calibration.bootstrap, 1)
-        more = self._more[self._stage].done if self._stage in self._more else 0.0
+        more = self._more_done[self._stage] / max(self._more.get(self._stage, 0), 1)
         if self._stage == "coarse":
             return 0.0 if self._coarse is None else share_of_map([self._coarse.done, more])
         refined = [one.done for name, one in self._maps.items() if name.startswith("refined-")]

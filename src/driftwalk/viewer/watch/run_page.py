@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final, Protocol
 
 from driftwalk.core.errors import DriftwalkError, InputError, RunDirectoryError
 from driftwalk.core.files.file_names import path_inside, text_of_name
@@ -13,14 +13,11 @@ from driftwalk.core.files.run_layout import MANIFEST_FILE, RECORD_FILE, state_of
 from driftwalk.core.files.shards import read_specification
 from driftwalk.core.provenance import read_manifest, refuse_other_version
 from driftwalk.core.run_stages import tell_nobody
+from driftwalk.page.html import page_frame
+from driftwalk.page.parts import empty_section
 from driftwalk.schema.runs import RUN_KINDS, load_maker
 from driftwalk.viewer.hub import Content, Publish, Source
-from driftwalk.viewer.shell import page_frame
-from driftwalk.viewer.watch.live_run_page import NO_CELL, RunningOther
-from driftwalk.viewer.watch.shards import quiet_time
-
-if TYPE_CHECKING:
-    from driftwalk.viewer.watch.live_run_page import Running
+from driftwalk.viewer.watch.shards import RunReader, quiet_time
 
 LOOK_EVERY_S: Final = 0.25
 """Time between two looks at the run directory [s]."""
@@ -29,6 +26,75 @@ QUIET_S: Final = 60.0
 """Time without a result [s] after which the page says how long it has been."""
 SPANS: Final = ((86400.0, "days"), (3600.0, "h"), (60.0, "min"))
 """Units in which that is said, each from two of it on; the last from one."""
+
+Section = dict[str, Any]
+
+
+class Running(Protocol):
+    """A run that is under way."""
+
+    title: str
+
+    def look(self) -> list[Section]:
+        """Read what is new, and return the sections that it changed."""
+
+    def sections(self) -> list[Section]:
+        """Return all sections as they are now."""
+
+    def state(self) -> tuple[float | None, str]:
+        """Return how far the run is, 0 to 1, and what is under way in words."""
+
+    def cell(self, row: int, column: int) -> dict[str, Any]:
+        """Return what is kept of a setting of the map."""
+
+
+NO_CELL: Final[dict[str, Any]] = dict.fromkeys(
+    (
+        *("excerpt_time", "excerpt_x", "excerpt_y", "density"),
+        *("ks_step_length", "ks_turning_angle", "over_time"),
+    )
+)
+"""Answer for a setting that has not been simulated."""
+
+
+class RunningOther:
+    """A run of a kind that shows nothing before it is finished.
+
+    Parameters
+    ----------
+    folder : Path
+        The run directory.
+    specification : mapping
+        Everything that determines its numbers.
+    """
+
+    title = "A run under way"
+
+    def __init__(self, folder: Path, specification: Mapping[str, Any]) -> None:
+        self._reader = RunReader(folder)
+        self._done = 0
+        kind = RUN_KINDS.get(str(specification.get("kind")))
+        if kind is not None:
+            self.title = kind.under_way
+
+    def look(self) -> list[Section]:
+        """Count what is finished."""
+        self._done += sum(1 for _ in self._reader.new_units())
+        return []
+
+    def sections(self) -> list[Section]:
+        """Return one section that says that there is nothing to see yet."""
+        reason = "This kind of run shows its results when it is finished. The page waits for it."
+        return [empty_section("waiting", self.title, reason)]
+
+    def state(self) -> tuple[float | None, str]:
+        """Return that nobody knows how far it is."""
+        units = f": {self._done} work units are finished" if self._done else ""
+        return None, f"under way{units}"
+
+    def cell(self, row: int, column: int) -> dict[str, Any]:  # noqa: ARG002
+        """Return nothing: there is no map."""
+        return dict(NO_CELL)
 
 
 class RunSource(Source):

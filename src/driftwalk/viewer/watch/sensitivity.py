@@ -6,7 +6,7 @@ import json
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -20,25 +20,15 @@ from driftwalk.assembly.sensitivity.times import (
     kept_times,
 )
 from driftwalk.page import encode_array
-from driftwalk.page.axes import ranked_axes
-from driftwalk.page.sections.assemblies.classes import cells_of
-from driftwalk.page.sections.assemblies.sensitivity_times import over_time_part
+from driftwalk.page.parts import axis, section
+from driftwalk.page.sections.outcomes import cells_of
+from driftwalk.page.sections.sensitivity_maps import AXES, axis_words, over_time_part, ranked_axes
 from driftwalk.plot.parts.assembly_labels import classes_to_show
-from driftwalk.viewer.watch.live_run_page import NO_CELL, Section
+from driftwalk.viewer.watch.run_page import NO_CELL, Section
 from driftwalk.viewer.watch.shards import RunReader
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
-
-LABELS: Final[dict[str, tuple[str, str]]] = {
-    "tank_diameter": ("tank diameter", "m"),
-    "blocks": ("blocks", "1"),
-    "flow": ("flow", "1"),
-    "latching": ("latching", "1"),
-    "hidden_face_drag": ("drag on joined faces", "1"),
-    "drag_coefficient": ("drag coefficient C_d", "1"),
-    "force_std": ("stochastic force σ_F", "N"),
-}
 
 
 class RunningSensitivity:
@@ -80,23 +70,22 @@ class RunningSensitivity:
         """Return the map up to now: of the last two axes, the others at their first value."""
         names = list(self._axes)
         fixed = names[: max(len(names) - 2, 0)]
-        at = ", ".join(f"{LABELS[name][0]} {self._axes[name][0]}" for name in fixed)
+        at = ", ".join(f"{axis_words(name)} {self._axes[name][0]}" for name in fixed)
         across, *up = ranked_axes(names[-2:])
-        rows = _axis(up[0], self._axes[up[0]]) if up else _axis("", (0,))
         return [
-            {
-                "id": "l1",
-                "kind": "l1_map",
-                "title": "Distance of the outcomes to the reference",
-                "note": f"Settings appear as they are simulated{f'; here {at}' if at else ''}.",
-                "x": _axis(across, self._axes[across]),
-                "y": rows,
-                "value": encode_array(self._distances()[self._settings]),
-                "reference": None,
-                "noise": None,
-                "label": "l1 distance",
+            section(
+                "l1",
+                "l1_map",
+                "Distance of the outcomes to the reference",
+                f"Settings appear as they are simulated{f'; here {at}' if at else ''}.",
+                x=_axis(across, self._axes[across]),
+                y=_axis(up[0], self._axes[up[0]]) if up else _axis("", (0,)),
+                value=encode_array(self._distances()[self._settings]),
+                reference=None,
+                noise=None,
+                label="l1 distance",
                 **self._outcomes(),
-            }
+            )
         ]
 
     def state(self) -> tuple[float | None, str]:
@@ -193,13 +182,8 @@ def _blocks(count: Mapping[str, int]) -> int:
 
 def _axis(name: str, values: tuple[Any, ...]) -> dict[str, Any]:
     """Return an axis; words stand as their numbers, and in the label."""
-    label, unit = LABELS.get(name, ("", "1"))
+    label, unit, _ = AXES.get(name, (axis_words(name), "1", ""))
     if any(isinstance(value, str) for value in values):
         words = ", ".join(f"{number}: {value}" for number, value in enumerate(values))
-        return {
-            "name": name,
-            "label": f"{label} ({words})",
-            "unit": unit,
-            "values": list(range(len(values))),
-        }
-    return {"name": name, "label": label, "unit": unit, "values": [float(v) for v in values]}
+        return axis(name, f"{label} ({words})", unit, range(len(values)))
+    return axis(name, label, unit, values)

@@ -9,9 +9,8 @@ from driftwalk.calibration.estimation.bootstrap_correction import (
     BootstrapEstimates,
     bootstrap_estimates,
 )
-from driftwalk.calibration.estimation.emulator import fit_emulator
-from driftwalk.calibration.estimation.posterior import Posterior
-from driftwalk.calibration.estimation.region import Region
+from driftwalk.calibration.estimation.posterior import Posterior, Region
+from driftwalk.calibration.estimation.synthetic_likelihood import fit_emulator
 
 STD = 0.01
 CENTRE = np.array([0.4, 0.6])

@@ -7,7 +7,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from driftwalk.calibration.estimation.emulator import SHRUNK, LocalEmulator, fit_emulator
+from driftwalk.calibration.estimation.synthetic_likelihood import (
+    SHRUNK,
+    LocalEmulator,
+    fit_emulator,
+)
 
 CENTRE = np.array([0.4, 0.6])
 WIDTH = np.array([0.1, 0.05])

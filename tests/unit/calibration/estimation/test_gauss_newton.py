@@ -15,7 +15,7 @@ from driftwalk.calibration.estimation.gauss_newton import (
     rounded,
     simulations_of,
 )
-from driftwalk.calibration.evolution.search import RESOLUTION
+from driftwalk.calibration.evolution import RESOLUTION
 
 SPREAD = np.array([0.003, 0.1, 0.1, 0.05])
 

@@ -10,8 +10,8 @@ from scipy.stats import ks_2samp
 
 import driftwalk as dw
 from driftwalk.calibration.estimation.label_switching import label_order
-from driftwalk.calibration.evolution import Scales, recorded_ranges
 from driftwalk.calibration.held_out.candidates import Candidate
+from driftwalk.calibration.held_out.recorded import Scales, recorded_ranges
 from driftwalk.conditions import Conditions
 from driftwalk.core.seeds import world_keys
 from driftwalk.model import Tank

@@ -9,10 +9,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from driftwalk.calibration.estimation.emulator import fit_emulator
 from driftwalk.calibration.estimation.gauss_newton import LocalOptimum, drawn_settings
-from driftwalk.calibration.estimation.modes import Modes, find_modes
-from driftwalk.calibration.estimation.posterior import POSTERIOR, Posterior, sample_posterior
+from driftwalk.calibration.estimation.posterior import (
+    POSTERIOR,
+    Modes,
+    Posterior,
+    find_modes,
+    sample_posterior,
+)
+from driftwalk.calibration.estimation.synthetic_likelihood import fit_emulator
 
 SPREAD = np.array([0.006, 0.01, 0.05])
 TRUTH = np.array([0.7, 0.4])
@@ -43,7 +48,7 @@ def found_from(*centres: tuple[float, float], steep: float = 0.0) -> tuple[Modes
 
     def sample_about(end: LocalOptimum, number: int) -> Posterior:
         sampled.append(number)
-        return sample_posterior(simulate, recorded, end.emulator, end.solution, seed=10 * number)
+        return sample_posterior(simulate, recorded, end, seed=10 * number)
 
     optima = [end_at(one, steep, 5 + place) for place, one in enumerate(centres)]
     return find_modes(optima, sample_about), sampled

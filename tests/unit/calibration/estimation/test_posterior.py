@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 from scipy.stats import truncnorm
 
-from driftwalk.calibration.estimation.emulator import fit_emulator
-from driftwalk.calibration.estimation.gauss_newton import drawn_settings, rounded
+from driftwalk.calibration.estimation.gauss_newton import LocalOptimum, drawn_settings, rounded
 from driftwalk.calibration.estimation.posterior import POSTERIOR, Posterior, sample_posterior
+from driftwalk.calibration.estimation.synthetic_likelihood import fit_emulator
 
 SLOPES = np.array([[1.0, 0.3], [0.2, 1.0], [0.5, 0.5], [0.4, -0.3]])
 SPREAD = np.array([0.02, 0.04, 0.03, 0.05])
@@ -52,7 +52,10 @@ def sampled(recorded: np.ndarray, seed: int, *, width: float = 0.1) -> Sampled:
     summaries = first @ SLOPES.T + SPREAD * rng.normal(size=(512, len(SPREAD)))
     emulator = fit_emulator(first, summaries, centre=centre, width=wide)
     solution = emulator.solve(recorded[0], reach=1.25)
-    return Sampled(sample_posterior(simulate, recorded, emulator, solution, seed=seed), len(boxes))
+    return Sampled(
+        sample_posterior(simulate, recorded, LocalOptimum(emulator, solution, 1), seed=seed),
+        len(boxes),
+    )
 
 
 @pytest.mark.slow
@@ -122,7 +125,9 @@ def cut_off(end: float, outside: float, seed: int) -> np.ndarray:
     first = drawn_settings(centre, width, 512, seed)
     emulator = fit_emulator(first, simulate(first, parts=1)[:, 0], centre=centre, width=width)
     solution = emulator.solve(recorded[0], reach=1.25)
-    return sample_posterior(simulate, recorded, emulator, solution, seed=seed).sample[:, 0]
+    return sample_posterior(
+        simulate, recorded, LocalOptimum(emulator, solution, 1), seed=seed
+    ).sample[:, 0]
 
 
 @pytest.mark.slow

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from driftwalk.calibration.estimation.emulator import LocalEmulator
-from driftwalk.calibration.estimation.profile import discrepancy_profiles
+from driftwalk.calibration.estimation.identifiability import discrepancy_profiles
+from driftwalk.calibration.estimation.synthetic_likelihood import LocalEmulator
 
 CENTRE, WIDTH = np.array([0.4, 0.6]), np.array([0.1, 0.05])
 REACH = 1.25

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.special import gammainc
 
-from driftwalk.calibration.estimation.gauss_newton import rounded
-from driftwalk.calibration.estimation.region import REGION, Region, region_about
+from driftwalk.calibration.estimation.posterior import REGION, Region, region_about
+from driftwalk.calibration.evolution import rounded
 
 ROOT = np.array([[0.02, 0.0, 0.0], [0.015, 0.01, 0.0], [-0.01, 0.004, 0.005]])
 MIDDLE = np.full(3, 0.5)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from driftwalk.calibration.estimation.emulator import SHRUNK
 from driftwalk.calibration.estimation.synthetic_likelihood import (
+    SHRUNK,
     SIMULATIONS,
     synthetic_likelihood_at,
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from driftwalk.calibration.estimation.emulator import LocalEmulator
+from driftwalk.calibration.estimation.synthetic_likelihood import LocalEmulator
 
 SUMMARIES, PARAMETERS, SIMULATIONS, REPETITIONS = 40, 2, 121, 1500
 

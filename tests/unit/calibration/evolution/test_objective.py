@@ -11,12 +11,10 @@ import driftwalk as dw
 from driftwalk.calibration.evolution import (
     AspectObjective,
     Budget,
-    Scales,
-    recorded_ranges,
-    scales_of,
     search_minimum,
     wall_distance,
 )
+from driftwalk.calibration.held_out.recorded import Scales, recorded_ranges, scales_of
 from driftwalk.comparison.aspects import aspect_reference, form_aspects, plan_aspects
 from driftwalk.conditions import Conditions
 from driftwalk.core.errors import InputError

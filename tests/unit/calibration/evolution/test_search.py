@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from driftwalk.calibration.evolution import Budget, search_minimum
-from driftwalk.calibration.evolution.search import RESOLUTION, population
+from driftwalk.calibration.evolution import RESOLUTION, Budget, population, search_minimum
 
 QUICK = Budget(design=32, starts=2, short=8, long=12)
 

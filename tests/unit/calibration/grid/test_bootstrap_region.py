@@ -10,7 +10,7 @@ from driftwalk.calibration.grid.bootstrap_region import (
     confidence_region,
     region_contains,
 )
-from driftwalk.calibration.grid.surface import make_smoother
+from driftwalk.calibration.grid.energy_score import make_smoother
 
 DRAG = np.linspace(0.3, 0.5, 21)
 FORCE = np.linspace(4e-4, 8e-4, 21)

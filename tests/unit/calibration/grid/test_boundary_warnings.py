@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from driftwalk.calibration.grid.boundary_warnings import interval_warnings, optimum_warnings
+from driftwalk.calibration.warnings import interval_warnings, optimum_warnings
 from driftwalk.schema import Parameter
 
 DRAG = Parameter("drag_coefficient", "1", 0.0, 2.0, step=0.1, label="drag coefficient")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from driftwalk.calibration.grid.surface import (
+from driftwalk.calibration.grid.energy_score import (
     FINENESS,
     lattice_of,
     lowest_point,

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from driftwalk.calibration.held_out.checks import CHECKS, LAGS, motion_checks
+from driftwalk.calibration.held_out.recorded import CHECKS, LAGS, motion_checks
 from driftwalk.comparison.aspects import plan_aspects
 
 INTERVAL = 0.1

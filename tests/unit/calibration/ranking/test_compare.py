@@ -14,7 +14,7 @@ import driftwalk as dw
 from driftwalk.calibration import check_models, compare_models
 from driftwalk.calibration.estimation import gauss_newton, regression_abc, synthetic_likelihood
 from driftwalk.calibration.evolution import Budget
-from driftwalk.calibration.ranking import evidence_ranking
+from driftwalk.calibration.ranking import model_evidence
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.schema import Parameter
 from driftwalk.schema.check import check_dataset
@@ -221,8 +221,8 @@ def test_a_users_own_model_that_fails_is_not_waited_for(recorded: xr.Dataset) ->
 @pytest.fixture
 def asked(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let every model be asked, and simulate little for it."""
-    every = evidence_ranking.EVIDENCE._replace(tied_sigmas=1e6)
-    monkeypatch.setattr(evidence_ranking, "EVIDENCE", every)
+    every = model_evidence.EVIDENCE._replace(tied_sigmas=1e6)
+    monkeypatch.setattr(model_evidence, "EVIDENCE", every)
     wide = regression_abc.REGRESSION._replace(simulations=64, most_rounds=2)
     monkeypatch.setattr(regression_abc, "REGRESSION", wide)
     narrow = gauss_newton.GAUSS_NEWTON._replace(fewest_simulations=(128, 128), most_rounds=2)

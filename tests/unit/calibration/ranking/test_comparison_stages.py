@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from driftwalk.calibration.problem import in_memory
 from driftwalk.calibration.ranking import comparison_stages
 from driftwalk.calibration.ranking.comparison_stages import Stages
-from driftwalk.calibration.ranking.evidence_ranking import Evidence, Shortlist
+from driftwalk.calibration.ranking.model_evidence import Evidence, Shortlist
 
 
 @pytest.mark.parametrize(
@@ -37,7 +38,7 @@ def test_others_than_those_that_tie_are_asked_until_one_gives_the_summaries(
     entry = SimpleNamespace(ranges=("a",), baseline=False)
     work: Any = SimpleNamespace(entries=[entry] * 4, costs=lambda: [1] * 4)
     judged: Any = [SimpleNamespace(point=np.zeros(1))] * 4
-    made = Stages(work, 20, None, None, lambda *_: None)
+    made = Stages(work, 20, in_memory, None, lambda *_: None)
     assert list(made.evidence(judged)) == wanted
     # With fewer than two recordings that could judge a misfit nobody is asked.
-    assert Stages(work, 0, None, None, lambda *_: None).evidence(judged) == {}
+    assert Stages(work, 0, in_memory, None, lambda *_: None).evidence(judged) == {}

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from driftwalk.calibration.held_out.candidates import Candidate
-from driftwalk.calibration.held_out.held_out_score import HeldOutScore, without_error
-from driftwalk.calibration.ranking.evidence_ranking import (
+from driftwalk.calibration.held_out.held_out_score import HeldOutScore, Verdict, without_error
+from driftwalk.calibration.ranking.model_evidence import (
     EVIDENCE,
     Evidence,
     EvidenceRanking,
@@ -21,7 +21,6 @@ from driftwalk.calibration.ranking.evidence_ranking import (
     shortlist_models,
 )
 from driftwalk.calibration.ranking.result import answer_sentence
-from driftwalk.calibration.ranking.verdict import Verdict
 
 ERROR = 0.05
 

@@ -7,9 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from driftwalk.calibration.held_out.checks import CHECKS
-from driftwalk.calibration.held_out.held_out_score import HELD_OUT_REPLICATES, HeldOutScore
-from driftwalk.calibration.ranking.verdict import checks_off, verdict_of
+from driftwalk.calibration.held_out.held_out_score import (
+    HELD_OUT_REPLICATES,
+    HeldOutScore,
+    checks_off,
+    verdict_of,
+)
+from driftwalk.calibration.held_out.recorded import CHECKS
 
 NAMES = ("steps", "steps_3", "steps_9", "frame", "wall", "memory")
 

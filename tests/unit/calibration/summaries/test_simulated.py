@@ -9,17 +9,16 @@ import pytest
 from self_propelled import moving
 
 import driftwalk as dw
-from driftwalk.calibration.evolution import AspectObjective, wall_distance
-from driftwalk.calibration.held_out.candidates import prepare_candidates
-from driftwalk.calibration.held_out.held_out_score import even_blocks
-from driftwalk.calibration.held_out.recorded import RecordedMotion, body_motion
-from driftwalk.calibration.summaries.displacements import plan_summaries
-from driftwalk.calibration.summaries.simulated import (
+from driftwalk.calibration.estimation.summary_objective import (
     ALIKE,
     AT_ONCE,
     SummaryObjective,
 )
-from driftwalk.calibration.summaries.statistics import summarise
+from driftwalk.calibration.evolution import AspectObjective, wall_distance
+from driftwalk.calibration.held_out.candidates import prepare_candidates
+from driftwalk.calibration.held_out.held_out_score import even_blocks
+from driftwalk.calibration.held_out.recorded import RecordedMotion, body_motion
+from driftwalk.calibration.summaries import plan_summaries, summarise
 from driftwalk.comparison.aspects import block_of
 from driftwalk.motion.score import BROKEN
 from driftwalk.sweep import MemoryStore, Store
@@ -36,8 +35,8 @@ def motion() -> RecordedMotion:
 
 @pytest.fixture(scope="module")
 def worlds(motion: RecordedMotion) -> AspectObjective:
-    (entry,), _ = prepare_candidates([dw.motion_model("active")], motion, STUDY)
-    return even_blocks(entry, motion, seed=4)
+    (entry,), _ = prepare_candidates([dw.motion_model("active")], motion)
+    return replace(even_blocks(entry, motion), seed=4)
 
 
 def objective_of(

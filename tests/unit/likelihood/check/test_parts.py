@@ -11,7 +11,6 @@ from scipy.stats import chi2
 from driftwalk.comparison import ks_distance
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood.check.errors import Contrast, Innovations, Leverage, velocity_at
-from driftwalk.likelihood.check.motion import compare_motion
 from driftwalk.likelihood.check.place import (
     Layout,
     cell_of,
@@ -21,7 +20,7 @@ from driftwalk.likelihood.check.place import (
     spread_of,
     trend_of,
 )
-from driftwalk.likelihood.check.posterior_predictive import Replicates
+from driftwalk.likelihood.check.posterior_predictive import Replicates, compare_motion
 from driftwalk.likelihood.check.scan import scan_of
 from driftwalk.likelihood.check.verdict import motion_criterion
 from driftwalk.likelihood.check.whiteness import whiteness_tests

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from driftwalk.likelihood.contacts.lattice import search_walls
+from driftwalk.likelihood.contacts.estimate import search_walls
 
 
 def test_each_wall_is_tried_once_and_the_progress_ends() -> None:

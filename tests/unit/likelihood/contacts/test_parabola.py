@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from driftwalk.likelihood.contacts.lattice import Wall
-from driftwalk.likelihood.contacts.parabola import answer, is_undetermined
+from driftwalk.likelihood.contacts.estimate import Wall, answer, is_undetermined
 
 
 def test_a_parabola_gives_its_top_and_its_width() -> None:

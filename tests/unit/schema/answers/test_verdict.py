@@ -14,7 +14,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.likelihood import Judged, fit_motion, judge_fit
 from driftwalk.page.sections.fit import fit_sections
 from driftwalk.plot import residuals as plot_residual_map
-from driftwalk.schema.answers.verdict import BY_CELL, residuals_of
+from driftwalk.schema.answers.fit import BY_CELL, residuals_of
 from driftwalk.schema.check import check_dataset, unknown_names
 from driftwalk.schema.stores.netcdf import netcdf_bytes, open_netcdf
 

@@ -75,7 +75,7 @@ def test_damaged_texts_are_refused_unread(
         assert kind_of_file(path) is None
         said = refusal(here("info", path, "--scale", "0.001"))
         assert DAMAGES[damage] in said
-    assert time.process_time() - begin < 1.0
+    assert time.process_time() - begin < 10.0
 
 
 def test_whole_texts_are_read(tmp_path: Path) -> None:

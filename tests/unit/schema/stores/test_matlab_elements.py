@@ -14,7 +14,7 @@ from command_line import here, refusal
 from scipy.io import loadmat, savemat
 
 from driftwalk.core.errors import FormatError
-from driftwalk.schema.stores.matlab_elements import refuse_unknown_elements
+from driftwalk.schema.stores.matlab import refuse_unknown_elements
 
 VALUES = 0.1 * np.arange(20)
 TABLE = {"S": {"t": VALUES, "x": VALUES, "y": 2 * VALUES}, "names": np.array(["a", 3.0], object)}

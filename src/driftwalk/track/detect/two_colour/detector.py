@@ -8,11 +8,16 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from driftwalk.core.extras import require_opencv
-from driftwalk.track.detect.chroma import ChromaTables
-from driftwalk.track.detect.markers import TwoColourMarker
-from driftwalk.track.detect.two_colour.discs import Disc, find_regions, join_pieces, sort_out
+from driftwalk.track.detect.markers import ChromaTables, TwoColourMarker
+from driftwalk.track.detect.two_colour.discs import (
+    Disc,
+    Pair,
+    find_regions,
+    join_pieces,
+    pair_discs,
+    sort_out,
+)
 from driftwalk.track.detect.two_colour.outline import outlined_centres
-from driftwalk.track.detect.two_colour.pairs import Pair, pair_discs
 from driftwalk.track.detect.two_colour.pose import CENTRES, Measured, weighted_centres
 from driftwalk.track.types import Array, Detection, Image, PixelToWorld, Rejected
 
@@ -107,17 +112,13 @@ class TwoColourDetector:
 
     def _discs(self, image: Image) -> tuple[tuple[list[Disc], list[Disc]], list[Rejected]]:
         """Return the candidates of both colours, and the regions that are none."""
-        cv2 = self._cv2
-        rows, columns = image.shape[:2]
         if not self._factor:
-            self._factor = self._choose_factor(columns, rows)
-        factor = self._factor
-        small = image
-        if factor > 1:
-            size = (columns // factor, rows // factor)
-            cut = image[: size[1] * factor, : size[0] * factor]
-            small = cv2.resize(cut, size, interpolation=cv2.INTER_AREA)
-        label = self._tables.label.take(self._tables.codes(cv2, small))
+            # As small as it can be with the discs still found.
+            middle = (np.array([image.shape[1::-1]]) - 1) / 2
+            diameter = self._diameter(middle)[0] / _TWO_COLOUR.coarse_diameter_px
+            self._factor = int(np.clip(diameter, 1, _TWO_COLOUR.most_factor))
+        cv2, factor = self._cv2, self._factor
+        label = self._tables.label.take(self._tables.codes(cv2, _reduced(cv2, image, factor)))
         both, rejected = [], []
         for colour in (1, 2):
             regions = find_regions(cv2, label, colour, factor, diameter_at=self._diameter)
@@ -126,24 +127,10 @@ class TwoColourDetector:
             rejected += wrong
         return (both[0], both[1]), rejected
 
-    def _choose_factor(self, columns: int, rows: int) -> int:
-        """Return by how much an image can be reduced with the discs still found."""
-        middle = np.array([[(columns - 1) / 2, (rows - 1) / 2]])
-        return int(
-            np.clip(
-                self._diameter(middle)[0] / _TWO_COLOUR.coarse_diameter_px,
-                1,
-                _TWO_COLOUR.most_factor,
-            )
-        )
-
     def _diameter(self, points: Array) -> Array:
         """Return the diameter of a whole disc at points of the image [px]."""
-        return self.marker.size_m * self._px_per_m(points)
-
-    def _px_per_m(self, points: Array) -> Array:
-        jacobian = self.camera.jacobian(points)
-        return np.asarray(1.0 / np.sqrt(np.abs(np.linalg.det(jacobian))))
+        px_per_m = 1.0 / np.sqrt(np.abs(np.linalg.det(self.camera.jacobian(points))))
+        return np.asarray(self.marker.size_m * px_per_m)
 
     def _measure(self, image: Image, pair: Pair) -> Measured:
         """Return the centres of a pair of discs in the image at full size."""
@@ -158,11 +145,12 @@ class TwoColourDetector:
         reach = (spacing + diameter) / 2 * (1.6 if partly else 1.25) + 3.0
         rows, columns = image.shape[:2]
         left, top = (max(int(value - reach), 0) for value in centre)
-        right, bottom = (
-            min(int(centre[0] + reach) + 2, columns),
-            min(int(centre[1] + reach) + 2, rows),
-        )
-        patch, factor = self._reduce(image[top:bottom, left:right], diameter)
+        right = min(int(centre[0] + reach) + 2, columns)
+        bottom = min(int(centre[1] + reach) + 2, rows)
+        # Reduced where its discs are large, and with less noise.
+        factor = int(np.clip(diameter / _TWO_COLOUR.fine_diameter_px, 1, _TWO_COLOUR.most_factor))
+        patch = _reduced(self._cv2, image[top:bottom, left:right], factor)
+        patch = self._cv2.GaussianBlur(patch, (3, 3), CENTRES.smoothing_px)
         codes = self._tables.codes(self._cv2, patch)
         weights = [table.take(codes) for table in self._tables.soft]
         corner = np.array([left, top]) + (factor - 1) / 2
@@ -177,16 +165,6 @@ class TwoColourDetector:
         return Measured(
             result.centres * factor + corner, result.covariance * factor**2, result.shares
         )
-
-    def _reduce(self, patch: Image, diameter: float) -> tuple[Any, int]:
-        """Return a patch with less noise, reduced where its discs are large, and by how much."""
-        cv2 = self._cv2
-        factor = int(np.clip(diameter / _TWO_COLOUR.fine_diameter_px, 1, _TWO_COLOUR.most_factor))
-        if factor > 1:
-            size = (patch.shape[1] // factor, patch.shape[0] // factor)
-            cut = patch[: size[1] * factor, : size[0] * factor]
-            patch = cv2.resize(cut, size, interpolation=cv2.INTER_AREA)
-        return cv2.GaussianBlur(patch, (3, 3), CENTRES.smoothing_px), factor
 
     def _place(self, measured: list[tuple[Pair, Measured]]) -> list[Detection]:
         """Return the detections in the world."""
@@ -221,3 +199,12 @@ class TwoColourDetector:
                 )
             )
         return found
+
+
+def _reduced(cv2: Any, image: Image, factor: int) -> Image:
+    """Return an image reduced by a whole factor, without the rows and columns that are left."""
+    if factor == 1:
+        return image
+    columns, rows = image.shape[1] // factor, image.shape[0] // factor
+    cut = image[: rows * factor, : columns * factor]
+    return np.asarray(cv2.resize(cut, (columns, rows), interpolation=cv2.INTER_AREA))

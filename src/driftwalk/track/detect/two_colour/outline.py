@@ -13,7 +13,8 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.track.detect.chroma import Weights
+from driftwalk.core.arrays import Bools
+from driftwalk.track.detect.markers import Weights
 from driftwalk.track.detect.two_colour.pose import Measured
 from driftwalk.track.types import Array
 
@@ -117,9 +118,7 @@ def _outline(weight: Weights, at: Array, diameter: float) -> Array:
     return np.asarray(found + corner)
 
 
-def _around(
-    weight: Weights, at: Array, reach: float
-) -> tuple[Weights, npt.NDArray[np.bool_], Array]:
+def _around(weight: Weights, at: Array, reach: float) -> tuple[Weights, Bools, Array]:
     """Return a part of a patch, which of its pixels are near a place, and where it begins."""
     left, top = (max(math.floor(place - reach), 0) for place in at.tolist())
     # One more than needed, for outlines between the last pixel that is near and the next.

@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.track.detect.chroma import Weights
+from driftwalk.track.detect.markers import Weights
 from driftwalk.track.types import Array
 
 

@@ -1,0 +1,240 @@
+"""Model evidence from summaries of the motion ranks the models that distances leave tied."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from driftwalk.calibration.estimation.estimate import find_optima
+from driftwalk.calibration.estimation.gauss_newton import GAUSS_NEWTON, simulations_of
+from driftwalk.calibration.estimation.label_switching import label_order
+from driftwalk.calibration.estimation.regression_abc import REGRESSION
+from driftwalk.calibration.estimation.summary_objective import SummaryObjective
+from driftwalk.calibration.estimation.synthetic_likelihood import (
+    SIMULATIONS,
+    synthetic_likelihood_at,
+)
+from driftwalk.calibration.evolution import Tell, rounded
+from driftwalk.calibration.held_out.candidates import Candidate, with_contact_clearance
+from driftwalk.calibration.held_out.held_out_score import HeldOutScore, even_blocks
+from driftwalk.calibration.held_out.recorded import RecordedMotion
+from driftwalk.core.arrays import Floats
+from driftwalk.core.processors import one_blas_thread
+from driftwalk.sweep import Store
+
+
+class EvidencePolicy(NamedTuple):
+    """Which models are compared by their evidence, and when one is ahead."""
+
+    tied_sigmas: float = 4.0
+    """Models tie within this many standard errors. With ten blocks, errors are known to a quarter,
+    and one of six models is far off."""
+    most_models: int = 5
+    """Most models that are matched: a bound on the time."""
+    rival: float = 10.0
+    """Difference of deviance below which models are equally likely: a discrepancy of a hundred has
+    an error of some 5, from the simulated covariance."""
+    typical_quantile: float = 0.99
+    """One recording of the model itself in a hundred is called unlike it."""
+    hopeless: float = 3.0
+    """Discrepancy per summary above which a search is given up. The true model has 0.7 to 1.2;
+    wrong ones would take three times as long."""
+    starts: int = 2
+    """Starts: from the regression, and from the answer of the distances."""
+    blur: float = 1e-3
+    """Noise added to simulated summaries. At a wall without camera noise some vary by less, and a
+    micrometre of clearance would count as another motion."""
+
+
+EVIDENCE: Final = EvidencePolicy()
+
+
+class Evidence(NamedTuple):
+    """The summaries of the motion, as one model gives them."""
+
+    discrepancy: float
+    """Sum of squares of the summaries' deviations, in standard deviations."""
+    median_discrepancy: float
+    """Its median over simulated recordings of the model,"""
+    upper_discrepancy: float
+    """and their 99 % quantile."""
+    deviance: float
+    """-2 log of the evidence, but for a constant that all models share."""
+
+    @property
+    def usual(self) -> bool:
+        """Whether the summaries are like those of the model's own recordings."""
+        return self.discrepancy <= self.upper_discrepancy
+
+
+class EvidenceRanking(NamedTuple):
+    """The answer of the summaries of the motion."""
+
+    best: int | None
+    """The model that they speak for; None where no model gives them."""
+    rivals: tuple[int, ...]
+    """Others that give them as well."""
+
+
+class Shortlist(NamedTuple):
+    """Models whose summaries are asked, in turn."""
+
+    models: tuple[int, ...]
+    """Those that tie first, the closest before the others; their places among all models."""
+    tied: int
+    """How many are asked in any case. The others are asked until one gives the summaries: a search
+    by distances may have missed the place of the true model."""
+
+
+def shortlist_models(entries: Sequence[Candidate], held_out: Sequence[HeldOutScore]) -> Shortlist:
+    """Return the models whose summaries decide; none where there are not two to choose from.
+
+    Walks of recorded steps are never asked, nor are models without parameters.
+    """
+    order = np.argsort([one.score for one in held_out], kind="stable")
+    able = [int(k) for k in order if not entries[k].baseline and entries[k].ranges]
+    if len(able) < 2:
+        return Shortlist((), 0)
+    closest = held_out[able[0]]
+
+    def is_tied(k: int) -> bool:
+        difference, error = held_out[k].behind(closest)
+        return difference <= EVIDENCE.tied_sigmas * error
+
+    tied = [k for k in able if is_tied(k)]
+    behind = [k for k in able if not is_tied(k)]
+    return Shortlist(
+        tuple([*tied, *behind][: EVIDENCE.most_models]), min(len(tied), EVIDENCE.most_models)
+    )
+
+
+def rank_by_evidence(
+    entries: Sequence[Candidate], evidence: Mapping[int, Evidence]
+) -> EvidenceRanking:
+    """Return which model the summaries speak for.
+
+    Among those whose discrepancy is usual it is the one of the largest evidence, which has a price
+    for each parameter. Where others are equally likely, it is the one with the fewest numbers.
+    """
+    usual = [k for k, one in evidence.items() if one.usual]
+    if not usual:
+        return EvidenceRanking(None, ())
+    least = min(evidence[k].deviance for k in usual)
+    left = [k for k in usual if evidence[k].deviance < least + EVIDENCE.rival]
+    best = min(left, key=lambda k: (entries[k].numbers, evidence[k].deviance))
+    return EvidenceRanking(best, tuple(k for k in left if k != best))
+
+
+def discrepancy_sentence(one: Evidence) -> str | None:
+    """Return how far a model's summaries are from the recording's; None where they are like them.
+
+    Examples
+    --------
+    >>> discrepancy_sentence(Evidence(812.3, 101.0, 140.2, 900.0))
+    "summaries of the motion: a misfit of 812, that of the model's own recordings is below 140"
+    """
+    if one.usual:
+        return None
+    return (
+        f"summaries of the motion: a misfit of {one.discrepancy:.0f}, that of the model's own "
+        f"recordings is below {one.upper_discrepancy:.0f}"
+    )
+
+
+def ranking_sentence(
+    names: Sequence[str], evidence: Mapping[int, Evidence], answer: EvidenceRanking
+) -> str:
+    """Return what the summaries of the motion say, in a sentence."""
+    discrepancies = {k: f"{names[k]} {one.discrepancy:.0f}" for k, one in evidence.items()}
+    if answer.best is None:
+        return (
+            "The summaries of the motion tell nothing more, for no model gives them: the misfits "
+            f"are {', '.join(discrepancies.values())}, those of the models' own recordings below "
+            f"{max(one.upper_discrepancy for one in evidence.values()):.0f}"
+        )
+    best = evidence[answer.best]
+    sentence = (
+        f"{names[answer.best]} is named by the summaries of the motion: a misfit of "
+        f"{best.discrepancy:.0f}, that of its own recordings is below {best.upper_discrepancy:.0f}"
+    )
+    if answer.rivals:
+        rivals = ", ".join(names[k] for k in answer.rivals)
+        sentence += f"; no clear difference from {rivals}, with as many numbers or more"
+    others = [k for k in evidence if k != answer.best and k not in answer.rivals]
+    if others:
+        sentence += f"; less likely are {', '.join(discrepancies[k] for k in others)}"
+    return sentence
+
+
+def most_settings(parameters: int, replicates: int) -> int:
+    """Return how many settings `estimate_evidence` simulates at most."""
+    narrow = EVIDENCE.starts * simulations_of(parameters)[0] * GAUSS_NEWTON.most_rounds
+    return REGRESSION.most_simulations + narrow + SIMULATIONS + replicates
+
+
+@one_blas_thread()
+def estimate_evidence(
+    entry: Candidate,
+    motion: RecordedMotion,
+    answer: Floats,
+    *,
+    executor: Executor | None,
+    store: Store | None,
+    tell: Tell,
+) -> Evidence:
+    """Match the summaries of a recording with a model, and say how well that went."""
+    entry = entry._replace(model=with_contact_clearance(entry.model, motion))
+    parameters, replicates = len(entry.ranges), motion.replicates
+    objective = SummaryObjective(
+        even_blocks(entry, motion),
+        motion,
+        store=store,
+        executor=executor,
+        tell=tell,
+        most=most_settings(parameters, replicates),
+    )
+    simulate = _Blurred(objective, motion.seed)
+    order = label_order(entry)
+    optima = find_optima(
+        simulate,
+        parameters,
+        lambda: answer[None],
+        order=order,
+        seed=motion.seed,
+        hopeless=EVIDENCE.hopeless,
+        give_up=EVIDENCE.hopeless,
+    )
+    best = optima[0].solution
+    found = synthetic_likelihood_at(
+        lambda settings: simulate(settings)[:, 0],
+        objective.recorded[0],
+        rounded(np.clip(best.setting, 0.0, 1.0)),
+        replicates,
+    )
+    return Evidence(
+        discrepancy=found.discrepancy,
+        median_discrepancy=float(np.median(found.own_discrepancies)),
+        upper_discrepancy=float(np.quantile(found.own_discrepancies, EVIDENCE.typical_quantile)),
+        # Laplace's approximation, with a prior that is even over the ranges.
+        deviance=found.discrepancy
+        + found.log_variance
+        - best.log_volume
+        - parameters * float(np.log(2.0 * np.pi)),
+    )
+
+
+class _Blurred:
+    """Simulates and summarises as an objective does, and adds noise of its own."""
+
+    def __init__(self, objective: SummaryObjective, seed: int) -> None:
+        self.recorded = objective.recorded
+        self._objective, self._seed = objective, seed
+
+    def __call__(self, settings: Floats, *, parts: int = 1) -> Floats:
+        """Return the summaries of settings, shape (settings, parts, summaries)."""
+        random = np.random.default_rng([self._seed, self._objective.done])
+        found = self._objective(settings, parts=parts)
+        return found + EVIDENCE.blur * random.standard_normal(found.shape)

@@ -1,1 +1,0 @@
-"""A motion in some hundred summary statistics, recorded or simulated."""

@@ -1,0 +1,267 @@
+"""Where a command takes its model from: a finished run, or a study and a flow field."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from driftwalk.cli.options.study import StudyOptions, option_name
+from driftwalk.cli.terminal.argument_names import to_options
+from driftwalk.cli.terminal.output import print_note
+from driftwalk.core.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+    from driftwalk.motion import MotionModel
+    from driftwalk.runs import FoundRun
+
+
+SEARCHED: Final = ("forces.drag_coefficient", "forces.force_std_N")
+"""Parameters that a run finds: a study file may hold any value for them."""
+FOUND_BY_A_RUN: Final = (*SEARCHED, "forces.force_interval_s")
+CONNECTOR: Final = ("assembly.connector_distance_m", "assembly.connector_axis_rad")
+"""Parameters of the latching rule "connector" alone."""
+RUN_NAMES: Final = (
+    *("blocks", "duration", "tank_diameter", "side", "mass", "depth"),
+    *("drag_coefficient", "force_std", "force_interval"),
+    *("wall_friction", "wall_restitution", "time_step"),
+    *("latching", "connector_distance", "connector_axis", "hidden_face_drag", "chirality"),
+    *("block_restitution", "block_friction", "confidence", "seed", "flow_repeat", "flow_start"),
+)
+"""Options for keys of a study that every command on self-assembly takes."""
+MODEL_KEYS: Final = ("block", "tank", "water", "forces", "simulation.time_step_s")
+"""Sections that a study file must not contradict when a run gives the model."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """The model and its source.
+
+    Attributes
+    ----------
+    study : Study
+        The study with the options over it.
+    flow : xarray.Dataset
+        The flow field.
+    uncertainty : xarray.Dataset or None
+        The fit or calibration where parameters can be drawn from it.
+    inputs : dict of str to Path
+        The files that were read, by their role.
+    warnings : list of str
+        Warnings for the user.
+    not_drawn : str or None
+        Why no parameters can be drawn from a run, None where they can or there is no run.
+    """
+
+    study: Study
+    flow: xr.Dataset
+    uncertainty: xr.Dataset | None
+    inputs: dict[str, Path]
+    warnings: list[str]
+    not_drawn: str | None = None
+
+
+def assembly_source(
+    run: Path | None, flow_file: Path | None, given: StudyOptions, *, refused: Sequence[str] = ()
+) -> Source:
+    """Return the model of a run, or of a study in a flow field.
+
+    Raises
+    ------
+    InputError
+        When a run is given with an option for what it has found, or with one that is `refused`;
+        when there is no flow field, or a file or option is wrong.
+    """
+    if run is None:
+        return _source_from_flow(given, flow_file)
+    refuse_found(run, given.overrides, also=refused)
+    return _source_from_run(run, flow_file, given)
+
+
+def _source_from_flow(given: StudyOptions, flow_file: Path | None) -> Source:
+    """Return the model of a study, in a flow field from a file."""
+    from driftwalk.conditions import unstated_warning
+
+    if flow_file is None:
+        raise InputError(
+            "the flow of the water is missing: give the run directory of a fit or a calibration, "
+            "or a flow field (--flow)"
+        )
+    chosen = given.study()
+    inputs = {"flow": flow_file, **({} if given.file is None else {"study": given.file})}
+    warning = unstated_warning(chosen, about="simulation")
+    field = load_flow_for(flow_file, chosen)
+    said = [*([] if warning is None else [warning]), *_without_effect(given, chosen)]
+    return Source(chosen, field, None, inputs, said)
+
+
+def _without_effect(given: StudyOptions, study: Study) -> list[str]:
+    """Return a warning where a connector is described that no block has."""
+    idle = [option_name(key, keys=given.keys) for key in CONNECTOR if key in given.overrides]
+    latching = study.assembly.latching
+    if not idle or latching == "connector":
+        return []
+    verb = "has" if len(idle) == 1 else "have"
+    return [
+        f"{' and '.join(idle)} {verb} no effect with --latching {latching}: blocks have connectors "
+        "with --latching connector"
+    ]
+
+
+def refuse_found(folder: Path, overrides: Mapping[str, Any], *, also: Sequence[str] = ()) -> None:
+    """Refuse options for what a run has found.
+
+    Raises
+    ------
+    InputError
+        Names the options.
+    """
+    refused = [*(option_name(key) for key in FOUND_BY_A_RUN if key in overrides), *also]
+    if refused:
+        raise InputError(
+            f"{', '.join(refused)}: not with a finished run, whose own values are used; to give "
+            f"them, take the run's flow field alone: --flow {folder}"
+        )
+
+
+def _source_from_run(folder: Path, flow_file: Path | None, given: StudyOptions) -> Source:
+    """Return the model of the block that a run has found, in its flow field or another one.
+
+    The sections [assembly] and [sensitivity] of a study file take the place of the run's, and it
+    may say how a flow series is met; the model is the run's.
+    """
+    from driftwalk.runs import read_found
+
+    found = read_found(folder)
+    base, study, inputs = f"the study of {folder}", found.block_study(), found.inputs
+    if given.file is not None:
+        base, study = str(given.file), _with_sections(study, given.file, folder)
+        inputs["study"] = given.file
+    chosen = given.over(study, base=base)
+    if flow_file is None:
+        field = found.flow(study)
+    else:
+        field, inputs["flow"] = load_flow_for(flow_file, chosen), flow_file
+    warnings = [*found.warnings, *_without_effect(given, chosen)]
+    return Source(chosen, field, found.uncertainty, inputs, warnings, found.not_drawn)
+
+
+def load_flow_for(path: Path, study: Study) -> xr.Dataset:
+    """Return the flow field of a file; one that knows no tank is that of the study's."""
+    from driftwalk.flow import load_flow
+
+    field = load_flow(path, arena=study.tank.to_arena(), own_flags="keep")
+    if field.attrs.get("method") == "file" and "warning" in field.attrs:
+        print_note(f"warning: {path}: {to_options(field.attrs['warning'])}")
+    return field
+
+
+def _with_sections(study: Study, path: Path, folder: Path) -> Study:
+    """Return the run's study with the sections of a file that say what is simulated."""
+    from driftwalk.model import load_study
+
+    given = load_study(path)
+    for name in MODEL_KEYS:
+        section, _, one = name.partition(".")
+        theirs, ours = getattr(given, section), getattr(study, section)
+        for key in [one] if one else sorted(theirs.model_fields_set):
+            stated = key in theirs.model_fields_set and f"{section}.{key}" not in SEARCHED
+            if stated and getattr(theirs, key) != getattr(ours, key):
+                raise InputError(
+                    f"{path}: [{section}] {key} is {getattr(theirs, key)}, and {folder} was "
+                    f"made with {getattr(ours, key)}; leave it out of the file, or take the run's "
+                    f"flow field alone: --flow {folder}"
+                )
+    series = ("repeat", "start")
+    flow = {key: getattr(given.flow, key) for key in series if key in given.flow.model_fields_set}
+    return study.model_copy(
+        update={
+            "assembly": given.assembly,
+            "sensitivity": given.sensitivity,
+            "flow": study.flow.model_copy(update=flow),
+        }
+    )
+
+
+@dataclass(frozen=True)
+class ModelSource:
+    """The model that simulate, play and study recover take: found by a run, or named.
+
+    Attributes
+    ----------
+    given : StudyOptions
+        The options and the study file.
+    named : str or None
+        The motion model that is named.
+    folder : Path or None
+        The run directory.
+    found : FoundRun or None
+        What the run has found.
+    """
+
+    given: StudyOptions
+    named: str | None
+    folder: Path | None
+    found: FoundRun | None
+
+    @property
+    def is_block(self) -> bool:
+        """Whether the model is the block in stirred water."""
+        return self.named is None and (self.found is None or self.found_block)
+
+    @property
+    def found_block(self) -> bool:
+        """Whether there is a run, and it is about the block."""
+        from driftwalk.motion import BlockModel
+
+        return self.found is not None and self.found.model == BlockModel.name
+
+    def study(self) -> Study:
+        """Return the study of the run, where it has one, with the options over it."""
+        if self.found is None:
+            return self.given.study()
+        if self.found_block:
+            own = self.found.block_study()
+        elif self.given.file is not None or not self.found.has_study:
+            return self.given.study()
+        else:
+            own = self.found.study()
+        return self.given.over(own, base=f"the study of {self.folder}")
+
+    def flow_for(self, model: MotionModel, study: Study, flow: Path | None) -> xr.Dataset | None:
+        """Return the flow for a model: a given one, that of the run if it is used, or None."""
+        if flow is not None:
+            return load_flow_for(flow, study)
+        return self.found.flow(study) if self.found is not None and model.needs_flow else None
+
+
+def flow_of_block(found: FoundRun, study: Study, flow: Path | None) -> xr.Dataset:
+    """Return the flow for the block that a run has found: a given one, or that of the run."""
+    return found.flow(found.block_study()) if flow is None else load_flow_for(flow, study)
+
+
+def open_source(folder: Path | None, given: StudyOptions, model: str | None) -> ModelSource:
+    """Return what the user has named as the model: a run, a motion model, or both.
+
+    Raises
+    ------
+    InputError
+        When the run cannot be used, or an option contradicts it.
+    """
+    from driftwalk.runs import read_found
+
+    if folder is None:
+        return ModelSource(given, model, None, None)
+    found = read_found(folder)
+    source = ModelSource(given, model, folder, found)
+    # The values of another model hold in any study; those of the block belong to its own.
+    own = source.found_block and given.file is not None
+    refuse_found(folder, given.overrides, also=["--study"] if own else [])
+    # A comparison of models holds values for the block and for others.
+    if model is not None and "model" not in found.found.dims and source.found_block:
+        raise InputError(f"{folder} is about the block, and not about {model}: leave out --model")
+    return source

@@ -1,1 +1,0 @@
-"""Commands that predict: motion, self-assembly, sensitivity, the live tank."""

@@ -1,0 +1,240 @@
+"""`driftwalk sensitivity`: how much what blocks build depends on the model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Final
+
+import numpy as np
+
+from driftwalk.cli.inputs.model_source import RUN_NAMES, Source, assembly_source, load_flow_for
+from driftwalk.cli.inputs.recordings import opening_note
+from driftwalk.cli.options.run import RunOptions, with_run_options
+from driftwalk.cli.options.shared import PANEL, FlowFile, Run, option
+from driftwalk.cli.options.study import StudyOptions, with_study_options
+from driftwalk.cli.terminal.output import print_prediction
+from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.core.study_keys import SENSITIVITY_KEYS
+from driftwalk.core.units import parse_quantity
+from driftwalk.model import declared
+from driftwalk.schema.kinds.flow import flow_series_words
+
+if TYPE_CHECKING:
+    from driftwalk.model import Study
+    from driftwalk.runs import SensitivityResult
+    from driftwalk.schema.answers.parts import Answer
+
+
+Vary = Annotated[
+    list[str] | None,
+    option(
+        "--vary NAME=VALUES",
+        "Values to compare: blocks=2,3,4 or drag-coefficient=0:1.5:0.05. Repeatable.",
+        panel=PANEL,
+    ),
+]
+
+
+AXES: Final = {
+    "tank": "sensitivity.tank_diameter_m",
+    "blocks": "sensitivity.blocks",
+    "flow": "sensitivity.flow",
+    "latching": "sensitivity.latching",
+    "hidden-face-drag": "sensitivity.hidden_face_drag",
+    "drag-coefficient": "sensitivity.drag_coefficient",
+    "force-std": "sensitivity.force_std_N",
+}
+"""From an input that can be varied to the key of the study that holds the list of its values."""
+MOST_VALUES: Final = 1_000_000
+VARY_KEYS: Final = {f"vary {name}": key for name, key in AXES.items()}
+"""From what an error calls the option to the key that it sets."""
+
+
+@with_run_options
+@with_study_options(SENSITIVITY_KEYS, "runs", "realisations", *RUN_NAMES)
+def sensitivity(
+    given: StudyOptions,
+    run: Run = None,
+    flow: FlowFile = None,
+    vary: Vary = None,
+    sobol: Annotated[
+        int | None, option("--sobol N", "Base samples for Sobol' indices, a power of two.", min=8)
+    ] = None,
+    *,
+    options: RunOptions,
+) -> None:
+    """Measure how much self-assembly depends on the model.
+
+    Simulates self-assembly at every setting of a map over the drag coefficient and the stochastic
+    force, or over the axes that --vary names. Measures the distance between their outcomes and the
+    outcomes of a reference, which has the parameters of a RUN or of a study (--flow). If you stop
+    the run, the same command continues it.
+    """
+    from driftwalk.runs import SensitivityWork
+
+    given = given.and_also(vary_overrides(vary or []), keys=VARY_KEYS)
+    source = assembly_source(run, flow, given)
+    named = VARY_KEYS["vary flow"] in given.overrides
+    if run is not None and not named and given.file is None and source.study.sensitivity.flow:
+        # A run may be someone else's: it does not say which files of this machine are read.
+        raise InputError(
+            f"the study of {run} names flow files ({', '.join(source.study.sensitivity.flow)}): "
+            "name the files again, --vary flow=FILE,FILE, or give the study file, --study FILE"
+        )
+    paths = _flow_paths(source.study, Path() if named or given.file is None else given.file.parent)
+    work = SensitivityWork(
+        study=source.study,
+        flow=source.flow,
+        flows={name: load_flow_for(path, source.study) for name, path in paths.items()},
+        samples=sobol,
+        inputs={**source.inputs, **{f"flow {name}": path for name, path in paths.items()}},
+        threads=options.threads,
+    )
+    begun = opening_note(source.study, given, about="simulation", otherwise=str(run))
+    result = options.run(work, "sensitivity", begun=begun)
+    warnings = [*source.warnings, *_warnings(source, result)]
+    print_prediction(sensitivity_of(result), options.out, run, warnings, json=options.json)
+
+
+def sensitivity_of(result: SensitivityResult) -> Answer:
+    """Return the answer of a sensitivity study."""
+    from driftwalk.assembly import disconnected_alignment
+    from driftwalk.schema.answers.sensitivity import sensitivity_answer
+
+    aligned = None
+    if result.components is not None:
+        # Without it, all classes that vary are of one kind.
+        with suppress(InputError):
+            aligned = disconnected_alignment(result.components)._asdict()
+    return sensitivity_answer(
+        result.sensitivity,
+        reference=result.reference,
+        components=result.components,
+        sobol=result.indices,
+        aligned=aligned,
+    )
+
+
+def _flow_paths(study: Study, folder: Path) -> dict[str, Path]:
+    """Return the files of the flow fields; those of a study file are relative to its folder."""
+    return {name: folder / name for name in study.sensitivity.flow or ()}
+
+
+def _warnings(source: Source, result: SensitivityResult) -> list[str]:
+    """Return what the user should know about the answer."""
+    found = result.sensitivity
+    axes = [str(name) for name in found["l1_distance"].dims]
+    left_out = int(found["left_out"].sum()) + int(result.reference.attrs["left_out"])
+    said: Sequence[tuple[bool, str]] = (
+        (left_out > 0, f"{left_out} runs broke down and are left out; use a smaller time step"),
+        (
+            "tank_diameter" in axes
+            and float(found["tank_diameter"].min()) < min(source.study.tank.extent_m),
+            "all tanks use the same flow field: the wall of a smaller tank cuts it "
+            "off and does not change it; to include that effect, give each tank its "
+            "own field",
+        ),
+        (
+            "blocks" in axes and bool(np.isnan(found["l1_distance"].values).any()),
+            "outcomes with another number of blocks share no class with the "
+            "reference: they have no l1 distance",
+        ),
+        (
+            result.components is None,
+            "there are no principal components: they need two settings with different outcomes",
+        ),
+    )
+    series = flow_series_words(result.reference.attrs, holds="shares and distances hold")
+    return [*series, *(text for holds, text in said if holds)]
+
+
+def vary_overrides(given: Sequence[str]) -> dict[str, Any]:
+    """Return the keys of the study that the options set.
+
+    Parameters
+    ----------
+    given : sequence of str
+        Such as ``"blocks=2,3,4"``, ``"drag-coefficient=0:1.5:0.05"`` (from, to, step),
+        ``"latching=collision,connector"``.
+
+    Raises
+    ------
+    InputError
+        When there is no such input, it is named twice, or a value cannot be read.
+
+    Examples
+    --------
+    >>> vary_overrides(["blocks=2:4:1", "force-std=0.2mN,1mN"])
+    {'sensitivity.blocks': [2, 3, 4], 'sensitivity.force_std_N': [0.0002, 0.001]}
+    """
+    found: dict[str, Any] = {}
+    for text in given:
+        name, sign, values = text.partition("=")
+        key = AXES.get(name.strip().replace("_", "-"))
+        if key is None or not sign:
+            raise InputError(
+                f"--vary {text}: expected NAME=VALUES with a name out of {', '.join(AXES)}"
+            )
+        if key in found:
+            raise InputError(f"--vary {text}: {name} is varied twice; name all values at once")
+        words = [word.strip() for word in values.split(",")]
+        if not all(words):
+            raise InputError(f"--vary {text}: a value is missing after '{name}='")
+        try:
+            found[key] = [value for word in words for value in _values(word, key)]
+        except ConfigurationError as error:
+            raise InputError(f"--vary {text}: {error}") from error
+    return found
+
+
+def _values(word: str, key: str) -> Iterator[Any]:
+    """Return the values of one word: itself, a number, or the numbers of a range."""
+    quantity = declared(key).quantity
+    if quantity is None:
+        yield word
+        return
+    parts = word.split(":")
+    numbers = [parse_quantity(part, quantity.unit) for part in parts]
+    if len(numbers) == 3:
+        numbers = _range(*numbers, parts=parts, unit=quantity.unit)
+    elif len(numbers) != 1:
+        raise ConfigurationError(f"expected a number or FROM:TO:STEP, got '{word}'")
+    for number in numbers:
+        # The study refuses a part of a block.
+        yield int(number) if quantity.whole and number.is_integer() else number
+
+
+def _range(
+    first: float, last: float, step: float, *, parts: Sequence[str], unit: str
+) -> list[float]:
+    """Return the numbers of a range, end included, rounded to the decimals of the step."""
+    shown = [f"{number:g}" + ("" if unit == "1" else f" {unit}") for number in (first, last, step)]
+    bare = [_is_bare(part) for part in parts]
+    # "0.4:0.6mN:0.2mN": whoever writes this means 0.4 mN.
+    advice = "".join(
+        f"; '{part}' without a unit is {text}"
+        for part, text, alone in zip(parts, shown, bare, strict=True)
+        if alone and not all(bare) and float(part)
+    )
+    if not (step > 0 and last >= first):
+        raise ConfigurationError(
+            f"no value from {shown[0]} to {shown[1]} in steps of {shown[2]}{advice}"
+        )
+    steps = (last - first) / step
+    if steps > MOST_VALUES:
+        raise ConfigurationError(
+            f"a step of {shown[2]} gives more than {MOST_VALUES} values{advice}"
+        )
+    return [float(f"{first + k * step:.12g}") for k in range(math.floor(steps + 1e-6) + 1)]
+
+
+def _is_bare(part: str) -> bool:
+    """Whether a text is a number without a unit."""
+    try:
+        float(part)
+    except ValueError:
+        return False
+    return True

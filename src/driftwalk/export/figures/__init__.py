@@ -1,1 +1,0 @@
-"""The figures of a run for print, with their numbers."""

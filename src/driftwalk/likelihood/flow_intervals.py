@@ -1,0 +1,211 @@
+"""The flows of a fit: one for each interval between the switching times of the pumps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from driftwalk.core.errors import InputError
+from driftwalk.schema import FLAGS, Track, build_flow_field
+from driftwalk.schema.check import refuse_other_version, require_kind
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+
+@dataclass(frozen=True)
+class Intervals:
+    """When the flow changes, and to which one.
+
+    Attributes
+    ----------
+    times : tuple of float
+        Switching times on the clock of each recording [s], increasing; empty for a steady flow.
+    flows : tuple of int
+        Number of the flow in each interval, one more than times.
+    labels : tuple of str
+        Names of the flows.
+
+    Examples
+    --------
+    >>> Intervals((600.0, 1200.0), (0, 1, 0), ("A", "B")).of_flow(0)
+    [0, 2]
+    """
+
+    times: tuple[float, ...]
+    flows: tuple[int, ...]
+    labels: tuple[str, ...]
+
+    @property
+    def steady(self) -> bool:
+        """Whether there is but one flow."""
+        return len(self.labels) == 1
+
+    def of_flow(self, flow: int) -> list[int]:
+        """Return the intervals in which the water flows so."""
+        return [index for index, one in enumerate(self.flows) if one == flow]
+
+    def describe(self, index: int) -> str:
+        """Return "600 s to 1200 s"."""
+        low = "the start" if index == 0 else f"{self.times[index - 1]:g} s"
+        high = "the end" if index == len(self.times) else f"{self.times[index]:g} s"
+        return f"{low} to {high}"
+
+    def describe_flow(self, flow: int) -> str:
+        """Return "flow A (the start to 600 s)"."""
+        spans = ", ".join(self.describe(index) for index in self.of_flow(flow))
+        return f"flow {self.labels[flow]} ({spans})"
+
+    def index_of(self, time: np.ndarray) -> np.ndarray:
+        """Return the interval of each time; a switching time begins the next one."""
+        return np.searchsorted(self.times, time, side="right")
+
+
+def intervals_of(study: Study) -> Intervals:
+    """Return the intervals that the section [fit] of a study names.
+
+    Examples
+    --------
+    >>> from driftwalk.model import Study
+    >>> intervals_of(Study(fit={"switching_times_s": [600, 1200]})).labels
+    ('A', 'B', 'C')
+    """
+    times = study.fit.switching_times_s or ()
+    # A, B, ..., Z, A1, B1, ...
+    letters = [f"{chr(ord('A') + k % 26)}{k // 26 or ''}" for k in range(len(times) + 1)]
+    names = study.fit.flow_labels or tuple(letters)
+    labels = tuple(dict.fromkeys(names))
+    return Intervals(tuple(times), tuple(labels.index(name) for name in names), labels)
+
+
+def fitted_intervals(fit: xr.Dataset) -> Intervals:
+    """Return the intervals of a fit."""
+    if "flow" not in fit.dims:
+        return Intervals((), (0,), ("A",))
+    return Intervals(
+        *(tuple(fit[name].values.tolist()) for name in ("switching_time", "interval_flow", "flow"))
+    )
+
+
+def cut_track(track: Track, intervals: Intervals, *, fewest: int, where: str) -> list[Track]:
+    """Cut a track at the switching times, one part for each interval."""
+    if not intervals.times:
+        return [track]
+    first, last = float(track.time[0]), float(track.time[-1])
+    for time in intervals.times:
+        if not first < time <= last:
+            raise InputError(
+                f"{where}the switching time {time:g} s is outside the recording, which goes from "
+                f"{first:g} s to {last:g} s: switching times are those of its own clock "
+                "(`fit.switching_times_s`)"
+            )
+    index = intervals.index_of(track.time)
+    parts = [Track(*(column[index == one] for column in track)) for one in range(index[-1] + 1)]
+    for one, part in enumerate(parts):
+        if part.time.size < fewest:
+            usual = float(np.median(np.diff(track.time)))
+            raise InputError(
+                f"{where}the interval from {intervals.describe(one)} has {part.time.size} "
+                f"positions; the fit needs {fewest} at least ({fewest * usual:.3g} s at this "
+                "rate), and ten minutes to be of use: leave out a switching time, or what is "
+                "before or after it (`start`, `stop` of `load`)"
+            )
+    return parts
+
+
+def switched_frames(
+    intervals: Intervals, fields: Mapping[str, Sequence[np.ndarray]], *, first: float
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Return frames of a flow that jumps at the switches, where frames are joined by lines.
+
+    Examples
+    --------
+    >>> steps = Intervals((5.0,), (0, 1), ("A", "B"))
+    >>> time, frames = switched_frames(steps, {"u": [np.zeros(1), np.ones(1)]}, first=2.0)
+    >>> time.tolist(), frames["u"].tolist()
+    ([2.999999, 3.000001], [[0.0], [1.0]])
+    """
+    time, flow = [], []
+    half = 1e-6  # [s], for a field is linear between its frames
+    for index, switch in enumerate(intervals.times):
+        time += [switch - first - half, switch - first + half]
+        flow += [intervals.flows[index], intervals.flows[index + 1]]
+    return np.array(time), {
+        name: np.stack([values[one] for one in flow]) for name, values in fields.items()
+    }
+
+
+def require_fit(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a fit; refuse any other dataset, and a fit of another schema version."""
+    return refuse_other_version(require_kind(dataset, "fit", "fit_motion makes one"))
+
+
+def fitted_flow(fit: xr.Dataset, *, interval: int | None = None) -> xr.Dataset:
+    """Return the flow of a fit as a flow field, for everything that takes one.
+
+    Parameters
+    ----------
+    fit : xarray.Dataset
+        Result of `fit_motion`.
+    interval : int, optional
+        With switching times: the interval, counted from 0, whose steady flow is wanted. Without
+        it the flow that changes is returned: its frames are a microsecond before and after each
+        switch, as fields are linear in time between frames; times count from the first sample of
+        the first recording, as those of a simulation do.
+
+    Returns
+    -------
+    xarray.Dataset
+        A `flow_field`. Nodes that the block has been over are *measured*, the others of the tank
+        *filled*: there the spline is continued smoothly. Standard errors stand at measured nodes
+        (those of all nodes are in the fit); they are correlated over about the distance of knots.
+
+    Raises
+    ------
+    InputError
+        When the dataset is no fit, or has no such interval.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> flow = dw.fitted_flow(dw.fit_motion(dw.tank30_recording()))  # doctest: +SKIP
+    """
+    fit = require_fit(fit)
+    intervals = fitted_intervals(fit)
+    if interval is not None and not 0 <= interval < len(intervals.flows):
+        raise InputError(
+            f"no interval {interval}: the fit has {len(intervals.flows)}, counted from 0"
+        )
+    attrs: dict[str, Any] = {
+        "method": "bicubic spline, fitted with drag and noise by the innovations' likelihood",
+        "cell_size_m": float(fit["cell_size"]),
+        **{key: fit.attrs[key] for key in ("arena", "source")},
+    }
+    x, y = fit["x"].values, fit["y"].values
+    if intervals.steady:
+        return build_flow_field(x, y, attrs=attrs, **_field_variables(fit))
+    fields = [_field_variables(fit.isel(flow=index)) for index in range(fit.sizes["flow"])]
+    if interval is not None:
+        flow = intervals.flows[interval]
+        attrs["flow_label"] = intervals.labels[flow]
+        attrs["intervals"] = ", ".join(intervals.describe(one) for one in intervals.of_flow(flow))
+        return build_flow_field(x, y, attrs=attrs, **fields[flow])
+    attrs["repeat"] = "hold"  # before the first switch and after the last the flow is steady
+    by_name = {name: [one[name] for one in fields] for name in fields[0]}
+    time, frames = switched_frames(intervals, by_name, first=float(fit["recording_start"]))
+    return build_flow_field(x, y, time=time, attrs=attrs, **frames)
+
+
+def _field_variables(fit: xr.Dataset) -> dict[str, Any]:
+    """Return the variables of a flow field: standard errors at measured nodes only."""
+    measured = fit["flag"].values == FLAGS["measured"]
+    errors = {
+        name: np.where(measured, fit[name].values, np.nan)
+        for name in ("u_standard_error", "v_standard_error")
+    }
+    return {**{name: fit[name].values for name in ("u", "v", "flag", "count")}, **errors}

@@ -1,1 +1,0 @@
-"""Study files: a study as TOML, and the template with comments."""

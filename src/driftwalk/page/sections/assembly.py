@@ -1,0 +1,270 @@
+"""A page on self-assembly: what the blocks built, how surely, when, and sample runs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from driftwalk.page.chart import chart, label, mark, series
+from driftwalk.page.number_words import count, percent, quantity
+from driftwalk.page.parts import (
+    Section,
+    attempt,
+    figure,
+    require,
+    required,
+    sections_of,
+    summary_section,
+    value_of,
+)
+from driftwalk.page.sections.outcomes import (
+    class_times_section,
+    classes_section,
+    size_numbers,
+    size_sections,
+)
+from driftwalk.page.sections.replay import replay_section
+from driftwalk.plot.parts.assembly_labels import class_names
+from driftwalk.schema.shapes import short_class
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+FOUND, DRAWN = "parameters found", "parameters drawn"
+SURVIVAL: Final = {
+    "first_contact": "no two blocks have met yet",
+    "completion": "not all blocks are in one assembly yet",
+}
+
+
+def assembly_sections(
+    *,
+    distribution: xr.Dataset | None = None,
+    distribution_drawn: xr.Dataset | None = None,
+    class_times: xr.Dataset | None = None,
+    assembly: xr.Dataset | None = None,
+    assembly_drawn: xr.Dataset | None = None,
+    path: xr.Dataset | None = None,
+    sizes: xr.Dataset | None = None,
+    sizes_drawn: xr.Dataset | None = None,
+) -> list[Section]:
+    """Return the sections of a page on self-assembly.
+
+    Parameters
+    ----------
+    distribution, distribution_drawn : xarray.Dataset, optional
+        The `outcome_distribution` of runs with the parameters found, and with drawn ones.
+    class_times : xarray.Dataset, optional
+        A `class_times`.
+    assembly, assembly_drawn : xarray.Dataset, optional
+        The `assembly` of every run.
+    path : xarray.Dataset, optional
+        An `assembly_path` of sample runs.
+    sizes, sizes_drawn : xarray.Dataset, optional
+        The `assembly_sizes` of both. They take the place of the classes.
+
+    Returns
+    -------
+    list of dict
+        Sections; what cannot be shown is an empty one that says why.
+
+    Examples
+    --------
+    >>> [part["kind"] for part in assembly_sections()]
+    ['empty']
+    """
+    outcomes = _by_set(distribution, distribution_drawn)
+    made = sections_of(
+        distribution,
+        "There are no outcomes yet.",
+        lambda found: assembly_summary(found, distribution_drawn, class_times, assembly, sizes),
+        lambda _: _left_out(outcomes),
+    )
+    if outcomes and sizes is None:
+        made += attempt("classes", "Structures built", lambda: classes_section(outcomes))
+    if sizes is not None:
+        made += size_sections(_by_set(sizes, sizes_drawn))
+    if class_times is not None:
+        if sizes is None:
+            title = "Outcome classes over time"
+            made += attempt("class-times", title, lambda: class_times_section(class_times))
+        title = "Time to contact and completion"
+        made += attempt("survival", title, lambda: survival_section(class_times))
+    if path is not None:
+        made += attempt("replay", "Sample runs", lambda: replay_section(path, assembly))
+    if assembly_drawn is not None:
+        made += attempt("drawn", "The drawn parameters", lambda: drawn_section(assembly_drawn))
+    return made
+
+
+def _by_set(found: xr.Dataset | None, drawn: xr.Dataset | None) -> dict[str, xr.Dataset]:
+    """Return the results of the sets of runs that there are, by the name of the set."""
+    if found is None:
+        return {}
+    return {"runs": found} if drawn is None else {FOUND: found, DRAWN: drawn}
+
+
+def assembly_summary(
+    distribution: xr.Dataset,
+    drawn: xr.Dataset | None = None,
+    times: xr.Dataset | None = None,
+    assembly: xr.Dataset | None = None,
+    sizes: xr.Dataset | None = None,
+) -> Section:
+    """Return the outcomes of self-assembly in words and numbers."""
+    require(distribution, "class", "proportion")
+    facts = distribution.attrs
+    done = (
+        f"{count(int(facts.get('blocks', 0)), 'block')} were simulated in "
+        f"{count(int(facts.get('runs', 0)), 'run')}"
+    )
+    duration = value_of(distribution, "duration_s")
+    done += f" of {quantity(duration, 's')}" if duration is not None else ""
+    done += _parameters(distribution, assembly)
+    rules = [
+        f"{words} {facts[name]}"
+        for name, words in (("latching", "latching by"), ("hidden_face_drag", "hidden-face drag"))
+        if name in facts
+    ]
+    done += f" ({', '.join(rules)})" if rules else ""
+    paragraphs = [f"{done}.", _most_common(distribution, named=sizes is None)]
+    shown = [_complete(distribution, "complete: one assembly")]
+    if drawn is not None:
+        paragraphs.append(_beside(distribution, drawn, classes=sizes is None))
+        shown.append(_complete(drawn, "complete, parameters drawn"))
+    if sizes is not None:
+        shown += size_numbers(sizes)
+    paragraphs.append("These predictions use latching rules that no recording has settled.")
+    if times is not None:
+        shown += [_median(times, name) for name in SURVIVAL]
+    return summary_section(paragraphs, shown)
+
+
+def survival_section(times: xr.Dataset) -> Section:
+    """Return the shares of runs without contact yet, and without completion yet."""
+    require(times, "time", *SURVIVAL)
+    drawn: list[dict[str, Any]] = []
+    for name, words in SURVIVAL.items():
+        ends = [f"{name}_{end}" for end in ("low", "high")]
+        known = all(end in times for end in ends)
+        band = (times[ends[0]].values, times[ends[1]].values) if known else None
+        drawn.append(series(words, times["time"].values, times[name].values, ends=band))
+    return chart(
+        "survival", "Time to contact and completion",
+        x=label("time", "s"), y=label("share of runs"), series=drawn,
+        marks=[mark("half of the runs", y=0.5)],
+    )  # fmt: skip
+
+
+def drawn_section(assembly: xr.Dataset) -> Section:
+    """Return the parameters that were drawn for each run."""
+    require(assembly, "force_std", "drag_coefficient")
+    force, drag = (assembly[name].values for name in ("force_std", "drag_coefficient"))
+    what = str(assembly.attrs.get("drawn", "")).split()
+    every = value_of(assembly, "force_interval_s")
+    redrawn = "" if every is None else f", redrawn every {quantity(every, 's')}"
+    note = f"{count(int(force.size), 'run')}, each with its own parameters."
+    if "flow" in what:
+        note += " Each also has its own flow, drawn within the errors of the field."
+    return chart(
+        "drawn", "The drawn parameters", note,
+        x=label(f"stochastic force σ_F{redrawn}", "N"), y=label("drag coefficient C_d"),
+        series=[series("runs", force, drag, style="points")],
+    )  # fmt: skip
+
+
+def _parameters(distribution: xr.Dataset, assembly: xr.Dataset | None) -> str:
+    if assembly is None or "drag_coefficient" not in assembly or "force_std" not in assembly:
+        return ""
+    drag, force = (np.unique(assembly[n].values) for n in ("drag_coefficient", "force_std"))
+    if drag.size != 1 or force.size != 1:
+        return ""
+    every = value_of(distribution, "force_interval_s")
+    redrawn = "" if every is None else f" redrawn every {quantity(every, 's')}"
+    values = f" with C_d = {quantity(float(drag[0]))} and σ_F = {quantity(float(force[0]), 'N')}"
+    return values + redrawn
+
+
+def _beside(distribution: xr.Dataset, drawn: xr.Dataset, *, classes: bool) -> str:
+    """Return how far the runs with drawn parameters are from the others."""
+    require(drawn, "class", "proportion")
+    words = [_drawn_word(name) for name in str(drawn.attrs.get("drawn", "")).split()]
+    what = " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+    said = (
+        f"In a second set each run has its own {what or 'parameters'}, drawn from the "
+        "uncertainty of the run that found them."
+    )
+    if not classes:
+        return said
+    apart, chance = l1_and_chance(distribution, drawn)
+    return (
+        f"{said} The l1 distance of the two sets is "
+        f"{apart:.3g} (0: identical, 2: nothing in common); by chance alone it would "
+        f"be {chance:.2g} on average."
+    )
+
+
+def l1_and_chance(first: xr.Dataset, second: xr.Dataset) -> tuple[float, float]:
+    """Return the l1 distance of two distributions, and what chance alone makes on average.
+
+    The second number is that of normal differences of the shares, with the variance that their
+    common value gives.
+    """
+    runs = [float(required(one, "runs")) for one in (first, second)]
+    shares: list[dict[str, float]] = [
+        dict(zip(class_names(one), one["proportion"].values.tolist(), strict=True))
+        for one in (first, second)
+    ]
+    names = list(dict.fromkeys([*shares[0], *shares[1]]))
+    one, other = (np.array([share.get(name, 0.0) for name in names]) for share in shares)
+    common = (runs[0] * one + runs[1] * other) / sum(runs)
+    spread = np.sqrt(common * (1.0 - common) * sum(1.0 / number for number in runs))
+    return float(np.abs(one - other).sum()), float(np.sqrt(2.0 / np.pi) * spread.sum())
+
+
+def _most_common(distribution: xr.Dataset, *, named: bool) -> str:
+    names = [short_class(str(name)) for name in distribution["class"].values]
+    share = distribution["proportion"].values
+    first = np.argsort(-share, kind="stable")[:3]
+    listed = ", ".join(f"{names[i]} in {percent(float(share[i]))}" for i in first if share[i] > 0)
+    complete = value_of(distribution, "complete")
+    if complete is None or not listed:
+        return f"Most common: {listed or 'nothing'}."
+    ends = [value_of(distribution, f"complete_{end}") for end in ("low", "high")]
+    band = ""
+    if ends[0] is not None and ends[1] is not None:
+        band = f" ({percent(ends[0])} to {percent(ends[1])})"
+    done = f"{percent(complete)}{band} of the runs end as one assembly."
+    return f"{done} Most common: {listed}." if named else done
+
+
+def _complete(distribution: xr.Dataset, words: str) -> dict[str, Any]:
+    value, low, high = (value_of(distribution, f"complete{end}") for end in ("", "_low", "_high"))
+    confidence = value_of(distribution, "confidence")
+    return figure(words, value, ends=(low, high), confidence=confidence)
+
+
+def _median(times: xr.Dataset, name: str) -> dict[str, Any]:
+    value, low, high = (value_of(times, f"{name}_median{end}_s") for end in ("", "_low", "_high"))
+    note = None if value is not None else "not reached in half the runs"
+    confidence = value_of(times, "confidence")
+    words = f"{_word(name)}, median"
+    return figure(words, value, "s", note=note, ends=(low, high), confidence=confidence)
+
+
+def _left_out(found: dict[str, xr.Dataset]) -> list[str]:
+    return [
+        f"{count(int(one.attrs['left_out']), 'run')} ({name}) broke down and are left out; use a "
+        "smaller time step"
+        for name, one in found.items()
+        if one.attrs.get("left_out")
+    ]
+
+
+def _drawn_word(name: str) -> str:
+    return "stochastic force" if name == "force_std" else _word(name)
+
+
+def _word(name: str) -> str:
+    return name.replace("_", " ")

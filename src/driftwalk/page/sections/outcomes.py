@@ -1,0 +1,260 @@
+"""The parts of a page on what blocks built: outcome classes, their sketches, and sizes."""
+
+from __future__ import annotations
+
+import functools
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from driftwalk.core.arrays import Floats
+from driftwalk.page.arrays import number, numbers
+from driftwalk.page.chart import chart, label, series
+from driftwalk.page.number_words import count, percent
+from driftwalk.page.parts import Section, attempt, figure, require, section, value_of
+from driftwalk.plot.parts.assembly_labels import OTHER, class_names, classes_to_show
+from driftwalk.plot.parts.polyomino_sketch import class_cells, is_class
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+MOST_TIMES: Final = 401
+"""Times at which a page has the shares."""
+MEAN_TITLE: Final = "Mean size over time"
+SHARES_TITLE: Final = "Largest assembly and free blocks"
+SHARES: Final = {"largest_share": "in the largest assembly", "free_share": "alone"}
+
+
+@functools.cache
+def cells_of(name: str) -> list[list[float]]:
+    """Return the squares in the sketch of a class, see `class_cells`; none of anything else.
+
+    Examples
+    --------
+    >>> cells_of("2+1"), cells_of("other")
+    ([[0.0, 1.6], [1.0, 1.6], [0.0, 0.0]], [])
+    """
+    found: list[list[float]] = class_cells(name).tolist() if is_class(name) else []
+    return found
+
+
+def classes_section(
+    found: dict[str, xr.Dataset], *, id: str = "classes", title: str = "Structures built"
+) -> Section:
+    """Return the shares of the outcome classes, one series next to the other.
+
+    Parameters
+    ----------
+    found : dict of str to xarray.Dataset
+        Each an `outcome_distribution`, by what it is of.
+    id, title : str
+        Name of the section in its page, and its heading.
+
+    Raises
+    ------
+    InputError
+        When one of them has no shares.
+    """
+    for one in found.values():
+        require(one, "class", "count", "proportion")
+    names = list(dict.fromkeys(name for one in found.values() for name in class_names(one)))
+    largest = np.max([_by_name(one, "proportion", names) for one in found.values()], axis=0)
+    shown = [names[index] for index in classes_to_show(names, np.nan_to_num(largest))]
+    first = next(iter(found.values()))
+    confidence = value_of(first, "confidence")
+    return section(
+        id, "classes", title,
+        None if confidence is None else f"{percent(confidence)} simultaneous intervals.",
+        confidence=confidence,
+        runs=int(first.attrs.get("runs", 0)),
+        series=[{"name": name, "items": _items(one, names, shown)} for name, one in found.items()],
+    )  # fmt: skip
+
+
+def class_times_section(times: xr.Dataset) -> Section:
+    """Return the shares of the outcome classes over time.
+
+    Parameters
+    ----------
+    times : xarray.Dataset
+        A `class_times`.
+
+    Raises
+    ------
+    InputError
+        When it has no shares.
+    """
+    require(times, "time", "class", "proportion")
+    every = -(-times.sizes["time"] // MOST_TIMES)
+    thin = times.isel(time=slice(None, None, every))
+    names = class_names(thin)
+    share = thin["proportion"].transpose("class", "time").values
+    shown = classes_to_show(names, np.nan_to_num(share).max(axis=1, initial=0.0))
+    ends = [f"proportion_{end}" for end in ("low", "high")]
+    bands = [thin[end].transpose("class", "time").values if end in thin else None for end in ends]
+    classes = [
+        _over_time(names[i], share[i], *(None if band is None else band[i] for band in bands))
+        for i in shown
+    ]
+    rest = sorted(set(range(len(names))) - set(shown))
+    if rest:
+        classes.append(_over_time(OTHER, share[rest].sum(axis=0), None, None))
+    return section(
+        "class-times", "class_times", "Outcome classes over time",
+        time=numbers(thin["time"].values), classes=classes,
+    )  # fmt: skip
+
+
+def _over_time(name: str, share: Floats, low: Floats | None, high: Floats | None) -> dict[str, Any]:
+    return {
+        "class": name,
+        "cells": cells_of(name),
+        "share": numbers(share),
+        "low": None if low is None else numbers(low),
+        "high": None if high is None else numbers(high),
+    }
+
+
+def _by_name(found: xr.Dataset, variable: str, names: list[str]) -> Floats:
+    """Return a variable of the classes in another order, NaN where a class does not occur."""
+    place = {name: index for index, name in enumerate(class_names(found))}
+    values = np.asarray(found[variable].values, dtype=np.float64)
+    return np.array([values[place[name]] if name in place else np.nan for name in names])
+
+
+def _items(found: xr.Dataset, names: list[str], shown: list[str]) -> list[dict[str, Any]]:
+    keys = ("count", "proportion", "interval_low", "interval_high")
+    columns = {
+        key: dict(zip(names, _by_name(found, key, names), strict=True)) for key in keys
+        if key in found
+    }  # fmt: skip
+
+    def column(key: str, name: str) -> float | None:
+        return number(columns[key][name]) if key in columns else None
+
+    items = [
+        {
+            "class": name, "cells": cells_of(name),
+            "count": None if (n := column("count", name)) is None else int(n),
+            "share": column("proportion", name),
+            "low": column("interval_low", name), "high": column("interval_high", name),
+        }
+        for name in shown
+    ]  # fmt: skip
+    rest = [name for name in names if name not in shown]
+    if rest:
+        total = [sum(column(key, name) or 0.0 for name in rest) for key in keys[:2]]
+        items.append(
+            {
+                "class": OTHER, "cells": [], "count": int(total[0]), "share": total[1],
+                "low": None, "high": None, "note": count(len(rest), "class") + " that are rare",
+            }
+        )  # fmt: skip
+    return items
+
+
+def size_sections(found: dict[str, xr.Dataset]) -> list[Section]:
+    """Return the sizes at the end of the runs, and their growth over time.
+
+    Parameters
+    ----------
+    found : dict of str to xarray.Dataset
+        Each an `assembly_sizes`, by what it is of.
+    """
+    return [
+        *attempt("sizes", "Sizes of the assemblies", lambda: sizes_section(found)),
+        *attempt("mean-size", MEAN_TITLE, lambda: mean_size_section(found)),
+        *attempt("size-shares", SHARES_TITLE, lambda: shares_section(found)),
+    ]
+
+
+def mean_size_section(found: dict[str, xr.Dataset]) -> Section:
+    """Return the mean size of the assemblies over time."""
+    return chart(
+        "mean-size", MEAN_TITLE, _note(found), x=label("time", "s"), y=label("blocks per assembly"),
+        series=_courses(found, {"mean_size": ""}),
+    )  # fmt: skip
+
+
+def shares_section(found: dict[str, xr.Dataset]) -> Section:
+    """Return the shares of the blocks that are in the largest assembly, and alone, over time."""
+    return chart(
+        "size-shares", SHARES_TITLE, _note(found), x=label("time", "s"),
+        y=label("share of the blocks"), series=_courses(found, SHARES),
+    )  # fmt: skip
+
+
+def sizes_section(found: dict[str, xr.Dataset]) -> Section:
+    """Return the share of the blocks that is in assemblies of each size at the end.
+
+    Parameters
+    ----------
+    found : dict of str to xarray.Dataset
+        Each an `assembly_sizes`, by what it is of.
+
+    Raises
+    ------
+    InputError
+        When one of them has no sizes.
+    """
+    drawn = []
+    groups: dict[str, None] = {}
+    for name, one in found.items():
+        require(one, "size", "size_to", "block_share")
+        ends = zip(one["size"].values, one["size_to"].values, strict=True)
+        groups |= dict.fromkeys(f"{low} to {high}" for low, high in ends if high > low)
+        middle = np.sqrt(one["size"].values * one["size_to"].values)
+        drawn.append(_series(name, middle, one, "block_share", style="points"))
+    grouped = "Sizes that share a point, at their geometric mean"
+    note = f"{grouped}: {', '.join(groups)}. " if groups else ""
+    return chart(
+        "sizes", "Sizes of the assemblies", f"At the end of the runs. {note}{_note(found)}",
+        x=label("blocks in the assembly", log=True), y=label("share of the blocks"), series=drawn,
+    )  # fmt: skip
+
+
+def size_numbers(sizes: xr.Dataset) -> list[dict[str, Any]]:
+    """Return the numbers of a summary: the end of the runs, with intervals."""
+    end = sizes.isel(time=-1)
+    words = {
+        "largest_share": "share of the blocks in the largest assembly",
+        "free_share": "share of the blocks that are alone",
+        "mean_size": "blocks per assembly, mean",
+    }
+    confidence = value_of(sizes, "confidence")
+    shown = [
+        figure(
+            text, end[name], ends=(end[f"{name}_low"], end[f"{name}_high"]), confidence=confidence
+        )
+        for name, text in words.items()
+    ]
+    compact = figure(
+        "compactness",
+        value_of(sizes, "compactness"),
+        note="least perimeter over perimeter",
+        ends=(value_of(sizes, "compactness_low"), value_of(sizes, "compactness_high")),
+        confidence=confidence,
+    )
+    return [*shown, compact]
+
+
+def _courses(found: dict[str, xr.Dataset], names: dict[str, str]) -> list[dict[str, Any]]:
+    drawn = []
+    for kind, one in found.items():
+        require(one, "time", *names)
+        for name, words in names.items():
+            both = (words, kind if len(found) > 1 or not words else "")
+            text = ", ".join(part for part in both if part)
+            drawn.append(_series(text, one["time"].values, one, name))
+    return drawn
+
+
+def _series(name: str, x: Any, found: xr.Dataset, of: str, **how: Any) -> dict[str, Any]:
+    ends = (found[f"{of}_low"].values, found[f"{of}_high"].values)
+    return series(name, x, found[of].values, ends=ends, **how)
+
+
+def _note(found: dict[str, xr.Dataset]) -> str:
+    confidence = value_of(next(iter(found.values())), "confidence")
+    each = "" if confidence is None else f", with {percent(confidence)} intervals"
+    return f"Means over the runs{each}."

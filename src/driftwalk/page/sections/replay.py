@@ -1,0 +1,125 @@
+"""The replay of a page: blocks of sample runs over time, and what joined when."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from driftwalk.core.errors import InputError
+from driftwalk.page.arrays import binary_step, encode_array
+from driftwalk.page.number_words import count, quantity
+from driftwalk.page.parts import Section, arena_part, require, required, section
+from driftwalk.page.sections.outcomes import cells_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+MOST_POSES: Final = 400_000
+"""Poses that a page holds; longer paths are shown more rarely, then fewer of them."""
+FEWEST_TIMES: Final = 300
+POSITION_PARTS: Final = 2000
+ANGLE_STEP: Final = 2.0**-9
+TIME_STEP: Final = 2.0**-14
+
+
+def replay_section(path: xr.Dataset, assembly: xr.Dataset | None = None) -> Section:
+    """Return the sample runs of an assembly, to be played.
+
+    Parameters
+    ----------
+    path : xarray.Dataset
+        An `assembly_path`.
+    assembly : xarray.Dataset, optional
+        The `assembly` that the runs belong to, for what joined when.
+
+    Raises
+    ------
+    InputError
+        When the path lacks poses or the side of the blocks.
+    """
+    require(path, "x", "y", "theta", "assembly", "time")
+    side = float(required(path, "block_side_m"))
+    runs, every = _shares(path)
+    thin = path.isel(run=slice(0, runs), time=slice(None, None, every))
+    step = binary_step(2.0 * float(np.nanmax(np.abs(thin["x"].values))), POSITION_PARTS)
+    known_to = quantity(step, "m", digits=2)
+    note = f"{count(runs, 'run')}, a position every {_interval(thin)}, to {known_to}."
+    if runs < path.sizes["run"]:
+        note += f" {count(path.sizes['run'] - runs, 'more run')} in the file."
+    made = [_run(thin.isel(run=index), index, assembly, step) for index in range(runs)]
+    names = {change["class"] for run in made for change in run["classes"]}
+    return section(
+        "replay", "replay", "Sample runs", note,
+        arena=arena_part(path),
+        side=side,
+        time=encode_array(thin["time"].values, step=TIME_STEP),
+        runs=made,
+        cells={name: cells_of(name) for name in sorted(names)},
+    )  # fmt: skip
+
+
+def _shares(path: xr.Dataset) -> tuple[int, int]:
+    """Return how many runs are shown, and every how manyth sample of them."""
+    runs, times, blocks = (path.sizes[name] for name in ("run", "time", "block"))
+    while runs > 1 and runs * min(times, FEWEST_TIMES) * blocks > MOST_POSES:
+        runs -= 1
+    return runs, max(1, -(-runs * times * blocks // MOST_POSES))
+
+
+def _interval(path: xr.Dataset) -> str:
+    time = path["time"].values
+    return quantity(float(np.median(np.diff(time))), "s", digits=3) if time.size > 1 else "run"
+
+
+def _run(path: xr.Dataset, index: int, assembly: xr.Dataset | None, step: float) -> dict[str, Any]:
+    x, y, theta, joined = (
+        path[name].transpose("block", "time").values for name in ("x", "y", "theta", "assembly")
+    )
+    # From the path's own numbering: its first run need not be the first of all.
+    number_of = int(path["run"]) if "run" in path.coords else index
+    events = [] if assembly is None else _events(assembly, number_of)
+    turned = np.angle(np.exp(1j * theta.astype(np.float64)))
+    return {
+        "name": f"run {number_of}",
+        "x": encode_array(x, step=step),
+        "y": encode_array(y, step=step),
+        "theta": encode_array(turned, step=ANGLE_STEP),
+        "assembly": encode_array(joined),
+        "events": events,
+        "classes": _classes(assembly, number_of, events),
+    }
+
+
+def _events(assembly: xr.Dataset, run: int) -> list[dict[str, Any]]:
+    """Return what joined in a run, in the order of time."""
+    require(assembly, "event_count", "event_time", "event_block", "event_class", "class")
+    if run not in assembly["run"].values:
+        return []
+    found = assembly.sel(run=run)
+    return [
+        {
+            "time": float(found["event_time"].values[event]),
+            "blocks": [int(block) for block in found["event_block"].values[event]],
+            "class": _class(assembly, int(found["event_class"].values[event])),
+        }
+        for event in range(int(found["event_count"]))
+    ]
+
+
+def _classes(
+    assembly: xr.Dataset | None, run: int, events: list[dict[str, Any]]
+) -> list[dict[str, Any]]:
+    """Return the class of all blocks from each change on."""
+    if assembly is None or run not in assembly["run"].values:
+        return []
+    blocks = assembly.sizes.get("block", 0)
+    start = {"time": 0.0, "class": "+".join(["1"] * blocks)}
+    return [start, *({"time": event["time"], "class": event["class"]} for event in events)]
+
+
+def _class(assembly: xr.Dataset, index: int) -> str:
+    names = assembly["class"].values
+    if not 0 <= index < names.size:
+        raise InputError(f"an event of the assembly has class {index}, of {names.size} there are")
+    return str(names[index])

@@ -1,0 +1,391 @@
+"""How assemblies grow over time: outcome classes, contact and completion, sizes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Final, Literal
+
+import numpy as np
+
+from driftwalk.core.arrays import Floats
+from driftwalk.core.errors import InputError
+from driftwalk.plot.parts.assembly_labels import (
+    OTHER,
+    check_kind,
+    class_colors,
+    class_names,
+    classes_to_show,
+    is_complete,
+    percent,
+    runs_text,
+)
+from driftwalk.plot.parts.labels import number_fact
+from driftwalk.plot.parts.polyomino_sketch import (
+    NAME_SIZE_PT,
+    axes_points,
+    class_cells,
+    name_text,
+    place_sketch,
+    sketch_size,
+)
+from driftwalk.plot.parts.style import BLUE, INK, MUTED, ORANGE, axes_or_new
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+# Share of the height between two labels at the right edge, and their largest sketch [pt].
+LABEL_GAP: Final = 0.012
+SKETCH_PT: Final = 9.0
+TIME_LABEL: Final = "time (s)"
+SURVIVAL: Final = {
+    "first_contact": ("no two blocks have met", BLUE, "-"),
+    "completion": ("more than one assembly", ORANGE, (0, (5, 2))),
+}
+
+BAR_WIDTH: Final = 0.76
+GROWTH: Final = {
+    "mean size": {"mean_size": "mean size"},
+    "shares": {"largest_share": "in the largest assembly", "free_share": "alone"},
+}
+DASHES: Final = ("-", (0, (5, 2)))
+
+
+def plot_class_times(
+    times: xr.Dataset, ax: Axes | None = None, *, form: Literal["lines", "stacked"] = "stacked"
+) -> Axes:
+    """Draw the proportion of runs in every outcome class over time, labelled at the right edge.
+
+    Hues are classes of one assembly, greys those of several. Of more than 16 classes, those that
+    reach 1 % at some time are shown, at most 20, and the sum of the rest as "other".
+
+    Parameters
+    ----------
+    times : xarray.Dataset
+        A `class_times`.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure when left out.
+    form : {"lines", "stacked"}
+        One line per class, or areas on top of each other, the first class at the bottom.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+
+    Raises
+    ------
+    InputError
+        When the dataset is of another kind, or the form is not known.
+
+    Examples
+    --------
+    ``plot_class_times(times, form="lines")``
+    """
+    if form not in ("lines", "stacked"):
+        raise InputError(f"form='{form}': choose lines or stacked")
+    check_kind(times, "class_times", "proportion", "time", "class")
+    ax = axes_or_new(ax, height_mm=75.0)
+    time = np.asarray(times["time"].values, dtype=np.float64)
+    names, proportion = _shown(times)
+    colors = class_colors(names)
+    ax.set_xlim(time[0], time[-1])
+    if form == "stacked":
+        ax.stackplot(
+            time, proportion, colors=[colors[name] for name in names], labels=names,
+            edgecolor="white", linewidth=0.3,
+        )  # fmt: skip
+        ax.set_ylim(0.0, 1.0)
+        # Rounding in the file: the top of the last area is the top of the axes.
+        height = np.cumsum(proportion[:, -1]) - proportion[:, -1] / 2.0
+        labelled = proportion[:, -1] > 0.0
+    else:
+        for name, line in zip(names, proportion, strict=True):
+            ax.plot(
+                time, line, color=colors[name], label=name, ls="-" if is_complete(name) else "--"
+            )
+        ax.set_ylim(0.0, min(1.0, 1.08 * float(np.nanmax(proportion))) or 1.0)
+        height = proportion[:, -1]
+        labelled = proportion.max(axis=1) > 0.0
+    kept = np.flatnonzero(labelled)
+    _label_right(ax, [names[index] for index in kept], height[kept], colors)
+    ax.set_xlabel(TIME_LABEL)
+    ax.set_ylabel("proportion of runs")
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.set_title(runs_text(times), loc="left")
+    return ax
+
+
+def plot_survival(times: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw the shares of runs without contact yet, and without completion yet, with their bands.
+
+    Parameters
+    ----------
+    times : xarray.Dataset
+        A `class_times` with ``first_contact`` or ``completion``, or both.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure when left out.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+
+    Raises
+    ------
+    InputError
+        When the dataset is of another kind, or has neither curve.
+
+    Examples
+    --------
+    ``plot_survival(times).figure.savefig("survival.png")``
+    """
+    check_kind(times, "class_times", "time")
+    curves = [name for name in SURVIVAL if name in times]
+    if not curves:
+        raise InputError(f"the dataset 'class_times' lacks {' and '.join(SURVIVAL)}")
+    ax = axes_or_new(ax, height_mm=65.0)
+    time = np.asarray(times["time"].values, dtype=np.float64)
+    for name in curves:
+        text, color, dashes = SURVIVAL[name]
+        ax.plot(time, times[name].values, color=color, ls=dashes, label=text, lw=1.3)
+        if f"{name}_low" in times and f"{name}_high" in times:
+            ax.fill_between(
+                time, times[f"{name}_low"].values, times[f"{name}_high"].values, color=color,
+                alpha=0.2, lw=0,
+            )  # fmt: skip
+    ax.set_xlim(time[0], time[-1])
+    ax.set_ylim(0.0, 1.02)
+    ax.set_xlabel(TIME_LABEL)
+    ax.set_ylabel("proportion of runs")
+    ax.spines[["top", "right"]].set_visible(False)
+    confidence = number_fact(times, "confidence")
+    bands = f"bands: {percent(confidence)}" if np.isfinite(confidence) else ""
+    ax.set_title(", ".join(part for part in (runs_text(times), bands) if part), loc="left")
+    ax.legend(loc="upper right")
+    return ax
+
+
+def _shown(times: xr.Dataset) -> tuple[list[str], Floats]:
+    """Return the names drawn and their proportions (class, time)."""
+    names = class_names(times)
+    proportion = np.asarray(times["proportion"].transpose("class", "time").values, dtype=np.float64)
+    shown = classes_to_show(names, proportion.max(axis=1))
+    drawn, kept = [names[index] for index in shown], proportion[shown]
+    if len(shown) < len(names):
+        drawn.append(OTHER)
+        kept = np.vstack([kept, np.delete(proportion, shown, axis=0).sum(axis=0)])
+    return drawn, kept
+
+
+def _label_right(ax: Axes, names: list[str], height: Floats, colors: dict[str, str]) -> None:
+    """Put sketch and name of every class at its end, moved apart where they would meet."""
+    total_pt = float(axes_points(ax)[1])
+    low, high = ax.get_ylim()
+    share = (height - low) / (high - low)
+    known = [name != OTHER for name in names]
+    tall = np.array(
+        [
+            sketch_size(class_cells(name))[1] if there else 1.0
+            for name, there in zip(names, known, strict=True)
+        ]
+    )
+    free_pt = (1.0 - LABEL_GAP * len(names)) * total_pt
+    cell_pt = min(SKETCH_PT / 2.0, free_pt / max(float(tall.sum()), 1.0))
+    needed = np.maximum(tall * cell_pt, NAME_SIZE_PT) / total_pt
+    place = spread_apart(share, needed + LABEL_GAP)
+    wide = max(
+        (sketch_size(class_cells(n))[0] for n, there in zip(names, known, strict=True) if there),
+        default=1.0,
+    )
+    for name, there, at, end in zip(names, known, place, share, strict=True):
+        ax.annotate(
+            "", (1.0, end), xytext=(8.0, (at - end) * total_pt), xycoords="axes fraction",
+            textcoords="offset points", annotation_clip=False,
+            arrowprops={"arrowstyle": "-", "lw": 0.4, "color": MUTED, "shrinkA": 0, "shrinkB": 0},
+        )  # fmt: skip
+        if there:
+            _sketch_at(ax, name, at, cell_pt, colors[name])
+        ax.annotate(
+            name_text(name), (1.0, at), xytext=(13.0 + wide * cell_pt, 0.0),
+            xycoords="axes fraction", textcoords="offset points", va="center",
+            size=NAME_SIZE_PT, color=INK, annotation_clip=False,
+        )  # fmt: skip
+
+
+def _sketch_at(ax: Axes, name: str, at: float, cell_pt: float, color: str) -> None:
+    artist = place_sketch(
+        ax, name, (1.0, at), transform="axes fraction", alignment=(0.0, 0.5), cell_pt=cell_pt,
+        color=color,
+    )  # fmt: skip
+    artist.xybox = (10.0, 0.0)
+
+
+def spread_apart(wanted: Floats, size: Floats) -> Floats:
+    """Move places on a line apart so that things of these sizes do not overlap, within [0, 1].
+
+    Parameters
+    ----------
+    wanted : array, shape (n,)
+        Where the middles would be best.
+    size : array, shape (n,)
+        How long the things are; when their sum exceeds 1 they are shrunk to fit.
+
+    Returns
+    -------
+    array, shape (n,)
+        Middles, in the order of `wanted`, with the smallest sum of squared moves for this order.
+
+    Examples
+    --------
+    >>> spread_apart(np.array([0.5, 0.5]), np.array([0.2, 0.2])).round(6).tolist()
+    [0.4, 0.6]
+    """
+    size = size / max(1.0, float(size.sum()))
+    order = np.argsort(wanted, kind="stable")
+    half = size[order] / 2.0
+    # What lies before a thing, packed tightly: the middles minus this need only not decrease.
+    packed = np.cumsum(size[order]) - half
+    level = _isotonic(wanted[order] - packed)
+    level = np.clip(level, 0.0, 1.0 - float(size.sum()))
+    place = np.empty_like(wanted, dtype=np.float64)
+    place[order] = level + packed
+    return place
+
+
+def _isotonic(values: Floats) -> Floats:
+    """Return the nearest sequence that does not decrease: neighbours that do are pooled."""
+    blocks: list[tuple[float, int]] = []
+    for value in values:
+        mean, count = float(value), 1
+        while blocks and blocks[-1][0] > mean:
+            before, many = blocks.pop()
+            mean, count = (mean * count + before * many) / (count + many), count + many
+        blocks.append((mean, count))
+    return np.concatenate([np.full(count, mean) for mean, count in blocks] or [np.empty(0)])
+
+
+def plot_assembly_sizes(
+    sizes: xr.Dataset,
+    ax: Axes | None = None,
+    *,
+    beside: xr.Dataset | None = None,
+    labels: tuple[str, str] = ("", ""),
+) -> Axes:
+    """Draw which share of the blocks is in assemblies of each size at the end of the runs.
+
+    Parameters
+    ----------
+    sizes : xarray.Dataset
+        An `assembly_sizes`.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure when left out.
+    beside : xarray.Dataset, optional
+        A second one of as many blocks, drawn next to the first.
+    labels : tuple of str
+        Names of the first and the second, for the legend.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+
+    Raises
+    ------
+    InputError
+        When a dataset is of another kind or lacks what is drawn.
+
+    Examples
+    --------
+    ``plot_assembly_sizes(sizes).figure.savefig("sizes.png")``
+    """
+    both = [sizes] if beside is None else [sizes, beside]
+    for one in both:
+        check_kind(one, "assembly_sizes", "size", "size_to", "block_share")
+    ax = axes_or_new(ax, height_mm=65.0)
+    place = np.arange(sizes.sizes["size"])
+    width = BAR_WIDTH / len(both)
+    for index, (one, color) in enumerate(zip(both, (BLUE, ORANGE), strict=False)):
+        share, low, high = (one[f"block_share{end}"].values for end in ("", "_low", "_high"))
+        ax.bar(
+            place + (index - (len(both) - 1) / 2) * width, share, width, color=color,
+            yerr=None if np.isnan(low).any() else [share - low, high - share],
+            error_kw={"elinewidth": 0.8}, label=labels[index] or None,
+        )  # fmt: skip
+    ends = zip(sizes["size"].values, sizes["size_to"].values, strict=True)
+    ax.set_xticks(place, [str(a) if a == b else f"{a}–{b}" for a, b in ends], rotation=45)
+    ax.set_ylim(bottom=0.0)
+    ax.set_xlabel("blocks in the assembly")
+    ax.set_ylabel("share of the blocks")
+    _finish(ax, both)
+    return ax
+
+
+def plot_growth(
+    sizes: xr.Dataset,
+    ax: Axes | None = None,
+    *,
+    beside: xr.Dataset | None = None,
+    labels: tuple[str, str] = ("", ""),
+    what: Literal["mean size", "shares"] = "mean size",
+) -> Axes:
+    """Draw how assemblies grow over time, with the bands of the means over runs.
+
+    Parameters
+    ----------
+    sizes : xarray.Dataset
+        An `assembly_sizes`.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure when left out.
+    beside : xarray.Dataset, optional
+        A second one, drawn in the second colour.
+    labels : tuple of str
+        Names of the first and the second, for the legend.
+    what : {"mean size", "shares"}
+        The mean size of the assemblies, or the shares of the blocks that are in the largest
+        assembly and alone.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+
+    Raises
+    ------
+    InputError
+        When a dataset is of another kind or lacks what is drawn, or `what` is not known.
+
+    Examples
+    --------
+    ``plot_growth(sizes, what="shares")``
+    """
+    if what not in GROWTH:
+        raise InputError(f"what='{what}': choose {' or '.join(GROWTH)}")
+    both = [sizes] if beside is None else [sizes, beside]
+    curves = GROWTH[what]
+    for one in both:
+        check_kind(one, "assembly_sizes", "time", *curves)
+    ax = axes_or_new(ax, height_mm=65.0)
+    time = sizes["time"].values
+    for one, color, label in zip(both, (BLUE, ORANGE), labels, strict=False):
+        for (name, words), dashes in zip(curves.items(), DASHES, strict=False):
+            text = ", ".join(part for part in (words if len(curves) > 1 else "", label) if part)
+            ax.plot(one["time"], one[name], color=color, ls=dashes, lw=1.3, label=text or None)
+            ends = (one[f"{name}_low"].values, one[f"{name}_high"].values)
+            ax.fill_between(one["time"].values, *ends, color=color, alpha=0.2, lw=0)
+    ax.set_xlim(time[0], time[-1])
+    ax.set_ylim(bottom=0.0)
+    if what == "shares":
+        ax.set_ylim(0.0, 1.02)
+    ax.set_xlabel(TIME_LABEL)
+    ax.set_ylabel("blocks per assembly, mean" if what == "mean size" else "share of the blocks")
+    _finish(ax, both)
+    return ax
+
+
+def _finish(ax: Axes, both: list[xr.Dataset]) -> None:
+    """Say of how many runs it is, and name the curves where there are several."""
+    ax.spines[["top", "right"]].set_visible(False)
+    intervals = f"intervals: {percent(both[0].attrs['confidence'])}"
+    ax.set_title(", ".join(part for part in (runs_text(both[0]), intervals) if part), loc="left")
+    if ax.get_legend_handles_labels()[1]:
+        ax.legend()

@@ -1,1 +1,0 @@
-"""Joins between tracked blocks, frame by frame."""
