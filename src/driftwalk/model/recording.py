@@ -102,8 +102,8 @@ class Recording(Section):
     y_axis: Literal["auto", "up", "down"] = "auto"
     """Direction of the file's y axis; "auto" uses the direction of the format, down for pixels."""
     columns: Columns | None = Field(default=None, examples=['{ t = "time", x = 2, y = 3 }'])
-    """Columns of a table (t, frame, x, y, theta, body and others), each by its name in the header or
-    its number from 1; a unit may follow, as in "angle:deg"."""
+    """Columns of a table (t, frame, x, y, theta, body and others), each by its name in the header
+    or its number from 1; a unit may follow, as in "angle:deg"."""
     delimiter: str | None = Field(default=None, examples=[";"])
     """Character between the fields of a table; recognised when not given."""
     up: Literal["auto", "x", "y", "z", "-x", "-y", "-z"] = "auto"
