@@ -48,6 +48,26 @@ class Columns(Section):
     """Column of the quaternion's w, its real part."""
     body: Column = None
     """Column of the body's name."""
+    x1: Column = None
+    """Column of x of a box's first corner."""
+    y1: Column = None
+    """Column of y of a box's first corner."""
+    x2: Column = None
+    """Column of x of a box's second corner."""
+    y2: Column = None
+    """Column of y of a box's second corner."""
+    w: Column = None
+    """Column of the width of a box."""
+    h: Column = None
+    """Column of the height of a box."""
+    lon: Column = None
+    """Column of the longitude."""
+    lat: Column = None
+    """Column of the latitude."""
+    confidence: Column = None
+    """Column of the confidence."""
+    skip: Column = None
+    """Columns to leave out, with + between them."""
 
     def to_dict(self) -> dict[str, str]:
         """Return the columns that are set, from quantity to column."""
@@ -75,13 +95,15 @@ class Recording(Section):
         default=None, examples=[0.0005]
     )
     """Size of a pixel in m, if the file is in pixels."""
-    length_unit: Literal["auto", "m", "cm", "mm", "um", "km", "px"] = "auto"
+    length_unit: Literal[
+        "auto", "m", "dm", "cm", "mm", "um", "nm", "km", "ft", "in", "yd", "px"
+    ] = "auto"
     """Unit of the positions; "auto" uses the unit of the file."""
     y_axis: Literal["auto", "up", "down"] = "auto"
     """Direction of the file's y axis; "auto" uses the direction of the format, down for pixels."""
     columns: Columns | None = Field(default=None, examples=['{ t = "time", x = 2, y = 3 }'])
-    """Columns of a table (t, frame, x, y, z, theta, qx, qy, qz, qw, body), each by its name in the
-    header or its number from 1; a unit may follow, as in "angle:deg"."""
+    """Columns of a table (t, frame, x, y, theta, body and others), each by its name in the header
+    or its number from 1; a unit may follow, as in "angle:deg"."""
     delimiter: str | None = Field(default=None, examples=[";"])
     """Character between the fields of a table; recognised when not given."""
     up: Literal["auto", "x", "y", "z", "-x", "-y", "-z"] = "auto"
@@ -108,7 +130,13 @@ class Recording(Section):
     min_confidence: Annotated[float | None, Quantity("1", ge=0)] = Field(
         default=None, examples=[0.6]
     )
-    """Smallest confidence of a keypoint; others are missing. Not set: the format's."""
+    """Smallest confidence of a keypoint or row; others are missing. Not set: the format's."""
+    box: Literal["auto", "xyxy", "xywh", "cxcywh", "none"] = "auto"
+    """Columns of a box: two corners, corner or centre with width and height, or no box; "auto" goes
+    by their names."""
+    missing: tuple[str, ...] | None = Field(default=None, examples=['["0,0"]'])
+    """Positions that mean that the body was not seen: "X,Y", a number, or "held" for that of the
+    sample before."""
     sort: Literal["error", "sort"] = "error"
     """Times that go back: "error" refuses them, "sort" sorts them."""
     max_speed_m_s: Annotated[float | None, Quantity("m/s", gt=0, le=1e4)] = Field(
@@ -150,6 +178,8 @@ class Recording(Section):
             "keypoint": self.keypoint,
             "heading": self.heading,
             "min_confidence": self.min_confidence,
+            "box": self.box if self.box != "auto" else None,
+            "missing": self.missing,
         }
         return {name: value for name, value in named.items() if value is not None}
 

@@ -31,7 +31,8 @@ def describe(trajectory: xr.Dataset) -> dict[str, Any]:
     dict
         JSON-ready, with units in the keys: ``source``, ``format``, ``y_axis``, ``time_origin``
         (the date and time of t = 0, where the file has one), ``arena``,
-        ``position_quantum_m``, ``counts``, ``warnings``, and ``bodies``: name to samples, missing
+        ``position_quantum_m``, ``columns`` (what each column of a table was taken for: column,
+        meaning, unit, why), ``counts``, ``warnings``, and ``bodies``: name to samples, missing
         rows, duration_s, rate_Hz, jitter, gaps, extent, the circle of the centres, speed, the
         estimated tracking noise, and of a tracked recording the ``ambiguous_share``. ``tracking``
         is what tracking counted, None of other recordings. A number that cannot be had is None.
@@ -57,6 +58,7 @@ def describe(trajectory: xr.Dataset) -> dict[str, Any]:
         "position_quantum_m": json_value(float(attrs.get("position_quantum_m", math.nan))),
         "metres_per_pixel": json_value(float(attrs.get("metres_per_pixel", math.nan))),
         "tracking": _tracking(attrs),
+        "columns": _json_attribute(attrs, "columns_read", []),
         "counts": counts,
         "warnings": warnings,
         "bodies": {name: _describe_body(trajectory, name) for name in body_names(trajectory)},

@@ -19,8 +19,10 @@ from driftwalk.core.units import parse_quantity
 from driftwalk.record.arena import PlacedArena, arena_attributes, place_arena
 from driftwalk.record.cleaning.clean import Counts, clean_body
 from driftwalk.record.cleaning.clock import check_clock
+from driftwalk.record.cleaning.counters import unwrap_counters
 from driftwalk.record.cleaning.extent import refuse_many_bodies, refuse_sparse
 from driftwalk.record.cleaning.jumps import arena_diagonal, impossible_steps, impossible_warning
+from driftwalk.record.cleaning.missing import blank_missing, mark_warnings
 from driftwalk.record.cleaning.warn import angle_warnings, plausibility_warnings
 from driftwalk.record.convert_units import convert_units
 from driftwalk.record.noise import noise_reach
@@ -65,6 +67,8 @@ def load(
     keypoint: str | None = None,
     heading: Sequence[str] | None = None,
     min_confidence: float | None = None,
+    box: str | None = None,
+    missing: str | Sequence[str] | None = None,
     replicate: int | None = None,
 ) -> xr.Dataset:
     """Load a recording as a `trajectory` dataset in SI units, y up.
@@ -96,7 +100,7 @@ def load(
         Frames per second [Hz] of a recording that counts frames.
     metres_per_pixel : float, optional
         Scale of a recording in pixels [m].
-    length_unit : {"m", "cm", "mm", "um", "px"}, optional
+    length_unit : {"m", "dm", "cm", "mm", "um", "nm", "km", "ft", "in", "yd", "px"}, optional
         Unit of positions in a file that does not say.
     y_axis : {"up", "down"}, optional
         Direction of y in the file; None: down for pixels (y and theta are negated), else up.
@@ -105,8 +109,9 @@ def load(
     sort : {"error", "sort"}
         Behaviour if times go backwards.
     columns : mapping, optional
-        For a plain table: t, frame, x, y, theta, body to the name or number (from 1) of the
-        column; ``":unit"`` may follow, such as ``{"x": "2:mm"}``.
+        For a plain table: t, frame, x, y, theta, body and other quantities to the name or number
+        (from 1) of the column; ``":unit"`` may follow, such as ``{"x": "2:mm"}``. A time may be the
+        sum of two, ``{"t": "1:s+2:ns"}``; columns of ``"skip"`` are not read.
     delimiter : str, optional
         Character between fields of a plain table, or ``"tab"``, ``"space"``.
     up : {"x", "y", "z", "-x", "-y", "-z"}, optional
@@ -127,8 +132,15 @@ def load(
         Two keypoints of a pose file, or two bodies that are markers of one: the orientation is the
         angle from the first to the second, and the body of markers their middle, or `keypoint`.
     min_confidence : float, optional
-        Keypoints of a pose file seen with less confidence are missing, from 0 to 1; None: a value
-        that is usual for the format, and a note says which.
+        Keypoints of a pose file, or rows of a table with a column of confidence, that were seen
+        with less are missing, from 0 to 1; None: a value that is usual for the format, and a note
+        says which.
+    box : {"xyxy", "xywh", "cxcywh", "none"}, optional
+        What columns of a box hold: two corners, the corner of the least x and y with width and
+        height, or the centre with them; ``"none"``: they are no box. The body is its centre.
+    missing : str or sequence of str, optional
+        Mark of a position that was not seen, in the file's units: a place such as
+        ``"0,0"``, a number such as ``"-9999"``, or ``"held"``, the place of the sample before.
     replicate : int, optional
         Replicate of a simulation, counted from 0; default: the first.
 
@@ -170,6 +182,8 @@ def load(
         keypoint=keypoint,
         heading=two_names(heading),
         min_confidence=min_confidence,
+        box=box,
+        missing=(missing,) if isinstance(missing, str) else tuple(missing or ()),
         replicate=replicate or 0,
     )
     origin = origin_of(path, options, format=format, replicate=replicate)
@@ -180,7 +194,9 @@ def load(
         raw.bodies = _select(raw.bodies, body)
         refuse_many_bodies([one.name for one in raw.bodies])
         _refuse_unused(options, raw, origin.format)
-        raw.notes += [*origin.notes(), *check_clock(raw), *angle_warnings(raw)]
+        blank_missing(raw, options.missing)
+        raw.notes += [*origin.notes(), *unwrap_counters(raw), *check_clock(raw)]
+        raw.notes += [*angle_warnings(raw), *mark_warnings(raw, options.missing)]
         bodies, attrs = convert_units(raw, options, y_axis=y_axis, tank=tank)
         clean = partial(
             clean_body,
@@ -200,6 +216,8 @@ def load(
                 raise InputError("no sample lies between `start` and `stop`")
             raise InputError("the recording has no row with a time")
         attrs |= {"source": origin.name, "format": origin.format}
+        if raw.columns:
+            attrs["columns_read"] = json.dumps(raw.columns, ensure_ascii=False)
         return _assemble(cleaned, counts, attrs, raw, tank=tank, block_side=block_side)
     except (InputError, *DAMAGED_GZIP) as error:
         raise origin.explained(error) from error
@@ -226,6 +244,8 @@ def _refuse_unused(options: ReadOptions, raw: RawRecording, format: str) -> None
         raise InputError("the file is no ROS bag: leave `topic` out")
     if options.header_line is not None and format not in (PLAIN, "excel"):
         raise InputError(f"`header_line` is for plain tables, and this is '{format}': leave it out")
+    if options.box is not None and not raw.columns:
+        raise InputError(f"`box` is for tables, and this is '{format}': leave it out")
     if options.sheet is not None and format not in ("excel", "matlab", "arrays"):
         raise InputError(
             f"`sheet` is for workbooks, MATLAB files and arrays, and this is '{format}': leave it "

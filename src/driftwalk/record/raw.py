@@ -14,10 +14,17 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-MISSING = frozenset(
-    {"", "#N/A", "NaN", "nan", "NAN", "NA", "N/A", "null", "NULL", "None", "none", "-nan"}
+from driftwalk.record.vocabulary import words
+
+NAMELESS = words("#N/A NaN nan NAN NA N/A null NULL None none -nan") | {""}
+"""Words for a missing name of a body."""
+
+MISSING = NAMELESS | words(
+    "- -- --- . .. n/a n.a. missing Missing MISSING <NA> NaT nil 1.#QNAN -1.#QNAN 1.#IND "
+    "-1.#IND 1.#QNB 1.#SNAN nan(ind) -nan(ind) nan(snan) -nan(snan) nanq nans #DIV/0! #VALUE! "
+    "#REF! #NUM! #NAME? #NULL! #NV #NV! #WERT! #N/D"
 )
-"""Words that trackers write for a missing number."""
+"""Words that trackers, spreadsheets and compilers write for a missing number."""
 
 
 @dataclass(frozen=True)
@@ -43,13 +50,22 @@ class TableLayout:
 
 Array = npt.NDArray[np.float64]
 
-LENGTH_UNITS: dict[str, float] = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "km": 1e3}
+LENGTH_UNITS: dict[str, float] = {
+    **{"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "km": 1e3, "dm": 0.1, "nm": 1e-9},
+    **{"ft": 0.3048, "in": 0.0254, "yd": 0.9144},
+}
 """Metres per unit of length; pixels are ``"px"``, and ``""`` is a file that does not say."""
 
-CLOCK_UNITS: dict[str, float] = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9, "min": 1.0 / 60.0}
+CLOCK_UNITS: dict[str, float] = {
+    **{"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9},
+    **{"min": 1.0 / 60.0, "h": 1.0 / 3600.0, "d": 1.0 / 86_400.0},
+}
 """Units of time per second; a clock that counts frames is ``"frame"``."""
 
-ANGLE_UNITS: dict[str, float] = {"rad": 1.0, "deg": float(np.pi / 180.0)}
+ANGLE_UNITS: dict[str, float] = {
+    **{"rad": 1.0, "deg": float(np.pi / 180.0), "mrad": 1e-3, "gon": float(np.pi / 200.0)},
+    **{"turn": float(2.0 * np.pi), "ddeg": float(np.pi / 1800.0), "cdeg": float(np.pi / 18000.0)},
+}
 """Radians per unit of angle."""
 
 
@@ -139,6 +155,8 @@ class RawRecording:
     body_columns: Callable[[bool], list[str]] | None = None
     """Finds the columns that could name the body, see `record.several_bodies`; None: there are no
     columns to choose from."""
+    columns: list[dict[str, str]] = field(default_factory=list)
+    """Readings of the columns of a table: column, meaning, unit, why."""
 
 
 @dataclass(frozen=True)
@@ -149,8 +167,8 @@ class ReadOptions:
     """
 
     columns: dict[str, str] = field(default_factory=dict)
-    """Name or number (from 1) of the column of each of t, frame, x, y, theta, body; ``":unit"`` may
-    follow."""
+    """Name or number (from 1) of the column of each quantity, such as t, frame, x, y, theta, body;
+    ``":unit"`` may follow. Columns of ``"skip"``, with plus signs between, are not read."""
     delimiter: str | None = None
     """Character between fields; None: recognised."""
     frame_rate_hz: float | None = None
@@ -180,6 +198,10 @@ class ReadOptions:
     """Two keypoints, or markers: the body points from the first to the second."""
     min_confidence: float | None = None
     """Keypoints seen with less confidence are missing; None: as usual for the format."""
+    box: str | None = None
+    """Columns of a box: ``"xyxy"``, ``"xywh"``, ``"cxcywh"``; ``"none"``: there is no box."""
+    missing: tuple[str, ...] = ()
+    """Places that mean that the body was not seen: ``"0,0"``, ``"-9999"``, ``"held"``."""
     replicate: int = 0
     """Replicate of a simulation, counted from 0."""
 

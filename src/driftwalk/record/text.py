@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import check_lines
-from driftwalk.record.raw import MISSING, Array, TableLayout
+from driftwalk.record.raw import MISSING, NAMELESS, Array, TableLayout
 from driftwalk.record.tables.encoding import WINDOWS, TranscodedText, other_encoding
 from driftwalk.record.tables.growing import GrowingColumn
 from driftwalk.record.tables.stamps import StampError, StampReader, calendar_of, clock_of_stamps
@@ -440,18 +440,20 @@ def _parse(block: bytes, layout: TableLayout, *, path: Path, line: int, decimal:
     if (whole != width).any():
         widest = check_lines(block, layout, path=path, line=line, decimal=decimal)
         width = max(width, widest)
+    used = sorted({*layout.numbers, *layout.texts, *layout.stamps})
     # The stubs of pandas cannot follow options in a dictionary.
+    missing: Any = {at: list(NAMELESS if at in layout.texts else MISSING) for at in used}
     exact: Any = {} if _pandas_is_exact(pd.__version__) else {"float_precision": "round_trip"}
     try:
         frame = pd.read_csv(
             io.BytesIO(block),
             header=None,
             names=list(range(width)),
-            usecols=sorted({*layout.numbers, *layout.texts, *layout.stamps}),
+            usecols=used,
             dtype=dict.fromkeys((*layout.texts, *layout.stamps), str),
             decimal=decimal,
             sep=r"\s+" if layout.delimiter == " " else layout.delimiter,
-            na_values=list(MISSING),
+            na_values=missing,
             keep_default_na=False,
             index_col=False,
             skipinitialspace=True,

@@ -217,7 +217,7 @@ def test_automatic_time_step_is_the_largest_divisor_up_to_ten_milliseconds(
             "2001 x 2001 = 4004001 settings",
         ),
         ("[recording]\nstart_s = 5\nstop_s = 3", "stop_s = 3 is not after start_s = 5"),
-        ("[recording]\ncolumns = { w = 1 }", "[recording.columns] unknown key 'w'"),
+        ("[recording]\ncolumns = { v = 1 }", "[recording.columns] unknown key 'v'"),
         ("[tank\n", "not a TOML file"),
         ("[tank]\n[tank]\n", "not a TOML file"),
         ("[block]\nmass_kg = 0\n[tank]\nwall_friction = -1", "(and 1 more problem)"),

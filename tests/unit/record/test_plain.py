@@ -11,7 +11,7 @@ import pytest
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record import load
-from driftwalk.record.column_names import ColumnMeaning, column_meaning
+from driftwalk.record.column_names import column_meaning
 from driftwalk.schema import body_names, body_track
 
 
@@ -48,12 +48,12 @@ def write(folder: Path, text: str | bytes, name: str = "synthetic.csv") -> Path:
 def test_meaning_of_a_column_name(
     name: str, quantity: str, unit: str, body: str, bare: bool
 ) -> None:
-    assert column_meaning(name) == ColumnMeaning(quantity, unit, body, bare)
+    found = column_meaning(name)
+    assert found is not None
+    assert (found.quantity, found.unit, found.body, found.bare) == (quantity, unit, body, bare)
 
 
-@pytest.mark.parametrize(
-    "name", ["", "area", "compactness", "x (furlong)", "ValueChanged", "frame x", "probability"]
-)
+@pytest.mark.parametrize("name", ["", "area", "compactness", "ValueChanged", "frame x", "distance"])
 def test_a_name_that_says_nothing_known(name: str) -> None:
     assert column_meaning(name) is None
 
@@ -236,7 +236,7 @@ def test_the_header_of_a_column_that_does_not_exist(tmp_path: Path) -> None:
     ):
         load(path, columns={"x": "east"})
     with pytest.raises(FormatError, match="unknown quantity"):
-        load(path, columns={"w": "x"})
+        load(path, columns={"v": "x"})
 
 
 def test_one_row_constant_and_missing_positions_load_with_a_warning(tmp_path: Path) -> None:
@@ -282,16 +282,19 @@ def test_resolution_of_few_or_many_digits(tmp_path: Path) -> None:
 
 # As a lab's program may write it: 25 Hz, the rows of frames 3 and 4 missing, in degrees.
 FOREIGN = (
-    "Bild;x [mm];y [mm];Winkel [°]\n0;1;2;350\n1;2;3;355\n2;3;4;0\n5;4;5;5\n6;5;6;10\n7;6;7;15\n"
+    "Aufnahme;x [mm];y [mm];Drehung [°]\n0;1;2;350\n1;2;3;355\n2;3;4;0\n"
+    "5;4;5;5\n6;5;6;10\n7;6;7;15\n"
 )
 
 
 def test_a_clock_of_unknown_name_that_skips_rows_is_named(tmp_path: Path) -> None:
     """Counting its rows as frames would close the gaps."""
     path = write(tmp_path, FOREIGN)
-    with pytest.raises(FormatError, match=r"'Bild' counts up .*`columns=\{\"frame\": \"Bild\"\}`"):
+    with pytest.raises(
+        FormatError, match=r"'Aufnahme' counts up .*`columns=\{\"frame\": \"Aufnahme\"\}`"
+    ):
         load(path, frame_rate=25.0)
-    track = body_track(load(path, frame_rate=25.0, columns={"frame": "Bild"}))
+    track = body_track(load(path, frame_rate=25.0, columns={"frame": "Aufnahme"}))
     np.testing.assert_allclose(track.time, np.array([0, 1, 2, 5, 6, 7]) / 25.0)
 
 
@@ -318,7 +321,7 @@ def test_a_table_without_a_clock_says_how_to_name_one(tmp_path: Path) -> None:
 
 def test_a_chosen_column_keeps_the_unit_in_its_name(tmp_path: Path) -> None:
     path = write(tmp_path, FOREIGN)
-    columns = {"frame": "Bild", "theta": "Winkel [°]"}
+    columns = {"frame": "Aufnahme", "theta": "Drehung [°]"}
     track = body_track(load(path, frame_rate=25.0, columns=columns))
     np.testing.assert_allclose(track.theta, np.radians([-10, -5, 0, 5, 10, 15]), atol=1e-12)
     path = write(tmp_path, "Zeit [ms],x_m,y_m\n0,1,2\n40,1,3\n")
@@ -326,8 +329,8 @@ def test_a_chosen_column_keeps_the_unit_in_its_name(tmp_path: Path) -> None:
 
 
 def test_an_angle_of_unknown_name_is_pointed_out(tmp_path: Path) -> None:
-    dataset = load(write(tmp_path, FOREIGN), frame_rate=25.0, columns={"frame": "Bild"})
+    dataset = load(write(tmp_path, FOREIGN), frame_rate=25.0, columns={"frame": "Aufnahme"})
     (warning,) = json.loads(dataset.attrs["counts"])["warnings"]
     assert warning == (
-        'no orientation is read: add `columns={"theta": "Winkel [°]"}` if that column holds it'
+        'no orientation is read: add `columns={"theta": "Drehung [°]"}` if that column holds it'
     )

@@ -135,8 +135,8 @@ def test_trackmate_csv_in_pixels_and_frames(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="does not name the unit"):
         load(old, frame_rate=10.0)
     np.testing.assert_allclose(body_track(load(old, **FRAMES), "0").x, [0.1, 0.11])
-    with pytest.raises(FormatError, match="positions are in 'inch': give the image one of"):
-        load(spots_csv(tmp_path / "inch.csv", "inch", "sec"))
+    with pytest.raises(FormatError, match="positions are in 'furlong': give the image one of"):
+        load(spots_csv(tmp_path / "furlong.csv", "furlong", "sec"))
     renamed = write(tmp_path / "r.csv", path.read_text().replace("POSITION_T", "TIME"))
     with pytest.raises(FormatError, match="line 1: no column POSITION_T"):
         load(renamed)

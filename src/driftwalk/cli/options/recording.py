@@ -64,7 +64,7 @@ class RecordingOptions:
         _option(
             "--length-unit",
             help="Unit of positions, if the file names none.",
-            metavar="m|cm|mm|um|px",
+            metavar="m|cm|mm|um|ft|in|px",
         ),
     ] = None
     y_axis: Annotated[
@@ -157,9 +157,27 @@ class RecordingOptions:
         float | None,
         _option(
             "--min-confidence",
-            help="Smallest confidence of a keypoint; others are missing (default: the format's).",
+            help="Smallest confidence of a keypoint or row; others are missing (default: the "
+            "format's).",
             metavar="SHARE",
             min=0.0,
+        ),
+    ] = None
+    box: Annotated[
+        str | None,
+        _option(
+            "--box",
+            help="Columns of a box: two corners, corner or centre with its size, or no box.",
+            metavar="xyxy|xywh|cxcywh|none",
+        ),
+    ] = None
+    missing: Annotated[
+        list[str] | None,
+        _option(
+            "--missing",
+            help="Position that means that the body was not seen, or held: that of the sample "
+            "before. Repeatable.",
+            metavar="X,Y|NUMBER|held",
         ),
     ] = None
     replicate: Annotated[

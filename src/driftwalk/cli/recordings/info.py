@@ -13,6 +13,9 @@ from driftwalk.cli.terminal.output import print_json, print_next, print_table, p
 SIDE_BY_SIDE = 5
 """Bodies shown as columns; more are shown as rows, with fewer numbers."""
 
+MOST_UNREAD = 12
+"""Columns that are not read, of which each has a row."""
+
 _ROWS: list[tuple[str, str, float]] = [
     ("samples", "samples", 1),
     ("orientation", "has_orientation", 1),
@@ -118,6 +121,9 @@ def info(
         return
     _print_file(described)
     print()
+    if described["columns"]:
+        _print_columns(described["columns"])
+        print()
     _print_bodies(described["bodies"])
     print()
     if described["tracking"] is not None:
@@ -176,6 +182,17 @@ def _print_file(described: dict[str, Any]) -> None:
     if described["metres_per_pixel"] is not None:
         rows.append(["scale [mm/pixel]", described["metres_per_pixel"] * 1e3])
     print_table(rows)
+
+
+def _print_columns(columns: list[dict[str, str]]) -> None:
+    """Print what each column was taken for, in which unit, and why."""
+    shown = [one for one in columns if one["meaning"] != "not read"]
+    rest = [one for one in columns if one["meaning"] == "not read"]
+    shown += rest[:MOST_UNREAD]
+    rows = [[one["column"], one["meaning"], one["unit"], to_options(one["why"])] for one in shown]
+    if len(rest) > MOST_UNREAD:
+        rows.append([f"{len(rest) - MOST_UNREAD} more", "not read", "", ""])
+    print_table(rows, columns=["column", "taken for", "unit", "why"])
 
 
 def _arena_text(described: dict[str, Any]) -> str:

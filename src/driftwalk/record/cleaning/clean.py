@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
+from driftwalk.record.cleaning.counters import overlap, starts_over
 from driftwalk.record.cleaning.jumps import find_jumps
 from driftwalk.record.cleaning.several_bodies import (
     BodyColumns,
@@ -136,14 +137,19 @@ def _in_order(body: RawBody, counts: Counts, *, sort: str, columns: BodyColumns 
     backwards = np.flatnonzero(body.clock[1:] < body.clock[:-1])
     if not backwards.size:
         return body
-    if sort == "error":
+    anew = starts_over(body.clock)
+    if sort == "error" or (anew and overlap(body.clock)):
         at = int(backwards[0])
         found = [] if columns is None else columns(True)
-        remedy = (
-            f'{name_the_body(found)}, or `sort="sort"` if it is one body'
-            if found
-            else 'add `sort="sort"` to sort them'
-        )
+        if found:
+            remedy = f'{name_the_body(found)}, or `sort="sort"` if it is one body'
+        elif anew:
+            remedy = (
+                "the clock starts over there, as where a counter was reset or recordings were "
+                "joined: split the file before that row"
+            )
+        else:
+            remedy = 'add `sort="sort"` to sort them'
         raise InputError(
             f"time goes backwards in row {at + 2} of body '{body.name}': {body.clock[at]:.6g} s is "
             f"followed by {body.clock[at + 1]:.6g} s ({backwards.size} such rows); {remedy}"

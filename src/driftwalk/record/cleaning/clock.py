@@ -27,6 +27,10 @@ class ClockPolicy(NamedTuple):
     """Three years: a clock beyond them counts from 1970; chosen by hand."""
     longest_recording_s: float = 1e12
     """30,000 years; powers of much longer times are beyond float64."""
+    first_serial: float = 15_000.0
+    """Days since 1900 of the year 1941, as spreadsheets count them; chosen by hand."""
+    last_serial: float = 80_000.0
+    """The same of the year 2119; chosen by hand."""
     fastest_s: float = 1e-4
     """Shortest interval of a likely camera [s]; chosen by hand."""
     slowest_s: float = 2.0
@@ -78,8 +82,9 @@ def _check_bare(column: str, steps: Array, first: float, last: float) -> list[st
     interval = float(np.median(steps)) if steps.size else 0.0
     long = interval > CLOCK.longest_interval_s and not _whole_hours(steps)
     short = 0.0 < interval < CLOCK.shortest_interval_s
+    serial = CLOCK.first_serial <= first < CLOCK.last_serial and interval < CLOCK.fastest_s
     what = f"the clock{f' in column {column!r}' if column else ''} names no unit"
-    if first >= CLOCK.last_day_s or long or short:
+    if first >= CLOCK.last_day_s or long or short or (serial and interval > 0.0):
         raise InputError(
             f"{what}, and as seconds it would begin at {first:.3g} s, last {last - first:.3g} s "
             f"and have an interval of {interval:.3g} s: {_remedy(column, first, interval)}"
@@ -108,7 +113,8 @@ def _remedy(column: str, first: float, interval: float) -> str:
     """Return what to do, with the units that would make sense."""
     if not column:
         return "the format has its times in seconds; write them so"
-    likely = [unit for unit in ("ms", "us", "ns") if _likely(CLOCK_UNITS[unit], first, interval)]
+    units = [unit for unit in CLOCK_UNITS if unit != "s"]
+    likely = [unit for unit in units if _likely(CLOCK_UNITS[unit], first, interval)]
     named = [
         f"{_option(column, unit)} makes it {interval / CLOCK_UNITS[unit]:.3g} s" for unit in likely
     ]

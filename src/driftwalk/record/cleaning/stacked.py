@@ -75,3 +75,17 @@ def order_in_frame(frame: npt.ArrayLike) -> npt.NDArray[np.int32]:
     starts = np.flatnonzero(np.concatenate(([True], values[1:] != values[:-1])))
     lengths = np.diff(np.append(starts, values.size))
     return (np.arange(values.size) - np.repeat(starts, lengths)).astype(np.int32)
+
+
+def order_in_body(codes: npt.NDArray[np.int32]) -> Array:
+    """Return, for rows of several bodies, the place of each row among those of its body.
+
+    Examples
+    --------
+    >>> order_in_body(np.array([0, 1, 0, 1, 1], dtype=np.int32)).tolist()
+    [0.0, 0.0, 1.0, 1.0, 2.0]
+    """
+    order = np.argsort(codes, kind="stable")
+    place = np.empty(codes.size)
+    place[order] = order_in_frame(codes[order])
+    return place

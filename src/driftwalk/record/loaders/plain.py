@@ -6,7 +6,7 @@ from pathlib import Path
 
 from driftwalk.record.raw import RawRecording, ReadOptions
 from driftwalk.record.tables.rows import recording_of
-from driftwalk.record.tables.source import TextSource
+from driftwalk.record.tables.text_source import TextSource
 from driftwalk.record.text_head import first_lines
 
 

@@ -5,17 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
-from driftwalk.core.errors import InputError
+from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.bad_row import is_number
-from driftwalk.record.column_names import map_columns, unit_of_name
-from driftwalk.record.raw import MISSING, ReadOptions
+from driftwalk.record.column_names import column_meaning
+from driftwalk.record.raw import MISSING, ReadOptions, TableLayout
+from driftwalk.record.tables.columns import read_columns
+from driftwalk.record.tables.stamps import StampForm
+from driftwalk.record.text import Table
 from driftwalk.record.text_head import is_numeric_row
+from driftwalk.record.vocabulary import NO_UNIT, UNITS
 
 
 class TablePolicy(NamedTuple):
     """How much of a table is looked at before it is read."""
 
-    heading_rows: int = 12
+    heading_rows: int = 100
     """Rows among which are the names of the columns and the first row of data; chosen by hand."""
     sample_rows: int = 50
     """Rows by which a table is recognised; chosen by hand."""
@@ -27,10 +31,32 @@ TABLE: Final = TablePolicy()
 
 
 class Heading(NamedTuple):
-    """The names of the columns, and how many rows they are in."""
+    """The names of the columns, their units, and how many rows they are in."""
 
     names: list[str]
+    units: list[str]
     rows: int
+
+
+class _Names:
+    """Names of columns alone, as a table that cannot be read yet."""
+
+    has_header = True
+
+    def __init__(self, names: list[str], units: list[str]) -> None:
+        self.names, self.units = names, units
+
+    def sample(self) -> list[list[str]]:
+        return []
+
+    def stamps(self, _column: int, /) -> StampForm | None:
+        return None
+
+    def read(self, _wanted: TableLayout, /, *, head: bool = False) -> Table:  # noqa: ARG002
+        raise InputError("these are names alone")
+
+    def error(self, message: str, /) -> FormatError:
+        return FormatError(message)
 
 
 def heading_of(rows: Sequence[list[str]], options: ReadOptions) -> Heading | None:
@@ -52,19 +78,71 @@ def heading_of(rows: Sequence[list[str]], options: ReadOptions) -> Heading | Non
     --------
     >>> rows = [["t", "x", "y"], ["[ms]", "[cm]", "[cm]"], ["0", "1.5", "2"]]
     >>> heading_of(rows, ReadOptions())
-    Heading(names=['t [ms]', 'x [cm]', 'y [cm]'], rows=2)
+    Heading(names=['t', 'x', 'y'], units=['ms', 'cm', 'cm'], rows=2)
     """
     if rows and rows[0][:1] == ["coords"]:
         # The lowest level of DeepLabCut's header: those above it name the body parts.
         return None
-    if len(rows) > 1 and _holds_positions(rows[0], rows[1], options):
-        return Heading(rows[0], 1)
-    if len(rows) > 2 and (units := _units(rows[1])):
-        pairs = zip(rows[0], units + [""] * len(rows[0]), strict=False)
-        names = [f"{name} [{unit}]" if name and unit else name for name, unit in pairs]
-        if _holds_positions(names, rows[2], options):
-            return Heading(names, 2)
+    if len(rows) > 1 and _holds_positions(rows[0], [], rows[1], options):
+        return Heading(rows[0], [], 1)
+    if len(rows) > 2 and (units := units_below(rows[0], rows[1], options)):
+        names = rows[0][: len(units)]
+        if _holds_positions(names, units, rows[2], options):
+            return Heading(names, units, 2)
     return None
+
+
+def units_below(names: list[str], row: list[str], options: ReadOptions) -> list[str]:
+    """Return what a row of units says of each column, [] where it is none.
+
+    Columns that are not read may have any unit, such as cm/s.
+    """
+    fields = [field.strip("[]() ") for field in row[: len(names)]]
+    fields += [""] * (len(names) - len(fields))
+    chosen = set(options.columns.values())
+    known = 0
+    for name, field in zip(names, fields, strict=True):
+        if not field or field in MISSING:
+            continue
+        if field.lower() in UNITS or field.lower() in NO_UNIT:
+            known += 1
+        elif (
+            is_number(field)
+            or name in chosen
+            or ((meaning := column_meaning(name)) is not None and meaning.quantity != "body")
+        ):
+            return []
+    return ["" if field in MISSING else field for field in fields] if known else []
+
+
+def is_data(first: list[str], below: Sequence[list[str]], options: ReadOptions) -> bool:
+    """Whether a first row that holds a text is data, and no header.
+
+    Parameters
+    ----------
+    first : list of str
+        Its fields.
+    below : sequence of list of str
+        The rows below it.
+    options : ReadOptions
+        Columns that are named by their numbers are to hold numbers.
+    """
+    second = below[0] if below else []
+    numeric = [
+        _is_numeric(field) and at < len(second) and _is_numeric(second[at])
+        for at, field in enumerate(first)
+    ]
+    if not any(numeric) or len(second) != len(first):
+        return False
+    references = [one.rpartition(":")[0] or one for one in options.columns.values()]
+    if options.columns:
+        return not any(one in first and not one.isdecimal() for one in references)
+    known = [meaning.quantity for name in first if (meaning := column_meaning(name)) is not None]
+    return not {"x", "y"} <= set(known)
+
+
+def _is_numeric(field: str) -> bool:
+    return field not in MISSING and (is_number(field) or is_number(field, decimal=","))
 
 
 def header_advice(rows: Sequence[list[str]], first: int) -> str:
@@ -86,29 +164,23 @@ def header_advice(rows: Sequence[list[str]], first: int) -> str:
     )
 
 
-def _units(row: list[str]) -> list[str]:
-    """Return the units of a row that holds nothing else, [] where it holds more."""
-    units = [unit_of_name(f"_ {field}") if field else "" for field in row]
-    stated = [unit for unit, field in zip(units, row, strict=True) if field]
-    return units if stated and all(stated) else []
-
-
-def _holds_positions(names: list[str], below: list[str], options: ReadOptions) -> bool:
+def _holds_positions(
+    names: list[str], units: list[str], below: list[str], options: ReadOptions
+) -> bool:
     """Whether some names are those of positions, and a row holds a position below them."""
     try:
-        columns = map_columns(
-            names,
-            options.columns,
-            use_frames=options.frame_rate_hz is not None,
-            in_space=options.up is not None,
-        )
+        reading = read_columns(_Names(names, units), options, lenient=True)
     except InputError:
         return False
-    cells = [
-        below[places[axis]] if places[axis] < len(below) else ""
-        for places in columns.bodies.values()
-        for axis in "xy"
+    columns = [
+        at
+        for places in reading.bodies.values()
+        for quantity, at in places.items()
+        if quantity != "theta"
     ]
+    if any(_is_numeric(names[at]) for at in columns):
+        return False  # a row of data
+    cells = [below[at] if at < len(below) else "" for at in columns]
     known = [cell for cell in cells if cell not in MISSING]
     numeric = all(is_number(cell) or is_number(cell, decimal=",") for cell in known)
     return numeric and any(below)  # a body that is not seen yet has a row without a position

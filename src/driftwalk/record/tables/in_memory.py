@@ -16,6 +16,7 @@ from driftwalk.record.tables.cells import (
     as_numbers,
     as_ticks,
     form_of,
+    text_of_cell,
 )
 from driftwalk.record.tables.heading import TABLE
 from driftwalk.record.tables.stamps import (
@@ -45,6 +46,8 @@ class MemorySource:
         Whether the columns have names.
     zoned : set of int
         Columns of times of NumPy that are in UTC.
+    matrices : bool
+        Whether numbers after x and y count the columns of matrices, each of which is a body.
     """
 
     def __init__(
@@ -55,10 +58,13 @@ class MemorySource:
         *,
         has_header: bool = True,
         zoned: frozenset[int] = frozenset(),
+        matrices: bool = False,
     ) -> None:
         self.what = what
         self.names = names
+        self.units: list[str] = []
         self.has_header = has_header
+        self.matrices = matrices
         self._columns = columns
         self._zoned = zoned
 
@@ -71,6 +77,14 @@ class MemorySource:
         """Return the values of a column, which must not be changed."""
         return self._columns[at]
 
+    def sample(self) -> list[list[str]]:
+        """Return the first rows as texts."""
+        texts = [
+            [text_of_cell(cell) for cell in column[: TABLE.sample_rows].tolist()]
+            for column in self._columns
+        ]
+        return [list(row) for row in zip(*texts, strict=True)]
+
     def stamps(self, column: int) -> StampForm | None:
         """Return how the first time stamp of a column is written, None where it has none."""
         return form_of(self._columns[column])
@@ -80,48 +94,51 @@ class MemorySource:
         if not self.rows:
             raise FormatError("holds no rows of data")
         taken = slice(TABLE.first_rows if head else None)
+        used = {*wanted.numbers, *wanted.texts, *wanted.stamps}
         try:
-            return self._table(wanted, taken)
+            return table_of({at: self._columns[at][taken] for at in used}, wanted, self._zoned)
         except (CellError, StampError) as error:
             raise FormatError(f"{error} (row {error.row}, counted from 0)") from error
-
-    def _table(self, wanted: TableLayout, taken: slice) -> Table:
-        columns, labels = self._columns, wanted.names
-        origin = 0
-        if wanted.clock is not None:
-            origin = far_origin(np.asarray(columns[wanted.clock]))
-        numbers = {
-            at: as_numbers(
-                columns[at][taken] - origin
-                if origin and at == wanted.clock
-                else columns[at][taken],
-                labels[at],
-            )
-            for at in wanted.numbers
-        }
-        names = {at: as_names(columns[at][taken]) for at in wanted.texts}
-        calendar = ""
-        if wanted.stamps:
-            readers = [StampReader() for _ in wanted.stamps]
-            ticks = []
-            for at, reader in zip(wanted.stamps, readers, strict=True):
-                ticks.append(as_ticks(columns[at][taken], reader))
-                reader.zoned |= at in self._zoned
-            clock, first = clock_of_stamps(ticks, None)
-            numbers[wanted.stamps[0]] = clock
-            origin, calendar = first or 0, calendar_of(readers)
-        return Table(
-            rows=len(range(*taken.indices(columns[0].size))),
-            numbers=numbers,
-            codes={at: codes for at, (codes, _) in names.items()},
-            labels={at: found for at, (_, found) in names.items()},
-            clock_origin=origin,
-            calendar=calendar,
-        )
 
     def error(self, message: str) -> FormatError:
         """Return an error about the table."""
         return FormatError(message)
+
+
+def table_of(
+    columns: Mapping[int, Values], wanted: TableLayout, zoned: frozenset[int] = frozenset()
+) -> Table:
+    """Return the numbers, names and times of columns.
+
+    Raises
+    ------
+    CellError, StampError
+        At the first value that is not of the kind that its column has to be of.
+    """
+    origin, numbers = 0, {}
+    if wanted.clock is not None:
+        origin = far_origin(np.asarray(columns[wanted.clock]))
+    for at in wanted.numbers:
+        values = columns[at] - origin if origin and at == wanted.clock else columns[at]
+        numbers[at] = as_numbers(values, wanted.names[at])
+    names = {at: as_names(columns[at]) for at in wanted.texts}
+    calendar = ""
+    if wanted.stamps:
+        readers = [StampReader() for _ in wanted.stamps]
+        pairs = zip(wanted.stamps, readers, strict=True)
+        ticks = [as_ticks(columns[at], reader) for at, reader in pairs]
+        for at, reader in zip(wanted.stamps, readers, strict=True):
+            reader.zoned |= at in zoned
+        numbers[wanted.stamps[0]], first = clock_of_stamps(ticks, None)
+        origin, calendar = first or 0, calendar_of(readers)
+    return Table(
+        rows=next(iter(columns.values())).size,
+        numbers=numbers,
+        codes={at: codes for at, (codes, _) in names.items()},
+        labels={at: found for at, (_, found) in names.items()},
+        clock_origin=origin,
+        calendar=calendar,
+    )
 
 
 def table_in_memory(data: Any) -> MemorySource | None:

@@ -112,6 +112,7 @@ def _of_fields(fields: dict[str, Value], what: str, path: Path) -> MemorySource 
         return None
     names: list[str] = []
     columns: list[Values] = []
+    matrices = False
     for name, value in fields.items():
         several = isinstance(value, np.ndarray) and min(value.shape) > 1
         meaning = column_meaning(name)
@@ -120,8 +121,14 @@ def _of_fields(fields: dict[str, Value], what: str, path: Path) -> MemorySource 
         for number, column in enumerate(_columns(value, rows), start=1):
             names.append(_numbered(name, number) if several else name)
             columns.append(column)
+            matrices |= several
         _refuse_wide(len(columns), what, path)
-    return MemorySource(what, names, columns) if columns else None
+    counts = np.asarray(fields.get("ntargets", [])).ravel()
+    if counts.size and counts.dtype.kind in "fiu" and counts.sum() == rows:
+        # As Ctrax has it: bodies frame after frame, and how many there are in each.
+        names.append("frame")
+        columns.append(np.repeat(np.arange(counts.size), counts.astype(np.int64)))
+    return MemorySource(what, names, columns, matrices=matrices) if columns else None
 
 
 def _row_count(fields: dict[str, Value]) -> int | None:

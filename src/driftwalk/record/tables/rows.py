@@ -5,23 +5,38 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
+import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError, InputError, argument_text
-from driftwalk.record.cleaning.stacked import split_bodies
-from driftwalk.record.column_names import ColumnMap, map_columns, unit_of_name
+from driftwalk.record.cleaning.stacked import order_in_body, split_bodies
 from driftwalk.record.convert_units import scale_wanted
-from driftwalk.record.raw import ANGLE_UNITS, Array, RawBody, RawRecording, ReadOptions, TableLayout
+from driftwalk.record.pose.keypoints import angle_between
+from driftwalk.record.raw import (
+    ANGLE_UNITS,
+    CLOCK_UNITS,
+    Array,
+    RawBody,
+    RawRecording,
+    ReadOptions,
+    TableLayout,
+)
 from driftwalk.record.space.columns import body_in_plane, plane_of_columns
+from driftwalk.record.space.globe import on_the_ground
 from driftwalk.record.space.plane import Plane
-from driftwalk.record.tables.body_columns import body_columns
-from driftwalk.record.tables.clock import TableClock, clock_of
+from driftwalk.record.tables.boxes import box_angle, box_centre
+from driftwalk.record.tables.column_reading import TableReading
+from driftwalk.record.tables.columns import read_columns
 from driftwalk.record.tables.midnights import count_days
+from driftwalk.record.tables.row_order import body_columns, other_order
 from driftwalk.record.tables.source import TableSource
 from driftwalk.record.tables.stamps import DAY
-from driftwalk.record.tables.uneven_clock import uneven_clock
 from driftwalk.record.text import Table
 
 NO_CLOCK = "the table has no column of times or frames: every row counts as a frame"
+NO_CLOCK_OF_EACH = (
+    "the table has no column of times or frames: every row of a body counts as a frame, from its "
+    "first on"
+)
 NAME_THE_CLOCK = (
     'no column is known to hold times or frames: name it with `columns={"t": "NAME:s"}` or '
     '`columns={"frame": "NAME"}`; if there is none, give `frame_rate`, and every row counts as '
@@ -44,47 +59,55 @@ def recording_of(source: TableSource, options: ReadOptions) -> RawRecording:
     FormatError
         When it has no positions, or a row or field cannot be read.
     """
-    columns, planes = columns_of(source, options)
-    labels = [name or str(index) for index, name in enumerate(source.names, start=1)]
-    clock_columns = clock_of(source, columns)
-    if clock_columns.column is None:
-        _require_rows_are_frames(source, columns, labels, options)
-    table = _read(source, columns, clock_columns, labels)
-    clock: Array = (
-        np.arange(table.rows, dtype=np.float64)
-        if clock_columns.column is None
-        else table.numbers[clock_columns.column]
-    )
-    notes = [] if clock_columns.column is not None else [NO_CLOCK]
-    notes += _unread_angles(columns, labels)
-    if "body" not in options.columns and _numbers_the_rows(table, columns.body_column, clock):
-        notes.append(f"column '{labels[columns.body_column or 0]}' numbers the rows: one body")
-        columns.body_column = None
-    bodies, against = _bodies(table, columns, clock, planes, source)
+    reading, planes = columns_of(source, options)
+    labels = [column.name for column in reading.columns]
+    if reading.clock is None:
+        _require_rows_are_frames(source, reading, labels, options)
+    table = _read(source, reading, labels)
+    clock = _clock(table, reading)
+    notes = [*reading.notes, *_unread_angles(reading)]
+    body = reading.body_column
+    if "body" not in options.columns and _numbers_the_rows(table, body, clock):
+        notes.append(f"column '{labels[body or 0]}' numbers the rows: one body")
+        reading.columns[body or 0].role, reading.body_column = "", None
+        reading.columns[body or 0].why = "it numbers the rows"
+    codes = None if reading.body_column is None else table.codes[reading.body_column]
+    if reading.clock is None:
+        alone = codes is None or int(codes.max()) == 0
+        clock = clock if alone or codes is None else order_in_body(codes)
+        notes.insert(0, NO_CLOCK if alone else NO_CLOCK_OF_EACH)
+    bodies, against = _bodies(table, reading, clock, planes, options)
     if table.calendar == DAY:
-        codes = None if columns.body_column is None else table.codes[columns.body_column]
         bodies = count_days(bodies, clock, codes)
+    on_globe = any("lon" in places for places in reading.bodies.values())
+    if on_globe:
+        notes.append(on_the_ground(bodies))
     plane = next((one for one in planes if one is not None), None)
-    bare = columns.bare_clock and not clock_columns.stamps and clock_columns.column is not None
+    bare = reading.bare_clock and bool(reading.numbers)
     return RawRecording(
         bodies=bodies,
-        clock_unit=clock_columns.unit,
+        clock_unit=reading.clock_unit if len(reading.numbers) < 2 else "ns",
         clock_origin=table.clock_origin,
         calendar=table.calendar,
-        length_unit=columns.length_unit,
-        angle_unit=columns.angle_unit or "rad",
-        bare_clock=labels[columns.clock or 0] if bare else None,
-        bare_angle=not columns.angle_unit and plane is None,
+        length_unit="m" if on_globe else reading.length_unit,
+        angle_unit=reading.angle_unit or "rad",
+        bare_clock=labels[reading.numbers[0]] if bare else None,
+        bare_angle=not reading.angle_unit and plane is None and reading.parts is None,
         plane="" if plane is None else plane.describe(),
-        body_columns=partial(_body_columns, source, columns, clock_columns, labels),
+        y_axis="up" if on_globe else "",
+        body_columns=partial(body_columns, source, reading, labels),
         # Bare `x, y` next to a time in seconds is SI; next to frame numbers it may be pixels.
-        bare_length_is_si=columns.bare and clock_columns.unit != "frame",
+        bare_length_is_si=reading.bare and reading.clock_unit != "frame",
+        has_confidence=any("confidence" in places for places in reading.bodies.values()),
         rows=table.rows,
         notes=[*notes, *against],
+        columns=[column.described() for column in reading.columns],
     )
 
 
-def columns_of(source: TableSource, options: ReadOptions) -> tuple[ColumnMap, list[Plane | None]]:
+def columns_of(
+    source: TableSource, options: ReadOptions
+) -> tuple[TableReading, list[Plane | None]]:
     """Return what the columns of a table are, and for each body the plane that it is laid into.
 
     Parameters
@@ -99,62 +122,71 @@ def columns_of(source: TableSource, options: ReadOptions) -> tuple[ColumnMap, li
     FormatError
         When columns are missing or ambiguous.
     """
-    names = source.names
     if not source.has_header and not options.columns:
         raise source.error(
-            f"the table has {len(names)} columns and no header: name them with `columns`, such as "
-            '`columns={"t": "1", "x": "2", "y": "3"}`'
+            f"the table has {len(source.names)} columns and no header: name them with `columns`, "
+            'such as `columns={"t": "1", "x": "2", "y": "3"}`'
         )
     try:
-        columns = map_columns(
-            names,
-            options.columns,
-            use_frames=options.frame_rate_hz is not None,
-            in_space=options.up is not None,
-        )
-        return columns, [plane_of_columns(of, options.up) for of in columns.bodies.values()]
+        reading = read_columns(source, options)
+        return reading, [plane_of_columns(of, options.up) for of in reading.bodies.values()]
+    except FormatError:
+        raise
     except InputError as error:
         raise source.error(str(error)) from error
 
 
-def _read(source: TableSource, columns: ColumnMap, clock: TableClock, labels: list[str]) -> Table:
-    used = {index for places in columns.bodies.values() for index in places.values()}
-    if clock.number is not None:
-        used.add(clock.number)
-    texts = () if columns.body_column is None else (columns.body_column,)
+def _read(source: TableSource, reading: TableReading, labels: list[str]) -> Table:
+    used = {index for places in reading.bodies.values() for index in places.values()}
+    used.update(reading.numbers)
+    texts = () if reading.body_column is None else (reading.body_column,)
     wanted = TableLayout(
         "",
         labels,
         numbers=tuple(sorted(used - set(texts))),
         texts=texts,
-        stamps=clock.stamps,
-        clock=clock.number,
+        stamps=reading.stamps,
+        clock=next(iter(reading.numbers), None),
     )
     return source.read(wanted)
 
 
+def _clock(table: Table, reading: TableReading) -> Array:
+    """Return the clock of all rows; without one every row counts as a frame."""
+    if reading.clock is None:
+        return np.arange(table.rows, dtype=np.float64)
+    clock: Array = table.numbers[reading.clock]
+    if len(reading.numbers) == 2:
+        # Nanoseconds from the first second on: since 1970 they are beyond float64.
+        second, part = reading.numbers
+        ticks = CLOCK_UNITS["ns"] / CLOCK_UNITS[reading.columns[part].unit or "ns"]
+        known = clock[np.isfinite(clock)]
+        origin = float(known[0]) if known.size else 0.0
+        unit = CLOCK_UNITS["ns"] / CLOCK_UNITS[reading.columns[second].unit or "s"]
+        clock = (clock - origin) * unit + table.numbers[part] * ticks
+        table.clock_origin = int((table.clock_origin + int(origin)) * unit)
+    return clock
+
+
 def _require_rows_are_frames(
-    source: TableSource, columns: ColumnMap, labels: list[str], options: ReadOptions
+    source: TableSource, reading: TableReading, labels: list[str], options: ReadOptions
 ) -> None:
     """Refuse a table without a known clock whose rows cannot, or need not, be frames."""
-    found = uneven_clock(source, columns, labels)
+    found = other_order(source, reading, labels)
     if found is not None:
-        frame, time = (argument_text("columns", {what: found}) for what in ("frame", "t"))
-        raise source.error(
-            f"no column is known to hold times or frames, but '{found}' counts up and skips some: "
-            f"add {frame} if it counts frames, {time} if it holds times"
-        )
+        raise source.error(found)
     if options.frame_rate_hz is None:
-        scale = scale_wanted(columns.length_unit, bare_is_si=False, options=options)
+        scale = scale_wanted(reading.length_unit, bare_is_si=False, options=options)
         raise source.error(NAME_THE_CLOCK + (f"; {scale}" if scale else ""))
 
 
-def _unread_angles(columns: ColumnMap, labels: list[str]) -> list[str]:
+def _unread_angles(reading: TableReading) -> list[str]:
     """Say which columns look like the orientation by their unit alone, where none was found."""
-    if any({"theta", "qw"} & set(places) for places in columns.bodies.values()):
+    if any({"theta", "qw"} & set(places) for places in reading.bodies.values()):
         return []
-    angles = [name for name in labels if unit_of_name(name) in ANGLE_UNITS]
-    if len(angles) != 1:
+    unread = [column for column in reading.columns if not column.role]
+    angles = [column.name for column in unread if column.unit in ANGLE_UNITS]
+    if not angles:
         return []
     argument = argument_text("columns", {"theta": angles[0]})
     return [f"no orientation is read: add {argument} if that column holds it"]
@@ -170,48 +202,70 @@ def _numbers_the_rows(table: Table, column: int | None, clock: Array) -> bool:
     return all(label == str(int(first) + at) for at, label in enumerate(rest, start=1))
 
 
-def _body_columns(
-    source: TableSource,
-    columns: ColumnMap,
-    clock: TableClock,
-    labels: list[str],
-    in_order: bool,
-) -> list[str]:
-    return body_columns(source, columns, labels, clock=clock, in_order=in_order)
-
-
 def _bodies(
     table: Table,
-    columns: ColumnMap,
+    reading: TableReading,
     clock: Array,
     planes: list[Plane | None],
-    source: TableSource,
+    options: ReadOptions,
 ) -> tuple[list[RawBody], list[str]]:
     """Return the bodies, and what speaks against the planes that they were laid into."""
-    if columns.body_column is not None and len(columns.bodies) > 1:
+    column = reading.body_column
+    if column is not None and len(reading.bodies) > 1 and reading.parts is None:
         raise FormatError(
             "has several columns of x and also a column that names the body: choose one layout "
             "with `columns`",
-            path=source.error("").path,
         )
-    found, notes = [], []
-    for (name, places), plane in zip(columns.bodies.items(), planes, strict=True):
-        body, against = _body(table.numbers, places, clock, plane)
+    codes = None if column is None else table.codes[column]
+    found, notes = {}, []
+    for (name, places), plane in zip(reading.bodies.items(), planes, strict=True):
+        body, against = _body(table.numbers, places, clock, plane, reading, codes)
         body.name = name or "0"
-        found.append(body)
+        _blank(body, table.numbers, places, options)
+        found[name] = body
         notes += against
-    if columns.body_column is None:
-        return found, notes
-    codes, labels = table.codes[columns.body_column], table.labels[columns.body_column]
-    one = found[0]
+    if reading.parts is not None:
+        middle, front = (found[name] for name in reading.parts)
+        middle.name = "0"
+        middle.theta = angle_between((middle.x, middle.y), (front.x, front.y))
+        found = {"": middle}
+    if column is None or codes is None:
+        return list(found.values()), notes
+    one = next(iter(found.values()))
+    labels = table.labels[column]
     return split_bodies(codes, labels, clock=clock, x=one.x, y=one.y, theta=one.theta), notes
 
 
 def _body(
-    values: dict[int, Array], places: dict[str, int], clock: Array, plane: Plane | None
+    values: dict[int, Array],
+    places: dict[str, int],
+    clock: Array,
+    plane: Plane | None,
+    reading: TableReading,
+    codes: npt.NDArray[np.int32] | None,
 ) -> tuple[RawBody, list[str]]:
     """Return the body of some columns, and what speaks against its plane."""
     if plane is not None:
         return body_in_plane(values, places, clock, plane)
     theta = values[places["theta"]] if "theta" in places else None
-    return RawBody("0", clock, values[places["x"]], values[places["y"]], theta), []
+    if reading.box is None:
+        x, y = (values[places[axis]] for axis in (("x", "y") if "x" in places else ("lon", "lat")))
+        return RawBody("0", clock, x, y, theta), []
+    turn = 2.0 * np.pi / ANGLE_UNITS[reading.angle_unit or "rad"]
+    x, y = box_centre(reading.box, values)
+    followed = box_angle(reading.box, values, theta, codes, turn)
+    notes = []
+    if theta is not None and followed is not theta:
+        notes = ["the angle of the box is that of an axis: it is followed over its symmetry"]
+    return RawBody("0", clock, x, y, followed), notes
+
+
+def _blank(
+    body: RawBody, values: dict[int, Array], places: dict[str, int], options: ReadOptions
+) -> None:
+    """Make positions that were seen with too little confidence missing."""
+    if "confidence" in places and options.min_confidence is not None:
+        lost = values[places["confidence"]] < options.min_confidence
+        body.x, body.y = np.where(lost, np.nan, body.x), np.where(lost, np.nan, body.y)
+        if body.theta is not None:
+            body.theta = np.where(lost, np.nan, body.theta)

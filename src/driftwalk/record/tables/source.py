@@ -1,19 +1,13 @@
-"""Table of text, of a sheet or of arrays, read column by column."""
+"""Interface of a table to the reader: names, units, first rows, and columns to read."""
 
 from __future__ import annotations
 
-import contextlib
-from dataclasses import replace
-from pathlib import Path
 from typing import Protocol
 
 from driftwalk.core.errors import FormatError
-from driftwalk.record.bad_row import split_fields
-from driftwalk.record.raw import MISSING, ReadOptions, TableLayout
-from driftwalk.record.tables.heading import TABLE, header_advice, heading_of
-from driftwalk.record.tables.stamps import StampForm, stamp_form
-from driftwalk.record.text import Table, header_rows, read_table
-from driftwalk.record.text_head import detect_delimiter, read_header
+from driftwalk.record.raw import TableLayout
+from driftwalk.record.tables.stamps import StampForm
+from driftwalk.record.text import Table
 
 
 class TableSource(Protocol):
@@ -24,8 +18,15 @@ class TableSource(Protocol):
         """Names of the columns, ``""`` where there is none."""
 
     @property
+    def units(self) -> list[str]:
+        """Units in a row below the names; empty where there is no such row."""
+
+    @property
     def has_header(self) -> bool:
         """Whether the columns have names."""
+
+    def sample(self) -> list[list[str]]:
+        """Return the first rows as texts."""
 
     def stamps(self, column: int, /) -> StampForm | None:
         """Return how the first time stamp of a column is written, None where it has none."""
@@ -41,61 +42,3 @@ class TableSource(Protocol):
 
     def error(self, message: str, /) -> FormatError:
         """Return an error about the header, or the table where it has none."""
-
-
-class TextSource:
-    """A table in a text file."""
-
-    def __init__(self, path: Path, options: ReadOptions) -> None:
-        self._path = path
-        names, self._delimiter, self._skip, self.has_header = read_header(
-            path, delimiter=options.delimiter, header_line=options.header_line
-        )
-        self.names, self._advice = names, ""
-        if self.has_header and options.header_line is None:
-            # A line that is no text is refused when the table is read.
-            with contextlib.suppress(FormatError):
-                self._find_header(options)
-
-    def _find_header(self, options: ReadOptions) -> None:
-        """Take the first line that names positions for the header, with the units below it."""
-        begin = self._skip - 1
-        lines = header_rows(self._path, begin + TABLE.heading_rows)[begin:]
-        for at, line in enumerate(lines):
-            if not line.strip():
-                continue
-            here = self._delimiter if not at else None
-            delimiter = options.delimiter or here or detect_delimiter(lines[at : at + 2])
-            rows = [split_fields(one.lstrip("# "), delimiter) for one in lines[at : at + 3]]
-            found = heading_of(rows, options)
-            if found is not None:
-                if at or found.rows > 1:
-                    self.names, self._delimiter = found.names, delimiter
-                    self._skip = begin + at + found.rows
-                return
-        rows = [split_fields(line, options.delimiter or detect_delimiter([line])) for line in lines]
-        self._advice = header_advice(rows, begin + 1)
-
-    def stamps(self, column: int) -> StampForm | None:
-        """Return how the first time stamp of a column is written, None where it has none."""
-        lines = header_rows(self._path, self._skip + TABLE.sample_rows)[self._skip :]
-        rows = (split_fields(line, self._delimiter) for line in lines if line.strip())
-        fields = (row[column] for row in rows if len(row) > column)
-        return next((stamp_form(field) for field in fields if field not in MISSING), None)
-
-    def read(self, wanted: TableLayout, *, head: bool = False) -> Table:
-        """Read columns, in blocks of the file."""
-        layout = replace(wanted, delimiter=self._delimiter, skip_lines=self._skip)
-        try:
-            return read_table(self._path, layout, blocks=1 if head else None)
-        except FormatError as error:
-            if not self._advice:
-                raise
-            raise FormatError(
-                error.reason + self._advice, path=error.path, line=error.line
-            ) from error
-
-    def error(self, message: str) -> FormatError:
-        """Return an error about the header, or the file where it has none."""
-        line = self._skip if self.has_header else None
-        return FormatError(message + self._advice, path=self._path, line=line)

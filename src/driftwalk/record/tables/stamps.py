@@ -26,11 +26,19 @@ LOCAL: Final = "local"
 DAY: Final = "day"
 
 _TIME: Final = r"(?P<hour>\d\d):(?P<minute>\d\d)(?::(?P<second>\d\d)(?:[.,](?P<fraction>\d+))?)?"
+_HALF: Final = (
+    r"(?P<hour>\d{1,2}):(?P<minute>\d\d)(?::(?P<second>\d\d)(?:[.,](?P<fraction>\d+))?)?"
+    r" ?(?P<half>[AaPp])\.?[Mm]\.?"
+)
+"""A time of day that counts twelve hours twice."""
+_DATES: Final = (
+    r"(?P<year>\d{4})-(?P<month>\d\d)-(?P<day>\d\d)",
+    r"(?P<day>\d\d)\.(?P<month>\d\d)\.(?P<year>\d{4})",  # calendars in German and others
+)
 _ZONE: Final = r"(?: ?(?P<zone>[Zz]|[+-](?P<zone_hour>\d\d)(?::?(?P<zone_minute>\d\d))?))?"
 _MOMENTS: Final = (
-    re.compile(rf"(?P<year>\d{{4}})-(?P<month>\d\d)-(?P<day>\d\d)(?:[T ]{_TIME}{_ZONE})?"),
-    # As calendars in German and many other languages have it.
-    re.compile(rf"(?P<day>\d\d)\.(?P<month>\d\d)\.(?P<year>\d{{4}})(?:[T ]{_TIME}{_ZONE})?"),
+    *(re.compile(rf"{date}(?:[T ]{_TIME}{_ZONE})?") for date in _DATES),
+    *(re.compile(f"{date} {_HALF}") for date in _DATES),
     re.compile(
         r"(?P<year>\d{4})(?P<month>\d\d)(?P<day>\d\d)T(?P<hour>\d\d)(?P<minute>\d\d)(?P<second>\d\d)"
         rf"(?:[.,](?P<fraction>\d+))?{_ZONE}"
@@ -39,9 +47,10 @@ _MOMENTS: Final = (
 _OF_DAY: Final = re.compile(
     r"(?P<hour>\d{1,4}):(?P<minute>\d\d):(?P<second>\d\d)(?:[.,](?P<fraction>\d+))?"
 )
+_HALF_DAY: Final = re.compile(_HALF)
 _UNCLEAR: Final = re.compile(
     r"\d{1,2}/\d{1,2}/\d{2,4}.*|\d{1,2}-\d{1,2}-\d{2,4}.*|\d{1,2}\.\d{1,2}\.\d{2,4}.*"
-    r"|\d{4}/\d.*|\d.*\d ?[AaPp]\.?[Mm]\.?|\d{1,3}:\d{2}(?:[.,]\d+)?"
+    r"|\d{4}/\d.*|\d{1,3}:\d{2}(?:[.,]\d+)?"
 )
 """Dates and times that can be read in more than one way."""
 
@@ -75,13 +84,17 @@ def stamp_form(text: str) -> StampForm | None:
     """
     match = _match(text)
     if match is not None:
-        return StampForm(OF_DAY if match.re is _OF_DAY else MOMENT, match["hour"] is not None)
+        return StampForm(_kind(match), match["hour"] is not None)
     return StampForm("") if _UNCLEAR.fullmatch(text) else None
 
 
 def _match(text: str) -> re.Match[str] | None:
-    matches = (form.fullmatch(text) for form in (*_MOMENTS, _OF_DAY))
+    matches = (form.fullmatch(text) for form in (*_MOMENTS, _OF_DAY, _HALF_DAY))
     return next((match for match in matches if match is not None), None)
+
+
+def _kind(match: re.Match[str]) -> str:
+    return MOMENT if "year" in match.re.groupindex else OF_DAY
 
 
 class StampReader:
@@ -138,8 +151,8 @@ class StampReader:
         match = _match(text)
         if match is None:
             raise StampError(row, f"'{text:.40}' is no time stamp{how_to_write(text)}")
-        kind = OF_DAY if match.re is _OF_DAY else MOMENT
-        zoned = kind == MOMENT and match["zone"] is not None
+        kind = _kind(match)
+        zoned = match.groupdict().get("zone") is not None
         if not self.kind:
             self.kind, self.zoned = kind, zoned
         if kind != self.kind:
@@ -193,14 +206,17 @@ def _nanoseconds(texts: Texts, match: re.Match[str], rows: npt.NDArray[np.int64]
     ticks: Ticks
     hour, minute, second = (part(name) for name in ("hour", "minute", "second"))
     wrong = (minute > 59) | (second > 59)
+    if "half" in match.re.groupindex:
+        wrong |= (hour < 1) | (hour > 12)
+        hour = hour % 12 + (12 if match["half"] in "Pp" else 0)
     ticks = _fraction(letters, match) + SECOND_NS * (second + 60 * (minute + 60 * hour))
-    if match.re is not _OF_DAY:
+    if _kind(match) == MOMENT:
         days, no_day = _days(part("year"), part("month"), part("day"))
         offset = 60 * (part("zone_minute") + 60 * part("zone_hour"))
         wrong |= no_day | (hour > 23) | (part("zone_minute") > 59) | (part("zone_hour") > 23)
         # Nothing of it is beyond 64 bits where the day is one of the calendar.
         ticks += DAY_NS * np.where(no_day, 0, days)
-        zone = match["zone"] or ""
+        zone = match.groupdict().get("zone") or ""
         ticks -= SECOND_NS * offset * (-1 if zone.startswith("-") else 1)
     if wrong.any():
         at = int(np.argmax(wrong))
@@ -211,7 +227,7 @@ def _nanoseconds(texts: Texts, match: re.Match[str], rows: npt.NDArray[np.int64]
 def _fraction(letters: npt.NDArray[np.uint8], match: re.Match[str]) -> Ticks:
     """Return the decimals of the seconds in nanoseconds; those beyond nine are left out."""
     ticks = np.zeros(len(letters), dtype=np.int64)
-    if match["fraction"] is not None:
+    if match.groupdict().get("fraction") is not None:
         for weight, place in enumerate(range(*match.span("fraction"))[:9]):
             ticks += 10 ** (8 - weight) * (letters[:, place] - np.int64(ord("0")))
     return ticks

@@ -33,7 +33,8 @@ REFUSED = {
     "ns from zero, 1 kHz": ([1_000_000 * i for i in range(50)], ["us", "ns"]),
     "us from zero": ([33_333 * i for i in range(50)], ["us"]),
     "one row": ([UNIX_NS], ["ns"]),
-    "days": ([739_000 + 0.04 / 86400 * i for i in range(50)], ["UNIT"]),
+    "days": ([739_000 + 0.04 / 86400 * i for i in range(50)], ["h", "d"]),
+    "days of a spreadsheet": ([45_413.5 + 0.1 / 86400 * i for i in range(50)], ["h", "d"]),
     "in the order of nothing": ([UNIX_NS + 5_000_000 * (i ^ 1) for i in range(50)], ["ns"]),
 }
 

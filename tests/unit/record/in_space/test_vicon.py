@@ -98,7 +98,7 @@ def test_markers(tmp_path: Path) -> None:
         ("\n10\n", "\nfast\n", "line 2: expected the frame rate, got 'fast'"),
         ("TX", "Tx", "'Block' has no columns TX, TY, TZ"),
         ("mm,mm,mm", "mm,m,mm", "units of the positions are m, mm"),
-        ("mm", "in", "units of the positions are in"),
+        ("mm", "furlong", "units of the positions are furlong"),
         ("rad", "turns", "the unit of the angles is 'turns'"),
         ("\n5,0,", "\n5,0,0,", "line 10: expected 14 fields"),
         ("\n5,0,", "\n5,0,x", "line 10, column 3: 'x"),

@@ -29,6 +29,8 @@ def table(folder: Path, header: str, *rows: str) -> Path:
         (("20240501T120000", "20240501T120001.25"), ""),
         (("01.05.2024 12:00:00", "01.05.2024 12:00:01.250000"), ""),
         (("2024-05-01T12:00:00", "2024-05-01 12:00:01.250000000"), ""),
+        (("2024-05-01 12:00:00 PM", "2024-05-01 12:00:01.25 pm"), ""),
+        (("01.05.2024 12:00 PM", "01.05.2024 12:00:01.25 p.m."), ""),
     ],
 )
 @pytest.mark.parametrize("delimiter", [";", "\t"])
@@ -117,7 +119,7 @@ BAD = {
     ),
     "minutes or hours": ("12:30", "several ways"),
     "minutes": ("30:01.3", "several ways"),
-    "half a day": ("12:30:00 PM", "several ways"),
+    "no such half of a day": ("13:30:00 PM", "not a valid date and time"),
     "no such day": ("2023-02-29T12:00:00", "not a valid date and time"),
     "no such hour": ("2024-05-01T25:00:00", "not a valid date and time"),
     "no such minute": ("12:61:00", "not a valid date and time"),

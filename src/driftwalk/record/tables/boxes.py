@@ -1,0 +1,332 @@
+"""Bounding boxes: which columns are the sides of a box, its centre, and the angle of its axis."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import InputError, argument_text
+from driftwalk.core.text.did_you_mean import listed
+from driftwalk.record.column_names import ColumnMeaning, words_of
+from driftwalk.record.raw import Array, ReadOptions, TableLayout
+from driftwalk.record.vocabulary import BOXES, LENGTHS, NO_UNIT, UNITS, words
+
+if TYPE_CHECKING:
+    from driftwalk.record.tables.source import TableSource
+
+FORMS: Final = ("xyxy", "xywh", "cxcywh", "none")
+_CORNERS: Final = ("x1", "y1", "x2", "y2")
+_QUAD: Final = tuple(f"{axis}{corner}" for corner in range(1, 5) for axis in "xy")
+_OF_QUAD: Final = re.compile(r"(?:tag)?(?:c|corner|p|pt)([0-3])([xy])")
+_CENTRE: Final = words("cx cy xc yc center centre centroid mitte centro")
+_CLASSES: Final = words("class cls classid classname label category")
+
+
+class BoxPolicy(NamedTuple):
+    """When four numbers are the corners of a box; chosen by hand."""
+
+    spread: float = 0.5
+    """Range of the sides of a box at most, as a share of the way that it goes."""
+    skew: float = 0.15
+    """Departure of four corners from a parallelogram at most, in diagonals."""
+    square: float = 1.25
+    """Ratio of the sides up to which a box is a square, whose angle repeats after a quarter."""
+    full: float = 1.05
+    """Range of an angle, in periods of the axis, beyond which it is that of a direction."""
+
+
+BOX: Final = BoxPolicy()
+
+
+@dataclass(frozen=True)
+class Box:
+    """Columns that are sides of a box."""
+
+    form: str
+    """One of `FORMS`, or ``"quad"`` of four corners; ``""``: the corners are left out."""
+    sides: dict[str, int]
+    units: list[str] = field(default_factory=list)
+    replaced: tuple[int, ...] = ()
+    """Columns that would be bodies by their names."""
+    why: str = "a side of a box"
+    notes: tuple[str, ...] = ()
+    symmetric: bool = True
+    """Whether its angle is that of an axis."""
+
+
+def find_box(
+    source: TableSource,
+    options: ReadOptions,
+    meanings: Mapping[int, ColumnMeaning],
+    chosen: Mapping[str, str],
+) -> Box | None:
+    """Return the columns that are the sides of a box, None where there are none.
+
+    Raises
+    ------
+    InputError
+        When a box that is stated has not its columns, and when the first rows leave open whether
+        columns are a box, and which point of it is meant.
+    """
+    if options.box is not None and options.box not in FORMS:
+        raise InputError(f"`box` is one of {', '.join(FORMS)}; got '{options.box}'")
+    if options.box == "none":
+        return None
+    found, units, plain = _sides(source, meanings)
+    if options.box is not None:
+        return _stated(options.box, found, units)
+    if {"x", "y"} & set(chosen) and not {"x1", "w"} & set(chosen):
+        return None
+    if getattr(source, "matrices", False):
+        return None
+    quad = _quad(source)
+    if quad is not None:
+        return quad
+    if set(_CORNERS) <= set(found):
+        return _corners(source, found, units, meanings, plain=plain)
+    if not {"w", "h"} <= set(found):
+        return None
+    if {"x1", "y1"} <= set(found) and not {"x", "y"} <= set(found):
+        return _stated("xywh", found, units)
+    if not {"x", "y"} <= set(found):
+        return None
+    words = {word.lower() for side in "xy" for word in words_of(source.names[found[side]])}
+    if words & _CENTRE:
+        return _stated("cxcywh", found, units)
+    names = [source.names[found[side]] for side in ("x", "y", "w", "h")]
+    raise InputError(
+        f"the columns {listed([repr(name) for name in names])} are a box, and nothing says which "
+        'point of it x and y are: add `box="xywh"` if they are its corner of the least x and y, '
+        '`box="cxcywh"` if its centre'
+    )
+
+
+def _sides(
+    source: TableSource, meanings: Mapping[int, ColumnMeaning]
+) -> tuple[dict[str, int], dict[str, str], bool]:
+    """Return the column of each side, its unit, and whether corners are named by numbers alone."""
+    found: dict[str, int] = {}
+    units: dict[str, str] = {}
+    plain = True
+    for at, name in enumerate(source.names):
+        meaning = meanings.get(at)
+        if meaning is not None and meaning.quantity in (*_CORNERS, "w", "h"):
+            found[meaning.quantity], units[meaning.quantity], plain = at, meaning.unit, False
+            continue
+        text = re.sub(r"[\[(].*", "", name).strip("#% \"'")
+        words = [word.lower() for word in words_of(text)]
+        unit = UNITS.get(words[-1], "") if len(words) > 1 else ""
+        inside = re.search(r"[\[(]([^\])]*)", name)
+        below = source.units[at] if source.units else ""
+        stated = inside[1] if inside else below.strip("[]() ")
+        if unit in LENGTHS or (len(words) > 1 and words[-1] in NO_UNIT):
+            words.pop()
+        elif stated:
+            unit = UNITS.get(stated.lower(), "")
+        side = BOXES.get("".join(words), "")
+        if side in ("x", "y") or (
+            meaning is not None and meaning.quantity in ("x", "y") and not side
+        ):
+            side = (
+                meaning.quantity if meaning is not None and meaning.quantity in ("x", "y") else ""
+            )
+            if meaning is not None and (meaning.body and meaning.rank >= 0):
+                side = ""
+        if side and side not in found:
+            found[side], units[side] = at, unit if unit in LENGTHS else ""
+            plain = plain and (side not in _CORNERS or words == [side])
+    for at, meaning in meanings.items():
+        if meaning.rank < 0 and meaning.quantity in ("x", "y"):
+            found[meaning.quantity], units[meaning.quantity] = at, meaning.unit
+    return found, units, plain
+
+
+def _stated(form: str, found: Mapping[str, int], units: Mapping[str, str]) -> Box:
+    """Return the box of a form, or say which columns it lacks."""
+    sides: tuple[str, ...] = _CORNERS
+    if form != "xyxy":
+        corner = "x1" in found and "x" not in found
+        sides = ("x1", "y1", "w", "h") if corner else ("x", "y", "w", "h")
+    missing = [side for side in sides if side not in found]
+    if missing:
+        wanted = argument_text("columns", dict.fromkeys(sides, "NAME"))
+        raise InputError(f"a box of the form '{form}' has no column of {listed(missing)}: {wanted}")
+    names = dict(zip(sides, _CORNERS if form == "xyxy" else ("x", "y", "w", "h"), strict=True))
+    return Box(
+        form,
+        {names[side]: found[side] for side in sides},
+        [units[side] for side in sides],
+        tuple(found[side] for side in sides if side not in ("x", "y")),
+    )
+
+
+def _corners(
+    source: TableSource,
+    found: Mapping[str, int],
+    units: Mapping[str, str],
+    meanings: Mapping[int, ColumnMeaning],
+    *,
+    plain: bool,
+) -> Box | None:
+    """Return the box of two corners; values decide whether x1, y1, x2, y2 are two bodies."""
+    box = _stated("xyxy", found, units)
+    numbered = {one.body for one in meanings.values() if one.body.isdecimal()}
+    if plain and (
+        numbered - {"1", "2"}
+        or any(one.quantity == "theta" and one.body in numbered for one in meanings.values())
+    ):
+        return None
+    if not plain and not {"x", "y"} <= set(found):
+        return box
+    centre = {"x", "y"} <= set(found)
+    sides = (*_CORNERS, *("xy" if centre else ""))
+    values = _values(source, [found[side] for side in sides])
+    if values is None:
+        return None
+    x1, y1, x2, y2 = values[:4]
+    if not len(x1) or (x2 < x1).any() or (y2 < y1).any():
+        return None
+    if centre:
+        apart = np.hypot(values[4] - 0.5 * (x1 + x2), values[5] - 0.5 * (y1 + y2))
+        if (apart <= 0.5 * np.hypot(x2 - x1, y2 - y1) + 1e-9).all():
+            return Box("", {}, replaced=box.replaced, why="a corner of the box around x and y")
+        return None
+    ways = max(np.ptp(x1 + x2), np.ptp(y1 + y2)) / 2.0
+    compact = max(np.ptp(x2 - x1), np.ptp(y2 - y1)) <= BOX.spread * ways
+    words = {"".join(words_of(name)).lower() for name in source.names}
+    of_detector = bool(words & _CLASSES) or any(
+        one.quantity == "confidence" for one in meanings.values()
+    )
+    if not compact and not of_detector:
+        return None
+    names = listed([repr(source.names[found[side]]) for side in _CORNERS])
+    if compact and of_detector:
+        note = (
+            f"{names} are read as the corners of a box, whose centre is the body: add "
+            '`box="none"` if they are two bodies'
+        )
+        return Box(box.form, box.sides, box.units, box.replaced, notes=(note,))
+    raise InputError(
+        f"{names} may be the corners of a box (the second is always beyond the first) or two "
+        'bodies: add `box="xyxy"` or `box="none"`'
+    )
+
+
+def _quad(source: TableSource) -> Box | None:
+    """Return the box of four corners: c0x, c0y, ... of markers, or x1, ..., y4 of one shape."""
+    found: dict[str, int] = {}
+    named = True
+    for at, name in enumerate(source.names):
+        word = "".join(words_of(name)).lower()
+        match = _OF_QUAD.fullmatch(word)
+        if match is not None:
+            found[f"{match[2]}{int(match[1]) + 1}"] = at
+        elif word in _QUAD:
+            found[word], named = at, False
+    if set(found) != set(_QUAD):
+        return None
+    if not named:
+        values = _values(source, [found[side] for side in _QUAD])
+        if values is None or not len(values[0]):
+            return None
+        x, y = np.array(values[::2]), np.array(values[1::2])
+        skew = np.hypot(x[0] - x[1] + x[2] - x[3], y[0] - y[1] + y[2] - y[3])
+        if (skew > BOX.skew * np.hypot(x[0] - x[2], y[0] - y[2])).any():
+            return None
+    return Box("quad", found, replaced=tuple(found.values()), symmetric=not named)
+
+
+def _values(source: TableSource, columns: list[int]) -> list[Array] | None:
+    """Return the first rows of columns in which all have a number, None where one has texts."""
+    labels = [name or str(at) for at, name in enumerate(source.names, start=1)]
+    try:
+        table = source.read(TableLayout("", labels, numbers=tuple(sorted(columns))), head=True)
+    except InputError:
+        return None  # reading it reports what is wrong
+    values = [table.numbers[at] for at in columns]
+    known = np.all([np.isfinite(one) for one in values], axis=0)
+    return [one[known] for one in values]
+
+
+def box_centre(box: Box, values: Mapping[int, Array]) -> tuple[Array, Array]:
+    """Return the centre of a box in each row."""
+    side = {name: values[at] for name, at in box.sides.items()}
+    with np.errstate(over="ignore", invalid="ignore"):  # an infinite position is a gap
+        if box.form == "xyxy":
+            return 0.5 * (side["x1"] + side["x2"]), 0.5 * (side["y1"] + side["y2"])
+        if box.form == "quad":
+            corners = [[side[f"{axis}{n}"] for n in range(1, 5)] for axis in "xy"]
+            x, y = (np.mean(of_axis, axis=0) for of_axis in corners)
+            return x, y
+        if box.form == "xywh":
+            return side["x"] + 0.5 * side["w"], side["y"] + 0.5 * side["h"]
+    return side["x"], side["y"]
+
+
+def box_angle(
+    box: Box,
+    values: Mapping[int, Array],
+    theta: Array | None,
+    codes: npt.NDArray[np.int32] | None,
+    turn: float,
+) -> Array | None:
+    """Return the orientation of a box: its axis, followed over its symmetry, body by body.
+
+    A square looks the same after a quarter of a turn, any other box after a half.
+
+    Parameters
+    ----------
+    box : Box
+        Its columns.
+    values : mapping
+        Columns of the table, each of shape (n,).
+    theta : array, shape (n,), optional
+        The angle in the table.
+    codes : array of int32, shape (n,), optional
+        Index of each row's body.
+    turn : float
+        A full turn in the unit of the angle.
+    """
+    side = {name: values[at] for name, at in box.sides.items()}
+    if box.form == "quad" and theta is None:
+        along = [
+            side[f"{axis}2"] + side[f"{axis}3"] - side[f"{axis}1"] - side[f"{axis}4"]
+            for axis in "xy"
+        ]
+        theta = np.arctan2(along[1], along[0])
+        w = np.hypot(*along)
+        h = np.hypot(
+            *(
+                side[f"{axis}3"] + side[f"{axis}4"] - side[f"{axis}1"] - side[f"{axis}2"]
+                for axis in "xy"
+            )
+        )
+        turn = 2.0 * np.pi
+    elif theta is None or "w" not in side:
+        return theta
+    else:
+        w, h = side["w"], side["h"]
+    if not box.symmetric:
+        return theta
+    followed = theta.copy()
+    for code in [None] if codes is None else range(int(codes.max()) + 1):
+        known = np.isfinite(theta) & np.isfinite(w) & np.isfinite(h)
+        rows = np.flatnonzero(known if codes is None else known & (codes == code))
+        if rows.size:
+            followed[rows] = _followed(theta[rows], w[rows], h[rows], turn)
+    return followed
+
+
+def _followed(theta: Array, w: Array, h: Array, turn: float) -> Array:
+    ratio = float(np.median(np.maximum(w, h) / np.maximum(np.minimum(w, h), 1e-300)))
+    period = turn / 4.0 if ratio < BOX.square else turn / 2.0
+    axis = theta if ratio < BOX.square else theta + np.where(h > w, turn / 4.0, 0.0)
+    if np.ptp(theta) > BOX.full * period:
+        return theta
+    followed: Array = np.unwrap(axis, period=period)
+    return followed

@@ -1,0 +1,328 @@
+"""Column readings of a table: bodies, boxes, clock and units, of names and first rows."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from driftwalk.core.errors import InputError, argument_text
+from driftwalk.core.text.did_you_mean import listed
+from driftwalk.record.column_names import OF_BODY, QUATERNION, unit_of_name
+from driftwalk.record.raw import MISSING, ReadOptions
+from driftwalk.record.tables.boxes import find_box
+from driftwalk.record.tables.column_reading import ColumnReading, TableReading
+from driftwalk.record.tables.named_columns import NamedColumns, may_be_unit, shown
+from driftwalk.record.tables.source import TableSource
+from driftwalk.record.tables.stamps import OF_DAY
+from driftwalk.record.vocabulary import FRONT, MIDDLE, REAR
+
+
+def read_columns(
+    source: TableSource, options: ReadOptions, *, lenient: bool = False
+) -> TableReading:
+    """Return what each column of a table is, by its names, its first rows and what the user says.
+
+    Parameters
+    ----------
+    source : TableSource
+        Names of the columns, units below them, and the first rows.
+    options : ReadOptions
+        What is known about the table.
+    lenient : bool
+        Whether a unit that is not known is no error, as in the search for the names.
+
+    Raises
+    ------
+    InputError
+        When a column is missing, named twice, does not exist, or cannot be decided.
+    """
+    return _Reader(source, options, lenient=lenient).reading()
+
+
+class _Reader(NamedColumns):
+    """The columns of a table as far as they are decided."""
+
+    def reading(self) -> TableReading:
+        """Return the reading."""
+        self.choose()
+        box = find_box(self.source, self.options, self.meanings, self.chosen)
+        if box is not None:
+            self.drop((at for at in box.replaced), box.why)
+            self.result.box = box if box.sides else None
+            self.result.notes += box.notes
+        self.leave_out_other_pairs()
+        self.refuse_unknown_units()
+        self._find_bodies()
+        self._find_clock()
+        self._find_units()
+        self._describe()
+        return self.result
+
+    def _find_bodies(self) -> None:
+        """Put the columns of each body together, and refuse what is ambiguous."""
+        self._leave_out_the_third_axis()
+        places: dict[str, dict[str, int]] = {}
+        for at, meaning in sorted(self.meanings.items()):
+            if meaning.quantity not in OF_BODY or meaning.quantity == "confidence":
+                continue
+            own = places.setdefault(meaning.body, {})
+            if meaning.quantity in own:
+                raise InputError(self.both(own[meaning.quantity], at, meaning.quantity))
+            own[meaning.quantity] = at
+        bodies = {
+            body: columns
+            for body, columns in places.items()
+            if {"x", "y"} <= set(columns) or {"lon", "lat"} <= set(columns)
+        }
+        if any({"x", "y"} <= set(columns) for columns in bodies.values()):
+            bodies = {body: one for body, one in bodies.items() if {"x", "y"} <= set(one)}
+        box = self.result.box
+        if box is not None and (not bodies or not {"x", "y"} <= set(box.sides)):
+            name = next((body for body in bodies if not body), "")
+            bodies = {name: {**places.get(name, {}), **box.sides}}
+        elif box is not None and len(bodies) == 1:
+            bodies = {name: {**one, **box.sides} for name, one in bodies.items()}
+        if not bodies:
+            raise InputError(
+                f"no columns of x and y among {shown(self.names)}: name them with "
+                '`columns={"x": "NAME", "y": "NAME"}` (or their numbers, from 1)'
+            )
+        if len(bodies) == 1:
+            self._add_loose_angle(next(iter(bodies.values())), places, set(bodies))
+        self.result.bodies = bodies
+        self.result.body_column = self._single("body")
+        self._find_parts()
+        if self.options.min_confidence is not None:
+            self._find_confidences()
+
+    def _leave_out_the_third_axis(self) -> None:
+        """Leave out heights that nobody asks for, and parts of quaternions that are not whole."""
+        meanings = self.meanings
+        turned = {body for body in {one.body for one in meanings.values()} if self._is_turned(body)}
+        parts = [at for at, one in meanings.items() if one.quantity in QUATERNION]
+        loose = [at for at in parts if meanings[at].body not in turned]
+        self.drop(loose, "no whole quaternion, or an angle next to it")
+        if self.options.up is None:
+            height = [at for at, one in meanings.items() if one.quantity == "z"]
+            self.drop(height, "height: the plane of the water is x, y without `up`")
+
+    def _is_turned(self, body: str) -> bool:
+        """Whether a body has a quaternion and no angle; half of a chosen quaternion is refused."""
+        own = [one.quantity for one in self.meanings.values() if one.body == body]
+        whole = all(own.count(part) == 1 for part in QUATERNION)
+        if not whole and any(part in self.chosen for part in QUATERNION):
+            raise InputError(
+                'an orientation in space has four parts: name each with `columns={"qx": "NAME"}`, '
+                "qy, qz and qw"
+            )
+        return whole and "theta" not in own
+
+    def _add_loose_angle(
+        self, only: dict[str, int], places: dict[str, dict[str, int]], bodies: set[str]
+    ) -> None:
+        """Give the only body an orientation that stands without its number: x1, y1, heading."""
+        loose = [
+            one["theta"] for body, one in places.items() if body not in bodies and "theta" in one
+        ]
+        if "theta" in only or not loose:
+            return
+        if len(loose) > 1:
+            names = listed([repr(self.names[at]) for at in loose])
+            choice = argument_text("columns", {"theta": self.names[loose[0]]})
+            self.result.notes.append(f"no orientation is read of {names}: name one, as in {choice}")
+            return
+        meaning = self.meanings[loose[0]]
+        if may_be_unit(meaning.ending) and meaning.body == meaning.ending and not self.lenient:
+            raise InputError(self.no_unit(loose[0], meaning.body))
+        only["theta"] = loose[0]
+
+    def _find_parts(self) -> None:
+        """Find the middle and the front of one body among bodies that are its parts."""
+        bodies = self.result.bodies
+        lower = {body.lower(): body for body in bodies}
+        if len(lower) < 2 or set(lower) - MIDDLE - FRONT - REAR or self.options.heading is not None:
+            return
+        middle = [body for name, body in lower.items() if name in MIDDLE]
+        front = [body for name, body in lower.items() if name in FRONT]
+        if len(middle) == len(front) == 1 and not any("theta" in one for one in bodies.values()):
+            self.result.parts = (middle[0], front[0])
+            names = [self.names[bodies[body]["x"]] for body in self.result.parts]
+            self.result.notes.append(
+                f"'{names[0]}' and '{names[1]}' are read as the middle and the front of one body, "
+                "whose orientation is the direction between them"
+            )
+
+    def _find_confidences(self) -> None:
+        """Give each body the column of its confidence."""
+        found: dict[str, list[int]] = {}
+        for at, one in self.meanings.items():
+            if one.quantity == "confidence":
+                found.setdefault(one.body, []).append(at)
+        for body, places in self.result.bodies.items():
+            own = found.get(body) or found.get("", [])
+            if len(own) > 1:
+                raise InputError(self.both(own[0], own[1], "confidence"))
+            if own:
+                places["confidence"] = own[0]
+
+    def _single(self, quantity: str) -> int | None:
+        """Return the column of a quantity that a table has once, None where there is none."""
+        found = [(one.rank, at) for at, one in self.meanings.items() if one.quantity == quantity]
+        if not found:
+            return None
+        found.sort()
+        rank, at = found[0]
+        rivals = [other for other_rank, other in found[1:] if other_rank == rank]
+        alike = rank > 1 and (
+            self.lenient or (quantity == "t" and rivals and self._run_together(at, rivals[0]))
+        )
+        if rivals and not alike:
+            raise InputError(self.both(at, rivals[0], quantity))
+        name = self.result.columns[at].name
+        self.drop((other for _, other in found[1:]), f"'{name}' is the {quantity} that counts")
+        return at
+
+    def _run_together(self, first: int, second: int) -> bool:
+        """Whether two clocks differ by the same in the first rows."""
+        texts = [(row[first], row[second]) for row in self.source.sample() if len(row) > second]
+        try:
+            values = np.array(
+                [[float(one.replace(",", ".")) for one in pair] for pair in texts if "" not in pair]
+            )
+        except ValueError:
+            return False
+        return values.size > 0 and float(np.ptp(values[:, 1] - values[:, 0])) <= 1e-9 + 1e-3
+
+    def _find_clock(self) -> None:
+        """Find the clock: frames, numbers, seconds and their fraction, or time stamps."""
+        result, source = self.result, self.source
+        frame, time, part = (self._single(quantity) for quantity in ("frame", "t", "t+"))
+        date = self._single("date")
+        if time is None and part is not None:
+            time, part = part, None
+            self.meanings[time] = replace(self.meanings[time], quantity="t")
+        if frame is not None and (time is None or self.options.frame_rate_hz is not None):
+            result.numbers = (frame,)
+            if time is not None:
+                self.drop([time], "frames are counted, because their rate is given")
+            return
+        if frame is not None:
+            self.drop([frame], "the table has times")
+        form = None if time is None else source.stamps(time)
+        if time is not None and form is None:
+            meaning = self.meanings[time]
+            result.clock_unit, result.numbers = meaning.unit or "s", (time,)
+            result.bare_clock = not meaning.unit
+            if part is not None and (
+                part in self._chosen_columns() or self._is_fraction(time, part)
+            ):
+                result.numbers = (time, part)
+            if meaning.rank == 0 and not meaning.unit and self._is_of_ros(time):
+                result.clock_unit, result.bare_clock = "ns", False
+                self.meanings[time] = replace(meaning, unit="ns")
+            return
+        date_form = None if date is None else source.stamps(date)
+        if time is None:
+            result.stamps = () if date is None or date_form is None else (date,)
+        elif (
+            form is not None and form.kind == OF_DAY and date is not None and date_form is not None
+        ):
+            # A date that has its own time of day says all.
+            result.stamps = (date,) if date_form.kind and date_form.has_time else (date, time)
+        else:
+            result.stamps = (time,)
+        if result.stamps:
+            result.clock_unit = "ns"
+
+    def _chosen_columns(self) -> set[int]:
+        return {at for at, one in self.meanings.items() if one.rank < 0}
+
+    def _sampled(self, column: int) -> list[str]:
+        rows = (row[column] for row in self.source.sample() if len(row) > column)
+        return [one for one in rows if one not in MISSING]
+
+    def _is_fraction(self, time: int, part: int) -> bool:
+        """Whether a column holds less than a second, next to whole seconds."""
+        whole = all(one.lstrip("-").isdecimal() for one in self._sampled(time))
+        ticks = {"ns": 9, "us": 6, "ms": 3}.get(self.meanings[part].unit, 0)
+        parts = self._sampled(part)
+        return whole and all(one.isdecimal() and int(one) < 10**ticks for one in parts)
+
+    def _is_of_ros(self, time: int) -> bool:
+        """Whether the stamp of a header counts whole nanoseconds since 1970."""
+        first = next(iter(self._sampled(time)), "")
+        return first.isdecimal() and len(first) >= 18
+
+    def _find_units(self) -> None:
+        result = self.result
+        lengths = ("x", "y", "z")
+        used = {at for one in result.bodies.values() for at in one.values()}
+        wanted = [
+            one for at, one in self.meanings.items() if one.quantity in lengths and at in used
+        ]
+        units = [one.unit for one in wanted]
+        if result.box is not None:
+            units += result.box.units
+        result.length_unit = _agreed(units, "positions")
+        angles = [
+            one for at, one in self.meanings.items() if one.quantity == "theta" and at in used
+        ]
+        result.angle_unit = _agreed([one.unit for one in angles], "angles") if angles else ""
+        result.bare = all(one.bare for one in wanted) and (result.box is None or bool(wanted))
+
+    def _describe(self) -> None:
+        """Write down what each column was taken for."""
+        result = self.result
+        used = {at: body for body, one in result.bodies.items() for at in one.values()}
+        sides = {} if result.box is None else {at: side for side, at in result.box.sides.items()}
+        clock = {*result.numbers, *result.stamps}
+        for at, column in enumerate(result.columns):
+            meaning = self.meanings.get(at)
+            if at not in used and at not in clock and at != result.body_column:
+                column.unit = self.unit_of(at)
+                if meaning is not None and meaning.quantity == "confidence":
+                    column.why = "confidence, of use with `min_confidence`"
+                elif meaning is not None:
+                    column.why = "no pair of x and y, or no body, goes with it"
+                continue
+            column.role = sides.get(at, meaning.quantity if meaning else "")
+            column.body = used.get(at, "")
+            column.unit = meaning.unit if meaning else ""
+            if column.why != "you named it":
+                column.why = "by its name"
+                if at in sides and result.box is not None:
+                    column.why = f"by its name: a side of a box ({result.box.form})"
+            column.why += self._why_unit(at, column)
+
+    def _why_unit(self, at: int, column: ColumnReading) -> str:
+        if at in self.result.stamps:
+            column.unit = "time stamp"
+            return ""
+        if column.unit and self.below[at]:
+            return "; unit from the row below the names"
+        if column.unit and unit_of_name(self.names[at]) == column.unit:
+            return "; unit from its name"
+        options, length = (
+            self.options,
+            column.role in ("x", "y", "z", "x1", "y1", "x2", "y2", "w", "h"),
+        )
+        if not column.unit and length:
+            if options.length_unit or options.metres_per_pixel is not None:
+                column.unit = options.length_unit or "px"
+                return "; unit as you stated it"
+            if self.result.bare and self.result.clock_unit != "frame":
+                column.unit = "m"
+                return "; no unit named, so metres"
+        elif not column.unit and column.role in ("t", "theta"):
+            column.unit = {"t": "s", "theta": "rad"}[column.role]
+            return f"; no unit named, so {column.unit}"
+        return ""
+
+
+def _agreed(units: list[str], what: str) -> str:
+    distinct = sorted(set(units))
+    if len(distinct) > 1:
+        shown = ", ".join(unit or "none" for unit in distinct)
+        raise InputError(f"the columns of {what} name different units ({shown}): name them alike")
+    return distinct[0] if distinct else ""

@@ -1,0 +1,250 @@
+"""Columns by their names: which the user named, which are no body, which have no known unit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Final
+
+from driftwalk.core.errors import InputError, argument_text
+from driftwalk.core.text.did_you_mean import listed
+from driftwalk.record.column_names import ColumnMeaning, column_meaning, unit_of_name
+from driftwalk.record.raw import ReadOptions
+from driftwalk.record.tables.column_reading import ColumnReading, TableReading
+from driftwalk.record.tables.source import TableSource
+from driftwalk.record.vocabulary import (
+    ALLOWED,
+    FRONT,
+    MIDDLE,
+    REAR,
+    ROOTS,
+    SETPOINTS,
+    UNITS,
+    VARIANTS,
+)
+
+_SKIP: Final = "skip"
+LEFT_OUT: Final = "you left it out"
+_OTHER_BODY: Final = "what it was to do, or what moved it: no body where another is"
+_SAME_BODY: Final = "the same body, before or after a computation"
+
+
+class NamedColumns:
+    """The columns of a table as far as their names decide."""
+
+    def __init__(self, source: TableSource, options: ReadOptions, *, lenient: bool) -> None:
+        self.source, self.options, self.lenient = source, options, lenient
+        self.names, self.below = source.names, source.units or [""] * len(source.names)
+        labels = [name or str(at) for at, name in enumerate(self.names, start=1)]
+        self.result = TableReading([ColumnReading(label) for label in labels])
+        self.chosen = {key: one for key, one in options.columns.items() if key != _SKIP}
+        pairs = zip(self.names, self.below, strict=True)
+        known = [column_meaning(name, unit) for name, unit in pairs]
+        self.meanings = {at: one for at, one in enumerate(known) if one is not None}
+
+    def drop(self, columns: Iterable[int], why: str) -> None:
+        """Leave columns out, and say why."""
+        for at in list(columns):
+            self.meanings.pop(at, None)
+            self.result.columns[at].why = why
+
+    def choose(self) -> None:
+        """Take the columns that the user names for what they are said to be."""
+        skipped = self.options.columns.get(_SKIP, "")
+        for name in filter(None, skipped.split("+")):
+            index, _ = self._find(name, _SKIP)
+            self.drop([index], LEFT_OUT)
+        for quantity, reference in self.chosen.items():
+            first, *more = self._references(reference, quantity)
+            for part, (index, unit) in zip((quantity, "t+"), (first, *more), strict=False):
+                if unit and unit not in ALLOWED[quantity]:
+                    raise InputError(
+                        f"{argument_text('columns', {quantity: reference})}: '{unit}' is not a "
+                        f"unit of {quantity}"
+                    )
+                known = self.meanings.get(index)
+                kept = {
+                    other: meaning
+                    for other, meaning in self.meanings.items()
+                    if meaning.quantity != part and other != index
+                }
+                stated = self.unit_of(index)
+                inferred = stated if stated in ALLOWED[quantity] else ""
+                unknown = known.unknown if known and not unit and known.quantity == quantity else ""
+                kept[index] = ColumnMeaning(
+                    part, unit or inferred, "", bool(known and known.bare), unknown, rank=-1
+                )
+                self.meanings = kept
+                self.result.columns[index].why = "you named it"
+
+    def unit_of(self, at: int) -> str:
+        """Return the unit of any column, as its name or the row below states it."""
+        below = self.below[at]
+        return unit_of_name(f"_ {below}") if below else unit_of_name(self.names[at])
+
+    def _references(self, reference: str, quantity: str) -> list[tuple[int, str]]:
+        """Return the columns that are named; of a time there may be two, with a plus between."""
+        try:
+            return [self._find(reference, quantity)]
+        except InputError:
+            parts = reference.split("+")
+            if quantity != "t" or len(parts) != 2:
+                raise
+            return [self._find(part, quantity) for part in parts]
+
+    def _find(self, reference: str, quantity: str) -> tuple[int, str]:
+        names = self.names
+        if quantity not in ALLOWED and quantity != _SKIP:
+            raise InputError(
+                f"{argument_text('columns', {quantity: reference})}: unknown quantity; name "
+                f"{', '.join([*ALLOWED, _SKIP])}"
+            )
+        with_units = [f"{name} [{unit}]" for name, unit in zip(names, self.below, strict=True)]
+        with_marks = [f"{name} {unit}" for name, unit in zip(names, self.below, strict=True)]
+        for text, unit in ((reference, ""), reference.rpartition(":")[::2]):
+            for known in (names, with_units, with_marks):
+                if text in known:
+                    return known.index(text), UNITS.get(unit.lower(), unit)
+            if text.isdecimal() and 1 <= int(text) <= len(names):
+                return int(text) - 1, UNITS.get(unit.lower(), unit)
+        raise InputError(
+            f"{argument_text('columns', {quantity: reference})}: no such column; the file has "
+            f"{len(names)}: {shown(names)}"
+        )
+
+    def bodies_with(self, quantity: str = "x") -> dict[str, int]:
+        """Return the names of the bodies that have a quantity, and its column."""
+        return {one.body: at for at, one in self.meanings.items() if one.quantity == quantity}
+
+    def leave_out_other_pairs(self) -> None:
+        """Leave out pairs that are no body, or a body once more, where another pair is."""
+        bodies = [body for body in self.bodies_with("x") if body in self.bodies_with("y")]
+        kinds = {one.body: _kinds(one.body) for one in self.meanings.values() if one.body}
+        real = [body for body in bodies if body not in kinds or not any(kinds[body])]
+        setpoints = [body for body in bodies if body in kinds and kinds[body][0]]
+        variants = [
+            body for body in bodies if body in kinds and kinds[body][1] and not kinds[body][0]
+        ]
+        left = dict.fromkeys(setpoints, _OTHER_BODY) if real or variants else {}
+        if self.result.box is not None:
+            left = dict.fromkeys(setpoints, _OTHER_BODY)
+        if len(setpoints) > 1 and not left and not self.lenient:
+            raise InputError(self._one_of([f"x_{body}" for body in setpoints], setpoints))
+        if len(setpoints) == 1 and not left and not self.lenient:
+            self.result.notes.append(
+                f"'{setpoints[0]}' is read as a body, though its name is that of a setpoint: "
+                "there is no other pair of x and y"
+            )
+        left |= self._computed(variants, real)
+        for body, kind in kinds.items():
+            # An angle of a setpoint stands alone where its position has other names.
+            if kind[0] and body not in bodies:
+                left[body] = _OTHER_BODY
+            if kind[1] and body not in bodies and _base(body) in self.bodies_with("theta"):
+                left[body] = _SAME_BODY
+        for body, why in left.items():
+            self.drop([at for at, one in self.meanings.items() if one.body == body], why)
+        named = [body for body in left if body in bodies]
+        if named:
+            self.result.notes.append(
+                f"pairs of x and y that are read as no body: {listed(named)} (name one by "
+                f"{argument_text('columns', {'x': 'NAME', 'y': 'NAME'})} if it is the one)"
+            )
+
+    def _computed(self, variants: list[str], real: list[str]) -> dict[str, str]:
+        """Return the pairs that are a body once more; of several, one has to be named."""
+        left: dict[str, str] = {}
+        of_base: dict[str, list[str]] = {}
+        for body in variants:
+            of_base.setdefault(_base(body), []).append(body)
+        for base, several in of_base.items():
+            if base in real or (not base and self.result.box is not None):
+                left |= dict.fromkeys(several, _SAME_BODY)
+            elif len(several) > 1 and not self.lenient:
+                raise InputError(self._one_of([], several))
+        return left
+
+    def _one_of(self, _names: list[str], bodies: list[str]) -> str:
+        columns = self.bodies_with("x")
+        found = [self.names[columns[body]] for body in bodies]
+        other = {"x": found[0], "y": self.names[self.bodies_with("y")[bodies[0]]]}
+        return (
+            f"{listed([repr(name) for name in found])} hold one body more than once, or none: name "
+            f"the one to read, as in {argument_text('columns', other)}"
+        )
+
+    def refuse_unknown_units(self) -> None:
+        """Refuse positions, angles and times whose unit is none that is known."""
+        options = self.options
+        stated = options.length_unit is not None or options.metres_per_pixel is not None
+        unknown = {at: one for at, one in self.meanings.items() if one.unknown}
+        for at, meaning in unknown.items():
+            length = meaning.quantity in ("x", "y", "z")
+            if (length and stated) or self.lenient:
+                continue
+            same = [
+                other
+                for other, one in self.meanings.items()
+                if (one.quantity, one.body) == (meaning.quantity, meaning.body) and not one.unknown
+            ]
+            if (
+                same
+                or meaning.quantity == "z"
+                or (meaning.quantity == "t" and self.bodies_with("frame"))
+            ):
+                self.drop([at], f"'{meaning.unknown}' is no unit that is known")
+                continue
+            raise InputError(self.no_unit(at, meaning.unknown))
+        if stated or self.lenient:
+            return
+        bodies = self.bodies_with("y")
+        pairs = {
+            at: one
+            for at, one in self.meanings.items()
+            if one.quantity in ("x", "y") and one.body in bodies
+        }
+        words = {one.ending for one in pairs.values()}
+        word = next(iter(words)) if len(words) == 1 else ""
+        if may_be_unit(word) and not any(one.unit for one in pairs.values()):
+            raise InputError(
+                self.no_unit(next(iter(pairs)), word)
+                + "; if it names the body, state the unit of its positions with `length_unit`"
+            )
+
+    def no_unit(self, at: int, word: str) -> str:
+        """Return what to do about a column with a unit that is none."""
+        quantity = self.meanings[at].quantity
+        allowed = ", ".join(sorted(ALLOWED[quantity]))
+        choice = argument_text("columns", {quantity: f"{self.names[at]}:UNIT"})
+        return (
+            f"'{word}' in column '{self.names[at]}' is no unit that is known: say which of "
+            f"{allowed} it is, as in {choice}"
+        )
+
+    def both(self, first: int, second: int, quantity: str) -> str:
+        """Return what to do about two columns that could be one quantity."""
+        return (
+            f"columns '{self.names[first]}' and '{self.names[second]}' could both be "
+            f"{quantity}: name one with {argument_text('columns', {quantity: 'NAME'})}"
+        )
+
+
+def _kinds(body: str) -> tuple[bool, bool]:
+    words = {word.lower().rstrip("0123456789") for word in body.split("_")}
+    return bool(words & SETPOINTS), bool(words & VARIANTS)
+
+
+def _base(body: str) -> str:
+    """Return the name of a body without the words of a computation."""
+    return "_".join(word for word in body.split("_") if word.lower() not in VARIANTS)
+
+
+def may_be_unit(word: str) -> bool:
+    """Whether a word next to a coordinate may be a unit rather than the name of a body."""
+    lower = word.lower()
+    other = lower in VARIANTS or lower in SETPOINTS or lower in MIDDLE | FRONT | REAR
+    return lower.isalpha() and len(lower) > 1 and not other and ROOTS.get(lower) != "body"
+
+
+def shown(names: list[str]) -> str:
+    """Return the first names of columns."""
+    return ", ".join(repr(name) for name in names[:12]) + (", …" if len(names) > 12 else "")

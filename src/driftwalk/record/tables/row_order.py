@@ -1,0 +1,274 @@
+"""Columns of unknown names that count frames or name bodies, by the order of their values.
+
+Slow and plain: it runs only on a table without a known clock, or one that has been refused.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.core.errors import argument_text
+from driftwalk.record.bad_row import is_number
+from driftwalk.record.cleaning.several_bodies import LARGEST_SHARE
+from driftwalk.record.column_names import column_meaning
+from driftwalk.record.raw import MISSING, Array, TableLayout
+from driftwalk.record.tables.column_reading import TableReading
+from driftwalk.record.tables.named_columns import LEFT_OUT
+from driftwalk.record.tables.source import TableSource
+from driftwalk.record.text import Table
+
+
+class UnevenClockPolicy(NamedTuple):
+    """Which unnamed column counts up like a clock, and which one tells bodies apart."""
+
+    even: float = 0.1
+    """Relative difference of a camera's intervals from their median, but for missing rows;
+    chosen by hand."""
+    skipped: float = 1.5
+    """Median intervals from which on an interval lacks a row; chosen by hand."""
+    own: float = 0.9
+    """Share of the rows in which a clock has different values; chosen by hand."""
+    fewest: int = 3
+    """Rows without which a clock is not recognised; chosen by hand."""
+    leap: float = 5.0
+    """Lengths of the usual step (its 90th percentile) from which on a body cannot have gone from
+    one row to the next; chosen by hand."""
+    turns: float = 1.5
+    """The same where bodies take turns, of medians; chosen by hand."""
+
+
+_ORDER: Final = UnevenClockPolicy()
+
+
+def other_order(source: TableSource, reading: TableReading, names: list[str]) -> str | None:
+    """Return why rows of a table without a known clock are no frames of one body, None if they may.
+
+    Parameters
+    ----------
+    source : TableSource
+        The table.
+    reading : TableReading
+        How it was read.
+    names : list of str
+        Names of all columns.
+    """
+    used = {at for places in reading.bodies.values() for at in places.values()}
+    skipped = [at for at, column in enumerate(reading.columns) if column.why == LEFT_OUT]
+    free = [at for at in range(len(names)) if at not in (*used, *skipped, reading.body_column)]
+    x, y = _position(reading)
+    texts = [*free, *([] if reading.body_column is None else [reading.body_column])]
+    if not free:
+        return None
+    # The first rows are enough: what skips none in 4 MiB is no clock with missing rows.
+    numbers = tuple(sorted({x, y}))
+    table = source.read(TableLayout("", names, numbers=numbers, texts=tuple(texts)), head=True)
+    counters = {at: values for at in free if (values := _numbers(table, at)) is not None}
+    if reading.body_column is None:
+        own = [at for at in free if len(table.labels[at]) >= _ORDER.own * table.rows]
+        for at in own:
+            if at in counters and _skips_rows(counters[at]):
+                return _counts_up(names[at])
+    apart = _tracks(table, counters, free, reading.body_column)
+    if apart is not None:
+        body, frame = apart
+        what, columns = f"'{names[frame]}' counts frames", {"frame": names[frame]}
+        if body is not None and body != reading.body_column:
+            what += f" and '{names[body]}' names bodies"
+            columns["body"] = names[body]
+        return (
+            f"no column is known to hold times or frames, but it seems that {what}: add "
+            f"{argument_text('columns', columns)}"
+        )
+    if reading.body_column is None:
+        for at in free:
+            if _leaps(table, at, x, y):
+                add, skip = (argument_text("columns", {one: names[at]}) for one in ("body", "skip"))
+                return (
+                    f"rows seem to be of several bodies, or runs, which '{names[at]}' names: add "
+                    f"{add} if so, {skip} if it is one body, whose rows are its frames"
+                )
+    return None
+
+
+def _counts_up(name: str) -> str:
+    frame, time = (argument_text("columns", {what: name}) for what in ("frame", "t"))
+    return (
+        f"no column is known to hold times or frames, but '{name}' counts up and skips some: "
+        f"add {frame} if it counts frames, {time} if it holds times"
+    )
+
+
+def _position(reading: TableReading) -> tuple[int, int]:
+    """Return two columns that move with the body."""
+    places = next(iter(reading.bodies.values()))
+    first, second = (
+        places.get(axis, places.get(f"{axis}1", min(places.values()))) for axis in "xy"
+    )
+    return first, second
+
+
+def _numbers(table: Table, column: int) -> Array | None:
+    """Return the values of a column of texts in each row, None where one is no number."""
+    labels = [label.replace(",", ".") for label in table.labels[column]]
+    if not all(is_number(label) or label in MISSING for label in labels):
+        return None
+    values = np.array([float(one) if is_number(one) else np.nan for one in labels])
+    numbers: Array = values[table.codes[column]]
+    return numbers
+
+
+def _skips_rows(values: Array) -> bool:
+    """Whether values count up evenly and leave some out."""
+    steps = np.diff(values[np.isfinite(values)])
+    steps = steps[steps != 0.0]
+    if steps.size < _ORDER.fewest or not (np.isfinite(steps).all() and (steps > 0).all()):
+        return False
+    usual = float(np.median(steps))
+    even = np.abs(steps - usual) <= _ORDER.even * usual
+    return bool(2 * even.sum() >= steps.size and (steps > _ORDER.skipped * usual).any())
+
+
+def _tracks(
+    table: Table, counters: dict[int, Array], free: list[int], body: int | None
+) -> tuple[int | None, int] | None:
+    """Return the columns of body and frame of a table whose frames repeat or start over."""
+    found: list[tuple[int, int | None, int]] = []
+    for frame, values in counters.items():
+        whole = np.isfinite(values).all() and not (values % 1.0 != 0.0).any()
+        one = body is None and (np.diff(values) > 0).all()  # a body, row by row
+        if not whole or one or table.rows < 4 or np.unique(values).size < 3:
+            continue
+        for other in free if body is None else [body]:
+            bodies = len(table.labels[other])
+            few = (2 if body is None else 1) <= bodies <= table.rows // 2
+            if few and other != frame and _counts_each(table.codes[other], values, body):
+                found.append((bodies, other, frame))
+        if not found and body is None and _starts_over(values):
+            found.append((table.rows, None, frame))
+    return min(found, key=lambda entry: entry[0])[1:] if found else None
+
+
+def _counts_each(codes: npt.NDArray[np.int32], values: Array, body: int | None) -> bool:
+    """Whether values count up, mostly one by one, in the rows of each body."""
+    order = np.argsort(codes, kind="stable")
+    same = codes[order][1:] == codes[order][:-1]
+    steps = np.diff(values[order])[same]
+    if not steps.size or not (steps > 0).all() or np.median(steps) != 1.0:
+        return False
+    firsts = values[order][np.append(True, ~same)]
+    # Of known bodies that all begin with the same number, counting the rows says the same.
+    return body is None or not ((steps == 1.0).all() and np.unique(firsts).size == 1)
+
+
+def _starts_over(values: Array) -> bool:
+    """Whether values count up one by one, and start over or stay the same for several bodies."""
+    _, counts = np.unique(values, return_counts=True)
+    if (np.diff(values) >= 0).all():
+        return bool(counts[0] > 1 and (counts == counts[0]).all() and np.diff(values).max() == 1.0)
+    steps = np.diff(values)
+    back = steps < 0
+    return bool(back.any() and (steps[~back] == 1.0).mean() > _ORDER.own and back.mean() < 0.1)
+
+
+def _leaps(table: Table, column: int, x: int, y: int) -> bool:
+    """Whether a column tells bodies, or runs, apart: the position leaps wherever it changes."""
+    codes = table.codes[column]
+    labels = len(table.labels[column])
+    changes = codes[1:] != codes[:-1]
+    if labels < 2 or labels > table.rows // 4 or not changes.any():
+        return False
+    counts = np.bincount(codes)
+    turns = np.arange(codes.size) % labels
+    if (counts == counts[0]).all() and (changes.sum() == labels - 1 or (codes == turns).all()):
+        return True  # as many rows of each, one after the other or in turns
+    order = np.argsort(codes, kind="stable")
+    same = codes[order][1:] == codes[order][:-1]
+    within = np.hypot(*(np.diff(table.numbers[axis][order])[same] for axis in (x, y)))
+    leaps = np.hypot(*(np.diff(table.numbers[axis])[changes] for axis in (x, y)))
+    within = within[np.isfinite(within) & (within > 0)]
+    leaps = leaps[np.isfinite(leaps)]
+    if not within.size or not leaps.size:
+        return False
+    if 2 * changes.sum() >= changes.size:
+        # Bodies take turns: of one body the like values would be farther apart.
+        return bool(np.median(leaps) > _ORDER.turns * np.median(within))
+    least = np.median(leaps) if changes.sum() >= labels else leaps.min()
+    return bool(least > _ORDER.leap * np.percentile(within, 90.0))
+
+
+def body_columns(
+    source: TableSource, reading: TableReading, names: list[str], in_order: bool
+) -> list[str]:
+    """Return the columns that, taken as the body, leave it in one place at a time.
+
+    Parameters
+    ----------
+    source : TableSource
+        The table.
+    reading : TableReading
+        How it was read.
+    names : list of str
+        Names of all columns.
+    in_order : bool
+        Whether the times of each body have to be in order, too.
+
+    Returns
+    -------
+    list of str
+        At most three names, that with the fewest bodies first.
+    """
+    if reading.clock is None:
+        return []
+    x_column, y_column = _position(reading)
+    numbers = {x_column, y_column, *reading.numbers[:1]}
+    taken = {*numbers, *reading.numbers, *reading.stamps, reading.body_column}
+    free = tuple(
+        index for index, name in enumerate(names) if index not in taken and _may_be_a_name(name)
+    )
+    # The first rows tell the columns of measurements, which have another value in every row.
+    wanted = TableLayout(
+        "", names, numbers=tuple(sorted(numbers)), texts=free, stamps=reading.stamps
+    )
+    head = source.read(wanted, head=True)
+    free = tuple(index for index in free if 2 * len(head.labels[index]) <= max(head.rows, 2))
+    table = source.read(replace(wanted, texts=free))
+    times, x, y = (table.numbers[index] for index in (reading.clock, x_column, y_column))
+    found = {
+        index: len(table.labels[index])
+        for index in free
+        if _are_names(table.labels[index], rows=table.rows)
+        and _tells_apart(table.codes[index], times, x, y, in_order=in_order)
+    }
+    return [names[index] for index in sorted(found, key=lambda index: found[index])[:3]]
+
+
+def _may_be_a_name(column: str) -> bool:
+    meaning = column_meaning(column)
+    return meaning is None or meaning.quantity == "body"
+
+
+def _are_names(labels: list[str], *, rows: int) -> bool:
+    """Whether the values of a column could name bodies that are seen several times each."""
+    if not 1 < len(labels) <= rows // 2:
+        return False
+    return not any(is_number(label) and float(label) % 1.0 for label in labels)
+
+
+def _tells_apart(
+    codes: npt.NDArray[np.int32], clock: Array, x: Array, y: Array, *, in_order: bool
+) -> bool:
+    """Whether hardly a body is in two places at one time, and none goes back in time if asked."""
+    present = np.flatnonzero(np.isfinite(clock) & np.isfinite(x) & np.isfinite(y))
+    if in_order:
+        rows = present[np.argsort(codes[present], kind="stable")]
+        same = codes[rows][1:] == codes[rows][:-1]
+        if (same & (np.diff(clock[rows]) < 0)).any():
+            return False
+    rows = present[np.lexsort((clock[present], codes[present]))]
+    again = (codes[rows][1:] == codes[rows][:-1]) & (np.diff(clock[rows]) == 0)
+    elsewhere = again & ((np.diff(x[rows]) != 0) | (np.diff(y[rows]) != 0))
+    return int(elsewhere.sum()) <= LARGEST_SHARE * (rows.size - int(again.sum()))
