@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from driftwalk.core.errors import InputError
+from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.text.did_you_mean import listed
 from driftwalk.core.text.json_text import parse_json
 from driftwalk.core.units import parse_quantity
@@ -189,6 +189,7 @@ def load(
     origin = origin_of(path, options, format=format, replicate=replicate)
     try:
         raw = origin.read(options)
+        _refuse_uneven(raw)
         # Markers become bodies before `body` chooses among the names.
         join_markers(raw, options)
         raw.bodies = _select(raw.bodies, body)
@@ -234,6 +235,19 @@ def readable_formats() -> dict[str, str]:
     from driftwalk.record.registry import loaders
 
     return {name: loader.description for name, loader in loaders().items()}
+
+
+def _refuse_uneven(raw: RawRecording) -> None:
+    """Refuse a body whose columns have unequal numbers of values."""
+    for one in raw.bodies:
+        columns = {"time": one.clock, "x": one.x, "y": one.y, "theta": one.theta}
+        sizes = {name: len(column) for name, column in columns.items() if column is not None}
+        if len(set(sizes.values())) > 1:
+            counts = ", ".join(f"{size} of {name}" for name, size in sizes.items())
+            raise FormatError(
+                f"is no recording of poses: body '{one.name}' has unequal numbers of values: "
+                + counts
+            )
 
 
 def _refuse_unused(options: ReadOptions, raw: RawRecording, format: str) -> None:

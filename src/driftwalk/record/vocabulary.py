@@ -94,8 +94,8 @@ NO_POSITION: Final = words(
 )
 """Words next to a coordinate or an angle that rule out a position."""
 SETPOINTS: Final = words(
-    "ref reference cmd command commanded goal target setpoint desired des origin wind current "
-    "waypoint wp offset soll sollwert consigne"
+    "ref reference cmd command commanded goal target tgt setpoint setp sp desired des demand "
+    "origin wind current waypoint wp offset soll sollwert consigne consigna"
 )
 """Words of pairs that are no body where another pair is: what it was to do, or what pushed it."""
 VARIANTS: Final = words(

@@ -133,7 +133,9 @@ class _Reader(NamedColumns):
             self.result.notes.append(f"no orientation is read of {names}: name one, as in {choice}")
             return
         meaning = self.meanings[loose[0]]
-        if may_be_unit(meaning.ending) and meaning.body == meaning.ending and not self.lenient:
+        stem = meaning.ending.rstrip("0123456789")
+        doubted = may_be_unit(stem) or (stem and stem != meaning.ending)
+        if doubted and meaning.body == meaning.ending and not self.lenient:
             raise InputError(self.no_unit(loose[0], meaning.body))
         only["theta"] = loose[0]
 

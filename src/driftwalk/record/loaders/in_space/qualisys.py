@@ -13,7 +13,7 @@ from driftwalk.record.raw import Array, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.space.flat import SpaceTrack, lay_flat
 from driftwalk.record.space.plane import plane_of
 from driftwalk.record.space.turns import QUATERNION, Turns
-from driftwalk.record.text import read_table
+from driftwalk.record.text import read_head, read_table
 
 _FIRST: Final = "NO_OF_FRAMES"
 _BODIES: Final = ("BODY_NAMES", "MARKER_NAMES")
@@ -69,8 +69,7 @@ class QualisysLoader:
 
 def _head(path: Path) -> tuple[dict[str, list[str]], int, list[str]]:
     """Return the facts above the rows, their lines, and the fields of the first row."""
-    with path.open("rb") as file:
-        lines = file.read(1 << 20).split(b"\n")
+    lines = read_head(path).split(b"\n")
     facts: dict[str, list[str]] = {}
     for at, line in enumerate(lines[:_MOST_HEAD]):
         fields = line.decode("utf-8-sig", "replace").rstrip("\r").split("\t")
