@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from driftwalk.cli.main import COMMANDS, load_command, main
-from driftwalk.cli.options.shared import PANEL
+from driftwalk.cli.options.shared_types import PANEL
 from driftwalk.cli.options.study import PANELS
 from driftwalk.cli.terminal.help import MAIN_OPTIONS
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from driftwalk.schema.runs import RUN_KINDS, load_maker
-from driftwalk.schema.runs.registry import BUILT_IN
+from driftwalk.schema.runs.run_kinds import BUILT_IN
 
 SOURCE = Path(__file__).resolve().parents[2] / "src" / "driftwalk"
 ROOMS = {

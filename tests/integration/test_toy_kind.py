@@ -18,7 +18,7 @@ from driftwalk.export.figures import draw_run
 from driftwalk.notebook.result import as_result
 from driftwalk.page import dataset_page, report_page
 from driftwalk.runs import run_folder, run_work
-from driftwalk.schema.runs import RUN_KINDS, RunKind, register, registry, run_kind
+from driftwalk.schema.runs import RUN_KINDS, RunKind, register, run_kind, run_kinds
 from driftwalk.viewer import RunSource
 
 SETS = 5
@@ -41,7 +41,7 @@ def toy() -> Iterator[RunKind]:
 
     register(TOY)
     yield TOY
-    registry.unregister("toy")
+    run_kinds.unregister("toy")
 
 
 @pytest.fixture(scope="module")

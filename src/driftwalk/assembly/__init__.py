@@ -3,7 +3,7 @@
 from driftwalk.assembly.lattice.events import ReplayedEvents, replay_events
 from driftwalk.assembly.lattice.polyomino import polyomino_cells, polyomino_name, polyominoes
 from driftwalk.assembly.live_world import LiveEvent, LiveTank
-from driftwalk.assembly.outcomes.classes import (
+from driftwalk.assembly.outcomes.class_names import (
     class_cells,
     class_name,
     class_shapes,

@@ -20,7 +20,7 @@ from driftwalk.assembly.lattice.joined_faces import (
     smallest_distance,
 )
 from driftwalk.assembly.lattice.polyomino import Chirality, require_chirality
-from driftwalk.assembly.outcomes.classes import listed_classes, listed_shapes
+from driftwalk.assembly.outcomes.class_names import listed_classes, listed_shapes
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
 from driftwalk.schema import body_names, check_trajectory

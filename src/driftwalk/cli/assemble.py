@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 from driftwalk.cli.inputs.model_source import RUN_NAMES, assembly_source
 from driftwalk.cli.inputs.recordings import opening_note
 from driftwalk.cli.options.run import RunOptions, with_run_options
-from driftwalk.cli.options.shared import FlowFile, Run, option
+from driftwalk.cli.options.shared_types import FlowFile, Run, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_prediction
 from driftwalk.core.errors import InputError

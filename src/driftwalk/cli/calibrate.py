@@ -8,7 +8,7 @@ from driftwalk.cli.inputs.recordings import read_for_models
 from driftwalk.cli.options.model import ModelName, ParameterChoices, chosen_model
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
 from driftwalk.cli.options.run import RunOptions, with_run_options
-from driftwalk.cli.options.shared import FlowFile, option
+from driftwalk.cli.options.shared_types import FlowFile, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_result
 from driftwalk.core.study_keys import CALIBRATION_KEYS

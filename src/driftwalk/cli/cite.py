@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path, PurePath
 from typing import Annotated, Any
 
-from driftwalk.cli.options.shared import Json, argument, option
+from driftwalk.cli.options.shared_types import Json, argument, option
 from driftwalk.cli.terminal.output import print_json, print_warnings, printable
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.run_layout import MANIFEST_FILE, faults_of, state_of

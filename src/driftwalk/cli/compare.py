@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from driftwalk.cli.inputs.recordings import load_motion
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import Json, Replace, argument, option
+from driftwalk.cli.options.shared_types import Json, Replace, argument, option
 from driftwalk.cli.options.study import study_option
 from driftwalk.cli.terminal.output import (
     print_json,

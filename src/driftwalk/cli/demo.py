@@ -7,7 +7,7 @@ from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
-from driftwalk.cli.options.shared import Json, Overwrite, Threads, option
+from driftwalk.cli.options.shared_types import Json, Overwrite, Threads, option
 from driftwalk.cli.terminal.output import print_json, print_note
 from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.run_stages import tell_nobody

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from typing import Annotated
 
-from driftwalk.cli.options.shared import Json, argument, option
+from driftwalk.cli.options.shared_types import Json, argument, option
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import print_json, print_note, print_row
 from driftwalk.cli.terminal.progress import ProgressReporter

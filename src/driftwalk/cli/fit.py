@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from driftwalk.cli.inputs.recordings import opening_note, read_for_run
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import Json, Overwrite, argument, option
+from driftwalk.cli.options.shared_types import Json, Overwrite, argument, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import print_note, print_parts, print_places, print_result

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import FlowVariables, FrameInterval, Json, Replace, option
+from driftwalk.cli.options.shared_types import FlowVariables, FrameInterval, Json, Replace, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import (

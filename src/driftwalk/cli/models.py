@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Any
 
-from driftwalk.cli.options.shared import Json, argument
+from driftwalk.cli.options.shared_types import Json, argument
 from driftwalk.cli.terminal.output import print_json, print_next, print_table
 
 if TYPE_CHECKING:

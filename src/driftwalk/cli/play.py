@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from driftwalk.cli.inputs.model_source import ModelSource, flow_of_block, open_source
 from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.model import KnownModel, ModelName, PlayedParameters, playable_model
-from driftwalk.cli.options.shared import FlowFile, Run, option
+from driftwalk.cli.options.shared_types import FlowFile, Run, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_note, print_warnings
 from driftwalk.cli.view import Host, Open, Port, show

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from driftwalk.cli.inputs.recordings import load_simulation
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import Replace, argument, option
+from driftwalk.cli.options.shared_types import Replace, argument, option
 from driftwalk.cli.terminal.output import print_note, print_warnings, require_place
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from driftwalk.cli.inputs.model_source import RUN_NAMES, Source, assembly_source, load_flow_for
 from driftwalk.cli.inputs.recordings import opening_note
 from driftwalk.cli.options.run import RunOptions, with_run_options
-from driftwalk.cli.options.shared import PANEL, FlowFile, Run, option
+from driftwalk.cli.options.shared_types import PANEL, FlowFile, Run, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_prediction
 from driftwalk.core.errors import ConfigurationError, InputError

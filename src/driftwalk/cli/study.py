@@ -21,7 +21,7 @@ from driftwalk.cli.options.model import (
 )
 from driftwalk.cli.options.recording import RecordingOptions
 from driftwalk.cli.options.run import RunOptions
-from driftwalk.cli.options.shared import (
+from driftwalk.cli.options.shared_types import (
     BodyOfLike,
     Json,
     Replace,

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from driftwalk.cli.options.shared import argument, option
+from driftwalk.cli.options.shared_types import argument, option
 from driftwalk.cli.terminal.output import print_note, print_warnings
 from driftwalk.core.errors import InputError
 

@@ -13,7 +13,7 @@ from functools import lru_cache
 
 from driftwalk.assembly import class_name, outcome_classes
 from driftwalk.assembly.lattice.polyomino import Chirality, name_of, neighbours
-from driftwalk.assembly.outcomes.classes import MOST_BLOCKS
+from driftwalk.assembly.outcomes.class_names import MOST_BLOCKS
 from driftwalk.schema.shapes import Cell, moved_to_origin
 
 Lattice = dict[Cell, int]

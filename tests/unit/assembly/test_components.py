@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 from scipy.linalg import eigh
 
-from driftwalk.assembly.outcomes.classes import outcome_classes
+from driftwalk.assembly.outcomes.class_names import outcome_classes
 from driftwalk.assembly.outcomes.components import disconnected_alignment, principal_components
 from driftwalk.core.errors import InputError
 

@@ -20,7 +20,7 @@ import typer
 from driftwalk import __version__
 from driftwalk.cli import main as cli_main
 from driftwalk.cli.main import COMMANDS, Command, main
-from driftwalk.cli.options.shared import Json
+from driftwalk.cli.options.shared_types import Json
 from driftwalk.cli.options.study import StudyOptions, option_name, with_study_options
 from driftwalk.cli.terminal.argument_names import option_of
 from driftwalk.cli.terminal.output import print_json, print_table, to_json

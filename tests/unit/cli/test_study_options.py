@@ -14,7 +14,7 @@ from hypothesis import given as examples, settings, strategies as st
 from driftwalk.cli import main as cli_main
 from driftwalk.cli.main import Command, main
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import Json
+from driftwalk.cli.options.shared_types import Json
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.argument_names import option_of
 from driftwalk.core import study_keys

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.lattice.polyomino import STEPS, Chirality, name_of, require_chirality
-from driftwalk.assembly.outcomes.classes import (
+from driftwalk.assembly.outcomes.class_names import (
     all_single,
     class_name,
     listed_classes,

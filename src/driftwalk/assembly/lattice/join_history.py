@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from driftwalk.assembly.lattice.joined_faces import Join
 from driftwalk.assembly.lattice.polyomino import STEPS, Chirality, name_of
-from driftwalk.assembly.outcomes.classes import class_name
+from driftwalk.assembly.outcomes.class_names import class_name
 from driftwalk.schema.shapes import Cell, moved_to_origin
 
 

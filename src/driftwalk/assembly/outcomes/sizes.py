@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.lattice.polyomino import shape_size
-from driftwalk.assembly.outcomes.classes import MOST_BLOCKS
+from driftwalk.assembly.outcomes.class_names import MOST_BLOCKS
 from driftwalk.assembly.outcomes.distribution import (
     NOT_COPIED,
     check_confidence,

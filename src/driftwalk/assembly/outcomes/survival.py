@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.outcomes.classes import all_single
+from driftwalk.assembly.outcomes.class_names import all_single
 from driftwalk.assembly.outcomes.distribution import (
     check_times,
     class_names,

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.outcomes.classes import listed_classes
+from driftwalk.assembly.outcomes.class_names import listed_classes
 from driftwalk.assembly.outcomes.distribution import (
     check_confidence,
     is_complete,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
 
-from driftwalk.cli.options.shared import option
+from driftwalk.cli.options.shared_types import option
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.text.did_you_mean import did_you_mean
 

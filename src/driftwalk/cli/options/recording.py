@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 import typer
 
 from driftwalk.cli.options.flatten_options import with_options
-from driftwalk.cli.options.shared import option, scale_option
+from driftwalk.cli.options.shared_types import option, scale_option
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from driftwalk.cli.options.flatten_options import with_options
-from driftwalk.cli.options.shared import Json, Overwrite, Threads, option
+from driftwalk.cli.options.shared_types import Json, Overwrite, Threads, option
 from driftwalk.cli.terminal.output import print_note
 from driftwalk.cli.terminal.progress import reported
 from driftwalk.core.errors import ConfigurationError

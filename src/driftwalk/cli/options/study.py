@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 import typer
 
 from driftwalk.cli.options.flatten_options import Command, Part, spread
-from driftwalk.cli.options.shared import PANEL, StudyFile, quantity_parser
+from driftwalk.cli.options.shared_types import PANEL, StudyFile, quantity_parser
 from driftwalk.cli.terminal.argument_names import option_of, to_options
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.study_keys import CALIBRATION_KEYS, STUDY_KEYS, study_overrides

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Final
 
-from driftwalk.cli.options.shared import argument, option, scale_option
+from driftwalk.cli.options.shared_types import argument, option, scale_option
 from driftwalk.core.errors import InputError
 
 _FINDING: Final = "How objects are found"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 import typer
 
 from driftwalk.cli.main import paragraphs
-from driftwalk.cli.options.shared import Json, Replace, argument, option, quantity_option
+from driftwalk.cli.options.shared_types import Json, Replace, argument, option, quantity_option
 from driftwalk.cli.terminal.help import HelpCommand, HelpGroup
 from driftwalk.cli.terminal.output import print_json, print_next, print_note, print_table
 from driftwalk.core.errors import FormatError, InputError

@@ -10,7 +10,7 @@ from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.inputs.recordings import open_kind
 from driftwalk.cli.options.flatten_options import with_options
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import Json, Replace, argument, option, quantity_option
+from driftwalk.cli.options.shared_types import Json, Replace, argument, option, quantity_option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import (
     print_json,

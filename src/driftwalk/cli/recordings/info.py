@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import FlowVariables, FrameInterval, Json
+from driftwalk.cli.options.shared_types import FlowVariables, FrameInterval, Json
 from driftwalk.cli.options.study import Side
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import print_json, print_next, print_table, print_warnings

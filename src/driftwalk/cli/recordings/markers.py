@@ -9,7 +9,7 @@ import typer
 
 from driftwalk.cli.main import paragraphs
 from driftwalk.cli.options.flatten_options import with_options
-from driftwalk.cli.options.shared import Replace, option
+from driftwalk.cli.options.shared_types import Replace, option
 from driftwalk.cli.options.tracking import TrackingOptions
 from driftwalk.cli.terminal.help import HelpCommand, HelpGroup
 from driftwalk.cli.terminal.output import print_next, print_note, print_table

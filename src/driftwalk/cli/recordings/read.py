@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 from driftwalk.cli.options.recording import RecordingFile, RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared import Json, Replace, option
+from driftwalk.cli.options.shared_types import Json, Replace, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import (
     print_json,

@@ -13,7 +13,7 @@ from types import FrameType
 from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from driftwalk.cli.options.flatten_options import with_options
-from driftwalk.cli.options.shared import Json, Replace, option
+from driftwalk.cli.options.shared_types import Json, Replace, option
 from driftwalk.cli.options.tracking import TrackingOptions
 from driftwalk.cli.recordings.live_output import LiveOutputs
 from driftwalk.cli.terminal.output import (

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from driftwalk.cli.options.flatten_options import with_options
-from driftwalk.cli.options.shared import Replace, option
+from driftwalk.cli.options.shared_types import Replace, option
 from driftwalk.cli.options.tracking import TrackingOptions
 from driftwalk.cli.terminal.output import print_note, print_warnings, printable
 from driftwalk.core.errors import InputError

@@ -1,7 +1,7 @@
 """Kinds of runs: the one table of them, and the contents of a run directory."""
 
 from driftwalk.schema.runs.contents import RunContents, StoredRun, open_run_folder
-from driftwalk.schema.runs.registry import (
+from driftwalk.schema.runs.run_kinds import (
     RUN_KINDS,
     RunKind,
     answer_of,

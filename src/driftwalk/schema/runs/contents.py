@@ -21,7 +21,7 @@ from driftwalk.core.files.run_layout import (
 )
 from driftwalk.core.files.shards import read_specification
 from driftwalk.core.provenance import read_manifest, refuse_other_version
-from driftwalk.schema.runs.registry import RUN_KINDS, Maker, RunKind, kind_of_folder, load_maker
+from driftwalk.schema.runs.run_kinds import RUN_KINDS, Maker, RunKind, kind_of_folder, load_maker
 from driftwalk.schema.stores.netcdf import open_netcdf
 
 if TYPE_CHECKING:
