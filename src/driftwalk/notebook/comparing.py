@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal, Unpack
 
 from driftwalk.conditions import require_motion, study_for
 from driftwalk.core.errors import InputError
-from driftwalk.core.study_keys import CALIBRATION_KEYS, StudySettings, study_overrides
+from driftwalk.core.study_keys import CALIBRATION_KEYS, CalibrationSettings, study_overrides
 from driftwalk.notebook.simulating import flow_field_of
 
 if TYPE_CHECKING:
@@ -109,7 +109,7 @@ def compare_models(
     threads: int | None = None,
     executor: Executor | None = None,
     progress: Progress | None = None,
-    **settings: Unpack[StudySettings],
+    **settings: Unpack[CalibrationSettings],
 ) -> xr.Dataset:
     """Say which motion models explain a recording.
 

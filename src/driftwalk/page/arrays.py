@@ -22,6 +22,11 @@ SHORT: Final = 64
 """Arrays with fewer numbers than this stand as a plain list where their reader allows it."""
 MOST_LISTED: Final = 100_000
 """Numbers of a plain list; no axis of a study has so many."""
+FAR_RANGES: Final = 256.0
+"""How many of its ranges an array lies from zero when its middle becomes the offset.
+
+A float32 has 24 bits: nearer than that it still tells 2¹⁶ values of the range apart.
+"""
 
 
 def encode_array(
@@ -37,7 +42,8 @@ def encode_array(
         Rounds the values to multiples of it, in their unit; 0: not at all. A power of two leaves
         zeros at the end of a float32, which take no room; see `binary_step`.
     offset : float
-        Subtracted before they become float32: the first of the times on a clock.
+        Subtracted before they become float32: the first of the times on a clock. Of values far from
+        it, such as metres of a map, also their middle is.
 
     Returns
     -------
@@ -59,6 +65,8 @@ def encode_array(
     if not 0.0 <= step < math.inf:
         raise InputError(f"the step of an array is a number from 0 on, got {step}")
     array = np.asarray(values, dtype=np.float64) - offset
+    middle = _far_middle(array, step)
+    array, offset = array - middle, offset + middle
     if step > 0.0:
         array = step * np.rint(array / step)
     with np.errstate(over="ignore"):
@@ -166,3 +174,13 @@ def binary_step(extent: float, parts: float) -> float:
     if not (math.isfinite(extent) and extent > 0.0):
         return 0.0
     return 2.0 ** math.floor(math.log2(extent / parts))
+
+
+def _far_middle(array: Floats, step: float) -> float:
+    """Return the middle of an array far from zero, a multiple of the step; 0 of one near it."""
+    known = array[np.isfinite(array)]
+    low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
+    if not 0.0 < FAR_RANGES * (high - low) < max(-low, high):
+        return 0.0
+    middle = low + 0.5 * (high - low)
+    return step * round(middle / step) if step > 0.0 else middle

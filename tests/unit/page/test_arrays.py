@@ -55,6 +55,16 @@ def test_times_on_a_clock_keep_their_fractions() -> None:
     np.testing.assert_allclose(found - clock[0], np.arange(100) / 60.0, rtol=0, atol=2.0**-15)
 
 
+@pytest.mark.parametrize("step", [0.0, 2.0**-16])
+def test_positions_far_from_the_origin_keep_their_shape(step: float) -> None:
+    x = 5e5 + np.linspace(-0.15, 0.15, 1000)
+    x[7] = np.nan
+    encoded = through_json(encode_array(x, step=step))
+    np.testing.assert_allclose(decode_array(encoded), x, rtol=0.0, atol=0.5 * step + 1e-8)
+    np.testing.assert_array_equal(values(encoded), decode_array(encoded))
+    assert encode_array([0.1, 0.2], step=step)["offset"] == 0.0
+
+
 def test_infinity_is_no_number() -> None:
     assert np.isnan(decode_array(encode_array([np.inf, -np.inf, 1e39]))).all()
 

@@ -1,4 +1,4 @@
-"""Output of a command on stdout: JSON for programs, a table for people."""
+"""Output of a command: JSON or a table, the answer of a run, warnings, and what to type next."""
 
 from __future__ import annotations
 
