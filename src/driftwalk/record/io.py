@@ -27,8 +27,7 @@ from driftwalk.record.cleaning.warn import angle_warnings, plausibility_warnings
 from driftwalk.record.convert_units import convert_units
 from driftwalk.record.noise import noise_reach
 from driftwalk.record.origin import origin_of
-from driftwalk.record.pose.keypoints import two_names
-from driftwalk.record.pose.markers import join_markers
+from driftwalk.record.pose import join_markers, two_names
 from driftwalk.record.raw import DELIMITERS, Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.registry import PLAIN
 from driftwalk.record.text import DAMAGED_GZIP

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 from driftwalk.core.errors import FormatError, InputError, reason_of
 from driftwalk.record.raw import RawRecording, ReadOptions
 from driftwalk.record.stores.npz import ZIP
-from driftwalk.record.tables.choose import the_one_that_fits
-from driftwalk.record.tables.rows import recording_of
+from driftwalk.record.tables.rows import recording_of, the_one_that_fits
 from driftwalk.record.tables.sheet import SheetSource
 from driftwalk.schema.stores.netcdf import refuse_huge
 

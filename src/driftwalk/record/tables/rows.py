@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError, InputError, argument_text
-from driftwalk.record.cleaning.stacked import order_in_body, split_bodies
+from driftwalk.core.text.did_you_mean import listed
+from driftwalk.record.cleaning.several_bodies import order_in_body, split_bodies
 from driftwalk.record.convert_units import scale_wanted
-from driftwalk.record.pose.keypoints import angle_between
+from driftwalk.record.pose import angle_between
 from driftwalk.record.raw import (
     ANGLE_UNITS,
     CLOCK_UNITS,
@@ -20,16 +23,13 @@ from driftwalk.record.raw import (
     ReadOptions,
     TableLayout,
 )
-from driftwalk.record.space.columns import body_in_plane, plane_of_columns
-from driftwalk.record.space.globe import on_the_ground
-from driftwalk.record.space.plane import Plane
+from driftwalk.record.space import Plane, body_in_plane, on_the_ground, plane_of_columns
 from driftwalk.record.tables.boxes import box_angle, box_centre
 from driftwalk.record.tables.column_reading import TableReading
 from driftwalk.record.tables.columns import read_columns
-from driftwalk.record.tables.midnights import count_days
 from driftwalk.record.tables.row_order import body_columns, other_order
 from driftwalk.record.tables.source import TableSource
-from driftwalk.record.tables.stamps import DAY
+from driftwalk.record.tables.stamps import DAY, count_days
 from driftwalk.record.text import Table
 
 NO_CLOCK = "the table has no column of times or frames: every row counts as a frame"
@@ -269,3 +269,62 @@ def _blank(
         body.x, body.y = np.where(lost, np.nan, body.x), np.where(lost, np.nan, body.y)
         if body.theta is not None:
             body.theta = np.where(lost, np.nan, body.theta)
+
+
+def the_one_that_fits(
+    tables: Mapping[str, TableSource], options: ReadOptions, path: Path, what: str
+) -> TableSource:
+    """Return the table that the user names, or the only one that holds positions.
+
+    Parameters
+    ----------
+    tables : mapping
+        Tables by their names.
+    options : ReadOptions
+        `sheet` names one, by its name or its number from 1.
+    path : Path
+        The file, for errors.
+    what : str
+        What such a table is called, "sheet" or "variable".
+
+    Raises
+    ------
+    FormatError
+        When there is none, or several.
+    """
+    if not tables:
+        raise FormatError(f"has no {what} that is a table", path=path)
+    if options.sheet is not None:
+        return _named(tables, options.sheet, path, what)
+    if len(tables) == 1:
+        return next(iter(tables.values()))
+    fitting: list[str] = []
+    reasons: list[str] = []
+    for name, table in tables.items():
+        try:
+            columns_of(table, options)
+            fitting.append(name)
+        except InputError as error:
+            reasons.append(error.reason if isinstance(error, FormatError) else str(error))
+    if len(fitting) > 1:
+        choice = argument_text("sheet", fitting[0])
+        raise FormatError(
+            f"holds positions in more than one {what}, {listed(fitting)}: name it, as in {choice}",
+            path=path,
+        )
+    if not fitting:
+        raise FormatError(
+            f"has no {what} with positions among {listed(list(tables))}; {reasons[0]}", path=path
+        )
+    return tables[fitting[0]]
+
+
+def _named(tables: Mapping[str, TableSource], wanted: str, path: Path, what: str) -> TableSource:
+    if wanted in tables:
+        return tables[wanted]
+    if wanted.isdecimal() and 1 <= int(wanted) <= len(tables):
+        return list(tables.values())[int(wanted) - 1]
+    raise FormatError(
+        f"{argument_text('sheet', wanted)}: no such {what}; it has {listed(list(tables))}",
+        path=path,
+    )

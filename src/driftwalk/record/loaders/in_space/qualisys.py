@@ -10,9 +10,7 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.raw import Array, RawRecording, ReadOptions, TableLayout
-from driftwalk.record.space.flat import SpaceTrack, lay_flat
-from driftwalk.record.space.plane import plane_of
-from driftwalk.record.space.turns import QUATERNION, Turns
+from driftwalk.record.space import QUATERNION, SpaceTrack, Turns, lay_flat, plane_of
 from driftwalk.record.text import read_head, read_table
 
 _FIRST: Final = "NO_OF_FRAMES"

@@ -19,9 +19,7 @@ from driftwalk.record.raw import (
     ReadOptions,
     TableLayout,
 )
-from driftwalk.record.space.flat import SpaceTrack, lay_flat
-from driftwalk.record.space.plane import plane_of
-from driftwalk.record.space.turns import QUATERNION, VECTOR, Turns
+from driftwalk.record.space import QUATERNION, VECTOR, SpaceTrack, Turns, lay_flat, plane_of
 from driftwalk.record.text import Table, header_rows, read_table
 from driftwalk.record.text_head import first_lines
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
-from driftwalk.record.pose.keypoints import (
+from driftwalk.record.pose import (
     Chosen,
     Confidence,
     Point,

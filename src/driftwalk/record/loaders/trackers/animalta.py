@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from driftwalk.core.errors import FormatError
-from driftwalk.record.cleaning.stacked import split_bodies
+from driftwalk.record.cleaning.several_bodies import split_bodies
 from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import read_table
 from driftwalk.record.text_head import first_lines, read_header

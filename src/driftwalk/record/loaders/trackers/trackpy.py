@@ -12,7 +12,7 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import split_fields
-from driftwalk.record.cleaning.stacked import number_codes, split_bodies
+from driftwalk.record.cleaning.several_bodies import number_codes, split_bodies
 from driftwalk.record.raw import Array, Marks, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.stores.hdf5 import Hdf5Contents, names_in, opened_hdf5
 from driftwalk.record.stores.pandas_frame import Frame, frame_in

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.bad_row import split_fields
 from driftwalk.record.column_names import unit_of_name
-from driftwalk.record.pose.keypoints import angle_between
+from driftwalk.record.pose import angle_between
 from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.stores.npz import ZIP, members, opened_npz
 from driftwalk.record.text import read_table
