@@ -97,16 +97,6 @@ def _fields_of_npy(head: bytes) -> tuple[str, ...]:
     return tuple(dict.fromkeys(words))
 
 
-NO_RECORDINGS: Final = (
-    (
-        "HDF5",
-        {"frames", "instances", "points"},
-        "it is a SLEAP project: export it as analysis HDF5 or CSV",
-    ),
-)
-"""Files that are no recordings, and what to do: container, names in it, advice."""
-
-
 def unknown_file(path: Path, head: bytes, loaders: Mapping[str, Any]) -> str:
     """Return what a file is that no loader recognises, and which formats it is nearest to.
 
@@ -120,9 +110,8 @@ def unknown_file(path: Path, head: bytes, loaders: Mapping[str, Any]) -> str:
         Loaders by their names; those with `marks` can be near.
     """
     contents = contents_of(path, head)
-    for container, names, advice in NO_RECORDINGS:
-        if container == contents.container and names <= set(contents.names):
-            return advice
+    if contents.container == "HDF5" and {"frames", "instances", "points"} <= set(contents.names):
+        return "it is a SLEAP project: export it as analysis HDF5 or CSV"
     near = _near(contents, loaders)
     found = [f"{name} ({lacks or 'it is damaged'})" for _, name, lacks in near[:3]]
     if found:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import gzip
 import io
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError
-from driftwalk.record.bad_row import check_lines
+from driftwalk.record.bad_row import check_lines, decoded_line
 from driftwalk.record.raw import MISSING, NAMELESS, Array, TableLayout
 from driftwalk.record.tables.encoding import WINDOWS, TranscodedText, other_encoding
 from driftwalk.record.tables.growing import GrowingColumn
@@ -67,6 +67,10 @@ class Table:
     """Text column to the index of each row's value in `labels`."""
     labels: dict[int, list[str]] = field(default_factory=dict)
     """Text column to its distinct values, in order of appearance."""
+
+    def stack(self, columns: Iterable[int]) -> Array:
+        """Return columns of numbers side by side, shape (rows, columns)."""
+        return np.column_stack([self.numbers[column] for column in columns])
 
 
 def open_binary(path: Path) -> IO[bytes]:
@@ -202,25 +206,6 @@ def header_rows(path: Path, count: int) -> list[str]:
             text = line.removeprefix(BOM if number == 1 else b"").removesuffix(b"\n")
             rows.append(decoded_line(text, path, number))
     return rows
-
-
-def decoded_line(line: bytes, path: Path, number: int) -> str:
-    """Return a line as text, without the carriage return at its end.
-
-    Raises
-    ------
-    FormatError
-        When it is not UTF-8.
-    """
-    try:
-        return line.decode("utf-8").rstrip("\r")
-    except UnicodeDecodeError as error:
-        raise FormatError(
-            f"is not UTF-8 text (byte 0x{line[error.start]:02x}): save the file as UTF-8",
-            path=path,
-            line=number,
-            column=error.start + 1,
-        ) from error
 
 
 def read_table(path: Path, layout: TableLayout, *, blocks: int | None = None) -> Table:

@@ -6,10 +6,10 @@ import re
 from pathlib import Path
 
 from driftwalk.core.errors import FormatError
-from driftwalk.record.bad_row import is_number, split_fields
+from driftwalk.record.bad_row import decoded_line, is_number, split_fields
 from driftwalk.record.raw import MISSING
 from driftwalk.record.tables.stamps import stamp_form
-from driftwalk.record.text import decoded_line, header_rows, read_head
+from driftwalk.record.text import header_rows, read_head
 
 _COMMA_DECIMAL = re.compile(r"[+-]?\d+,\d+(?:[eE][+-]?\d+)?")
 _DELIMITER_LINE = re.compile(r"sep=(.)\s*", re.IGNORECASE)

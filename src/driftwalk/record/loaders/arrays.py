@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from driftwalk.core.errors import FormatError, InputError, reason_of
+from driftwalk.core.errors import FormatError, InputError, damaged_as
 from driftwalk.record.column_names import column_meaning
 from driftwalk.record.raw import RawRecording, ReadOptions
 from driftwalk.record.stores.hdf5 import Hdf5Contents, names_in, opened_hdf5
@@ -69,12 +69,8 @@ def _inner_positions(path: Path) -> bool:
 
 def _of_array(path: Path, options: ReadOptions) -> RawRecording:
     """Return the recording of one array, whose rows are samples."""
-    try:
-        with path.open("rb") as file:
-            array = np.load(io.BytesIO(file.read()), allow_pickle=False)
-    except Exception as error:
-        # On a damaged file the library fails with whatever the damage leads it to.
-        raise FormatError(f"cannot be read as .npy: {reason_of(error)}", path=path) from error
+    with damaged_as("as .npy", path):
+        array = np.load(io.BytesIO(path.read_bytes()), allow_pickle=False)
     if array.ndim == 2 and array.dtype.names is None and array.shape[0] < array.shape[1]:
         # There are more samples than quantities, whichever way they lie.
         array = array.T
@@ -156,13 +152,9 @@ def _frame(path: Path) -> Any:
         raise InputError(
             "Parquet and Feather need pyarrow: pip install 'driftwalk[arrow]', or save CSV"
         ) from error
-    try:
-        with path.open("rb") as file:
-            read = parquet.read_table if file.read(4) == _PARQUET else feather.read_table
-        return read(path).to_pandas()
-    except Exception as error:
-        # On a damaged file the library fails with whatever the damage leads it to.
-        raise FormatError(f"cannot be read by pyarrow: {reason_of(error)}", path=path) from error
+    with damaged_as("by pyarrow", path):
+        is_parquet = file_start(path).startswith(_PARQUET)
+        return (parquet if is_parquet else feather).read_table(path).to_pandas()
 
 
 LOADERS = (ArraysLoader(), ArrowLoader())

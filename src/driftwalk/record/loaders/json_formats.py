@@ -32,15 +32,7 @@ class JsonPointsLoader:
 
     def read(self, path: Path, _options: ReadOptions) -> RawRecording:
         """Read the points. Objects may have ``t`` [s] and ``theta`` [rad]."""
-        with open_binary(path) as file:
-            text = file.read(MOST_BYTES + 1)
-        if len(text) > MOST_BYTES:
-            raise FormatError(
-                f"holds more than {MOST_BYTES / MIB:g} MiB of JSON: store it as CSV, which is read "
-                "piece by piece",
-                path=path,
-            )
-        points = parse_json(text, path=path)
+        points = parse_json(_bounded(path), path=path)
         if not isinstance(points, list) or not points:
             raise FormatError("expected a list with one point per frame", path=path)
         rows = np.empty((len(points), len(KEYS)))
@@ -55,6 +47,19 @@ class JsonPointsLoader:
         return RawRecording(
             [body], clock_unit="s" if timed else "frame", bare_clock="", rows=x.size
         )
+
+
+def _bounded(path: Path) -> bytes:
+    """Return the contents of a file, or refuse more than JSON is read of."""
+    with open_binary(path) as file:
+        text = file.read(MOST_BYTES + 1)
+    if len(text) > MOST_BYTES:
+        raise FormatError(
+            f"holds more than {MOST_BYTES / MIB:g} MiB of JSON: store it as CSV, which is read "
+            "piece by piece",
+            path=path,
+        )
+    return text
 
 
 def _point(point: Any, index: int, path: Path) -> list[float]:
@@ -104,12 +109,8 @@ class JsonLinesLoader:
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the lines; a list of objects in one makes a row of each, for several bodies."""
-        with open_binary(path) as file:
-            text = file.read(MOST_BYTES + 1)
-        if len(text) > MOST_BYTES:
-            raise FormatError(f"holds more than {MOST_BYTES / MIB:g} MiB of JSON", path=path)
         rows: list[dict[str, Any]] = []
-        for number, line in enumerate(text.splitlines(), start=1):
+        for number, line in enumerate(_bounded(path).splitlines(), start=1):
             if not line.strip():
                 continue
             try:

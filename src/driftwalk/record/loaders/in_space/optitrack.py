@@ -6,11 +6,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import split_fields
-from driftwalk.record.raw import Array, RawRecording, ReadOptions, TableLayout
+from driftwalk.record.raw import RawRecording, ReadOptions, TableLayout
 from driftwalk.record.space import QUATERNION, SpaceTrack, Turns, lay_flat, plane_of
 from driftwalk.record.text import Table, header_rows, read_table
 
@@ -70,7 +68,7 @@ class OptiTrackLoader:
             SpaceTrack(
                 name,
                 table.numbers[clock],
-                _stack(table, placed[name], "XYZ"),
+                table.stack(placed[name][axis] for axis in "XYZ"),
                 _turns(header, table, turned[name], path),
             )
             for name in bodies
@@ -161,12 +159,8 @@ def _turns(header: _Header, table: Table, columns: dict[str, int], path: Path) -
             "export quaternions, or Euler angles in an order such as XYZ",
             path=path,
         )
-    values = _stack(table, columns, axes)
+    values = table.stack(columns[axis] for axis in axes)
     return Turns(values, QUATERNION) if form == "Quaternion" else Turns(values, form, degrees=True)
-
-
-def _stack(table: Table, columns: dict[str, int], axes: str) -> Array:
-    return np.column_stack([table.numbers[columns[axis]] for axis in axes])
 
 
 LOADER = OptiTrackLoader()

@@ -13,7 +13,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.core.errors import FormatError, InputError, reason_of
+from driftwalk.core.errors import FormatError, InputError, damaged_as
 from driftwalk.core.files.bounded import MIB, read_bounded
 from driftwalk.core.text.json_text import MOST_LEVELS
 from driftwalk.record.raw import RawRecording, ReadOptions
@@ -154,20 +154,13 @@ def _opened(path: Path) -> Iterator[Any]:
     except ImportError as error:
         raise InputError("a ROS bag needs rosbags: pip install 'driftwalk[ros]'") from error
     _refuse_nested(path)
-    try:
+    advice = "if it was cut off, mend it first (ros2 bag reindex, mcap recover)"
+    with (
+        damaged_as("as a ROS bag", path, advice=advice),
         # A bag that does not describe its messages is taken to hold those of a common ROS 2.
-        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
-            yield reader
-    except InputError:
-        raise
-    except Exception as error:
-        # On a damaged bag the library fails with whatever the damage leads it to.
-        reason = reason_of(error)
-        raise FormatError(
-            f"cannot be read as a ROS bag: {reason.rstrip('.')}; if it was cut off, mend it first "
-            "(ros2 bag reindex, mcap recover)",
-            path=path,
-        ) from error
+        AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader,
+    ):
+        yield reader
 
 
 def _refuse_nested(path: Path) -> None:

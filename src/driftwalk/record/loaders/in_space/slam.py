@@ -13,19 +13,16 @@ from itertools import takewhile
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from driftwalk.core.errors import FormatError
 from driftwalk.record.column_names import unit_of_name
 from driftwalk.record.raw import CLOCK_UNITS, RawRecording, ReadOptions, TableLayout
-from driftwalk.record.space import QUATERNION, SpaceTrack, Turns, lay_flat, plane_of
+from driftwalk.record.space import PARTS, QUATERNION, SpaceTrack, Turns, lay_flat, plane_of
 from driftwalk.record.text import header_rows, read_table
 from driftwalk.record.text_head import first_lines, first_row, is_numeric_row
 
 _START: Final = re.compile(r"#\s*timestamp\b[^,]*(,\s*p_\w*[xyz]\b[^,]*){3}")
 _PART: Final = re.compile(r"([pq])_(?:[A-Za-z]+_)*([wxyz])\s*(?:\[.*\])?")
 _POSITION: Final = ("px", "py", "pz")
-_QUATERNION: Final = ("qx", "qy", "qz", "qw")
 _UP: Final = "z"
 
 
@@ -53,11 +50,11 @@ class EurocLoader:
             raise FormatError(
                 f"the header names no column of p_…_{lacking[0][1]}", path=path, line=1
             )
-        turned = set(_QUATERNION) <= set(columns)
-        parts = (*_POSITION, *(_QUATERNION if turned else ()))
+        turned = set(PARTS) <= set(columns)
+        parts = (*_POSITION, *(PARTS if turned else ()))
         used = tuple(columns[part] for part in parts)
         table = read_table(path, TableLayout(",", names, 1, (0, *used), clock=0))
-        values = np.column_stack([table.numbers[column] for column in used])
+        values = table.stack(used)
         turns = Turns(values[:, 3:], QUATERNION) if turned else None
         track = SpaceTrack("0", table.numbers[0], values[:, :3], turns)
         unit = unit_of_name(names[0])
@@ -93,7 +90,7 @@ class TumLoader:
         comments = takewhile(lambda line: line.startswith("#"), header_rows(path, 20))
         layout = TableLayout(" ", _NAMES, len(list(comments)), tuple(range(len(_NAMES))))
         table = read_table(path, layout)
-        values = np.column_stack([table.numbers[column] for column in range(1, len(_NAMES))])
+        values = table.stack(range(1, 8))
         track = SpaceTrack("0", table.numbers[0], values[:, :3], Turns(values[:, 3:], QUATERNION))
         return replace(
             lay_flat([track], plane_of(options.up or _UP)),

@@ -7,14 +7,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
 from driftwalk.record.raw import (
     ANGLE_UNITS,
     LENGTH_UNITS,
-    Array,
     RawRecording,
     ReadOptions,
     TableLayout,
@@ -72,7 +69,7 @@ class ViconLoader:
             SpaceTrack(
                 name,
                 table.numbers[0],
-                _stack(table, placed[name]),
+                table.stack(placed[name]),
                 _turns(header, table, columns[name], path),
             )
             for name in bodies
@@ -142,18 +139,14 @@ def _turns(header: _Header, table: Table, columns: dict[str, int], path: Path) -
     if not set(_QUATERNION[:3]) <= set(columns):
         return None
     if "RW" in columns:
-        return Turns(_stack(table, [columns[axis] for axis in _QUATERNION]), QUATERNION)
+        return Turns(table.stack([columns[axis] for axis in _QUATERNION]), QUATERNION)
     unit = header.units[columns["RX"]]
     if unit not in ANGLE_UNITS:
         raise FormatError(
             f"the unit of the angles is '{unit}': expected rad or deg", path=path, line=_LINES
         )
-    values = _stack(table, [columns[axis] for axis in _QUATERNION[:3]])
+    values = table.stack([columns[axis] for axis in _QUATERNION[:3]])
     return Turns(values, VECTOR, degrees=unit == "deg")
-
-
-def _stack(table: Table, columns: list[int]) -> Array:
-    return np.column_stack([table.numbers[column] for column in columns])
 
 
 def _read_rows(path: Path, layout: TableLayout) -> Table:

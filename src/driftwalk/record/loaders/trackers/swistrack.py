@@ -76,24 +76,25 @@ def _old_recording(tables: dict[str, Table], options: ReadOptions, *, rows: int)
     timed = options.frame_rate_hz is None and all(
         (table.numbers[8] >= 0).all() for table in tables.values()
     )
-    x, y = (3, 4) if world else (1, 2)
+    used = (8 if timed else 0, *((3, 4) if world else (1, 2)), 6)
     bodies = [
-        RawBody(
-            name,
-            table.numbers[8 if timed else 0],
-            table.numbers[x],
-            table.numbers[y],
-            table.numbers[6],
-        )
-        for name, table in tables.items()
+        RawBody(name, *(table.numbers[column] for column in used)) for name, table in tables.items()
     ]
+    return _recording(bodies, "ms" if timed else "frame", world=world, rows=rows)
+
+
+def _recording(
+    bodies: list[RawBody], clock_unit: str, *, world: bool, rows: int, note: str = ""
+) -> RawRecording:
+    """Return bodies in the world or the image; angles are measured in the image in either case."""
     return RawRecording(
         bodies,
-        clock_unit="ms" if timed else "frame",
+        clock_unit=clock_unit,
         length_unit="m" if world else "px",
         y_axis="up" if world else "down",
         theta_axis="down",
         rows=rows,
+        notes=[note] if note else [],
     )
 
 
@@ -166,15 +167,8 @@ class SwisTrackParticlesLoader:
         note = (
             "particles.csv holds no identities: bodies are distinguished by their order in a frame"
         )
-        return RawRecording(
-            bodies,
-            clock_unit="s" if timed else "frame",
-            length_unit="m" if world else "px",
-            y_axis="up" if world else "down",
-            theta_axis="down",
-            rows=table.rows,
-            notes=[note] if count > 1 else [],
-        )
+        clock_unit, note = "s" if timed else "frame", note if count > 1 else ""
+        return _recording(bodies, clock_unit, world=world, rows=table.rows, note=note)
 
 
 def _times(table: Table, path: Path) -> Array:
@@ -229,14 +223,8 @@ class SwisTrackNmeaLoader:
             theta=theta,
         )
         note = "ids repeat within a frame: bodies are distinguished by their order in the frame"
-        return RawRecording(
-            bodies,
-            length_unit="m" if world else "px",
-            y_axis="up" if world else "down",
-            theta_axis="down",
-            rows=int(frame.size),
-            notes=[note] if repeated else [],
-        )
+        note = note if repeated else ""
+        return _recording(bodies, "frame", world=world, rows=int(frame.size), note=note)
 
 
 def _particles(path: Path) -> tuple[Array, npt.NDArray[np.int64]]:
