@@ -18,8 +18,7 @@ from driftwalk.core.text.json_text import parse_json
 from driftwalk.core.units import parse_quantity
 from driftwalk.record.arena import PlacedArena, arena_attributes, place_arena
 from driftwalk.record.cleaning.clean import Counts, clean_body
-from driftwalk.record.cleaning.clock import check_clock
-from driftwalk.record.cleaning.counters import unwrap_counters
+from driftwalk.record.cleaning.clock import check_clock, unwrap_counters
 from driftwalk.record.cleaning.extent import refuse_many_bodies, refuse_sparse
 from driftwalk.record.cleaning.jumps import arena_diagonal, impossible_steps, impossible_warning
 from driftwalk.record.cleaning.missing import blank_missing, mark_warnings

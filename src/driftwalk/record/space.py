@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Bools
 from driftwalk.core.errors import InputError
 from driftwalk.record.raw import Array, RawBody, RawRecording
 
@@ -127,7 +127,7 @@ class Turns:
         tilt[known] = np.arccos(np.clip(rotation.apply(up) @ up, -1.0, 1.0))
         return angle, tilt
 
-    def _known(self) -> npt.NDArray[np.bool_]:
+    def _known(self) -> Bools:
         known = np.isfinite(self.values).all(axis=1)
         if self.form == QUATERNION:
             # Four zeros are how some programs write that there is none.

@@ -29,6 +29,16 @@ def first_lines(head: bytes, count: int = 5) -> list[str]:
     return [line.decode("utf-8", "replace").rstrip("\r") for line in lines[:count] if line.strip()]
 
 
+def first_line(head: bytes) -> str:
+    """Return the first line of a file's start, ``""`` when it is blank or cannot be text."""
+    return next(iter(first_lines(head, 1)), "")
+
+
+def first_names(head: bytes) -> list[str]:
+    """Return the fields between the commas of the first line of a file's start."""
+    return split_fields(first_line(head), ",")
+
+
 def detect_delimiter(lines: list[str]) -> str:
     """Return the character that separates the fields of the first lines; a blank when none does.
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.arrays import Codes
 from driftwalk.core.errors import InputError, argument_text
 from driftwalk.record.cleaning.extent import refuse_many_bodies
 from driftwalk.record.raw import Array, RawBody
@@ -109,7 +110,7 @@ def name_the_body(columns: list[str]) -> str:
 
 
 def split_bodies(
-    codes: npt.NDArray[np.int32],
+    codes: Codes,
     labels: Sequence[str],
     *,
     clock: Array,
@@ -146,7 +147,7 @@ def split_bodies(
     ]
 
 
-def number_codes(values: Array) -> tuple[npt.NDArray[np.int32], list[str]]:
+def number_codes(values: Array) -> tuple[Codes, list[str]]:
     """Return, for numbers that name bodies, the index of each row's body, and their names.
 
     Parameters
@@ -164,7 +165,7 @@ def number_codes(values: Array) -> tuple[npt.NDArray[np.int32], list[str]]:
     return codes.ravel().astype(np.int32), names
 
 
-def order_in_frame(frame: npt.ArrayLike) -> npt.NDArray[np.int32]:
+def order_in_frame(frame: npt.ArrayLike) -> Codes:
     """Return, for rows in the order of their frames, the place of each row within its frame."""
     values = np.asarray(frame)
     if not values.size:
@@ -174,7 +175,7 @@ def order_in_frame(frame: npt.ArrayLike) -> npt.NDArray[np.int32]:
     return (np.arange(values.size) - np.repeat(starts, lengths)).astype(np.int32)
 
 
-def order_in_body(codes: npt.NDArray[np.int32]) -> Array:
+def order_in_body(codes: Codes) -> Array:
     """Return, for rows of several bodies, the place of each row among those of its body.
 
     Examples

@@ -9,12 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.record.bad_row import split_fields
 from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.tables.rows import recording_of
 from driftwalk.record.tables.text_source import TextSource
 from driftwalk.record.text import read_table
-from driftwalk.record.text_head import first_lines, first_row, read_header
+from driftwalk.record.text_head import first_lines, first_names, first_row, read_header
 
 
 class PlainLoader:
@@ -55,9 +54,8 @@ class HeadedFormat:
 
     def sniff(self, head: bytes, _path: Path) -> float:
         """Recognise the header."""
-        lines = first_lines(head, 1)
-        names = tuple(split_fields(lines[0], ",")) if lines else ()
-        return 0.95 if names[: len(self.header)] == self.header else 0.0
+        names = first_names(head)[: len(self.header)]
+        return 0.95 if tuple(names) == self.header else 0.0
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read every body, in the format's own unit of length."""

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Codes
 from driftwalk.core.errors import InputError, argument_text
 from driftwalk.core.text.did_you_mean import listed
 from driftwalk.record.column_names import ColumnMeaning, words_of
@@ -17,7 +17,7 @@ from driftwalk.record.raw import Array, ReadOptions, TableLayout
 from driftwalk.record.vocabulary import BOXES, LENGTHS, NO_UNIT, UNITS, words
 
 if TYPE_CHECKING:
-    from driftwalk.record.tables.source import TableSource
+    from driftwalk.record.tables.column_reading import TableSource
 
 FORMS: Final = ("xyxy", "xywh", "cxcywh", "none")
 _CORNERS: Final = ("x1", "y1", "x2", "y2")
@@ -272,7 +272,7 @@ def box_angle(
     box: Box,
     values: Mapping[int, Array],
     theta: Array | None,
-    codes: npt.NDArray[np.int32] | None,
+    codes: Codes | None,
     turn: float,
 ) -> Array | None:
     """Return the orientation of a box: its axis, followed over its symmetry, body by body.

@@ -9,16 +9,15 @@ from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Codes
 from driftwalk.core.errors import argument_text
 from driftwalk.record.bad_row import is_number
 from driftwalk.record.cleaning.several_bodies import LARGEST_SHARE
 from driftwalk.record.column_names import column_meaning
 from driftwalk.record.raw import MISSING, Array, TableLayout
-from driftwalk.record.tables.column_reading import TableReading
+from driftwalk.record.tables.column_reading import TableReading, TableSource
 from driftwalk.record.tables.named_columns import LEFT_OUT
-from driftwalk.record.tables.source import TableSource
 from driftwalk.record.text import Table
 
 
@@ -152,7 +151,7 @@ def _tracks(
     return min(found, key=lambda entry: entry[0])[1:] if found else None
 
 
-def _counts_each(codes: npt.NDArray[np.int32], values: Array, body: int | None) -> bool:
+def _counts_each(codes: Codes, values: Array, body: int | None) -> bool:
     """Whether values count up, mostly one by one, in the rows of each body."""
     order = np.argsort(codes, kind="stable")
     same = codes[order][1:] == codes[order][:-1]
@@ -258,9 +257,7 @@ def _are_names(labels: list[str], *, rows: int) -> bool:
     return not any(is_number(label) and float(label) % 1.0 for label in labels)
 
 
-def _tells_apart(
-    codes: npt.NDArray[np.int32], clock: Array, x: Array, y: Array, *, in_order: bool
-) -> bool:
+def _tells_apart(codes: Codes, clock: Array, x: Array, y: Array, *, in_order: bool) -> bool:
     """Whether hardly a body is in two places at one time, and none goes back in time if asked."""
     present = np.flatnonzero(np.isfinite(clock) & np.isfinite(x) & np.isfinite(y))
     if in_order:

@@ -7,8 +7,8 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Codes
 from driftwalk.core.errors import FormatError, InputError, argument_text
 from driftwalk.core.text.did_you_mean import listed
 from driftwalk.record.cleaning.several_bodies import order_in_body, split_bodies
@@ -25,10 +25,9 @@ from driftwalk.record.raw import (
 )
 from driftwalk.record.space import Plane, body_in_plane, on_the_ground, plane_of_columns
 from driftwalk.record.tables.boxes import box_angle, box_centre
-from driftwalk.record.tables.column_reading import TableReading
+from driftwalk.record.tables.column_reading import TableReading, TableSource
 from driftwalk.record.tables.columns import read_columns
 from driftwalk.record.tables.row_order import body_columns, other_order
-from driftwalk.record.tables.source import TableSource
 from driftwalk.record.tables.stamps import DAY, count_days
 from driftwalk.record.text import Table
 
@@ -221,7 +220,8 @@ def _bodies(
     for (name, places), plane in zip(reading.bodies.items(), planes, strict=True):
         body, against = _body(table.numbers, places, clock, plane, reading, codes)
         body.name = name or "0"
-        _blank(body, table.numbers, places, options)
+        if "confidence" in places and options.min_confidence is not None:
+            body.blank(table.numbers[places["confidence"]] < options.min_confidence)
         found[name] = body
         notes += against
     if reading.parts is not None:
@@ -242,7 +242,7 @@ def _body(
     clock: Array,
     plane: Plane | None,
     reading: TableReading,
-    codes: npt.NDArray[np.int32] | None,
+    codes: Codes | None,
 ) -> tuple[RawBody, list[str]]:
     """Return the body of some columns, and what speaks against its plane."""
     if plane is not None:
@@ -258,17 +258,6 @@ def _body(
     if theta is not None and followed is not theta:
         notes = ["the angle of the box is that of an axis: it is followed over its symmetry"]
     return RawBody("0", clock, x, y, followed), notes
-
-
-def _blank(
-    body: RawBody, values: dict[int, Array], places: dict[str, int], options: ReadOptions
-) -> None:
-    """Make positions that were seen with too little confidence missing."""
-    if "confidence" in places and options.min_confidence is not None:
-        lost = values[places["confidence"]] < options.min_confidence
-        body.x, body.y = np.where(lost, np.nan, body.x), np.where(lost, np.nan, body.y)
-        if body.theta is not None:
-            body.theta = np.where(lost, np.nan, body.theta)
 
 
 def the_one_that_fits(

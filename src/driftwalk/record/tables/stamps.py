@@ -9,9 +9,10 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.arrays import Bools, Codes, Floats, Integers
 from driftwalk.record.raw import MISSING, Array, RawBody
 
-Ticks = npt.NDArray[np.int64]
+Ticks = Integers
 Texts = npt.NDArray[np.bytes_]
 
 SECOND_NS: Final = 1_000_000_000
@@ -176,7 +177,7 @@ def how_to_write(text: str) -> str:
     return ": it can be read in several ways, so write it as 2024-05-31T13:30:00 or 13:30:00"
 
 
-def _of_one_shape(texts: Texts) -> list[npt.NDArray[np.int64]]:
+def _of_one_shape(texts: Texts) -> list[Integers]:
     """Return the rows of each class of texts that differ in their digits alone, as they come."""
     if not texts.size:
         return []
@@ -192,7 +193,7 @@ def _of_one_shape(texts: Texts) -> list[npt.NDArray[np.int64]]:
     return [np.flatnonzero(codes == at) for at in np.argsort(first)]
 
 
-def _nanoseconds(texts: Texts, match: re.Match[str], rows: npt.NDArray[np.int64]) -> Ticks:
+def _nanoseconds(texts: Texts, match: re.Match[str], rows: Integers) -> Ticks:
     """Return the nanoseconds of texts whose parts stand at the places of those of the first."""
     letters = texts.view(np.uint8).reshape(texts.size, -1)
 
@@ -233,7 +234,7 @@ def _fraction(letters: npt.NDArray[np.uint8], match: re.Match[str]) -> Ticks:
     return ticks
 
 
-def _days(year: Ticks, month: Ticks, day: Ticks) -> tuple[Ticks, npt.NDArray[np.bool_]]:
+def _days(year: Ticks, month: Ticks, day: Ticks) -> tuple[Ticks, Bools]:
     """Return days since 1970, and where there is no such day."""
     wrong = (year < 1678) | (year > 2261) | (month < 1) | (month > 12) | (day < 1)
     months = np.where(wrong, 0, 12 * (year - 1970) + month - 1).astype("datetime64[M]")
@@ -255,9 +256,7 @@ def calendar_of(readers: list[StampReader]) -> str:
     return next((calendar for calendar in found if calendar != DAY), found[0] if found else "")
 
 
-def clock_of_stamps(
-    columns: list[Ticks], origin: int | None
-) -> tuple[npt.NDArray[np.float64], int | None]:
+def clock_of_stamps(columns: list[Ticks], origin: int | None) -> tuple[Floats, int | None]:
     """Return the sum of columns of time stamps from an origin on [ns], and that origin.
 
     Parameters
@@ -305,9 +304,7 @@ def moment_text(nanoseconds: int, calendar: str) -> str:
     return f"{text}{decimals}{'Z' if calendar == UTC else ''}"
 
 
-def count_days(
-    bodies: list[RawBody], clock: Array, codes: npt.NDArray[np.int32] | None
-) -> list[RawBody]:
+def count_days(bodies: list[RawBody], clock: Array, codes: Codes | None) -> list[RawBody]:
     """Return bodies whose times of day have a day more after each midnight.
 
     Rows of several bodies that take turns are in the order of their times: midnight is the same row
@@ -323,12 +320,12 @@ def count_days(
         Index of each row's body, in the order of the bodies; None: all share the clock.
     """
     if codes is None or len(bodies) == 1:
-        counted = with_days_counted(clock)
+        counted = counted_on(clock, DAY_NS)
         return [replace(body, clock=counted) for body in bodies]
     turns = int((codes[1:] != codes[:-1]).sum())
     if turns < len(bodies):
-        return [replace(body, clock=with_days_counted(body.clock)) for body in bodies]
-    counted = with_days_counted(clock)
+        return [replace(body, clock=counted_on(body.clock, DAY_NS)) for body in bodies]
+    counted = counted_on(clock, DAY_NS)
     present = np.unique(codes)
     return [
         replace(body, clock=counted[codes == code])
@@ -336,26 +333,27 @@ def count_days(
     ]
 
 
-def with_days_counted(clock: Array) -> Array:
-    """Return times of day [ns] with a day more after each midnight.
+def counted_on(clock: Array, period: float) -> Array:
+    """Return a clock that starts over after each period with that period more each time.
 
-    A step back by more than half a day is a midnight.
+    A step back by more than half a period is a start.
 
     Parameters
     ----------
     clock : array, shape (n,)
-        Nanoseconds since midnight, NaN where there is no time.
+        Times since the last start, NaN where there is no time.
+    period : float
+        In the unit of the clock.
 
     Examples
     --------
-    >>> hour = 3600e9
-    >>> (with_days_counted(np.array([23.0 * hour, 1.0 * hour])) / hour).tolist()
+    >>> counted_on(np.array([23.0, 1.0]), 24.0).tolist()
     [23.0, 25.0]
     """
     known = np.flatnonzero(np.isfinite(clock))
-    midnights = np.diff(clock[known]) < -0.5 * DAY_NS
-    if not midnights.any():
+    starts = np.diff(clock[known]) < -0.5 * period
+    if not starts.any():
         return clock
     counted = clock.copy()
-    counted[known[1:]] += DAY_NS * np.cumsum(midnights)
+    counted[known[1:]] += period * np.cumsum(starts)
     return counted

@@ -18,7 +18,7 @@ from driftwalk.record.column_names import unit_of_name
 from driftwalk.record.raw import CLOCK_UNITS, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.space import PARTS, QUATERNION, SpaceTrack, Turns, lay_flat, plane_of
 from driftwalk.record.text import header_rows, read_table
-from driftwalk.record.text_head import first_lines, first_row, is_numeric_row
+from driftwalk.record.text_head import first_line, first_lines, first_row, is_numeric_row
 
 _START: Final = re.compile(r"#\s*timestamp\b[^,]*(,\s*p_\w*[xyz]\b[^,]*){3}")
 _PART: Final = re.compile(r"([pq])_(?:[A-Za-z]+_)*([wxyz])\s*(?:\[.*\])?")
@@ -34,8 +34,7 @@ class EurocLoader:
 
     def sniff(self, head: bytes, _path: Path) -> float:
         """Recognise the header."""
-        lines = first_lines(head, 1)
-        return 0.9 if lines and _START.match(lines[0]) else 0.0
+        return 0.9 if _START.match(first_line(head)) else 0.0
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the one body; its whole nanoseconds stay exact."""

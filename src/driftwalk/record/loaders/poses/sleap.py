@@ -11,15 +11,15 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.arrays import Codes
 from driftwalk.core.errors import FormatError
 from driftwalk.core.text.json_text import parse_json
-from driftwalk.record.bad_row import split_fields
 from driftwalk.record.cleaning.several_bodies import split_bodies
 from driftwalk.record.pose import Confidence, Point, Poses, bodies_of, choose_keypoints
 from driftwalk.record.raw import Array, Marks, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.stores.hdf5 import Hdf5Contents, names_in, opened_hdf5, text_of
 from driftwalk.record.text import read_table
-from driftwalk.record.text_head import first_lines, first_row
+from driftwalk.record.text_head import first_names, first_row
 
 ORDER: Final = ("track", "xy", "node", "frame")
 """Dimensions as SLEAP writes them; newer files name theirs in an attribute."""
@@ -103,8 +103,7 @@ class SleapCsvLoader:
 
     def sniff(self, head: bytes, _path: Path) -> float:
         """Recognise the header."""
-        lines = first_lines(head, 1)
-        names = split_fields(lines[0], ",") if lines else []
+        names = first_names(head)
         dotted = any(name.endswith(".x") and f"{name[:-2]}.y" in names for name in names)
         return 0.95 if "frame_idx" in names and dotted else 0.0
 
@@ -149,9 +148,7 @@ class SleapCsvLoader:
         )
 
 
-def _require_tracks(
-    labels: list[str], codes: npt.NDArray[np.int32], frame: Array, path: Path
-) -> None:
+def _require_tracks(labels: list[str], codes: Codes, frame: Array, path: Path) -> None:
     """Refuse several instances of a frame that no track tells apart."""
     if "" not in labels:
         return

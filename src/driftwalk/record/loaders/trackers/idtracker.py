@@ -25,7 +25,7 @@ from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOption
 from driftwalk.record.stores.hdf5 import names_in, opened_hdf5
 from driftwalk.record.stores.plain_pickle import PickledArray, unpickle
 from driftwalk.record.text import read_table
-from driftwalk.record.text_head import first_lines, first_row, read_header
+from driftwalk.record.text_head import first_line, first_row, read_header
 from driftwalk.schema.stores.netcdf import HDF5, file_start
 
 _HEADER = re.compile(r"X1\s+Y1\s+ProbId1\b", re.ASCII)
@@ -39,8 +39,7 @@ class IdTrackerLoader:
 
     def sniff(self, head: bytes, _path: Path) -> float:
         """Recognise the header."""
-        lines = first_lines(head, 1)
-        return 0.95 if lines and _HEADER.match(lines[0]) else 0.0
+        return 0.95 if _HEADER.match(first_line(head)) else 0.0
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read every individual; ``ProbId`` -1 and -2 mark positions that idTracker estimated."""

@@ -21,13 +21,13 @@ from functools import reduce
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Integers
 from driftwalk.core.errors import FormatError
 from driftwalk.record.cleaning.several_bodies import order_in_frame, split_bodies
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import Table, lines_of, open_binary, read_head, read_table
-from driftwalk.record.text_head import first_lines
+from driftwalk.record.text_head import first_line, first_lines
 
 OLD = ["frame", "x (image)", "y (image)", "x (world)", "y (world)", "area", "orientation"]
 OLD = [*OLD, "compactness", "time stamp"]
@@ -100,9 +100,9 @@ def _recording(
 
 def _columns(head: bytes) -> list[str]:
     """Return the columns that the header announces, [] when it is not SwisTrack's."""
-    lines = first_lines(head, 1)
-    header = [field.strip().lower() for field in lines[0].lstrip("% ").split("\t")] if lines else []
-    if not lines or not lines[0].startswith("%") or not header[0].startswith("frame number"):
+    line = first_line(head)
+    header = [field.strip().lower() for field in line.lstrip("% ").split("\t")]
+    if not line.startswith("%") or not header[0].startswith("frame number"):
         return []
     if len(header) == 1:  # the newer versions write the header with commas above tabs
         header = [field.strip() for field in header[0].split(",") if field.strip()]
@@ -142,8 +142,7 @@ class SwisTrackParticlesLoader:
 
     def sniff(self, head: bytes, _path: Path) -> float:
         """Recognise the header."""
-        lines = first_lines(head, 1)
-        header = lines[0].lower() if lines else ""
+        header = first_line(head).lower()
         known = header.startswith("%") and "frame number" in header and "time" in header
         return 0.93 if known and header.find("time") < header.find("x (image)") else 0.0
 
@@ -227,7 +226,7 @@ class SwisTrackNmeaLoader:
         return _recording(bodies, "frame", world=world, rows=int(frame.size), note=note)
 
 
-def _particles(path: Path) -> tuple[Array, npt.NDArray[np.int64]]:
+def _particles(path: Path) -> tuple[Array, Integers]:
     """Return (frame, image x, y, world x, y, orientation) and the ids, one column a particle."""
     values = array("d")
     ids = array("q")

@@ -24,7 +24,13 @@ from driftwalk.record.column_names import unit_of_name
 from driftwalk.record.loaders.plain import HeadedFormat
 from driftwalk.record.raw import Marks, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import header_rows, read_head, read_table
-from driftwalk.record.text_head import first_lines, first_row, is_numeric_row, read_header
+from driftwalk.record.text_head import (
+    first_line,
+    first_lines,
+    first_row,
+    is_numeric_row,
+    read_header,
+)
 
 _DLTDV_X = re.compile(r"(pt\d+_cam\d+)_X", re.IGNORECASE)
 
@@ -37,8 +43,7 @@ class DltdvLoader:
 
     def sniff(self, head: bytes, _path: Path) -> float:
         """Recognise the header."""
-        lines = first_lines(head, 1)
-        return 0.95 if lines and _DLTDV_X.match(lines[0].lstrip('"')) else 0.0
+        return 0.95 if _DLTDV_X.match(first_line(head).lstrip('"')) else 0.0
 
     def read(self, path: Path, _options: ReadOptions) -> RawRecording:
         """Read every point of every camera as a body."""

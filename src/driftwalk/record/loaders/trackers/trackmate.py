@@ -27,7 +27,7 @@ from driftwalk.record.raw import (
     TableLayout,
 )
 from driftwalk.record.text import DAMAGED_GZIP, header_rows, open_binary, read_table
-from driftwalk.record.text_head import first_lines
+from driftwalk.record.text_head import first_names
 
 NEEDED: Final = ("TRACK_ID", "POSITION_X", "POSITION_Y", "POSITION_T", "FRAME")
 OUTSIDE: Final = "spots outside the tracks, left out: {}"
@@ -42,9 +42,8 @@ class TrackMateLoader:
 
     def sniff(self, head: bytes, _path: Path) -> float:
         """Recognise the names of the spots' columns."""
-        lines = first_lines(head, 1)
-        names = set(split_fields(lines[0], ",")) if lines else set()
-        return 0.95 if {"TRACK_ID", "POSITION_X", "POSITION_Y"} <= names else 0.0
+        needed = {"TRACK_ID", "POSITION_X", "POSITION_Y"}
+        return 0.95 if needed <= set(first_names(head)) else 0.0
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read every track; `frame_rate` counts frames in place of the file's times."""

@@ -16,13 +16,12 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.record.bad_row import split_fields
 from driftwalk.record.column_names import unit_of_name
 from driftwalk.record.pose import angle_between
 from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.stores.npz import ZIP, members, opened_npz
 from driftwalk.record.text import read_table
-from driftwalk.record.text_head import first_lines, first_row
+from driftwalk.record.text_head import first_names, first_row
 from driftwalk.schema.stores.netcdf import file_start
 
 CENTRES: Final = ("wcentroid", "centroid", "pcentroid", "head")
@@ -116,8 +115,7 @@ class TrexLoader:
             return 0.8 if _files(path) else 0.0
         if head.startswith(ZIP):
             return 0.95 if _is_individual(members(path)) else 0.0
-        lines = first_lines(head, 1)
-        names = [name.partition(" ")[0] for name in split_fields(lines[0], ",")] if lines else []
+        names = [name.partition(" ")[0] for name in first_names(head)]
         return 0.95 if "frame" in names and any("#wcentroid" in name for name in names) else 0.0
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
