@@ -13,7 +13,7 @@ import numpy as np
 from driftwalk.core.errors import InputError, argument_text
 from driftwalk.record.circle import implied_scale
 from driftwalk.record.cleaning.clock import CLOCK
-from driftwalk.record.cleaning.extent import refuse_far
+from driftwalk.record.cleaning.warn import refuse_far
 from driftwalk.record.raw import (
     ANGLE_UNITS,
     CLOCK_UNITS,

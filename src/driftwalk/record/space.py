@@ -225,7 +225,6 @@ def _against(name: str, plane: Plane, height: float, width: float, tilt: Array |
 
 
 PARTS: Final = ("qx", "qy", "qz", "qw")
-_UP: Final = "z"
 
 
 def plane_of_columns(places: Mapping[str, int], up: str | None) -> Plane | None:
@@ -245,7 +244,7 @@ def plane_of_columns(places: Mapping[str, int], up: str | None) -> Plane | None:
     """
     if up is None and not set(PARTS) <= set(places):
         return None
-    plane = plane_of(up or _UP)
+    plane = plane_of(up or "z")
     if up is not None and "z" not in places:
         raise InputError(
             "`up` needs a third axis, and no column is known to hold z: name it with "

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from driftwalk.core.arrays import Codes
 from driftwalk.core.errors import InputError, argument_text
-from driftwalk.record.cleaning.extent import refuse_many_bodies
+from driftwalk.record.cleaning.warn import refuse_many_bodies
 from driftwalk.record.raw import Array, RawBody
 
 LARGEST_SHARE = 0.01

@@ -6,8 +6,7 @@ over body, frame and field, with the names of the fields. Robotarium: five rows 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
@@ -67,30 +66,27 @@ class MatlabTracksLoader:
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read every body."""
         del options
-        with _found(path) as (read, value):
-            recording = None if read is None else read(value)
-            if recording is None or not recording.bodies:
-                raise FormatError(
-                    f"has no tracks: it needs one of {', '.join(_READERS)} in the layout of its "
-                    "program",
-                    path=path,
-                )
-            return recording
+        recording = _tracks(path)
+        if recording is None or not recording.bodies:
+            raise FormatError(
+                f"has no tracks: it needs one of {', '.join(_READERS)} in the layout of its "
+                "program",
+                path=path,
+            )
+        return recording
 
 
-@contextmanager
-def _found(path: Path) -> Iterator[tuple[Callable[[Value], RawRecording | None] | None, Value]]:
-    """Give the reader of a file's tracks, and what it reads."""
+def _tracks(path: Path) -> RawRecording | None:
+    """Return the tracks of a file, None where no variable has the layout of its program."""
     with matlab_variables_of(path) as variables:
         name = next((one for one in _READERS if one in variables), None)
-        yield (None, None) if name is None else (_READERS[name], variables[name])
+        return None if name is None else _READERS[name](variables[name])
 
 
 def _known(path: Path) -> bool:
     """Whether the variable of that name has the layout of its program."""
     try:
-        with _found(path) as (read, value):
-            return read is not None and read(value) is not None
+        return _tracks(path) is not None
     except FormatError:
         return False
 

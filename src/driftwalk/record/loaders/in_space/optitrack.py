@@ -15,8 +15,6 @@ from driftwalk.record.text import Table, header_rows, read_table
 START: Final = b"Format Version,"
 _UNITS: Final = {"meters": "m", "centimeters": "cm", "millimeters": "mm"}
 _ORDERS: Final = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
-_UP: Final = "y"
-"""Motive's own axes. Its CSV says nothing about another choice at the export."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +71,8 @@ class OptiTrackLoader:
             )
             for name in bodies
         ]
-        flat = lay_flat(tracks, plane_of(options.up or _UP))
+        # Motive's own axis. Its CSV says nothing about another choice at the export.
+        flat = lay_flat(tracks, plane_of(options.up or "y"))
         if kind != "Rigid Body":
             flat.notes.append("no rigid bodies: each marker is read as a body, without orientation")
         rate = header.settings.get("Export Frame Rate") or header.settings.get("Capture Frame Rate")

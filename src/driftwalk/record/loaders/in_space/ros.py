@@ -95,7 +95,6 @@ METADATA: Final = "metadata.yaml"
 _MCAP: Final = b"\x89MCAP0\r\n"
 _SQLITE: Final = b"SQLite format 3\0"
 _ROS_1: Final = b"#ROSBAG V2.0\n"
-_UP: Final = "z"
 
 
 @dataclass
@@ -118,7 +117,7 @@ class RosLoader:
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the poses of the chosen topics."""
-        plane = plane_of(options.up or _UP)
+        plane = plane_of(options.up or "z")
         with _opened(path) as reader:
             chosen = _choose(reader.connections, options.topic, path)
             tracks, parents, recorded = _collect(reader, chosen)

@@ -23,7 +23,6 @@ from driftwalk.record.text_head import first_line, first_lines, first_row, is_nu
 _START: Final = re.compile(r"#\s*timestamp\b[^,]*(,\s*p_\w*[xyz]\b[^,]*){3}")
 _PART: Final = re.compile(r"([pq])_(?:[A-Za-z]+_)*([wxyz])\s*(?:\[.*\])?")
 _POSITION: Final = ("px", "py", "pz")
-_UP: Final = "z"
 
 
 class EurocLoader:
@@ -58,7 +57,7 @@ class EurocLoader:
         track = SpaceTrack("0", table.numbers[0], values[:, :3], turns)
         unit = unit_of_name(names[0])
         return replace(
-            lay_flat([track], plane_of(options.up or _UP)),
+            lay_flat([track], plane_of(options.up or "z")),
             clock_unit=unit if unit in CLOCK_UNITS else "ns",
             clock_origin=table.clock_origin,
             length_unit="m",
@@ -92,7 +91,7 @@ class TumLoader:
         values = table.stack(range(1, 8))
         track = SpaceTrack("0", table.numbers[0], values[:, :3], Turns(values[:, 3:], QUATERNION))
         return replace(
-            lay_flat([track], plane_of(options.up or _UP)),
+            lay_flat([track], plane_of(options.up or "z")),
             clock_unit="s",
             length_unit="m",
             rows=table.rows,

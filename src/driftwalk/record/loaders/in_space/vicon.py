@@ -23,7 +23,6 @@ from driftwalk.record.text_head import first_lines
 _READ: Final = ("Objects", "Segments", "Trajectories")
 _OTHERS: Final = ("Devices", "Joints", "Model Outputs")
 _LINES: Final = 5
-_UP: Final = "z"
 _POSITIONS: Final = (("TX", "TY", "TZ"), ("X", "Y", "Z"))
 _QUATERNION: Final = ("RX", "RY", "RZ", "RW")
 _PREFIX: Final = re.compile(r"^Global Angle\s+")
@@ -75,7 +74,7 @@ class ViconLoader:
             for name in bodies
         ]
         return replace(
-            lay_flat(tracks, plane_of(options.up or _UP)),
+            lay_flat(tracks, plane_of(options.up or "z")),
             length_unit=_length_unit(header, placed, path),
             frame_rate_hz=header.rate_hz,
             rows=table.rows,

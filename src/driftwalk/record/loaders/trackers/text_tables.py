@@ -70,11 +70,7 @@ class DltdvLoader:
         return RawRecording(bodies, length_unit="px", rows=table.rows, notes=notes)
 
 
-SMARTICLES = [
-    "sync",
-    "t",
-    *(f"{name}{robot}" for robot in range(1, 4) for name in ("x", "y", "theta")),
-]
+SMARTICLES = ["sync", "t", *(f"{name}{at}" for at in (1, 2, 3) for name in ("x", "y", "theta"))]
 
 
 class SmarticlesLoader:
@@ -86,9 +82,7 @@ class SmarticlesLoader:
     def sniff(self, head: bytes, _path: Path) -> float:
         """Recognise eleven numbers of which the second grows and the positions are pixels."""
         rows = [line.split(",") for line in first_lines(head)]
-        if len(rows) < 2 or any(
-            len(row) != len(SMARTICLES) or not is_numeric_row(row) for row in rows
-        ):
+        if len(rows) < 2 or not all(len(row) == 11 and is_numeric_row(row) for row in rows):
             return 0.0
         try:
             times = [float(row[1]) for row in rows]
@@ -101,18 +95,14 @@ class SmarticlesLoader:
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the three robots."""
         names, delimiter, skip, has_header = read_header(path, delimiter=options.delimiter)
-        if has_header or len(names) != len(SMARTICLES):
+        if has_header or len(names) != 11:
             raise FormatError("expected eleven columns without a header", path=path, line=1)
-        table = read_table(
-            path, TableLayout(delimiter, SMARTICLES, skip, tuple(range(1, len(SMARTICLES))))
-        )
+        table = read_table(path, TableLayout(delimiter, SMARTICLES, skip, tuple(range(1, 11))))
         bodies = [
             RawBody(
-                str(robot + 1),
-                table.numbers[1],
-                *(table.numbers[2 + 3 * robot + offset] for offset in range(3)),
+                str(at), *(table.numbers[column] for column in (1, *range(3 * at - 1, 3 * at + 2)))
             )
-            for robot in range(3)
+            for at in (1, 2, 3)
         ]
         return RawRecording(
             bodies, clock_unit="s", bare_clock="", separate=True, length_unit="px", rows=table.rows

@@ -58,8 +58,8 @@ class TrackMateLoader:
         header = _rows_of_header(rows, places["POSITION_X"])
         units = rows[3] if header == 4 and len(rows[3]) == len(names) else [""] * len(names)
         length = stated_unit(units[places["POSITION_X"]], path)
-        timed = _is_timed(units[places["POSITION_T"]], options)
-        clock = "POSITION_T" if timed else "FRAME"
+        clock_unit = _clock_unit(units[places["POSITION_T"]], options)
+        clock = "FRAME" if clock_unit == "frame" else "POSITION_T"
         wanted = {name: places[name] for name in ("TRACK_ID", "POSITION_X", "POSITION_Y", clock)}
         layout = TableLayout(",", names, header, tuple(sorted(wanted.values())))
         table = read_table(path, layout)
@@ -72,7 +72,7 @@ class TrackMateLoader:
         outside = int((~inside).sum())
         return RawRecording(
             bodies,
-            clock_unit=unit_of_name(f"t {units[places['POSITION_T']]}") if timed else "frame",
+            clock_unit=clock_unit,
             length_unit=length,
             y_axis="down",
             rows=table.rows,
@@ -88,9 +88,10 @@ def _rows_of_header(rows: list[list[str]], place: int) -> int:
     return len(rows)
 
 
-def _is_timed(unit: str, options: ReadOptions) -> bool:
-    """Whether the times of the file are used, and not its frames."""
-    return options.frame_rate_hz is None and unit_of_name(f"t {unit}") in ("s", "ms", "us", "min")
+def _clock_unit(stated: str, options: ReadOptions) -> str:
+    """Return the unit of the times of the file, or ``"frame"`` where its frames are used."""
+    unit = unit_of_name(f"t {stated}")
+    return unit if options.frame_rate_hz is None and unit in ("s", "ms", "us", "min") else "frame"
 
 
 def stated_unit(text: str, path: Path) -> str:
@@ -171,8 +172,7 @@ class TrackMateXmlLoader:
             raise FormatError("holds no spots: is it a TrackMate session?", path=path)
         spots = np.array(contents.spots).reshape(-1, len(_SPOT))
         spots = spots[np.argsort(spots[:, 0], kind="stable")]
-        unit = unit_of_name(f"t ({contents.units.get('timeunits', '')})")
-        timed = options.frame_rate_hz is None and unit in ("s", "ms", "us", "min")
+        clock_unit = _clock_unit(f"({contents.units.get('timeunits', '')})", options)
         tracks = {
             name: ends
             for name, ends in contents.edges.items()
@@ -181,13 +181,13 @@ class TrackMateXmlLoader:
         if not tracks:
             raise FormatError("no track is kept: track the spots in TrackMate, and save", path=path)
         bodies = [
-            _body(name, spots, ends, clock=3 if timed else 4, path=path)
+            _body(name, spots, ends, clock=4 if clock_unit == "frame" else 3, path=path)
             for name, ends in sorted(tracks.items(), key=lambda entry: (len(entry[0]), entry[0]))
         ]
         outside = len(spots) - len(np.unique(np.concatenate([*map(np.array, tracks.values())])))
         return RawRecording(
             bodies,
-            clock_unit=unit if timed else "frame",
+            clock_unit=clock_unit,
             length_unit=stated_unit(contents.units.get("spatialunits", ""), path),
             y_axis="down",
             rows=len(spots),

@@ -162,28 +162,24 @@ def _is_individual(names: set[str]) -> bool:
 
 def _video(file: Path) -> str:
     match = _NUMBER.fullmatch(file.name)
-    return match.group(1) if match else file.stem
+    return match[1] if match else file.stem
 
 
 def _individual(file: Path) -> str:
     match = _NUMBER.fullmatch(file.name)
-    return match.group(2) if match else "0"
+    return match[2] if match else "0"
 
 
 def _keys(point: str) -> tuple[str, str]:
     """Return the names of x and y of a point."""
     if point == "head":
         return "X", "Y"
-    return (
-        (f"poseX{point[4:]}", f"poseY{point[4:]}")
-        if point in POSE
-        else (f"X#{point}", f"Y#{point}")
-    )
+    end = f"#{point}"
+    return (f"poseX{point[4:]}", f"poseY{point[4:]}") if point in POSE else (f"X{end}", f"Y{end}")
 
 
 def _read(path: Path, options: ReadOptions) -> _Individual:
-    is_npz = file_start(path).startswith(ZIP)
-    if not is_npz:
+    if not file_start(path).startswith(ZIP):
         individual = _of_csv(path)
         individual.make_body(options)
         return individual
