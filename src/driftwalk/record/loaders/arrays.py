@@ -17,7 +17,7 @@ from driftwalk.record.stores.npz import ZIP, members, opened_npz
 from driftwalk.record.tables.in_memory import table_in_memory
 from driftwalk.record.tables.matlab import matlab_tables
 from driftwalk.record.tables.rows import recording_of, the_one_that_fits
-from driftwalk.schema.stores.netcdf import HDF5, file_start
+from driftwalk.schema.stores.netcdf import file_start
 
 _NPY: Final = b"\x93NUMPY"
 _RATES: Final = ("fps", "frame_rate", "framerate", "frame_rate_hz", "frames_per_second")
@@ -35,8 +35,6 @@ class ArraysLoader:
             return 0.4 if b"'|O'" not in head[:200] else 0.0
         if head.startswith(ZIP):
             return 0.3 if _are_positions(members(path)) else 0.0
-        if not head.startswith(HDF5):
-            return 0.0
         names = names_in(path, head)
         return 0.3 if _are_positions(names) or (names and _inner_positions(path)) else 0.0
 
