@@ -17,7 +17,7 @@ from driftwalk.record.raw import Array, ReadOptions, TableLayout
 from driftwalk.record.vocabulary import BOXES, LENGTHS, NO_UNIT, UNITS, words
 
 if TYPE_CHECKING:
-    from driftwalk.record.tables.column_reading import TableSource
+    from driftwalk.record.tables.source import TableSource
 
 FORMS: Final = ("xyxy", "xywh", "cxcywh", "none")
 _CORNERS: Final = ("x1", "y1", "x2", "y2")

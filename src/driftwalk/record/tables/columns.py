@@ -11,8 +11,9 @@ from driftwalk.core.text.did_you_mean import listed
 from driftwalk.record.column_names import OF_BODY, QUATERNION, unit_of_name
 from driftwalk.record.raw import MISSING, ReadOptions
 from driftwalk.record.tables.boxes import find_box
-from driftwalk.record.tables.column_reading import ColumnReading, TableReading, TableSource
+from driftwalk.record.tables.column_reading import ColumnReading, TableReading
 from driftwalk.record.tables.named_columns import NamedColumns, may_be_unit, shown
+from driftwalk.record.tables.source import TableSource
 from driftwalk.record.tables.stamps import OF_DAY
 from driftwalk.record.vocabulary import FRONT, MIDDLE, REAR
 

@@ -18,7 +18,7 @@ from driftwalk.record.tables.cells import (
     form_of,
     text_of_cell,
 )
-from driftwalk.record.tables.column_reading import TABLE
+from driftwalk.record.tables.source import TABLE
 from driftwalk.record.tables.stamps import (
     StampError,
     StampForm,

@@ -10,8 +10,8 @@ from pathlib import Path
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import split_fields
 from driftwalk.record.raw import MISSING, ReadOptions, TableLayout
-from driftwalk.record.tables.column_reading import TABLE
 from driftwalk.record.tables.heading import header_advice, heading_of, is_data, units_below
+from driftwalk.record.tables.source import TABLE
 from driftwalk.record.tables.stamps import StampForm, stamp_form
 from driftwalk.record.text import Table, header_rows, read_table
 from driftwalk.record.text_head import detect_delimiter, read_header
