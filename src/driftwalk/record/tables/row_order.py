@@ -20,6 +20,7 @@ from driftwalk.record.tables.column_reading import TableReading
 from driftwalk.record.tables.named_columns import LEFT_OUT
 from driftwalk.record.tables.source import TableSource
 from driftwalk.record.text import Table
+from driftwalk.record.vocabulary import ALLOWED, UNITS
 
 
 class UnevenClockPolicy(NamedTuple):
@@ -247,6 +248,8 @@ def body_columns(
 
 
 def _may_be_a_name(column: str) -> bool:
+    if UNITS.get(column.strip().lower()) in ALLOWED["t"]:
+        return False  # "min" next to "sec"
     meaning = column_meaning(column)
     return meaning is None or meaning.quantity == "body"
 
