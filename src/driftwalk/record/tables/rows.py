@@ -44,7 +44,7 @@ _FULL_TURN: Final = 6.3
 """A turn in radians, and what rounding adds."""
 _FLAGS: Final = {
     **dict.fromkeys(words("true t yes y ja oui si sí vrai wahr ok"), 1.0),
-    **dict.fromkeys(words("false f no n nein non faux falsch"), 0.0),
+    **dict.fromkeys(words("false f no n nein non faux falsch lost missing invalid bad"), 0.0),
 }
 """Words of a column that says whether the body was seen."""
 NAME_THE_CLOCK = (
@@ -136,7 +136,7 @@ def columns_of(
     if not source.has_header and not options.columns:
         raise source.error(
             f"the table has {len(source.names)} columns and no header: name them with `columns`, "
-            'such as `columns={"t": "1", "x": "2", "y": "3"}`'
+            'such as `columns={"t": "1", "x": "2", "y": "3"}`' + _detector_advice(source)
         )
     try:
         reading = read_columns(source, options)
@@ -145,6 +145,32 @@ def columns_of(
         raise
     except InputError as error:
         raise source.error(str(error)) from error
+
+
+def _detector_advice(source: TableSource) -> str:
+    """Return how to name the columns of rows without a header that are those of a detector."""
+    try:
+        rows = np.array([[float(one) for one in row] for row in source.sample()])
+    except ValueError:
+        return ""
+    width = rows.shape[1] if rows.ndim == 2 else 0
+    if width in (9, 10) and not (rows[:, :2] % 1.0).any() and (rows[:, 4:6] > 0.0).all():
+        named = dict(
+            zip(("frame", "body", "x", "y", "w", "h", "confidence"), "1234567", strict=True)
+        )
+        return (
+            "; if they are those of MOT (frame, identity, left, top, width, height, confidence), "
+            f'{argument_text("columns", named)} and `box="xywh"`'
+        )
+    shares = width in (5, 6, 7) and bool(((rows[:, 1:5] >= 0.0) & (rows[:, 1:5] <= 1.0)).all())
+    if shares and not (rows[:, 0] % 1.0).any():
+        named = dict(zip(("x", "y", "w", "h"), "2345", strict=True))
+        return (
+            "; if they are those of YOLO (class, centre and size as shares of the image), multiply "
+            "x and w by its width and y and h by its height in pixels, then "
+            f'{argument_text("columns", named)} and `box="cxcywh"`'
+        )
+    return ""
 
 
 def _read(source: TableSource, reading: TableReading, labels: list[str]) -> Table:
@@ -167,6 +193,9 @@ def _read(source: TableSource, reading: TableReading, labels: list[str]) -> Tabl
     )
     table = source.read(wanted)
     for at in flags:
+        unknown = {label.lower() for label in table.labels[at]} - MISSING - set(_FLAGS)
+        if unknown:
+            raise source.error(f"'{min(unknown)}' in column '{labels[at]}' is no yes and no no")
         marks = [_FLAGS.get(label.lower(), np.nan) for label in table.labels[at]]
         table.numbers[at] = np.array(marks)[table.codes[at]]
     return table
@@ -174,7 +203,8 @@ def _read(source: TableSource, reading: TableReading, labels: list[str]) -> Tabl
 
 def _holds_flags(source: TableSource, column: int) -> bool:
     """Whether the first values of a column are words for yes and no."""
-    found = {row[column].lower() for row in source.sample() if len(row) > column} - MISSING
+    found = {row[column].lower() for row in source.sample() if len(row) > column}
+    found -= MISSING - set(_FLAGS)
     return bool(found) and found <= set(_FLAGS)
 
 

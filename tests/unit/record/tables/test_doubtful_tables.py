@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 
@@ -70,7 +71,7 @@ def test_a_further_pair_of_an_unknown_name_is_doubted(tmp_path: Path) -> None:
     check(load(path, columns={"skip": "x_home+y_home"}))
 
 
-@pytest.mark.parametrize("words", [("True", "False"), ("yes", "no"), ("1", "0")])
+@pytest.mark.parametrize("words", [("True", "False"), ("yes", "no"), ("OK", "LOST"), ("1", "0")])
 def test_words_for_seen(tmp_path: Path, words: tuple[str, str]) -> None:
     seen = [words[1] if k in (3, 9) else words[0] for k in range(40)]
     path = columns(tmp_path, {"t": T, "x": X, "y": Y, "valid": seen})
@@ -154,3 +155,51 @@ def test_minutes_next_to_seconds_name_no_body(tmp_path: Path) -> None:
     path = columns(tmp_path, {"min": seconds // 60, "sec": seconds % 60, "x_m": X, "y_m": Y})
     with pytest.raises(InputError, match="the clock starts over"):
         load(path)
+
+
+def test_rows_of_a_detector_say_how_they_are_named(tmp_path: Path) -> None:
+    path = tmp_path / "gt.txt"
+    row = "{},1,{:.3f},{:.3f},30,30,1,-1,-1,-1".format
+    path.write_text("\n".join(row(k + 1, PX[k] - 15, PY[k] - 15) for k in range(40)) + "\n")
+    with pytest.raises(InputError, match="those of MOT"):
+        load(path, **PIXELS)
+    named = {"frame": "1", "body": "2", "x": "3", "y": "4", "w": "5", "h": "6", "confidence": "7"}
+    check(load(path, columns=named, box="xywh", **PIXELS), x=X + 0.2)
+    path.write_text(
+        "".join(f"0 {x:.6f} {y:.6f} 0.03 0.03\n" for x, y in zip(X + 0.2, Y + 0.2, strict=True))
+    )
+    with pytest.raises(InputError, match="those of YOLO"):
+        load(path, **PIXELS)
+
+
+def test_lists_of_numbers_in_json_lines(tmp_path: Path) -> None:
+    path = tmp_path / "log.jsonl"
+    entries = [{"t": t, "position": [x, y, 0.0]} for t, x, y in zip(T, X, Y, strict=True)]
+    path.write_text("".join(json.dumps(one) + "\n" for one in entries))
+    check(load(path, length_unit="m"))
+    boxes = [{"frame": k, "bbox": [PX[k] - 15, PY[k] - 15, 30, 30]} for k in range(40)]
+    path.write_text("".join(json.dumps(one) + "\n" for one in boxes))
+    sides = {side: f"bbox.{at}" for at, side in enumerate("xywh")}
+    check(load(path, columns=sides, box="xywh", **PIXELS), x=X + 0.2)
+
+
+def test_units_in_the_attributes_of_arrays(tmp_path: Path) -> None:
+    path = tmp_path / "lab.h5"
+    with h5py.File(path, "w") as file:
+        file["t"], file["x"], file["y"] = T, X * 1e3, Y * 1e3
+        file["x"].attrs["units"] = file["y"].attrs["units"] = "mm"
+    check(load(path))
+
+
+@pytest.mark.parametrize("mark", ["na", "-NaN", "—", "*", "ND", "undefined"])
+def test_further_marks_of_what_is_missing(tmp_path: Path, mark: str) -> None:
+    x = [mark if k in (7, 8) else value for k, value in enumerate(X)]
+    y = [mark if k in (7, 8) else value for k, value in enumerate(Y)]
+    assert body_track(load(columns(tmp_path, {"t": T, "x": x, "y": y})), "0").time.size == 38
+
+
+def test_a_blank_line_below_the_units(tmp_path: Path) -> None:
+    path = tmp_path / "logger.txt"
+    rows = "".join(f"{t}\t{x * 100}\t{y * 100}\n" for t, x, y in zip(T, X, Y, strict=True))
+    path.write_text(f"Vernier Format 2\nLatest\nTime\tX\tY\nT\tX\tY\ns\tcm\tcm\n\n{rows}")
+    check(load(path))
