@@ -48,7 +48,13 @@ def test_info_of_many_bodies(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     rows = [f"{t},{b},{t},robot{b}" for t in range(3) for b in range(8)]
     (tmp_path / "a.csv").write_text("t,x,y,robot\n" + "\n".join(rows))
     assert main(["info", str(tmp_path / "a.csv")]) == 0
-    assert sum(line.startswith("robot") and "body" not in line for line in capsys.readouterr().out.splitlines()) == 8
+    assert (
+        sum(
+            line.startswith("robot") and "body" not in line
+            for line in capsys.readouterr().out.splitlines()
+        )
+        == 8
+    )
 
 
 def test_convert_to_both_formats(

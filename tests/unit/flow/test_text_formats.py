@@ -344,7 +344,7 @@ def test_a_number_far_beyond_all_others_is_no_velocity(tmp_path: Path, mark: str
     path.write_text("\n".join(["x,y,u,v", *rows, ""]), encoding="utf-8")
     field = load_flow(path)
     assert int((field.flag == 1).sum()) == 11
-    assert "at 1 nodes: taken as missing" in field.attrs["warning"]
+    assert "at 1 node: taken as missing" in field.attrs["warning"]
     np.testing.assert_allclose(field.u, 0.1)
 
 

@@ -144,7 +144,8 @@ def read(path: Path, options: TextOptions | None = None) -> RawField:
     for value in _sentinels(values[~missing, 2:4]):
         marked = (values[:, 2:4] == value).all(axis=1)
         missing |= marked
-        notes.append(f"u and v are {value:g} at {int(marked.sum())} nodes: taken as missing")
+        nodes = int(marked.sum())
+        notes.append(f"u and v are {value:g} at {nodes} node{'s' * (nodes > 1)}: taken as missing")
     rows = masked_rows(line, values, missing, path)
     length, velocity = places["x"][1], places["u"][1]
     if not (length or velocity):

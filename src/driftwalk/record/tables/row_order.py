@@ -64,6 +64,13 @@ def other_order(source: TableSource, reading: TableReading, names: list[str]) ->
     texts = [*free, *([] if reading.body_column is None else [reading.body_column])]
     if not free:
         return None
+    for at in free:
+        unit = UNITS.get(names[at].strip().lower(), "")
+        if unit in ("ms", "us", "ns"):
+            return (
+                f"no column is known to hold times or frames, but '{names[at]}' may hold times: "
+                f"add {argument_text('columns', {'t': f'{names[at]}:{unit}'})}"
+            )
     # The first rows are enough: what skips none in 4 MiB is no clock with missing rows.
     numbers = tuple(sorted({x, y}))
     table = source.read(TableLayout("", names, numbers=numbers, texts=tuple(texts)), head=True)

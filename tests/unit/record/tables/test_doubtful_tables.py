@@ -203,3 +203,27 @@ def test_a_blank_line_below_the_units(tmp_path: Path) -> None:
     rows = "".join(f"{t}\t{x * 100}\t{y * 100}\n" for t, x, y in zip(T, X, Y, strict=True))
     path.write_text(f"Vernier Format 2\nLatest\nTime\tX\tY\nT\tX\tY\ns\tcm\tcm\n\n{rows}")
     check(load(path))
+
+
+def test_a_column_called_by_a_unit_of_time_is_no_body(tmp_path: Path) -> None:
+    ms, dev = np.repeat(40 * np.arange(40), 2), np.tile([0, 1], 40)
+    x, y = np.repeat(X, 2), np.repeat(Y, 2) + 0.05 * dev
+    path = columns(tmp_path, {"dev": dev, "ms": ms, "x_m": x, "y_m": y})
+    with pytest.raises(InputError, match="'ms' may hold times") as caught:
+        load(path)
+    assert "ms:ms" in str(caught.value)
+    assert len(body_names(load(path, columns={"t": "ms:ms", "body": "dev"}))) == 2
+
+
+def test_a_clock_that_counts_frames_can_be_named(tmp_path: Path) -> None:
+    path = columns(tmp_path, {"t": range(40), "x": X, "y": Y})
+    with pytest.raises(InputError, match="name the column that counts frames"):
+        load(path, frame_rate=25.0)
+    check(load(path, frame_rate=25.0, length_unit="m", columns={"frame": "t"}))
+
+
+def test_a_name_without_a_column_at_the_end(tmp_path: Path) -> None:
+    path = tmp_path / "lab.lvm"
+    rows = "".join(f"{t}\t{x}\t{y}\n" for t, x, y in zip(T, X, Y, strict=True))
+    path.write_text(f"LabVIEW Measurement\t\nOperator\tme\n\nTime\tx\ty\tComment\n{rows}")
+    check(load(path))
