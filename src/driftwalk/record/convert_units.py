@@ -237,7 +237,10 @@ def _ticks(raw: RawRecording, options: ReadOptions) -> tuple[float, float | None
     """Return (units of the clock per second, frame rate if the clock counts frames)."""
     if raw.clock_unit != "frame":
         if options.frame_rate_hz is not None:
-            raise InputError("the file has its own clock: leave `frame_rate` out")
+            raise InputError(
+                "the file has its own clock: leave `frame_rate` out, or name the column that "
+                'counts frames, as in `columns={"frame": "NAME"}`'
+            )
         return CLOCK_UNITS[raw.clock_unit], None
     rate = options.frame_rate_hz if options.frame_rate_hz is not None else raw.frame_rate_hz
     return _positive(rate, "frame_rate"), rate

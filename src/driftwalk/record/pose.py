@@ -236,7 +236,10 @@ def join_markers(raw: RawRecording, options: ReadOptions) -> None:
         When a marker does not exist, or a confidence is asked of a format without any.
     """
     if options.min_confidence is not None and not (raw.has_keypoints or raw.has_confidence):
-        raise InputError("the format holds no confidences: leave `min_confidence` out")
+        raise InputError(
+            "the format holds no confidences: leave `min_confidence` out, or name their column "
+            'with `columns={"confidence": "NAME"}` in a plain table'
+        )
     if raw.has_keypoints:
         return
     if options.heading is None:

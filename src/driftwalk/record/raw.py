@@ -22,7 +22,8 @@ NAMELESS = words("#N/A NaN nan NAN NA N/A null NULL None none -nan") | {""}
 MISSING = NAMELESS | words(
     "- -- --- . .. n/a n.a. missing Missing MISSING <NA> NaT nil 1.#QNAN -1.#QNAN 1.#IND "
     "-1.#IND 1.#QNB 1.#SNAN nan(ind) -nan(ind) nan(snan) -nan(snan) nanq nans #DIV/0! #VALUE! "
-    "#REF! #NUM! #NAME? #NULL! #NV #NV! #WERT! #N/D"
+    "#REF! #NUM! #NAME? #NULL! #NV #NV! #WERT! #N/D na nd ND n.d. -NaN NaN() — – * ** *** "
+    "undefined invalid lost"
 )
 """Words that trackers, spreadsheets and compilers write for a missing number."""
 

@@ -26,6 +26,9 @@ class PlausibilityPolicy(NamedTuple):
     """Longest recording, 30 years [s]; chosen by hand."""
     shortest_interval_s: float = 1e-5
     """Shortest interval between samples [s]; chosen by hand."""
+    usual_step_rad: float = 1.5
+    """Median change of an angle between samples, beyond which it is hardly followed in radians;
+    chosen by hand."""
     leap_rad: float = 90.0
     """Turn from one sample to the next [rad] that only degrees have, where they wrap around;
     chosen by hand."""
@@ -116,8 +119,10 @@ def angle_warnings(raw: RawRecording) -> list[str]:
     known = [body.theta[np.isfinite(body.theta)] for body in raw.bodies if body.theta is not None]
     for theta in known:
         with np.errstate(over="ignore"):  # a leap may be infinite
-            leaps = np.abs(np.diff(theta)) > PLAUSIBLE.leap_rad
-        if theta.size and (abs(theta[0]) > 6.2832 or leaps.any()):
+            steps = np.abs(np.diff(theta))
+        fast = steps.size > 1 and np.median(steps) > PLAUSIBLE.usual_step_rad
+        leaps = bool((steps > PLAUSIBLE.leap_rad).any())
+        if theta.size and (abs(theta[0]) > 6.2832 or leaps or fast):
             low, high = float(theta.min()), float(theta.max())
             return [
                 f"angles from {low:.4g} to {high:.4g} are read as radians: if they are degrees, "

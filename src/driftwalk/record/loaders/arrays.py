@@ -17,6 +17,7 @@ from driftwalk.record.stores.npz import ZIP, members, opened_npz
 from driftwalk.record.tables.in_memory import table_in_memory
 from driftwalk.record.tables.matlab import matlab_tables
 from driftwalk.record.tables.rows import recording_of, the_one_that_fits
+from driftwalk.record.vocabulary import ALLOWED
 from driftwalk.schema.stores.netcdf import file_start
 
 _NPY: Final = b"\x93NUMPY"
@@ -108,16 +109,31 @@ def _of_hdf5(contents: Hdf5Contents) -> dict[str, Value]:
         if hasattr(entry, "keys"):
             inner = [one for one in entry if hasattr(entry[one], "shape")]
             found[str(name)] = Struct(
-                [{str(one): _value(contents.array(f"{name}/{one}")) for one in inner}]
+                [
+                    {
+                        _with_unit(str(one), entry[one]): _value(contents.array(f"{name}/{one}"))
+                        for one in inner
+                    }
+                ]
             )
         elif hasattr(entry, "shape"):
-            found[str(name)] = _value(contents.array(str(name)))
+            found[_with_unit(str(name), entry)] = _value(contents.array(str(name)))
     found |= {
         str(name): np.atleast_2d(np.float64(value))
         for name, value in contents.file.attrs.items()
         if str(name).lower() in _RATES and np.size(value) == 1
     }
     return found
+
+
+def _with_unit(name: str, entry: Any) -> str:
+    """Return the name of an array with the unit in its attributes, where that is one of its own."""
+    stated = next((entry.attrs[key] for key in ("units", "unit") if key in entry.attrs), "")
+    unit = stated.decode("utf-8", "replace") if isinstance(stated, bytes) else str(stated)
+    meaning = column_meaning(name)
+    if meaning is None or meaning.unit or not ALLOWED[meaning.quantity] or not unit.strip():
+        return name
+    return f"{name} [{unit.strip()}]"
 
 
 _PARQUET: Final = b"PAR1"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -15,6 +15,12 @@ from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.tables.in_memory import MemorySource
 from driftwalk.record.tables.rows import recording_of
 from driftwalk.record.text import open_binary
+from driftwalk.record.vocabulary import words
+
+_MOST_NUMBERS: Final = 16
+"""Numbers in a list up to which each is a column."""
+_POINTS: Final = words("position pos point xy xyz center centre centroid coordinates location")
+"""Names of lists that hold x and y."""
 
 KEYS = ("x", "y", "theta", "t")
 
@@ -143,10 +149,17 @@ def _objects(value: list[Any]) -> bool:
     return all(isinstance(one, dict) for one in value)
 
 
+def _numbers(value: list[Any]) -> bool:
+    return all(one is None or isinstance(one, int | float) for one in value)
+
+
 def _flat(entry: dict[str, Any], before: str = "") -> dict[str, Any]:
-    """Return the values of an object, those inside with their path for a name."""
+    """Return the values of an object, those inside, and numbers of a list, with their path."""
     found: dict[str, Any] = {}
     for name, value in entry.items():
+        if isinstance(value, list) and 1 < len(value) <= _MOST_NUMBERS and _numbers(value):
+            axes = "xyz" if len(value) < 4 and name.lower() in _POINTS else range(len(value))
+            value = {str(axis): one for axis, one in zip(axes, value, strict=False)}
         if isinstance(value, dict):
             found |= _flat(value, f"{before}{name}.")
         else:

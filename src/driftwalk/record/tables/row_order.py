@@ -20,6 +20,7 @@ from driftwalk.record.tables.column_reading import TableReading
 from driftwalk.record.tables.named_columns import LEFT_OUT
 from driftwalk.record.tables.source import TableSource
 from driftwalk.record.text import Table
+from driftwalk.record.vocabulary import ALLOWED, UNITS
 
 
 class UnevenClockPolicy(NamedTuple):
@@ -63,6 +64,13 @@ def other_order(source: TableSource, reading: TableReading, names: list[str]) ->
     texts = [*free, *([] if reading.body_column is None else [reading.body_column])]
     if not free:
         return None
+    for at in free:
+        unit = UNITS.get(names[at].strip().lower(), "")
+        if unit in ("ms", "us", "ns"):
+            return (
+                f"no column is known to hold times or frames, but '{names[at]}' may hold times: "
+                f"add {argument_text('columns', {'t': f'{names[at]}:{unit}'})}"
+            )
     # The first rows are enough: what skips none in 4 MiB is no clock with missing rows.
     numbers = tuple(sorted({x, y}))
     table = source.read(TableLayout("", names, numbers=numbers, texts=tuple(texts)), head=True)
@@ -247,6 +255,8 @@ def body_columns(
 
 
 def _may_be_a_name(column: str) -> bool:
+    if UNITS.get(column.strip().lower()) in ALLOWED["t"]:
+        return False  # "min" next to "sec"
     meaning = column_meaning(column)
     return meaning is None or meaning.quantity == "body"
 

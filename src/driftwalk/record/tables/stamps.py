@@ -34,6 +34,7 @@ _HALF: Final = (
 """A time of day that counts twelve hours twice."""
 _DATES: Final = (
     r"(?P<year>\d{4})-(?P<month>\d\d)-(?P<day>\d\d)",
+    r"(?P<year>\d{4})/(?P<month>\d\d)/(?P<day>\d\d)",
     r"(?P<day>\d\d)\.(?P<month>\d\d)\.(?P<year>\d{4})",  # calendars in German and others
 )
 _ZONE: Final = r"(?: ?(?P<zone>[Zz]|[+-](?P<zone_hour>\d\d)(?::?(?P<zone_minute>\d\d))?))?"
@@ -52,6 +53,7 @@ _HALF_DAY: Final = re.compile(_HALF)
 _UNCLEAR: Final = re.compile(
     r"\d{1,2}/\d{1,2}/\d{2,4}.*|\d{1,2}-\d{1,2}-\d{2,4}.*|\d{1,2}\.\d{1,2}\.\d{2,4}.*"
     r"|\d{4}/\d.*|\d{1,3}:\d{2}(?:[.,]\d+)?"
+    r"|\d{1,2}:\d\d:\d\d:\d+"  # a fourth part may count frames, hundredths or thousandths
 )
 """Dates and times that can be read in more than one way."""
 
