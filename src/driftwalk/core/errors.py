@@ -8,7 +8,8 @@ The command line prints it on one line and exits with code 2.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 
@@ -107,3 +108,27 @@ def argument_text(name: str, value: str | Mapping[str, str]) -> str:
     # A backquote would end the argument early; its escape means the same in Python and in JSON.
     escaped = text.replace("`", "\\u0060")
     return f"`{name}={escaped}`"
+
+
+@contextmanager
+def damaged_as(what: str, path: Path, *, advice: str = "") -> Iterator[None]:
+    """Turn whatever a library raises on a damaged file into a `FormatError`.
+
+    Parameters
+    ----------
+    what : str
+        Completes "cannot be read", such as ``"as HDF5"``.
+    path : Path
+        The file.
+    advice : str
+        What to do about it, after a semicolon.
+    """
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:
+        reason = f"cannot be read {what}: {reason_of(error)}"
+        if advice:
+            reason = f"{reason.rstrip('.')}; {advice}"
+        raise FormatError(reason, path=path) from error

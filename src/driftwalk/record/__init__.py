@@ -13,7 +13,7 @@ from driftwalk.record.cleaning.jumps import (
     impossible_warning,
 )
 from driftwalk.record.info import describe
-from driftwalk.record.io import load, readable_formats
+from driftwalk.record.io import load, readable_formats, save_trajectory
 from driftwalk.record.noise import (
     NoiseBound,
     NoiseEstimate,
@@ -21,7 +21,6 @@ from driftwalk.record.noise import (
     noise_bound,
     noise_reach,
 )
-from driftwalk.record.write import save_trajectory
 
 __all__ = [
     "CircleFit",

@@ -34,27 +34,34 @@ def check_lines(
     """
     widest = 0
     for offset, raw in enumerate(block.split(b"\n")):
-        text = _decode(raw, path=path, line=line + offset)
+        number = line + offset
+        text = decoded_line(raw, path, number)
+        if "\0" in text:
+            raise FormatError("has a zero byte: this is not a text file", path=path, line=number)
         if text.strip():
             fields = split_fields(text, layout.delimiter)
             widest = max(widest, len(fields))
-            _check_row(fields, text, layout, path=path, line=line + offset, decimal=decimal)
+            _check_row(fields, text, layout, path=path, line=number, decimal=decimal)
     return widest
 
 
-def _decode(raw: bytes, *, path: Path, line: int) -> str:
+def decoded_line(line: bytes, path: Path, number: int) -> str:
+    """Return a line as text, without the carriage return at its end.
+
+    Raises
+    ------
+    FormatError
+        When it is not UTF-8.
+    """
     try:
-        text = raw.decode("utf-8")
+        return line.decode("utf-8").rstrip("\r")
     except UnicodeDecodeError as error:
         raise FormatError(
-            f"is not UTF-8 text (byte 0x{raw[error.start]:02x}): save the file as UTF-8",
+            f"is not UTF-8 text (byte 0x{line[error.start]:02x}): save the file as UTF-8",
             path=path,
-            line=line,
+            line=number,
             column=error.start + 1,
         ) from error
-    if "\0" in text:
-        raise FormatError("has a zero byte: this is not a text file", path=path, line=line)
-    return text
 
 
 def _check_row(

@@ -11,6 +11,7 @@ from typing import Final
 from driftwalk.record.vocabulary import (
     ALLOWED,
     IMAGE_WORDS,
+    INNER,
     NO_POSITION,
     NO_UNIT,
     ROOTS,
@@ -89,12 +90,19 @@ def column_meaning(name: str, unit_below: str = "") -> ColumnMeaning | None:
         and (last in ALLOWED[quantity] or UNITS.get(last) in ALLOWED[quantity])
     ):
         unit = UNITS[tokens.pop().lower()]
-    elif not inside and quantity and last in NO_UNIT and ALLOWED[quantity]:
-        unknown = tokens.pop()
+    elif not inside and quantity and (last in NO_UNIT or _scaled(last) in ALLOWED[quantity]):
+        unknown = tokens.pop() if ALLOWED[quantity] else ""
     else:
         index, quantity, number = _quantity(tokens)
     if not quantity:
         return None
+    if quantity in OF_BODY and not (inside or unit or unknown):
+        inner = _inner_unit(tokens, index, quantity)
+        if inner is not None and UNITS.get(last) in ALLOWED["t"]:
+            return None  # "x_mm_s" is a velocity
+        if inner is not None:
+            unit = UNITS[tokens.pop(inner).lower()]
+            index -= inner < index
     rest = [token for position, token in enumerate(tokens) if position != index]
     lower = {token.lower() for token in rest}
     root = tokens[index].lower()
@@ -139,6 +147,22 @@ def _quantity(tokens: list[str]) -> tuple[int, str, str]:
         elif kinds == ("theta", "theta"):
             found = found[:1]  # "heading angle"
     return found[0] if len(found) == 1 else (-1, "", "")
+
+
+def _scaled(word: str) -> str:
+    """Return the unit of a word such as "10um", ``""`` of any other."""
+    stem = word.lstrip("0123456789")
+    return UNITS.get(stem, "") if stem != word else ""
+
+
+def _inner_unit(tokens: list[str], index: int, quantity: str) -> int | None:
+    """Return where a unit stands in the middle of a name, None where none does."""
+    for at, token in enumerate(tokens):
+        word = token.lower()
+        after = word == "m" and at == index + 1 < len(tokens) - 1
+        if (word in INNER or after) and UNITS[word] in ALLOWED[quantity]:
+            return at
+    return None
 
 
 def _stamp(tokens: list[str], unit: str) -> ColumnMeaning | None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from driftwalk.core.arrays import Bools
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.text.json_text import json_value, parse_json
 from driftwalk.record.circle import fit_circle
@@ -174,7 +175,7 @@ def _speed(track: Track) -> dict[str, Any]:
     return described
 
 
-def _turn_rate(theta: Array, interval: Array, near: np.ndarray[Any, Any]) -> dict[str, float]:
+def _turn_rate(theta: Array, interval: Array, near: Bools) -> dict[str, float]:
     turned = np.diff(theta)
     turned = (turned + np.pi) % (2.0 * np.pi) - np.pi
     rate = (turned[near] / interval[near])[np.isfinite(turned[near])]

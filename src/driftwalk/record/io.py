@@ -1,4 +1,4 @@
-"""Load a recording: read, convert to SI, clean, place in its arena."""
+"""Load a recording: read, convert to SI, clean, place in its arena; write a trajectory."""
 
 from __future__ import annotations
 
@@ -13,26 +13,30 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.files.atomic import atomic_path, require_target, write_atomic
 from driftwalk.core.text.did_you_mean import listed
 from driftwalk.core.text.json_text import parse_json
 from driftwalk.core.units import parse_quantity
 from driftwalk.record.arena import PlacedArena, arena_attributes, place_arena
 from driftwalk.record.cleaning.clean import Counts, clean_body
-from driftwalk.record.cleaning.clock import check_clock
-from driftwalk.record.cleaning.counters import unwrap_counters
-from driftwalk.record.cleaning.extent import refuse_many_bodies, refuse_sparse
+from driftwalk.record.cleaning.clock import check_clock, unwrap_counters
 from driftwalk.record.cleaning.jumps import arena_diagonal, impossible_steps, impossible_warning
 from driftwalk.record.cleaning.missing import blank_missing, mark_warnings
-from driftwalk.record.cleaning.warn import angle_warnings, plausibility_warnings
+from driftwalk.record.cleaning.warn import (
+    angle_warnings,
+    plausibility_warnings,
+    refuse_many_bodies,
+    refuse_sparse,
+)
 from driftwalk.record.convert_units import convert_units
 from driftwalk.record.noise import noise_reach
 from driftwalk.record.origin import origin_of
-from driftwalk.record.pose.keypoints import two_names
-from driftwalk.record.pose.markers import join_markers
+from driftwalk.record.pose import join_markers, two_names
 from driftwalk.record.raw import DELIMITERS, Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.registry import PLAIN
 from driftwalk.record.text import DAMAGED_GZIP
-from driftwalk.schema import Track, build_trajectory
+from driftwalk.schema import Track, body_names, build_trajectory, check_trajectory
+from driftwalk.schema.stores.netcdf import netcdf_bytes
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -417,3 +421,76 @@ def _usual_rate(bodies: list[RawBody]) -> float:
         if body.clock.size > 1
     ]
     return float(1.0 / np.median(intervals)) if intervals else 0.0
+
+
+CSV_COLUMNS = ["t_s", "x_m", "y_m", "theta_rad", "body"]
+
+
+def save_trajectory(
+    dataset: xr.Dataset, path: str | PathLike[str], *, existing: str = "error"
+) -> Path:
+    """Write a trajectory as NetCDF (``.nc``) or plain CSV (``.csv``), by the name's ending.
+
+    CSV has the columns t_s, x_m, y_m, theta_rad and body. Numbers have as many digits as it takes
+    to read the same float64 back. Rows are the present samples, and one row with empty positions
+    for a time at which no body is present; the arena and the other attributes are lost, so NetCDF
+    is the format to keep.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A `trajectory`.
+    path : path-like
+        Where to write. The file appears whole or not at all.
+    existing : {"error", "replace"}
+        Behaviour if the file exists already.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        When the file exists, its folder does not, or its ending is neither ``.nc`` nor ``.csv``.
+    RunDirectoryError
+        When the place cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from driftwalk.schema import build_trajectory
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_trajectory(build_trajectory([0.0], [0.1], [0.2]), f"{folder}/a.csv").name
+    'a.csv'
+    """
+    check_trajectory(dataset)
+    target = Path(path)
+    require_target(target, existing=existing, endings=(".nc", ".csv"))
+    if target.suffix.lower() == ".csv":
+        with atomic_path(target) as partial:
+            _write_csv(dataset, partial)
+    else:
+        write_atomic(target, netcdf_bytes(dataset))
+    return target
+
+
+def _write_csv(dataset: xr.Dataset, path: Path) -> None:
+    """Write block by block, so that the text never stands in memory as a whole."""
+    import pandas as pd
+
+    time = dataset["time"].values
+    names = np.array(body_names(dataset), dtype=object)
+    with path.open("w", encoding="utf-8", newline="") as file:
+        pd.DataFrame(columns=CSV_COLUMNS).to_csv(file, index=False)
+        for first in range(0, time.size, 200_000):
+            block = slice(first, first + 200_000)
+            x, y, theta = (dataset[name].values[block] for name in ("x", "y", "theta"))
+            present = np.isfinite(x) & np.isfinite(y)
+            present[:, 0] |= ~present.any(axis=1)
+            row, body = np.nonzero(present)
+            values = [time[block][row], x[row, body], y[row, body], theta[row, body], names[body]]
+            pd.DataFrame(dict(zip(CSV_COLUMNS, values, strict=True))).to_csv(
+                file, index=False, header=False
+            )

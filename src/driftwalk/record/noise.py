@@ -6,8 +6,8 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Bools, Integers
 from driftwalk.core.memoize import remembered
 from driftwalk.record.raw import Array
 from driftwalk.schema import Track
@@ -246,7 +246,7 @@ def _estimate(time: Array, series: tuple[Array, ...]) -> _Estimate:
     return _Estimate(math.sqrt(noise), standard_error, max(intensity, 0.0), sum(map(len, blocks)))
 
 
-def _window_starts(time: Array) -> npt.NDArray[np.int64]:
+def _window_starts(time: Array) -> Integers:
     """Return the first sample of each window of five that no gap splits."""
     if time.size <= _NOISE.order:
         return np.zeros(0, dtype=np.int64)
@@ -255,11 +255,11 @@ def _window_starts(time: Array) -> npt.NDArray[np.int64]:
     return np.flatnonzero(span <= 1.5 * _NOISE.order * usual)
 
 
-def _members(starts: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+def _members(starts: Integers) -> Integers:
     return starts[:, None] + np.arange(_NOISE.order + 1)
 
 
-def _weights(time: Array, starts: npt.NDArray[np.int64]) -> tuple[Array, Array]:
+def _weights(time: Array, starts: Integers) -> tuple[Array, Array]:
     """Return the times of each window and the weights of its divided difference.
 
     Scaled to the sum of squares of (1, -4, 6, -4, 1), which they are on an even clock.
@@ -274,9 +274,7 @@ def _weights(time: Array, starts: npt.NDArray[np.int64]) -> tuple[Array, Array]:
     return times, weights
 
 
-def _lag_sums(
-    time: Array, starts: npt.NDArray[np.int64], values: Array, good: npt.NDArray[np.bool_]
-) -> Array:
+def _lag_sums(time: Array, starts: Integers, values: Array, good: Bools) -> Array:
     """Return for each lag the sums of (noise term, process term, product of differences, count)."""
     times, weights = _weights(time, starts)
     sums = np.zeros((_NOISE.lags + 1, 4))

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.errors import FormatError, InputError, reason_of
 from driftwalk.record.raw import (
     ANGLE_UNITS,
     CLOCK_UNITS,
@@ -61,7 +61,7 @@ class ForeignLoader:
             kind = type(error).__name__
             self.failed = (
                 f"the loader '{self.name}' of the package {self.package} failed to recognise it: "
-                f"{kind}: {_one_line(error)}"
+                f"{kind}: {reason_of(error)}"
             )
             return 0.0
 
@@ -72,16 +72,16 @@ class ForeignLoader:
             raw = self._loader.read(path, options)
         except FormatError as error:
             raise FormatError(
-                f"{_one_line(error.reason)} ({by})",
+                f"{' '.join(error.reason.split())} ({by})",
                 path=error.path or path,
                 line=error.line,
                 column=error.column,
             ) from error
         except InputError as error:
-            raise InputError(f"{_one_line(error)} ({by})") from error
+            raise InputError(f"{reason_of(error)} ({by})") from error
         except Exception as error:  # whatever another package's code raises
             kind = type(error).__name__
-            raise FormatError(f"{by} failed: {kind}: {_one_line(error)}", path=path) from error
+            raise FormatError(f"{by} failed: {kind}: {reason_of(error)}", path=path) from error
         wrong = _what_is_wrong(raw)
         if wrong:
             raise FormatError(f"{by} returned {wrong}", path=path)
@@ -114,7 +114,7 @@ def foreign_loaders(taken: Container[str]) -> ForeignLoaders:
                 raise TypeError(f"it has no {' and no '.join(lacking)}")
             foreign = ForeignLoader(loader, _package(point))
         except Exception as error:  # whatever another package's code raises
-            reason = f"{type(error).__name__}: {_one_line(error)}"
+            reason = f"{type(error).__name__}: {reason_of(error)}"
             broken[point.name] = f"the package {_package(point)} has a broken loader ({reason})"
             continue
         if foreign.name in taken or foreign.name in found:
@@ -129,10 +129,6 @@ def foreign_loaders(taken: Container[str]) -> ForeignLoaders:
 
 def _package(point: EntryPoint) -> str:
     return point.dist.name if point.dist is not None else point.value
-
-
-def _one_line(error: object) -> str:
-    return " ".join(str(error).split())
 
 
 def _what_is_wrong(raw: Any) -> str:

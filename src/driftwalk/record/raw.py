@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Bools, Floats
 from driftwalk.record.vocabulary import words
 
 NAMELESS = words("#N/A NaN nan NAN NA N/A null NULL None none -nan") | {""}
@@ -22,7 +22,8 @@ NAMELESS = words("#N/A NaN nan NAN NA N/A null NULL None none -nan") | {""}
 MISSING = NAMELESS | words(
     "- -- --- . .. n/a n.a. missing Missing MISSING <NA> NaT nil 1.#QNAN -1.#QNAN 1.#IND "
     "-1.#IND 1.#QNB 1.#SNAN nan(ind) -nan(ind) nan(snan) -nan(snan) nanq nans #DIV/0! #VALUE! "
-    "#REF! #NUM! #NAME? #NULL! #NV #NV! #WERT! #N/D"
+    "#REF! #NUM! #NAME? #NULL! #NV #NV! #WERT! #N/D na nd ND n.d. -NaN NaN() — – * ** *** "
+    "undefined invalid lost"
 )
 """Words that trackers, spreadsheets and compilers write for a missing number."""
 
@@ -48,7 +49,7 @@ class TableLayout:
     It becomes the numbers of the first of them."""
 
 
-Array = npt.NDArray[np.float64]
+Array = Floats
 
 LENGTH_UNITS: dict[str, float] = {
     **{"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "km": 1e3, "dm": 0.1, "nm": 1e-9},
@@ -92,6 +93,12 @@ class RawBody:
     """Orientation, shape (n,), wrapped or not; None when the file has none."""
     extra: dict[str, Array] = field(default_factory=dict, kw_only=True)
     """Further values of each sample, shape (n, ...), by name; see `RawRecording.extra`."""
+
+    def blank(self, lost: Bools) -> None:
+        """Make rows missing, in new arrays."""
+        self.x, self.y = np.where(lost, np.nan, self.x), np.where(lost, np.nan, self.y)
+        if self.theta is not None:
+            self.theta = np.where(lost, np.nan, self.theta)
 
 
 @dataclass(frozen=True)

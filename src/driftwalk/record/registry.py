@@ -1,8 +1,8 @@
-"""Registry of the readable formats: one file each under `record.loaders`, found automatically.
+"""Registry of the readable formats: files under `record.loaders`, found automatically.
 
-A further format joins by one file that defines ``LOADER``, an object with the members of
-`Loader`. Nothing else has to be edited. Other packages name theirs by entry points, see
-`record.foreign`.
+A further format joins by one file that defines ``LOADER``, an object with the members of `Loader`,
+or by an entry in the ``LOADERS`` of a file of several. Nothing else has to be edited. Other
+packages name theirs by entry points, see `record.plugin_loaders`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Final, Protocol, runtime_checkable
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.plugin_loaders import ForeignLoaders, foreign_loaders
 from driftwalk.record.raw import RawRecording, ReadOptions
-from driftwalk.record.recognise.suggest_format import nearest_table, unknown_file
+from driftwalk.record.recognise import nearest_table, unknown_file
 from driftwalk.record.text import read_head
 
 PLAIN: Final = "csv"
@@ -72,13 +72,12 @@ def _own_loaders() -> dict[str, Loader]:
 
     from driftwalk.record import loaders as package
 
-    found: dict[str, Loader] = {}
-    modules = pkgutil.walk_packages(package.__path__, f"{package.__name__}.")
-    for module in sorted(modules, key=lambda entry: entry.name.rpartition(".")[2]):
-        if not module.ispkg:
-            loader = importlib.import_module(module.name).LOADER
-            found[loader.name] = loader
-    return found
+    found: list[Loader] = []
+    for entry in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+        if not entry.ispkg:
+            module = importlib.import_module(entry.name)
+            found += getattr(module, "LOADERS", None) or (module.LOADER,)
+    return {loader.name: loader for loader in sorted(found, key=lambda one: one.name)}
 
 
 def find_loader(path: Path, *, format: str | None = None, by_columns: bool = False) -> Loader:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import gzip
 import io
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -20,11 +20,11 @@ from typing import IO, Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.arrays import Bools, Codes, Integers
 from driftwalk.core.errors import FormatError
-from driftwalk.record.bad_row import check_lines
+from driftwalk.record.bad_row import check_lines, decoded_line
 from driftwalk.record.raw import MISSING, NAMELESS, Array, TableLayout
 from driftwalk.record.tables.encoding import WINDOWS, TranscodedText, other_encoding
-from driftwalk.record.tables.growing import GrowingColumn
 from driftwalk.record.tables.stamps import StampError, StampReader, calendar_of, clock_of_stamps
 
 
@@ -63,10 +63,14 @@ class Table:
     """Offset subtracted from the clock, so that nanoseconds since 1970 stay exact."""
     calendar: str = ""
     """Origin of the nanoseconds of time stamps, see `StampReader`; ``""``: the clock has none."""
-    codes: dict[int, npt.NDArray[np.int32]] = field(default_factory=dict)
+    codes: dict[int, Codes] = field(default_factory=dict)
     """Text column to the index of each row's value in `labels`."""
     labels: dict[int, list[str]] = field(default_factory=dict)
     """Text column to its distinct values, in order of appearance."""
+
+    def stack(self, columns: Iterable[int]) -> Array:
+        """Return columns of numbers side by side, shape (rows, columns)."""
+        return np.column_stack([self.numbers[column] for column in columns])
 
 
 def open_binary(path: Path) -> IO[bytes]:
@@ -204,25 +208,6 @@ def header_rows(path: Path, count: int) -> list[str]:
     return rows
 
 
-def decoded_line(line: bytes, path: Path, number: int) -> str:
-    """Return a line as text, without the carriage return at its end.
-
-    Raises
-    ------
-    FormatError
-        When it is not UTF-8.
-    """
-    try:
-        return line.decode("utf-8").rstrip("\r")
-    except UnicodeDecodeError as error:
-        raise FormatError(
-            f"is not UTF-8 text (byte 0x{line[error.start]:02x}): save the file as UTF-8",
-            path=path,
-            line=number,
-            column=error.start + 1,
-        ) from error
-
-
 def read_table(path: Path, layout: TableLayout, *, blocks: int | None = None) -> Table:
     """Read the numbered and the text columns of a table.
 
@@ -260,14 +245,44 @@ def read_table(path: Path, layout: TableLayout, *, blocks: int | None = None) ->
     return collected.table()
 
 
+class _GrowingColumn:
+    """An array that values are appended to."""
+
+    def __init__(self, dtype: npt.DTypeLike, *, expected: int = 0) -> None:
+        # Memory that is never written to is never taken.
+        self._values = np.empty(expected, dtype=dtype)
+        self._count = 0
+
+    def append(self, values: npt.NDArray[Any]) -> None:
+        """Append values, which are copied."""
+        stop = self._count + values.size
+        if stop > self._values.size:
+            self._values.resize(max(stop, int(1.25 * self._values.size)), refcheck=False)
+        self._values[self._count : stop] = values
+        self._count = stop
+
+    def whole(self) -> Bools:
+        """Return where the values are whole numbers, or no numbers."""
+        values = self._values[: self._count]
+        whole: Bools = ~(np.isfinite(values) & (values % 1.0 != 0.0))
+        return whole
+
+    def take(self) -> npt.NDArray[Any]:
+        """Return the array, which is this column's no more."""
+        values, self._values = self._values, np.empty(0, dtype=self._values.dtype)
+        values.resize(self._count, refcheck=False)
+        self._count = 0
+        return values
+
+
 class _Collected:
     """Columns of a table as far as it is read."""
 
     def __init__(self, layout: TableLayout, path: Path) -> None:
         self._layout = layout
         self._path = path
-        self._numbers: dict[int, GrowingColumn] = {}
-        self._codes: dict[int, GrowingColumn] = {}
+        self._numbers: dict[int, _GrowingColumn] = {}
+        self._codes: dict[int, _GrowingColumn] = {}
         self._labels: dict[int, dict[str, int]] = {column: {} for column in layout.texts}
         self._stamps = {column: StampReader() for column in layout.stamps}
         self._decimal = "."
@@ -335,9 +350,9 @@ class _Collected:
         # A packed file has fewer bytes than its text: the columns then grow.
         rows = int(1.02 * len(frame) * self._path.stat().st_size / len(block)) + len(frame)
         numbers = (*self._layout.numbers, *self._layout.stamps[:1])
-        self._numbers = {column: GrowingColumn(np.float64, expected=rows) for column in numbers}
+        self._numbers = {column: _GrowingColumn(np.float64, expected=rows) for column in numbers}
         self._codes = {
-            column: GrowingColumn(np.int32, expected=rows) for column in self._layout.texts
+            column: _GrowingColumn(np.int32, expected=rows) for column in self._layout.texts
         }
 
     def _from_origin(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
@@ -475,7 +490,7 @@ def _pandas_is_exact(version: str) -> bool:
     return (major, minor) >= (3, 1)
 
 
-def _field_counts(block: bytes, delimiter: str) -> npt.NDArray[np.int64]:
+def _field_counts(block: bytes, delimiter: str) -> Integers:
     """Count the fields of each line of a block; 0 for a blank line."""
     characters = np.frombuffer(block, dtype=np.uint8)
     ends = np.flatnonzero(characters == ord("\n"))
@@ -495,9 +510,7 @@ def _field_counts(block: bytes, delimiter: str) -> npt.NDArray[np.int64]:
     return fields
 
 
-def _quoted(
-    characters: npt.NDArray[np.uint8], starts: npt.NDArray[np.int64]
-) -> npt.NDArray[np.bool_]:
+def _quoted(characters: npt.NDArray[np.uint8], starts: Integers) -> Bools:
     """Return what stands between quotation marks, of lines in which all of them are closed."""
     marks = (characters == ord('"')).astype(np.int64)
     before = np.cumsum(marks)
@@ -508,7 +521,7 @@ def _quoted(
     return np.asarray((within % 2 == 1) & closed)
 
 
-def _encode(values: Any, seen: dict[str, int]) -> npt.NDArray[np.int32]:
+def _encode(values: Any, seen: dict[str, int]) -> Codes:
     """Turn the texts of a column into numbers, adding new ones to `seen`."""
     import pandas as pd
 

@@ -6,10 +6,10 @@ import re
 from pathlib import Path
 
 from driftwalk.core.errors import FormatError
-from driftwalk.record.bad_row import is_number, split_fields
+from driftwalk.record.bad_row import decoded_line, is_number, split_fields
 from driftwalk.record.raw import MISSING
 from driftwalk.record.tables.stamps import stamp_form
-from driftwalk.record.text import decoded_line, header_rows, read_head
+from driftwalk.record.text import header_rows, read_head
 
 _COMMA_DECIMAL = re.compile(r"[+-]?\d+,\d+(?:[eE][+-]?\d+)?")
 _DELIMITER_LINE = re.compile(r"sep=(.)\s*", re.IGNORECASE)
@@ -27,6 +27,16 @@ def first_lines(head: bytes, count: int = 5) -> list[str]:
         return []
     lines = head.split(b"\n")
     return [line.decode("utf-8", "replace").rstrip("\r") for line in lines[:count] if line.strip()]
+
+
+def first_line(head: bytes) -> str:
+    """Return the first line of a file's start, ``""`` when it is blank or cannot be text."""
+    return next(iter(first_lines(head, 1)), "")
+
+
+def first_names(head: bytes) -> list[str]:
+    """Return the fields between the commas of the first line of a file's start."""
+    return split_fields(first_line(head), ",")
 
 
 def detect_delimiter(lines: list[str]) -> str:

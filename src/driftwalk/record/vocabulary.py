@@ -26,16 +26,17 @@ ROOTS: Final[dict[str, str]] = {
     **{part: part for part in ("qx", "qy", "qz", "qw")},
     **_words("theta", "theta heading orientation angle yaw winkel ausrichtung orientierung"),
     **_words("theta", "orientierungswinkel drehwinkel ángulo angulo orientación orientacion"),
-    **_words("theta", "angolo orientamento"),
+    **_words("theta", "angolo orientamento θ"),
     **_words("body", "body id track trackid robot robotid individual animal name particle agent"),
     **_words("body", "subject fish mouse rat bot particleid agentid objectid tagid uid tracklet"),
     **_words("body", "trackingid identity trajectory spur körper koerper roboter tier piste corps"),
     **_words("body", "individu trajectoire cuerpo pista trayectoria individuo corpo traccia"),
     **_words("body", "traiettoria instanceid"),
-    **_words("lon", "lon lng longitude"),
-    **_words("lat", "lat latitude"),
+    **_words("lon", "lon lng long longitude longitud longitudine länge laenge"),
+    **_words("lat", "lat latitude latitud latitudine"),
     **_words("confidence", "p conf confidence likelihood prob probability score valid visible"),
     **_words("confidence", "visibility certainty konfidenz confiance confianza confidenza"),
+    **_words("confidence", "quality isvalid isvisible detected tracked"),
 }
 WITH_ID: Final = words("object obj cell marker tag target blob instance tracking")
 """These name bodies only with "id": alone they may be a class or a state, which changes."""
@@ -81,8 +82,11 @@ NO_UNIT: Final = words(
 )
 """Units without a length or an angle of their own, or with several: they are refused by name."""
 
+INNER: Final = words("mm cm um µm μm nm dm px pixel pixels deg degrees rad mrad")
+"""Units that no body is called by: they count in the middle of a name, too (x_mm_filtered)."""
+
 IMAGE_WORDS: Final = words(
-    "pos position center centre centroid image coord coordinate mitte schwerpunkt mittelpunkt "
+    "pos posn position center centre centroid image coord coordinate mitte schwerpunkt mittelpunkt "
     "posición posicion centro posizione centroide"
 )
 """Words next to x or y that name no body. They hint at an image: such lengths are not metres."""
@@ -90,17 +94,18 @@ NO_POSITION: Final = words(
     "velocity vel speed acceleration acc accel force err error std sigma var variance min max "
     "confidence likelihood score dot ddot gyro gyroscope mag magnetometer accelerometer rate "
     "omega angular linear twist torque jerk cov covariance bias noise diff delta gradient "
-    "geschwindigkeit vitesse velocidad velocità kraft"
+    "geschwindigkeit vitesse velocidad velocità kraft per"
 )
 """Words next to a coordinate or an angle that rule out a position."""
 SETPOINTS: Final = words(
     "ref reference cmd command commanded goal target tgt setpoint setp sp desired des demand "
-    "origin wind current waypoint wp offset soll sollwert consigne consigna"
+    "origin wind current waypoint wp offset soll sollwert consigne consigna expected planned "
+    "nominal joy joystick touch cursor"
 )
 """Words of pairs that are no body where another pair is: what it was to do, or what pushed it."""
 VARIANTS: Final = words(
     "raw filt filtered smooth smoothed est estimate estimated true truth gt meas measured "
-    "pred predicted kf ekf interp interpolated corrected"
+    "pred predicted kf ekf interp interpolated corrected mean hat odom odometry gps imu"
 )
 """Words of pairs that are one body once more, from before or after a computation."""
 TIME_WORDS: Final = words(
@@ -114,10 +119,10 @@ MIDDLE: Final = words("body center centre centroid middle mid") | {""}
 """Parts of one body: its orientation is the direction from the middle to the front."""
 
 _CORNERS: Final = {
-    "x1": "xmin minx left bbleft bboxleft boxleft xtl x1 xleft",
-    "y1": "ymin miny top bbtop bboxtop boxtop ytl y1 ytop",
-    "x2": "xmax maxx right bbright bboxright boxright xbr x2 xright",
-    "y2": "ymax maxy bottom bbbottom bboxbottom boxbottom ybr y2 ybottom",
+    "x1": "xmin minx left bbleft bboxleft boxleft xtl tlx xul ulx x1 xleft",
+    "y1": "ymin miny top bbtop bboxtop boxtop ytl tly yul uly y1 ytop",
+    "x2": "xmax maxx right bbright bboxright boxright xbr brx xlr lrx x2 xright",
+    "y2": "ymax maxy bottom bbbottom bboxbottom boxbottom ybr bry ylr lry y2 ybottom",
     "w": "w width bbwidth bboxwidth boxwidth breite largeur ancho larghezza",
     "h": "h height bbheight bboxheight boxheight höhe hoehe hauteur alto altezza",
     "x": "x",

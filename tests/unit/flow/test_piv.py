@@ -368,7 +368,7 @@ MAKERS: dict[str, Callable[[Path], Path]] = {
         ("insight", " mm", " furlong", "unknown unit 'furlong'"),
         ("insight", ", 1\n", "\n", "expected 5 fields, got 4"),
         ("davis", "2D-vector", "3D-vector", 'line 1: expected "2D-vector"'),
-        ("davis", '"mm"', '"inch"', "unknown unit 'inch'"),
+        ("davis", '"mm"', '"furlong"', "unknown unit 'furlong'"),
         ("davis", "16\t64\t", "16\t", "expected 4 fields, got 3"),
     ],
 )

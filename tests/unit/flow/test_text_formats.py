@@ -334,3 +334,32 @@ def test_a_file_that_ends_within_a_row(tmp_path: Path, back: int) -> None:
     with pytest.raises(InputError) as caught:
         load_flow(path, **PIXELS)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("mark", ["-9999", "999", "1e20"])
+def test_a_number_far_beyond_all_others_is_no_velocity(tmp_path: Path, mark: str) -> None:
+    path = tmp_path / "field.csv"
+    rows = [f"{x},{y},0.1,-0.2" for y in range(3) for x in range(4)]
+    rows[5] = f"1,1,{mark},{mark}"
+    path.write_text("\n".join(["x,y,u,v", *rows, ""]), encoding="utf-8")
+    field = load_flow(path)
+    assert int((field.flag == 1).sum()) == 11
+    assert "at 1 node: taken as missing" in field.attrs["warning"]
+    np.testing.assert_allclose(field.u, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("head", "length", "speed"),
+    [
+        ("x_mm,y_mm,vx_mm_s,vy_mm_s", 1e-3, 1e-3),
+        ("x_m,y_m,u_m_per_s,v_m_per_s", 1.0, 1.0),
+        ("x [in],y [in],u [ft/s],v [ft/s]", 0.0254, 0.3048),
+    ],
+)
+def test_further_names_and_units(tmp_path: Path, head: str, length: float, speed: float) -> None:
+    path = tmp_path / "field.csv"
+    rows = [f"{x},{y},0.1,-0.2" for y in range(3) for x in range(4)]
+    path.write_text("\n".join([head, *rows, ""]), encoding="utf-8")
+    field = load_flow(path)
+    np.testing.assert_allclose(field.x, length * np.arange(4))
+    np.testing.assert_allclose(field.v, -0.2 * speed)

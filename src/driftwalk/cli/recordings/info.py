@@ -134,7 +134,7 @@ def info(
     block = [] if side is None else ["--side", f"{side:.12g}"]
     words = [*how.words(), *block, *words_to_fit(trajectory, described)]
     # A body that never moves cannot be fitted.
-    if any(body["speed_max_m_s"] for body in described["bodies"].values()):
+    if any(body.get("speed_max_m_s") for body in described["bodies"].values()):
         print_next("fit", recording, *words, "-o", f"{recording.stem}-fit")
 
 

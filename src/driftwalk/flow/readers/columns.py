@@ -45,7 +45,10 @@ _MARKS: Final[dict[str, Callable[[Array], npt.NDArray[np.bool_]]]] = {
 """Columns that say which velocities were measured, and which of their values say so."""
 _TIMES: Final = frozenset({"t", "t s", "time", "time s", "frame", "timestamp", "slice"})
 _BRACKET: Final = re.compile(r"(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]")
-_SUFFIX: Final = re.compile(r"([xyuv])_(m|cm|mm|um|px|pixel)(?:_(s|frame))?", re.IGNORECASE)
+_SUFFIX: Final = re.compile(
+    r"([xyuv]|[uv][xy]|vel_?[xy])_(m|cm|mm|um|px|pixel|in|ft)(?:(?:_per_|_|/)(s|min|frame))?",
+    re.IGNORECASE,
+)
 MISSING: Final = frozenset(
     ("", "nan", "-nan", "na", "n/a", "#n/a", "<na>", "null", "none", "-", "--", ".", "missing")
 ) | frozenset(("nan(ind)", "-nan(ind)", "1.#qnan", "-1.#ind", "1.#ind", "masked"))
@@ -88,9 +91,10 @@ def column_of(name: str) -> Column:
     if suffix is not None:
         text, unit = suffix[1].lower(), suffix[2].lower()
         # A position over a time, or a velocity without one, is some other quantity.
-        known = bool(suffix[3]) == (text in "uv")
+        quantity = _quantity([text.replace("_", "")])
+        known = bool(suffix[3]) == (quantity in ("u", "v"))
         over = f"/{suffix[3].lower()}" if suffix[3] else ""
-        return Column(text if known else "", f"{unit}{over}", text)
+        return Column(quantity if known else "", f"{unit}{over}", text)
     while (match := _BRACKET.fullmatch(text)) is not None:
         text, unit = match[1], unit or match[2]
     words = [one for one in re.split(r"[\s_.:-]+", _plain(text)) if one]

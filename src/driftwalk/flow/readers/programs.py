@@ -115,6 +115,11 @@ PROGRAMS: Final = (
         *("davis", "DaVis table", r'(?m)^"?x \[\w+\]"?[;,\t]"?y \[.*Velocity u \['),
         zero_is_missing=True,
     ),
+    Program(
+        *("fiji", "PIV plugin of ImageJ", r"(?im)^\W*x\W+y\W+ux1\W+uy1\b"),
+        y="down",
+        units=("px", "px/frame"),
+    ),
     Program("openpiv", "OpenPIV", r"(?i)\A\s*#\s*x\s+y\s+u\s+v\b", y="rows"),
 )
 _BY_WIDTH: Final = {

@@ -31,6 +31,9 @@ Lines = list[tuple[int, str]]
 _DELIMITERS: Final = ("\t", ";", ",", None)
 _ROW: Final = re.compile(r"\s*(?:[-+.\d]|nan\b)", re.IGNORECASE)
 _WORDS: Final = re.compile(r'"[^"]*"|vector type(?:\s*\[-\])?|\S+(?:\s*[\[(][^\])]*[\])])*', re.I)
+_WORDS_END: Final = (32767.0, 32768.0, 65535.0)
+_FAR: Final = 20.0
+"""Largest velocities from which on a value such as -9999 is none; chosen by hand."""
 _MOST_HEAD: Final = 200
 """Lines among which a header is looked for."""
 
@@ -137,6 +140,12 @@ def read(path: Path, options: TextOptions | None = None) -> RawField:
         missing |= ~rule(mark)
     if program.zero_is_missing and not marks:
         missing |= (values[:, 2:4] == 0.0).all(axis=1)
+    notes = []
+    for value in _sentinels(values[~missing, 2:4]):
+        marked = (values[:, 2:4] == value).all(axis=1)
+        missing |= marked
+        nodes = int(marked.sum())
+        notes.append(f"u and v are {value:g} at {nodes} node{'s' * (nodes > 1)}: taken as missing")
     rows = masked_rows(line, values, missing, path)
     length, velocity = places["x"][1], places["u"][1]
     if not (length or velocity):
@@ -148,11 +157,29 @@ def read(path: Path, options: TextOptions | None = None) -> RawField:
         velocity,
         down=program.counts_down(rows.y),
         frame_interval=program.interval_in(text),
-        notes=[f"columns beyond x, y, u, v have no name and are not read: {unread}"]
-        if unread
-        else [],
+        notes=[
+            *notes,
+            *(
+                [f"columns beyond x, y, u, v have no name and are not read: {unread}"]
+                * bool(unread)
+            ),
+        ],
         reading=_described(layout, places, list(marks)),
     )
+
+
+def _sentinels(velocity: Array) -> list[float]:
+    """Return the values far beyond all others that stand for a velocity that is not there."""
+    known = velocity[np.isfinite(velocity).all(axis=1)]
+    alike = known[known[:, 0] == known[:, 1], 0]
+    found = [
+        float(value)
+        for value in np.unique(alike)
+        if abs(value) >= 1e9 or abs(value) in _WORDS_END or re.fullmatch("9{2,}", f"{abs(value):g}")
+    ]
+    rest = known[~np.isin(known, found).all(axis=1)]
+    largest = float(np.abs(rest).max()) if rest.size else math.inf
+    return [value for value in found if abs(value) > _FAR * largest]
 
 
 def _described(layout: Layout, places: Mapping[str, tuple[int, str]], marks: list[int]) -> str:

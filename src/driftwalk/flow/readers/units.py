@@ -61,6 +61,12 @@ _WORDS: Final = {
     **dict.fromkeys(("px", "pix", "pixel", "pixels"), "px"),
     **dict.fromkeys(("frame", "frames", "dt", "deltat"), "frame"),
 }
+_IMPERIAL: Final = {
+    **dict.fromkeys(("in", "inch", "inches"), 0.0254),
+    **dict.fromkeys(("ft", "foot", "feet"), 0.3048),
+    **dict.fromkeys(("yd", "yard", "yards"), 0.9144),
+}
+"""Metres of units that `parse_quantity` does not know."""
 _DEGREES: Final = re.compile(r"degrees?(_?(east|west|north|south|e|n|w|s))?|°", re.IGNORECASE)
 _SHIFTS: Final = ("px", "px/frame", "px / frame", "px frame-1")
 """Velocities that are shifts between the two images of a pair."""
@@ -224,6 +230,9 @@ def _parse(unit: str, wanted: str) -> float:
             "the positions are degrees of longitude and latitude: project the field to metres "
             "first, for example with pyproj"
         )
+    word = re.match(r"[A-Za-z]*", unit)
+    if word is not None and word[0].lower() in _IMPERIAL:
+        return _IMPERIAL[word[0].lower()] * _parse(f"m{unit[word.end() :]}", wanted)
     try:
         return parse_quantity(f"1 {unit}", wanted)
     except ConfigurationError as error:

@@ -6,10 +6,10 @@ from dataclasses import asdict, dataclass
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Bools, Integers
 from driftwalk.core.errors import InputError
-from driftwalk.record.cleaning.counters import overlap, starts_over
+from driftwalk.record.cleaning.clock import overlap, starts_over
 from driftwalk.record.cleaning.jumps import find_jumps
 from driftwalk.record.cleaning.several_bodies import (
     BodyColumns,
@@ -127,7 +127,7 @@ def clean_body(
     return body, counts
 
 
-def _take(body: RawBody, rows: npt.NDArray[np.bool_] | npt.NDArray[np.int64]) -> RawBody:
+def _take(body: RawBody, rows: Bools | Integers) -> RawBody:
     theta = None if body.theta is None else body.theta[rows]
     extra = {name: values[rows] for name, values in body.extra.items()}
     return RawBody(body.name, body.clock[rows], body.x[rows], body.y[rows], theta, extra=extra)
@@ -182,7 +182,7 @@ def _blank_missing(body: RawBody) -> int:
     return count
 
 
-def _without(body: RawBody, rows: npt.NDArray[np.int64]) -> RawBody:
+def _without(body: RawBody, rows: Integers) -> RawBody:
     if not rows.size:
         return body
     x, y = body.x.copy(), body.y.copy()

@@ -11,8 +11,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats, Integers
 from driftwalk.record.cleaning.warn import PLAUSIBLE
 from driftwalk.record.raw import Array, RawBody
 
@@ -44,7 +44,7 @@ class JumpPolicy(NamedTuple):
 JUMPS: Final = JumpPolicy()
 
 
-def find_jumps(body: RawBody, max_speed: float) -> npt.NDArray[np.int64]:
+def find_jumps(body: RawBody, max_speed: float) -> Integers:
     """Return the indices of samples that the body cannot have been at, at `max_speed` [m/s].
 
     From each sample that is left to the next, the body is never faster than that. Of all ways to
@@ -77,11 +77,11 @@ def find_jumps(body: RawBody, max_speed: float) -> npt.NDArray[np.int64]:
 
 
 def _best_chain(
-    t: npt.NDArray[np.float64],
-    x: npt.NDArray[np.float64],
-    y: npt.NDArray[np.float64],
+    t: Floats,
+    x: Floats,
+    y: Floats,
     max_speed: float,
-) -> npt.NDArray[np.int64]:
+) -> Integers:
     """Return the samples of the cheapest chain, in order.
 
     ``cost`` is that of the cheapest chain to end in a sample, less one for each sample up to there.

@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Bools, Integers
 from driftwalk.core.errors import InputError, argument_text
 from driftwalk.record.raw import Array, RawBody, RawRecording
 
 HELD: Final = "held"
-Flags = npt.NDArray[np.bool_]
 
 
 class MissingPolicy(NamedTuple):
@@ -57,14 +56,12 @@ def blank_missing(raw: RawRecording, marks: tuple[str, ...]) -> None:
             lost = _lost(body, mark)
             rows = int(lost.sum())
             if rows:
-                body.x, body.y = np.where(lost, np.nan, body.x), np.where(lost, np.nan, body.y)
-                if body.theta is not None:
-                    body.theta = np.where(lost, np.nan, body.theta)
+                body.blank(lost)
             count += rows
         raw.notes.append(f"samples that are missing by {argument_text('missing', mark)}: {count}")
 
 
-def _lost(body: RawBody, mark: str) -> Flags:
+def _lost(body: RawBody, mark: str) -> Bools:
     if mark == HELD:
         same = (np.diff(body.x) == 0.0) & (np.diff(body.y) == 0.0)
         return np.append(False, same)[: body.x.size]
@@ -134,7 +131,7 @@ def _marks_of(body: RawBody) -> list[tuple[str, str]]:
     return marks
 
 
-def _far_places(x: Array, y: Array, far: npt.NDArray[np.int64]) -> list[tuple[str, str]]:
+def _far_places(x: Array, y: Array, far: Integers) -> list[tuple[str, str]]:
     """Return the place that samples share exactly, and reach by far steps alone."""
     reached = np.unique(np.concatenate([far, far + 1]))
     places, counts = np.unique(
@@ -156,7 +153,7 @@ def _far_places(x: Array, y: Array, far: npt.NDArray[np.int64]) -> list[tuple[st
     return []
 
 
-def _held_runs(square: Array, still: Flags, usual: float) -> tuple[int, int]:
+def _held_runs(square: Array, still: Bools, usual: float) -> tuple[int, int]:
     """Return how often the body stays for several rows and then leaps, and for how many rows."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(np.int8)))
     begins, ends = edges[::2], edges[1::2]

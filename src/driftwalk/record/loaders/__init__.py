@@ -1,1 +1,1 @@
-"""One file per format. A file that defines ``LOADER`` is a format; see `record.registry`."""
+"""Formats: files that define ``LOADER``, or ``LOADERS`` of several; see `record.registry`."""

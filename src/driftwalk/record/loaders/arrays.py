@@ -1,4 +1,4 @@
-"""Plain arrays: ``.npy`` with a row per sample, ``.npz`` and HDF5 with an array per quantity."""
+"""Arrays: ``.npy`` with a row per sample, ``.npz`` and HDF5 by name, Parquet and Feather."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from typing import Any, Final
 
 import numpy as np
 
-from driftwalk.core.errors import FormatError, InputError, reason_of
+from driftwalk.core.errors import FormatError, InputError, damaged_as
 from driftwalk.record.column_names import column_meaning
 from driftwalk.record.raw import RawRecording, ReadOptions
 from driftwalk.record.stores.hdf5 import Hdf5Contents, names_in, opened_hdf5
 from driftwalk.record.stores.matlab import Struct, Value
 from driftwalk.record.stores.npz import ZIP, members, opened_npz
-from driftwalk.record.tables.choose import the_one_that_fits
 from driftwalk.record.tables.in_memory import table_in_memory
 from driftwalk.record.tables.matlab import matlab_tables
-from driftwalk.record.tables.rows import recording_of
-from driftwalk.schema.stores.netcdf import HDF5, file_start
+from driftwalk.record.tables.rows import recording_of, the_one_that_fits
+from driftwalk.record.vocabulary import ALLOWED
+from driftwalk.schema.stores.netcdf import file_start
 
 _NPY: Final = b"\x93NUMPY"
 _RATES: Final = ("fps", "frame_rate", "framerate", "frame_rate_hz", "frames_per_second")
@@ -36,8 +36,6 @@ class ArraysLoader:
             return 0.4 if b"'|O'" not in head[:200] else 0.0
         if head.startswith(ZIP):
             return 0.3 if _are_positions(members(path)) else 0.0
-        if not head.startswith(HDF5):
-            return 0.0
         names = names_in(path, head)
         return 0.3 if _are_positions(names) or (names and _inner_positions(path)) else 0.0
 
@@ -70,12 +68,8 @@ def _inner_positions(path: Path) -> bool:
 
 def _of_array(path: Path, options: ReadOptions) -> RawRecording:
     """Return the recording of one array, whose rows are samples."""
-    try:
-        with path.open("rb") as file:
-            array = np.load(io.BytesIO(file.read()), allow_pickle=False)
-    except Exception as error:
-        # On a damaged file the library fails with whatever the damage leads it to.
-        raise FormatError(f"cannot be read as .npy: {reason_of(error)}", path=path) from error
+    with damaged_as("as .npy", path):
+        array = np.load(io.BytesIO(path.read_bytes()), allow_pickle=False)
     if array.ndim == 2 and array.dtype.names is None and array.shape[0] < array.shape[1]:
         # There are more samples than quantities, whichever way they lie.
         array = array.T
@@ -115,10 +109,15 @@ def _of_hdf5(contents: Hdf5Contents) -> dict[str, Value]:
         if hasattr(entry, "keys"):
             inner = [one for one in entry if hasattr(entry[one], "shape")]
             found[str(name)] = Struct(
-                [{str(one): _value(contents.array(f"{name}/{one}")) for one in inner}]
+                [
+                    {
+                        _with_unit(str(one), entry[one]): _value(contents.array(f"{name}/{one}"))
+                        for one in inner
+                    }
+                ]
             )
         elif hasattr(entry, "shape"):
-            found[str(name)] = _value(contents.array(str(name)))
+            found[_with_unit(str(name), entry)] = _value(contents.array(str(name)))
     found |= {
         str(name): np.atleast_2d(np.float64(value))
         for name, value in contents.file.attrs.items()
@@ -127,4 +126,49 @@ def _of_hdf5(contents: Hdf5Contents) -> dict[str, Value]:
     return found
 
 
-LOADER = ArraysLoader()
+def _with_unit(name: str, entry: Any) -> str:
+    """Return the name of an array with the unit in its attributes, where that is one of its own."""
+    stated = next((entry.attrs[key] for key in ("units", "unit") if key in entry.attrs), "")
+    unit = stated.decode("utf-8", "replace") if isinstance(stated, bytes) else str(stated)
+    meaning = column_meaning(name)
+    if meaning is None or meaning.unit or not ALLOWED[meaning.quantity] or not unit.strip():
+        return name
+    return f"{name} [{unit.strip()}]"
+
+
+_PARQUET: Final = b"PAR1"
+_FEATHER: Final = (b"ARROW1", b"FEA1")
+
+
+class ArrowLoader:
+    """Columns, times and units as in a DataFrame."""
+
+    name = "arrow"
+    description = "Parquet and Feather (columns as in a plain table; needs pyarrow)"
+
+    def sniff(self, head: bytes, _path: Path) -> float:
+        """Recognise the first letters."""
+        return 0.9 if head.startswith((_PARQUET, *_FEATHER)) else 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read the columns."""
+        table = table_in_memory(_frame(path))
+        if table is None:
+            raise FormatError("holds no table", path=path)
+        return recording_of(table, options)
+
+
+def _frame(path: Path) -> Any:
+    """Return the columns as a DataFrame of pandas."""
+    try:
+        from pyarrow import feather, parquet
+    except ImportError as error:
+        raise InputError(
+            "Parquet and Feather need pyarrow: pip install 'driftwalk[arrow]', or save CSV"
+        ) from error
+    with damaged_as("by pyarrow", path):
+        is_parquet = file_start(path).startswith(_PARQUET)
+        return (parquet if is_parquet else feather).read_table(path).to_pandas()
+
+
+LOADERS = (ArraysLoader(), ArrowLoader())

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import warnings
-import zipfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from driftwalk.core.errors import FormatError, InputError, reason_of
+from driftwalk.core.errors import FormatError, InputError, damaged_as
 from driftwalk.record.raw import RawRecording, ReadOptions
-from driftwalk.record.stores.npz import ZIP
-from driftwalk.record.tables.choose import the_one_that_fits
-from driftwalk.record.tables.rows import recording_of
+from driftwalk.record.stores.npz import ZIP, refuse_huge_zip, zip_names
+from driftwalk.record.tables.rows import recording_of, the_one_that_fits
 from driftwalk.record.tables.sheet import SheetSource
-from driftwalk.schema.stores.netcdf import refuse_huge
+from driftwalk.schema.stores.netcdf import file_start
 
 if TYPE_CHECKING:
     from openpyxl import Workbook
@@ -47,7 +45,7 @@ class ExcelLoader:
             return 0.0
         if path.suffix.lower() in _NAMED:
             return 0.9
-        return 0.9 if {_WORKBOOK, *_OTHERS} & _members(path) else 0.0
+        return 0.9 if {_WORKBOOK, *_OTHERS} & zip_names(path) else 0.0
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the sheet that holds positions."""
@@ -61,27 +59,17 @@ class ExcelLoader:
         return recording_of(the_one_that_fits(filled, options, path, "sheet"), options)
 
 
-def _members(path: Path) -> set[str]:
-    """Return the names in a zip file, {} when it is damaged."""
-    try:
-        with zipfile.ZipFile(path) as file:
-            return set(file.namelist())
-    except (OSError, ValueError, zipfile.BadZipFile, NotImplementedError):
-        return set()
-
-
 def _refuse_other(path: Path) -> None:
     """Refuse workbooks of other formats, by name."""
     if path.is_dir():
         raise FormatError("is a folder, and no workbook", path=path)
-    with path.open("rb") as file:
-        if file.read(len(_OLD)) == _OLD:
-            raise FormatError(
-                "is a workbook of Excel before 2007 (.xls), or one with a password: save it as "
-                ".xlsx without a password, or as CSV",
-                path=path,
-            )
-    members = _members(path)
+    if file_start(path).startswith(_OLD):
+        raise FormatError(
+            "is a workbook of Excel before 2007 (.xls), or one with a password: save it as "
+            ".xlsx without a password, or as CSV",
+            path=path,
+        )
+    members = zip_names(path)
     if _WORKBOOK not in members:
         advice = next((text for name, text in _OTHERS.items() if name in members), None)
         raise FormatError(advice or "is no Excel workbook, or a damaged one", path=path)
@@ -94,21 +82,12 @@ def _opened(path: Path) -> Iterator[Workbook]:
         import openpyxl
     except ImportError as error:
         raise InputError("a workbook needs openpyxl: pip install 'driftwalk[excel]'") from error
-    try:
-        with zipfile.ZipFile(path) as file:
-            refuse_huge(sum(entry.file_size for entry in file.infolist()), path)
+    with damaged_as("as an Excel workbook", path):
+        refuse_huge_zip(path)
         with _unremarked():
             book = openpyxl.load_workbook(path, read_only=True, data_only=True, keep_links=False)
-        try:
+        with closing(book):
             yield book
-        finally:
-            book.close()
-    except InputError:
-        raise
-    except Exception as error:
-        # On a damaged file the library fails with whatever the damage leads it to.
-        reason = reason_of(error)
-        raise FormatError(f"cannot be read as an Excel workbook: {reason}", path=path) from error
 
 
 def _rows(path: Path, title: str) -> Iterator[tuple[Any, ...]]:

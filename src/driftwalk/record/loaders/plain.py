@@ -1,13 +1,19 @@
-"""Plain tables: CSV, TSV, semicolons or blanks, with or without header, columns named or mapped."""
+"""Plain tables, tables of programs with one header line, and one matrix per coordinate."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from driftwalk.record.raw import RawRecording, ReadOptions
+import numpy as np
+
+from driftwalk.core.errors import FormatError, InputError
+from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.tables.rows import recording_of
 from driftwalk.record.tables.text_source import TextSource
-from driftwalk.record.text_head import first_lines
+from driftwalk.record.text import read_table
+from driftwalk.record.text_head import first_lines, first_names, first_row, read_header
 
 
 class PlainLoader:
@@ -28,4 +34,99 @@ class PlainLoader:
         return recording_of(TextSource(path, options), options)
 
 
-LOADER = PlainLoader()
+@dataclass(frozen=True)
+class HeadedFormat:
+    """A format with one header line, which is recognised by its first names."""
+
+    name: str
+    description: str
+    header: tuple[str, ...]
+    """Names that the header begins with."""
+    columns: Mapping[str, str]
+    """From a quantity to its column, as `columns` of `load` has it; those that are absent are left
+    out."""
+    length_unit: str = ""
+
+    @property
+    def marks(self) -> tuple[Marks, ...]:
+        """Names that a nearly readable file has."""
+        return (Marks("table", tuple(filter(None, self.header))),)
+
+    def sniff(self, head: bytes, _path: Path) -> float:
+        """Recognise the header."""
+        names = first_names(head)[: len(self.header)]
+        return 0.95 if tuple(names) == self.header else 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read every body, in the format's own unit of length."""
+        names = first_row(path)
+        if tuple(names[: len(self.header)]) != self.header:
+            raise FormatError(
+                f"the first columns are not {', '.join(self.header)}", path=path, line=1
+            )
+        own = {
+            quantity: column
+            for quantity, column in self.columns.items()
+            if column.partition(":")[0] in names
+        }
+        rate = None if "t" in own else options.frame_rate_hz
+        stated = replace(options, columns=own, delimiter=",", box="none", frame_rate_hz=rate)
+        raw = recording_of(TextSource(path, stated), stated)
+        return replace(
+            raw, length_unit=self.length_unit, bare_length_is_si=False, body_columns=None
+        )
+
+
+class MatricesLoader:
+    """Metres and radians unless another unit is given; the frame rate has to be given."""
+
+    name = "matrices"
+    description = "one matrix per coordinate (`x`, `y` and, if there is one, `theta`); metres"
+
+    def sniff(self, _head: bytes, _path: Path) -> float:
+        """Never claim a file: `x` and `y` choose this format."""
+        return 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read the matrices; names are relative to the recording's folder."""
+        folder = path if path.is_dir() else path.parent
+        x_file = options.x or (None if path.is_dir() else path)
+        if x_file is None or options.y is None:
+            raise InputError(
+                "one matrix per coordinate needs `x` and `y` (and `theta` if there is)"
+            )
+        x, names = _matrix(_place(x_file, folder))
+        y, _ = _matrix(_place(options.y, folder))
+        theta = None if options.theta is None else _matrix(_place(options.theta, folder))[0]
+        for name, values in (("y", y), ("theta", theta)):
+            if values is not None and [v.size for v in values] != [v.size for v in x]:
+                raise InputError(
+                    f"the matrices disagree: `x` has {x[0].size} rows and {len(x)} columns, "
+                    f"`{name}` has {values[0].size} rows and {len(values)} columns"
+                )
+        frame = np.arange(x[0].size, dtype=np.float64)
+        bodies = [
+            RawBody(name, frame, x[i], y[i], None if theta is None else theta[i])
+            for i, name in enumerate(names)
+        ]
+        return RawRecording(bodies, bare_length_is_si=True, rows=int(frame.size))
+
+
+def _place(name: Path, folder: Path) -> Path:
+    """Return the file in the recording's folder, or the path as given if there is none."""
+    beside = folder / name
+    path = beside if beside.exists() else name
+    if not path.is_file():
+        raise FormatError("there is no such file", path=path)
+    return path
+
+
+def _matrix(path: Path) -> tuple[list[Array], list[str]]:
+    """Return the columns of a matrix and their names."""
+    names, delimiter, skip, has_header = read_header(path)
+    labels = names if has_header else [str(index) for index in range(len(names))]
+    table = read_table(path, TableLayout(delimiter, labels, skip, tuple(range(len(names)))))
+    return [table.numbers[column] for column in range(len(names))], labels
+
+
+LOADERS = (PlainLoader(), MatricesLoader())

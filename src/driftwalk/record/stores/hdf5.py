@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.errors import FormatError, damaged_as
 from driftwalk.record.raw import Array
 from driftwalk.schema.stores.hdf5_texts import refuse_endless_texts
 from driftwalk.schema.stores.netcdf import HDF5, declared_bytes, refuse_elsewhere, refuse_huge
@@ -106,7 +106,7 @@ def opened_hdf5(path: Path) -> Iterator[Hdf5Contents]:
     """
     import h5py
 
-    try:
+    with damaged_as("as HDF5", path):
         refuse_endless_texts(path)
         with h5py.File(path, "r") as file:
             refuse_elsewhere(file, path)
@@ -114,12 +114,6 @@ def opened_hdf5(path: Path) -> Iterator[Hdf5Contents]:
                 # A damaged entry is found here, before the attributes.
                 file[name]
             yield Hdf5Contents(file, path)
-    except InputError:
-        raise
-    except Exception as error:
-        # On a damaged file the library fails with whatever the damage leads it to.
-        reason = (str(error) or type(error).__name__).splitlines()[0]
-        raise FormatError(f"cannot be read as HDF5: {reason}", path=path) from error
 
 
 def names_in(path: Path, head: bytes) -> set[str]:

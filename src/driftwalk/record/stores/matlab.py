@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.errors import FormatError, InputError, reason_of
+from driftwalk.core.errors import FormatError, damaged_as
 from driftwalk.record.stores.hdf5 import Hdf5Contents, opened_hdf5, text_of
 from driftwalk.schema.stores.matlab import HDF5_BASED, OLD, read_old, refuse_many
 
@@ -61,14 +61,8 @@ def matlab_variables_of(path: Path) -> Iterator[dict[str, Value]]:
 
 
 def _of_old(path: Path) -> dict[str, Value]:
-    try:
+    with damaged_as("as a MATLAB file", path):
         content = read_old(path)
-    except InputError:
-        raise
-    except Exception as error:
-        # On a damaged file the library fails with whatever the damage leads it to.
-        reason = reason_of(error)
-        raise FormatError(f"cannot be read as a MATLAB file: {reason}", path=path) from error
     return {_own_name(value) or name: _old_value(value) for name, value in content.items()}
 
 

@@ -11,21 +11,30 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.errors import damaged_as
 from driftwalk.schema.stores.netcdf import refuse_huge
 
 ZIP: Final = b"PK\x03\x04"
-_NPY: Final = ".npy"
 
 
 def members(path: Path) -> set[str]:
     """Return the names of the arrays in a file, {} when it is no zip file or damaged."""
+    return {name.removesuffix(".npy") for name in zip_names(path) if name.endswith(".npy")}
+
+
+def zip_names(path: Path) -> set[str]:
+    """Return the names in a zip file, {} when it is none or damaged."""
     try:
         with zipfile.ZipFile(path) as file:
-            names = file.namelist()
+            return set(file.namelist())
     except (OSError, ValueError, zipfile.BadZipFile, NotImplementedError):
         return set()
-    return {name.removesuffix(_NPY) for name in names if name.endswith(_NPY)}
+
+
+def refuse_huge_zip(path: Path) -> None:
+    """Refuse a zip file that declares more than a file of its size can hold."""
+    with zipfile.ZipFile(path) as file:
+        refuse_huge(sum(entry.file_size for entry in file.infolist()), path)
 
 
 @contextmanager
@@ -37,14 +46,7 @@ def opened_npz(path: Path) -> Iterator[Mapping[str, npt.NDArray[Any]]]:
     FormatError
         When it is none, is damaged, or declares more than it can hold.
     """
-    try:
-        with zipfile.ZipFile(path) as file:
-            refuse_huge(sum(entry.file_size for entry in file.infolist()), path)
+    with damaged_as("as NumPy's .npz", path):
+        refuse_huge_zip(path)
         with np.load(path, allow_pickle=False) as arrays:
             yield arrays
-    except InputError:
-        raise
-    except Exception as error:
-        # On a damaged file the libraries fail with whatever the damage leads them to.
-        reason = (str(error) or type(error).__name__).splitlines()[0]
-        raise FormatError(f"cannot be read as NumPy's .npz: {reason}", path=path) from error

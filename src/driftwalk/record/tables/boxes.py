@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Codes
 from driftwalk.core.errors import InputError, argument_text
 from driftwalk.core.text.did_you_mean import listed
 from driftwalk.record.column_names import ColumnMeaning, words_of
@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 FORMS: Final = ("xyxy", "xywh", "cxcywh", "none")
 _CORNERS: Final = ("x1", "y1", "x2", "y2")
 _QUAD: Final = tuple(f"{axis}{corner}" for corner in range(1, 5) for axis in "xy")
-_OF_QUAD: Final = re.compile(r"(?:tag)?(?:c|corner|p|pt)([0-3])([xy])")
+_FROM_ZERO: Final = {"x0": "x1", "y0": "y1", "x1": "x2", "y1": "y2"}
+_OF_QUAD: Final = re.compile(r"(?:tag)?(?:c|corner|p|pt)([0-4])([xy])")
 _CENTRE: Final = words("cx cy xc yc center centre centroid mitte centro")
 _CLASSES: Final = words("class cls classid classname label category")
 
@@ -113,6 +114,8 @@ def _sides(
     found: dict[str, int] = {}
     units: dict[str, str] = {}
     plain = True
+    lower = {name.strip().lower() for name in source.names}
+    from_zero = set(_FROM_ZERO) <= lower and not {"x2", "y2"} & lower
     for at, name in enumerate(source.names):
         meaning = meanings.get(at)
         if meaning is not None and meaning.quantity in (*_CORNERS, "w", "h"):
@@ -128,7 +131,8 @@ def _sides(
             words.pop()
         elif stated:
             unit = UNITS.get(stated.lower(), "")
-        side = BOXES.get("".join(words), "")
+        word = "".join(words)
+        side = _FROM_ZERO.get(word, "") if from_zero else BOXES.get(word, "")
         if side in ("x", "y") or (
             meaning is not None and meaning.quantity in ("x", "y") and not side
         ):
@@ -139,7 +143,7 @@ def _sides(
                 side = ""
         if side and side not in found:
             found[side], units[side] = at, unit if unit in LENGTHS else ""
-            plain = plain and (side not in _CORNERS or words == [side])
+            plain = plain and (side not in _CORNERS or from_zero or words == [side])
     for at, meaning in meanings.items():
         if meaning.rank < 0 and meaning.quantity in ("x", "y"):
             found[meaning.quantity], units[meaning.quantity] = at, meaning.unit
@@ -177,7 +181,7 @@ def _corners(
     box = _stated("xyxy", found, units)
     numbered = {one.body for one in meanings.values() if one.body.isdecimal()}
     if plain and (
-        numbered - {"1", "2"}
+        not (numbered <= {"1", "2"} or numbered <= {"0", "1"})
         or any(one.quantity == "theta" and one.body in numbered for one in meanings.values())
     ):
         return None
@@ -221,14 +225,15 @@ def _quad(source: TableSource) -> Box | None:
     """Return the box of four corners: c0x, c0y, ... of markers, or x1, ..., y4 of one shape."""
     found: dict[str, int] = {}
     named = True
-    for at, name in enumerate(source.names):
-        word = "".join(words_of(name)).lower()
+    joined = ["".join(words_of(name)).lower() for name in source.names]
+    first = int({"corner4x", "corner4y"} <= set(joined))  # of p1 ... p4 each may be a body
+    for at, word in enumerate(joined):
         match = _OF_QUAD.fullmatch(word)
         if match is not None:
-            found[f"{match[2]}{int(match[1]) + 1}"] = at
+            found[f"{match[2]}{int(match[1]) + 1 - first}"] = at
         elif word in _QUAD:
             found[word], named = at, False
-    if set(found) != set(_QUAD):
+    if not set(_QUAD) <= set(found):
         return None
     if not named:
         values = _values(source, [found[side] for side in _QUAD])
@@ -238,7 +243,8 @@ def _quad(source: TableSource) -> Box | None:
         skew = np.hypot(x[0] - x[1] + x[2] - x[3], y[0] - y[1] + y[2] - y[3])
         if (skew > BOX.skew * np.hypot(x[0] - x[2], y[0] - y[2])).any():
             return None
-    return Box("quad", found, replaced=tuple(found.values()), symmetric=not named)
+    sides = {side: found[side] for side in _QUAD}
+    return Box("quad", sides, replaced=tuple(sides.values()), symmetric=not named)
 
 
 def _values(source: TableSource, columns: list[int]) -> list[Array] | None:
@@ -272,7 +278,7 @@ def box_angle(
     box: Box,
     values: Mapping[int, Array],
     theta: Array | None,
-    codes: npt.NDArray[np.int32] | None,
+    codes: Codes | None,
     turn: float,
 ) -> Array | None:
     """Return the orientation of a box: its axis, followed over its symmetry, body by body.

@@ -11,6 +11,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.arrays import Codes
 from driftwalk.record.bad_row import is_number
 from driftwalk.record.raw import MISSING, Array
 from driftwalk.record.tables.stamps import (
@@ -136,7 +137,7 @@ def _duration(cell: datetime.timedelta) -> str:
     return f"{sign}{minutes // 60:02d}:{minutes % 60:02d}:{second:02d}.{micro:06d}"
 
 
-def as_names(values: Values) -> tuple[npt.NDArray[np.int32], list[str]]:
+def as_names(values: Values) -> tuple[Codes, list[str]]:
     """Return the index of each value in the distinct ones, and those as texts, as they come.
 
     Parameters

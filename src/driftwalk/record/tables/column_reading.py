@@ -55,8 +55,8 @@ class TableReading:
     bare: bool = True
     """Whether the names of positions are plain symbols, which mean metres next to seconds."""
     box: Box | None = None
-    parts: tuple[str, str] | None = None
-    """Two bodies that are the middle and the front of one."""
+    parts: tuple[str, str, str] | None = None
+    """Bodies that are parts of one: its middle, and those from and to which it points."""
     notes: list[str] = field(default_factory=list)
 
     @property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
 
@@ -16,6 +17,8 @@ from driftwalk.record.tables.named_columns import NamedColumns, may_be_unit, sho
 from driftwalk.record.tables.source import TableSource
 from driftwalk.record.tables.stamps import OF_DAY
 from driftwalk.record.vocabulary import FRONT, MIDDLE, REAR
+
+_ON_GLOBE: Final = ("lon", "lat")
 
 
 def read_columns(
@@ -76,7 +79,11 @@ class _Reader(NamedColumns):
             if {"x", "y"} <= set(columns) or {"lon", "lat"} <= set(columns)
         }
         if any({"x", "y"} <= set(columns) for columns in bodies.values()):
-            bodies = {body: one for body, one in bodies.items() if {"x", "y"} <= set(one)}
+            bodies = {
+                body: {quantity: at for quantity, at in one.items() if quantity not in _ON_GLOBE}
+                for body, one in bodies.items()
+                if {"x", "y"} <= set(one)
+            }
         box = self.result.box
         if box is not None and (not bodies or not {"x", "y"} <= set(box.sides)):
             name = next((body for body in bodies if not body), "")
@@ -147,12 +154,23 @@ class _Reader(NamedColumns):
             return
         middle = [body for name, body in lower.items() if name in MIDDLE]
         front = [body for name, body in lower.items() if name in FRONT]
-        if len(middle) == len(front) == 1 and not any("theta" in one for one in bodies.values()):
-            self.result.parts = (middle[0], front[0])
-            names = [self.names[bodies[body]["x"]] for body in self.result.parts]
+        rear = [body for name, body in lower.items() if name in REAR]
+        if any("theta" in one for one in bodies.values()):
+            return
+        if len(middle) == 1 and (len(front) == 1 or (len(rear) == 1 and not front)):
+            other, what = (front[0], "front") if front else (rear[0], "rear")
+            start, end = (middle[0], other) if front else (other, middle[0])
+            self.result.parts = (middle[0], start, end)
+            names = [self.names[bodies[body]["x"]] for body in (middle[0], other)]
             self.result.notes.append(
-                f"'{names[0]}' and '{names[1]}' are read as the middle and the front of one body, "
+                f"'{names[0]}' and '{names[1]}' are read as the middle and the {what} of one body, "
                 "whose orientation is the direction between them"
+            )
+        elif len(front) == len(rear) == 1:
+            heading = f"{rear[0]},{front[0]}"
+            self.result.notes.append(
+                f"'{rear[0]}' and '{front[0]}' are read as two bodies: if they are parts of one, "
+                f"add {argument_text('heading', heading)}"
             )
 
     def _find_confidences(self) -> None:

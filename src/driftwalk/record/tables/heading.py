@@ -3,31 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
-from driftwalk.core.errors import FormatError, InputError
+import numpy as np
+
+from driftwalk.core.errors import InputError
 from driftwalk.record.bad_row import is_number
 from driftwalk.record.column_names import column_meaning
-from driftwalk.record.raw import MISSING, ReadOptions, TableLayout
+from driftwalk.record.raw import MISSING, ReadOptions
 from driftwalk.record.tables.columns import read_columns
-from driftwalk.record.tables.stamps import StampForm
-from driftwalk.record.text import Table
+from driftwalk.record.tables.in_memory import MemorySource
 from driftwalk.record.text_head import is_numeric_row
 from driftwalk.record.vocabulary import NO_UNIT, UNITS
-
-
-class TablePolicy(NamedTuple):
-    """How much of a table is looked at before it is read."""
-
-    heading_rows: int = 100
-    """Rows among which are the names of the columns and the first row of data; chosen by hand."""
-    sample_rows: int = 50
-    """Rows by which a table is recognised; chosen by hand."""
-    first_rows: int = 100_000
-    """Rows that are read where only the first ones are needed; chosen by hand."""
-
-
-TABLE: Final = TablePolicy()
 
 
 class Heading(NamedTuple):
@@ -36,27 +23,6 @@ class Heading(NamedTuple):
     names: list[str]
     units: list[str]
     rows: int
-
-
-class _Names:
-    """Names of columns alone, as a table that cannot be read yet."""
-
-    has_header = True
-
-    def __init__(self, names: list[str], units: list[str]) -> None:
-        self.names, self.units = names, units
-
-    def sample(self) -> list[list[str]]:
-        return []
-
-    def stamps(self, _column: int, /) -> StampForm | None:
-        return None
-
-    def read(self, _wanted: TableLayout, /, *, head: bool = False) -> Table:  # noqa: ARG002
-        raise InputError("these are names alone")
-
-    def error(self, message: str, /) -> FormatError:
-        return FormatError(message)
 
 
 def heading_of(rows: Sequence[list[str]], options: ReadOptions) -> Heading | None:
@@ -169,7 +135,8 @@ def _holds_positions(
 ) -> bool:
     """Whether some names are those of positions, and a row holds a position below them."""
     try:
-        reading = read_columns(_Names(names, units), options, lenient=True)
+        source = MemorySource("the names", names, [np.zeros(0)] * len(names), units=units)
+        reading = read_columns(source, options, lenient=True)
     except InputError:
         return False
     columns = [

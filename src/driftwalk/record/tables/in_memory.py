@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -18,7 +18,7 @@ from driftwalk.record.tables.cells import (
     form_of,
     text_of_cell,
 )
-from driftwalk.record.tables.heading import TABLE
+from driftwalk.record.tables.source import TABLE
 from driftwalk.record.tables.stamps import (
     StampError,
     StampForm,
@@ -48,6 +48,8 @@ class MemorySource:
         Columns of times of NumPy that are in UTC.
     matrices : bool
         Whether numbers after x and y count the columns of matrices, each of which is a body.
+    units : sequence of str
+        Their units; empty where none are known.
     """
 
     def __init__(
@@ -59,10 +61,11 @@ class MemorySource:
         has_header: bool = True,
         zoned: frozenset[int] = frozenset(),
         matrices: bool = False,
+        units: Sequence[str] = (),
     ) -> None:
         self.what = what
         self.names = names
-        self.units: list[str] = []
+        self.units = list(units)
         self.has_header = has_header
         self.matrices = matrices
         self._columns = columns

@@ -143,12 +143,27 @@ class NamedColumns:
                 left[body] = _SAME_BODY
         for body, why in left.items():
             self.drop([at for at, one in self.meanings.items() if one.body == body], why)
+        self._doubt(set(bodies) - set(left))
         named = [body for body in left if body in bodies]
         if named:
             self.result.notes.append(
                 f"pairs of x and y that are read as no body: {listed(named)} (name one by "
                 f"{argument_text('columns', {'x': 'NAME', 'y': 'NAME'})} if it is the one)"
             )
+
+    def _doubt(self, bodies: set[str]) -> None:
+        """Say that pairs next to plain x and y are read as bodies: their names may mean else."""
+        others = sorted(
+            body for body in bodies if body and body.lower() not in MIDDLE | FRONT | REAR
+        )
+        if "" not in bodies or not others or self.chosen:
+            return
+        columns = {quantity: self.bodies_with(quantity)[others[0]] for quantity in "xy"}
+        names = [self.names[at] for at in columns.values()]
+        self.result.notes.append(
+            f"{listed([repr(name) for name in names])} are read as one body more, next to x and "
+            f"y: if they are none, add {argument_text('columns', {'skip': '+'.join(names)})}"
+        )
 
     def _computed(self, variants: list[str], real: list[str]) -> dict[str, str]:
         """Return the pairs that are a body once more; of several, one has to be named."""

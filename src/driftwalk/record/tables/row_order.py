@@ -9,8 +9,8 @@ from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Codes
 from driftwalk.core.errors import argument_text
 from driftwalk.record.bad_row import is_number
 from driftwalk.record.cleaning.several_bodies import LARGEST_SHARE
@@ -20,6 +20,7 @@ from driftwalk.record.tables.column_reading import TableReading
 from driftwalk.record.tables.named_columns import LEFT_OUT
 from driftwalk.record.tables.source import TableSource
 from driftwalk.record.text import Table
+from driftwalk.record.vocabulary import ALLOWED, UNITS
 
 
 class UnevenClockPolicy(NamedTuple):
@@ -63,6 +64,13 @@ def other_order(source: TableSource, reading: TableReading, names: list[str]) ->
     texts = [*free, *([] if reading.body_column is None else [reading.body_column])]
     if not free:
         return None
+    for at in free:
+        unit = UNITS.get(names[at].strip().lower(), "")
+        if unit in ("ms", "us", "ns"):
+            return (
+                f"no column is known to hold times or frames, but '{names[at]}' may hold times: "
+                f"add {argument_text('columns', {'t': f'{names[at]}:{unit}'})}"
+            )
     # The first rows are enough: what skips none in 4 MiB is no clock with missing rows.
     numbers = tuple(sorted({x, y}))
     table = source.read(TableLayout("", names, numbers=numbers, texts=tuple(texts)), head=True)
@@ -152,7 +160,7 @@ def _tracks(
     return min(found, key=lambda entry: entry[0])[1:] if found else None
 
 
-def _counts_each(codes: npt.NDArray[np.int32], values: Array, body: int | None) -> bool:
+def _counts_each(codes: Codes, values: Array, body: int | None) -> bool:
     """Whether values count up, mostly one by one, in the rows of each body."""
     order = np.argsort(codes, kind="stable")
     same = codes[order][1:] == codes[order][:-1]
@@ -247,6 +255,8 @@ def body_columns(
 
 
 def _may_be_a_name(column: str) -> bool:
+    if UNITS.get(column.strip().lower()) in ALLOWED["t"]:
+        return False  # "min" next to "sec"
     meaning = column_meaning(column)
     return meaning is None or meaning.quantity == "body"
 
@@ -258,9 +268,7 @@ def _are_names(labels: list[str], *, rows: int) -> bool:
     return not any(is_number(label) and float(label) % 1.0 for label in labels)
 
 
-def _tells_apart(
-    codes: npt.NDArray[np.int32], clock: Array, x: Array, y: Array, *, in_order: bool
-) -> bool:
+def _tells_apart(codes: Codes, clock: Array, x: Array, y: Array, *, in_order: bool) -> bool:
     """Whether hardly a body is in two places at one time, and none goes back in time if asked."""
     present = np.flatnonzero(np.isfinite(clock) & np.isfinite(x) & np.isfinite(y))
     if in_order:

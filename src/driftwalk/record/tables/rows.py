@@ -2,41 +2,51 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
+from pathlib import Path
+from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Codes
 from driftwalk.core.errors import FormatError, InputError, argument_text
-from driftwalk.record.cleaning.stacked import order_in_body, split_bodies
+from driftwalk.core.text.did_you_mean import listed
+from driftwalk.record.cleaning.several_bodies import order_in_body, split_bodies
 from driftwalk.record.convert_units import scale_wanted
-from driftwalk.record.pose.keypoints import angle_between
+from driftwalk.record.pose import angle_between
 from driftwalk.record.raw import (
     ANGLE_UNITS,
     CLOCK_UNITS,
+    MISSING,
     Array,
     RawBody,
     RawRecording,
     ReadOptions,
     TableLayout,
 )
-from driftwalk.record.space.columns import body_in_plane, plane_of_columns
-from driftwalk.record.space.globe import on_the_ground
-from driftwalk.record.space.plane import Plane
+from driftwalk.record.space import Plane, body_in_plane, on_the_ground, plane_of_columns
 from driftwalk.record.tables.boxes import box_angle, box_centre
 from driftwalk.record.tables.column_reading import TableReading
 from driftwalk.record.tables.columns import read_columns
-from driftwalk.record.tables.midnights import count_days
 from driftwalk.record.tables.row_order import body_columns, other_order
 from driftwalk.record.tables.source import TableSource
-from driftwalk.record.tables.stamps import DAY
+from driftwalk.record.tables.stamps import DAY, count_days
 from driftwalk.record.text import Table
+from driftwalk.record.vocabulary import words
 
 NO_CLOCK = "the table has no column of times or frames: every row counts as a frame"
 NO_CLOCK_OF_EACH = (
     "the table has no column of times or frames: every row of a body counts as a frame, from its "
     "first on"
 )
+_FULL_TURN: Final = 6.3
+"""A turn in radians, and what rounding adds."""
+_FLAGS: Final = {
+    **dict.fromkeys(words("true t yes y ja oui si sí vrai wahr ok"), 1.0),
+    **dict.fromkeys(words("false f no n nein non faux falsch lost missing invalid bad"), 0.0),
+}
+"""Words of a column that says whether the body was seen."""
 NAME_THE_CLOCK = (
     'no column is known to hold times or frames: name it with `columns={"t": "NAME:s"}` or '
     '`columns={"frame": "NAME"}`; if there is none, give `frame_rate`, and every row counts as '
@@ -82,6 +92,7 @@ def recording_of(source: TableSource, options: ReadOptions) -> RawRecording:
     on_globe = any("lon" in places for places in reading.bodies.values())
     if on_globe:
         notes.append(on_the_ground(bodies))
+    notes += _doubted_confidences(table, reading, options)
     plane = next((one for one in planes if one is not None), None)
     bare = reading.bare_clock and bool(reading.numbers)
     return RawRecording(
@@ -125,7 +136,7 @@ def columns_of(
     if not source.has_header and not options.columns:
         raise source.error(
             f"the table has {len(source.names)} columns and no header: name them with `columns`, "
-            'such as `columns={"t": "1", "x": "2", "y": "3"}`'
+            'such as `columns={"t": "1", "x": "2", "y": "3"}`' + _detector_advice(source)
         )
     try:
         reading = read_columns(source, options)
@@ -136,10 +147,42 @@ def columns_of(
         raise source.error(str(error)) from error
 
 
+def _detector_advice(source: TableSource) -> str:
+    """Return how to name the columns of rows without a header that are those of a detector."""
+    try:
+        rows = np.array([[float(one) for one in row] for row in source.sample()])
+    except ValueError:
+        return ""
+    width = rows.shape[1] if rows.ndim == 2 else 0
+    if width in (9, 10) and not (rows[:, :2] % 1.0).any() and (rows[:, 4:6] > 0.0).all():
+        named = dict(
+            zip(("frame", "body", "x", "y", "w", "h", "confidence"), "1234567", strict=True)
+        )
+        return (
+            "; if they are those of MOT (frame, identity, left, top, width, height, confidence), "
+            f'{argument_text("columns", named)} and `box="xywh"`'
+        )
+    shares = width in (5, 6, 7) and bool(((rows[:, 1:5] >= 0.0) & (rows[:, 1:5] <= 1.0)).all())
+    if shares and not (rows[:, 0] % 1.0).any():
+        named = dict(zip(("x", "y", "w", "h"), "2345", strict=True))
+        return (
+            "; if they are those of YOLO (class, centre and size as shares of the image), multiply "
+            "x and w by its width and y and h by its height in pixels, then "
+            f'{argument_text("columns", named)} and `box="cxcywh"`'
+        )
+    return ""
+
+
 def _read(source: TableSource, reading: TableReading, labels: list[str]) -> Table:
     used = {index for places in reading.bodies.values() for index in places.values()}
     used.update(reading.numbers)
-    texts = () if reading.body_column is None else (reading.body_column,)
+    flags = {
+        one["confidence"]
+        for one in reading.bodies.values()
+        if "confidence" in one and _holds_flags(source, one["confidence"])
+    }
+    body = () if reading.body_column is None else (reading.body_column,)
+    texts = (*body, *sorted(flags - set(body)))
     wanted = TableLayout(
         "",
         labels,
@@ -148,7 +191,21 @@ def _read(source: TableSource, reading: TableReading, labels: list[str]) -> Tabl
         stamps=reading.stamps,
         clock=next(iter(reading.numbers), None),
     )
-    return source.read(wanted)
+    table = source.read(wanted)
+    for at in flags:
+        unknown = {label.lower() for label in table.labels[at]} - MISSING - set(_FLAGS)
+        if unknown:
+            raise source.error(f"'{min(unknown)}' in column '{labels[at]}' is no yes and no no")
+        marks = [_FLAGS.get(label.lower(), np.nan) for label in table.labels[at]]
+        table.numbers[at] = np.array(marks)[table.codes[at]]
+    return table
+
+
+def _holds_flags(source: TableSource, column: int) -> bool:
+    """Whether the first values of a column are words for yes and no."""
+    found = {row[column].lower() for row in source.sample() if len(row) > column}
+    found -= MISSING - set(_FLAGS)
+    return bool(found) and found <= set(_FLAGS)
 
 
 def _clock(table: Table, reading: TableReading) -> Array:
@@ -192,6 +249,21 @@ def _unread_angles(reading: TableReading) -> list[str]:
     return [f"no orientation is read: add {argument} if that column holds it"]
 
 
+def _doubted_confidences(table: Table, reading: TableReading, options: ReadOptions) -> list[str]:
+    """Say that confidences are no shares of 1, where the least one that is asked for is."""
+    least = options.min_confidence
+    columns = sorted({one["confidence"] for one in reading.bodies.values() if "confidence" in one})
+    for at in columns:
+        known = table.numbers[at][np.isfinite(table.numbers[at])]
+        if least is not None and least <= 1.0 and known.size and np.median(known) > 2.0:
+            return [
+                f"the confidences in column '{reading.columns[at].name}' go up to "
+                f"{known.max():.6g}, and {least:g} is compared with these numbers: state the "
+                "least one in their unit"
+            ]
+    return []
+
+
 def _numbers_the_rows(table: Table, column: int | None, clock: Array) -> bool:
     """Whether what seems to name the body counts up row by row, over more than one moment."""
     if column is None or table.rows < 3 or len(table.labels[column]) != table.rows:
@@ -219,15 +291,16 @@ def _bodies(
     codes = None if column is None else table.codes[column]
     found, notes = {}, []
     for (name, places), plane in zip(reading.bodies.items(), planes, strict=True):
-        body, against = _body(table.numbers, places, clock, plane, reading, codes)
+        body, against = _body(table.numbers, places, clock, plane, reading, codes, options)
         body.name = name or "0"
-        _blank(body, table.numbers, places, options)
+        if "confidence" in places and options.min_confidence is not None:
+            body.blank(table.numbers[places["confidence"]] < options.min_confidence)
         found[name] = body
         notes += against
     if reading.parts is not None:
-        middle, front = (found[name] for name in reading.parts)
+        middle, start, end = (found[name] for name in reading.parts)
         middle.name = "0"
-        middle.theta = angle_between((middle.x, middle.y), (front.x, front.y))
+        middle.theta = angle_between((start.x, start.y), (end.x, end.y))
         found = {"": middle}
     if column is None or codes is None:
         return list(found.values()), notes
@@ -242,7 +315,8 @@ def _body(
     clock: Array,
     plane: Plane | None,
     reading: TableReading,
-    codes: npt.NDArray[np.int32] | None,
+    codes: Codes | None,
+    options: ReadOptions,
 ) -> tuple[RawBody, list[str]]:
     """Return the body of some columns, and what speaks against its plane."""
     if plane is not None:
@@ -251,6 +325,7 @@ def _body(
     if reading.box is None:
         x, y = (values[places[axis]] for axis in (("x", "y") if "x" in places else ("lon", "lat")))
         return RawBody("0", clock, x, y, theta), []
+    _require_units_of_box(reading, values, theta, options)
     turn = 2.0 * np.pi / ANGLE_UNITS[reading.angle_unit or "rad"]
     x, y = box_centre(reading.box, values)
     followed = box_angle(reading.box, values, theta, codes, turn)
@@ -260,12 +335,79 @@ def _body(
     return RawBody("0", clock, x, y, followed), notes
 
 
-def _blank(
-    body: RawBody, values: dict[int, Array], places: dict[str, int], options: ReadOptions
+def _require_units_of_box(
+    reading: TableReading, values: dict[int, Array], theta: Array | None, options: ReadOptions
 ) -> None:
-    """Make positions that were seen with too little confidence missing."""
-    if "confidence" in places and options.min_confidence is not None:
-        lost = values[places["confidence"]] < options.min_confidence
-        body.x, body.y = np.where(lost, np.nan, body.x), np.where(lost, np.nan, body.y)
-        if body.theta is not None:
-            body.theta = np.where(lost, np.nan, body.theta)
+    """Refuse sides that are shares of an image, and angles of an axis that cannot be radians."""
+    sides = [values[at] for at in (() if reading.box is None else reading.box.sides.values())]
+    known = [side[np.isfinite(side)] for side in sides]
+    shares = all(one.size and one.min() >= 0.0 and one.max() <= 1.0 for one in known)
+    if shares and options.metres_per_pixel is not None and not reading.length_unit:
+        raise FormatError(
+            "the sides of the boxes are between 0 and 1, shares of the image as YOLO writes them: "
+            "multiply those along x by its width and those along y by its height in pixels"
+        )
+    if theta is not None and not reading.angle_unit and (np.abs(theta) > _FULL_TURN).any():
+        raise FormatError(
+            "the angles of the boxes name no unit, and in radians they would be beyond a turn: "
+            'name it, as in `columns={"theta": "NAME:deg"}`'
+        )
+
+
+def the_one_that_fits(
+    tables: Mapping[str, TableSource], options: ReadOptions, path: Path, what: str
+) -> TableSource:
+    """Return the table that the user names, or the only one that holds positions.
+
+    Parameters
+    ----------
+    tables : mapping
+        Tables by their names.
+    options : ReadOptions
+        `sheet` names one, by its name or its number from 1.
+    path : Path
+        The file, for errors.
+    what : str
+        What such a table is called, "sheet" or "variable".
+
+    Raises
+    ------
+    FormatError
+        When there is none, or several.
+    """
+    if not tables:
+        raise FormatError(f"has no {what} that is a table", path=path)
+    if options.sheet is not None:
+        return _named(tables, options.sheet, path, what)
+    if len(tables) == 1:
+        return next(iter(tables.values()))
+    fitting: list[str] = []
+    reasons: list[str] = []
+    for name, table in tables.items():
+        try:
+            columns_of(table, options)
+            fitting.append(name)
+        except InputError as error:
+            reasons.append(error.reason if isinstance(error, FormatError) else str(error))
+    if len(fitting) > 1:
+        choice = argument_text("sheet", fitting[0])
+        raise FormatError(
+            f"holds positions in more than one {what}, {listed(fitting)}: name it, as in {choice}",
+            path=path,
+        )
+    if not fitting:
+        raise FormatError(
+            f"has no {what} with positions among {listed(list(tables))}; {reasons[0]}", path=path
+        )
+    return tables[fitting[0]]
+
+
+def _named(tables: Mapping[str, TableSource], wanted: str, path: Path, what: str) -> TableSource:
+    if wanted in tables:
+        return tables[wanted]
+    if wanted.isdecimal() and 1 <= int(wanted) <= len(tables):
+        return list(tables.values())[int(wanted) - 1]
+    raise FormatError(
+        f"{argument_text('sheet', wanted)}: no such {what}; it has {listed(list(tables))}",
+        path=path,
+    )

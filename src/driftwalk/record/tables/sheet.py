@@ -12,8 +12,9 @@ import numpy as np
 from driftwalk.core.errors import FormatError
 from driftwalk.record.raw import ReadOptions, TableLayout
 from driftwalk.record.tables.cells import CellError, Values, form_of, text_of_cell
-from driftwalk.record.tables.heading import TABLE, header_advice, heading_of, is_data, units_below
+from driftwalk.record.tables.heading import header_advice, heading_of, is_data, units_below
 from driftwalk.record.tables.in_memory import table_of
+from driftwalk.record.tables.source import TABLE
 from driftwalk.record.tables.stamps import StampError, StampForm
 from driftwalk.record.text import Table
 from driftwalk.record.text_head import is_numeric_row

@@ -2,12 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Final, NamedTuple, Protocol
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.raw import TableLayout
 from driftwalk.record.tables.stamps import StampForm
 from driftwalk.record.text import Table
+
+
+class TablePolicy(NamedTuple):
+    """How much of a table is looked at before it is read."""
+
+    heading_rows: int = 100
+    """Rows among which are the names of the columns and the first row of data; chosen by hand."""
+    sample_rows: int = 50
+    """Rows by which a table is recognised; chosen by hand."""
+    first_rows: int = 100_000
+    """Rows that are read where only the first ones are needed; chosen by hand."""
+
+
+TABLE: Final = TablePolicy()
 
 
 class TableSource(Protocol):

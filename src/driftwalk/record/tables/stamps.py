@@ -1,17 +1,18 @@
-"""Time stamps of ISO 8601: dates with a time of day, and times of day alone, to the nanosecond."""
+"""Time stamps of ISO 8601 to the nanosecond, and times of day across midnight."""
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.record.raw import MISSING
+from driftwalk.core.arrays import Bools, Codes, Floats, Integers
+from driftwalk.record.raw import MISSING, Array, RawBody
 
-Ticks = npt.NDArray[np.int64]
+Ticks = Integers
 Texts = npt.NDArray[np.bytes_]
 
 SECOND_NS: Final = 1_000_000_000
@@ -33,6 +34,7 @@ _HALF: Final = (
 """A time of day that counts twelve hours twice."""
 _DATES: Final = (
     r"(?P<year>\d{4})-(?P<month>\d\d)-(?P<day>\d\d)",
+    r"(?P<year>\d{4})/(?P<month>\d\d)/(?P<day>\d\d)",
     r"(?P<day>\d\d)\.(?P<month>\d\d)\.(?P<year>\d{4})",  # calendars in German and others
 )
 _ZONE: Final = r"(?: ?(?P<zone>[Zz]|[+-](?P<zone_hour>\d\d)(?::?(?P<zone_minute>\d\d))?))?"
@@ -51,6 +53,7 @@ _HALF_DAY: Final = re.compile(_HALF)
 _UNCLEAR: Final = re.compile(
     r"\d{1,2}/\d{1,2}/\d{2,4}.*|\d{1,2}-\d{1,2}-\d{2,4}.*|\d{1,2}\.\d{1,2}\.\d{2,4}.*"
     r"|\d{4}/\d.*|\d{1,3}:\d{2}(?:[.,]\d+)?"
+    r"|\d{1,2}:\d\d:\d\d:\d+"  # a fourth part may count frames, hundredths or thousandths
 )
 """Dates and times that can be read in more than one way."""
 
@@ -176,7 +179,7 @@ def how_to_write(text: str) -> str:
     return ": it can be read in several ways, so write it as 2024-05-31T13:30:00 or 13:30:00"
 
 
-def _of_one_shape(texts: Texts) -> list[npt.NDArray[np.int64]]:
+def _of_one_shape(texts: Texts) -> list[Integers]:
     """Return the rows of each class of texts that differ in their digits alone, as they come."""
     if not texts.size:
         return []
@@ -192,7 +195,7 @@ def _of_one_shape(texts: Texts) -> list[npt.NDArray[np.int64]]:
     return [np.flatnonzero(codes == at) for at in np.argsort(first)]
 
 
-def _nanoseconds(texts: Texts, match: re.Match[str], rows: npt.NDArray[np.int64]) -> Ticks:
+def _nanoseconds(texts: Texts, match: re.Match[str], rows: Integers) -> Ticks:
     """Return the nanoseconds of texts whose parts stand at the places of those of the first."""
     letters = texts.view(np.uint8).reshape(texts.size, -1)
 
@@ -233,7 +236,7 @@ def _fraction(letters: npt.NDArray[np.uint8], match: re.Match[str]) -> Ticks:
     return ticks
 
 
-def _days(year: Ticks, month: Ticks, day: Ticks) -> tuple[Ticks, npt.NDArray[np.bool_]]:
+def _days(year: Ticks, month: Ticks, day: Ticks) -> tuple[Ticks, Bools]:
     """Return days since 1970, and where there is no such day."""
     wrong = (year < 1678) | (year > 2261) | (month < 1) | (month > 12) | (day < 1)
     months = np.where(wrong, 0, 12 * (year - 1970) + month - 1).astype("datetime64[M]")
@@ -255,9 +258,7 @@ def calendar_of(readers: list[StampReader]) -> str:
     return next((calendar for calendar in found if calendar != DAY), found[0] if found else "")
 
 
-def clock_of_stamps(
-    columns: list[Ticks], origin: int | None
-) -> tuple[npt.NDArray[np.float64], int | None]:
+def clock_of_stamps(columns: list[Ticks], origin: int | None) -> tuple[Floats, int | None]:
     """Return the sum of columns of time stamps from an origin on [ns], and that origin.
 
     Parameters
@@ -303,3 +304,58 @@ def moment_text(nanoseconds: int, calendar: str) -> str:
     text = str(np.datetime64(seconds, "s"))
     decimals = f".{fraction:09d}".rstrip("0") if fraction else ""
     return f"{text}{decimals}{'Z' if calendar == UTC else ''}"
+
+
+def count_days(bodies: list[RawBody], clock: Array, codes: Codes | None) -> list[RawBody]:
+    """Return bodies whose times of day have a day more after each midnight.
+
+    Rows of several bodies that take turns are in the order of their times: midnight is the same row
+    for all. Where bodies stand one below the other, each has its own midnights.
+
+    Parameters
+    ----------
+    bodies : list of RawBody
+        Their clocks in nanoseconds since midnight.
+    clock : array, shape (n,)
+        The clock of all rows.
+    codes : array of int32, shape (n,), optional
+        Index of each row's body, in the order of the bodies; None: all share the clock.
+    """
+    if codes is None or len(bodies) == 1:
+        counted = counted_on(clock, DAY_NS)
+        return [replace(body, clock=counted) for body in bodies]
+    turns = int((codes[1:] != codes[:-1]).sum())
+    if turns < len(bodies):
+        return [replace(body, clock=counted_on(body.clock, DAY_NS)) for body in bodies]
+    counted = counted_on(clock, DAY_NS)
+    present = np.unique(codes)
+    return [
+        replace(body, clock=counted[codes == code])
+        for body, code in zip(bodies, present, strict=True)
+    ]
+
+
+def counted_on(clock: Array, period: float) -> Array:
+    """Return a clock that starts over after each period with that period more each time.
+
+    A step back by more than half a period is a start.
+
+    Parameters
+    ----------
+    clock : array, shape (n,)
+        Times since the last start, NaN where there is no time.
+    period : float
+        In the unit of the clock.
+
+    Examples
+    --------
+    >>> counted_on(np.array([23.0, 1.0]), 24.0).tolist()
+    [23.0, 25.0]
+    """
+    known = np.flatnonzero(np.isfinite(clock))
+    starts = np.diff(clock[known]) < -0.5 * period
+    if not starts.any():
+        return clock
+    counted = clock.copy()
+    counted[known[1:]] += period * np.cumsum(starts)
+    return counted

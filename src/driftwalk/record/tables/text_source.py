@@ -10,7 +10,8 @@ from pathlib import Path
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import split_fields
 from driftwalk.record.raw import MISSING, ReadOptions, TableLayout
-from driftwalk.record.tables.heading import TABLE, header_advice, heading_of, is_data, units_below
+from driftwalk.record.tables.heading import header_advice, heading_of, is_data, units_below
+from driftwalk.record.tables.source import TABLE
 from driftwalk.record.tables.stamps import StampForm, stamp_form
 from driftwalk.record.text import Table, header_rows, read_table
 from driftwalk.record.text_head import detect_delimiter, read_header
@@ -47,13 +48,17 @@ class TextSource:
                 continue
             here = self._delimiter if not at else None
             delimiter = options.delimiter or here or detect_delimiter(lines[at : at + 2])
-            texts = [line.lstrip("# "), *lines[at + 1 : at + 3]]
+            below_at = [n for n in range(at + 1, len(lines)) if lines[n].strip()][:2]
+            texts = [line.lstrip("# "), *(lines[n] for n in below_at)]
             rows = [split_fields(one, delimiter) for one in texts]
             found = heading_of(rows, options)
             if found is not None:
                 if at or found.rows > 1:
                     self.names, self.units, self._delimiter = found.names, found.units, delimiter
-                    self._skip = begin + at + found.rows
+                    self._skip = begin + [at, *below_at][found.rows - 1] + 1
+                below = self._fields(header_rows(self._path, self._skip + 1)[self._skip :])
+                if self.names[-1:] == ["Comment"] and len(below[0]) == len(self.names) - 1:
+                    self.names = self.names[:-1]  # LabVIEW names it and leaves it out
                 return
         if is_data(self.names, below, options):
             self.names, self._skip = [""] * len(self.names), begin

@@ -8,9 +8,7 @@ from scipy.spatial.transform import Rotation
 from spatial import PLANES, in_space, spin, wrapped
 
 from driftwalk.core.errors import InputError
-from driftwalk.record.space.flat import SpaceTrack, lay_flat
-from driftwalk.record.space.plane import plane_of
-from driftwalk.record.space.turns import QUATERNION, VECTOR, Turns
+from driftwalk.record.space import QUATERNION, VECTOR, SpaceTrack, Turns, lay_flat, plane_of
 
 
 def in_form(rotation: Rotation, form: str) -> Turns:

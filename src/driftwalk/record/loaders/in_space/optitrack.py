@@ -6,21 +6,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import split_fields
-from driftwalk.record.raw import Array, RawRecording, ReadOptions, TableLayout
-from driftwalk.record.space.flat import SpaceTrack, lay_flat
-from driftwalk.record.space.plane import plane_of
-from driftwalk.record.space.turns import QUATERNION, Turns
+from driftwalk.record.raw import RawRecording, ReadOptions, TableLayout
+from driftwalk.record.space import QUATERNION, SpaceTrack, Turns, lay_flat, plane_of
 from driftwalk.record.text import Table, header_rows, read_table
 
 START: Final = b"Format Version,"
 _UNITS: Final = {"meters": "m", "centimeters": "cm", "millimeters": "mm"}
 _ORDERS: Final = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
-_UP: Final = "y"
-"""Motive's own axes. Its CSV says nothing about another choice at the export."""
 
 
 @dataclass(frozen=True)
@@ -72,12 +66,13 @@ class OptiTrackLoader:
             SpaceTrack(
                 name,
                 table.numbers[clock],
-                _stack(table, placed[name], "XYZ"),
+                table.stack(placed[name][axis] for axis in "XYZ"),
                 _turns(header, table, turned[name], path),
             )
             for name in bodies
         ]
-        flat = lay_flat(tracks, plane_of(options.up or _UP))
+        # Motive's own axis. Its CSV says nothing about another choice at the export.
+        flat = lay_flat(tracks, plane_of(options.up or "y"))
         if kind != "Rigid Body":
             flat.notes.append("no rigid bodies: each marker is read as a body, without orientation")
         rate = header.settings.get("Export Frame Rate") or header.settings.get("Capture Frame Rate")
@@ -163,12 +158,8 @@ def _turns(header: _Header, table: Table, columns: dict[str, int], path: Path) -
             "export quaternions, or Euler angles in an order such as XYZ",
             path=path,
         )
-    values = _stack(table, columns, axes)
+    values = table.stack(columns[axis] for axis in axes)
     return Turns(values, QUATERNION) if form == "Quaternion" else Turns(values, form, degrees=True)
-
-
-def _stack(table: Table, columns: dict[str, int], axes: str) -> Array:
-    return np.column_stack([table.numbers[columns[axis]] for axis in axes])
 
 
 LOADER = OptiTrackLoader()

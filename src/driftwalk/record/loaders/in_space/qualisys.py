@@ -9,11 +9,10 @@ from typing import Final
 import numpy as np
 
 from driftwalk.core.errors import FormatError
-from driftwalk.record.raw import Array, RawRecording, ReadOptions, TableLayout
-from driftwalk.record.space.flat import SpaceTrack, lay_flat
-from driftwalk.record.space.plane import plane_of
-from driftwalk.record.space.turns import QUATERNION, Turns
-from driftwalk.record.text import read_head, read_table
+from driftwalk.record.bad_row import is_number
+from driftwalk.record.raw import RawRecording, ReadOptions, TableLayout
+from driftwalk.record.space import QUATERNION, SpaceTrack, Turns, lay_flat, plane_of
+from driftwalk.record.text import Table, read_head, read_table
 
 _FIRST: Final = "NO_OF_FRAMES"
 _BODIES: Final = ("BODY_NAMES", "MARKER_NAMES")
@@ -57,8 +56,7 @@ class QualisysLoader:
         wanted = tuple(range(first, first + _WIDTH[kind] * len(names)))
         table = read_table(path, TableLayout("\t", [""] * len(fields), skip, wanted))
         tracks = [
-            _track(name, table.numbers, first + at * _WIDTH[kind], kind, table.rows)
-            for at, name in enumerate(names)
+            _track(name, table, first + at * _WIDTH[kind], kind) for at, name in enumerate(names)
         ]
         rate = _rate(facts, path)
         flat = lay_flat(tracks, plane_of(options.up or "z"))
@@ -73,40 +71,32 @@ def _head(path: Path) -> tuple[dict[str, list[str]], int, list[str]]:
     facts: dict[str, list[str]] = {}
     for at, line in enumerate(lines[:_MOST_HEAD]):
         fields = line.decode("utf-8-sig", "replace").rstrip("\r").split("\t")
-        if _is_number(fields[0]):
+        if is_number(fields[0]):
             return facts, at, fields
         facts[fields[0]] = fields[1:]
     raise FormatError("has no rows under its head", path=path)
 
 
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
 def _rate(facts: dict[str, list[str]], path: Path) -> float:
     """Return the frames per second [Hz]."""
     text = (facts.get("FREQUENCY") or [""])[0]
-    if not _is_number(text) or not float(text) > 0.0:
+    if not is_number(text) or not float(text) > 0.0:
         raise FormatError(f"FREQUENCY is '{text}', and no rate of frames", path=path)
     return float(text)
 
 
-def _track(name: str, columns: dict[int, Array], first: int, kind: str, rows: int) -> SpaceTrack:
+def _track(name: str, table: Table, first: int, kind: str) -> SpaceTrack:
     """Return a marker or a body; three zeros are where it was not seen."""
-    position = np.column_stack([columns[first + axis] for axis in range(3)])
+    position = table.stack(range(first, first + 3))
     position[(position == 0.0).all(axis=1)] = np.nan
-    clock = np.arange(rows, dtype=np.float64)
+    clock = np.arange(table.rows, dtype=np.float64)
     if kind == "3D":
         return SpaceTrack(name, clock, position)
     # The nine elements go down the columns of the matrix.
-    elements = np.column_stack([columns[first + 7 + at] for at in range(9)])
+    elements = table.stack(range(first + 7, first + 16))
     matrix = elements.reshape(-1, 3, 3).transpose(0, 2, 1)
     known = np.isfinite(matrix).all(axis=(1, 2)) & (np.abs(matrix).max(axis=(1, 2)) > 0.0)
-    quaternion = np.full((rows, 4), np.nan)
+    quaternion = np.full((table.rows, 4), np.nan)
     if known.any():
         from scipy.spatial.transform import Rotation
 

@@ -2,30 +2,99 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.core.errors import FormatError, InputError, reason_of
+from driftwalk.core.errors import FormatError, InputError, damaged_as
 from driftwalk.core.files.bounded import MIB, read_bounded
 from driftwalk.core.text.json_text import MOST_LEVELS
 from driftwalk.record.raw import RawRecording, ReadOptions
-from driftwalk.record.space.flat import SpaceTrack, lay_flat
-from driftwalk.record.space.plane import plane_of
-from driftwalk.record.space.ros_poses import READERS
-from driftwalk.record.space.turns import QUATERNION, Turns
+from driftwalk.record.space import QUATERNION, SpaceTrack, Turns, lay_flat, plane_of
+
+
+class Pose(NamedTuple):
+    """One body in one message."""
+
+    body: str
+    stamp: Any
+    """The stamp of its header, None where the message has none."""
+    parent: str
+    """Frame that the pose is in, ``""`` where the message does not say."""
+    values: tuple[float, ...]
+    """Position x, y, z [m] and quaternion x, y, z, w."""
+
+
+def _values(position: Any, orientation: Any) -> tuple[float, ...]:
+    return (
+        *(position.x, position.y, position.z),
+        *(orientation.x, orientation.y, orientation.z, orientation.w),
+    )
+
+
+def _pose(message: Any, topic: str) -> Iterator[Pose]:
+    yield Pose(topic, None, "", _values(message.position, message.orientation))
+
+
+def _pose_2d(message: Any, topic: str) -> Iterator[Pose]:
+    turned = (0.0, 0.0, math.sin(0.5 * message.theta), math.cos(0.5 * message.theta))
+    yield Pose(topic, None, "", (message.x, message.y, 0.0, *turned))
+
+
+def _pose_stamped(message: Any, topic: str) -> Iterator[Pose]:
+    pose, header = message.pose, message.header
+    yield Pose(topic, header.stamp, header.frame_id, _values(pose.position, pose.orientation))
+
+
+def _with_covariance(message: Any, topic: str) -> Iterator[Pose]:
+    pose, header = message.pose.pose, message.header
+    name = getattr(message, "child_frame_id", "") or topic
+    yield Pose(name, header.stamp, header.frame_id, _values(pose.position, pose.orientation))
+
+
+def _pose_array(message: Any, _topic: str) -> Iterator[Pose]:
+    header = message.header
+    for number, pose in enumerate(message.poses):
+        values = _values(pose.position, pose.orientation)
+        yield Pose(str(number), header.stamp, header.frame_id, values)
+
+
+def _transform(message: Any, _topic: str) -> Iterator[Pose]:
+    transform, header = message.transform, message.header
+    values = _values(transform.translation, transform.rotation)
+    yield Pose(message.child_frame_id, header.stamp, header.frame_id, values)
+
+
+def _transforms(message: Any, topic: str) -> Iterator[Pose]:
+    for transform in message.transforms:
+        yield from _transform(transform, topic)
+
+
+READERS: Final[dict[str, Callable[[Any, str], Iterator[Pose]]]] = {
+    "geometry_msgs/msg/Pose": _pose,
+    "geometry_msgs/msg/Pose2D": _pose_2d,
+    "geometry_msgs/msg/PoseStamped": _pose_stamped,
+    "geometry_msgs/msg/PoseWithCovarianceStamped": _with_covariance,
+    "geometry_msgs/msg/PoseArray": _pose_array,
+    "geometry_msgs/msg/TransformStamped": _transform,
+    "nav_msgs/msg/Odometry": _with_covariance,
+    "tf2_msgs/msg/TFMessage": _transforms,
+    "tf/msg/tfMessage": _transforms,
+}
+"""From a type of message to what takes the poses out of one, given the name of its topic."""
+
 
 METADATA: Final = "metadata.yaml"
 _MCAP: Final = b"\x89MCAP0\r\n"
 _SQLITE: Final = b"SQLite format 3\0"
 _ROS_1: Final = b"#ROSBAG V2.0\n"
-_UP: Final = "z"
 
 
 @dataclass
@@ -48,7 +117,7 @@ class RosLoader:
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the poses of the chosen topics."""
-        plane = plane_of(options.up or _UP)
+        plane = plane_of(options.up or "z")
         with _opened(path) as reader:
             chosen = _choose(reader.connections, options.topic, path)
             tracks, parents, recorded = _collect(reader, chosen)
@@ -84,20 +153,13 @@ def _opened(path: Path) -> Iterator[Any]:
     except ImportError as error:
         raise InputError("a ROS bag needs rosbags: pip install 'driftwalk[ros]'") from error
     _refuse_nested(path)
-    try:
+    advice = "if it was cut off, mend it first (ros2 bag reindex, mcap recover)"
+    with (
+        damaged_as("as a ROS bag", path, advice=advice),
         # A bag that does not describe its messages is taken to hold those of a common ROS 2.
-        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
-            yield reader
-    except InputError:
-        raise
-    except Exception as error:
-        # On a damaged bag the library fails with whatever the damage leads it to.
-        reason = reason_of(error)
-        raise FormatError(
-            f"cannot be read as a ROS bag: {reason.rstrip('.')}; if it was cut off, mend it first "
-            "(ros2 bag reindex, mcap recover)",
-            path=path,
-        ) from error
+        AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader,
+    ):
+        yield reader
 
 
 def _refuse_nested(path: Path) -> None:

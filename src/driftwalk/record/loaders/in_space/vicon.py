@@ -7,28 +7,22 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
 from driftwalk.record.raw import (
     ANGLE_UNITS,
     LENGTH_UNITS,
-    Array,
     RawRecording,
     ReadOptions,
     TableLayout,
 )
-from driftwalk.record.space.flat import SpaceTrack, lay_flat
-from driftwalk.record.space.plane import plane_of
-from driftwalk.record.space.turns import QUATERNION, VECTOR, Turns
+from driftwalk.record.space import QUATERNION, VECTOR, SpaceTrack, Turns, lay_flat, plane_of
 from driftwalk.record.text import Table, header_rows, read_table
 from driftwalk.record.text_head import first_lines
 
 _READ: Final = ("Objects", "Segments", "Trajectories")
 _OTHERS: Final = ("Devices", "Joints", "Model Outputs")
 _LINES: Final = 5
-_UP: Final = "z"
 _POSITIONS: Final = (("TX", "TY", "TZ"), ("X", "Y", "Z"))
 _QUATERNION: Final = ("RX", "RY", "RZ", "RW")
 _PREFIX: Final = re.compile(r"^Global Angle\s+")
@@ -74,13 +68,13 @@ class ViconLoader:
             SpaceTrack(
                 name,
                 table.numbers[0],
-                _stack(table, placed[name]),
+                table.stack(placed[name]),
                 _turns(header, table, columns[name], path),
             )
             for name in bodies
         ]
         return replace(
-            lay_flat(tracks, plane_of(options.up or _UP)),
+            lay_flat(tracks, plane_of(options.up or "z")),
             length_unit=_length_unit(header, placed, path),
             frame_rate_hz=header.rate_hz,
             rows=table.rows,
@@ -144,18 +138,14 @@ def _turns(header: _Header, table: Table, columns: dict[str, int], path: Path) -
     if not set(_QUATERNION[:3]) <= set(columns):
         return None
     if "RW" in columns:
-        return Turns(_stack(table, [columns[axis] for axis in _QUATERNION]), QUATERNION)
+        return Turns(table.stack([columns[axis] for axis in _QUATERNION]), QUATERNION)
     unit = header.units[columns["RX"]]
     if unit not in ANGLE_UNITS:
         raise FormatError(
             f"the unit of the angles is '{unit}': expected rad or deg", path=path, line=_LINES
         )
-    values = _stack(table, [columns[axis] for axis in _QUATERNION[:3]])
+    values = table.stack([columns[axis] for axis in _QUATERNION[:3]])
     return Turns(values, VECTOR, degrees=unit == "deg")
-
-
-def _stack(table: Table, columns: list[int]) -> Array:
-    return np.column_stack([table.numbers[column] for column in columns])
 
 
 def _read_rows(path: Path, layout: TableLayout) -> Table:

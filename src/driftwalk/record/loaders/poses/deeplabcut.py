@@ -14,7 +14,7 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
-from driftwalk.record.pose.keypoints import (
+from driftwalk.record.pose import (
     Chosen,
     Confidence,
     Point,
@@ -52,8 +52,7 @@ class DeepLabCutLoader:
         """Recognise the first header row, or the name of the table in HDF5."""
         if head.startswith(b"scorer,"):
             return 0.95
-        known = head.startswith(HDF5) and KEYS[0] in names_in(path, head)
-        return 0.95 if known else 0.0
+        return 0.95 if KEYS[0] in names_in(path, head) else 0.0
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the chosen bodyparts of every individual."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.core.text.json_text import parse_json
-from driftwalk.record.pose.keypoints import Confidence, Point, Poses, bodies_of, choose_keypoints
+from driftwalk.record.pose import Confidence, Point, Poses, bodies_of, choose_keypoints
 from driftwalk.record.raw import LENGTH_UNITS, Array, Marks, RawBody, RawRecording, ReadOptions
 from driftwalk.schema.stores.netcdf import MAGIC, open_netcdf, text_attribute
 

@@ -13,10 +13,10 @@ from typing import Final
 import numpy as np
 
 from driftwalk.core.errors import FormatError
-from driftwalk.record.cleaning.stacked import split_bodies
+from driftwalk.record.cleaning.several_bodies import split_bodies
 from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import read_table
-from driftwalk.record.text_head import first_lines, read_header
+from driftwalk.record.text_head import first_line, read_header
 
 STACKED: Final = ("Frame", "Time", "Arena", "Ind", "X", "Y")
 HALF_DIGIT_S: Final = 0.0051
@@ -36,8 +36,7 @@ class AnimalTALoader:
 
     def sniff(self, head: bytes, _path: Path) -> float:
         """Recognise the header."""
-        lines = first_lines(head, 1)
-        names = lines[0].split(";") if lines else []
+        names = first_line(head).split(";")
         known = names[:2] == ["Frame", "Time"] and (
             tuple(names[:6]) == STACKED or any(_X.fullmatch(name) for name in names[2:])
         )

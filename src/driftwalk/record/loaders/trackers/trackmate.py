@@ -1,22 +1,33 @@
-"""TrackMate's spots as CSV: names, titles, short titles and units in four rows, then the spots.
+"""TrackMate: spots as CSV, and its own XML of spots and the edges that make tracks of them.
 
-Before version 7 there was one row of names, and no units.
+CSV: names, titles, short titles and units in four rows, then the spots; before version 7 there was
+one row of names, and no units.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
+from xml.parsers import expat
 
 import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
-from driftwalk.record.cleaning.stacked import number_codes, split_bodies
+from driftwalk.record.cleaning.several_bodies import number_codes, split_bodies
 from driftwalk.record.column_names import unit_of_name
-from driftwalk.record.raw import LENGTH_UNITS, Marks, RawRecording, ReadOptions, TableLayout
-from driftwalk.record.text import header_rows, read_table
-from driftwalk.record.text_head import first_lines
+from driftwalk.record.raw import (
+    LENGTH_UNITS,
+    Array,
+    Marks,
+    RawBody,
+    RawRecording,
+    ReadOptions,
+    TableLayout,
+)
+from driftwalk.record.text import DAMAGED_GZIP, header_rows, open_binary, read_table
+from driftwalk.record.text_head import first_names
 
 NEEDED: Final = ("TRACK_ID", "POSITION_X", "POSITION_Y", "POSITION_T", "FRAME")
 OUTSIDE: Final = "spots outside the tracks, left out: {}"
@@ -31,9 +42,8 @@ class TrackMateLoader:
 
     def sniff(self, head: bytes, _path: Path) -> float:
         """Recognise the names of the spots' columns."""
-        lines = first_lines(head, 1)
-        names = set(split_fields(lines[0], ",")) if lines else set()
-        return 0.95 if {"TRACK_ID", "POSITION_X", "POSITION_Y"} <= names else 0.0
+        needed = {"TRACK_ID", "POSITION_X", "POSITION_Y"}
+        return 0.95 if needed <= set(first_names(head)) else 0.0
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read every track; `frame_rate` counts frames in place of the file's times."""
@@ -48,8 +58,8 @@ class TrackMateLoader:
         header = _rows_of_header(rows, places["POSITION_X"])
         units = rows[3] if header == 4 and len(rows[3]) == len(names) else [""] * len(names)
         length = stated_unit(units[places["POSITION_X"]], path)
-        timed = _is_timed(units[places["POSITION_T"]], options)
-        clock = "POSITION_T" if timed else "FRAME"
+        clock_unit = _clock_unit(units[places["POSITION_T"]], options)
+        clock = "FRAME" if clock_unit == "frame" else "POSITION_T"
         wanted = {name: places[name] for name in ("TRACK_ID", "POSITION_X", "POSITION_Y", clock)}
         layout = TableLayout(",", names, header, tuple(sorted(wanted.values())))
         table = read_table(path, layout)
@@ -62,7 +72,7 @@ class TrackMateLoader:
         outside = int((~inside).sum())
         return RawRecording(
             bodies,
-            clock_unit=unit_of_name(f"t {units[places['POSITION_T']]}") if timed else "frame",
+            clock_unit=clock_unit,
             length_unit=length,
             y_axis="down",
             rows=table.rows,
@@ -78,9 +88,10 @@ def _rows_of_header(rows: list[list[str]], place: int) -> int:
     return len(rows)
 
 
-def _is_timed(unit: str, options: ReadOptions) -> bool:
-    """Whether the times of the file are used, and not its frames."""
-    return options.frame_rate_hz is None and unit_of_name(f"t {unit}") in ("s", "ms", "us", "min")
+def _clock_unit(stated: str, options: ReadOptions) -> str:
+    """Return the unit of the times of the file, or ``"frame"`` where its frames are used."""
+    unit = unit_of_name(f"t {stated}")
+    return unit if options.frame_rate_hz is None and unit in ("s", "ms", "us", "min") else "frame"
 
 
 def stated_unit(text: str, path: Path) -> str:
@@ -106,4 +117,127 @@ def stated_unit(text: str, path: Path) -> str:
     return unit
 
 
-LOADER = TrackMateLoader()
+_SPOT: Final = ("ID", "POSITION_X", "POSITION_Y", "POSITION_T", "FRAME")
+
+
+@dataclass
+class _Contents:
+    """Attributes of the elements of a file."""
+
+    units: dict[str, str] = field(default_factory=dict)
+    spots: list[float] = field(default_factory=list)
+    """The attributes of `_SPOT`, one spot after the other."""
+    edges: dict[str, list[float]] = field(default_factory=dict)
+    """Track to the spots at the ends of its edges."""
+    kept: set[str] = field(default_factory=set)
+    """Tracks that the filters of the session keep."""
+    filtered: bool = False
+    track: str = ""
+    has_model: bool = False
+
+    def start(self, element: str, attributes: dict[str, str]) -> None:
+        """Take the start of an element."""
+        if element == "Spot":
+            self.spots.extend(float(attributes[name]) for name in _SPOT)
+        elif element == "Edge":
+            ends = (attributes["SPOT_SOURCE_ID"], attributes["SPOT_TARGET_ID"])
+            self.edges[self.track].extend(float(end) for end in ends)
+        elif element == "Track":
+            self.track = attributes["TRACK_ID"]
+            self.edges.setdefault(self.track, [])
+        elif element == "TrackID":
+            self.kept.add(attributes["TRACK_ID"])
+        elif element == "FilteredTracks":
+            self.filtered = True
+        elif element == "Model":
+            self.has_model = True
+            self.units = attributes
+
+
+class TrackMateXmlLoader:
+    """One body per track that the session's filters keep, in the unit of the image."""
+
+    name = "trackmate-xml"
+    description = "TrackMate XML (spots, edges, spatialunits, timeunits)"
+    marks = (Marks("XML", ("TrackMate", "Model", "AllSpots", "Spot", "AllTracks")),)
+
+    def sniff(self, head: bytes, _path: Path) -> float:
+        """Recognise the root element."""
+        return 0.95 if b"<TrackMate" in head[:1000] else 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read every track; `frame_rate` counts frames in place of the file's times."""
+        contents = _parsed(path)
+        if not contents.has_model or not contents.spots:
+            raise FormatError("holds no spots: is it a TrackMate session?", path=path)
+        spots = np.array(contents.spots).reshape(-1, len(_SPOT))
+        spots = spots[np.argsort(spots[:, 0], kind="stable")]
+        clock_unit = _clock_unit(f"({contents.units.get('timeunits', '')})", options)
+        tracks = {
+            name: ends
+            for name, ends in contents.edges.items()
+            if ends and (name in contents.kept or not contents.filtered)
+        }
+        if not tracks:
+            raise FormatError("no track is kept: track the spots in TrackMate, and save", path=path)
+        bodies = [
+            _body(name, spots, ends, clock=4 if clock_unit == "frame" else 3, path=path)
+            for name, ends in sorted(tracks.items(), key=lambda entry: (len(entry[0]), entry[0]))
+        ]
+        outside = len(spots) - len(np.unique(np.concatenate([*map(np.array, tracks.values())])))
+        return RawRecording(
+            bodies,
+            clock_unit=clock_unit,
+            length_unit=stated_unit(contents.units.get("spatialunits", ""), path),
+            y_axis="down",
+            rows=len(spots),
+            notes=[OUTSIDE.format(outside)] if outside else [],
+        )
+
+
+def _body(name: str, spots: Array, ends: list[float], *, clock: int, path: Path) -> RawBody:
+    """Return the spots of a track in the order of their times."""
+    ids = np.unique(np.array(ends))
+    rows = np.minimum(np.searchsorted(spots[:, 0], ids), len(spots) - 1)
+    if (spots[rows, 0] != ids).any():
+        lost = ids[spots[rows, 0] != ids][0]
+        raise FormatError(
+            f"track {name} has an edge to spot {lost:.0f}, which is not there", path=path
+        )
+    rows = rows[np.argsort(spots[rows, clock], kind="stable")]
+    return RawBody(name, spots[rows, clock], spots[rows, 1], spots[rows, 2])
+
+
+def _parsed(path: Path) -> _Contents:
+    contents = _Contents()
+    parser = expat.ParserCreate()
+    parser.StartElementHandler = contents.start
+    parser.StartDoctypeDeclHandler = _refuse_doctype
+    try:
+        with open_binary(path) as file:
+            while block := file.read(1 << 20):
+                parser.Parse(block)
+            parser.Parse(b"", True)
+    except DAMAGED_GZIP as error:
+        raise FormatError(f"is a damaged gzip file: {error}", path=path) from error
+    except expat.ExpatError as error:
+        reason = expat.ErrorString(error.code)
+        raise FormatError(f"is damaged XML: {reason}", path=path, line=error.lineno) from error
+    except LookupError as error:
+        if not isinstance(error, KeyError):  # expat asks Python for encodings that it lacks
+            raise FormatError(f"is damaged XML: {error}", path=path) from error
+        what = f"an element lacks its attribute {error}"
+        raise FormatError(what, path=path, line=parser.CurrentLineNumber) from error
+    except ValueError as error:
+        raise FormatError(
+            f"an attribute is no number: {error}", path=path, line=parser.CurrentLineNumber
+        ) from error
+    return contents
+
+
+def _refuse_doctype(*_: object) -> None:
+    """Refuse definitions of entities, by which a small file may become a huge one."""
+    raise FormatError("defines a document type, which TrackMate's files do not")
+
+
+LOADERS = (TrackMateLoader(), TrackMateXmlLoader())

@@ -11,13 +11,12 @@ from typing import Final
 import numpy as np
 
 from driftwalk.core.errors import FormatError
-from driftwalk.record.bad_row import split_fields
-from driftwalk.record.cleaning.stacked import number_codes, split_bodies
+from driftwalk.record.cleaning.several_bodies import number_codes, split_bodies
 from driftwalk.record.raw import Array, Marks, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.stores.hdf5 import Hdf5Contents, names_in, opened_hdf5
 from driftwalk.record.stores.pandas_frame import Frame, frame_in
 from driftwalk.record.text import read_table
-from driftwalk.record.text_head import first_lines, first_row
+from driftwalk.record.text_head import first_names, first_row
 from driftwalk.schema.stores.netcdf import HDF5, file_start
 
 NEEDED: Final = ("x", "y", "frame", "particle")
@@ -40,8 +39,7 @@ class TrackpyLoader:
         """Recognise the columns of features, or a store of pandas."""
         if head.startswith(HDF5):
             return 0.5 if "PYTABLES_FORMAT_VERSION" in names_in(path, head) else 0.0
-        lines = first_lines(head, 1)
-        names = set(split_fields(lines[0], ",")) if lines else set()
+        names = set(first_names(head))
         return 0.9 if set(NEEDED) <= names and len(OWN & names) > 1 else 0.0
 
     def read(self, path: Path, _options: ReadOptions) -> RawRecording:

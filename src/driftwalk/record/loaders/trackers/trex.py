@@ -16,13 +16,12 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.record.bad_row import split_fields
 from driftwalk.record.column_names import unit_of_name
-from driftwalk.record.pose.keypoints import angle_between
+from driftwalk.record.pose import angle_between
 from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.stores.npz import ZIP, members, opened_npz
 from driftwalk.record.text import read_table
-from driftwalk.record.text_head import first_lines, first_row
+from driftwalk.record.text_head import first_names, first_row
 from driftwalk.schema.stores.netcdf import file_start
 
 CENTRES: Final = ("wcentroid", "centroid", "pcentroid", "head")
@@ -116,8 +115,7 @@ class TrexLoader:
             return 0.8 if _files(path) else 0.0
         if head.startswith(ZIP):
             return 0.95 if _is_individual(members(path)) else 0.0
-        lines = first_lines(head, 1)
-        names = [name.partition(" ")[0] for name in split_fields(lines[0], ",")] if lines else []
+        names = [name.partition(" ")[0] for name in first_names(head)]
         return 0.95 if "frame" in names and any("#wcentroid" in name for name in names) else 0.0
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
@@ -164,28 +162,24 @@ def _is_individual(names: set[str]) -> bool:
 
 def _video(file: Path) -> str:
     match = _NUMBER.fullmatch(file.name)
-    return match.group(1) if match else file.stem
+    return match[1] if match else file.stem
 
 
 def _individual(file: Path) -> str:
     match = _NUMBER.fullmatch(file.name)
-    return match.group(2) if match else "0"
+    return match[2] if match else "0"
 
 
 def _keys(point: str) -> tuple[str, str]:
     """Return the names of x and y of a point."""
     if point == "head":
         return "X", "Y"
-    return (
-        (f"poseX{point[4:]}", f"poseY{point[4:]}")
-        if point in POSE
-        else (f"X#{point}", f"Y#{point}")
-    )
+    end = f"#{point}"
+    return (f"poseX{point[4:]}", f"poseY{point[4:]}") if point in POSE else (f"X{end}", f"Y{end}")
 
 
 def _read(path: Path, options: ReadOptions) -> _Individual:
-    is_npz = file_start(path).startswith(ZIP)
-    if not is_npz:
+    if not file_start(path).startswith(ZIP):
         individual = _of_csv(path)
         individual.make_body(options)
         return individual

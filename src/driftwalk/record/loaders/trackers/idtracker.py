@@ -1,12 +1,14 @@
-"""idtracker.ai 4 to 6: a dictionary in ``.npy`` or ``.pickle``, HDF5, or CSV and its attributes.
+"""idTracker's text (2014), and idtracker.ai 4 to 6: NumPy, pickle, HDF5, CSV and its attributes.
 
-Trajectories over frame, individual and (x, y), in pixels, with the frame rate. A pickle is read
+idTracker: tab-separated ``X1 Y1 ProbId1 X2 ...``, pixels, one row per frame. idtracker.ai:
+trajectories over frame, individual and (x, y), in pixels, with the frame rate. A pickle is read
 without executing anything in it: see `record.stores.plain_pickle`.
 """
 
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,13 +20,54 @@ import numpy.typing as npt
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.files.bounded import MIB, read_bounded
 from driftwalk.core.text.json_text import parse_json
-from driftwalk.record.cleaning.stacked import number_codes, split_bodies
+from driftwalk.record.cleaning.several_bodies import number_codes, split_bodies
 from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.stores.hdf5 import names_in, opened_hdf5
 from driftwalk.record.stores.plain_pickle import PickledArray, unpickle
 from driftwalk.record.text import read_table
-from driftwalk.record.text_head import first_row
+from driftwalk.record.text_head import first_line, first_row, read_header
 from driftwalk.schema.stores.netcdf import HDF5, file_start
+
+_HEADER = re.compile(r"X1\s+Y1\s+ProbId1\b", re.ASCII)
+
+
+class IdTrackerLoader:
+    """Positions in pixels without a clock: the frame rate and the scale have to be given."""
+
+    name = "idtracker"
+    description = "idTracker trajectories.txt (X1 Y1 ProbId1 ..., pixels, no clock)"
+
+    def sniff(self, head: bytes, _path: Path) -> float:
+        """Recognise the header."""
+        return 0.95 if _HEADER.match(first_line(head)) else 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read every individual; ``ProbId`` -1 and -2 mark positions that idTracker estimated."""
+        names, delimiter, skip, _ = read_header(path, delimiter=options.delimiter)
+        places = {name: index for index, name in enumerate(names)}
+        individuals = [
+            name[1:] for name in names if re.fullmatch(r"X\d+", name) and f"Y{name[1:]}" in places
+        ]
+        if not individuals:
+            raise FormatError("no columns X1, Y1 as idTracker writes them", path=path, line=skip)
+        table = read_table(path, TableLayout(delimiter, names, skip, tuple(range(len(names)))))
+        frame = np.arange(table.rows, dtype=np.float64)
+        bodies = [
+            RawBody(
+                name, frame, table.numbers[places[f"X{name}"]], table.numbers[places[f"Y{name}"]]
+            )
+            for name in individuals
+        ]
+        estimated = sum(
+            int((table.numbers[places[f"ProbId{name}"]] < 0).sum())
+            for name in individuals
+            if f"ProbId{name}" in places
+        )
+        notes = (
+            [f"{estimated} positions were estimated by idTracker, not seen"] if estimated else []
+        )
+        return RawRecording(bodies, length_unit="px", rows=table.rows, notes=notes)
+
 
 NPY: Final = b"\x93NUMPY"
 TABLE: Final = "trajectories.csv"
@@ -272,4 +315,4 @@ def _of_tidy(path: Path, options: ReadOptions) -> RawRecording:
     )
 
 
-LOADER = IdTrackerAiLoader()
+LOADERS = (IdTrackerLoader(), IdTrackerAiLoader())

@@ -1,0 +1,108 @@
+"""Trajectories of visual odometry and SLAM: EuRoC's ground truth, and TUM's text.
+
+EuRoC: CSV with ``p_RS_R_x [m]`` and ``q_RS_w []``, a clock of nanoseconds. TUM: ``timestamp tx ty
+tz qx qy qz qw``, blanks between, seconds and metres.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import replace
+from itertools import takewhile
+from pathlib import Path
+from typing import Final
+
+from driftwalk.core.errors import FormatError
+from driftwalk.record.column_names import unit_of_name
+from driftwalk.record.raw import CLOCK_UNITS, RawRecording, ReadOptions, TableLayout
+from driftwalk.record.space import PARTS, QUATERNION, SpaceTrack, Turns, lay_flat, plane_of
+from driftwalk.record.text import header_rows, read_table
+from driftwalk.record.text_head import first_line, first_lines, first_row, is_numeric_row
+
+_START: Final = re.compile(r"#\s*timestamp\b[^,]*(,\s*p_\w*[xyz]\b[^,]*){3}")
+_PART: Final = re.compile(r"([pq])_(?:[A-Za-z]+_)*([wxyz])\s*(?:\[.*\])?")
+_POSITION: Final = ("px", "py", "pz")
+
+
+class EurocLoader:
+    """One body; velocities and biases that follow are not read."""
+
+    name = "euroc"
+    description = "EuRoC ground truth CSV (#timestamp [ns], p_RS_R_x [m], …, q_RS_w, …; z up)"
+
+    def sniff(self, head: bytes, _path: Path) -> float:
+        """Recognise the header."""
+        return 0.9 if _START.match(first_line(head)) else 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read the one body; its whole nanoseconds stay exact."""
+        names = [name.lstrip("# ") for name in first_row(path)]
+        columns = {
+            "".join(match.groups()): column
+            for column, name in enumerate(names)
+            if (match := _PART.fullmatch(name))
+        }
+        lacking = [part for part in _POSITION if part not in columns]
+        if lacking:
+            raise FormatError(
+                f"the header names no column of p_…_{lacking[0][1]}", path=path, line=1
+            )
+        turned = set(PARTS) <= set(columns)
+        parts = (*_POSITION, *(PARTS if turned else ()))
+        used = tuple(columns[part] for part in parts)
+        table = read_table(path, TableLayout(",", names, 1, (0, *used), clock=0))
+        values = table.stack(used)
+        turns = Turns(values[:, 3:], QUATERNION) if turned else None
+        track = SpaceTrack("0", table.numbers[0], values[:, :3], turns)
+        unit = unit_of_name(names[0])
+        return replace(
+            lay_flat([track], plane_of(options.up or "z")),
+            clock_unit=unit if unit in CLOCK_UNITS else "ns",
+            clock_origin=table.clock_origin,
+            length_unit="m",
+            rows=table.rows,
+        )
+
+
+_NAMES: Final = ["timestamp", "tx", "ty", "tz", "qx", "qy", "qz", "qw"]
+
+
+class TumLoader:
+    """One body, with its time stamps as they are."""
+
+    name = "tum"
+    description = "TUM trajectory (timestamp tx ty tz qx qy qz qw; s, m; z up)"
+
+    def sniff(self, head: bytes, _path: Path) -> float:
+        """Recognise eight numbers of which the last four make a unit quaternion."""
+        lines = first_lines(head, 20)
+        rows = [line.split() for line in lines if not line.startswith("#")][:2]
+        named = any(line.lstrip("# ").split() == _NAMES for line in lines if line[:1] == "#")
+        if not rows or not all(len(row) == len(_NAMES) and is_numeric_row(row) for row in rows):
+            return 0.0
+        return 0.9 if named or all(_is_unit(row[4:]) for row in rows) else 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read the one body."""
+        comments = takewhile(lambda line: line.startswith("#"), header_rows(path, 20))
+        layout = TableLayout(" ", _NAMES, len(list(comments)), tuple(range(len(_NAMES))))
+        table = read_table(path, layout)
+        values = table.stack(range(1, 8))
+        track = SpaceTrack("0", table.numbers[0], values[:, :3], Turns(values[:, 3:], QUATERNION))
+        return replace(
+            lay_flat([track], plane_of(options.up or "z")),
+            clock_unit="s",
+            length_unit="m",
+            rows=table.rows,
+        )
+
+
+def _is_unit(fields: list[str]) -> bool:
+    try:
+        return abs(math.hypot(*map(float, fields)) - 1.0) < 0.02
+    except ValueError:
+        return False
+
+
+LOADERS = (EurocLoader(), TumLoader())

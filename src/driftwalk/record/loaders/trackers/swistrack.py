@@ -1,0 +1,277 @@
+"""SwisTrack: track files, ``particles.csv``, and the NMEA stream of its server.
+
+Track files: one per track, tab-separated, a header that starts with ``%``. 2009 to 2022
+(``track_00000003.txt``): frame, image x, y, world x, y, area, orientation, compactness, time stamp
+in ms since 1970 or -1. Since 2022 (``track00000003.csv``): frame, x, y in image pixels.
+
+``particles.csv`` (since 2022), tab-separated despite its name: frame, ISO time, image x, y, world
+x, y, area, orientation, compactness; the header has commas and starts with ``%``.
+
+NMEA: lines ``$COMMAND,argument,...*HH``; HH, the exclusive or of the characters between ``$`` and
+``*``, may be absent. Up to 2022 ``$PARTICLE`` has id, image x, y, orientation, world x, y; later
+id, image x, y, world x, y, area, orientation, compactness. There is no clock.
+"""
+
+from __future__ import annotations
+
+import re
+from array import array
+from datetime import UTC, datetime
+from functools import reduce
+from pathlib import Path
+
+import numpy as np
+
+from driftwalk.core.arrays import Integers
+from driftwalk.core.errors import FormatError
+from driftwalk.record.cleaning.several_bodies import order_in_frame, split_bodies
+from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions, TableLayout
+from driftwalk.record.text import Table, lines_of, open_binary, read_head, read_table
+from driftwalk.record.text_head import first_line, first_lines
+
+OLD = ["frame", "x (image)", "y (image)", "x (world)", "y (world)", "area", "orientation"]
+OLD = [*OLD, "compactness", "time stamp"]
+NEW = ["frame", "x", "y"]
+_FILE_NAME = re.compile(r"(?:.*_)?(?:track_?)?(\d{8})\.(?:txt|csv)")
+
+
+class SwisTrackTracksLoader:
+    """A body per track: give one file, or the run folder for all of its tracks."""
+
+    name = "swistrack-tracks"
+    description = "SwisTrack track files (track_00000003.txt of 2009-2022, track00000003.csv since)"
+
+    def sniff(self, head: bytes, path: Path) -> float:
+        """Recognise the header, or a folder that holds track files."""
+        if path.is_dir():
+            return 0.7 if _track_files(path) else 0.0
+        return 0.95 if _columns(head) else 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read one track, or every track of a folder.
+
+        World coordinates are used when the run was calibrated, unless `metres_per_pixel` asks
+        for the image. Angles are measured in the image in either case.
+        """
+        files = _track_files(path) if path.is_dir() else [path]
+        if not files:
+            raise FormatError("the folder holds no track files (track_00000000.txt)", path=path)
+        tables = {_track_name(file): _read_one(file) for file in files}
+        first = next(iter(tables.values()))
+        if any(set(table.numbers) != set(first.numbers) for table in tables.values()):
+            raise FormatError("the folder mixes track files of two SwisTrack versions", path=path)
+        rows = sum(table.rows for table in tables.values())
+        if len(first.numbers) == len(NEW):
+            bodies = [
+                RawBody(name, *(table.numbers[column] for column in range(3)))
+                for name, table in tables.items()
+            ]
+            return RawRecording(bodies, length_unit="px", rows=rows)
+        return _old_recording(tables, options, rows=rows)
+
+
+def _old_recording(tables: dict[str, Table], options: ReadOptions, *, rows: int) -> RawRecording:
+    calibrated = any(table.numbers[column].any() for table in tables.values() for column in (3, 4))
+    world = calibrated and options.metres_per_pixel is None
+    timed = options.frame_rate_hz is None and all(
+        (table.numbers[8] >= 0).all() for table in tables.values()
+    )
+    used = (8 if timed else 0, *((3, 4) if world else (1, 2)), 6)
+    bodies = [
+        RawBody(name, *(table.numbers[column] for column in used)) for name, table in tables.items()
+    ]
+    return _recording(bodies, "ms" if timed else "frame", world=world, rows=rows)
+
+
+def _recording(
+    bodies: list[RawBody], clock_unit: str, *, world: bool, rows: int, note: str = ""
+) -> RawRecording:
+    """Return bodies in the world or the image; angles are measured in the image in either case."""
+    return RawRecording(
+        bodies,
+        clock_unit=clock_unit,
+        length_unit="m" if world else "px",
+        y_axis="up" if world else "down",
+        theta_axis="down",
+        rows=rows,
+        notes=[note] if note else [],
+    )
+
+
+def _columns(head: bytes) -> list[str]:
+    """Return the columns that the header announces, [] when it is not SwisTrack's."""
+    line = first_line(head)
+    header = [field.strip().lower() for field in line.lstrip("% ").split("\t")]
+    if not line.startswith("%") or not header[0].startswith("frame number"):
+        return []
+    if len(header) == 1:  # the newer versions write the header with commas above tabs
+        header = [field.strip() for field in header[0].split(",") if field.strip()]
+    if len(header) == len(OLD) and "image" in header[1] and "time" in header[8]:
+        return OLD
+    return NEW if header[1:] == ["x", "y"] else []
+
+
+def _read_one(path: Path) -> Table:
+    columns = _columns(read_head(path))
+    if not columns:
+        raise FormatError("the header is not that of a SwisTrack track file", path=path, line=1)
+    table = read_table(path, TableLayout("\t", columns, 1, tuple(range(len(columns)))))
+    if np.isnan(table.numbers[0]).any():
+        raise FormatError("a row has no frame number", path=path)
+    return table
+
+
+def _track_files(folder: Path) -> list[Path]:
+    return sorted(file for file in folder.iterdir() if _FILE_NAME.fullmatch(file.name))
+
+
+def _track_name(path: Path) -> str:
+    match = _FILE_NAME.fullmatch(path.name)
+    return str(int(match.group(1))) if match else "0"
+
+
+PARTICLES = ["frame", "time", "x (image)", "y (image)", "x (world)", "y (world)"]
+PARTICLES = [*PARTICLES, "area", "orientation", "compactness"]
+
+
+class SwisTrackParticlesLoader:
+    """Bodies are distinguished by their order within a frame, since the file has no identities."""
+
+    name = "swistrack-particles"
+    description = "SwisTrack particles.csv (2022 and later; no identities)"
+
+    def sniff(self, head: bytes, _path: Path) -> float:
+        """Recognise the header."""
+        header = first_line(head).lower()
+        known = header.startswith("%") and "frame number" in header and "time" in header
+        return 0.93 if known and header.find("time") < header.find("x (image)") else 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read every particle; world coordinates where the run was calibrated."""
+        table = read_table(path, TableLayout("\t", PARTICLES, 1, (0, 2, 3, 4, 5, 7), (1,)))
+        numbers = table.numbers
+        calibrated = bool(numbers[4].any() or numbers[5].any())
+        world = calibrated and options.metres_per_pixel is None
+        order = order_in_frame(numbers[0])
+        count = int(order.max()) + 1
+        timed = options.frame_rate_hz is None
+        bodies = split_bodies(
+            order,
+            [str(index) for index in range(count)],
+            clock=_times(table, path) if timed else numbers[0],
+            x=numbers[4 if world else 2],
+            y=numbers[5 if world else 3],
+            theta=numbers[7],
+        )
+        note = (
+            "particles.csv holds no identities: bodies are distinguished by their order in a frame"
+        )
+        clock_unit, note = "s" if timed else "frame", note if count > 1 else ""
+        return _recording(bodies, clock_unit, world=world, rows=table.rows, note=note)
+
+
+def _times(table: Table, path: Path) -> Array:
+    """Return seconds since 1970 of the ISO time stamps."""
+    try:
+        stamps = np.array([_since_1970(label) for label in table.labels[1]], dtype=np.float64)
+    except (ValueError, OverflowError) as error:
+        raise FormatError(
+            f"a time stamp is not an ISO date ({error}); give `frame_rate` to use frame numbers",
+            path=path,
+        ) from error
+    seconds: Array = stamps[table.codes[1]]
+    return seconds
+
+
+def _since_1970(stamp: str) -> float:
+    """Return the seconds of an ISO time stamp; one that names no zone is taken as UTC."""
+    time = datetime.fromisoformat(stamp)
+    return (time if time.tzinfo is not None else time.replace(tzinfo=UTC)).timestamp()
+
+
+class SwisTrackNmeaLoader:
+    """Frame numbers and poses; the frame rate has to be given."""
+
+    name = "swistrack-nmea"
+    description = "SwisTrack NMEA log ($FRAMENUMBER, $PARTICLE; no clock)"
+
+    def sniff(self, head: bytes, _path: Path) -> float:
+        """Recognise the commands."""
+        lines = first_lines(head, 20)
+        known = ("$STEP_START", "$FRAMENUMBER", "$PARTICLE")
+        return 0.95 if any(line.startswith(known) for line in lines) else 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read every particle; world coordinates where the run was calibrated."""
+        values, ids = _particles(path)
+        frame, image_x, image_y, world_x, world_y, theta = values
+        if not frame.size:
+            raise FormatError("holds no $PARTICLE", path=path)
+        world = bool(world_x.any() or world_y.any()) and options.metres_per_pixel is None
+        order = order_in_frame(frame)
+        labels, codes = np.unique(ids, return_inverse=True)
+        # Some senders give every particle the same id: then only their order tells them apart.
+        repeated = np.unique(np.stack([frame, ids]), axis=1).shape[1] < frame.size
+        names = [str(index) for index in (range(int(order.max()) + 1) if repeated else labels)]
+        bodies = split_bodies(
+            order if repeated else codes.astype(np.int32),
+            names,
+            clock=frame,
+            x=world_x if world else image_x,
+            y=world_y if world else image_y,
+            theta=theta,
+        )
+        note = "ids repeat within a frame: bodies are distinguished by their order in the frame"
+        note = note if repeated else ""
+        return _recording(bodies, "frame", world=world, rows=int(frame.size), note=note)
+
+
+def _particles(path: Path) -> tuple[Array, Integers]:
+    """Return (frame, image x, y, world x, y, orientation) and the ids, one column a particle."""
+    values = array("d")
+    ids = array("q")
+    frame = float("nan")
+    with open_binary(path) as file:
+        for line, raw in lines_of(file, path):
+            text = raw.strip()
+            if text.startswith((b"$FRAMENUMBER,", b"$PARTICLE,")):
+                command, *arguments = _verified(text, path, line).split(",")
+                try:
+                    if command == "FRAMENUMBER":
+                        frame = float(int(arguments[0]))
+                        continue
+                    places = {6: (1, 2, 4, 5, 3), 8: (1, 2, 3, 4, 6)}[len(arguments)]
+                    ids.append(int(arguments[0]))
+                    values.append(frame)
+                    values.extend(float(arguments[place]) for place in places)
+                except (KeyError, ValueError, OverflowError) as error:
+                    raise FormatError(
+                        f"cannot read '{text[:60].decode('ascii', 'replace')}': expected 6 or 8 "
+                        "numbers after $PARTICLE, 1 after $FRAMENUMBER",
+                        path=path,
+                        line=line,
+                    ) from error
+                if frame != frame:
+                    raise FormatError("$PARTICLE before any $FRAMENUMBER", path=path, line=line)
+            elif text and not text.startswith(b"$"):
+                raise FormatError("expected a line that starts with $", path=path, line=line)
+    columns = np.frombuffer(values, dtype=np.float64).reshape(-1, 6).T
+    return np.ascontiguousarray(columns), np.array(ids, dtype=np.int64)
+
+
+def _verified(text: bytes, path: Path, line: int) -> str:
+    """Return the line between ``$`` and ``*``, its checksum compared if it has one."""
+    content, star, stated = text[1:].partition(b"*")
+    if star:
+        actual = f"{reduce(lambda total, byte: total ^ byte, content, 0):02X}"
+        if stated.strip().decode("ascii", "replace").upper() != actual:
+            raise FormatError(
+                f"the checksum is {stated.decode('ascii', 'replace')}, computed {actual}: the line "
+                "is damaged",
+                path=path,
+                line=line,
+            )
+    return content.decode("ascii", "replace")
+
+
+LOADERS = (SwisTrackTracksLoader(), SwisTrackParticlesLoader(), SwisTrackNmeaLoader())

@@ -1,0 +1,288 @@
+"""Text tables of tracking programs, one file each: DLTdv, smarticles, ToxTrac, UbiTrail, yupi.
+
+DLTdv: ``pt1_cam1_X,pt1_cam1_Y,...``, pixels, one row per frame. Smarticles: eleven columns without
+header: sync pulse, time, then x, y, theta of three robots. ToxTrac: image space without header
+(pixels), or real space with one (seconds, mm). UbiTrail: a line of R metadata, then
+``Area,Territory,X,Y,time,L``; often in gzip. yupi: rows of its settings, then ``x,y,t`` (or
+``x,y,z,t``) and what else; version 2 begins with ``v2,N``, N rows before the data, version 1 with
+name, interval, dimensions. Programs with one header line are descriptions for `HeadedFormat`.
+"""
+
+from __future__ import annotations
+
+import re
+from itertools import pairwise
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from driftwalk.core.errors import FormatError
+from driftwalk.record.bad_row import is_number, split_fields
+from driftwalk.record.cleaning.several_bodies import split_bodies
+from driftwalk.record.column_names import unit_of_name
+from driftwalk.record.loaders.plain import HeadedFormat
+from driftwalk.record.raw import Marks, RawBody, RawRecording, ReadOptions, TableLayout
+from driftwalk.record.text import header_rows, read_head, read_table
+from driftwalk.record.text_head import (
+    first_line,
+    first_lines,
+    first_row,
+    is_numeric_row,
+    read_header,
+)
+
+_DLTDV_X = re.compile(r"(pt\d+_cam\d+)_X", re.IGNORECASE)
+
+
+class DltdvLoader:
+    """Points seen by a camera. Versions differ in the direction of y: taken as an image's, down."""
+
+    name = "dltdv"
+    description = "DLTdv xypts.csv (pt1_cam1_X, pt1_cam1_Y, ...; pixels, no clock)"
+
+    def sniff(self, head: bytes, _path: Path) -> float:
+        """Recognise the header."""
+        return 0.95 if _DLTDV_X.match(first_line(head).lstrip('"')) else 0.0
+
+    def read(self, path: Path, _options: ReadOptions) -> RawRecording:
+        """Read every point of every camera as a body."""
+        names, delimiter, skip, _ = read_header(path)
+        lower = [name.lower() for name in names]
+        points = [match.group(1) for name in names if (match := _DLTDV_X.fullmatch(name))]
+        missing = [point for point in points if f"{point}_y".lower() not in lower]
+        if missing or not points:
+            raise FormatError(f"no column of y for {missing or 'any point'}", path=path, line=skip)
+        table = read_table(path, TableLayout(delimiter, names, skip, tuple(range(len(names)))))
+        frame = np.arange(table.rows, dtype=np.float64)
+        bodies = [
+            RawBody(
+                point,
+                frame,
+                table.numbers[lower.index(f"{point}_x".lower())],
+                table.numbers[lower.index(f"{point}_y".lower())],
+            )
+            for point in points
+        ]
+        notes = [
+            'DLTdv versions differ in the direction of y: if yours counts up, add `y_axis="up"`'
+        ]
+        return RawRecording(bodies, length_unit="px", rows=table.rows, notes=notes)
+
+
+SMARTICLES = ["sync", "t", *(f"{name}{at}" for at in (1, 2, 3) for name in ("x", "y", "theta"))]
+
+
+class SmarticlesLoader:
+    """Seconds, pixels and unwrapped radians of three robots side by side."""
+
+    name = "smarticles"
+    description = "smarticle CSV (sync, t, then x, y, theta of three robots; pixels, no header)"
+
+    def sniff(self, head: bytes, _path: Path) -> float:
+        """Recognise eleven numbers of which the second grows and the positions are pixels."""
+        rows = [line.split(",") for line in first_lines(head)]
+        if len(rows) < 2 or not all(len(row) == 11 and is_numeric_row(row) for row in rows):
+            return 0.0
+        try:
+            times = [float(row[1]) for row in rows]
+            pixels = [float(row[index]) for row in rows for index in (2, 3, 5, 6, 8, 9)]
+        except ValueError:
+            return 0.0
+        grows = all(later > earlier for earlier, later in pairwise(times))
+        return 0.8 if grows and min(pixels) > 1.0 else 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read the three robots."""
+        names, delimiter, skip, has_header = read_header(path, delimiter=options.delimiter)
+        if has_header or len(names) != 11:
+            raise FormatError("expected eleven columns without a header", path=path, line=1)
+        table = read_table(path, TableLayout(delimiter, SMARTICLES, skip, tuple(range(1, 11))))
+        bodies = [
+            RawBody(
+                str(at), *(table.numbers[column] for column in (1, *range(3 * at - 1, 3 * at + 2)))
+            )
+            for at in (1, 2, 3)
+        ]
+        return RawRecording(
+            bodies, clock_unit="s", bare_clock="", separate=True, length_unit="px", rows=table.rows
+        )
+
+
+TOXTRAC: Final = ["frame", "arena", "track", "x", "y", "label"]
+REAL_SPACE: Final = ("Time", "Arena", "Track", "Pos. X", "Pos. Y", "Label")
+"""Names of the columns in real space; units follow in brackets."""
+
+
+class ToxTracLoader:
+    """One row per frame and track; a body is a track, or arena/track where there are arenas."""
+
+    name = "toxtrac"
+    description = "ToxTrac text (frame or time, arena, track, x, y, label; tabs; pixels or mm)"
+    marks = (
+        Marks("table", ("Time (sec)", "Arena", "Track", "Pos. X (mm)", "Pos. Y (mm)", "Label")),
+    )
+
+    def sniff(self, head: bytes, _path: Path) -> float:
+        """Recognise the header of real space, or six numbers of which four are whole."""
+        rows = [line.split("\t") for line in first_lines(head)]
+        if rows and _is_real_space(rows[0]):
+            return 0.95
+        if not rows or any(len(row) != 6 or not is_numeric_row(row) for row in rows):
+            return 0.0
+        whole = all(row[index].strip().isdecimal() for row in rows for index in (0, 1, 2, 5))
+        return 0.9 if whole else 0.0
+
+    def read(self, path: Path, _options: ReadOptions) -> RawRecording:
+        """Read every track."""
+        header = first_row(path, "\t")
+        real = _is_real_space(header)
+        layout = TableLayout("\t", header if real else TOXTRAC, int(real), numbers=tuple(range(6)))
+        table = read_table(path, layout)
+        clock, arena, track, x, y, label = (table.numbers[column] for column in range(6))
+        if not (np.isfinite(arena) & np.isfinite(track)).all():
+            raise FormatError("a row names no arena or no track", path=path)
+        pairs, codes = np.unique(np.stack([arena, track]), axis=1, return_inverse=True)
+        several = np.unique(pairs[0]).size > 1
+        labels = [
+            f"{place:g}/{number:g}" if several else f"{number:g}"
+            for place, number in pairs.T.tolist()
+        ]
+        bodies = split_bodies(codes.ravel().astype(np.int32), labels, clock=clock, x=x, y=y)
+        # Label 0 is a position that was predicted, not seen.
+        predicted = int((label == 0.0).sum())
+        return RawRecording(
+            bodies,
+            clock_unit=unit_of_name(header[0]) if real else "frame",
+            length_unit=unit_of_name(header[3]) if real else "px",
+            y_axis="down",
+            rows=table.rows,
+            notes=[f"positions that ToxTrac predicted, not seen: {predicted}"] if predicted else [],
+        )
+
+
+def _is_real_space(row: list[str]) -> bool:
+    return tuple(name.partition("(")[0].strip() for name in row) == REAL_SPACE
+
+
+UBITRAIL = ["Area", "Territory", "X", "Y", "time", "L"]
+_AREAS = re.compile(
+    r"Areas=matrix\(c\(([\d.,\s-]+)\),4,\d+,dimname=list\(c\([^)]*\),c\(([^)]*)\)\)\)"
+)
+
+
+class UbiTrailLoader:
+    """One body per area. X and Y count widths of the area, which the metadata give in pixels."""
+
+    name = "ubitrail"
+    description = "UbiTrail CSV (R metadata, then Area,Territory,X,Y,time,L; time in ms)"
+
+    def sniff(self, head: bytes, _path: Path) -> float:
+        """Recognise the second line."""
+        lines = first_lines(head, 2)
+        return 0.95 if len(lines) == 2 and lines[1].split(",") == UBITRAIL else 0.0
+
+    def read(self, path: Path, _options: ReadOptions) -> RawRecording:
+        """Read every area and turn widths of the area into pixels."""
+        widths = _area_widths(path)
+        table = read_table(path, TableLayout(",", UBITRAIL, 2, (2, 3, 4), (0,)))
+        areas = table.labels[0]
+        unknown = [area for area in areas if area not in widths]
+        if unknown:
+            raise FormatError(
+                f"the metadata give no width for area {unknown[0]}", path=path, line=1
+            )
+        scale = np.array([widths[area] for area in areas])[table.codes[0]]
+        with np.errstate(over="ignore"):  # an infinite position is a gap
+            x, y = (table.numbers[column] * scale for column in (2, 3))
+        bodies = split_bodies(table.codes[0], areas, clock=table.numbers[4], x=x, y=y)
+        # An area is a body. The clock, of a video's file, often says the same of two frames.
+        return RawRecording(
+            bodies,
+            clock_unit="ms",
+            length_unit="px",
+            separate=True,
+            rows=table.rows,
+            attrs={"bodies_apart": "yes"},
+        )
+
+
+def _area_widths(path: Path) -> dict[str, float]:
+    """Return the width of each area in pixels, from the first line."""
+    lines = first_lines(read_head(path), 1)
+    match = _AREAS.search(lines[0]) if lines else None
+    if match is None:
+        raise FormatError("the metadata hold no matrix of areas (W, H, X, Y)", path=path, line=1)
+    try:
+        numbers = [float(text) for text in match.group(1).split(",")]
+    except ValueError as error:
+        raise FormatError(f"the matrix of areas is damaged: {error}", path=path, line=1) from error
+    names = [text.strip().strip('"') for text in match.group(2).split(",")]
+    return dict(zip(names, numbers[::4], strict=False))
+
+
+YUPI_AXES: Final = ("x", "y", "z")
+
+
+class YupiLoader:
+    """One body; seconds, and no unit of length."""
+
+    name = "yupi"
+    description = "yupi CSV, versions 1 and 2 (settings, then x, y, t; no unit of length)"
+
+    def sniff(self, head: bytes, _path: Path) -> float:
+        """Recognise the rows of settings."""
+        rows = [split_fields(line, ",") for line in first_lines(head, 4)]
+        if rows and rows[0][0] == "v2" and len(rows[0]) == 2 and rows[0][1].isdecimal():
+            return 0.95
+        known = (
+            len(rows) > 2
+            and [len(row) for row in rows[:2]] == [3, 3]
+            and rows[0][2] in ("2", "3")
+            and all(field.isdecimal() for field in rows[1])
+            and all(len(row) == 1 + int(rows[0][2]) for row in rows[2:])
+            and not is_number(rows[0][0])
+        )
+        return 0.9 if known else 0.0
+
+    def read(self, path: Path, _options: ReadOptions) -> RawRecording:
+        """Read the trajectory."""
+        rows = [split_fields(line, ",") or [""] for line in header_rows(path, 20)]
+        second = bool(rows) and rows[0][0] == "v2"
+        try:
+            skip = int(rows[0][1]) if second else 2
+            name, _, dimensions = rows[1 if second else 0]
+            axes = YUPI_AXES[: int(dimensions)]
+            further = rows[5] if second else []
+        except (ValueError, IndexError) as error:
+            raise FormatError(f"the rows of settings are damaged: {error}", path=path) from error
+        if len(axes) < 2:
+            raise FormatError(
+                f"has {len(axes)} dimensions, and a path in the plane needs two", path=path
+            )
+        names = [*axes, "t", *(one for one in further if one)]
+        table = read_table(path, TableLayout(",", names, skip, (0, 1, len(axes))))
+        body = RawBody(name or "0", table.numbers[len(axes)], table.numbers[0], table.numbers[1])
+        return RawRecording([body], clock_unit="s", bare_clock="", rows=table.rows)
+
+
+LOADERS = (
+    HeadedFormat(
+        name="tracktor",
+        description="Tracktor CSV (frame, pos_x, pos_y[, id]; pixels)",
+        header=("", "frame", "pos_x", "pos_y"),
+        columns={"frame": "frame", "x": "pos_x", "y": "pos_y", "body": "id"},
+        length_unit="px",
+    ),
+    HeadedFormat(
+        name="traja",
+        description="traja CSV (Frame, Time, TrackId, x, y; seconds, no unit of length)",
+        header=("Frame", "Time", "TrackId", "x", "y"),
+        columns={"t": "Time:s", "x": "x", "y": "y", "body": "TrackId"},
+    ),
+    DltdvLoader(),
+    SmarticlesLoader(),
+    ToxTracLoader(),
+    UbiTrailLoader(),
+    YupiLoader(),
+)

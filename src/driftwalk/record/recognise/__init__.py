@@ -1,1 +1,0 @@
-"""Recognition of formats by the names that a file holds."""

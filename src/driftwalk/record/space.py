@@ -1,0 +1,323 @@
+"""3-D poses of motion capture and robots, projected onto the plane of the water."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from driftwalk.core.arrays import Bools
+from driftwalk.core.errors import InputError
+from driftwalk.record.raw import Array, RawBody, RawRecording
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
+
+
+# The plane's axes for each axis that is up. Right-handed, so that angles stay counter-clockwise
+# seen from above, and with the file's x kept wherever it lies in the plane.
+_PLANES: Final = {
+    "x": ("y", "z"),
+    "y": ("x", "-z"),
+    "z": ("x", "y"),
+    "-x": ("y", "-z"),
+    "-y": ("x", "z"),
+    "-z": ("x", "-y"),
+}
+
+
+@dataclass(frozen=True)
+class Plane:
+    """A plane by its names in the file, and their unit vectors."""
+
+    up: str
+    """Axis that points up, such as ``"-y"``."""
+    x: str
+    """Axis that becomes x."""
+    y: str
+    """Axis that becomes y."""
+
+    @property
+    def vectors(self) -> Array:
+        """Unit vectors of x, y and up in the axes of the file, shape (3, 3)."""
+        return np.array([_vector(name) for name in (self.x, self.y, self.up)])
+
+    def describe(self) -> str:
+        """Return the plane in words.
+
+        Examples
+        --------
+        >>> plane_of("y").describe()
+        "the file's y points up, and x, y are its x, -z"
+        """
+        return f"the file's {self.up} points up, and x, y are its {self.x}, {self.y}"
+
+
+def plane_of(up: str) -> Plane:
+    """Return the plane that the axis `up` stands on.
+
+    Parameters
+    ----------
+    up : str
+        ``"x"``, ``"y"``, ``"z"``, or one of them with a minus in front.
+
+    Raises
+    ------
+    InputError
+        When there is no such axis.
+
+    Examples
+    --------
+    >>> plane_of("y").vectors.tolist()
+    [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]
+    """
+    name = up.strip().lower().removeprefix("+")
+    if name not in _PLANES:
+        raise InputError(f"`up` is one of {', '.join(_PLANES)}; got '{up}'")
+    return Plane(name, *_PLANES[name])
+
+
+def _vector(name: str) -> Array:
+    # Added to zeros, so that no axis gets a minus zero.
+    vector = np.zeros(3)
+    vector["xyz".index(name[-1])] = -1.0 if name.startswith("-") else 1.0
+    return vector
+
+
+QUATERNION: Final = "quaternion"
+VECTOR: Final = "vector"
+
+
+@dataclass(frozen=True)
+class Turns:
+    """Orientations of a body in space, from its own axes to the file's."""
+
+    values: Array
+    """Shape (n, 4) or (n, 3), NaN where there is none."""
+    form: str
+    """`QUATERNION` (x, y, z, w), `VECTOR` (axis times angle), or the order of Euler angles about
+    the axes of the body, such as ``"XYZ"``."""
+    degrees: bool = False
+    """Whether angles are in degrees."""
+
+    def in_plane(self, plane: Plane) -> tuple[Array, Array]:
+        """Return the angle in the plane and the tilt out of it.
+
+        The angle [rad] is the direction of that axis of the body that lies along the plane's x
+        where the body is not turned: the yaw of a body that stands upright, and of one that rolls
+        and pitches as well, counter-clockwise seen from above. The tilt [rad] is how far the body's
+        own upward axis leans.
+
+        Raises
+        ------
+        InputError
+            When quaternions have not the length 1.
+        """
+        angle, tilt = np.full(len(self.values), np.nan), np.full(len(self.values), np.nan)
+        known = self._known()
+        if not known.any():
+            return angle, tilt
+        rotation = self._rotation(self.values[known])
+        x, y, up = plane.vectors
+        forward = rotation.apply(x)
+        angle[known] = np.arctan2(forward @ y, forward @ x)
+        tilt[known] = np.arccos(np.clip(rotation.apply(up) @ up, -1.0, 1.0))
+        return angle, tilt
+
+    def _known(self) -> Bools:
+        known = np.isfinite(self.values).all(axis=1)
+        if self.form == QUATERNION:
+            # Four zeros are how some programs write that there is none.
+            # float64 does not hold the squares of much smaller numbers.
+            known = known & (np.abs(self.values) > 1e-12).any(axis=1)
+        return np.asarray(known)
+
+    def _rotation(self, values: Array) -> Rotation:
+        from scipy.spatial.transform import Rotation
+
+        if self.form == QUATERNION:
+            _require_unit_length(values)
+            return Rotation.from_quat(values)
+        if self.form == VECTOR:
+            return Rotation.from_rotvec(values, degrees=self.degrees)
+        return Rotation.from_euler(self.form, values, degrees=self.degrees)
+
+
+def _require_unit_length(quaternions: Array) -> None:
+    with np.errstate(over="ignore"):
+        length = float(np.median(np.linalg.norm(quaternions, axis=1)))
+    # Printed with three digits, a unit quaternion keeps its length to within 2 %.
+    if not abs(length - 1.0) <= 0.02:
+        raise InputError(
+            f"the quaternions have a length of {length:.4g} instead of 1: are their columns "
+            "x, y, z, w the right ones?"
+        )
+
+
+MOST_TILT: Final = math.radians(30.0)
+"""A body that leans further as a rule does not float in that plane."""
+
+
+@dataclass(frozen=True)
+class SpaceTrack:
+    """The samples of one body in space, in the units and axes of the file."""
+
+    name: str
+    clock: Array
+    """Time stamps or frame numbers, shape (n,)."""
+    position: Array
+    """Positions, shape (n, 3), NaN where the body was not seen."""
+    turns: Turns | None = None
+    """Orientations; None when the file has none."""
+
+
+def lay_flat(tracks: Sequence[SpaceTrack], plane: Plane) -> RawRecording:
+    """Return the bodies in the plane, with notes on what speaks against the plane.
+
+    The loader says the rest: clock, units and rows.
+
+    Parameters
+    ----------
+    tracks : sequence of SpaceTrack
+        Bodies in space.
+    plane : Plane
+        The plane of the water.
+
+    Raises
+    ------
+    InputError
+        When the orientations of a body are none.
+    """
+    bodies, notes = [], []
+    for track in tracks:
+        with np.errstate(invalid="ignore"):  # an infinite position is a gap
+            x, y, height = (track.position @ vector for vector in plane.vectors)
+        angle, tilt = (None, None) if track.turns is None else track.turns.in_plane(plane)
+        bodies.append(RawBody(track.name, track.clock, x, y, angle))
+        notes += _against(track.name, plane, _span(height), max(_span(x), _span(y)), tilt)
+    return RawRecording(bodies, y_axis="up", plane=plane.describe(), notes=notes)
+
+
+def _span(values: Array) -> float:
+    """Return how far a coordinate reaches, without the farthest hundredths, 0 when unknown."""
+    known = values[np.isfinite(values)]
+    return float(np.ptp(np.percentile(known, [1.0, 99.0]))) if known.size else 0.0
+
+
+def _against(name: str, plane: Plane, height: float, width: float, tilt: Array | None) -> list[str]:
+    notes = []
+    if height > width:
+        notes.append(
+            f"body '{name}' moves farther along {plane.up}, which is taken to point up, than in "
+            "the plane of the water: is `up` right?"
+        )
+    known = np.zeros(0) if tilt is None else tilt[np.isfinite(tilt)]
+    leaning = float(np.median(known)) if known.size else 0.0
+    if leaning > MOST_TILT:
+        notes.append(
+            f"body '{name}' leans by {math.degrees(leaning):.0f}° as a rule: is `up` right? Its "
+            "angle is that of its own axis that lies in the plane where the body is not turned"
+        )
+    return notes
+
+
+PARTS: Final = ("qx", "qy", "qz", "qw")
+
+
+def plane_of_columns(places: Mapping[str, int], up: str | None) -> Plane | None:
+    """Return the plane that the columns of a body have to be laid into, None when they lie in one.
+
+    Parameters
+    ----------
+    places : mapping
+        From a quantity of the body to its column.
+    up : str, optional
+        Axis that points up, if anybody says so.
+
+    Raises
+    ------
+    InputError
+        When an axis is said to be up and there is no column of z.
+    """
+    if up is None and not set(PARTS) <= set(places):
+        return None
+    plane = plane_of(up or "z")
+    if up is not None and "z" not in places:
+        raise InputError(
+            "`up` needs a third axis, and no column is known to hold z: name it with "
+            '`columns={"z": "NAME"}`'
+        )
+    return plane
+
+
+def body_in_plane(
+    values: Mapping[int, Array], places: Mapping[str, int], clock: Array, plane: Plane
+) -> tuple[RawBody, list[str]]:
+    """Return the body of some columns in the plane, and what speaks against the plane.
+
+    Parameters
+    ----------
+    values : mapping
+        Columns of the table, each of shape (n,).
+    places : mapping
+        From a quantity of the body to its column.
+    clock : array, shape (n,)
+        Times or frame numbers.
+    plane : Plane
+        The plane of the water.
+
+    Raises
+    ------
+    InputError
+        When the quaternions have not the length 1.
+    """
+    axes = [values[places[axis]] for axis in ("x", "y", "z") if axis in places]
+    if len(axes) == 2:
+        axes.append(np.zeros(clock.size))
+    turned = set(PARTS) <= set(places)
+    parts = [values[places[part]] for part in PARTS] if turned else []
+    turns = Turns(np.column_stack(parts), QUATERNION) if turned else None
+    flat = lay_flat([SpaceTrack("0", clock, np.column_stack(axes), turns)], plane)
+    return flat.bodies[0], flat.notes
+
+
+_RADIUS_M: Final = 6_378_137.0
+"""Equatorial radius of the ellipsoid WGS 84."""
+_ECCENTRICITY: Final = 6.694379990141e-3
+"""Square of its first eccentricity."""
+
+
+def on_the_ground(bodies: list[RawBody]) -> str:
+    """Turn longitude and latitude [deg] of all bodies into x, y [m], in place; return the note.
+
+    The plane touches the ellipsoid at the first position: east is x, north is y. A kilometre away
+    its error is a few centimetres.
+
+    Raises
+    ------
+    InputError
+        When a latitude is none.
+    """
+    known = [np.isfinite(body.x) & np.isfinite(body.y) for body in bodies]
+    first = next((body, at) for body, at in zip(bodies, known, strict=True) if at.any())
+    at = int(np.argmax(first[1]))
+    lon, lat = float(first[0].x[at]), float(first[0].y[at])
+    for body, there in zip(bodies, known, strict=True):
+        if (np.abs(body.y[there]) > 90.0).any() or (np.abs(body.x[there]) > 360.0).any():
+            raise InputError(
+                "a latitude is beyond 90, or a longitude beyond 360 degrees: are the columns "
+                "right, and are they in degrees?"
+            )
+    bend = 1.0 - _ECCENTRICITY * np.sin(np.radians(lat)) ** 2
+    east = _RADIUS_M / np.sqrt(bend) * np.cos(np.radians(lat))
+    north = _RADIUS_M * (1.0 - _ECCENTRICITY) / bend**1.5
+    for body in bodies:
+        away = (body.x - lon + 180.0) % 360.0 - 180.0
+        body.x, body.y = east * np.radians(away), north * np.radians(body.y - lat)
+    return (
+        f"longitude and latitude are projected: x to the east and y to the north of the first "
+        f"position, {lat:.7g}, {lon:.7g}"
+    )

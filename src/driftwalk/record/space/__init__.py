@@ -1,1 +1,0 @@
-"""3-D poses of motion capture and robots, projected onto the plane of the water."""
