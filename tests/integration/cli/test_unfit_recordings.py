@@ -40,6 +40,14 @@ def test_a_body_that_only_the_tracker_moves(
     assert not (tmp_path / "run").exists()
 
 
+def test_one_sample_is_described(tmp_path: Path) -> None:
+    path = tmp_path / "one.csv"
+    path.write_text("t,x,y\n0,0.1,0.2\n", encoding="utf-8")
+    done = here("info", path)
+    assert done.code == 0
+    assert "the body never moves" in done.err
+
+
 def test_the_side_counts_for_the_block_alone() -> None:
     """A beetle of 2 mm that walks over 2 mm moves; a block of 3 cm does not."""
     time = 0.1 * np.arange(SAMPLES)

@@ -169,7 +169,7 @@ def read(path: Path, options: TextOptions | None = None) -> RawField:
 
 
 def _sentinels(velocity: Array) -> list[float]:
-    """Return the values far beyond all others that stand for a velocity that is not there."""
+    """Return the values far beyond all others that mark a missing velocity."""
     known = velocity[np.isfinite(velocity).all(axis=1)]
     alike = known[known[:, 0] == known[:, 1], 0]
     found = [
