@@ -28,17 +28,25 @@ from driftwalk.schema import Track, body_names, body_track, check_trajectory
 if TYPE_CHECKING:
     import xarray as xr
 
-MOST_SAMPLES: Final = 20_000
-MOST_GAPS: Final = 1000
-"""Gaps that a page lists, the longest ones."""
-MOST_BODIES: Final = 8
-SPEED_BINS: Final = 40
-FAR_SPEED: Final = 2.0
-"""How many times the 99th percentile a speed may be and still be in the histogram."""
-POSITION_PARTS: Final = 20_000
-"""The extent of a path in steps of its resolution, at least."""
-ANGLE_STEP: Final = 2.0**-10
-TIME_STEP: Final = 2.0**-14
+
+class RecordingSectionPolicy(NamedTuple):
+    """How much of a recording a page holds, and how finely; sizes chosen by hand."""
+
+    most_samples: int = 20_000
+    """Of a path that is drawn and played."""
+    most_gaps: int = 1000
+    """The longest ones."""
+    most_bodies: int = 8
+    speed_bins: int = 40
+    far_speed: float = 2.0
+    """How many times the 99th percentile a speed may be and still be in the histogram."""
+    position_parts: int = 20_000
+    """The extent of a path in steps of its resolution, at least."""
+    angle_step_rad: float = 2.0**-10
+    time_step_s: float = 2.0**-14
+
+
+SECTION: Final = RecordingSectionPolicy()
 
 COUNTED: Final = {
     "frames": ("frames tracked", None),
@@ -78,7 +86,7 @@ def recording_sections(
         The noise of its tracking where one body is shown, or that of each body by its name.
     """
     names = body_names(check_trajectory(trajectory))
-    chosen = names[:MOST_BODIES] if body is None else [body]
+    chosen = names[: SECTION.most_bodies] if body is None else [body]
     noises = _by_body(noise, chosen)
     made: list[Section] = []
     for number_of, name in enumerate(chosen, start=1):
@@ -93,8 +101,10 @@ def recording_sections(
                 id=f"recording-{number_of}",
             ),
         )
-    if body is None and len(names) > MOST_BODIES:
-        made[-1]["note"] = f"{made[-1]['note'] or ''} {len(names) - MOST_BODIES} more bodies."
+    if body is None and len(names) > SECTION.most_bodies:
+        made[-1]["note"] = (
+            f"{made[-1]['note'] or ''} {len(names) - SECTION.most_bodies} more bodies."
+        )
     return made
 
 
@@ -142,12 +152,14 @@ def trajectory_section(
     interval = np.diff(track.time)
     gap = interval > GAP_INTERVALS * np.median(interval)
     shown, every = _shown(track, interval, gap)
-    step = binary_step(max(float(np.ptp(track.x)), float(np.ptp(track.y))), POSITION_PARTS)
+    step = binary_step(max(float(np.ptp(track.x)), float(np.ptp(track.y))), SECTION.position_parts)
     path: dict[str, Any] = {
-        "time": encode_array(shown.time, step=TIME_STEP, offset=float(shown.time[0])),
+        "time": encode_array(shown.time, step=SECTION.time_step_s, offset=float(shown.time[0])),
         "x": encode_array(shown.x, step=step),
         "y": encode_array(shown.y, step=step),
-        "theta": encode_array(shown.theta, step=ANGLE_STEP) if track.has_orientation else None,
+        "theta": encode_array(shown.theta, step=SECTION.angle_step_rad)
+        if track.has_orientation
+        else None,
     }
     speed = np.hypot(np.diff(track.x), np.diff(track.y))[~gap] / interval[~gap]
     notes = [SIMULATED] if is_simulated(trajectory) else []
@@ -210,8 +222,8 @@ def _shown(track: Track, interval: Floats, gap: Bools) -> tuple[Track, int]:
     """Return what is shown of a track, broken by NaN at gaps, and every how manyth sample it is."""
     size = track.time.size
     ends = np.flatnonzero(gap)
-    longest = ends[np.argsort(-interval[ends], kind="stable")[:MOST_GAPS]]
-    room = max(MOST_SAMPLES - 3 * longest.size - 1, 1)
+    longest = ends[np.argsort(-interval[ends], kind="stable")[: SECTION.most_gaps]]
+    room = max(SECTION.most_samples - 3 * longest.size - 1, 1)
     every = max(1, -(-size // room))
     kept = np.unique(np.concatenate([np.arange(0, size, every), longest, longest + 1, [size - 1]]))
     columns = [column[kept] for column in track]
@@ -226,20 +238,20 @@ def _shown(track: Track, interval: Floats, gap: Bools) -> tuple[Track, int]:
 
 def _gaps(track: Track, interval: Floats, gap: Bools) -> list[list[float]]:
     ends = np.flatnonzero(gap)
-    longest = np.sort(ends[np.argsort(-interval[ends], kind="stable")[:MOST_GAPS]])
+    longest = np.sort(ends[np.argsort(-interval[ends], kind="stable")[: SECTION.most_gaps]])
     return [[float(track.time[i]), float(track.time[i + 1])] for i in longest]
 
 
 def _top_speed(speed: Floats) -> float:
     """Return where the histogram ends: a few jumps must not squeeze all else into one bin."""
     top = float(speed.max(initial=0.0)) or 1.0
-    usual = FAR_SPEED * float(np.percentile(speed, 99.0)) if speed.size else top
+    usual = SECTION.far_speed * float(np.percentile(speed, 99.0)) if speed.size else top
     return usual if 0.0 < usual < top else top
 
 
 def _speed_density(speed: Floats, top: float) -> dict[str, Any]:
     """Return the density of all speeds, as far as it is shown."""
-    number_of, edges = np.histogram(speed, bins=SPEED_BINS, range=(0.0, top))
+    number_of, edges = np.histogram(speed, bins=SECTION.speed_bins, range=(0.0, top))
     density = number_of / (max(speed.size, 1) * np.diff(edges))
     return {"edges": plain_list(edges), "density": plain_list(density)}
 

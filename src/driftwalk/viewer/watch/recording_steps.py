@@ -18,13 +18,24 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
-BINS: Final = 32
-EXCERPT_S: Final = 30.0
-# The bins of a calibration: they reach over nearly all steps, and half as far again.
-LENGTH_SHARE: Final = 0.999
-LENGTH_REACH: Final = 1.5
-ANGLE_SHARE: Final = 0.98
-ANGLE_REACH: Final = 2.5
+
+class LiveStepsPolicy(NamedTuple):
+    """The histograms of a recording's steps on a live page, with the bins of a calibration."""
+
+    bins: int = 32
+    excerpt_s: float = 30.0
+    """Of the path that is drawn; chosen by hand."""
+    length_share: float = 0.999
+    """Share of the step lengths that the bins hold before they reach further; chosen by hand."""
+    length_reach: float = 1.5
+    """How much further, as a factor; chosen by hand."""
+    angle_share: float = 0.98
+    """The same of turning angles; chosen by hand."""
+    angle_reach: float = 2.5
+    """The same of turning angles; chosen by hand."""
+
+
+LIVE_STEPS: Final = LiveStepsPolicy()
 
 
 class RecordedSteps(NamedTuple):
@@ -76,8 +87,12 @@ def recorded_steps(
     plan = plan_steps(time, step_interval=None if interval == "auto" else float(interval))
     found = apply_steps(plan, track.x, track.y)
     points = np.column_stack([found.step_length, found.turning_angle])
-    length_limit = LENGTH_REACH * float(np.quantile(points[:, 0], LENGTH_SHARE))
-    angle_limit = ANGLE_REACH * float(np.quantile(np.abs(points[:, 1]), ANGLE_SHARE))
+    length_limit = LIVE_STEPS.length_reach * float(
+        np.quantile(points[:, 0], LIVE_STEPS.length_share)
+    )
+    angle_limit = LIVE_STEPS.angle_reach * float(
+        np.quantile(np.abs(points[:, 1]), LIVE_STEPS.angle_share)
+    )
     angle_limit = min(np.pi, angle_limit) or np.pi
     # The samples of the worlds, which need not have the recording's gaps.
     sampled = sample_times(track, study)
@@ -85,7 +100,7 @@ def recorded_steps(
         name=str(recording.attrs.get("source", "recording")),
         step_interval=plan.step_interval,
         points=points,
-        length_edge=np.linspace(0.0, length_limit or 1.0, BINS + 1),
-        angle_edge=np.linspace(-angle_limit, angle_limit, BINS + 1),
-        excerpt_time=sampled[sampled <= EXCERPT_S],
+        length_edge=np.linspace(0.0, length_limit or 1.0, LIVE_STEPS.bins + 1),
+        angle_edge=np.linspace(-angle_limit, angle_limit, LIVE_STEPS.bins + 1),
+        excerpt_time=sampled[sampled <= LIVE_STEPS.excerpt_s],
     )
