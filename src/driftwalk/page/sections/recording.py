@@ -33,17 +33,22 @@ class RecordingSectionPolicy(NamedTuple):
     """How much of a recording a page holds, and how finely; sizes chosen by hand."""
 
     most_samples: int = 20_000
-    """Of a path that is drawn and played."""
+    """Of a path that is drawn and played; chosen by hand."""
     most_gaps: int = 1000
-    """The longest ones."""
+    """The longest ones; chosen by hand."""
     most_bodies: int = 8
+    """Chosen by hand."""
     speed_bins: int = 40
+    """Chosen by hand."""
     far_speed: float = 2.0
-    """How many times the 99th percentile a speed may be and still be in the histogram."""
+    """How many times the 99th percentile a speed may be and still be in the histogram; chosen by
+    hand."""
     position_parts: int = 20_000
-    """The extent of a path in steps of its resolution, at least."""
+    """The extent of a path in steps of its resolution, at least; chosen by hand."""
     angle_step_rad: float = 2.0**-10
+    """Chosen by hand: 0.06 degrees."""
     time_step_s: float = 2.0**-14
+    """Chosen by hand: 0.06 ms."""
 
 
 SECTION: Final = RecordingSectionPolicy()

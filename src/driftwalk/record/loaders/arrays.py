@@ -36,8 +36,7 @@ class ArraysLoader:
             return 0.4 if b"'|O'" not in head[:200] else 0.0
         if head.startswith(ZIP):
             return 0.3 if _are_positions(members(path)) else 0.0
-        names = names_in(path, head)
-        return 0.3 if _are_positions(names) or (names and _inner_positions(path)) else 0.0
+        return 0.3 if names_in(path, head) and _holds_positions(path) else 0.0
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the array, or those that belong together."""
@@ -56,12 +55,21 @@ def _are_positions(names: set[str]) -> bool:
     return {"x", "y"} <= {one.quantity for one in meanings if one is not None}
 
 
-def _inner_positions(path: Path) -> bool:
-    """Whether a group of an HDF5 file holds positions."""
+def _holds_positions(path: Path) -> bool:
+    """Whether an HDF5 file holds positions at its top or in a group; axes of a grid are none."""
     try:
         with opened_hdf5(path) as contents:
-            groups = [one for one in contents.file.values() if hasattr(one, "keys")]
-            return any(_are_positions(set(map(str, one))) for one in groups)
+            inner = [one for one in contents.file.values() if hasattr(one, "keys")]
+            return any(
+                _are_positions(
+                    {
+                        str(name)
+                        for name, one in group.items()
+                        if not getattr(one, "is_scale", False)
+                    }
+                )
+                for group in (contents.file, *inner)
+            )
     except InputError:
         return False
 

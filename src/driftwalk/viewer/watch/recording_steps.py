@@ -23,6 +23,7 @@ class LiveStepsPolicy(NamedTuple):
     """The histograms of a recording's steps on a live page, with the bins of a calibration."""
 
     bins: int = 32
+    """Chosen by hand."""
     excerpt_s: float = 30.0
     """Of the path that is drawn; chosen by hand."""
     length_share: float = 0.999
