@@ -146,7 +146,7 @@ def _verdict(fit: xr.Dataset, check: xr.Dataset | None) -> list[Part]:
     more = ": far, but within the uncertainty of the fit" if far else ""
     parts.append(Row("KS distance", f"{distance:.3f}, noise floor {floor:.3f}{more}"))
     chance = float(check.attrs.get("ks_p_value", "nan"))
-    return [*parts, Row("p-value of it", f"{chance:.2g}")] if isfinite(chance) else parts
+    return [*parts, Row("  p-value", f"{chance:.2g}")] if isfinite(chance) else parts
 
 
 def fit_json(fit: xr.Dataset, check: xr.Dataset | None = None) -> dict[str, Any]:
