@@ -201,8 +201,10 @@ def dask(part: str, *words: object, **environment: str) -> Iterator[subprocess.P
 
 # Loaded by a worker before it begins: its simulations end a last bit away from those of others.
 OTHER_BITS = """
+from importlib import import_module
 import driftwalk.simulation.run as run
-import driftwalk.cluster.connect as probe
+# The package has a function of this name too.
+probe = import_module("driftwalk.cluster.connect")
 
 def off(*study, **options):
     found = run.simulate(*study, **options)
