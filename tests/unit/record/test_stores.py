@@ -81,6 +81,22 @@ def of_npz(path: Path, arrays: dict[str, Any]) -> Path:
     return path
 
 
+def test_arrays_of_other_things_are_no_recording(tmp_path: Path) -> None:
+    """The axes of a grid, and the references of a MATLAB session, are named x and y as well."""
+    grid = tmp_path / "grid.h5"
+    with h5py.File(grid, "w") as file:
+        for name in ("x", "y"):
+            file[name] = np.arange(5.0)
+            file[name].make_scale(name)
+        file["u"] = np.zeros((5, 5))
+    session = tmp_path / "session.h5"
+    with h5py.File(session, "w") as file:
+        file.create_group("#refs#").update({"x1": X, "y1": Y})
+    for path in (grid, session):
+        with pytest.raises(InputError, match="format is not recognised"):
+            load(path, frame_rate=25.0, metres_per_pixel=1e-3)
+
+
 @pytest.mark.parametrize("ending", ["npz", "h5"])
 def test_arrays_by_name(tmp_path: Path, ending: str) -> None:
     path = tmp_path / f"a.{ending}"

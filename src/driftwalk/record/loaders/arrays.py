@@ -36,7 +36,9 @@ class ArraysLoader:
             return 0.4 if b"'|O'" not in head[:200] else 0.0
         if head.startswith(ZIP):
             return 0.3 if _are_positions(members(path)) else 0.0
-        return 0.3 if names_in(path, head) and _holds_positions(path) else 0.0
+        names = names_in(path, head)
+        # Cells and structs of MATLAB are references: its own loader knows which are recordings.
+        return 0.3 if names and "#refs#" not in names and _holds_positions(path) else 0.0
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the array, or those that belong together."""
