@@ -13,14 +13,13 @@ from driftwalk.record.column_names import column_meaning
 from driftwalk.record.raw import RawRecording, ReadOptions
 from driftwalk.record.stores.hdf5 import Hdf5Contents, names_in, opened_hdf5
 from driftwalk.record.stores.matlab import Struct, Value
-from driftwalk.record.stores.npz import ZIP, members, opened_npz
+from driftwalk.record.stores.npz import NPY, ZIP, members, opened_npz
 from driftwalk.record.tables.in_memory import table_in_memory
 from driftwalk.record.tables.matlab import matlab_tables
 from driftwalk.record.tables.rows import recording_of, the_one_that_fits
 from driftwalk.record.vocabulary import ALLOWED
 from driftwalk.schema.stores.netcdf import file_start
 
-_NPY: Final = b"\x93NUMPY"
 _RATES: Final = ("fps", "frame_rate", "framerate", "frame_rate_hz", "frames_per_second")
 
 
@@ -32,7 +31,7 @@ class ArraysLoader:
 
     def sniff(self, head: bytes, path: Path) -> float:
         """Recognise arrays of numbers, and names of positions."""
-        if head.startswith(_NPY):
+        if head.startswith(NPY):
             return 0.4 if b"'|O'" not in head[:200] else 0.0
         if head.startswith(ZIP):
             return 0.3 if _are_positions(members(path)) else 0.0
@@ -41,7 +40,7 @@ class ArraysLoader:
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the array, or those that belong together."""
         start = file_start(path)
-        if start.startswith(_NPY):
+        if start.startswith(NPY):
             return _of_array(path, options)
         if start.startswith(ZIP):
             with opened_npz(path) as arrays:
