@@ -19,7 +19,6 @@ from driftwalk.schema.stores.netcdf import HDF5
 OTHERS: Final = {
     b"CDF": "NetCDF 3",
     b"SQLite format 3": "an SQLite database",
-    b"PAR1": "Parquet, which is to be saved as CSV",
     b"%PDF": "a PDF",
     b"\x89PNG": "an image",
     b"\xff\xd8\xff": "an image",
