@@ -21,7 +21,7 @@ from driftwalk.flow.readers.columns import (
     marks_among,
     number,
 )
-from driftwalk.flow.readers.programs import PLAIN, Program, program_of
+from driftwalk.flow.readers.programs import HEAD, PLAIN, Program, program_of
 from driftwalk.flow.readers.units import RawField
 from driftwalk.flow.rows import FieldRows
 
@@ -98,9 +98,9 @@ def read_text(path: Path, *, most: int = -1) -> str:
 
 
 def signed(path: Path) -> str | None:
-    """Return the program whose sign a file has, though its rows cannot be read."""
+    """Return the program that a file is known to be of by its head, even if damaged."""
     try:
-        found = program_of(read_text(path, most=1 << 14))
+        found = program_of(read_text(path, most=HEAD))
     except FormatError:
         return None
     return None if found is PLAIN else found.name
