@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Array = npt.NDArray[np.float64]
+_ONLY_TEXT: Final = "`columns`, `header_line` and `delimiter` are for text, and this is {}"
 
 
 def load_flow(
@@ -124,7 +125,7 @@ def load_flow(
         if not is_netcdf(source) or is_pivlab(source):
             return _from_rows(source, options, said, arena=arena, attrs=attrs)
         if said != TextOptions():
-            raise InputError("columns and their header are those of a text, and this is NetCDF")
+            raise InputError(_ONLY_TEXT.format("NetCDF"))
         dataset = open_netcdf(source)
         if kind_name(dataset) == "flow_field" and "flag" in dataset:
             if arena is not None and own_flags == "refuse":
@@ -155,7 +156,7 @@ def _from_rows(
 ) -> xr.Dataset:
     """Return the field of a file that has a row for each node."""
     if options.variables:
-        raise InputError("`variables` are those of a NetCDF file, and this is none: leave it out")
+        raise InputError("`variables` are those of a NetCDF file, and this is none: leave them out")
     si = raw_to_si(read_raw(path, said), options)
     field = grid_rows(si.rows, path)
     attrs = {**attrs, "reading": si.reading, **_warning(si.notes)}
@@ -242,5 +243,5 @@ def read_raw(path: Path, said: TextOptions) -> RawField:
     except OSError as error:
         raise FormatError(f"cannot be opened: {error.strerror or error}", path=path) from error
     if said != TextOptions():
-        raise InputError("columns and their header are those of a text, and this is MATLAB's")
+        raise InputError(_ONLY_TEXT.format("a MATLAB file"))
     return pivlab.read(path)

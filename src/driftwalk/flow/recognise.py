@@ -7,9 +7,10 @@ from pathlib import Path
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.flow.readers import text
-from driftwalk.flow.readers.columns import column_of, holds_field, names_a_time
+from driftwalk.flow.readers.columns import FIELD, column_of, holds_field, names_a_time
 from driftwalk.flow.readers.netcdf import holds_velocities
 from driftwalk.flow.readers.pivlab import holds_velocities as holds_pivlab, is_pivlab
+from driftwalk.flow.readers.programs import HEAD
 from driftwalk.flow.readers.text import Layout, TextOptions
 from driftwalk.flow.rows import grid_rows
 from driftwalk.schema.stores.netcdf import is_netcdf, kind_of_file, open_netcdf
@@ -60,15 +61,15 @@ def flow_format(path: str | PathLike[str]) -> str | None:
 def _text_format(path: Path) -> str | None:
     """Return the program of a text whose names, or whose rows, are those of a field."""
     try:
-        head = text.read_text(path, most=1 << 14)
+        head = text.read_text(path, most=HEAD)
         layout = text.layout_of(head, TextOptions(), path)
     except FormatError:
-        # A damaged field of a program is one still.
+        # A damaged field is still one of its program.
         return None if path.stat().st_size == 0 else text.signed(path)
     names, program = layout.names, layout.program
     if names_a_time(names):
         return None
-    named = layout.header > 0 and {"x", "y", "u", "v"} <= {column_of(one).base for one in names}
+    named = layout.header > 0 and set(FIELD) <= {column_of(one).base for one in names}
     if named or (program.sign and holds_field(names)):
         return program.name
     along = holds_field(names) and _goes_along_a_line(layout)
@@ -76,9 +77,9 @@ def _text_format(path: Path) -> str | None:
 
 
 def _goes_along_a_line(layout: Layout) -> bool:
-    """Whether the first two rows share x or y, as two nodes of a grid do that are written in order.
+    """Whether the first two rows share x or y, as neighbouring nodes of a grid do.
 
-    No more is read of the many recordings in which they do not.
+    In most recordings they do not, and no more is read of those.
     """
     known = [column_of(name).quantity for name in layout.names]
     rows = [line.split(layout.delimiter) for _, line in layout.rows[:2]]

@@ -12,14 +12,13 @@ from typing import Any, Final
 from driftwalk.record.bad_row import is_number, split_fields
 from driftwalk.record.raw import Marks
 from driftwalk.record.stores.hdf5 import names_in
-from driftwalk.record.stores.npz import ZIP, members
+from driftwalk.record.stores.npz import NPY, ZIP, members
 from driftwalk.record.text_head import detect_delimiter, first_lines
 from driftwalk.schema.stores.netcdf import HDF5
 
 OTHERS: Final = {
     b"CDF": "NetCDF 3",
     b"SQLite format 3": "an SQLite database",
-    b"PAR1": "Parquet, which is to be saved as CSV",
     b"%PDF": "a PDF",
     b"\x89PNG": "an image",
     b"\xff\xd8\xff": "an image",
@@ -66,7 +65,7 @@ def contents_of(path: Path, head: bytes) -> Contents:
     if head.startswith(ZIP):
         names = tuple(sorted(members(path)))
         return Contents("npz", "NumPy's .npz" if names else "a zip file", names)
-    if head.startswith(b"\x93NUMPY"):
+    if head.startswith(NPY):
         return Contents("npy", "NumPy's .npy", _fields_of_npy(head))
     for start, kind in OTHERS.items():
         if head.lstrip().startswith(start):

@@ -23,18 +23,20 @@ _PLACES: Final = frozenset(
 )
 """Words next to x and y that name a position."""
 _VELOCITIES: Final = frozenset(
-    ("velocity", "vel", "component", "displacement", "shift", "geschwindigkeit", "komponente")
-) | frozenset(
-    ("verschiebung", "vitesse", "composante", "deplacement", "velocidad", "velocita", "componente")
+    (
+        *("velocity", "vel", "component", "displacement", "shift"),
+        *("geschwindigkeit", "komponente", "verschiebung", "vitesse", "composante", "deplacement"),
+        *("velocidad", "velocita", "componente"),
+    )
 )
 """Words next to u and v, or x and y, that name a velocity."""
 _SYMBOLS: Final = {
+    **dict.fromkeys(("x", "posx", "xpos"), "x"),
+    **dict.fromkeys(("y", "posy", "ypos"), "y"),
     **dict.fromkeys(("u", "ux", "vx", "dx", "ux1", "velx"), "u"),
     **dict.fromkeys(("v", "uy", "vy", "dy", "uy1", "vely"), "v"),
-    **{f"{before}{axis}{after}": axis for axis in "xy" for before, after in
-       (("", ""), ("pos", ""), ("", "pos"))},
-}  # fmt: skip
-
+}
+"""From a name without its further words to the quantity."""
 _MARKS: Final[dict[str, Callable[[Array], npt.NDArray[np.bool_]]]] = {
     **dict.fromkeys(("flags", "mask", "status"), lambda mark: mark == 0.0),
     **dict.fromkeys(("chc",), lambda mark: mark > 0.0),
@@ -42,7 +44,7 @@ _MARKS: Final[dict[str, Callable[[Array], npt.NDArray[np.bool_]]]] = {
     **dict.fromkeys(("vector type", "typevector"), lambda mark: mark == 1.0),
     "fiji flag": lambda mark: (mark != 999.0) & (mark != -1.0),
 }
-"""Columns that say which velocities were measured, and which of their values say so."""
+"""Columns that say which velocities were measured, and the values that say so."""
 _TIMES: Final = frozenset({"t", "t s", "time", "time s", "frame", "timestamp", "slice"})
 _BRACKET: Final = re.compile(r"(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]")
 _SUFFIX: Final = re.compile(
@@ -50,8 +52,11 @@ _SUFFIX: Final = re.compile(
     re.IGNORECASE,
 )
 MISSING: Final = frozenset(
-    ("", "nan", "-nan", "na", "n/a", "#n/a", "<na>", "null", "none", "-", "--", ".", "missing")
-) | frozenset(("nan(ind)", "-nan(ind)", "1.#qnan", "-1.#ind", "1.#ind", "masked"))
+    (
+        *("", "nan", "-nan", "na", "n/a", "#n/a", "<na>", "null", "none", "-", "--", "."),
+        *("nan(ind)", "-nan(ind)", "1.#qnan", "-1.#ind", "1.#ind", "missing", "masked"),
+    )
+)
 """Marks of a velocity that is not there, in small letters."""
 
 
@@ -132,7 +137,7 @@ def names_a_time(names: Sequence[str]) -> bool:
 
 
 def choose_columns(names: Sequence[str], stated: Mapping[str, str]) -> dict[str, tuple[int, str]]:
-    """Return the place and the unit of x, y, u and v; the user's word goes over the names.
+    """Return the place and the unit of x, y, u and v; what the user states overrides the names.
 
     Raises
     ------

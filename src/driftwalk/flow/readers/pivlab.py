@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.errors import FormatError, reason_of
+from driftwalk.core.errors import FormatError, damaged_as
 from driftwalk.flow.readers.text import masked_rows
 from driftwalk.flow.readers.units import RawField
 from driftwalk.schema.stores.hdf5_texts import refuse_endless_texts
@@ -108,7 +108,7 @@ def _opened(path: Path) -> Iterator[_File]:
     """Open a file of MATLAB; what goes wrong inside becomes a `FormatError`."""
     with path.open("rb") as binary:
         old = binary.read(len(OLD)) == OLD
-    try:
+    with damaged_as("as a MATLAB file", path):
         if old:
             yield _old_file(path)
             return
@@ -119,12 +119,6 @@ def _opened(path: Path) -> Iterator[_File]:
             refuse_elsewhere(file, path)
             refuse_huge(_declared(file), path)
             yield _File(list(file), lambda name: _hdf5_arrays(file, name))
-    except FormatError:
-        raise
-    except Exception as error:
-        # On a damaged file the libraries fail with whatever the damage leads them to.
-        reason = reason_of(error)
-        raise FormatError(f"cannot be read as a MATLAB file: {reason}", path=path) from error
 
 
 def _old_file(path: Path) -> _File:

@@ -14,7 +14,8 @@ from driftwalk.core.errors import FormatError
 
 _QUOTED: Final = re.compile(r'VARIABLES\s*=\s*((?:"[^"]*"\s*,?\s*)+)', re.IGNORECASE)
 _UNQUOTED: Final = re.compile(r'VARIABLES\s*=\s*([^"\n]+)', re.IGNORECASE)
-_HEAD: Final = 1 << 14
+HEAD: Final = 1 << 14
+"""Length of a text's start by which its program is known; chosen by hand."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,7 @@ class Program:
     name: str
     title: str
     sign: str = ""
-    """Regular expression that its head has, ``""`` for none."""
+    """Regular expression by which the head of its files is known, ``""`` for none."""
     y: Literal["up", "down", "rows", ""] = ""
     """Direction of y; "rows": down where the first row has the smallest; ``""``: the same in
     pixels alone, else up."""
@@ -51,14 +52,14 @@ class Program:
 
     def units_in(self, text: str) -> tuple[str, str]:
         """Return the units where the names have none."""
-        match = re.search(self.pixels_unless, text[:_HEAD]) if self.pixels_unless else None
+        match = re.search(self.pixels_unless, text[:HEAD]) if self.pixels_unless else None
         if match is None:
             return self.units
         return ("px", "px/frame") if float(match[1]) == 1.0 else ("m", "m/s")
 
     def interval_in(self, text: str) -> float | None:
         """Return the time between the two images [s], None where the text does not say it."""
-        match = re.search(self.interval, text[:_HEAD]) if self.interval else None
+        match = re.search(self.interval, text[:HEAD]) if self.interval else None
         try:
             found = float(match[1]) * 1e-6 if match else 0.0
         except ValueError:
@@ -73,7 +74,7 @@ class Program:
         FormatError
             When the head says that these are no planar vectors.
         """
-        head = text[:_HEAD]
+        head = text[:HEAD]
         if head.startswith("#DaVis"):
             first = head.splitlines()[0]
             units = [unit for _, unit in re.findall(r'"([^"]*)"\s+"([^"]*)"', first)]
@@ -94,17 +95,27 @@ class Program:
 
 
 PLAIN: Final = Program("csv", "plain table", units=("m", "m/s"))
-_FIJI: Final = ("x", "y", "ux1", "uy1", "mag1", "ang1", "p1", "second x", "second y", "mag2",
-                "ang2", "p2", "former x", "former y", "mag0", "fiji flag")  # fmt: skip
+_FIJI: Final = Program(
+    "fiji",
+    "PIV plugin of ImageJ",
+    y="down",
+    columns=("x", "y", "ux1", "uy1", "mag1", "ang1", "p1", "second x", "second y", "mag2",
+             "ang2", "p2", "former x", "former y", "mag0", "fiji flag"),
+    units=("px", "px/frame"),
+)  # fmt: skip
 PROGRAMS: Final = (
     Program("davis", "DaVis text", r"\A#DaVis", y="up", zero_is_missing=True),
     Program(
-        *("insight", "Insight", r'(?i)\A\s*TITLE(?s:.*)"CHC"'),
+        "insight",
+        "Insight",
+        r'(?i)\A\s*TITLE(?s:.*)"CHC"',
         y="up",
         interval=r'MicrosecondsPerDeltaT\s*=\s*"([\d.eE+-]+)"',
     ),
     Program(
-        *("pivlab", "PIVlab text", r"PIVlab|Vector type \[-\]"),
+        "pivlab",
+        "PIVlab text",
+        r"PIVlab|Vector type \[-\]",
         y="down",
         columns=("x", "y", "u", "v", "vector type"),
         pixels_unless=r"conversion factor xy \(px -> m\): *-?([\d.eE+-]+)",
@@ -112,18 +123,16 @@ PROGRAMS: Final = (
     Program("dantec", "Dantec DynamicStudio", r">>\*HEADER\*<<|>>\*DATA\*<<|DSExport", y="up"),
     Program("tecplot", "Tecplot", r"(?i)\bVARIABLES\s*="),
     Program(
-        *("davis", "DaVis table", r'(?m)^"?x \[\w+\]"?[;,\t]"?y \[.*Velocity u \['),
+        "davis",
+        "DaVis table",
+        r'(?m)^"?x \[\w+\]"?[;,\t]"?y \[.*Velocity u \[',
         zero_is_missing=True,
     ),
-    Program(
-        *("fiji", "PIV plugin of ImageJ", r"(?im)^\W*x\W+y\W+ux1\W+uy1\b"),
-        y="down",
-        units=("px", "px/frame"),
-    ),
+    replace(_FIJI, sign=r"(?im)^\W*x\W+y\W+ux1\W+uy1\b"),
     Program("openpiv", "OpenPIV", r"(?i)\A\s*#\s*x\s+y\s+u\s+v\b", y="rows"),
 )
 _BY_WIDTH: Final = {
-    16: Program("fiji", "PIV plugin of ImageJ", y="down", columns=_FIJI, units=("px", "px/frame")),
+    16: _FIJI,
     **dict.fromkeys(
         range(4, 8), Program("openpiv", "rows of numbers", y="rows", columns=("x", "y", "u", "v"))
     ),
@@ -135,5 +144,5 @@ def program_of(text: str, *, width: int = 0) -> Program:
     """Return the program whose sign a text has, or that writes rows of some width without one."""
     if width:
         return _BY_WIDTH.get(width, PLAIN)
-    head = text[:_HEAD]
+    head = text[:HEAD]
     return next((one for one in PROGRAMS if re.search(one.sign, head)), PLAIN)

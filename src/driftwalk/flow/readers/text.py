@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -21,7 +21,7 @@ from driftwalk.flow.readers.columns import (
     marks_among,
     number,
 )
-from driftwalk.flow.readers.programs import PLAIN, Program, program_of
+from driftwalk.flow.readers.programs import HEAD, PLAIN, Program, program_of
 from driftwalk.flow.readers.units import RawField
 from driftwalk.flow.rows import FieldRows
 
@@ -31,11 +31,13 @@ Lines = list[tuple[int, str]]
 _DELIMITERS: Final = ("\t", ";", ",", None)
 _ROW: Final = re.compile(r"\s*(?:[-+.\d]|nan\b)", re.IGNORECASE)
 _WORDS: Final = re.compile(r'"[^"]*"|vector type(?:\s*\[-\])?|\S+(?:\s*[\[(][^\])]*[\])])*', re.I)
-_WORDS_END: Final = (32767.0, 32768.0, 65535.0)
+_INTEGER_ENDS: Final = (32767.0, 32768.0, 65535.0)
+"""Ends of the integers of 16 bits, with which programs mark a missing velocity."""
 _FAR: Final = 20.0
-"""Largest velocities from which on a value such as -9999 is none; chosen by hand."""
+"""Times the largest velocity beyond which a value such as -9999 is a mark, and no velocity; chosen
+by hand."""
 _MOST_HEAD: Final = 200
-"""Lines among which a header is looked for."""
+"""Lines among which a header is looked for; chosen by hand."""
 
 
 @dataclass(frozen=True)
@@ -98,9 +100,9 @@ def read_text(path: Path, *, most: int = -1) -> str:
 
 
 def signed(path: Path) -> str | None:
-    """Return the program whose sign a file has, though its rows cannot be read."""
+    """Return the program that a file is known to be of by its head, even if damaged."""
     try:
-        found = program_of(read_text(path, most=1 << 14))
+        found = program_of(read_text(path, most=HEAD))
     except FormatError:
         return None
     return None if found is PLAIN else found.name
@@ -127,13 +129,7 @@ def read(path: Path, options: TextOptions | None = None) -> RawField:
         places = choose_columns(names, options.columns)
     except InputError as error:
         raise FormatError(str(error), path=path, line=layout.header or None) from error
-    # A column of words is no mark.
-    first = dict(enumerate(layout.rows[0][1].split(layout.delimiter)))
-    marks = {
-        at: rule
-        for at, rule in marks_among(names).items()
-        if number(first.get(at, ""), comma=False) is not None
-    }
+    marks = _marks(layout)
     line, values = _numbers(layout, [*(places[one][0] for one in FIELD), *marks], path)
     missing = np.zeros(len(line), dtype=bool)
     for rule, mark in zip(marks.values(), values.T[4:], strict=True):
@@ -151,35 +147,42 @@ def read(path: Path, options: TextOptions | None = None) -> RawField:
     if not (length or velocity):
         length, velocity = program.units_in(text)
     unread = 0 if layout.header else names.count("")
+    if unread:
+        notes.append(f"columns beyond x, y, u, v have no name and are not read: {unread}")
     return RawField(
         rows,
         length,
         velocity,
         down=program.counts_down(rows.y),
         frame_interval=program.interval_in(text),
-        notes=[
-            *notes,
-            *(
-                [f"columns beyond x, y, u, v have no name and are not read: {unread}"]
-                * bool(unread)
-            ),
-        ],
+        notes=notes,
         reading=_described(layout, places, list(marks)),
     )
+
+
+def _marks(layout: Layout) -> dict[int, Callable[[Array], npt.NDArray[np.bool_]]]:
+    """Return the columns that mark missing velocities, without those of words."""
+    first = dict(enumerate(layout.rows[0][1].split(layout.delimiter)))
+    return {
+        at: rule
+        for at, rule in marks_among(layout.names).items()
+        if number(first.get(at, ""), comma=False) is not None
+    }
 
 
 def _sentinels(velocity: Array) -> list[float]:
     """Return the values far beyond all others that mark a missing velocity."""
     known = velocity[np.isfinite(velocity).all(axis=1)]
     alike = known[known[:, 0] == known[:, 1], 0]
-    found = [
-        float(value)
-        for value in np.unique(alike)
-        if abs(value) >= 1e9 or abs(value) in _WORDS_END or re.fullmatch("9{2,}", f"{abs(value):g}")
-    ]
+    found = [float(value) for value in np.unique(alike) if _may_be_mark(abs(float(value)))]
     rest = known[~np.isin(known, found).all(axis=1)]
     largest = float(np.abs(rest).max()) if rest.size else math.inf
     return [value for value in found if abs(value) > _FAR * largest]
+
+
+def _may_be_mark(size: float) -> bool:
+    """Return whether programs mark a missing velocity with a value such as 1e32, -9999 or 32768."""
+    return size >= 1e9 or size in _INTEGER_ENDS or re.fullmatch("9{2,}", f"{size:g}") is not None
 
 
 def _described(layout: Layout, places: Mapping[str, tuple[int, str]], marks: list[int]) -> str:
@@ -237,7 +240,7 @@ def _tried(options: TextOptions) -> tuple[str | None, ...]:
 
 
 def _delimiter(line: str, options: TextOptions) -> str | None:
-    """Return the delimiter of a header that the user names: that of the most columns."""
+    """Return the delimiter of a header that the user points to: the one that finds most names."""
     return max(_tried(options), key=lambda one: len(_names(line, one)) if one else 1.5)
 
 
@@ -251,7 +254,7 @@ def _are_there(stated: Mapping[str, str], names: Sequence[str]) -> bool:
 
 
 def _under(lines: Lines, at: int, delimiter: str | None, program: Program) -> Layout:
-    """Return the layout of a table under its header, with a row of units between them or not."""
+    """Return the layout of a table below its header, where a row of units may come first."""
     line, header = lines[at]
     names = _names(header, delimiter)
     rest = [one for one in lines[at + 1 :] if not one[1].lstrip().startswith("#")]
@@ -278,11 +281,12 @@ def _are_units(row: list[str], below: list[str], *, comma: bool) -> bool:
     """Return whether a row holds units: words and no number, and numbers follow."""
     values = [number(one, comma=comma) for one in row]
     numbers = [number(one, comma=comma) for one in below]
-    return (
-        sum(value is None for value in values) >= 2
-        and all(value is None or math.isnan(value) for value in values)
-        and sum(value is not None and not math.isnan(value) for value in numbers) >= 2
-    )
+    return values.count(None) >= 2 and _known(values) == 0 and _known(numbers) >= 2
+
+
+def _known(values: Sequence[float | None]) -> int:
+    """Return how many fields hold a number, and no mark of a missing one."""
+    return sum(value is not None and not math.isnan(value) for value in values)
 
 
 def _after_text(
@@ -344,8 +348,7 @@ def row_delimiter(line: str) -> Row | None:
     for delimiter in _DELIMITERS:
         fields = _split(line, delimiter)
         values = [number(one, comma=delimiter != ",") for one in fields]
-        known = sum(one is not None and one == one for one in values)
-        if len(fields) >= 4 and known >= 2 and all(one is not None for one in values):
+        if len(fields) >= 4 and None not in values and _known(values) >= 2:
             return Row(delimiter, len(fields))
     return None
 

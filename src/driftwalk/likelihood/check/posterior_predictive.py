@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from driftwalk import _core
 from driftwalk.calibration.problem import Problem, prepare_problem
-from driftwalk.comparison import apply_steps, plan_steps
+from driftwalk.comparison import apply_steps, plan_steps, step_length_edges
 from driftwalk.conditions import recorded_camera
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
@@ -200,6 +200,8 @@ def _joined(parts: Sequence[Sequence[_World]], flow_of: Integers) -> Replicates:
 
 BAND: Final = 0.9
 """Share of the replicates within the bands of the densities."""
+BINS: Final = 40
+"""Bins of a density. Chosen by hand."""
 FEWEST_REPLICATES: Final = 4
 """Sound replicates of either set: two on either side of the noise floor."""
 
@@ -274,16 +276,15 @@ def compare_motion(
         np.abs(np.concatenate([real[:, k], *(steps[:, k] for steps in drawn.steps)]))
         for k in (0, 1)
     )
-    # The few longest steps would leave most bins empty.
-    longest, widest = float(np.quantile(lengths, 0.9995)) or 1.0, float(angles.max())
+    widest = float(angles.max())
     return MotionComparison(
         _distances([real], at_estimate.steps, threads)[0],
         floor.ravel(),
         _distances([real], drawn.steps, threads)[0],
         np.nanmean(among, axis=1),
         int(np.unique(drawn.flow).size),
-        _density(real, drawn, 0, np.linspace(0.0, longest, 41)),
-        _density(real, drawn, 1, np.linspace(-widest, widest, 41)),
+        _density(real, drawn, 0, step_length_edges(lengths, bins=BINS)),
+        _density(real, drawn, 1, np.linspace(-widest, widest, BINS + 1)),
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 from typing import Any, Final
 
@@ -11,16 +10,15 @@ import numpy as np
 from driftwalk.core.errors import FormatError, InputError, damaged_as
 from driftwalk.record.column_names import column_meaning
 from driftwalk.record.raw import RawRecording, ReadOptions
-from driftwalk.record.stores.hdf5 import Hdf5Contents, names_in, opened_hdf5
+from driftwalk.record.stores.hdf5 import Hdf5Contents, opened_hdf5, text_of
 from driftwalk.record.stores.matlab import Struct, Value
-from driftwalk.record.stores.npz import ZIP, members, opened_npz
+from driftwalk.record.stores.npz import NPY, ZIP, members, opened_npz
 from driftwalk.record.tables.in_memory import table_in_memory
 from driftwalk.record.tables.matlab import matlab_tables
 from driftwalk.record.tables.rows import recording_of, the_one_that_fits
 from driftwalk.record.vocabulary import ALLOWED
-from driftwalk.schema.stores.netcdf import file_start
+from driftwalk.schema.stores.netcdf import HDF5, file_start
 
-_NPY: Final = b"\x93NUMPY"
 _RATES: Final = ("fps", "frame_rate", "framerate", "frame_rate_hz", "frames_per_second")
 
 
@@ -32,18 +30,16 @@ class ArraysLoader:
 
     def sniff(self, head: bytes, path: Path) -> float:
         """Recognise arrays of numbers, and names of positions."""
-        if head.startswith(_NPY):
+        if head.startswith(NPY):
             return 0.4 if b"'|O'" not in head[:200] else 0.0
         if head.startswith(ZIP):
             return 0.3 if _are_positions(members(path)) else 0.0
-        names = names_in(path, head)
-        # Cells and structs of MATLAB are references: its own loader knows which are recordings.
-        return 0.3 if names and "#refs#" not in names and _holds_positions(path) else 0.0
+        return 0.3 if head.startswith(HDF5) and _holds_positions(path) else 0.0
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the array, or those that belong together."""
         start = file_start(path)
-        if start.startswith(_NPY):
+        if start.startswith(NPY):
             return _of_array(path, options)
         if start.startswith(ZIP):
             with opened_npz(path) as arrays:
@@ -58,28 +54,27 @@ def _are_positions(names: set[str]) -> bool:
 
 
 def _holds_positions(path: Path) -> bool:
-    """Whether an HDF5 file holds positions at its top or in a group; axes of a grid are none."""
+    """Whether an HDF5 file holds positions at its top or in a group."""
     try:
         with opened_hdf5(path) as contents:
+            if "#refs#" in contents.file:
+                # Cells and structs of MATLAB: its own loader knows which of them are recordings.
+                return False
             inner = [one for one in contents.file.values() if hasattr(one, "keys")]
-            return any(
-                _are_positions(
-                    {
-                        str(name)
-                        for name, one in group.items()
-                        if not getattr(one, "is_scale", False)
-                    }
-                )
-                for group in (contents.file, *inner)
-            )
+            return any(_are_positions(_names_but_axes(one)) for one in (contents.file, *inner))
     except InputError:
         return False
+
+
+def _names_but_axes(group: Any) -> set[str]:
+    """Return the names in a group of an HDF5 file, without those of the axes of a grid."""
+    return {str(name) for name, one in group.items() if not getattr(one, "is_scale", False)}
 
 
 def _of_array(path: Path, options: ReadOptions) -> RawRecording:
     """Return the recording of one array, whose rows are samples."""
     with damaged_as("as .npy", path):
-        array = np.load(io.BytesIO(path.read_bytes()), allow_pickle=False)
+        array = np.load(path, allow_pickle=False)
     if array.ndim == 2 and array.dtype.names is None and array.shape[0] < array.shape[1]:
         # There are more samples than quantities, whichever way they lie.
         array = array.T
@@ -139,11 +134,11 @@ def _of_hdf5(contents: Hdf5Contents) -> dict[str, Value]:
 def _with_unit(name: str, entry: Any) -> str:
     """Return the name of an array with the unit in its attributes, where that is one of its own."""
     stated = next((entry.attrs[key] for key in ("units", "unit") if key in entry.attrs), "")
-    unit = stated.decode("utf-8", "replace") if isinstance(stated, bytes) else str(stated)
+    unit = text_of(stated).strip()
     meaning = column_meaning(name)
-    if meaning is None or meaning.unit or not ALLOWED[meaning.quantity] or not unit.strip():
+    if meaning is None or meaning.unit or not ALLOWED[meaning.quantity] or not unit:
         return name
-    return f"{name} [{unit.strip()}]"
+    return f"{name} [{unit}]"
 
 
 _PARQUET: Final = b"PAR1"

@@ -18,7 +18,7 @@ from driftwalk.record.text import open_binary
 from driftwalk.record.vocabulary import words
 
 _MOST_NUMBERS: Final = 16
-"""Numbers in a list up to which each is a column."""
+"""Length of a list up to which each of its numbers becomes a column; chosen by hand."""
 _POINTS: Final = words("position pos point xy xyz center centre centroid coordinates location")
 """Names of lists that hold x and y."""
 
@@ -171,7 +171,7 @@ def _column(values: list[Any]) -> np.ndarray[Any, Any]:
     """Return numbers as float64, NaN where one is missing; whole ones and words as they are."""
     if all(isinstance(one, int) and abs(one) < 1 << 63 for one in values):
         return np.array(values, dtype=np.int64)
-    if all(one is None or isinstance(one, int | float) for one in values):
+    if _numbers(values):
         return np.array([np.nan if one is None else float(one) for one in values])
     column = np.empty(len(values), dtype=object)
     column[:] = values

@@ -15,6 +15,8 @@ from driftwalk.core.errors import damaged_as
 from driftwalk.schema.stores.netcdf import refuse_huge
 
 ZIP: Final = b"PK\x03\x04"
+NPY: Final = b"\x93NUMPY"
+"""First letters of a single array, ``.npy``."""
 
 
 def members(path: Path) -> set[str]:

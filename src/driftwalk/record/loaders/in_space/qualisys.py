@@ -12,11 +12,12 @@ from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number
 from driftwalk.record.raw import RawRecording, ReadOptions, TableLayout
 from driftwalk.record.space import QUATERNION, SpaceTrack, Turns, lay_flat, plane_of
-from driftwalk.record.text import Table, read_head, read_table
+from driftwalk.record.text import Table, header_rows, read_table
 
-_FIRST: Final = "NO_OF_FRAMES"
+_FIRST: Final = b"NO_OF_FRAMES\t"
 _BODIES: Final = ("BODY_NAMES", "MARKER_NAMES")
 _MOST_HEAD: Final = 40
+"""Lines among which the first row is looked for; chosen by hand."""
 _WIDTH: Final = {"3D": 3, "6D": 16}
 """Columns of a marker: X, Y, Z; of a rigid body: with three angles, the residual, nine of the
 rotation matrix."""
@@ -30,7 +31,7 @@ class QualisysLoader:
 
     def sniff(self, head: bytes, _path: Path) -> float:
         """Recognise the first line."""
-        return 0.95 if head.startswith(_FIRST.encode() + b"\t") else 0.0
+        return 0.95 if head.startswith(_FIRST) else 0.0
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the frames; the unit, the rate and the names stand above them."""
@@ -66,11 +67,10 @@ class QualisysLoader:
 
 
 def _head(path: Path) -> tuple[dict[str, list[str]], int, list[str]]:
-    """Return the facts above the rows, their lines, and the fields of the first row."""
-    lines = read_head(path).split(b"\n")
+    """Return the facts above the rows, how many lines they take, and the first row's fields."""
     facts: dict[str, list[str]] = {}
-    for at, line in enumerate(lines[:_MOST_HEAD]):
-        fields = line.decode("utf-8-sig", "replace").rstrip("\r").split("\t")
+    for at, line in enumerate(header_rows(path, _MOST_HEAD)):
+        fields = line.split("\t")
         if is_number(fields[0]):
             return facts, at, fields
         facts[fields[0]] = fields[1:]
@@ -86,7 +86,7 @@ def _rate(facts: dict[str, list[str]], path: Path) -> float:
 
 
 def _track(name: str, table: Table, first: int, kind: str) -> SpaceTrack:
-    """Return a marker or a body; three zeros are where it was not seen."""
+    """Return a marker or a body; it was not seen where all three coordinates are zero."""
     position = table.stack(range(first, first + 3))
     position[(position == 0.0).all(axis=1)] = np.nan
     clock = np.arange(table.rows, dtype=np.float64)

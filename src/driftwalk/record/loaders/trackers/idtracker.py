@@ -23,6 +23,7 @@ from driftwalk.core.text.json_text import parse_json
 from driftwalk.record.cleaning.several_bodies import number_codes, split_bodies
 from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.stores.hdf5 import names_in, opened_hdf5
+from driftwalk.record.stores.npz import NPY
 from driftwalk.record.stores.plain_pickle import PickledArray, unpickle
 from driftwalk.record.text import read_table
 from driftwalk.record.text_head import first_line, first_row, read_header
@@ -69,7 +70,6 @@ class IdTrackerLoader:
         return RawRecording(bodies, length_unit="px", rows=table.rows, notes=notes)
 
 
-NPY: Final = b"\x93NUMPY"
 TABLE: Final = "trajectories.csv"
 ATTRIBUTES: Final = "attributes.json"
 TIDY: Final = ["frame", "time", "individual", "x", "y", "probability"]

@@ -130,8 +130,10 @@ def _track_name(path: Path) -> str:
     return str(int(match.group(1))) if match else "0"
 
 
-PARTICLES = ["frame", "time", "x (image)", "y (image)", "x (world)", "y (world)"]
-PARTICLES = [*PARTICLES, "area", "orientation", "compactness"]
+PARTICLES = [
+    *("frame", "time", "x (image)", "y (image)", "x (world)", "y (world)"),
+    *("area", "orientation", "compactness"),
+]
 
 
 class SwisTrackParticlesLoader:

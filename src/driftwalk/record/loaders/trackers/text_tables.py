@@ -209,8 +209,7 @@ class UbiTrailLoader:
 
 def _area_widths(path: Path) -> dict[str, float]:
     """Return the width of each area in pixels, from the first line."""
-    lines = first_lines(read_head(path), 1)
-    match = _AREAS.search(lines[0]) if lines else None
+    match = _AREAS.search(first_line(read_head(path)))
     if match is None:
         raise FormatError("the metadata hold no matrix of areas (W, H, X, Y)", path=path, line=1)
     try:
