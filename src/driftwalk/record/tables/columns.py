@@ -51,7 +51,7 @@ class _Reader(NamedColumns):
         self.choose()
         box = find_box(self.source, self.options, self.meanings, self.chosen)
         if box is not None:
-            self.drop((at for at in box.replaced), box.why)
+            self.drop(box.replaced, box.why)
             self.result.box = box if box.sides else None
             self.result.notes += box.notes
         self.leave_out_other_pairs()
@@ -106,7 +106,7 @@ class _Reader(NamedColumns):
     def _leave_out_the_third_axis(self) -> None:
         """Leave out heights that nobody asks for, and parts of quaternions that are not whole."""
         meanings = self.meanings
-        turned = {body for body in {one.body for one in meanings.values()} if self._is_turned(body)}
+        turned = self._turned()
         parts = [at for at, one in meanings.items() if one.quantity in QUATERNION]
         loose = [at for at in parts if meanings[at].body not in turned]
         self.drop(loose, "no whole quaternion, or an angle next to it")
@@ -114,16 +114,22 @@ class _Reader(NamedColumns):
             height = [at for at, one in meanings.items() if one.quantity == "z"]
             self.drop(height, "height: the plane of the water is x, y without `up`")
 
-    def _is_turned(self, body: str) -> bool:
-        """Whether a body has a quaternion and no angle; half of a chosen quaternion is refused."""
-        own = [one.quantity for one in self.meanings.values() if one.body == body]
-        whole = all(own.count(part) == 1 for part in QUATERNION)
-        if not whole and any(part in self.chosen for part in QUATERNION):
+    def _turned(self) -> set[str]:
+        """Return bodies with a quaternion and no angle; half of a chosen quaternion is refused."""
+        quantities: dict[str, list[str]] = {}
+        for one in self.meanings.values():
+            quantities.setdefault(one.body, []).append(one.quantity)
+        whole = {
+            body
+            for body, own in quantities.items()
+            if all(own.count(part) == 1 for part in QUATERNION)
+        }
+        if any(part in self.chosen for part in QUATERNION) and len(whole) < len(quantities):
             raise InputError(
                 'an orientation in space has four parts: name each with `columns={"qx": "NAME"}`, '
                 "qy, qz and qw"
             )
-        return whole and "theta" not in own
+        return {body for body in whole if "theta" not in quantities[body]}
 
     def _add_loose_angle(
         self, only: dict[str, int], places: dict[str, dict[str, int]], bodies: set[str]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Final
+from typing import Final, NamedTuple
 
 from driftwalk.core.errors import InputError, argument_text
 from driftwalk.core.text.did_you_mean import listed
@@ -117,19 +117,18 @@ class NamedColumns:
 
     def leave_out_other_pairs(self) -> None:
         """Leave out pairs that are no body, or a body once more, where another pair is."""
-        bodies = [body for body in self.bodies_with("x") if body in self.bodies_with("y")]
-        kinds = {one.body: _kinds(one.body) for one in self.meanings.values() if one.body}
-        real = [body for body in bodies if body not in kinds or not any(kinds[body])]
-        setpoints = [body for body in bodies if body in kinds and kinds[body][0]]
-        variants = [
-            body for body in bodies if body in kinds and kinds[body][1] and not kinds[body][0]
-        ]
-        left = dict.fromkeys(setpoints, _OTHER_BODY) if real or variants else {}
-        if self.result.box is not None:
+        ys, thetas = self.bodies_with("y"), self.bodies_with("theta")
+        bodies = [body for body in self.bodies_with("x") if body in ys]
+        kinds = {one.body: _kinds(one.body) for one in self.meanings.values()}
+        real = [body for body in bodies if not any(kinds[body])]
+        setpoints = [body for body in bodies if kinds[body].setpoint]
+        variants = [body for body in bodies if kinds[body] == (False, True)]
+        left: dict[str, str] = {}
+        if real or variants or self.result.box is not None:
             left = dict.fromkeys(setpoints, _OTHER_BODY)
-        if len(setpoints) > 1 and not left and not self.lenient:
-            raise InputError(self._one_of([f"x_{body}" for body in setpoints], setpoints))
-        if len(setpoints) == 1 and not left and not self.lenient:
+        elif setpoints and not self.lenient:
+            if len(setpoints) > 1:
+                raise InputError(self._one_of(setpoints))
             self.result.notes.append(
                 f"'{setpoints[0]}' is read as a body, though its name is that of a setpoint: "
                 "there is no other pair of x and y"
@@ -137,12 +136,13 @@ class NamedColumns:
         left |= self._computed(variants, real)
         for body, kind in kinds.items():
             # An angle of a setpoint stands alone where its position has other names.
-            if kind[0] and body not in bodies:
+            if kind.setpoint and body not in bodies:
                 left[body] = _OTHER_BODY
-            if kind[1] and body not in bodies and _base(body) in self.bodies_with("theta"):
+            if kind.variant and body not in bodies and _base(body) in thetas:
                 left[body] = _SAME_BODY
-        for body, why in left.items():
-            self.drop([at for at, one in self.meanings.items() if one.body == body], why)
+        for at, meaning in list(self.meanings.items()):
+            if meaning.body in left:
+                self.drop([at], left[meaning.body])
         self._doubt(set(bodies) - set(left))
         named = [body for body in left if body in bodies]
         if named:
@@ -175,10 +175,11 @@ class NamedColumns:
             if base in real or (not base and self.result.box is not None):
                 left |= dict.fromkeys(several, _SAME_BODY)
             elif len(several) > 1 and not self.lenient:
-                raise InputError(self._one_of([], several))
+                raise InputError(self._one_of(several))
         return left
 
-    def _one_of(self, _names: list[str], bodies: list[str]) -> str:
+    def _one_of(self, bodies: list[str]) -> str:
+        """Return what to do about several bodies that may be one."""
         columns = self.bodies_with("x")
         found = [self.names[columns[body]] for body in bodies]
         other = {"x": found[0], "y": self.names[self.bodies_with("y")[bodies[0]]]}
@@ -243,9 +244,16 @@ class NamedColumns:
         )
 
 
-def _kinds(body: str) -> tuple[bool, bool]:
+class _Kinds(NamedTuple):
+    """Whether the name of a body has words of a setpoint, and of a computation."""
+
+    setpoint: bool
+    variant: bool
+
+
+def _kinds(body: str) -> _Kinds:
     words = {word.lower().rstrip("0123456789") for word in body.split("_")}
-    return bool(words & SETPOINTS), bool(words & VARIANTS)
+    return _Kinds(bool(words & SETPOINTS), bool(words & VARIANTS))
 
 
 def _base(body: str) -> str:
