@@ -222,8 +222,10 @@ def test_a_clock_that_counts_frames_can_be_named(tmp_path: Path) -> None:
     check(load(path, frame_rate=25.0, length_unit="m", columns={"frame": "t"}))
 
 
-def test_a_name_without_a_column_at_the_end(tmp_path: Path) -> None:
+@pytest.mark.parametrize("between", ["", "\n"])
+def test_a_name_without_a_column_at_the_end(tmp_path: Path, between: str) -> None:
     path = tmp_path / "lab.lvm"
     rows = "".join(f"{t}\t{x}\t{y}\n" for t, x, y in zip(T, X, Y, strict=True))
-    path.write_text(f"LabVIEW Measurement\t\nOperator\tme\n\nTime\tx\ty\tComment\n{rows}")
+    above = "LabVIEW Measurement\t\nOperator\tme\n\n"
+    path.write_text(f"{above}Time\tx\ty\tComment\n{between}{rows}")
     check(load(path))
