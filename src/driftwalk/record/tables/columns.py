@@ -16,7 +16,7 @@ from driftwalk.record.tables.column_reading import ColumnReading, TableReading
 from driftwalk.record.tables.named_columns import NamedColumns, may_be_unit, shown
 from driftwalk.record.tables.source import TableSource
 from driftwalk.record.tables.stamps import OF_DAY
-from driftwalk.record.vocabulary import FRONT, MIDDLE, REAR
+from driftwalk.record.vocabulary import ALLOWED, FRONT, LENGTHS, MIDDLE, REAR
 
 _ON_GLOBE: Final = ("lon", "lat")
 
@@ -271,9 +271,9 @@ class _Reader(NamedColumns):
     def _is_fraction(self, time: int, part: int) -> bool:
         """Whether a column holds less than a second, next to whole seconds."""
         whole = all(one.lstrip("-").isdecimal() for one in self._sampled(time))
-        ticks = {"ns": 9, "us": 6, "ms": 3}.get(self.meanings[part].unit, 0)
+        digits = {"ns": 9, "us": 6, "ms": 3}.get(self.meanings[part].unit, 0)
         parts = self._sampled(part)
-        return whole and all(one.isdecimal() and int(one) < 10**ticks for one in parts)
+        return whole and all(one.isdecimal() and int(one) < 10**digits for one in parts)
 
     def _is_of_ros(self, time: int) -> bool:
         """Whether the stamp of a header counts whole nanoseconds since 1970."""
@@ -329,11 +329,8 @@ class _Reader(NamedColumns):
             return "; unit from the row below the names"
         if column.unit and unit_of_name(self.names[at]) == column.unit:
             return "; unit from its name"
-        options, length = (
-            self.options,
-            column.role in ("x", "y", "z", "x1", "y1", "x2", "y2", "w", "h"),
-        )
-        if not column.unit and length:
+        options = self.options
+        if not column.unit and ALLOWED.get(column.role) == LENGTHS:
             if options.length_unit or options.metres_per_pixel is not None:
                 column.unit = options.length_unit or "px"
                 return "; unit as you stated it"
