@@ -267,7 +267,7 @@ def test_counters_that_run_over(tmp_path: Path, name: str, sort: str) -> None:
     path = table(tmp_path, f"{name},x_m,y_m", lambda k: f"{clock(k)},{X[k]},{Y[k]}")
     dataset = load(path, sort=sort, **options)
     check(dataset)
-    assert "runs over" in warnings_of(dataset)
+    assert "rolls over" in warnings_of(dataset)
 
 
 @pytest.mark.parametrize("sort", ["error", "sort"])
