@@ -33,13 +33,13 @@ class BoxPolicy(NamedTuple):
     """When four numbers are the corners of a box; chosen by hand."""
 
     spread: float = 0.5
-    """Range of the sides of a box at most, as a share of the way that it goes."""
+    """Largest range of the sides of a box, as a share of the range of its centre."""
     skew: float = 0.15
-    """Departure of four corners from a parallelogram at most, in diagonals."""
+    """Largest departure of four corners from a parallelogram, in diagonals."""
     square: float = 1.25
-    """Ratio of the sides up to which a box is a square, whose angle repeats after a quarter."""
+    """Ratio of the sides up to which a box is a square: it looks the same after a quarter turn."""
     full: float = 1.05
-    """Range of an angle, in periods of the axis, beyond which it is that of a direction."""
+    """Range of an angle, in its periods, beyond which it is the angle of a direction."""
 
 
 BOX: Final = BoxPolicy()
@@ -58,7 +58,7 @@ class Box:
     why: str = "a side of a box"
     notes: tuple[str, ...] = ()
     symmetric: bool = True
-    """Whether its angle is that of an axis."""
+    """Whether it looks the same after a half or quarter turn, so that its angle may leap by one."""
 
 
 def find_box(
@@ -72,8 +72,8 @@ def find_box(
     Raises
     ------
     InputError
-        When a box that is stated has not its columns, and when the first rows leave open whether
-        columns are a box, and which point of it is meant.
+        When a stated box lacks columns, when the first rows leave open whether columns are a box,
+        or when nothing says whether x and y are its corner or its centre.
     """
     if options.box is not None and options.box not in FORMS:
         raise InputError(f"`box` is one of {', '.join(FORMS)}; got '{options.box}'")
@@ -102,9 +102,9 @@ def find_box(
         return _stated("cxcywh", found, units)
     names = [source.names[found[side]] for side in ("x", "y", "w", "h")]
     raise InputError(
-        f"the columns {listed([repr(name) for name in names])} are a box, and nothing says which "
-        'point of it x and y are: add `box="xywh"` if they are its corner of the least x and y, '
-        '`box="cxcywh"` if its centre'
+        f"the columns {listed([repr(name) for name in names])} are a box, and nothing says "
+        'whether x and y are its corner or its centre: add `box="xywh"` if they are the corner '
+        'with the smallest x and y, `box="cxcywh"` if the centre'
     )
 
 
@@ -278,9 +278,9 @@ def box_angle(
     codes: Codes | None,
     turn: float,
 ) -> Array | None:
-    """Return the orientation of a box: its axis, followed over its symmetry, body by body.
+    """Return the orientation of a box, unwrapped body by body.
 
-    A square looks the same after a quarter of a turn, any other box after a half.
+    A square looks the same after a quarter turn, any other box after a half turn.
 
     Parameters
     ----------

@@ -33,7 +33,7 @@ def read_columns(
     options : ReadOptions
         What is known about the table.
     lenient : bool
-        Whether a unit that is not known is no error, as in the search for the names.
+        Whether to accept unknown units, as in the search for the names.
 
     Raises
     ------
@@ -109,7 +109,7 @@ class _Reader(NamedColumns):
         turned = self._turned()
         parts = [at for at, one in meanings.items() if one.quantity in QUATERNION]
         loose = [at for at in parts if meanings[at].body not in turned]
-        self.drop(loose, "no whole quaternion, or an angle next to it")
+        self.drop(loose, "part of an incomplete quaternion, or of one next to an angle")
         if self.options.up is None:
             height = [at for at, one in meanings.items() if one.quantity == "z"]
             self.drop(height, "height: the plane of the water is x, y without `up`")
@@ -143,7 +143,9 @@ class _Reader(NamedColumns):
         if len(loose) > 1:
             names = listed([repr(self.names[at]) for at in loose])
             choice = argument_text("columns", {"theta": self.names[loose[0]]})
-            self.result.notes.append(f"no orientation is read of {names}: name one, as in {choice}")
+            self.result.notes.append(
+                f"no orientation is read from {names}: name one, as in {choice}"
+            )
             return
         meaning = self.meanings[loose[0]]
         stem = meaning.ending.rstrip("0123456789")
@@ -206,11 +208,11 @@ class _Reader(NamedColumns):
         if rivals and not alike:
             raise InputError(self.both(at, rivals[0], quantity))
         name = self.result.columns[at].name
-        self.drop((other for _, other in found[1:]), f"'{name}' is the {quantity} that counts")
+        self.drop((other for _, other in found[1:]), f"'{name}' is read as {quantity} instead")
         return at
 
     def _run_together(self, first: int, second: int) -> bool:
-        """Whether two clocks differ by the same in the first rows."""
+        """Whether two clocks differ by a constant in the first rows, to 1e-3 and rounding."""
         texts = [(row[first], row[second]) for row in self.source.sample() if len(row) > second]
         try:
             values = np.array(
@@ -218,7 +220,7 @@ class _Reader(NamedColumns):
             )
         except ValueError:
             return False
-        return values.size > 0 and float(np.ptp(values[:, 1] - values[:, 0])) <= 1e-9 + 1e-3
+        return values.size > 0 and float(np.ptp(values[:, 1] - values[:, 0])) <= 1e-3 + 1e-9
 
     def _find_clock(self) -> None:
         """Find the clock: frames, numbers, seconds and their fraction, or time stamps."""
@@ -231,7 +233,7 @@ class _Reader(NamedColumns):
         if frame is not None and (time is None or self.options.frame_rate_hz is not None):
             result.numbers = (frame,)
             if time is not None:
-                self.drop([time], "frames are counted, because their rate is given")
+                self.drop([time], "the frames are the clock, because their rate is given")
             return
         if frame is not None:
             self.drop([frame], "the table has times")
@@ -254,7 +256,7 @@ class _Reader(NamedColumns):
         elif (
             form is not None and form.kind == OF_DAY and date is not None and date_form is not None
         ):
-            # A date that has its own time of day says all.
+            # A date with its own time of day needs no second column.
             result.stamps = (date,) if date_form.kind and date_form.has_time else (date, time)
         else:
             result.stamps = (time,)
@@ -308,9 +310,9 @@ class _Reader(NamedColumns):
             if at not in used and at not in clock and at != result.body_column:
                 column.unit = self.unit_of(at)
                 if meaning is not None and meaning.quantity == "confidence":
-                    column.why = "confidence, of use with `min_confidence`"
+                    column.why = "confidence: read only with `min_confidence`"
                 elif meaning is not None:
-                    column.why = "no pair of x and y, or no body, goes with it"
+                    column.why = "it belongs to no pair of x and y, or to no body"
                 continue
             column.role = sides.get(at, meaning.quantity if meaning else "")
             column.body = used.get(at, "")
@@ -347,5 +349,7 @@ def _agreed(units: list[str], what: str) -> str:
     distinct = sorted(set(units))
     if len(distinct) > 1:
         shown = ", ".join(unit or "none" for unit in distinct)
-        raise InputError(f"the columns of {what} name different units ({shown}): name them alike")
+        raise InputError(
+            f"the columns of {what} name different units ({shown}): give them one unit"
+        )
     return distinct[0] if distinct else ""

@@ -1,4 +1,4 @@
-"""Columns by their names: which the user named, which are no body, which have no known unit."""
+"""Columns by their names: which the user named, which are not a body, which have no known unit."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ from driftwalk.record.vocabulary import (
 
 _SKIP: Final = "skip"
 LEFT_OUT: Final = "you left it out"
-_OTHER_BODY: Final = "what it was to do, or what moved it: no body where another is"
-_SAME_BODY: Final = "the same body, before or after a computation"
+_OTHER_BODY: Final = "a setpoint, or something that moves the body, rather than a body"
+_SAME_BODY: Final = "the same body, before or after processing"
 
 
 class NamedColumns:
@@ -116,7 +116,7 @@ class NamedColumns:
         return {one.body: at for at, one in self.meanings.items() if one.quantity == quantity}
 
     def leave_out_other_pairs(self) -> None:
-        """Leave out pairs that are no body, or a body once more, where another pair is."""
+        """Leave out pairs that are not a body, or repeat one, where there is another pair."""
         ys, thetas = self.bodies_with("y"), self.bodies_with("theta")
         bodies = [body for body in self.bodies_with("x") if body in ys]
         kinds = {one.body: _kinds(one.body) for one in self.meanings.values()}
@@ -147,12 +147,12 @@ class NamedColumns:
         named = [body for body in left if body in bodies]
         if named:
             self.result.notes.append(
-                f"pairs of x and y that are read as no body: {listed(named)} (name one by "
-                f"{argument_text('columns', {'x': 'NAME', 'y': 'NAME'})} if it is the one)"
+                f"pairs of x and y that are not read as bodies: {listed(named)} (if one is the "
+                f"body, name it with {argument_text('columns', {'x': 'NAME', 'y': 'NAME'})})"
             )
 
     def _doubt(self, bodies: set[str]) -> None:
-        """Say that pairs next to plain x and y are read as bodies: their names may mean else."""
+        """Say that pairs next to plain x and y are read as bodies: they may be something else."""
         others = sorted(
             body for body in bodies if body and body.lower() not in MIDDLE | FRONT | REAR
         )
@@ -161,12 +161,12 @@ class NamedColumns:
         columns = {quantity: self.bodies_with(quantity)[others[0]] for quantity in "xy"}
         names = [self.names[at] for at in columns.values()]
         self.result.notes.append(
-            f"{listed([repr(name) for name in names])} are read as one body more, next to x and "
-            f"y: if they are none, add {argument_text('columns', {'skip': '+'.join(names)})}"
+            f"{listed([repr(name) for name in names])} are read as another body, next to x and "
+            f"y: if they are not one, add {argument_text('columns', {'skip': '+'.join(names)})}"
         )
 
     def _computed(self, variants: list[str], real: list[str]) -> dict[str, str]:
-        """Return the pairs that are a body once more; of several, one has to be named."""
+        """Return the pairs that repeat a body; of several, one has to be named."""
         left: dict[str, str] = {}
         of_base: dict[str, list[str]] = {}
         for body in variants:
@@ -184,12 +184,12 @@ class NamedColumns:
         found = [self.names[columns[body]] for body in bodies]
         other = {"x": found[0], "y": self.names[self.bodies_with("y")[bodies[0]]]}
         return (
-            f"{listed([repr(name) for name in found])} hold one body more than once, or none: name "
-            f"the one to read, as in {argument_text('columns', other)}"
+            f"{listed([repr(name) for name in found])} may be one body several times, or none: "
+            f"name the one to read, as in {argument_text('columns', other)}"
         )
 
     def refuse_unknown_units(self) -> None:
-        """Refuse positions, angles and times whose unit is none that is known."""
+        """Refuse positions, angles and times whose unit is not known."""
         options = self.options
         stated = options.length_unit is not None or options.metres_per_pixel is not None
         unknown = {at: one for at, one in self.meanings.items() if one.unknown}
@@ -207,7 +207,7 @@ class NamedColumns:
                 or meaning.quantity == "z"
                 or (meaning.quantity == "t" and self.bodies_with("frame"))
             ):
-                self.drop([at], f"'{meaning.unknown}' is no unit that is known")
+                self.drop([at], f"'{meaning.unknown}' is not a known unit")
                 continue
             raise InputError(self.no_unit(at, meaning.unknown))
         if stated or self.lenient:
@@ -227,12 +227,12 @@ class NamedColumns:
             )
 
     def no_unit(self, at: int, word: str) -> str:
-        """Return what to do about a column with a unit that is none."""
+        """Return what to do about a column whose unit is not known."""
         quantity = self.meanings[at].quantity
         allowed = ", ".join(sorted(ALLOWED[quantity]))
         choice = argument_text("columns", {quantity: f"{self.names[at]}:UNIT"})
         return (
-            f"'{word}' in column '{self.names[at]}' is no unit that is known: say which of "
+            f"'{word}' in column '{self.names[at]}' is not a known unit: say which of "
             f"{allowed} it is, as in {choice}"
         )
 

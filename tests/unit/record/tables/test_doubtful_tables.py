@@ -49,7 +49,7 @@ def test_a_unit_inside_a_name_counts(tmp_path: Path, form: str) -> None:
 @pytest.mark.parametrize("unit", ["10um", "5mm"])
 def test_a_unit_with_a_factor_is_refused(tmp_path: Path, unit: str) -> None:
     path = columns(tmp_path, {"t": T, f"x_{unit}": X, f"y_{unit}": Y})
-    with pytest.raises(InputError, match=rf"'{unit}' in column 'x_{unit}' is no unit"):
+    with pytest.raises(InputError, match=rf"'{unit}' in column 'x_{unit}' is not a known unit"):
         load(path)
 
 
@@ -67,7 +67,7 @@ def test_longitudes_next_to_positions_stay_out(tmp_path: Path) -> None:
 
 def test_a_further_pair_of_an_unknown_name_is_doubted(tmp_path: Path) -> None:
     path = columns(tmp_path, {"t": T, "x": X, "y": Y, "x_home": Y, "y_home": X})
-    assert "'x_home', 'y_home' are read as one body more" in warnings_of(load(path))
+    assert "'x_home', 'y_home' are read as another body" in warnings_of(load(path))
     check(load(path, columns={"skip": "x_home+y_home"}))
 
 
