@@ -27,7 +27,7 @@ OF_BODY: Final = ("x", "y", "z", "theta", *QUATERNION, "lon", "lat", "confidence
 # Words before x, y, z or w that make them a part of a quaternion: "orientation.x", "q_w".
 _QUATERNION_WORDS = frozenset({"q", "quat", "quaternion", "orientation"})
 _FRAME_WORDS = words("number no index stamp col num")
-# The words of English that every version knew: they come before others of the same quantity.
+# Of several columns of a quantity, one with such a word comes before one with any other.
 _FIRST = words(
     "t time timestamp datetime date frame frames framenumber frameno frameid frameindex body "
     "id track trackid robot robotid individual animal name particle agent subject fish mouse "

@@ -140,8 +140,8 @@ def load(
         with less are missing, from 0 to 1; None: a value that is usual for the format, and a note
         says which.
     box : {"xyxy", "xywh", "cxcywh", "none"}, optional
-        What columns of a box hold: two corners, the corner of the least x and y with width and
-        height, or the centre with them; ``"none"``: they are no box. The body is its centre.
+        What columns of a box hold: two corners, the corner with the smallest x and y, width and
+        height, or the centre with them; ``"none"``: they are not a box. The body is its centre.
     missing : str or sequence of str, optional
         Mark of a position that was not seen, in the file's units: a place such as
         ``"0,0"``, a number such as ``"-9999"``, or ``"held"``, the place of the sample before.

@@ -83,7 +83,7 @@ NO_UNIT: Final = words(
 """Units without a length or an angle of their own, or with several: they are refused by name."""
 
 INNER: Final = words("mm cm um µm μm nm dm px pixel pixels deg degrees rad mrad")
-"""Units that no body is called by: they count in the middle of a name, too (x_mm_filtered)."""
+"""Units that never name a body: they also count in the middle of a name (x_mm_filtered)."""
 
 IMAGE_WORDS: Final = words(
     "pos posn position center centre centroid image coord coordinate mitte schwerpunkt mittelpunkt "
@@ -102,12 +102,12 @@ SETPOINTS: Final = words(
     "origin wind current waypoint wp offset soll sollwert consigne consigna expected planned "
     "nominal joy joystick touch cursor"
 )
-"""Words of pairs that are no body where another pair is: what it was to do, or what pushed it."""
+"""Words of pairs that are not a body if there is another pair: setpoints, and what moves it."""
 VARIANTS: Final = words(
     "raw filt filtered smooth smoothed est estimate estimated true truth gt meas measured "
     "pred predicted kf ekf interp interpolated corrected mean hat odom odometry gps imu"
 )
-"""Words of pairs that are one body once more, from before or after a computation."""
+"""Words of pairs that repeat a body, from before or after processing."""
 TIME_WORDS: Final = words(
     "number no index stamp col num n° nr n trial recording elapsed video date ros unix epoch "
     "system relative simulation sim of day"

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import Final
 
 import numpy as np
 
 from driftwalk.core.arrays import Bools, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.record.cleaning.clock import overlap, starts_over
-from driftwalk.record.cleaning.jumps import find_jumps
+from driftwalk.record.cleaning.jumps import PART, find_jumps
 from driftwalk.record.cleaning.several_bodies import (
     BodyColumns,
     name_the_body,
@@ -18,9 +17,6 @@ from driftwalk.record.cleaning.several_bodies import (
     times_in_two_places,
 )
 from driftwalk.record.raw import RawBody
-
-_PART: Final = 1 << 20
-"""Times that are compared at once: some 16 MB."""
 
 
 @dataclass
@@ -160,9 +156,8 @@ def _in_order(body: RawBody, counts: Counts, *, sort: str, columns: BodyColumns 
 
 def _refuse_closest(body: RawBody) -> None:
     """Refuse two times by whose difference no speed can be divided."""
-    # In parts: a recording may have millions of times.
-    for start in range(0, body.clock.size - 1, _PART):
-        steps = np.diff(body.clock[start : start + _PART + 1])
+    for start in range(0, body.clock.size - 1, PART):
+        steps = np.diff(body.clock[start : start + PART + 1])
         at = int(steps.argmin())
         # No camera is that fast; powers of 1e12 are still within float64.
         if steps[at] < 1e-12:

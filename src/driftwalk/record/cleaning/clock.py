@@ -1,4 +1,4 @@
-"""Clocks: plausibility, above all of one without a unit; counters that run over or start over."""
+"""Clocks: plausibility, above all of one without a unit; counters that roll over or start over."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.core.arrays import Integers
 from driftwalk.core.errors import InputError, argument_text
 from driftwalk.record.raw import CLOCK_UNITS, Array, RawRecording
 from driftwalk.record.tables.stamps import counted_on
@@ -136,13 +135,13 @@ def _option(column: str, unit: str) -> str:
 
 
 class CounterPolicy(NamedTuple):
-    """When a step back is a counter that runs over, and when the clock starts over."""
+    """When a step back is a counter that rolls over, and when the clock starts over."""
 
     near: float = 0.1
-    """Share of its range that a counter is from its end before it runs over, and from its
+    """Share of its range that a counter is from its end before it rolls over, and from its
     beginning afterwards; chosen by hand."""
     steps: float = 50.0
-    """Usual steps that it goes on by at most when it runs over; chosen by hand."""
+    """Usual steps that it advances by at most when it rolls over; chosen by hand."""
     displaced: int = 3
     """Usual steps that rows out of order are displaced by at least for a clock that starts over;
     chosen by hand."""
@@ -156,7 +155,7 @@ _DAY_S: Final = 86_400.0
 
 
 def unwrap_counters(raw: RawRecording) -> list[str]:
-    """Make clocks that run over go on, in place; return what was done.
+    """Unwrap clocks that roll over, in place; return what was done.
 
     Parameters
     ----------
@@ -170,36 +169,25 @@ def unwrap_counters(raw: RawRecording) -> list[str]:
         moduli += [(2.0**32 / 1e6 * ticks, "32 bits of microseconds")]
         moduli += [(2.0**32 / 1e3 * ticks, "32 bits of milliseconds")]
         moduli += [(_DAY_S * ticks, "a day")] if raw.calendar == "" else []
-    notes: list[str] = []
-    clocks = {id(body.clock): body.clock for body in raw.bodies}
+    moduli.sort()
+    notes: dict[str, None] = {}
     unwrapped: dict[int, Array] = {}
-    for key, clock in clocks.items():
-        back = _steps_back(clock)
-        if not back.size:
+    for key, clock in {id(body.clock): body.clock for body in raw.bodies}.items():
+        finite = np.isfinite(clock)
+        known = clock if finite.all() else clock[finite]
+        if not (known[1:] < known[:-1]).any():
             continue
-        known = clock[np.isfinite(clock)]
-        for modulus, what in sorted(moduli):
-            if _runs_over(known, modulus):
-                unwrapped[key] = counted_on(clock, modulus)
-                note = f"the clock runs over after {modulus:.10g} ({what}): it is counted on"
-                notes += [] if note in notes else [note]
-                break
+        found = next((entry for entry in moduli if _rolls_over(known, entry[0])), None)
+        if found is not None:
+            modulus, what = found
+            unwrapped[key] = counted_on(clock, modulus)
+            notes[f"the clock rolls over after {modulus:.10g} ({what}): it is unwrapped"] = None
     for body in raw.bodies:
         body.clock = unwrapped.get(id(body.clock), body.clock)
-    return notes
+    return list(notes)
 
 
-def _steps_back(clock: Array) -> Integers:
-    """Return where a clock goes back; of rows without a time nothing is known."""
-    with np.errstate(invalid="ignore"):
-        back = np.flatnonzero(clock[1:] < clock[:-1])
-    if not back.size and not np.isfinite(clock).all():
-        known = clock[np.isfinite(clock)]
-        return np.flatnonzero(known[1:] < known[:-1])
-    return back
-
-
-def _runs_over(known: Array, modulus: float) -> bool:
+def _rolls_over(known: Array, modulus: float) -> bool:
     """Whether all steps back of a clock are those of a counter with this modulus."""
     low = float(known.min())
     # A signed counter runs from the negative half on.

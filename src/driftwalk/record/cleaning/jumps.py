@@ -42,6 +42,8 @@ class JumpPolicy(NamedTuple):
 
 
 JUMPS: Final = JumpPolicy()
+PART: Final = 1 << 20
+"""Samples that are compared at once, some 16 MB: a recording may have millions."""
 
 
 def find_jumps(body: RawBody, max_speed: float) -> Integers:
@@ -135,6 +137,18 @@ class Impossible(NamedTuple):
     """A speed that is faster than its other steps, and slower than these [m/s]."""
 
 
+def squared_steps(x: Array, y: Array) -> Array:
+    """Return the squares of the lengths of the steps: a root of each would take time."""
+    square: Array = np.diff(x)
+    with np.errstate(over="ignore"):
+        square *= square
+        for start in range(0, square.size, PART):
+            across = np.diff(y[start : start + PART + 1])
+            across *= across
+            square[start : start + PART] += across
+    return square
+
+
 def impossible_steps(time: Array, x: Array, y: Array, *, diagonal: float) -> Impossible | None:
     """Return the steps of a body that it cannot have made; None where there are none.
 
@@ -155,11 +169,7 @@ def impossible_steps(time: Array, x: Array, y: Array, *, diagonal: float) -> Imp
     """
     if diagonal < math.sqrt(2.0) * PLAUSIBLE.smallest_extent_m:
         return None  # at rest, or in a wrong unit: `plausibility_warnings` speaks of it
-    # Squares first: a long recording mostly has no long step, and roots take time.
-    square, across = np.diff(x), np.diff(y)
-    square *= square
-    across *= across
-    square += across
+    square = squared_steps(x, y)
     far = np.flatnonzero(square > (JUMPS.arena_share * diagonal) ** 2)
     if not far.size:
         return None

@@ -8,6 +8,7 @@ import numpy as np
 
 from driftwalk.core.arrays import Bools, Integers
 from driftwalk.core.errors import InputError, argument_text
+from driftwalk.record.cleaning.jumps import squared_steps
 from driftwalk.record.raw import Array, RawBody, RawRecording
 
 HELD: Final = "held"
@@ -22,14 +23,12 @@ class MissingPolicy(NamedTuple):
     """Samples in one place that are a mark where its numbers are whole, such as 0 or -1."""
     any_place: int = 4
     """Samples in any other place that are a mark."""
-    largest: float = 1e5
-    """Times the usual position from which on a single number alone is a mark."""
     held: int = 3
     """Rows in one place, in a body that moves otherwise, after which a leap shows a mark."""
     moving: float = 0.5
     """Share of the steps in which such a body moves."""
     leap: float = 2.0
-    """Lengths of the usual step that such a leap has at least."""
+    """Least length of such a leap, in lengths of the usual step."""
 
 
 MARK: Final = MissingPolicy()
@@ -58,7 +57,7 @@ def blank_missing(raw: RawRecording, marks: tuple[str, ...]) -> None:
             if rows:
                 body.blank(lost)
             count += rows
-        raw.notes.append(f"samples that are missing by {argument_text('missing', mark)}: {count}")
+        raw.notes.append(f"samples that {argument_text('missing', mark)} makes missing: {count}")
 
 
 def _lost(body: RawBody, mark: str) -> Bools:
@@ -105,15 +104,16 @@ def _marks_of(body: RawBody) -> list[tuple[str, str]]:
     x, y = (body.x, body.y) if known.all() else (body.x[known], body.y[known])
     if x.size < 2 * MARK.any_place:
         return []
-    square, across = np.diff(x), np.diff(y)
-    with np.errstate(over="ignore"):
-        square *= square
-        across *= across
-        square += across
-    moving = square[square > 0.0] if not square.all() else square
+    # The median sorts its steps in place, and they are computed anew: a long recording is not to
+    # be held once more.
+    moving = squared_steps(x, y)
+    if not moving.all():
+        moving = moving[moving > 0.0]
     if not moving.size:
         return []
-    usual = float(np.sqrt(np.median(moving)))
+    usual = float(np.sqrt(np.median(moving, overwrite_input=True)))
+    del moving
+    square = squared_steps(x, y)
     marks = []
     with np.errstate(over="ignore"):
         far = np.flatnonzero(square > (MARK.far * usual) ** 2)
@@ -121,7 +121,7 @@ def _marks_of(body: RawBody) -> list[tuple[str, str]]:
     if 0 < far.size <= x.size // 2:
         marks += _far_places(x, y, far)
     still = square == 0.0
-    if still.any() and 0.0 < still.mean() <= 1.0 - MARK.moving:
+    if 0.0 < still.mean() <= 1.0 - MARK.moving:
         runs, rows = _held_runs(square, still, usual)
         if runs > 1 or rows > MARK.held:
             times = "once" if runs == 1 else f"{runs} times"

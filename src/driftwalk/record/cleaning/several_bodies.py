@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.arrays import Codes
+from driftwalk.core.arrays import Codes, Integers
 from driftwalk.core.errors import InputError, argument_text
 from driftwalk.record.cleaning.warn import refuse_many_bodies
 from driftwalk.record.raw import Array, RawBody
@@ -137,14 +137,23 @@ def split_bodies(
     refuse_many_bodies(labels)
     if len(labels) == 1:
         return [RawBody(labels[0], clock, x, y, theta)]
-    order = np.argsort(codes, kind="stable")
-    ends = np.cumsum(np.bincount(codes, minlength=len(labels)))[:-1]
-    rows = np.split(order, ends)
     return [
         RawBody(name, clock[at], x[at], y[at], None if theta is None else theta[at])
-        for name, at in zip(labels, rows, strict=True)
+        for name, at in zip(labels, rows_of_bodies(codes, number=len(labels)), strict=True)
         if at.size
     ]
+
+
+def rows_of_bodies(codes: Codes, *, number: int = 0) -> list[Integers]:
+    """Return the rows of each body in the file's order, of `number` bodies or all that have rows.
+
+    Examples
+    --------
+    >>> [rows.tolist() for rows in rows_of_bodies(np.array([1, 0, 1], dtype=np.int32))]
+    [[1], [0, 2]]
+    """
+    ends = np.cumsum(np.bincount(codes, minlength=number))[:-1]
+    return np.split(np.argsort(codes, kind="stable"), ends)
 
 
 def number_codes(values: Array) -> tuple[Codes, list[str]]:

@@ -12,6 +12,7 @@ import numpy as np
 from driftwalk.core.arrays import Codes
 from driftwalk.core.errors import InputError, argument_text
 from driftwalk.core.text.did_you_mean import listed
+from driftwalk.record.cleaning.several_bodies import rows_of_bodies
 from driftwalk.record.column_names import ColumnMeaning, words_of
 from driftwalk.record.raw import Array, ReadOptions, TableLayout
 from driftwalk.record.vocabulary import BOXES, LENGTHS, NO_UNIT, UNITS, words
@@ -32,13 +33,13 @@ class BoxPolicy(NamedTuple):
     """When four numbers are the corners of a box; chosen by hand."""
 
     spread: float = 0.5
-    """Range of the sides of a box at most, as a share of the way that it goes."""
+    """Largest range of the sides of a box, as a share of the range of its centre."""
     skew: float = 0.15
-    """Departure of four corners from a parallelogram at most, in diagonals."""
+    """Largest departure of four corners from a parallelogram, in diagonals."""
     square: float = 1.25
-    """Ratio of the sides up to which a box is a square, whose angle repeats after a quarter."""
+    """Ratio of the sides up to which a box is a square: it looks the same after a quarter turn."""
     full: float = 1.05
-    """Range of an angle, in periods of the axis, beyond which it is that of a direction."""
+    """Range of an angle, in its periods, beyond which it is the angle of a direction."""
 
 
 BOX: Final = BoxPolicy()
@@ -57,7 +58,7 @@ class Box:
     why: str = "a side of a box"
     notes: tuple[str, ...] = ()
     symmetric: bool = True
-    """Whether its angle is that of an axis."""
+    """Whether it looks the same after a half or quarter turn, so that its angle may leap by one."""
 
 
 def find_box(
@@ -71,8 +72,8 @@ def find_box(
     Raises
     ------
     InputError
-        When a box that is stated has not its columns, and when the first rows leave open whether
-        columns are a box, and which point of it is meant.
+        When a stated box lacks columns, when the first rows leave open whether columns are a box,
+        or when nothing says whether x and y are its corner or its centre.
     """
     if options.box is not None and options.box not in FORMS:
         raise InputError(f"`box` is one of {', '.join(FORMS)}; got '{options.box}'")
@@ -96,14 +97,14 @@ def find_box(
         return _stated("xywh", found, units)
     if not {"x", "y"} <= set(found):
         return None
-    words = {word.lower() for side in "xy" for word in words_of(source.names[found[side]])}
-    if words & _CENTRE:
+    said = {word.lower() for side in "xy" for word in words_of(source.names[found[side]])}
+    if said & _CENTRE:
         return _stated("cxcywh", found, units)
     names = [source.names[found[side]] for side in ("x", "y", "w", "h")]
     raise InputError(
-        f"the columns {listed([repr(name) for name in names])} are a box, and nothing says which "
-        'point of it x and y are: add `box="xywh"` if they are its corner of the least x and y, '
-        '`box="cxcywh"` if its centre'
+        f"the columns {listed([repr(name) for name in names])} are a box, and nothing says "
+        'whether x and y are its corner or its centre: add `box="xywh"` if they are the corner '
+        'with the smallest x and y, `box="cxcywh"` if the centre'
     )
 
 
@@ -122,28 +123,24 @@ def _sides(
             found[meaning.quantity], units[meaning.quantity], plain = at, meaning.unit, False
             continue
         text = re.sub(r"[\[(].*", "", name).strip("#% \"'")
-        words = [word.lower() for word in words_of(text)]
-        unit = UNITS.get(words[-1], "") if len(words) > 1 else ""
+        parts = [word.lower() for word in words_of(text)]
+        last = parts[-1] if len(parts) > 1 else ""
+        unit = UNITS.get(last, "")
         inside = re.search(r"[\[(]([^\])]*)", name)
         below = source.units[at] if source.units else ""
         stated = inside[1] if inside else below.strip("[]() ")
-        if unit in LENGTHS or (len(words) > 1 and words[-1] in NO_UNIT):
-            words.pop()
+        if unit in LENGTHS or last in NO_UNIT:
+            parts.pop()
         elif stated:
             unit = UNITS.get(stated.lower(), "")
-        word = "".join(words)
+        word = "".join(parts)
         side = _FROM_ZERO.get(word, "") if from_zero else BOXES.get(word, "")
-        if side in ("x", "y") or (
-            meaning is not None and meaning.quantity in ("x", "y") and not side
-        ):
-            side = (
-                meaning.quantity if meaning is not None and meaning.quantity in ("x", "y") else ""
-            )
-            if meaning is not None and (meaning.body and meaning.rank >= 0):
-                side = ""
+        if side in ("", "x", "y"):  # then the meaning decides, of a body without a name
+            centre = meaning is not None and meaning.quantity in ("x", "y") and not meaning.body
+            side = meaning.quantity if meaning is not None and centre else ""
         if side and side not in found:
             found[side], units[side] = at, unit if unit in LENGTHS else ""
-            plain = plain and (side not in _CORNERS or from_zero or words == [side])
+            plain = plain and (side not in _CORNERS or from_zero or parts == [side])
     for at, meaning in meanings.items():
         if meaning.rank < 0 and meaning.quantity in ("x", "y"):
             found[meaning.quantity], units[meaning.quantity] = at, meaning.unit
@@ -202,8 +199,8 @@ def _corners(
         return None
     ways = max(np.ptp(x1 + x2), np.ptp(y1 + y2)) / 2.0
     compact = max(np.ptp(x2 - x1), np.ptp(y2 - y1)) <= BOX.spread * ways
-    words = {"".join(words_of(name)).lower() for name in source.names}
-    of_detector = bool(words & _CLASSES) or any(
+    joined = {"".join(words_of(name)).lower() for name in source.names}
+    of_detector = bool(joined & _CLASSES) or any(
         one.quantity == "confidence" for one in meanings.values()
     )
     if not compact and not of_detector:
@@ -281,9 +278,9 @@ def box_angle(
     codes: Codes | None,
     turn: float,
 ) -> Array | None:
-    """Return the orientation of a box: its axis, followed over its symmetry, body by body.
+    """Return the orientation of a box, unwrapped body by body.
 
-    A square looks the same after a quarter of a turn, any other box after a half.
+    A square looks the same after a quarter turn, any other box after a half turn.
 
     Parameters
     ----------
@@ -320,9 +317,9 @@ def box_angle(
     if not box.symmetric:
         return theta
     followed = theta.copy()
-    for code in [None] if codes is None else range(int(codes.max()) + 1):
-        known = np.isfinite(theta) & np.isfinite(w) & np.isfinite(h)
-        rows = np.flatnonzero(known if codes is None else known & (codes == code))
+    known = np.isfinite(theta) & np.isfinite(w) & np.isfinite(h)
+    for of_body in [np.arange(theta.size)] if codes is None else rows_of_bodies(codes):
+        rows = of_body[known[of_body]]
         if rows.size:
             followed[rows] = _followed(theta[rows], w[rows], h[rows], turn)
     return followed

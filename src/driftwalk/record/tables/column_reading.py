@@ -21,7 +21,7 @@ class ColumnReading:
     body: str = ""
     unit: str = ""
     """Of `UNITS`; ``""`` where nothing names it."""
-    why: str = "its name says nothing that is known"
+    why: str = "its name is not known"
 
     def described(self) -> dict[str, str]:
         """Return the reading for people."""

@@ -16,7 +16,7 @@ from driftwalk.record.tables.column_reading import ColumnReading, TableReading
 from driftwalk.record.tables.named_columns import NamedColumns, may_be_unit, shown
 from driftwalk.record.tables.source import TableSource
 from driftwalk.record.tables.stamps import OF_DAY
-from driftwalk.record.vocabulary import FRONT, MIDDLE, REAR
+from driftwalk.record.vocabulary import ALLOWED, FRONT, LENGTHS, MIDDLE, REAR
 
 _ON_GLOBE: Final = ("lon", "lat")
 
@@ -33,7 +33,7 @@ def read_columns(
     options : ReadOptions
         What is known about the table.
     lenient : bool
-        Whether a unit that is not known is no error, as in the search for the names.
+        Whether to accept unknown units, as in the search for the names.
 
     Raises
     ------
@@ -51,7 +51,7 @@ class _Reader(NamedColumns):
         self.choose()
         box = find_box(self.source, self.options, self.meanings, self.chosen)
         if box is not None:
-            self.drop((at for at in box.replaced), box.why)
+            self.drop(box.replaced, box.why)
             self.result.box = box if box.sides else None
             self.result.notes += box.notes
         self.leave_out_other_pairs()
@@ -106,24 +106,30 @@ class _Reader(NamedColumns):
     def _leave_out_the_third_axis(self) -> None:
         """Leave out heights that nobody asks for, and parts of quaternions that are not whole."""
         meanings = self.meanings
-        turned = {body for body in {one.body for one in meanings.values()} if self._is_turned(body)}
+        turned = self._turned()
         parts = [at for at, one in meanings.items() if one.quantity in QUATERNION]
         loose = [at for at in parts if meanings[at].body not in turned]
-        self.drop(loose, "no whole quaternion, or an angle next to it")
+        self.drop(loose, "part of an incomplete quaternion, or of one next to an angle")
         if self.options.up is None:
             height = [at for at, one in meanings.items() if one.quantity == "z"]
             self.drop(height, "height: the plane of the water is x, y without `up`")
 
-    def _is_turned(self, body: str) -> bool:
-        """Whether a body has a quaternion and no angle; half of a chosen quaternion is refused."""
-        own = [one.quantity for one in self.meanings.values() if one.body == body]
-        whole = all(own.count(part) == 1 for part in QUATERNION)
-        if not whole and any(part in self.chosen for part in QUATERNION):
+    def _turned(self) -> set[str]:
+        """Return bodies with a quaternion and no angle; half of a chosen quaternion is refused."""
+        quantities: dict[str, list[str]] = {}
+        for one in self.meanings.values():
+            quantities.setdefault(one.body, []).append(one.quantity)
+        whole = {
+            body
+            for body, own in quantities.items()
+            if all(own.count(part) == 1 for part in QUATERNION)
+        }
+        if any(part in self.chosen for part in QUATERNION) and len(whole) < len(quantities):
             raise InputError(
                 'an orientation in space has four parts: name each with `columns={"qx": "NAME"}`, '
                 "qy, qz and qw"
             )
-        return whole and "theta" not in own
+        return {body for body in whole if "theta" not in quantities[body]}
 
     def _add_loose_angle(
         self, only: dict[str, int], places: dict[str, dict[str, int]], bodies: set[str]
@@ -137,7 +143,9 @@ class _Reader(NamedColumns):
         if len(loose) > 1:
             names = listed([repr(self.names[at]) for at in loose])
             choice = argument_text("columns", {"theta": self.names[loose[0]]})
-            self.result.notes.append(f"no orientation is read of {names}: name one, as in {choice}")
+            self.result.notes.append(
+                f"no orientation is read from {names}: name one, as in {choice}"
+            )
             return
         meaning = self.meanings[loose[0]]
         stem = meaning.ending.rstrip("0123456789")
@@ -200,11 +208,11 @@ class _Reader(NamedColumns):
         if rivals and not alike:
             raise InputError(self.both(at, rivals[0], quantity))
         name = self.result.columns[at].name
-        self.drop((other for _, other in found[1:]), f"'{name}' is the {quantity} that counts")
+        self.drop((other for _, other in found[1:]), f"'{name}' is read as {quantity} instead")
         return at
 
     def _run_together(self, first: int, second: int) -> bool:
-        """Whether two clocks differ by the same in the first rows."""
+        """Whether two clocks differ by a constant in the first rows, to 1e-3 and rounding."""
         texts = [(row[first], row[second]) for row in self.source.sample() if len(row) > second]
         try:
             values = np.array(
@@ -212,7 +220,7 @@ class _Reader(NamedColumns):
             )
         except ValueError:
             return False
-        return values.size > 0 and float(np.ptp(values[:, 1] - values[:, 0])) <= 1e-9 + 1e-3
+        return values.size > 0 and float(np.ptp(values[:, 1] - values[:, 0])) <= 1e-3 + 1e-9
 
     def _find_clock(self) -> None:
         """Find the clock: frames, numbers, seconds and their fraction, or time stamps."""
@@ -225,7 +233,7 @@ class _Reader(NamedColumns):
         if frame is not None and (time is None or self.options.frame_rate_hz is not None):
             result.numbers = (frame,)
             if time is not None:
-                self.drop([time], "frames are counted, because their rate is given")
+                self.drop([time], "the frames are the clock, because their rate is given")
             return
         if frame is not None:
             self.drop([frame], "the table has times")
@@ -248,7 +256,7 @@ class _Reader(NamedColumns):
         elif (
             form is not None and form.kind == OF_DAY and date is not None and date_form is not None
         ):
-            # A date that has its own time of day says all.
+            # A date with its own time of day needs no second column.
             result.stamps = (date,) if date_form.kind and date_form.has_time else (date, time)
         else:
             result.stamps = (time,)
@@ -265,9 +273,9 @@ class _Reader(NamedColumns):
     def _is_fraction(self, time: int, part: int) -> bool:
         """Whether a column holds less than a second, next to whole seconds."""
         whole = all(one.lstrip("-").isdecimal() for one in self._sampled(time))
-        ticks = {"ns": 9, "us": 6, "ms": 3}.get(self.meanings[part].unit, 0)
+        digits = {"ns": 9, "us": 6, "ms": 3}.get(self.meanings[part].unit, 0)
         parts = self._sampled(part)
-        return whole and all(one.isdecimal() and int(one) < 10**ticks for one in parts)
+        return whole and all(one.isdecimal() and int(one) < 10**digits for one in parts)
 
     def _is_of_ros(self, time: int) -> bool:
         """Whether the stamp of a header counts whole nanoseconds since 1970."""
@@ -302,9 +310,9 @@ class _Reader(NamedColumns):
             if at not in used and at not in clock and at != result.body_column:
                 column.unit = self.unit_of(at)
                 if meaning is not None and meaning.quantity == "confidence":
-                    column.why = "confidence, of use with `min_confidence`"
+                    column.why = "confidence: read only with `min_confidence`"
                 elif meaning is not None:
-                    column.why = "no pair of x and y, or no body, goes with it"
+                    column.why = "it belongs to no pair of x and y, or to no body"
                 continue
             column.role = sides.get(at, meaning.quantity if meaning else "")
             column.body = used.get(at, "")
@@ -323,11 +331,8 @@ class _Reader(NamedColumns):
             return "; unit from the row below the names"
         if column.unit and unit_of_name(self.names[at]) == column.unit:
             return "; unit from its name"
-        options, length = (
-            self.options,
-            column.role in ("x", "y", "z", "x1", "y1", "x2", "y2", "w", "h"),
-        )
-        if not column.unit and length:
+        options = self.options
+        if not column.unit and ALLOWED.get(column.role) == LENGTHS:
             if options.length_unit or options.metres_per_pixel is not None:
                 column.unit = options.length_unit or "px"
                 return "; unit as you stated it"
@@ -344,5 +349,7 @@ def _agreed(units: list[str], what: str) -> str:
     distinct = sorted(set(units))
     if len(distinct) > 1:
         shown = ", ".join(unit or "none" for unit in distinct)
-        raise InputError(f"the columns of {what} name different units ({shown}): name them alike")
+        raise InputError(
+            f"the columns of {what} name different units ({shown}): give them one unit"
+        )
     return distinct[0] if distinct else ""

@@ -20,7 +20,7 @@ _NO_TEXT: Final = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")
 
 
 def other_encoding(start: bytes) -> str | None:
-    """Return the encoding of a text that is not UTF-8, None of UTF-8 and of what is no text.
+    """Return the encoding of a text that is not UTF-8, None for UTF-8 and for what is not text.
 
     Parameters
     ----------

@@ -148,6 +148,5 @@ def _holds_positions(
     if any(_is_numeric(names[at]) for at in columns):
         return False  # a row of data
     cells = [below[at] if at < len(below) else "" for at in columns]
-    known = [cell for cell in cells if cell not in MISSING]
-    numeric = all(is_number(cell) or is_number(cell, decimal=",") for cell in known)
+    numeric = all(cell in MISSING or _is_numeric(cell) for cell in cells)
     return numeric and any(below)  # a body that is not seen yet has a row without a position

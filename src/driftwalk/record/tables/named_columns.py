@@ -1,9 +1,9 @@
-"""Columns by their names: which the user named, which are no body, which have no known unit."""
+"""Columns by their names: which the user named, which are not a body, which have no known unit."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Final
+from typing import Final, NamedTuple
 
 from driftwalk.core.errors import InputError, argument_text
 from driftwalk.core.text.did_you_mean import listed
@@ -24,8 +24,8 @@ from driftwalk.record.vocabulary import (
 
 _SKIP: Final = "skip"
 LEFT_OUT: Final = "you left it out"
-_OTHER_BODY: Final = "what it was to do, or what moved it: no body where another is"
-_SAME_BODY: Final = "the same body, before or after a computation"
+_OTHER_BODY: Final = "a setpoint, or something that moves the body, rather than a body"
+_SAME_BODY: Final = "the same body, before or after processing"
 
 
 class NamedColumns:
@@ -116,20 +116,19 @@ class NamedColumns:
         return {one.body: at for at, one in self.meanings.items() if one.quantity == quantity}
 
     def leave_out_other_pairs(self) -> None:
-        """Leave out pairs that are no body, or a body once more, where another pair is."""
-        bodies = [body for body in self.bodies_with("x") if body in self.bodies_with("y")]
-        kinds = {one.body: _kinds(one.body) for one in self.meanings.values() if one.body}
-        real = [body for body in bodies if body not in kinds or not any(kinds[body])]
-        setpoints = [body for body in bodies if body in kinds and kinds[body][0]]
-        variants = [
-            body for body in bodies if body in kinds and kinds[body][1] and not kinds[body][0]
-        ]
-        left = dict.fromkeys(setpoints, _OTHER_BODY) if real or variants else {}
-        if self.result.box is not None:
+        """Leave out pairs that are not a body, or repeat one, where there is another pair."""
+        ys, thetas = self.bodies_with("y"), self.bodies_with("theta")
+        bodies = [body for body in self.bodies_with("x") if body in ys]
+        kinds = {one.body: _kinds(one.body) for one in self.meanings.values()}
+        real = [body for body in bodies if not any(kinds[body])]
+        setpoints = [body for body in bodies if kinds[body].setpoint]
+        variants = [body for body in bodies if kinds[body] == (False, True)]
+        left: dict[str, str] = {}
+        if real or variants or self.result.box is not None:
             left = dict.fromkeys(setpoints, _OTHER_BODY)
-        if len(setpoints) > 1 and not left and not self.lenient:
-            raise InputError(self._one_of([f"x_{body}" for body in setpoints], setpoints))
-        if len(setpoints) == 1 and not left and not self.lenient:
+        elif setpoints and not self.lenient:
+            if len(setpoints) > 1:
+                raise InputError(self._one_of(setpoints))
             self.result.notes.append(
                 f"'{setpoints[0]}' is read as a body, though its name is that of a setpoint: "
                 "there is no other pair of x and y"
@@ -137,22 +136,23 @@ class NamedColumns:
         left |= self._computed(variants, real)
         for body, kind in kinds.items():
             # An angle of a setpoint stands alone where its position has other names.
-            if kind[0] and body not in bodies:
+            if kind.setpoint and body not in bodies:
                 left[body] = _OTHER_BODY
-            if kind[1] and body not in bodies and _base(body) in self.bodies_with("theta"):
+            if kind.variant and body not in bodies and _base(body) in thetas:
                 left[body] = _SAME_BODY
-        for body, why in left.items():
-            self.drop([at for at, one in self.meanings.items() if one.body == body], why)
+        for at, meaning in list(self.meanings.items()):
+            if meaning.body in left:
+                self.drop([at], left[meaning.body])
         self._doubt(set(bodies) - set(left))
         named = [body for body in left if body in bodies]
         if named:
             self.result.notes.append(
-                f"pairs of x and y that are read as no body: {listed(named)} (name one by "
-                f"{argument_text('columns', {'x': 'NAME', 'y': 'NAME'})} if it is the one)"
+                f"pairs of x and y that are not read as bodies: {listed(named)} (if one is the "
+                f"body, name it with {argument_text('columns', {'x': 'NAME', 'y': 'NAME'})})"
             )
 
     def _doubt(self, bodies: set[str]) -> None:
-        """Say that pairs next to plain x and y are read as bodies: their names may mean else."""
+        """Say that pairs next to plain x and y are read as bodies: they may be something else."""
         others = sorted(
             body for body in bodies if body and body.lower() not in MIDDLE | FRONT | REAR
         )
@@ -161,12 +161,12 @@ class NamedColumns:
         columns = {quantity: self.bodies_with(quantity)[others[0]] for quantity in "xy"}
         names = [self.names[at] for at in columns.values()]
         self.result.notes.append(
-            f"{listed([repr(name) for name in names])} are read as one body more, next to x and "
-            f"y: if they are none, add {argument_text('columns', {'skip': '+'.join(names)})}"
+            f"{listed([repr(name) for name in names])} are read as another body, next to x and "
+            f"y: if they are not one, add {argument_text('columns', {'skip': '+'.join(names)})}"
         )
 
     def _computed(self, variants: list[str], real: list[str]) -> dict[str, str]:
-        """Return the pairs that are a body once more; of several, one has to be named."""
+        """Return the pairs that repeat a body; of several, one has to be named."""
         left: dict[str, str] = {}
         of_base: dict[str, list[str]] = {}
         for body in variants:
@@ -175,20 +175,21 @@ class NamedColumns:
             if base in real or (not base and self.result.box is not None):
                 left |= dict.fromkeys(several, _SAME_BODY)
             elif len(several) > 1 and not self.lenient:
-                raise InputError(self._one_of([], several))
+                raise InputError(self._one_of(several))
         return left
 
-    def _one_of(self, _names: list[str], bodies: list[str]) -> str:
+    def _one_of(self, bodies: list[str]) -> str:
+        """Return what to do about several bodies that may be one."""
         columns = self.bodies_with("x")
         found = [self.names[columns[body]] for body in bodies]
         other = {"x": found[0], "y": self.names[self.bodies_with("y")[bodies[0]]]}
         return (
-            f"{listed([repr(name) for name in found])} hold one body more than once, or none: name "
-            f"the one to read, as in {argument_text('columns', other)}"
+            f"{listed([repr(name) for name in found])} may be one body several times, or none: "
+            f"name the one to read, as in {argument_text('columns', other)}"
         )
 
     def refuse_unknown_units(self) -> None:
-        """Refuse positions, angles and times whose unit is none that is known."""
+        """Refuse positions, angles and times whose unit is not known."""
         options = self.options
         stated = options.length_unit is not None or options.metres_per_pixel is not None
         unknown = {at: one for at, one in self.meanings.items() if one.unknown}
@@ -206,7 +207,7 @@ class NamedColumns:
                 or meaning.quantity == "z"
                 or (meaning.quantity == "t" and self.bodies_with("frame"))
             ):
-                self.drop([at], f"'{meaning.unknown}' is no unit that is known")
+                self.drop([at], f"'{meaning.unknown}' is not a known unit")
                 continue
             raise InputError(self.no_unit(at, meaning.unknown))
         if stated or self.lenient:
@@ -226,12 +227,12 @@ class NamedColumns:
             )
 
     def no_unit(self, at: int, word: str) -> str:
-        """Return what to do about a column with a unit that is none."""
+        """Return what to do about a column whose unit is not known."""
         quantity = self.meanings[at].quantity
         allowed = ", ".join(sorted(ALLOWED[quantity]))
         choice = argument_text("columns", {quantity: f"{self.names[at]}:UNIT"})
         return (
-            f"'{word}' in column '{self.names[at]}' is no unit that is known: say which of "
+            f"'{word}' in column '{self.names[at]}' is not a known unit: say which of "
             f"{allowed} it is, as in {choice}"
         )
 
@@ -243,9 +244,16 @@ class NamedColumns:
         )
 
 
-def _kinds(body: str) -> tuple[bool, bool]:
+class _Kinds(NamedTuple):
+    """Whether the name of a body has words of a setpoint, and of a computation."""
+
+    setpoint: bool
+    variant: bool
+
+
+def _kinds(body: str) -> _Kinds:
     words = {word.lower().rstrip("0123456789") for word in body.split("_")}
-    return bool(words & SETPOINTS), bool(words & VARIANTS)
+    return _Kinds(bool(words & SETPOINTS), bool(words & VARIANTS))
 
 
 def _base(body: str) -> str:

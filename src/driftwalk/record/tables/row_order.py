@@ -46,7 +46,7 @@ _ORDER: Final = UnevenClockPolicy()
 
 
 def other_order(source: TableSource, reading: TableReading, names: list[str]) -> str | None:
-    """Return why rows of a table without a known clock are no frames of one body, None if they may.
+    """Return why rows of a table without a known clock cannot be frames of one body, or None.
 
     Parameters
     ----------

@@ -41,7 +41,7 @@ NO_CLOCK_OF_EACH = (
     "first on"
 )
 _FULL_TURN: Final = 6.3
-"""A turn in radians, and what rounding adds."""
+"""A full turn in radians, with room for rounding."""
 _FLAGS: Final = {
     **dict.fromkeys(words("true t yes y ja oui si sí vrai wahr ok"), 1.0),
     **dict.fromkeys(words("false f no n nein non faux falsch lost missing invalid bad"), 0.0),
@@ -195,7 +195,9 @@ def _read(source: TableSource, reading: TableReading, labels: list[str]) -> Tabl
     for at in flags:
         unknown = {label.lower() for label in table.labels[at]} - MISSING - set(_FLAGS)
         if unknown:
-            raise source.error(f"'{min(unknown)}' in column '{labels[at]}' is no yes and no no")
+            raise source.error(
+                f"'{min(unknown)}' in column '{labels[at]}' is neither a yes nor a no"
+            )
         marks = [_FLAGS.get(label.lower(), np.nan) for label in table.labels[at]]
         table.numbers[at] = np.array(marks)[table.codes[at]]
     return table
@@ -250,7 +252,7 @@ def _unread_angles(reading: TableReading) -> list[str]:
 
 
 def _doubted_confidences(table: Table, reading: TableReading, options: ReadOptions) -> list[str]:
-    """Say that confidences are no shares of 1, where the least one that is asked for is."""
+    """Say so where `min_confidence` is a share of 1 and the confidences are not."""
     least = options.min_confidence
     columns = sorted({one["confidence"] for one in reading.bodies.values() if "confidence" in one})
     for at in columns:
@@ -258,8 +260,8 @@ def _doubted_confidences(table: Table, reading: TableReading, options: ReadOptio
         if least is not None and least <= 1.0 and known.size and np.median(known) > 2.0:
             return [
                 f"the confidences in column '{reading.columns[at].name}' go up to "
-                f"{known.max():.6g}, and {least:g} is compared with these numbers: state the "
-                "least one in their unit"
+                f"{known.max():.6g}, and {least:g} is compared with these numbers: give "
+                "`min_confidence` on their scale"
             ]
     return []
 
@@ -331,7 +333,7 @@ def _body(
     followed = box_angle(reading.box, values, theta, codes, turn)
     notes = []
     if theta is not None and followed is not theta:
-        notes = ["the angle of the box is that of an axis: it is followed over its symmetry"]
+        notes = ["the box looks the same after a half or quarter turn: its angle is unwrapped"]
     return RawBody("0", clock, x, y, followed), notes
 
 
@@ -349,7 +351,7 @@ def _require_units_of_box(
         )
     if theta is not None and not reading.angle_unit and (np.abs(theta) > _FULL_TURN).any():
         raise FormatError(
-            "the angles of the boxes name no unit, and in radians they would be beyond a turn: "
+            "the angles of the boxes name no unit, and as radians they exceed a full turn: "
             'name it, as in `columns={"theta": "NAME:deg"}`'
         )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import cached_property
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -78,14 +79,18 @@ class SheetSource:
         """Whether the sheet has no header."""
         return not self.names
 
+    @cached_property
+    def _first(self) -> list[Row]:
+        return [row for _, row in islice(self._data(), TABLE.sample_rows)]
+
     def sample(self) -> list[list[str]]:
         """Return the first rows as texts."""
-        return [_texts(row) for _, row in islice(self._data(), TABLE.sample_rows)]
+        return [_texts(row) for row in self._first]
 
     def stamps(self, column: int) -> StampForm | None:
         """Return how the first time stamp of a column is written, None where it has none."""
-        rows = [row for _, row in islice(self._data(), TABLE.sample_rows)]
-        return form_of(_values([row[column] if column < len(row) else None for row in rows]))
+        cells = [row[column] if column < len(row) else None for row in self._first]
+        return form_of(_values(cells))
 
     def read(self, wanted: TableLayout, *, head: bool = False) -> Table:
         """Read columns, row by row."""

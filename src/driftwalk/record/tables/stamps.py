@@ -217,7 +217,7 @@ def _nanoseconds(texts: Texts, match: re.Match[str], rows: Integers) -> Ticks:
         days, no_day = _days(part("year"), part("month"), part("day"))
         offset = 60 * (part("zone_minute") + 60 * part("zone_hour"))
         wrong |= no_day | (hour > 23) | (part("zone_minute") > 59) | (part("zone_hour") > 23)
-        # Nothing of it is beyond 64 bits where the day is one of the calendar.
+        # This fits in 64 bits, because the years of a valid day do.
         ticks += DAY_NS * np.where(no_day, 0, days)
         zone = match.groupdict().get("zone") or ""
         ticks -= SECOND_NS * offset * (-1 if zone.startswith("-") else 1)
@@ -271,7 +271,7 @@ def clock_of_stamps(columns: list[Ticks], origin: int | None) -> tuple[Floats, i
     Raises
     ------
     StampError
-        At a date that is none.
+        When a date has its own time of day and times have a column of their own.
 
     Examples
     --------

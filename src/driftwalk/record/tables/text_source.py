@@ -56,9 +56,9 @@ class TextSource:
                 if at or found.rows > 1:
                     self.names, self.units, self._delimiter = found.names, found.units, delimiter
                     self._skip = begin + [at, *below_at][found.rows - 1] + 1
-                below = self._fields(header_rows(self._path, self._skip + 1)[self._skip :])
-                if self.names[-1:] == ["Comment"] and len(below[0]) == len(self.names) - 1:
-                    self.names = self.names[:-1]  # LabVIEW names it and leaves it out
+                # LabVIEW names a last column "Comment" and leaves it out.
+                if self.names[-1:] == ["Comment"] and len(self._rows[0]) == len(self.names) - 1:
+                    self.names = self.names[:-1]
                 return
         if is_data(self.names, below, options):
             self.names, self._skip = [""] * len(self.names), begin

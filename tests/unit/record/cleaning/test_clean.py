@@ -64,7 +64,7 @@ def test_times_too_close_are_found_part_by_part(monkeypatch: pytest.MonkeyPatch)
         sizes.append(values.size)
         return difference(values)
 
-    monkeypatch.setattr(clean, "_PART", 4)
+    monkeypatch.setattr(clean, "PART", 4)
     monkeypatch.setattr(clean.np, "diff", counted)
     time = np.arange(11.0)
     clean._refuse_closest(body(time, time))

@@ -49,7 +49,7 @@ def test_a_unit_inside_a_name_counts(tmp_path: Path, form: str) -> None:
 @pytest.mark.parametrize("unit", ["10um", "5mm"])
 def test_a_unit_with_a_factor_is_refused(tmp_path: Path, unit: str) -> None:
     path = columns(tmp_path, {"t": T, f"x_{unit}": X, f"y_{unit}": Y})
-    with pytest.raises(InputError, match=rf"'{unit}' in column 'x_{unit}' is no unit"):
+    with pytest.raises(InputError, match=rf"'{unit}' in column 'x_{unit}' is not a known unit"):
         load(path)
 
 
@@ -67,7 +67,7 @@ def test_longitudes_next_to_positions_stay_out(tmp_path: Path) -> None:
 
 def test_a_further_pair_of_an_unknown_name_is_doubted(tmp_path: Path) -> None:
     path = columns(tmp_path, {"t": T, "x": X, "y": Y, "x_home": Y, "y_home": X})
-    assert "'x_home', 'y_home' are read as one body more" in warnings_of(load(path))
+    assert "'x_home', 'y_home' are read as another body" in warnings_of(load(path))
     check(load(path, columns={"skip": "x_home+y_home"}))
 
 
@@ -222,8 +222,10 @@ def test_a_clock_that_counts_frames_can_be_named(tmp_path: Path) -> None:
     check(load(path, frame_rate=25.0, length_unit="m", columns={"frame": "t"}))
 
 
-def test_a_name_without_a_column_at_the_end(tmp_path: Path) -> None:
+@pytest.mark.parametrize("between", ["", "\n"])
+def test_a_name_without_a_column_at_the_end(tmp_path: Path, between: str) -> None:
     path = tmp_path / "lab.lvm"
     rows = "".join(f"{t}\t{x}\t{y}\n" for t, x, y in zip(T, X, Y, strict=True))
-    path.write_text(f"LabVIEW Measurement\t\nOperator\tme\n\nTime\tx\ty\tComment\n{rows}")
+    above = "LabVIEW Measurement\t\nOperator\tme\n\n"
+    path.write_text(f"{above}Time\tx\ty\tComment\n{between}{rows}")
     check(load(path))

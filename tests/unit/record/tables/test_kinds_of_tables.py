@@ -103,7 +103,7 @@ def test_units_of_length(tmp_path: Path, unit: str, form: str) -> None:
 @pytest.mark.parametrize("unit", ["bl", "norm", "grid", "furlong", "cells", "foo", "mi", "%"])
 def test_what_is_no_unit_is_refused_by_its_name(tmp_path: Path, unit: str) -> None:
     path = table(tmp_path, f"t,x_{unit},y_{unit}", lambda k: f"{T[k]},{X[k]},{Y[k]}")
-    with pytest.raises(InputError, match=rf"'{unit}' in column '[xy]_{unit}' is no unit"):
+    with pytest.raises(InputError, match=rf"'{unit}' in column '[xy]_{unit}' is not a known unit"):
         load(path)
     columns = {"x": f"x_{unit}:cm", "y": f"y_{unit}:cm"}
     check(load(path, columns=columns), x=X / 100)
@@ -133,7 +133,7 @@ def test_units_of_angle(tmp_path: Path, name: str, factor: float) -> None:
 @pytest.mark.parametrize("name", ["theta_foo", "yaw_norm", "winkel (grad)", "heading_camera"])
 def test_an_angle_of_no_known_unit_is_refused(tmp_path: Path, name: str) -> None:
     path = table(tmp_path, f"t,x,y,{name}", lambda k: f"{T[k]},{X[k]},{Y[k]},{ANGLE[k]}")
-    with pytest.raises(InputError, match="is no unit that is known"):
+    with pytest.raises(InputError, match="is not a known unit"):
         load(path)
     check(load(path, columns={"theta": f"{name}:rad"}))
     assert not body_track(load(path, columns={"skip": name})).has_orientation
@@ -267,7 +267,7 @@ def test_counters_that_run_over(tmp_path: Path, name: str, sort: str) -> None:
     path = table(tmp_path, f"{name},x_m,y_m", lambda k: f"{clock(k)},{X[k]},{Y[k]}")
     dataset = load(path, sort=sort, **options)
     check(dataset)
-    assert "runs over" in warnings_of(dataset)
+    assert "rolls over" in warnings_of(dataset)
 
 
 @pytest.mark.parametrize("sort", ["error", "sort"])
@@ -329,7 +329,7 @@ def test_pairs_that_are_no_body(tmp_path: Path, pair: str) -> None:
 @pytest.mark.parametrize("pairs", ["x_raw,y_raw,x_filt,y_filt", "x_true,y_true,x_est,y_est"])
 def test_of_one_body_twice_the_one_is_to_be_named(tmp_path: Path, pairs: str) -> None:
     path = table(tmp_path, f"t,{pairs}", lambda k: f"{T[k]},{X[k]},{Y[k]},{X[k] + 1},{Y[k]}")
-    with pytest.raises(InputError, match=r'hold one body more than once.*columns={"x": "x_'):
+    with pytest.raises(InputError, match=r'may be one body several times.*columns={"x": "x_'):
         load(path)
     x, y = pairs.split(",")[:2]
     check(load(path, columns={"x": f"{x}:m", "y": f"{y}:m"}))
