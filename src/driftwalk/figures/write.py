@@ -1,4 +1,4 @@
-"""Writing a table of figures into a folder, each in several formats."""
+"""A table of figures written into a folder, each in several formats or as its numbers."""
 
 from __future__ import annotations
 
