@@ -29,7 +29,7 @@ from driftwalk.conditions import Conditions
 from driftwalk.core.arrays import Floats
 from driftwalk.core.processors import map_in_threads
 from driftwalk.core.random_streams import trial_in
-from driftwalk.core.run_stages import tell_nobody
+from driftwalk.core.run_stages import Progress, tell_nobody
 from driftwalk.core.seeds import world_keys
 from driftwalk.motion import MotionModel, Worlds
 from driftwalk.motion.score import broken_worlds
@@ -129,7 +129,6 @@ def _from_edges(edges: Floats, x: Floats, y: Floats) -> Floats:
 
 Objective = Callable[[Floats, int, int], Floats]
 """Settings in the unit cube (n, parameters), number of the first evaluation, replicates: (n,)."""
-Tell = Callable[[int, int], None]
 
 RESOLUTION: Final = 2.0**-20
 """Settings are multiples of this part of a range: the last bits of linear algebra, which differ
@@ -238,7 +237,7 @@ def search_minimum(
     *,
     budget: Budget | None = None,
     seed: int = 0,
-    tell: Tell | None = None,
+    tell: Progress | None = None,
 ) -> SearchResult:
     """Search the unit cube for the smallest mean score.
 
@@ -272,7 +271,7 @@ class _Search:
     parameters: int
     budget: Budget
     seed: int
-    tell: Tell
+    tell: Progress
     done: int = 0
     """Settings evaluated so far: they are the addresses of the next random numbers."""
 

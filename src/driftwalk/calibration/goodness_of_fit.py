@@ -10,12 +10,13 @@ from typing import NamedTuple
 import numpy as np
 
 from driftwalk.calibration.grid.bootstrap_region import Bootstrap, simulated_steps
-from driftwalk.calibration.grid.grid_map import Map, MapSimulator, Progress
+from driftwalk.calibration.grid.grid_map import Map, MapSimulator
 from driftwalk.calibration.grid.grid_refinement import first_window, locate_minimum
 from driftwalk.calibration.problem import FlowSource, Problem, limits_of, prepare_problem
 from driftwalk.comparison.statistic import distances_among
 from driftwalk.core.arrays import Bools
 from driftwalk.core.errors import InputError
+from driftwalk.core.run_stages import Progress
 from driftwalk.schema import Track
 from driftwalk.schema.answers.facts import FAR_ABOVE_FLOOR, is_explained
 

@@ -76,7 +76,7 @@ def demo(
         _write_page(out, FIT)
         if not json:
             print_check(fitted)
-            print_next(out / PAGE)
+            print_page(out / PAGE)
         field = load_flow(flow, arena=study.tank.to_arena(), own_flags="keep")
         inputs = {**inputs, "flow": flow}
         search = CalibrationWork(recording, study, field, None, inputs, threads)
@@ -87,7 +87,7 @@ def demo(
         print_json(in_json(fitted, calibration))
     else:
         print_calibration(calibration)
-        print_places(out, out / PAGE)
+        _print_places(out, out / PAGE)
 
 
 def demo_study(*, quick: bool) -> Study:
@@ -227,16 +227,16 @@ def print_fit(fit: xr.Dataset) -> None:
 def print_check(fitted: Fitted) -> None:
     """Print how far the flow is off, whether the model explains the recording, and what warns."""
     fit = fit_json(fitted.fit, fitted.check)
-    print_row("flow past the block", "", f"{fitted.flow_error:.1%} off")
-    print_row("KS distance, floor", "", _distance(fit, "ks_noise_floor"))
-    print_row("model explains it", "", _word(fit["explained"]))
+    _print_row("flow past the block", "", f"{fitted.flow_error:.1%} off")
+    _print_row("KS distance, floor", "", _distance(fit, "ks_noise_floor"))
+    _print_row("model explains it", "", _word(fit["explained"]))
     for finding in fit["findings"]:
         print_note(f"model check: {finding}")
     for warning in fit["warnings"]:
         print_note(f"warning: fit: {warning}")
 
 
-def print_next(page: Path) -> None:
+def print_page(page: Path) -> None:
     """Say what comes next; whoever waits may open the page of the fit meanwhile."""
     print(f"Its page: {page}")
     # How long it takes stands at the bar below, which measures it.
@@ -247,13 +247,13 @@ def print_calibration(calibration: xr.Dataset) -> None:
     """Print the minimum of the map next to the truth, and its warnings."""
     search = calibration_answer(calibration).facts
     _print_estimates("KS map in the fitted flow", calibration)
-    print_row("KS distance, floor", "", _distance(search))
-    print_row("model explains it", "", _word(bool(calibration["explained"])))
+    _print_row("KS distance, floor", "", _distance(search))
+    _print_row("model explains it", "", _word(bool(calibration["explained"])))
     for warning in search["warnings"]:
         print_note(f"warning: KS map: {warning}")
 
 
-def print_places(folder: Path, page: Path) -> None:
+def _print_places(folder: Path, page: Path) -> None:
     """Print where the figures are and, last, the page to open."""
     print(f"\nfigures: {folder}/fit/figures, {folder}/calibrate/figures")
     print(f"open in a browser: {page}")
@@ -261,7 +261,7 @@ def print_places(folder: Path, page: Path) -> None:
 
 def _print_estimates(method: str, found: xr.Dataset) -> None:
     truth = demo_truth()
-    print_row("", "truth", method)
+    _print_row("", "truth", method)
     shown = {one.number.name: one for one in estimates(found)}
     for name in ROWS:
         number, text = PARAMETERS[name], "taken from the recording"
@@ -272,10 +272,10 @@ def _print_estimates(method: str, found: xr.Dataset) -> None:
             )
             text = f"{value} ({' to '.join(ends)})" if ends else value
         label = f"{number.words} [{number.reader_unit}]" if number.reader_unit else number.words
-        print_row(label, f"{number.factor * truth[number.key]:.4g}", text)
+        _print_row(label, f"{number.factor * truth[number.key]:.4g}", text)
 
 
-def print_row(name: str, *cells: str) -> None:
+def _print_row(name: str, *cells: str) -> None:
     """Print a row of the table."""
     widths = (9, 0)
     line = "".join(f"{cell:{width}}" for cell, width in zip(cells, widths, strict=True))

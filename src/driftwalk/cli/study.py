@@ -22,13 +22,13 @@ from driftwalk.cli.options.model import (
 from driftwalk.cli.options.recording import RecordingOptions
 from driftwalk.cli.options.run import RunOptions
 from driftwalk.cli.options.shared_types import (
+    PANEL,
     BodyOfLike,
     Json,
     Replace,
     Run,
     argument,
     option,
-    quantity_option,
 )
 from driftwalk.cli.options.study import StudyOptions, option_name, with_study_options
 from driftwalk.cli.terminal.help import HelpCommand, HelpGroup
@@ -142,7 +142,12 @@ def recover(
     body: BodyOfLike = None,
     sample_rate: Annotated[
         Any,
-        quantity_option("--sample-rate", "Hz", "Samples per second, with --model (default: 10)."),
+        option(
+            "--sample-rate",
+            "Samples per second, with --model (default: 10).",
+            unit="Hz",
+            panel=PANEL,
+        ),
     ] = None,
     threads: Annotated[
         int | None,

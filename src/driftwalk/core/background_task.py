@@ -7,7 +7,8 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
-Progress = Callable[[int, int], None]
+from driftwalk.core.run_stages import Progress
+
 Result = TypeVar("Result")
 
 

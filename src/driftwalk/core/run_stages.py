@@ -6,6 +6,9 @@ from collections.abc import Callable, Iterable, Mapping
 from itertools import accumulate
 from typing import Final, NamedTuple
 
+Progress = Callable[[int, int], None]
+"""Called with how much is done, and with all of it."""
+
 
 class Stage(NamedTuple):
     """A stage of a calibration."""

@@ -1,4 +1,4 @@
-"""The figures of self-assembly."""
+"""The figures of self-assembly, and of its sensitivity analysis."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The figures of a likelihood fit: the flow with its standard error, and the path."""
+"""The figures of a likelihood fit: flow and path, the laws that it compared, and its check."""
 
 from __future__ import annotations
 

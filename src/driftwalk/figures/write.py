@@ -1,4 +1,4 @@
-"""Writing a table of figures into a folder, each in several formats."""
+"""A table of figures written into a folder, each in several formats or as its numbers."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.atomic import atomic_path
 from driftwalk.core.provenance import file_sha256
@@ -151,7 +151,7 @@ COLUMNS: Final = (
 )
 """The head of the table. x and y are in the units that the labels of the axes name."""
 
-Rows = Iterator[tuple[int, npt.NDArray[np.float64]]]
+Rows = Iterator[tuple[int, Floats]]
 """The number of a part of an artist, and its rows of x, y, dx, dy and value; NaN where it has
 none."""
 
@@ -260,7 +260,7 @@ def _outlines(artist: Any) -> Rows:
         yield 0, _points(own.vertices)
 
 
-def _of_mesh(mesh: Any) -> npt.NDArray[np.float64]:
+def _of_mesh(mesh: Any) -> Floats:
     corners = np.asarray(mesh.get_coordinates(), dtype=np.float64)
     middle = (corners[:-1, :-1] + corners[1:, :-1] + corners[:-1, 1:] + corners[1:, 1:]) / 4.0
     values = _filled(mesh.get_array())
@@ -269,7 +269,7 @@ def _of_mesh(mesh: Any) -> npt.NDArray[np.float64]:
     return _table(places[..., 0], places[..., 1], value=values)
 
 
-def _of_image(image: Any) -> npt.NDArray[np.float64]:
+def _of_image(image: Any) -> Floats:
     """Return the cells of an image, or nothing of a picture that has colours and no values."""
     values = _filled(image.get_array())
     if values.ndim != 2:
@@ -284,18 +284,16 @@ def _of_image(image: Any) -> npt.NDArray[np.float64]:
     return _table(across, up, value=values)
 
 
-def _points(places: Any, value: Any = None) -> npt.NDArray[np.float64]:
+def _points(places: Any, value: Any = None) -> Floats:
     found = _filled(places).reshape(-1, 2)
     return _table(found[:, 0], found[:, 1], value=value)
 
 
-def _filled(values: Any) -> npt.NDArray[np.float64]:
+def _filled(values: Any) -> Floats:
     return np.ma.filled(np.ma.asarray(values, dtype=np.float64), np.nan)
 
 
-def _table(
-    x: Any, y: Any, dx: Any = None, dy: Any = None, value: Any = None
-) -> npt.NDArray[np.float64]:
+def _table(x: Any, y: Any, dx: Any = None, dy: Any = None, value: Any = None) -> Floats:
     columns = [_filled(np.nan if one is None else one).ravel() for one in (x, y, dx, dy, value)]
     return np.stack(np.broadcast_arrays(*columns), axis=1)
 

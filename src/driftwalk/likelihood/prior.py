@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -19,9 +19,6 @@ from driftwalk.core.arrays import Floats
 from driftwalk.likelihood.filter.filter_pass import Passes, Sums
 from driftwalk.likelihood.filter.parameters import NUMBERS, Point
 from driftwalk.likelihood.spline import penalties
-
-if TYPE_CHECKING:
-    pass
 
 
 class PriorPolicy(NamedTuple):

@@ -195,7 +195,7 @@ def meaning_of(section: type[Section], key: str) -> str:
 def _paragraphs(section: type[Section], key: str) -> list[str]:
     """Return the paragraphs below a field in the source of its class, each in one line.
 
-    Only help and templates need them. pydantic could read them, but for every section at import.
+    Only options and templates need them. pydantic would read those of every section at import.
     """
     stated = section.model_fields[key].description
     owners = (kind for kind in section.__mro__ if key in vars(kind).get("__annotations__", {}))

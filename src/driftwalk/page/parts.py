@@ -242,7 +242,7 @@ def settings_of(*values: Sequence[Any]) -> list[tuple[Any, ...]]:
     return list(product(*values))
 
 
-def warnings_section(items: Sequence[str], *, title: str = "Warnings") -> Section:
+def warnings_section(items: Sequence[str]) -> Section:
     """Return the warnings; that there are none is said too."""
     note = None if items else "None."
-    return section("warnings", "warnings", title, note, items=list(items))
+    return section("warnings", "warnings", "Warnings", note, items=list(items))

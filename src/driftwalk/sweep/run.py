@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import ClusterError, DriftwalkError, InputError
 from driftwalk.core.files.shards import Arrays, Unit, UnitT
+from driftwalk.core.run_stages import Progress
 from driftwalk.sweep.design import WorkUnit
 from driftwalk.sweep.scheduling import HANDOUT, Handout, UnitFuture, handout, is_lost
 from driftwalk.sweep.workers import UnitFunction
@@ -103,9 +104,6 @@ def collect(store: Store, units: Iterable[Unit]) -> Arrays:
 
 def _form(arrays: Arrays) -> dict[str, str]:
     return {name: f"{a.dtype}{list(a.shape[1:])}" for name, a in sorted(arrays.items())}
-
-
-Progress = Callable[[int, int], None]
 
 
 class SweepError(RuntimeError):

@@ -16,7 +16,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -24,10 +24,6 @@ import numpy.typing as npt
 from driftwalk.core.errors import ClusterError
 from driftwalk.core.provenance import package_versions
 from driftwalk.sweep.design import WorkUnit
-
-if TYPE_CHECKING:
-    pass
-
 
 KEPT: Final = 4
 """Functions that a process keeps ready: one for each stage that may be under way."""

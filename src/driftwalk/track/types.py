@@ -12,9 +12,10 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats
+
 Image = npt.NDArray[np.uint8]
 """An image, shape (rows, columns, 3), blue, green, red."""
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +66,7 @@ class Detection:
     column: float
     row: float
     theta: float
-    covariance: Array
+    covariance: Floats
     area_px: float
     key: str | None = None
     score: float = 1.0
@@ -119,13 +120,13 @@ class FrameResult:
 class PixelToWorld(Protocol):
     """A calibrated camera."""
 
-    def to_world(self, points: Array) -> Array:
+    def to_world(self, points: Floats) -> Floats:
         """Return pixels, shape (n, 2), as metres."""
 
-    def to_pixel(self, points: Array) -> Array:
+    def to_pixel(self, points: Floats) -> Floats:
         """Return metres, shape (n, 2), as pixels."""
 
-    def jacobian(self, points: Array) -> Array:
+    def jacobian(self, points: Floats) -> Floats:
         """Return d(x, y)/d(column, row) [m/px] at pixels, shape (n, 2, 2)."""
 
 

@@ -12,7 +12,7 @@ import pytest
 from command_line import Done, apart, contents, here, refusal, start
 from page_reading import page_in
 
-from driftwalk.cli.demo import print_next
+from driftwalk.cli.demo import print_page
 
 TRUTH = {
     "drag_coefficient": 0.3948,
@@ -135,7 +135,7 @@ def test_a_folder_with_other_files_is_refused_before_any_work(tmp_path: Path) ->
 
 
 def test_how_long_the_map_takes_stands_at_its_bar_alone(capsys: pytest.CaptureFixture[str]) -> None:
-    print_next(Path("report.html"))
+    print_page(Path("report.html"))
     said = capsys.readouterr().out
     assert "Next, the paper's method" in said
     assert not re.search(r"\d", said)

@@ -21,10 +21,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.assembly.runs.plan import stream_keys
-from driftwalk.core.arrays import Bools, Floats
+from driftwalk.core.arrays import Bools, Floats, Keys
 from driftwalk.core.errors import InputError
 from driftwalk.model import declared
 from driftwalk.schema.answers.facts import fitted_value
@@ -154,7 +153,7 @@ def _region_of(calibration: xr.Dataset) -> _Region:
     return _Region(border, (across, along), (1.0 - confidence) ** rise)
 
 
-def _draw(region: _Region, keys: npt.NDArray[np.uint64]) -> Floats:
+def _draw(region: _Region, keys: Keys) -> Floats:
     """Return one point per key, by rejection from the border's bounding box."""
     found = np.empty((keys.size, 2))
     waiting = np.arange(keys.size)

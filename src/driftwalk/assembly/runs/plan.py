@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from driftwalk import _core
 from driftwalk.assembly.runs.start import given_start, place_blocks, require_cover, require_room
-from driftwalk.core.arrays import Floats, Integers
+from driftwalk.core.arrays import Floats, Integers, Keys
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
 from driftwalk.core.processors import default_threads
@@ -41,7 +41,7 @@ class Plan:
     steps: int
     trial: int
     index: Integers
-    keys: npt.NDArray[np.uint64]
+    keys: Keys
     drag_coefficient: Floats
     force_std: Floats
     threads: int
@@ -187,9 +187,7 @@ def simulate_rows(
 Stream = Literal["run", "parameters", "flow"]
 
 
-def stream_keys(
-    stream: Stream, *, seed: int, trial: int, index: npt.ArrayLike
-) -> npt.NDArray[np.uint64]:
+def stream_keys(stream: Stream, *, seed: int, trial: int, index: npt.ArrayLike) -> Keys:
     """Return the keys of random streams, one per index.
 
     Parameters

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
@@ -24,6 +24,7 @@ from driftwalk.assembly.runs.plan import Backend, Plan, make_plan, simulate_rows
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
+from driftwalk.core.run_stages import Progress
 from driftwalk.schema.check import kind_name
 from driftwalk.sweep import Store, WorkUnit, grid, run_sweep, settings_per_unit, threads_of_unit
 
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 FlowDraws = Literal["standard_error", "none"]
-Progress = Callable[[int, int], None]
 
 RUNS_TOGETHER: Final = 4 * RUNS_PER_FLOW
 """Runs of a work unit at least: fewer leave lanes empty, and each then takes longer."""

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
-from driftwalk.core.arrays import Floats
+from driftwalk.core.arrays import Floats, Keys
 from driftwalk.core.errors import InputError
 from driftwalk.schema import FLAGS, check_flow_field
 from driftwalk.simulation.backend import wall_edges
@@ -50,9 +50,7 @@ def tank_area(tank: Tank) -> float:
     return 0.5 * float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y))
 
 
-def place_blocks(
-    study: Study, model: _core.Model, keys: npt.NDArray[np.uint64], *, threads: int
-) -> Floats:
+def place_blocks(study: Study, model: _core.Model, keys: Keys, *, threads: int) -> Floats:
     """Return random poses in the tank that do not overlap, [m, m, rad], shape (runs, blocks, 3).
 
     Raises

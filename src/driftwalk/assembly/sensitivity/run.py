@@ -12,7 +12,6 @@ from driftwalk.assembly.sensitivity.dataset import map_dataset, reference_datase
 from driftwalk.assembly.sensitivity.settings import (
     FIRST_TRIALS,
     Axes,
-    Progress,
     Settings,
     make_axes,
     make_settings,
@@ -20,6 +19,7 @@ from driftwalk.assembly.sensitivity.settings import (
     simulate_settings,
     world_plan,
 )
+from driftwalk.core.run_stages import Progress
 from driftwalk.sweep import threads_of_unit
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -23,9 +23,10 @@ from driftwalk.assembly.runs.dataset import completion_step, replay_of, times_of
 from driftwalk.assembly.runs.plan import Plan, make_plan, simulate_rows, stream_keys
 from driftwalk.assembly.runs.start import place_blocks
 from driftwalk.assembly.sensitivity.times import Courses, added, courses_of, courses_to_text
-from driftwalk.core.arrays import Floats, Integers
+from driftwalk.core.arrays import Floats, Integers, Keys
 from driftwalk.core.errors import ConfigurationError, DriftwalkError, InputError
 from driftwalk.core.files.shards import Arrays, Unit, UnitT
+from driftwalk.core.run_stages import Progress
 from driftwalk.simulation.backend import BROKEN
 from driftwalk.simulation.series import flow_starts
 from driftwalk.sweep import (
@@ -42,8 +43,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
-
-Progress = Callable[[int, int], None]
 
 
 class TrialPolicy(NamedTuple):
@@ -308,7 +307,7 @@ def _simulate(
     return found | made, replayed.classes
 
 
-def _keys(plan: Plan, trial: int, runs: range) -> npt.NDArray[np.uint64]:
+def _keys(plan: Plan, trial: int, runs: range) -> Keys:
     return stream_keys("run", seed=plan.study.assembly.seed, trial=trial, index=runs)
 
 

@@ -26,7 +26,6 @@ from driftwalk.assembly.sensitivity.settings import (
     FIRST_TRIALS,
     KEYS,
     Outcomes,
-    Progress,
     Settings,
     make_settings,
     place_first,
@@ -35,6 +34,7 @@ from driftwalk.assembly.sensitivity.settings import (
 )
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
+from driftwalk.core.run_stages import Progress
 from driftwalk.schema.check import build_dataset, described, require_kind
 from driftwalk.schema.kinds import KINDS
 from driftwalk.sweep import threads_of_unit

@@ -9,12 +9,13 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from driftwalk.calibration.evolution import AspectObjective, Tell, wall_distance
+from driftwalk.calibration.evolution import AspectObjective, wall_distance
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.calibration.summaries import SummaryPlan, plan_summaries, summarise
 from driftwalk.comparison.aspects import block_of
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.processors import map_in_threads, one_blas_thread
+from driftwalk.core.run_stages import Progress
 from driftwalk.motion import Worlds
 from driftwalk.motion.score import broken_worlds
 from driftwalk.sweep import Store, WorkUnit, run_sweep
@@ -62,7 +63,7 @@ class SummaryObjective:
         *,
         store: Store | None,
         executor: Executor | None = None,
-        tell: Tell,
+        tell: Progress,
         most: int,
     ) -> None:
         self.worlds, self.store, self.tell, self.most = worlds, store, tell, most

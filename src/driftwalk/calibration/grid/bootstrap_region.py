@@ -33,13 +33,13 @@ from driftwalk.calibration.grid.energy_score import (
     make_smoother,
     nearest_point,
 )
-from driftwalk.calibration.grid.grid_map import Progress
 from driftwalk.calibration.grid.grid_refinement import RefinedMap
 from driftwalk.calibration.problem import Axes, Problem, score_settings
 from driftwalk.comparison import Statistic, StepTable
 from driftwalk.comparison.statistic import distances_among
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.processors import map_in_threads
+from driftwalk.core.run_stages import Progress
 from driftwalk.sweep import Store, WorkUnit, grid, run_sweep
 
 

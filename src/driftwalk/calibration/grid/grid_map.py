@@ -14,12 +14,10 @@ from driftwalk.calibration.problem import Axes, Problem, Stores, in_memory, scor
 from driftwalk.comparison import StepTable
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.processors import map_in_threads
-from driftwalk.core.run_stages import MORE
+from driftwalk.core.run_stages import MORE, Progress
 from driftwalk.motion import Details
 from driftwalk.motion.score import broken_worlds
 from driftwalk.sweep import Design, Store, WorkUnit, grid, run_sweep, settings_per_unit
-
-Progress = Callable[[int, int], None]
 
 
 class Map(NamedTuple):

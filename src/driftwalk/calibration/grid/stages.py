@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Container, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -32,9 +31,6 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.run_stages import share_of_map, share_of_windows
 from driftwalk.motion.batches import no_numbers
 from driftwalk.motion.score import broken_worlds
-
-if TYPE_CHECKING:
-    pass
 
 
 class GridCalibration:

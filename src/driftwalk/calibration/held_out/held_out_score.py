@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -13,12 +12,11 @@ from driftwalk.calibration.held_out.recorded import CHECKS, UNITS, RecordedMotio
 from driftwalk.comparison.aspects import AspectReference
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
+from driftwalk.core.run_stages import Progress
 from driftwalk.motion.batches import no_numbers
 from driftwalk.motion.score import broken_worlds
 from driftwalk.schema.answers.facts import AnswerParts, texts
 from driftwalk.schema.answers.model_comparison import ASPECT_WORDS, CHECK_WORDS
-
-Tell = Callable[[int, int], None]
 
 HELD_OUT_REPLICATES: Final = 20
 """Worlds by which the answer of a search is judged."""
@@ -54,7 +52,7 @@ class HeldOutScore(NamedTuple):
 
 
 def score_candidate(
-    entry: Candidate, motion: RecordedMotion, *, budget: Budget, tell: Tell | None
+    entry: Candidate, motion: RecordedMotion, *, budget: Budget, tell: Progress | None
 ) -> HeldOutScore:
     """Search a model on the even blocks of a recording, and judge it on the odd ones."""
     objective = even_blocks(entry, motion)

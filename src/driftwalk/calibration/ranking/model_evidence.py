@@ -17,12 +17,13 @@ from driftwalk.calibration.estimation.synthetic_likelihood import (
     SIMULATIONS,
     synthetic_likelihood_at,
 )
-from driftwalk.calibration.evolution import Tell, rounded
+from driftwalk.calibration.evolution import rounded
 from driftwalk.calibration.held_out.candidates import Candidate, with_contact_clearance
 from driftwalk.calibration.held_out.held_out_score import HeldOutScore, even_blocks
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.core.arrays import Floats
 from driftwalk.core.processors import one_blas_thread
+from driftwalk.core.run_stages import Progress
 from driftwalk.sweep import Store
 
 
@@ -183,7 +184,7 @@ def estimate_evidence(
     *,
     executor: Executor | None,
     store: Store | None,
-    tell: Tell,
+    tell: Progress,
 ) -> Evidence:
     """Match the summaries of a recording with a model, and say how well that went."""
     entry = entry._replace(model=with_contact_clearance(entry.model, motion))

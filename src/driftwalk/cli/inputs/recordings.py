@@ -117,7 +117,6 @@ def words_to_fit(trajectory: xr.Dataset, described: Mapping[str, Any] | None = N
         DIAMETER``, which only the user can fill in.
     """
     from driftwalk.conditions import require_inside
-    from driftwalk.core.errors import InputError
     from driftwalk.model import Study
     from driftwalk.record import describe
     from driftwalk.schema import body_names

@@ -14,22 +14,17 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
-import typer
-
 from driftwalk.cli.options.flatten_options import with_options
-from driftwalk.cli.options.shared_types import option, scale_option
+from driftwalk.cli.options.shared_types import READING, argument, option, scale_option
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
 
-PANEL = "How to read the recording"
 _ARGUMENTS = {"fps": "frame_rate", "scale": "metres_per_pixel"}
 """Fields that have another name in `driftwalk.load`."""
-_option = partial(option, panel=PANEL)
-RecordingFile = Annotated[
-    Path, typer.Argument(metavar="RECORDING", help="Recording, in any readable format.")
-]
+_option = partial(option, panel=READING)
+RecordingFile = Annotated[Path, argument("RECORDING", "Recording, in any readable format.")]
 
 
 @dataclass(frozen=True)
@@ -38,154 +33,136 @@ class RecordingOptions:
 
     format: Annotated[
         str | None,
-        _option("--format", help="Format of the file (default: recognised by content)."),
+        _option("--format", "Format of the file (default: recognised by content)."),
     ] = None
-    body: Annotated[
-        str | None, _option("--body", help="Body to keep, or all.", metavar="NAME|all")
-    ] = None
-    start: Annotated[float | None, _option("--from", help="First time to keep.", unit="s")] = None
-    stop: Annotated[float | None, _option("--to", help="Last time to keep.", unit="s")] = None
+    body: Annotated[str | None, _option("--body NAME|all", "Body to keep, or all.")] = None
+    start: Annotated[float | None, _option("--from", "First time to keep.", unit="s")] = None
+    stop: Annotated[float | None, _option("--to", "Last time to keep.", unit="s")] = None
     tank: Annotated[
         str | None,
         _option(
-            "--tank",
-            help="Tank: the diameter (40cm), two sides (60cmx40cm), or fit; @X,Y after a size "
+            "--tank D|WxH|polygon:FILE|fit",
+            "Tank: the diameter (40cm), two sides (60cmx40cm), or fit; @X,Y after a size "
             "gives its centre in metres.",
-            metavar="D|WxH|polygon:FILE|fit",
         ),
     ] = None
     fps: Annotated[
         float | None,
-        _option("--fps", help="Frames per second, if the file counts frames.", unit="Hz"),
+        _option("--fps", "Frames per second, if the file counts frames.", unit="Hz"),
     ] = None
-    scale: Annotated[float | None, scale_option(PANEL)] = None
+    scale: Annotated[float | None, scale_option(READING)] = None
     length_unit: Annotated[
         str | None,
         _option(
-            "--length-unit",
-            help="Unit of positions, if the file names none.",
-            metavar="m|cm|mm|um|ft|in|px",
+            "--length-unit m|cm|mm|um|ft|in|px",
+            "Unit of positions, if the file names none.",
         ),
     ] = None
     y_axis: Annotated[
         str | None,
-        _option("--y-axis", help="Direction of y and of angles in the file.", metavar="up|down"),
+        _option("--y-axis up|down", "Direction of y and of angles in the file."),
     ] = None
     max_speed: Annotated[
         float | None,
         _option(
             "--max-speed",
-            help="Fastest plausible speed; samples that need a faster one become gaps.",
+            "Fastest plausible speed; samples that need a faster one become gaps.",
             unit="m/s",
         ),
     ] = None
     sort: Annotated[
-        bool, _option("--sort", help="Sort times that go backwards (default: refuse them).")
+        bool, _option("--sort", "Sort times that go backwards (default: refuse them).")
     ] = False
     columns: Annotated[
         list[str] | None,
         _option(
-            "--columns",
-            help="Columns of a plain table by name or number from 1, with an optional :unit. "
+            "--columns t=NAME,x=NAME,y=NAME",
+            "Columns of a plain table by name or number from 1, with an optional :unit. "
             "Repeatable.",
-            metavar="t=NAME,x=NAME,y=NAME",
         ),
     ] = None
     delimiter: Annotated[
         str | None,
         _option(
-            "--delimiter",
-            help="Character between fields, or tab or space (default: recognised).",
-            metavar="CHARACTER",
+            "--delimiter CHARACTER",
+            "Character between fields, or tab or space (default: recognised).",
         ),
     ] = None
     up: Annotated[
         str | None,
         _option(
-            "--up",
-            help="Axis that points up, if the file has three axes (default: the format's).",
-            metavar="x|y|z|-x|-y|-z",
+            "--up x|y|z|-x|-y|-z",
+            "Axis that points up, if the file has three axes (default: the format's).",
         ),
     ] = None
     topic: Annotated[
         str | None,
         _option(
-            "--topic",
-            help="Topic of a ROS bag, or several, separated by commas.",
-            metavar="NAME[,NAME]",
+            "--topic NAME[,NAME]",
+            "Topic of a ROS bag, or several, separated by commas.",
         ),
     ] = None
     header_line: Annotated[
         int | None,
         _option(
-            "--header-line",
-            help="Line of a plain table, from 1, that names its columns.",
-            metavar="N",
+            "--header-line N",
+            "Line of a plain table, from 1, that names its columns.",
             min=1,
         ),
     ] = None
     sheet: Annotated[
         str | None,
         _option(
-            "--sheet",
-            help="Sheet of a workbook, by name or number from 1, or variable of a MATLAB file.",
-            metavar="NAME",
+            "--sheet NAME",
+            "Sheet of a workbook, by name or number from 1, or variable of a MATLAB file.",
         ),
     ] = None
     x: Annotated[
         Path | None,
-        _option("--x", help="Matrix of x: a row per frame, a column per body.", metavar="FILE"),
+        _option("--x FILE", "Matrix of x: a row per frame, a column per body."),
     ] = None
-    y: Annotated[Path | None, _option("--y", help="Matrix of y.", metavar="FILE")] = None
-    theta: Annotated[Path | None, _option("--theta", help="Matrix of angles.", metavar="FILE")] = (
-        None
-    )
+    y: Annotated[Path | None, _option("--y FILE", "Matrix of y.")] = None
+    theta: Annotated[Path | None, _option("--theta FILE", "Matrix of angles.")] = None
     keypoint: Annotated[
         str | None,
-        _option("--keypoint", help="Keypoint of a pose file to use as the body.", metavar="NAME"),
+        _option("--keypoint NAME", "Keypoint of a pose file to use as the body."),
     ] = None
     heading: Annotated[
         str | None,
         _option(
-            "--heading",
-            help="Two keypoints, or two bodies that are markers of one; the orientation is the "
+            "--heading FROM,TO",
+            "Two keypoints, or two bodies that are markers of one; the orientation is the "
             "angle from the first to the second.",
-            metavar="FROM,TO",
         ),
     ] = None
     min_confidence: Annotated[
         float | None,
         _option(
-            "--min-confidence",
-            help="Smallest confidence of a keypoint or row; others are missing (default: the "
-            "format's).",
-            metavar="SHARE",
+            "--min-confidence SHARE",
+            "Smallest confidence of a keypoint or row; others are missing (default: the format's).",
             min=0.0,
         ),
     ] = None
     box: Annotated[
         str | None,
         _option(
-            "--box",
-            help="Columns of a box: two corners, corner or centre with its size, or no box.",
-            metavar="xyxy|xywh|cxcywh|none",
+            "--box xyxy|xywh|cxcywh|none",
+            "Columns of a box: two corners, corner or centre with its size, or no box.",
         ),
     ] = None
     missing: Annotated[
         list[str] | None,
         _option(
-            "--missing",
-            help="Position that means that the body was not seen, or held: that of the sample "
+            "--missing X,Y|NUMBER|held",
+            "Position that means that the body was not seen, or held: that of the sample "
             "before. Repeatable.",
-            metavar="X,Y|NUMBER|held",
         ),
     ] = None
     replicate: Annotated[
         int | None,
         _option(
-            "--replicate",
-            help="Replicate of a simulation, counted from 0 (default: the first).",
-            metavar="N",
+            "--replicate N",
+            "Replicate of a simulation, counted from 0 (default: the first).",
             min=0,
         ),
     ] = None

@@ -12,6 +12,8 @@ from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.units import Uncertain, parse_quantity, split_uncertain
 
 PANEL: Final = "Parameters"
+READING: Final = "How to read the recording"
+"""The panels of the help that several commands have."""
 
 
 def quantity_parser(unit: str, *words: str) -> Callable[[str], Any]:
@@ -48,7 +50,6 @@ def option(
     help: str,
     *,
     panel: str | None = None,
-    metavar: str = "",
     unit: str = "",
     **more: Any,
 ) -> Any:
@@ -56,13 +57,14 @@ def option(
 
     The names stand with the placeholder of the value as in the help: ``"--out -o FILE"``.
     """
+    if unit:
+        more["parser"] = quantity_parser(unit)
     words = names.split()
     placeholders = [word for word in words if not word.startswith("-")]
     return typer.Option(
         *(word for word in words if word.startswith("-")),
         help=help,
-        metavar=metavar or (f"<{unit}>" if unit else "".join(placeholders) or None),
-        parser=quantity_parser(unit) if unit else None,
+        metavar=f"<{unit}>" if unit else "".join(placeholders) or None,
         rich_help_panel=panel,
         **more,
     )
@@ -71,11 +73,6 @@ def option(
 def argument(placeholder: str, help: str) -> Any:
     """Return the declaration of an argument."""
     return typer.Argument(metavar=placeholder, help=help)
-
-
-def quantity_option(name: str, unit: str, help: str, *, panel: str = PANEL) -> Any:
-    """Return the declaration of an option that takes a quantity."""
-    return option(name, help=help, panel=panel, unit=unit)
 
 
 def parse_scale(text: Any) -> Any:
@@ -91,9 +88,7 @@ def parse_scale(text: Any) -> Any:
 def scale_option(panel: str) -> Any:
     """Return the declaration of the option for the scale of an image."""
     said = "Size of a pixel, such as 0.5mm or 2000px/m."
-    return typer.Option(
-        "--scale", help=said, metavar="<m>", parser=parse_scale, rich_help_panel=panel
-    )
+    return option("--scale <m>", said, panel=panel, parser=parse_scale)
 
 
 def flow_of_run(path: Path | None) -> Path | None:
@@ -124,30 +119,28 @@ StudyFile = Annotated[
 ]
 FlowFile = Annotated[
     Path | None,
-    typer.Option(
-        "--flow",
-        metavar="FILE",
-        help="Flow field to use, or the run directory that holds it.",
+    option(
+        "--flow FILE",
+        "Flow field to use, or the run directory that holds it.",
         callback=flow_of_run,
         show_default=False,
     ),
 ]
 FrameInterval = Annotated[
     float | None,
-    quantity_option(
+    option(
         "--frame-interval",
-        "s",
         "Time between the two images of a pair, for a flow field of shifts in pixels.",
-        panel="How to read the recording",
+        unit="s",
+        panel=READING,
     ),
 ]
 FlowVariables = Annotated[
     str | None,
-    typer.Option(
-        "--flow-variables",
-        metavar="u=NAME,v=NAME",
-        help="Variables of a flow field in NetCDF: u, v, x, y, time, mask.",
-        rich_help_panel="How to read the recording",
+    option(
+        "--flow-variables u=NAME,v=NAME",
+        "Variables of a flow field in NetCDF: u, v, x, y, time, mask.",
+        panel=READING,
         show_default=False,
     ),
 ]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal
 import typer
 
 from driftwalk.cli.main import paragraphs
-from driftwalk.cli.options.shared_types import Json, Replace, argument, option, quantity_option
+from driftwalk.cli.options.shared_types import PANEL, Json, Replace, argument, option
 from driftwalk.cli.terminal.help import HelpCommand, HelpGroup
 from driftwalk.cli.terminal.output import print_json, print_next, print_note, print_table
 from driftwalk.core.errors import FormatError, InputError
@@ -32,12 +32,12 @@ def calibrate(
     ],
     out: Annotated[Path, option("--out -o FILE.toml", "File to write.")],
     squares: Annotated[str, option("--squares COLUMNSxROWS", "Squares of the board, such as 9x7.")],
-    square: Annotated[float, quantity_option("--square", "m", "Side of a square.")],
+    square: Annotated[float, option("--square", "Side of a square.", unit="m", panel=PANEL)],
     board: Annotated[
         Literal["chessboard", "charuco"], option("--board", "Kind of the board.")
     ] = "chessboard",
     tag: Annotated[
-        float | None, quantity_option("--tag", "m", "Side of a ChArUco board's tags.")
+        float | None, option("--tag", "Side of a ChArUco board's tags.", unit="m", panel=PANEL)
     ] = None,
     dictionary: Annotated[
         str, option("--dictionary DICT", "Dictionary of these tags.")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -10,7 +11,7 @@ from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.inputs.recordings import open_kind
 from driftwalk.cli.options.flatten_options import with_options
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared_types import Json, Replace, argument, option, quantity_option
+from driftwalk.cli.options.shared_types import Json, Replace, argument, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import (
     print_json,
@@ -33,8 +34,7 @@ _PANEL = "Criteria of a join"
 _TOO_CLOSE = 0.8
 
 
-def _tolerance(name: str, unit: str, help: str) -> Any:
-    return quantity_option(name, unit, help, panel=_PANEL)
+_tolerance = partial(option, panel=_PANEL)
 
 
 @dataclass(frozen=True)
@@ -44,32 +44,38 @@ class JoinCriteria:
     join_distance: Annotated[
         float | None,
         _tolerance(
-            "--join-distance", "m", "Distance of face centres that join (default: side / 10)."
+            "--join-distance", "Distance of face centres that join (default: side / 10).", unit="m"
         ),
     ] = None
     join_angle: Annotated[
         float | None,
-        _tolerance("--join-angle", "rad", "Angle between faces that join (default: 10deg)."),
+        _tolerance("--join-angle", "Angle between faces that join (default: 10deg).", unit="rad"),
     ] = None
     release_distance: Annotated[
         float | None,
         _tolerance(
-            "--release-distance", "m", "Distance that parts them (default: twice that to join)."
+            "--release-distance",
+            "Distance that parts them (default: twice that to join).",
+            unit="m",
         ),
     ] = None
     release_angle: Annotated[
         float | None,
         _tolerance(
-            "--release-angle", "rad", "Angle that parts them (default: twice that to join)."
+            "--release-angle", "Angle that parts them (default: twice that to join).", unit="rad"
         ),
     ] = None
     min_duration: Annotated[
         float | None,
-        _tolerance("--min-duration", "s", "Shortest join or parting that counts (default: 0.5s)."),
+        _tolerance(
+            "--min-duration", "Shortest join or parting that counts (default: 0.5s).", unit="s"
+        ),
     ] = None
     hold: Annotated[
         float | None,
-        _tolerance("--hold", "s", "Time for which an unseen block keeps its joins (default: 1s)."),
+        _tolerance(
+            "--hold", "Time for which an unseen block keeps its joins (default: 1s).", unit="s"
+        ),
     ] = None
 
 

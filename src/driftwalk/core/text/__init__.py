@@ -1,1 +1,1 @@
-"""Text of arguments, JSON, TOML and messages."""
+"""JSON and TOML read within bounds, and names in messages."""

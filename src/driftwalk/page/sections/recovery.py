@@ -174,7 +174,7 @@ def estimates_section(recovery: xr.Dataset, *, name: str) -> Section:
             (f"{words}, left out of the summary", at, ~used, values),
         ]
     return _estimates_chart(
-        f"estimates-{name.replace('_', '-')}", f"Estimates: {parameter.words}",
+        _id_of(name), f"Estimates: {parameter.words}",
         label(parameter.words, parameter.unit), required(recovery, parameter.key), drawn,
     )  # fmt: skip
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, Final, NamedTuple
 
 PAPER_TITLE: Final = "A trajectory-based calibration method for stochastic motion models"
@@ -36,43 +35,74 @@ class Method(NamedTuple):
     """Entry of the run's specification that has to be set; ``""``: always used."""
 
 
-def _methods(text: str) -> Iterator[Method]:
-    """Yield a method per line: files (entry of the specification): its part; the work."""
-    for line in text.strip().splitlines():
-        row = " ".join(line.split())
-        files, what, work = re.split(": |; ", row, maxsplit=2)
-        results, _, under = files.rstrip(")").partition(" (")
-        yield Method(tuple(results.split()), what, work, under)
-
-
-METHODS: Final = tuple(
-    _methods("""
-fit.nc: restricted likelihood; Patterson and Thompson, Recovery of inter-block information when \
-    block sizes are unequal, Biometrika 58 (1971) 545
-fit.nc (wall): particle filter at the wall; Gordon, Salmond and Smith, Novel approach to \
-    nonlinear/non-Gaussian Bayesian state estimation, IEE Proceedings F 140 (1993) 107
-calibration.nc comparison.nc: distance between motions; Fasano and Franceschini, A \
-    multidimensional version of the Kolmogorov-Smirnov test, Monthly Notices of the Royal \
-    Astronomical Society 225 (1987) 155
-comparison.nc: search of the parameters; Hansen and Ostermeier, Completely derandomized \
-    self-adaptation in evolution strategies, Evolutionary Computation 9 (2001) 159
-model_calibration.nc: synthetic likelihood; Wood, Statistical inference for noisy nonlinear \
-    ecological dynamic systems, Nature 466 (2010) 1102
-model_calibration.nc: draws of the parameters; Foreman-Mackey, Hogg, Lang and Goodman, emcee: The \
-    MCMC Hammer, Publications of the Astronomical Society of the Pacific 125 (2013) 306
-model_calibration.nc: errors of a simulated covariance; Hartlap, Simon and Schneider, Why your \
-    model parameter confidences might be too optimistic, Astronomy and Astrophysics 464 (2007) 399
-assembly.nc: intervals of the shares; Clopper and Pearson, The use of confidence or fiducial \
-    limits illustrated in the case of the binomial, Biometrika 26 (1934) 404
-assembly.nc: courses of first contact and completion; Kaplan and Meier, Nonparametric estimation \
-    from incomplete observations, Journal of the American Statistical Association 53 (1958) 457
-sobol.nc: sensitivity indices; Saltelli et al., Variance based sensitivity analysis of model \
-    output: design and estimator for the total sensitivity index, Computer Physics Communications \
-    181 (2010) 259
-calibration.nc check.nc assembly.nc sensitivity.nc recovery.nc: random numbers; Salmon, Moraes, \
-    Dror and Shaw, Parallel random numbers: as easy as 1, 2, 3, International Conference for High \
-    Performance Computing (SC), 2011
-""")
+METHODS: Final = (
+    Method(
+        ("fit.nc",),
+        "restricted likelihood",
+        "Patterson and Thompson, Recovery of inter-block information when block sizes are unequal, "
+        "Biometrika 58 (1971) 545",
+    ),
+    Method(
+        ("fit.nc",),
+        "particle filter at the wall",
+        "Gordon, Salmond and Smith, Novel approach to nonlinear/non-Gaussian Bayesian state "
+        "estimation, IEE Proceedings F 140 (1993) 107",
+        under="wall",
+    ),
+    Method(
+        ("calibration.nc", "comparison.nc"),
+        "distance between motions",
+        "Fasano and Franceschini, A multidimensional version of the Kolmogorov-Smirnov test, "
+        "Monthly Notices of the Royal Astronomical Society 225 (1987) 155",
+    ),
+    Method(
+        ("comparison.nc",),
+        "search of the parameters",
+        "Hansen and Ostermeier, Completely derandomized self-adaptation in evolution strategies, "
+        "Evolutionary Computation 9 (2001) 159",
+    ),
+    Method(
+        ("model_calibration.nc",),
+        "synthetic likelihood",
+        "Wood, Statistical inference for noisy nonlinear ecological dynamic systems, "
+        "Nature 466 (2010) 1102",
+    ),
+    Method(
+        ("model_calibration.nc",),
+        "draws of the parameters",
+        "Foreman-Mackey, Hogg, Lang and Goodman, emcee: The MCMC Hammer, Publications of the "
+        "Astronomical Society of the Pacific 125 (2013) 306",
+    ),
+    Method(
+        ("model_calibration.nc",),
+        "errors of a simulated covariance",
+        "Hartlap, Simon and Schneider, Why your model parameter confidences might be too "
+        "optimistic, Astronomy and Astrophysics 464 (2007) 399",
+    ),
+    Method(
+        ("assembly.nc",),
+        "intervals of the shares",
+        "Clopper and Pearson, The use of confidence or fiducial limits illustrated in the case of "
+        "the binomial, Biometrika 26 (1934) 404",
+    ),
+    Method(
+        ("assembly.nc",),
+        "courses of first contact and completion",
+        "Kaplan and Meier, Nonparametric estimation from incomplete observations, Journal of the "
+        "American Statistical Association 53 (1958) 457",
+    ),
+    Method(
+        ("sobol.nc",),
+        "sensitivity indices",
+        "Saltelli et al., Variance based sensitivity analysis of model output: design and "
+        "estimator for the total sensitivity index, Computer Physics Communications 181 (2010) 259",
+    ),
+    Method(
+        ("calibration.nc", "check.nc", "assembly.nc", "sensitivity.nc", "recovery.nc"),
+        "random numbers",
+        "Salmon, Moraes, Dror and Shaw, Parallel random numbers: as easy as 1, 2, 3, International "
+        "Conference for High Performance Computing (SC), 2011",
+    ),
 )
 """Methods of others, in the order in which they are listed."""
 

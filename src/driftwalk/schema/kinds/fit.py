@@ -176,9 +176,9 @@ attributes:
     arena
     source
     study
-attributes (it was not):
+attributes (the model was not checked):
     check_left_out text: reason why the model was not checked
-attributes (asked for, and it was not):
+attributes (the wall was to be estimated, and was not):
     wall_left_out text: reason why the wall was not estimated
 """,
     flags={"flag": ORIGIN},

@@ -76,9 +76,9 @@ attributes ({_TRACERS}):
     samples_unjudged number: steps with too few neighbours
     samples_across_gaps number: pairs with a gap between
     samples_ambiguous number: pairs of unsure identity
-attributes (there is something):
-    warning text: what to know about it
-attributes (it changes, and says so):
+attributes (with a warning):
+    warning text: what to know about the field
+attributes (the flow changes, and its repeat is stated):
     repeat text: how it goes on beyond its frames: loop, mirror or hold
 """,
     flags={"flag": ORIGIN},
@@ -93,11 +93,11 @@ attributes ({_CHANGES}):
     flow_span_s number: time from the first frame to the last
     flow_repeat text: how the flow went on: none, loop, mirror or hold
     flow_begins text: when runs began in it: random, together or recorded
-attributes (it was repeated):
+attributes (the flow was repeated):
     flow_period_s number: time after which it was as before
-attributes (they did, and it was not repeated):
+attributes (runs began at random, and the flow was not repeated):
     flow_slack_s number: time within which runs began at random
-attributes (it began again):
+attributes (the flow began again):
     flow_join number: change from the last frame to the first, over that between frames
 """)
 """Attributes of whatever was simulated in a flow."""

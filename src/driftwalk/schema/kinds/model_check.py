@@ -111,7 +111,7 @@ attributes ({_COMPARED}):
     ks_p_value number: p value of the distance
     ks_rank_p_value number: p value by rank
     band number: share of the replicates in a band
-attributes (it was left out):
+attributes (the comparison was left out):
     ks_left_out text: reason why there is no distance
 """,
     *_density("step_length", "m", "step lengths"),

@@ -43,13 +43,13 @@ attributes (positions in pixels):
 attributes (the tank is known):
     arena
     arena_found object: how the tank was found
-attributes (it was stated):
+attributes (the block was stated):
     block_side_m number: side of the block
     block_mass_kg number: mass of the block
     block_depth_m number: wetted depth of a side face
     block_depth text: immersed or archimedes, instead of a length
-attributes (it has):
-    bodies_apart yes or no: whether each has a tank of its own
+attributes (several tanks in one recording):
+    bodies_apart yes or no: whether each body has a tank of its own
 attributes (simulated):
     simulated yes or no: whether a model made the motion
 attributes (tracked videos):

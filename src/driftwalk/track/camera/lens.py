@@ -9,11 +9,12 @@ from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.extras import require_opencv
 from driftwalk.track.camera.model import Camera, Lens
 from driftwalk.track.detect.tags import dictionary_of
-from driftwalk.track.types import Array, Image
+from driftwalk.track.types import Image
 
 
 class CornerPolicy(NamedTuple):
@@ -78,13 +79,13 @@ class Board:
                 f"state their side; got {self.marker_m}"
             )
 
-    def corners(self) -> Array:
+    def corners(self) -> Floats:
         """Return the places of all inner corners on the board [m], shape (n, 2), row by row."""
         column, row = np.meshgrid(np.arange(1, self.columns), np.arange(1, self.rows))
         places = np.stack([column.ravel(), row.ravel()], axis=-1).astype(np.float64)
         return np.asarray(places * self.square_m, dtype=np.float64)
 
-    def find(self, image: Image) -> tuple[Array, Array] | None:
+    def find(self, image: Image) -> tuple[Floats, Floats] | None:
         """Return places on the board [m] and in the image [px] of the corners seen, or None."""
         cv2 = require_opencv("calibration of a camera")
         grey = cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)
@@ -101,7 +102,7 @@ class Board:
             dictionary_of(cv2, self.dictionary),
         )
 
-    def _chessboard(self, cv2: Any, grey: Any) -> tuple[Array, Array] | None:
+    def _chessboard(self, cv2: Any, grey: Any) -> tuple[Floats, Floats] | None:
         size = (self.columns - 1, self.rows - 1)
         flags = cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY
         found, corners = cv2.findChessboardCornersSB(grey, size, flags=flags)
@@ -112,7 +113,7 @@ class Board:
         to_the_right = pixels[size[0] - 1 :: size[0]] - pixels[:: size[0]]
         return self.corners(), pixels if to_the_right[:, 0].sum() >= 0 else pixels[::-1].copy()
 
-    def _charuco(self, cv2: Any, grey: Any) -> tuple[Array, Array] | None:
+    def _charuco(self, cv2: Any, grey: Any) -> tuple[Floats, Floats] | None:
         detector = cv2.aruco.CharucoDetector(self.charuco_board(cv2))
         corners, numbers, _, _ = detector.detectBoard(grey)
         # Four corners determine the plane; twice as many show a wrong one.
@@ -125,7 +126,7 @@ class Board:
         return self.corners()[which], _refined(cv2, grey, corners, share)
 
 
-def _refined(cv2: Any, grey: Any, corners: Any, share: float) -> Array:
+def _refined(cv2: Any, grey: Any, corners: Any, share: float) -> Floats:
     """Return corners [px] once more, each from a window of a share of a square to each side."""
     pixels = np.asarray(corners, dtype=np.float32).reshape(-1, 2)
     apart = np.hypot(*(pixels[:, None] - pixels).transpose(2, 0, 1))
@@ -291,7 +292,7 @@ def _advice(board: Board) -> str:
     return f"check {what}, and that the board is sharp, flat and seen whole"
 
 
-def _is_right_handed(world: Array, pixels: Array) -> bool:
+def _is_right_handed(world: Floats, pixels: Floats) -> bool:
     """Return whether places and pixels turn the same way round."""
     with_one = np.column_stack([world, np.ones(len(world))])
     affine = np.linalg.lstsq(with_one, pixels, rcond=None)[0]

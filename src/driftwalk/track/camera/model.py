@@ -9,10 +9,10 @@ from typing import Annotated, ClassVar, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.model.section import Quantity, Section
 from driftwalk.track.toml_file import load_sections, save_sections
-from driftwalk.track.types import Array
 
 _HEAD = """\
 Camera of driftwalk: lens, and the plane of the water.
@@ -50,7 +50,7 @@ class Lens(Section):
     p1: float = Field(default=0.0, description="Tangential distortion, first.")
     p2: float = Field(default=0.0, description="Tangential distortion, second.")
 
-    def straighten(self, points: Array) -> Array:
+    def straighten(self, points: Floats) -> Floats:
         """Return where pixels, shape (n, 2), would lie without distortion."""
         bent = self._normalised(points)
         straight = bent.copy()
@@ -62,13 +62,13 @@ class Lens(Section):
             straight = update
         return self._to_pixels(straight)
 
-    def bend(self, points: Array) -> Array:
+    def bend(self, points: Floats) -> Floats:
         """Return where pixels without distortion, shape (n, 2), lie in the image."""
         straight = self._normalised(points)
         radial, shift = self._factors(straight)
         return self._to_pixels(straight * radial[:, None] + shift)
 
-    def _factors(self, points: Array) -> tuple[Array, Array]:
+    def _factors(self, points: Floats) -> tuple[Floats, Floats]:
         """Return radial factor and tangential shift at normalised points."""
         u, v = points[:, 0], points[:, 1]
         square = u * u + v * v
@@ -82,16 +82,16 @@ class Lens(Section):
         )
         return radial, shift
 
-    def _normalised(self, points: Array) -> Array:
+    def _normalised(self, points: Floats) -> Floats:
         return (points - self._centre()) / self._focal()
 
-    def _to_pixels(self, points: Array) -> Array:
+    def _to_pixels(self, points: Floats) -> Floats:
         return points * self._focal() + self._centre()
 
-    def _centre(self) -> Array:
+    def _centre(self) -> Floats:
         return np.array([self.centre_column_px, self.centre_row_px])
 
-    def _focal(self) -> Array:
+    def _focal(self) -> Floats:
         return np.array([self.focal_x_px, self.focal_y_px])
 
 
@@ -175,17 +175,17 @@ class Camera(Section):
             lens=lens,
         )
 
-    def to_world(self, points: Array) -> Array:
+    def to_world(self, points: Floats) -> Floats:
         """Return pixels, shape (n, 2), as metres, shape (n, 2)."""
         straight = points if self.lens is None else self.lens.straighten(points)
         return project(self._plane(), straight)
 
-    def to_pixel(self, points: Array) -> Array:
+    def to_pixel(self, points: Floats) -> Floats:
         """Return metres, shape (n, 2), as pixels, shape (n, 2)."""
         straight = project(np.asarray(np.linalg.inv(self._plane()), dtype=np.float64), points)
         return straight if self.lens is None else self.lens.bend(straight)
 
-    def jacobian(self, points: Array) -> Array:
+    def jacobian(self, points: Floats) -> Floats:
         """Return d(x, y)/d(column, row) [m/px] at pixels, shape (n, 2, 2)."""
         columns = []
         for step in (np.array([0.5, 0.0]), np.array([0.0, 0.5])):
@@ -207,7 +207,7 @@ class Camera(Section):
                 f"images are {width} x {height}: calibrate at this size"
             )
 
-    def _plane(self) -> Array:
+    def _plane(self) -> Floats:
         if self.homography_px_to_m is None:
             raise InputError(
                 "the camera has no scale: give the tank's diameter with `diameter` of "
@@ -216,7 +216,7 @@ class Camera(Section):
         return np.array(self.homography_px_to_m).reshape(3, 3)
 
 
-def project(matrix: Array, points: Array) -> Array:
+def project(matrix: Floats, points: Floats) -> Floats:
     """Return points, shape (n, 2), after a 3 x 3 projective map."""
     with_one = np.column_stack([points, np.ones(len(points))])
     mapped = with_one @ matrix.T

@@ -8,10 +8,11 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.extras import require_opencv
 from driftwalk.track.camera.model import Camera, Lens
-from driftwalk.track.types import Array, Image
+from driftwalk.track.types import Image
 
 
 class RimPolicy(NamedTuple):
@@ -247,7 +248,7 @@ def _roughly(cv2: Any, grey: Any, lens: Lens | None) -> tuple[float, float, floa
     )
 
 
-def _inner_edge(cv2: Any, grey: Any, circle: Array, around: float, lens: Lens | None) -> Array:
+def _inner_edge(cv2: Any, grey: Any, circle: Floats, around: float, lens: Lens | None) -> Floats:
     """Return the innermost strong edge along rays from the centre, shape (n, 2)."""
     angle = 2 * np.pi * np.arange(_RIM.rays) / _RIM.rays
     reach = circle[2] * np.array([1.0 - around, 1.0 + around])
@@ -279,7 +280,7 @@ def _inner_edge(cv2: Any, grey: Any, circle: Array, around: float, lens: Lens | 
     return np.asarray(circle[:2] + exact[:, None] * ray[rays])
 
 
-def _fit(points: Array) -> tuple[Array, int, float]:
+def _fit(points: Floats) -> tuple[Floats, int, float]:
     """Return a circle (column, row, radius), the points that belong to it, and their rms."""
     kept = np.ones(len(points), dtype=bool)
     circle = np.zeros(3)

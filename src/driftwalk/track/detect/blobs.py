@@ -7,9 +7,10 @@ from typing import Any, Final, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.extras import require_opencv
-from driftwalk.track.types import Array, Detection, Image, PixelToWorld, Rejected
+from driftwalk.track.types import Detection, Image, PixelToWorld, Rejected
 
 Polarity = Literal["dark", "bright", "both"]
 """Brightness of objects, compared with their background."""
@@ -234,7 +235,7 @@ class BlobDetector:
             return []
         pixels = np.array([[column, row] for _, column, row in kept])
         in_pixels = np.stack([np.diag([_BLOBS.position_std_px**2] * 2)] * len(kept))
-        world: Array | None = None
+        world: Floats | None = None
         if self.camera is not None:
             world = self.camera.to_world(pixels)
             slopes = self.camera.jacobian(pixels)

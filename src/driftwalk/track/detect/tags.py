@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.extras import require_opencv
-from driftwalk.track.types import Array, Detection, Image, PixelToWorld, Rejected
+from driftwalk.track.types import Detection, Image, PixelToWorld, Rejected
 
 
 def dictionary_of(cv2: Any, name: str) -> Any:
@@ -97,7 +98,7 @@ class TagDetector:
                 found.append(self._place(name, places))
         return found, rejected
 
-    def _place(self, name: str, corners: Array) -> Detection:
+    def _place(self, name: str, corners: Floats) -> Detection:
         pixel = _crossing(corners)
         # In the image, y up replaces the world if there is no camera.
         up = np.array([1.0, -1.0])
@@ -126,7 +127,7 @@ class TagDetector:
         )
 
 
-def _crossing(corners: Array) -> Array:
+def _crossing(corners: Floats) -> Floats:
     """Return where the diagonals of a quadrilateral cross: its middle, seen from anywhere."""
     first, second = corners[2] - corners[0], corners[3] - corners[1]
     matrix = np.column_stack([first, -second])
@@ -136,11 +137,11 @@ def _crossing(corners: Array) -> Array:
     return np.asarray(corners[0] + share * first)
 
 
-def _area(corners: Array) -> float:
+def _area(corners: Floats) -> float:
     x, y = corners.T
     return float(abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2)
 
 
-def _rejected(corners: Array, reason: str, kind: str) -> Rejected:
+def _rejected(corners: Floats, reason: str, kind: str) -> Rejected:
     column, row = corners.mean(axis=0)
     return Rejected(float(column), float(row), _area(corners), reason, kind)

@@ -10,6 +10,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.extras import require_opencv
 from driftwalk.track.detect.markers import (
@@ -19,7 +20,7 @@ from driftwalk.track.detect.markers import (
     hue_difference,
 )
 from driftwalk.track.detect.two_colour.discs import Disc, find_regions
-from driftwalk.track.types import Array, Image, PixelToWorld
+from driftwalk.track.types import Image, PixelToWorld
 
 
 class TeachPolicy(NamedTuple):
@@ -303,12 +304,12 @@ def _mutual(first: list[Disc], second: list[Disc]) -> list[tuple[Disc, Disc]]:
     return [(first[i], second[j]) for i, j in enumerate(to_second) if to_first[j] == i]
 
 
-def _least_diameters(places: Array) -> Array:
+def _least_diameters(places: Floats) -> Floats:
     """Return the least diameter of a disc, as long as the true one is not known [px]."""
     return np.full(len(places), 2.0 * math.sqrt(_TEACH.least_area_px / math.pi))
 
 
-def _places(discs: list[Disc]) -> Array:
+def _places(discs: list[Disc]) -> Floats:
     return np.array([[disc.column, disc.row] for disc in discs])
 
 
@@ -322,7 +323,7 @@ def _is_round(disc: Disc) -> bool:
     )
 
 
-def _chroma(cv2: Any, images: Sequence[Image]) -> tuple[Array, Array]:
+def _chroma(cv2: Any, images: Sequence[Image]) -> tuple[Floats, Floats]:
     """Return a* and b* of all pixels of images, noise smoothed."""
     parts = []
     for image in images:
@@ -332,7 +333,7 @@ def _chroma(cv2: Any, images: Sequence[Image]) -> tuple[Array, Array]:
     return together[:, 0], together[:, 1]
 
 
-def _describe(a_star: Array, b_star: Array, pixels: int) -> ColourSeen | None:
+def _describe(a_star: Floats, b_star: Floats, pixels: int) -> ColourSeen | None:
     """Return the colour of the inner pixels of what has one hue."""
     chroma = np.hypot(a_star, b_star)
     if a_star.size < max(_TEACH.least_share * pixels, _TEACH.least_area_px):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -13,10 +13,6 @@ from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.track.follow.kalman import Measured, Predicted
 from driftwalk.track.types import Detection
-
-if TYPE_CHECKING:
-    pass
-
 
 COVARIANCE: Final = ("xx", "xy", "yy", "xtheta", "ytheta", "thetatheta")
 """The parts of the covariance of a measurement, in the order in which they are kept."""

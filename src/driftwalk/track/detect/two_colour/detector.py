@@ -7,6 +7,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.extras import require_opencv
 from driftwalk.track.detect.markers import ChromaTables, TwoColourMarker
 from driftwalk.track.detect.two_colour.discs import (
@@ -19,7 +20,7 @@ from driftwalk.track.detect.two_colour.discs import (
 )
 from driftwalk.track.detect.two_colour.outline import outlined_centres
 from driftwalk.track.detect.two_colour.pose import CENTRES, Measured, weighted_centres
-from driftwalk.track.types import Array, Detection, Image, PixelToWorld, Rejected
+from driftwalk.track.types import Detection, Image, PixelToWorld, Rejected
 
 
 class TwoColourPolicy(NamedTuple):
@@ -127,7 +128,7 @@ class TwoColourDetector:
             rejected += wrong
         return (both[0], both[1]), rejected
 
-    def _diameter(self, points: Array) -> Array:
+    def _diameter(self, points: Floats) -> Floats:
         """Return the diameter of a whole disc at points of the image [px]."""
         px_per_m = 1.0 / np.sqrt(np.abs(np.linalg.det(self.camera.jacobian(points))))
         return np.asarray(self.marker.size_m * px_per_m)

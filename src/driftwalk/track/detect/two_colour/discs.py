@@ -9,7 +9,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.track.types import Array, Rejected
+from driftwalk.core.arrays import Floats
+from driftwalk.track.types import Rejected
 
 
 class DiscPolicy(NamedTuple):
@@ -63,7 +64,7 @@ def find_regions(
     colour: int,
     factor: int,
     *,
-    diameter_at: Callable[[Array], Array],
+    diameter_at: Callable[[Floats], Floats],
 ) -> list[Disc]:
     """Return the connected regions of one label; specks that noise alone makes are left out.
 
@@ -257,7 +258,7 @@ def pair_discs(
     return pairs, rejected
 
 
-def _misfit(first: list[Disc], second: list[Disc], ratio: float) -> tuple[Array, Array]:
+def _misfit(first: list[Disc], second: list[Disc], ratio: float) -> tuple[Floats, Floats]:
     """Return distances over the spacing, and their misfit over what is allowed."""
     a, b = (
         np.array([[d.column, d.row, d.diameter, d.share] for d in discs])
@@ -270,7 +271,7 @@ def _misfit(first: list[Disc], second: list[Disc], ratio: float) -> tuple[Array,
     return apart, np.abs(apart - 1.0) / allowed
 
 
-def _nearest(distances: Array, colour: int) -> str:
+def _nearest(distances: Floats, colour: int) -> str:
     return (
         f"no partner: the nearest disc of colour {colour} is at {distances.min():.2f} of the "
         "marker's spacing, or belongs to another"

@@ -11,14 +11,10 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from driftwalk.core.arrays import Bools
+from driftwalk.core.arrays import Bools, Floats, Indices
 from driftwalk.track.detect.markers import Weights
 from driftwalk.track.detect.two_colour.pose import Measured
-from driftwalk.track.types import Array
-
-Whole = npt.NDArray[np.intp]
 
 
 class OutlinePolicy(NamedTuple):
@@ -56,7 +52,7 @@ _SWINGS: Final = np.radians(np.arange(-60.0, 60.1, 0.5))
 
 
 def outlined_centres(
-    weights: list[Weights], start: Array, *, diameter: float, spacing: float
+    weights: list[Weights], start: Floats, *, diameter: float, spacing: float
 ) -> Measured | None:
     """Return the centres of two discs of which parts may be hidden.
 
@@ -102,7 +98,7 @@ def outlined_centres(
     return Measured(centres, covariance, shares)
 
 
-def _outline(weight: Weights, at: Array, diameter: float) -> Array:
+def _outline(weight: Weights, at: Floats, diameter: float) -> Floats:
     """Return where a colour's weight crosses half of its height, shape (n, 2)."""
     weight, near, corner = _around(weight, at, 1.2 * diameter)
     inside = weight[near & (weight > _OUTLINE.level)]
@@ -118,7 +114,7 @@ def _outline(weight: Weights, at: Array, diameter: float) -> Array:
     return np.asarray(found + corner)
 
 
-def _around(weight: Weights, at: Array, reach: float) -> tuple[Weights, Bools, Array]:
+def _around(weight: Weights, at: Floats, reach: float) -> tuple[Weights, Bools, Floats]:
     """Return a part of a patch, which of its pixels are near a place, and where it begins."""
     left, top = (max(math.floor(place - reach), 0) for place in at.tolist())
     # One more than needed, for outlines between the last pixel that is near and the next.
@@ -129,13 +125,15 @@ def _around(weight: Weights, at: Array, reach: float) -> tuple[Weights, Bools, A
     return part, across**2 + (down**2)[:, None] < reach**2, np.array([left, top])
 
 
-def _part(weight: Weights, level: float, row: Whole, column: Whole, step: tuple[int, int]) -> Array:
+def _part(
+    weight: Weights, level: float, row: Indices, column: Indices, step: tuple[int, int]
+) -> Floats:
     """Return which part of the way from pixels to the next ones a level is reached."""
     low, high = weight[row, column], weight[row + step[0], column + step[1]]
     return np.asarray((level - low) / (high - low), dtype=np.float64)
 
 
-def _search(points: Array, side: Array, first: Array, diameter: float, spacing: float) -> Array:
+def _search(points: Floats, side: Floats, first: Floats, diameter: float, spacing: float) -> Floats:
     """Return the best poses of a grid around the first one, shape (n, 3)."""
     shift = _SHIFTS * diameter
     turned = first[2] + _TURNS[:, None]
@@ -161,7 +159,7 @@ def _search(points: Array, side: Array, first: Array, diameter: float, spacing: 
     return np.asarray(first + np.stack([shift[i], shift[j], _TURNS[k]], axis=-1))
 
 
-def _cost(beyond: Array, scale: float) -> tuple[Array, Array]:
+def _cost(beyond: Floats, scale: float) -> tuple[Floats, Floats]:
     """Return cost and weight of points at a distance beyond their circle [px]."""
     square = (beyond / scale) ** 2
     limit = np.where(beyond > 0.0, _OUTLINE.outside, 1.0)
@@ -170,8 +168,8 @@ def _cost(beyond: Array, scale: float) -> tuple[Array, Array]:
 
 
 def _refine(
-    points: Array, side: Array, poses: Array, diameter: float, spacing: float
-) -> tuple[Array, Array, float]:
+    points: Floats, side: Floats, poses: Floats, diameter: float, spacing: float
+) -> tuple[Floats, Floats, float]:
     """Return the pose of least cost near some, its normal matrix and its residual [px].
 
     All are moved together, each until it stands still.
@@ -212,7 +210,7 @@ def _refine(
 
 
 def _swing_variance(
-    points: Array, held: Array, centre: Array, diameter: float, noise: float
+    points: Floats, held: Floats, centre: Floats, diameter: float, noise: float
 ) -> float:
     """Return the variance of a marker's direction when little is seen of one of its discs [rad²].
 
@@ -230,7 +228,7 @@ def _swing_variance(
     return float(likely @ _SWINGS**2 / likely.sum())
 
 
-def _shares(weights: list[Weights], centres: Array, diameter: float) -> Array:
+def _shares(weights: list[Weights], centres: Floats, diameter: float) -> Floats:
     """Return how much of each disc is seen."""
     seen = []
     for weight, centre in zip(weights, centres, strict=True):

@@ -14,8 +14,8 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.core.arrays import Floats
 from driftwalk.track.detect.markers import Weights
-from driftwalk.track.types import Array
 
 
 class CentrePolicy(NamedTuple):
@@ -56,9 +56,9 @@ class Measured:
         its centre is off when a part of its edge is hidden.
     """
 
-    centres: Array
-    covariance: Array
-    shares: Array
+    centres: Floats
+    covariance: Floats
+    shares: Floats
     uneven: float = 0.0
 
     @property
@@ -68,7 +68,7 @@ class Measured:
 
 
 def weighted_centres(
-    cv2: Any, weights: list[Weights], start: Array, *, diameter: float
+    cv2: Any, weights: list[Weights], start: Floats, *, diameter: float
 ) -> Measured:
     """Return the centres of two whole discs.
 
@@ -94,7 +94,7 @@ def weighted_centres(
     return Measured(centres, np.diag(variances), shares, float(uneven.max()) / diameter)
 
 
-def _centre(weight: Weights, start: Array, reach: float) -> tuple[Array, float]:
+def _centre(weight: Weights, start: Floats, reach: float) -> tuple[Floats, float]:
     """Return the centre of a disc, and the area over half of its height [px²]."""
     rows, columns = weight.shape
     column, row = start.tolist()
@@ -116,7 +116,7 @@ def _centre(weight: Weights, start: Array, reach: float) -> tuple[Array, float]:
     return np.array([column, row]), area
 
 
-def _variance(cv2: Any, weight: Weights, centre: Array, reach: float) -> tuple[Array, float]:
+def _variance(cv2: Any, weight: Weights, centre: Floats, reach: float) -> tuple[Floats, float]:
     """Return the variance of a disc's centre along columns and rows [px²], and how uneven it is.
 
     A disc looks the same when it is turned by half a turn about its centre: what differs is noise,
@@ -138,7 +138,7 @@ def _variance(cv2: Any, weight: Weights, centre: Array, reach: float) -> tuple[A
 
 
 @lru_cache(maxsize=64)
-def _window(half: int) -> tuple[Weights, Array, npt.NDArray[np.complex64]]:
+def _window(half: int) -> tuple[Weights, Floats, npt.NDArray[np.complex64]]:
     """Return a round window, squares of distances along one side, and two harmonics, flat.
 
     The harmonics are the second and the third; both are of the form of a distance, so that they
