@@ -33,6 +33,7 @@ _FIRST = words(
     "id track trackid robot robotid individual animal name particle agent subject fish mouse "
     "rat bot particleid agentid objectid tagid uid tracklet"
 )
+_P = re.compile(r"[pP]\d*")
 _BRACKETS = re.compile(r"^(.*?)\s*[\[(]\s*([^\])]*)\s*[\])]\s*$")
 _JOINED = re.compile(r"(position|cent(?:er|re|roid)|head|nose|tail)([xy])\b", re.IGNORECASE)
 
@@ -146,6 +147,8 @@ def _quantity(tokens: list[str]) -> tuple[int, str, str]:
             found = found[1:]
         elif kinds == ("theta", "theta"):
             found = found[:1]  # "heading angle"
+        elif first == "confidence" and second in OF_BODY and _P.fullmatch(tokens[found[0][0]]):
+            found = found[1:]  # "p_RS_R_x" is a position, "p1_x" that of a point
     return found[0] if len(found) == 1 else (-1, "", "")
 
 

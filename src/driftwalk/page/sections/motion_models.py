@@ -11,7 +11,6 @@ from driftwalk.page.chart import chart, label, mark, series
 from driftwalk.page.number_words import cell, quantity
 from driftwalk.page.parts import (
     Section,
-    answer_table,
     figure,
     require,
     required,
@@ -24,8 +23,8 @@ from driftwalk.page.sections.recording import recording_sections
 from driftwalk.schema.answers.model_comparison import (
     ASPECT_WORDS,
     CHECK_WORDS,
-    comparison_answer,
     own_score,
+    ranking_table,
 )
 from driftwalk.schema.answers.parts import each
 
@@ -223,7 +222,8 @@ def models_summary(comparison: xr.Dataset) -> Section:
 
 def ranking_section(comparison: xr.Dataset) -> Section:
     """Return the table of the models, the closest first."""
-    table = answer_table(comparison_answer(comparison))
+    require(comparison, "score", "score_std", "behind", "behind_std", "held_out_distance")
+    table = ranking_table(comparison)
     note = "Distance from blocks of time that no model was fitted to."
     return table_section("ranking", "Ranking", table.columns, table.rows, note)
 

@@ -61,25 +61,11 @@ def comparison_answer(found: xr.Dataset) -> Answer:
     """Return the answer of a comparison: the verdict, the ranking, the reasons."""
     findings, warnings = sentences(found, "finding"), sentences(found, "warning")
     models = each(found, "model")
-    asked = "asked" in found
-    rows = [
-        (
-            str(one["model"].values),
-            int(one["free_numbers"]),
-            f"{float(one['score']):.2f} ± {float(one['score_std']):.2f}",
-            f"{float(one['behind']):.2f} ± {float(one['behind_std']):.2f}" if index else "",
-            f"{float(one['held_out_distance'][0]):.3f}",
-            *((_misfit(one),) if asked else ()),
-            _explained(one),
-        )
-        for index, one in enumerate(models)
-    ]
-    columns = (*_COLUMNS, *(("misfit",) if asked else ()), "explained")
     own = by_name(found, "aspect", "own_distance")
     apart = ", ".join(f"{ASPECT_WORDS.get(name, name)} {value:.3f}" for name, value in own.items())
     parts: list[Part] = [
         *(f"{text}." for text in findings[:1]),
-        Table(rows, columns, "models, the closest first"),
+        ranking_table(found),
         f"D of the recording's own parts: {apart}",
         *(f"{text}." for text in findings[1:]),
     ]
@@ -103,6 +89,25 @@ def comparison_answer(found: xr.Dataset) -> Answer:
         "warnings": warnings,
     }
     return Answer(parts, facts, warnings)
+
+
+def ranking_table(found: xr.Dataset) -> Table:
+    """Return the table of the compared models, the closest first."""
+    asked = "asked" in found
+    rows = [
+        (
+            str(one["model"].values),
+            int(one["free_numbers"]),
+            f"{float(one['score']):.2f} ± {float(one['score_std']):.2f}",
+            f"{float(one['behind']):.2f} ± {float(one['behind_std']):.2f}" if index else "",
+            f"{float(one['held_out_distance'][0]):.3f}",
+            *((_misfit(one),) if asked else ()),
+            _explained(one),
+        )
+        for index, one in enumerate(each(found, "model"))
+    ]
+    columns = (*_COLUMNS, *(("misfit",) if asked else ()), "explained")
+    return Table(rows, columns, "models, the closest first")
 
 
 def _misfit(one: xr.Dataset) -> str:

@@ -86,12 +86,12 @@ def test_what_may_be_milliseconds_is_said_and_not_converted(step: float, tmp_pat
 @pytest.mark.parametrize(
     ("header", "columns"),
     [
+        ("#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m]", {}),
         ("timestamp,x_m,y_m", {"t": "timestamp:ns"}),
         ("timestamp,x_m,y_m", {"t": "1:ns"}),
         ("%time,x_m,y_m", {"t": "%time:ns"}),
         ("time stamp,x_m,y_m", {"t": "time stamp:ns"}),
         ("timestamp [ns],x_m,y_m", {}),
-        ("#timestamp [ns],p_RS_R_x [m],p_RS_R_y [m]", {}),
         ("timestamp_ns,x_m,y_m", {}),
     ],
 )
