@@ -68,7 +68,9 @@ def fitted(seconds: float) -> xr.Dataset:
     return _fitted(seconds).copy(deep=True)
 
 
-def driven(seed: int, seconds: float, changes: Mapping[str, Any]) -> xr.Dataset:
+def driven(
+    seed: int, seconds: float, changes: Mapping[str, Any], *, interval: float = 0.1
+) -> xr.Dataset:
     """Return a block on a swirl, with a jet that drives it to the wall; simulated by driftwalk.
 
     C_d is 0.45, σ_F 0.8 mN, the noise 0.3 mm and 9 mrad; `changes` are keys of the study.
@@ -90,9 +92,9 @@ def driven(seed: int, seconds: float, changes: Mapping[str, Any]) -> xr.Dataset:
     jet = 0.05 * np.exp(-0.5 * (np.hypot(x - 0.09, y + 0.05) / 0.03) ** 2)
     inside = np.ones(x.shape, dtype=np.int8)
     flow = build_flow_field(axis, axis, u=-swirl * y - jet, v=swirl * x, flag=inside)
-    time = np.arange(0.0, seconds + 20.0, 0.1)
+    time = np.arange(0.0, seconds + 20.0, interval)
     run = dw.simulate(study, flow, sample_time=time, replicates=1, seed=seed)
-    seen = run.isel(replicate=0, body=0, time=slice(200, None))
+    seen = run.isel(replicate=0, body=0, time=slice(round(20.0 / interval), None))
     return build_trajectory(
         seen["time"].values - 20.0, *(seen[name].values for name in ("x", "y", "theta"))
     )

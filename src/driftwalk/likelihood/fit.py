@@ -12,23 +12,35 @@ from driftwalk.core.processors import one_blas_thread
 from driftwalk.core.run_stages import Course, share_of_search, tell_nobody
 from driftwalk.likelihood.angle_consistency import angle_given_facts, spin_correlation
 from driftwalk.likelihood.filter.filter_pass import Passes
+from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.interval_inflation import (
     open_where_undetermined,
     parameter_covariance,
     parameter_facts,
     with_mended_frames,
 )
-from driftwalk.likelihood.law.force_law import assumptions_of, side_slopes, stated_drag
+from driftwalk.likelihood.law.force_law import Assumptions, assumptions_of, side_slopes, stated_drag
 from driftwalk.likelihood.law.forward_selection import LawResult
 from driftwalk.likelihood.law.search import LawSearch
-from driftwalk.likelihood.newton import WORK, Mode, ModeSearch, Passed, Tell, pieces, work_of_pass
+from driftwalk.likelihood.newton import (
+    FROM_ANOTHER,
+    WORK,
+    Mode,
+    ModeSearch,
+    Passed,
+    Tell,
+    pieces,
+    require_mode,
+    thinned,
+    work_of_pass,
+)
 from driftwalk.likelihood.preparation import (
     AngleUse,
     PreparedRecordings,
     as_list,
     prepare,
 )
-from driftwalk.likelihood.prior import Prior
+from driftwalk.likelihood.prior import Prior, Weights
 from driftwalk.likelihood.refuse import BREAKDOWN, require_noise_below_motion, solved
 from driftwalk.likelihood.reml import Restricted, restricted_drag
 from driftwalk.likelihood.result import build_fit, law_facts, visited_shares, whiteness_of
@@ -110,13 +122,16 @@ def fit_motion(
     with solved(ready.wall_share):
         passed = _work_listener(course, _usual_search(passes))
         search = ModeSearch(passes, Prior(passes), chosen.fit.iterations, passed)
-        law = LawSearch(search, assumptions).find(start, first_weights(ready.tracks, passes.spline))
+        law = _law_of(search, assumptions, start, first_weights(ready.tracks, passes.spline))
         course.begin("drag")
         try:
             restricted = restricted_drag(search, law.mode)
         except BREAKDOWN:
             # What was opened may have no restricted likelihood; the law without it has one.
-            law = replace(law, mode=law.base)
+            base = law.base
+            if thinned(passes) is not passes:
+                base = require_mode(search.find(base.point, base.weights, held=FROM_ANOTHER))
+            law = replace(law, mode=base)
             restricted = restricted_drag(search, law.mode)
     require_noise_below_motion(math.exp(restricted.point.log_noise), ready.tracks, ready.wall_share)
     with solved(ready.wall_share):
@@ -131,7 +146,7 @@ def fit_motion(
         turning["spin_correlation"] = spin_correlation(start.coefficients, passes)
     if ready.angle == "state":
         course.begin("angle as given")
-        given = ready.with_angle("given").passes
+        given = thinned(ready.with_angle("given").passes)
         turning |= angle_given_facts(given, law.mode, restricted, chosen)
     with solved(ready.wall_share):
         parameters = _parameter_facts(search, law.mode, restricted, ready)
@@ -159,6 +174,20 @@ def fit_motion(
             warning=("warning", texts(warnings))
         )
     )
+
+
+def _law_of(
+    search: ModeSearch, assumptions: Assumptions, start: Point, weights: Weights
+) -> LawResult:
+    """Return the law that the recording supports, of a fast camera from samples further apart."""
+    few = thinned(search.passes)
+    law = LawSearch(replace(search, passes=few), assumptions).find(start, weights)
+    if few is search.passes:
+        return law
+    mode = search.find(law.mode.point, law.mode.weights, held=FROM_ANOTHER)
+    if mode is None or not mode.converged:
+        return LawSearch(search, assumptions).find(start, weights)
+    return replace(law, mode=mode, base=mode if law.base is law.mode else law.base)
 
 
 def _parameter_facts(

@@ -53,6 +53,33 @@ def test_of_many_short_recordings_little_would_be_left_out() -> None:
     assert sum(one.time.size for one in few) == 5 * 2 * EXCERPT.piece_samples
 
 
+def test_a_thinned_series_leaves_out_what_it_holds_of_left_out_intervals() -> None:
+    series = _passes(60.0).series[0]
+    series.excluded[[0, 7, 200, 201, 599]] = 1
+    thin = series.thinned(0.3)
+    np.testing.assert_array_equal(thin.time, series.time[::3])
+    held = [series.excluded[max(k - 2, 0) : k + 1].max() for k in range(0, series.time.size, 3)]
+    np.testing.assert_array_equal(thin.excluded[:-1], held[:-1])
+    assert series.thinned(0.1) is series
+
+
+@pytest.mark.slow
+def test_a_law_searched_on_samples_further_apart_gives_the_same_fit(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Each ends within 0.15 standard deviations of the mode of all samples."""
+    recording = driven(3, 90.0, {}, interval=0.02)
+    study = coarse_study()
+    found = fit_motion(recording, study)
+    monkeypatch.setattr(newton, "EXCERPT", EXCERPT._replace(interval_s=0.0))
+    whole = fit_motion(recording, study)
+    assert int(found["samples_used"]) == int(whole["samples_used"]) > 2000
+    width = np.ptp(whole["interval"].values, axis=1) / 3.29
+    apart = np.abs(found["estimate"].values - whole["estimate"].values)
+    known = ~np.isin(whole["parameter"].values, ["force_lever", "added_mass_share"])
+    assert (apart < 0.3 * width)[known].all()
+
+
 @pytest.mark.slow
 def test_a_search_by_way_of_pieces_ends_where_one_of_the_whole_does(
     monkeypatch: pytest.MonkeyPatch,

@@ -5,7 +5,6 @@ The covariances of the innovations are many 2 x 2 or 3 x 3 matrices, factored al
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -133,16 +132,18 @@ def variance_changes(base: dict[str, Any], other: dict[str, Any]) -> Floats:
 
 
 def noise_derivatives(
-    base: dict[str, Any], pairs: Sequence[Pair], used: Bools
+    base: dict[str, Any], pairs: list[Pair], used: Bools
 ) -> tuple[Floats, list[Floats], list[Floats]]:
     """Return whitened innovations (n, D), and the derivatives of them and of S by the noises.
 
-    The derivatives of S are whitened from both sides, L^-1 dS L^-T, shape (D, D, n).
+    The derivatives of S are whitened from both sides, L^-1 dS L^-T, shape (D, D, n). The pairs are
+    taken from their list one by one: of a fast camera they fill a gigabyte.
     """
     root = factor(base["covariance"][used])
     white = forward(root, base["innovation"][used].T).T
     changes, spreads = [], []
-    for one, other, step, _, wave in pairs:
+    while pairs:
+        one, other, step, _, wave = pairs.pop(0)
         per = 1.0 / step if wave is None else wave[used, None] / step
         change = (one["innovation"][used] - other["innovation"][used]) * per
         changes.append(forward(root, change.T).T)

@@ -130,6 +130,9 @@ class Passes:
                     self.kernel(series, point.with_extra(name, high)).run(series.time.size)
                 )
                 pair = Pair(one, other, step, most)
+            # States are the larger half of a pass, and no derivative needs them.
+            one.pop("state", None)
+            other.pop("state", None)
             found[name] = pair
         for name in waves:
             cosine = cosine_of(series, STRENGTHS.index(name) + 1)
@@ -137,7 +140,7 @@ class Passes:
         return [found[name] for name in names]
 
     def _sums_of(
-        self, series: Series, point: Point, base: dict[str, Any], pairs: Sequence[Pair]
+        self, series: Series, point: Point, base: dict[str, Any], pairs: list[Pair]
     ) -> Sums:
         """Return the sums of one series: of coefficients and ln C_d by the kernel, then noises."""
         # A sample counts only where every pass has used it: else a difference of two passes would
@@ -155,7 +158,7 @@ class Passes:
             np.log(np.einsum("aan->an", factor(base["covariance"][used]))).sum()
         )
         count = len(found["information"])
-        size = count + len(pairs)
+        size = count + len(changes)
         score, information = np.empty(size), np.empty((size, size))
         score[:count] = found["products"][0]
         information[:count, :count] = found["information"]
@@ -166,7 +169,7 @@ class Passes:
         for k, (change, spread) in enumerate(zip(changes, spreads, strict=True)):
             bent = np.einsum("abn,na,nb->", spread, white, white, optimize=True)
             score[count + k] = (change * white).sum() + 0.5 * (bent - np.einsum("aan->", spread))
-            for other in range(len(pairs)):
+            for other in range(len(changes)):
                 information[count + k, count + other] = (change * changes[other]).sum() + 0.5 * (
                     spread * spreads[other]
                 ).sum()

@@ -82,6 +82,20 @@ class Series:
         columns = ("time", "x", "y", "theta", "omega", "excluded", "angle")
         return replace(self, **{name: getattr(self, name)[first:end] for name in columns})
 
+    def thinned(self, interval: float) -> Series:
+        """Return samples about an interval [s] apart; the series where they are no nearer."""
+        if self.time.size < 2:
+            return self
+        every = round(interval / max(float(np.median(np.diff(self.time))), 1e-9))
+        if every < 2:
+            return self
+        columns = ("time", "x", "y", "theta", "omega", "angle")
+        thin = {name: getattr(self, name)[::every] for name in columns}
+        # An interval is left out where one of those that it holds is.
+        firsts = np.maximum(np.arange(0, self.time.size, every) - every + 1, 0)
+        thin["excluded"] = np.maximum.reduceat(self.excluded, firsts)
+        return replace(self, **thin)
+
 
 @dataclass(frozen=True)
 class Body:
