@@ -82,8 +82,8 @@ def verdict_parts(verdict: Verdict | None, unchecked: str = "") -> list[Part]:
     --------
     >>> verdict_parts(verdict_of(["the flow changes"], []))
     [Row(label='verdict', text='does not explain:'), '  the flow changes']
-    >>> verdict_parts(None, "--no-check")
-    [Row(label='verdict', text='not checked: --no-check')]
+    >>> verdict_parts(None, "too few samples")
+    [Row(label='verdict', text='not checked: too few samples')]
     """
     if verdict is None:
         return [Row("verdict", f"not checked{': ' if unchecked else ''}{unchecked}")]
