@@ -98,7 +98,8 @@ def _facts(
         **_estimate(problem, lowest, "coarse_"),
         "ks_distance": stages.optimum.distance,
         "noise_floor": stages.floor,
-        "warnings": stages.warnings,
+        # Without a verdict, what would leave it open is a warning.
+        "warnings": stages.warnings if stages.verdict else [*stages.warnings, *stages.unable],
         "recording_name": str(recording.attrs.get("source", "")),
         "simulated_recording": str(recording.attrs.get("simulated", "no")),
         "study": problem.study.to_toml(),

@@ -24,7 +24,7 @@ from driftwalk.calibration.problem import (
 )
 from driftwalk.calibration.result import build_calibration
 from driftwalk.calibration.stationarity import stationarity_of
-from driftwalk.calibration.warnings import own_flow_warning, wall_warning
+from driftwalk.calibration.warnings import OWN_FLOW, wall_warning
 from driftwalk.comparison import Statistic, StepDistance
 from driftwalk.conditions import jump_warnings, study_in_arena, unstated_warning
 from driftwalk.core.background_task import run_in_background
@@ -145,11 +145,11 @@ def calibrate(
     is_block = isinstance(searched, BlockModel)
     unstated = unstated_warning(chosen, about="block" if is_block else "tank") if in_tank else None
     stages.warnings += jump_warnings(recording, body, track=track)
-    stages.warnings += [
+    stages.warnings += [] if unstated is None else [unstated]
+    stages.unable += [
         text
         for text in (
-            unstated,
-            own_flow_warning(searched, stages.quality) if flow is None else None,
+            OWN_FLOW if is_block and flow is None else None,
             wall_warning(track, chosen) if is_block else None,
             None if stationarity is None else stationarity.warning,
         )

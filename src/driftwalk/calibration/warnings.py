@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.calibration.goodness_of_fit import GoodnessOfFit
 from driftwalk.calibration.problem import Axes
 from driftwalk.core.arrays import Floats
 from driftwalk.flow.arena import outline_of
-from driftwalk.motion import BlockModel, MotionModel
 from driftwalk.schema import Parameter, Track
 
 if TYPE_CHECKING:
@@ -60,25 +58,14 @@ def wall_warning(track: Track, study: Study) -> str | None:
     )
 
 
-def own_flow_warning(model: MotionModel, quality: GoodnessOfFit | None) -> str | None:
-    """Return what to do where a block is not explained in a flow from its own recording.
-
-    Such a flow is too slow where the block seldom was, and its inward part near the wall is half of
-    the true one (docs/validation.md); C_d and sigma_F make up for that.
-
-    Examples
-    --------
-    >>> import driftwalk as dw
-    >>> own_flow_warning(BlockModel(dw.Study()), None) is None
-    True
-    """
-    if not isinstance(model, BlockModel) or quality is None or quality.explained:
-        return None
-    return (
-        "the flow was taken from the recording itself, and the parameters make up for its errors: "
-        "for a body that drifts, fit flow and parameters together (driftwalk fit) or give a "
-        "measured flow; for one that moves by itself, compare models (driftwalk compare-models)"
-    )
+OWN_FLOW: Final = (
+    "the flow was taken from the recording itself, and the parameters make up for its errors: "
+    "for a body that drifts, fit flow and parameters together (driftwalk fit) or give a "
+    "measured flow; for one that moves by itself, compare models (driftwalk compare-models)"
+)
+"""Such a flow is too slow where the block seldom was, and its inward part near the wall is half of
+the true one (docs/validation.md). C_d and sigma_F make up for that, at times with a D near the
+floor."""
 
 
 Boundary = tuple[int, int]

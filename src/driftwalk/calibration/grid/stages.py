@@ -25,6 +25,7 @@ from driftwalk.calibration.grid.grid_refinement import (
     locate_minimum,
     refine,
 )
+from driftwalk.calibration.misfit import drawn_distance, step_differences, undetermined
 from driftwalk.calibration.problem import Execution, Problem, limits_of
 from driftwalk.calibration.warnings import Boundary, interval_warnings, optimum_warnings
 from driftwalk.core.errors import InputError
@@ -40,11 +41,17 @@ class GridCalibration:
     def __init__(self, problem: Problem, how: Execution) -> None:
         self.problem = problem
         self.warnings: list[str] = []
+        self.against: list[str] = []
+        self.unable: list[str] = []
         self.bootstrap: Bootstrap | None = None
         self.quality: GoodnessOfFit | None = None
         self.region: Region | None = None
-        self.verdict: Verdict | None = None
         self._how = how
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """Whether the model explains the recording; None without a bootstrap."""
+        return None if self.quality is None else verdict_of(self.against, self.unable)
 
     def run(self) -> GridCalibration:
         """Run every stage that the study asks for."""
@@ -57,7 +64,10 @@ class GridCalibration:
         if search.refine == "auto":
             self._refine(search.refined_replicates)
         at_ends = optimum_warnings(self.problem.parameters, self.coarse.axes, self.optimum.point)
-        self.warnings += at_ends.values()
+        for (index, side), text in at_ends.items():
+            # The end of the search at 0 is one of nature.
+            at_zero = self.problem.parameters[index].to_value(self.coarse.axes[index][side]) == 0.0
+            (self.warnings if at_zero else self.unable).append(text)
         if search.bootstrap >= 2 and self.refined is not None:
             self._bootstrap(self.refined, search.bootstrap, at_ends)
         return self
@@ -99,7 +109,7 @@ class GridCalibration:
         self.optimum = self.refined.energy_score.optimum
         cell = better_cell(self.refined.map, self.refined.energy_score)
         if cell is not None:
-            self.warnings.append(self._unresolved(self.refined.map.point(cell)))
+            self.unable.append(self._unresolved(self.refined.map.point(cell)))
 
     def _unresolved(self, point: Sequence[float]) -> str:
         """Return the warning of a setting that is nearer to the recording than the optimum."""
@@ -142,7 +152,7 @@ class GridCalibration:
             confidence=self.problem.study.calibration.confidence,
             stretch=self.quality.stretch,
         )
-        self.warnings += interval_warnings(
+        self.unable += interval_warnings(
             self.problem.parameters,
             self.region.intervals,
             self.bootstrap.estimates,
@@ -152,11 +162,26 @@ class GridCalibration:
             steps=self.problem.refined_steps,
             known=known,
         )
-        against = []
+        self.unable += undetermined(
+            self.problem.parameters, self.region.intervals, self.optimum.point
+        )
         if not self.quality.explained:
-            against.append(
-                f"D = {self.quality.distance:.3f} at the optimum is "
-                f"{self.quality.distance / self.quality.floor:.1f} times the noise floor "
-                f"{self.quality.floor:.3f}; the parameters are the best of bad fits"
+            self._say_how_far(self.quality, self.bootstrap)
+
+    def _say_how_far(self, quality: GoodnessOfFit, bootstrap: Bootstrap) -> None:
+        """Say where the model differs, or that chance in the parameters may be the reason."""
+        far = (
+            f"D = {quality.distance:.3f} at the optimum is {quality.distance / quality.floor:.1f} "
+            f"times the noise floor {quality.floor:.3f}"
+        )
+        drawn = drawn_distance(self.problem, bootstrap)
+        if quality.distance <= drawn:
+            self.unable.append(
+                f"{far}, but simulations with other values that chance allows are {drawn:.3f} "
+                "apart: record longer"
             )
-        self.verdict = verdict_of(against, [])
+        else:
+            self.against += [
+                f"{far}; the parameters are the best of bad fits",
+                *step_differences(self.problem, self.optimum.point),
+            ]

@@ -32,6 +32,18 @@ class Verdict(NamedTuple):
         """Whether nothing is against the model, and a fault would have shown."""
         return self.word == EXPLAINS
 
+    def and_also(self, against: Sequence[str], unable: Sequence[str]) -> Verdict:
+        """Return the verdict that follows from these findings and from further ones.
+
+        Examples
+        --------
+        >>> verdict_of([], ["too short"]).and_also(["it is too fast"], [])
+        Verdict(word='does not explain', reasons=('too short', 'it is too fast'))
+        """
+        found = verdict_of(against, unable)
+        word = max(self.word, found.word, key=(EXPLAINS, CANNOT_TELL, DOES_NOT_EXPLAIN).index)
+        return Verdict(word, (*self.reasons, *found.reasons))
+
 
 def verdict_of(against: Sequence[str], unable: Sequence[str]) -> Verdict:
     """Return the verdict that follows from findings.
@@ -69,8 +81,8 @@ def verdict_variables(verdict: Verdict) -> dict[str, Any]:
 
 
 def stored_verdict(dataset: xr.Dataset) -> Verdict | None:
-    """Return the verdict that a dataset holds; None where the model was not checked."""
-    if "verdict" not in dataset.variables:
+    """Return the verdict that a dataset holds; None where it has none, or one for each model."""
+    if "verdict" not in dataset.variables or dataset["verdict"].ndim:
         return None
     return Verdict(str(dataset["verdict"].values), tuple(sentences(dataset, "verdict_reason")))
 
