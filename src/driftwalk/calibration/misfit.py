@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Final, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,11 @@ from driftwalk.comparison import StepDistance
 from driftwalk.comparison.statistic import distances_among
 from driftwalk.core.arrays import Floats
 from driftwalk.schema import Parameter
+from driftwalk.schema.kinds.fit import PARAMETERS
+from driftwalk.schema.kinds.flow import FIT_PREFIX
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 class MisfitPolicy(NamedTuple):
@@ -110,4 +115,34 @@ def undetermined(
                 f"the {one.label} is not determined: its interval is {low:.3g} to {high:.3g}{unit};"
                 " record longer, or other motion"
             )
+    return said
+
+
+def fit_disagreements(
+    flow: xr.Dataset, recording: str, intervals: Mapping[str, tuple[float, float]]
+) -> list[str]:
+    """Return where a calibration and the fit that made its flow exclude each other.
+
+    Parameters
+    ----------
+    flow : xarray.Dataset
+        A `flow_field`. One that no fit made, or one of another recording, says nothing.
+    recording : str
+        Name of the recording's file.
+    intervals : mapping of str to tuple
+        Of the calibration: ``drag_coefficient`` and ``force_noise_intensity`` [N2 s].
+    """
+    if recording not in str(flow.attrs.get("source", "")).split(", "):
+        return []
+    said = []
+    for name, ends in intervals.items():
+        of_fit = flow.attrs.get(f"{FIT_PREFIX}{name}")
+        if of_fit is None or not (ends[1] < of_fit[0] or of_fit[1] < ends[0]):
+            continue
+        number = PARAMETERS[name]
+        own, other = (f"{low:.3g} to {high:.3g}" for low, high in (ends, of_fit))
+        said.append(
+            f"{number.words} is {own} here and {other} in the fit that made the flow: at most one "
+            "of them is right; read the fit's own verdict, or measure the flow"
+        )
     return said

@@ -13,6 +13,7 @@ from driftwalk.calibration.goodness_of_fit import Halves, validate_on_halves
 from driftwalk.calibration.grid.grid_map import SweepProgress
 from driftwalk.calibration.grid.stages import GridCalibration
 from driftwalk.calibration.held_out.recorded import body_motion
+from driftwalk.calibration.misfit import fit_disagreements
 from driftwalk.calibration.problem import (
     Execution,
     FlowSource,
@@ -146,6 +147,15 @@ def calibrate(
     unstated = unstated_warning(chosen, about="block" if is_block else "tank") if in_tank else None
     stages.warnings += jump_warnings(recording, body, track=track)
     stages.warnings += [] if unstated is None else [unstated]
+    if is_block and flow is not None and stages.region is not None:
+        drag, force = stages.region.intervals
+        every = chosen.forces.force_interval_s
+        found_in_flow = {
+            "drag_coefficient": drag,
+            "force_noise_intensity": (every * force[0] ** 2, every * force[1] ** 2),
+        }
+        name = str(recording.attrs.get("source", ""))
+        stages.unable += fit_disagreements(flow, name, found_in_flow)
     stages.unable += [
         text
         for text in (

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from driftwalk.calibration import misfit
 from driftwalk.calibration.grid.stages import GridCalibration
-from driftwalk.calibration.misfit import step_differences, undetermined
+from driftwalk.calibration.misfit import fit_disagreements, step_differences, undetermined
 from driftwalk.comparison import StepDistance, StepTable
 from driftwalk.schema import Parameter
 
@@ -92,3 +93,32 @@ def test_a_large_distance_counts_unless_chance_in_the_values_is_as_large(
     assert made.verdict is not None
     assert made.verdict.word == word
     assert made.verdict.reasons[0].startswith("D = 0.300 at the optimum is 10.0 times")
+
+
+FIT = {
+    "source": "first.csv, second.csv",
+    "interval_of_drag_coefficient": [0.156, 0.231],
+    "interval_of_force_noise_intensity": [2e-9, 4e-9],
+}
+
+
+@pytest.mark.parametrize(
+    ("recording", "drag", "force", "named"),
+    [
+        ("second.csv", (0.0, 0.126), (3e-9, 5e-9), ["drag coefficient C_d is 0 to 0.126 here"]),
+        ("second.csv", (0.23, 0.3), (5e-9, 6e-9), ["noise intensity σ_F²·τ is 5e-09 to 6e-09"]),
+        ("second.csv", (0.1, 0.16), (1e-9, 2.1e-9), []),
+        ("third.csv", (0.0, 0.126), (5e-9, 6e-9), []),
+    ],
+)
+def test_a_calibration_that_excludes_the_fit_of_its_flow_is_told_so(
+    recording: str, drag: tuple[float, float], force: tuple[float, float], named: list[str]
+) -> None:
+    flow = xr.Dataset(attrs=FIT)
+    said = fit_disagreements(
+        flow, recording, {"drag_coefficient": drag, "force_noise_intensity": force}
+    )
+    assert len(said) == len(named)
+    for text, words in zip(said, named, strict=True):
+        assert text.startswith(words)
+    assert fit_disagreements(xr.Dataset(), recording, {"drag_coefficient": drag}) == []
