@@ -102,6 +102,7 @@ def interval_warnings(
     intervals: Sequence[tuple[float, float]],
     estimates: Floats,
     *,
+    border: Floats,
     search: Axes,
     window: Axes,
     lattice: Axes,
@@ -117,15 +118,23 @@ def interval_warnings(
             # The bootstrap's own 5 % tail may lie there; more means that the grid cuts it off.
             crowded = np.mean(_close(estimates[:, index], lattice[index][side], step)) > 0.05
             cut = _close(intervals[index][side], axis[side], step)
+            region_cut = bool(_close(border[:, index], axis[side], step).any())
             reaches = f"the interval of the {parameter.label} reaches the end of the"
+            region = f"the joint region reaches, along the {parameter.label}, the end of the"
             end = _shown(parameter, axis[side])
             if not _close(axis[side], search[index][side], step):
-                if crowded or cut:
-                    found.append(f"{reaches} refined grid ({end}): it is wider than stated")
-            elif cut and (index, side) not in known and parameter.to_value(axis[side]) != 0.0:
+                if crowded or cut or region_cut:
+                    what = reaches if crowded or cut else region
+                    found.append(f"{what} refined grid ({end}): it is wider than stated")
+            elif (
+                (cut or region_cut)
+                and (index, side) not in known
+                and parameter.to_value(axis[side]) != 0.0
+            ):
                 values = "smaller" if side == 0 else "larger"
                 found.append(
-                    f"{reaches} search ({end}): extend the grid if {values} values are possible"
+                    f"{reaches if cut else region} search ({end}): extend the grid if {values} "
+                    "values are possible"
                 )
     return found
 

@@ -8,7 +8,12 @@ from functools import partial
 
 import numpy as np
 
-from driftwalk.calibration.goodness_of_fit import GoodnessOfFit, goodness_of_fit, noise_floor_at
+from driftwalk.calibration.goodness_of_fit import (
+    GoodnessOfFit,
+    goodness_of_fit,
+    noise_floor_at,
+    within_chance,
+)
 from driftwalk.calibration.grid.bootstrap_region import (
     Bootstrap,
     Region,
@@ -147,7 +152,7 @@ class GridCalibration:
         self.floor = self.quality.floor
         self.region = confidence_region(
             energy_score.smoother,
-            energy_score.surface,
+            within_chance(energy_score, self.bootstrap, self.quality.stretch),
             self.bootstrap,
             confidence=self.problem.study.calibration.confidence,
             stretch=self.quality.stretch,
@@ -156,6 +161,7 @@ class GridCalibration:
             self.problem.parameters,
             self.region.intervals,
             self.bootstrap.estimates,
+            border=self.region.border,
             search=self.coarse.axes,
             window=refined.map.axes,
             lattice=surface.axes,
