@@ -165,7 +165,8 @@ def _fixed(entry: Candidate) -> dict[str, float]:
 
 def _findings(found: Estimation, entry: Candidate) -> tuple[list[str], list[str]]:
     """Return what the summaries and the ranges say against the model, and what they leave open."""
-    against, unable = [], []
+    against: list[str] = []
+    unable: list[str] = []
     matched = found.matched
     if matched is not None and not matched.usual:
         (against if matched.against else unable).append(
