@@ -1,4 +1,4 @@
-"""What speaks against a calibrated model, and what leaves it open: sentences of the verdict."""
+"""Sentences for the verdict of a calibration: how the model differs, which values are unknown."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What speaks against a calibrated model, and what leaves it open."""
+"""Sentences for the verdict of a calibration."""
 
 from __future__ import annotations
 
