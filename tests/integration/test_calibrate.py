@@ -214,11 +214,11 @@ def test_an_optimum_at_the_edge_of_the_grid_is_warned_of():
     )
     found = dw.calibrate(synthetic_recording(200.0), study, flow=dw.tank30_flow())
     warnings = found["warning"].values.tolist()
-    assert found["verdict_reason"].values[0].startswith("D = ")
+    assert any(text.startswith("D = ") for text in found["verdict_reason"].values)
     assert any("edge of the grid" in text for text in found["verdict_reason"].values)
     assert not any("driftwalk fit" in text for text in warnings)  # the flow was given
     assert found["interval_stretch"] > 2.0
-    assert found["verdict"] == "does not explain"
+    assert found["verdict"] == "cannot tell"
 
 
 def test_a_coarse_map_alone_is_possible():

@@ -77,9 +77,12 @@ def test_what_differs_is_named_with_its_size(
     assert step_differences(of_a_user, (0.0,)) == []  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(("drawn", "word"), [(0.05, "does not explain"), (0.5, "cannot tell")])
+@pytest.mark.parametrize(
+    ("drawn", "at_end", "word"),
+    [(0.05, False, "does not explain"), (0.5, False, "cannot tell"), (0.05, True, "cannot tell")],
+)
 def test_a_large_distance_counts_unless_chance_in_the_values_is_as_large(
-    drawn: float, word: str, monkeypatch: pytest.MonkeyPatch
+    drawn: float, at_end: bool, word: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from driftwalk.calibration.goodness_of_fit import GoodnessOfFit
     from driftwalk.calibration.grid import stages
@@ -89,7 +92,8 @@ def test_a_large_distance_counts_unless_chance_in_the_values_is_as_large(
     made = GridCalibration(SimpleNamespace(), SimpleNamespace())  # type: ignore[arg-type]
     made.optimum = SimpleNamespace(point=(0.4,))  # type: ignore[assignment]
     made.quality = GoodnessOfFit(0.3, 0.01, 0.03, 0.04)
-    made._say_how_far(made.quality, None)  # type: ignore[arg-type]
+    made.bootstrap = SimpleNamespace()  # type: ignore[assignment]
+    made._say_how_far(at_end=at_end)
     assert made.verdict is not None
     assert made.verdict.word == word
     assert made.verdict.reasons[0].startswith("D = 0.300 at the optimum is 10.0 times")

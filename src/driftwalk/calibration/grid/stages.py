@@ -69,12 +69,17 @@ class GridCalibration:
         if search.refine == "auto":
             self._refine(search.refined_replicates)
         at_ends = optimum_warnings(self.problem.parameters, self.coarse.axes, self.optimum.point)
-        for (index, side), text in at_ends.items():
-            # The end of the search at 0 is one of nature.
-            at_zero = self.problem.parameters[index].to_value(self.coarse.axes[index][side]) == 0.0
-            (self.warnings if at_zero else self.unable).append(text)
+        # No search goes on beyond 0.
+        extensible = [
+            text
+            for (index, side), text in at_ends.items()
+            if self.problem.parameters[index].to_value(self.coarse.axes[index][side]) != 0.0
+        ]
+        self.warnings += [text for text in at_ends.values() if text not in extensible]
+        self.unable += extensible
         if search.bootstrap >= 2 and self.refined is not None:
             self._bootstrap(self.refined, search.bootstrap, at_ends)
+            self._say_how_far(at_end=bool(extensible))
         return self
 
     def _coarse_map(self, replicates: int) -> Map:
@@ -171,17 +176,20 @@ class GridCalibration:
         self.unable += undetermined(
             self.problem.parameters, self.region.intervals, self.optimum.point
         )
-        if not self.quality.explained:
-            self._say_how_far(self.quality, self.bootstrap)
 
-    def _say_how_far(self, quality: GoodnessOfFit, bootstrap: Bootstrap) -> None:
-        """Say where the model differs, or that chance in the parameters may be the reason."""
+    def _say_how_far(self, *, at_end: bool) -> None:
+        """Say where the model differs, or why that tells nothing of the model."""
+        quality, bootstrap = self.quality, self.bootstrap
+        if quality is None or bootstrap is None or quality.explained:
+            return
         far = (
             f"D = {quality.distance:.3f} at the optimum is {quality.distance / quality.floor:.1f} "
             f"times the noise floor {quality.floor:.3f}"
         )
         drawn = drawn_distance(self.problem, bootstrap)
-        if quality.distance <= drawn:
+        if at_end:
+            self.unable.append(f"{far}, and other values than the searched ones may be closer")
+        elif quality.distance <= drawn:
             self.unable.append(
                 f"{far}, but simulations with other values that chance allows are {drawn:.3f} "
                 "apart: record longer"
