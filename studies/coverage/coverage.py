@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 import driftwalk as dw
-from driftwalk.calibration.goodness_of_fit import goodness_of_fit
+from driftwalk.calibration.goodness_of_fit import goodness_of_fit, within_chance
 from driftwalk.calibration.grid.bootstrap_region import (
     build_surface,
     confidence_region,
@@ -95,9 +95,10 @@ def answer_of(
     stored = build_surface(problem, found)
     simulated = run_bootstrap(problem, energy_score, stored, count=bootstrap)
     quality = goodness_of_fit(simulated)
+    surface = within_chance(energy_score, simulated, quality.stretch)
     region = confidence_region(
         energy_score.smoother,
-        energy_score.surface,
+        surface,
         simulated,
         confidence=0.9,
         stretch=quality.stretch,
@@ -106,7 +107,7 @@ def answer_of(
     return {
         "drag_coefficient": energy_score.optimum.point[0],
         "force_std_N": energy_score.optimum.point[1],
-        "region_holds": region_contains(energy_score.smoother, energy_score.surface, region, truth),
+        "region_holds": region_contains(energy_score.smoother, surface, region, truth),
         "drag_coefficient_holds": drag[0] <= truth[0] <= drag[1],
         "force_std_holds": force[0] <= truth[1] <= force[1],
         "drag_coefficient_interval": drag,

@@ -74,11 +74,11 @@ def test_the_truth_of_a_synthetic_recording_is_found(found):
     """
     assert facts_of(found)["drag_coefficient"] == pytest.approx(TRUTH["drag_coefficient"], abs=0.03)
     assert found["distance_to_floor_ratio"] < 1.5
-    assert bool(found["explained"])
     # In so few and coarse steps what they do not exclude of sigma_F goes on beyond the search.
-    said = [text for text in found["warning"].values if " not stated: " not in text]
-    assert len(said) < found["warning"].size  # the default block
-    assert all("force_std reaches the end of the search" in text for text in said)
+    assert found["verdict"] == "cannot tell"
+    assert all("the force_std " in text for text in found["verdict_reason"].values)
+    (unstated,) = found["warning"].values
+    assert " not stated: " in unstated
 
 
 @pytest.mark.slow
@@ -214,11 +214,11 @@ def test_an_optimum_at_the_edge_of_the_grid_is_warned_of():
     )
     found = dw.calibrate(synthetic_recording(200.0), study, flow=dw.tank30_flow())
     warnings = found["warning"].values.tolist()
-    assert any("edge of the grid" in text for text in warnings)
-    assert any("does not explain" in text for text in warnings)
+    assert any(text.startswith("D = ") for text in found["verdict_reason"].values)
+    assert any("edge of the grid" in text for text in found["verdict_reason"].values)
     assert not any("driftwalk fit" in text for text in warnings)  # the flow was given
     assert found["interval_stretch"] > 2.0
-    assert not bool(found["explained"])
+    assert found["verdict"] == "cannot tell"
 
 
 def test_a_coarse_map_alone_is_possible():
@@ -226,7 +226,7 @@ def test_a_coarse_map_alone_is_possible():
     found = dw.calibrate(synthetic_recording(100.0), study, flow=dw.tank30_flow())
     assert "refined_ks_distance" not in found
     assert "interval" not in found
-    assert "explained" not in found
+    assert "verdict" not in found
     assert facts_of(found)["drag_coefficient"] in found["drag_coefficient"].values
 
 
@@ -246,8 +246,8 @@ def test_a_block_that_its_own_flow_does_not_explain_is_told_what_to_do():
     study = apply_overrides(dw.Study(), {**SMALL, "calibration.bootstrap": 10})
     recording = dw.tank30_recording().isel(time=slice(0, 1000))
     own = dw.calibrate(recording, study)
-    assert not bool(own["explained"])
-    assert any("driftwalk fit" in text for text in own["warning"].values)
+    assert own["verdict"] == "does not explain"
+    assert any("driftwalk fit" in text for text in own["verdict_reason"].values)
 
 
 @pytest.mark.slow
@@ -258,7 +258,7 @@ def test_an_interval_that_the_search_cuts_off_is_warned_of():
     )
     found = dw.calibrate(synthetic_recording(60.0), study, flow=dw.tank30_flow())
     np.testing.assert_allclose(found["interval"].sel(parameter="force_std"), [0.2e-3, 0.8e-3])
-    told = [text for text in found["warning"].values if "end of the search" in text]
+    told = [text for text in found["verdict_reason"].values if "end of the search" in text]
     assert told == [
         f"the interval of the force_std reaches the end of the search ({end} N): extend the grid "
         f"if {which} values are possible"
@@ -308,4 +308,4 @@ def test_the_truth_of_a_slow_orbit_is_in_the_intervals():
     for name, truth in SLOW.items():
         low, high = facts_of(found)[f"{name}_interval"]
         assert low <= truth <= high, name
-    assert bool(found["explained"])
+    assert found["verdict"] != "does not explain"

@@ -10,11 +10,12 @@ from typing import NamedTuple
 import numpy as np
 
 from driftwalk.calibration.grid.bootstrap_region import Bootstrap, simulated_steps
+from driftwalk.calibration.grid.energy_score import EnergyScore
 from driftwalk.calibration.grid.grid_map import Map, MapSimulator
 from driftwalk.calibration.grid.grid_refinement import first_window, locate_minimum
 from driftwalk.calibration.problem import FlowSource, Problem, limits_of, prepare_problem
 from driftwalk.comparison.statistic import distances_among
-from driftwalk.core.arrays import Bools
+from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.run_stages import Progress
 from driftwalk.schema import Track
@@ -59,6 +60,20 @@ def goodness_of_fit(bootstrap: Bootstrap) -> GoodnessOfFit:
         float(np.median(bootstrap.to_each_other)),
         float(np.quantile(bootstrap.to_each_other, 0.95)),
     )
+
+
+def within_chance(energy_score: EnergyScore, bootstrap: Bootstrap, stretch: float) -> Floats:
+    """Return the surface of a recording, raised where a setting is too far from it for chance.
+
+    No recording simulated at the optimum is farther from the others, in floors. A setting whose own
+    distance is larger cannot have made the recording, however low the surface is there: the height
+    in floors is low where two recordings of one setting differ much.
+    """
+    surface, floor = energy_score.surface, energy_score.floor
+    to_others = bootstrap.to_each_other
+    farthest = to_others.mean(axis=0).max() / np.median(to_others)
+    beyond = energy_score.mean > stretch * farthest * floor
+    return np.where(beyond & (surface > surface.min()), 2.0 * surface.max(), surface)
 
 
 class Halves(NamedTuple):

@@ -13,6 +13,7 @@ from driftwalk.calibration.goodness_of_fit import Halves, validate_on_halves
 from driftwalk.calibration.grid.grid_map import SweepProgress
 from driftwalk.calibration.grid.stages import GridCalibration
 from driftwalk.calibration.held_out.recorded import body_motion
+from driftwalk.calibration.misfit import fit_disagreements
 from driftwalk.calibration.problem import (
     Execution,
     FlowSource,
@@ -24,7 +25,7 @@ from driftwalk.calibration.problem import (
 )
 from driftwalk.calibration.result import build_calibration
 from driftwalk.calibration.stationarity import stationarity_of
-from driftwalk.calibration.warnings import own_flow_warning, wall_warning
+from driftwalk.calibration.warnings import OWN_FLOW, wall_warning
 from driftwalk.comparison import Statistic, StepDistance
 from driftwalk.conditions import jump_warnings, study_in_arena, unstated_warning
 from driftwalk.core.background_task import run_in_background
@@ -98,7 +99,7 @@ def calibrate(
     xarray.Dataset
         A `calibration`. ``estimate`` and ``interval`` are the answer, by parameter:
         ``drag_coefficient`` and ``force_std`` [N] of the block. ``optimum_ks_distance`` is to be
-        compared with ``noise_floor``; ``explained`` and ``warning`` say what comes of that. Of the
+        compared with ``noise_floor``; ``verdict`` and ``warning`` say what comes of that. Of the
         block also ``force_interval`` [s] and ``force_noise_intensity`` [N2 s], which is what the
         recording can tell.
 
@@ -145,11 +146,20 @@ def calibrate(
     is_block = isinstance(searched, BlockModel)
     unstated = unstated_warning(chosen, about="block" if is_block else "tank") if in_tank else None
     stages.warnings += jump_warnings(recording, body, track=track)
-    stages.warnings += [
+    stages.warnings += [] if unstated is None else [unstated]
+    if is_block and flow is not None and stages.region is not None:
+        drag, force = stages.region.intervals
+        every = chosen.forces.force_interval_s
+        found_in_flow = {
+            "drag_coefficient": drag,
+            "force_noise_intensity": (every * force[0] ** 2, every * force[1] ** 2),
+        }
+        name = str(recording.attrs.get("source", ""))
+        stages.unable += fit_disagreements(flow, name, found_in_flow)
+    stages.unable += [
         text
         for text in (
-            unstated,
-            own_flow_warning(searched, stages.quality) if flow is None else None,
+            OWN_FLOW if is_block and flow is None else None,
             wall_warning(track, chosen) if is_block else None,
             None if stationarity is None else stationarity.warning,
         )

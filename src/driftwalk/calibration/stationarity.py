@@ -106,10 +106,15 @@ def motion_warnings(motion: RecordedMotion) -> list[str]:
     series that goes on beyond its frames.
     """
     said = series_warnings(motion.like.flow, duration=motion.duration)
+    return [*unsteady_motion(motion), *said]
+
+
+def unsteady_motion(motion: RecordedMotion) -> list[str]:
+    """Return a sentence where the halves of a recording differ, and when the speed changed."""
     stationarity = stationarity_of_motion(motion)
     if stationarity is None or stationarity.warning is None:
-        return said
-    return [stationarity.warning + _change(motion), *said]
+        return []
+    return [stationarity.warning + _change(motion)]
 
 
 def _change(motion: RecordedMotion) -> str:

@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.calibration.goodness_of_fit import GoodnessOfFit
 from driftwalk.calibration.problem import Axes
 from driftwalk.core.arrays import Floats
 from driftwalk.flow.arena import outline_of
-from driftwalk.motion import BlockModel, MotionModel
 from driftwalk.schema import Parameter, Track
 
 if TYPE_CHECKING:
@@ -60,25 +58,14 @@ def wall_warning(track: Track, study: Study) -> str | None:
     )
 
 
-def own_flow_warning(model: MotionModel, quality: GoodnessOfFit | None) -> str | None:
-    """Return what to do where a block is not explained in a flow from its own recording.
-
-    Such a flow is too slow where the block seldom was, and its inward part near the wall is half of
-    the true one (docs/validation.md); C_d and sigma_F make up for that.
-
-    Examples
-    --------
-    >>> import driftwalk as dw
-    >>> own_flow_warning(BlockModel(dw.Study()), None) is None
-    True
-    """
-    if not isinstance(model, BlockModel) or quality is None or quality.explained:
-        return None
-    return (
-        "the flow was taken from the recording itself, and the parameters make up for its errors: "
-        "for a body that drifts, fit flow and parameters together (driftwalk fit) or give a "
-        "measured flow; for one that moves by itself, compare models (driftwalk compare-models)"
-    )
+OWN_FLOW: Final = (
+    "the flow was taken from the recording itself, and the parameters make up for its errors: "
+    "for a body that drifts, fit flow and parameters together (driftwalk fit) or give a "
+    "measured flow; for one that moves by itself, compare models (driftwalk compare-models)"
+)
+"""Such a flow is too slow where the block seldom was, and its inward part near the wall is half of
+the true one (docs/validation.md). C_d and sigma_F make up for that, at times with a D near the
+floor."""
 
 
 Boundary = tuple[int, int]
@@ -115,6 +102,7 @@ def interval_warnings(
     intervals: Sequence[tuple[float, float]],
     estimates: Floats,
     *,
+    border: Floats,
     search: Axes,
     window: Axes,
     lattice: Axes,
@@ -130,15 +118,23 @@ def interval_warnings(
             # The bootstrap's own 5 % tail may lie there; more means that the grid cuts it off.
             crowded = np.mean(_close(estimates[:, index], lattice[index][side], step)) > 0.05
             cut = _close(intervals[index][side], axis[side], step)
+            region_cut = bool(_close(border[:, index], axis[side], step).any())
             reaches = f"the interval of the {parameter.label} reaches the end of the"
+            region = f"the joint region reaches, along the {parameter.label}, the end of the"
             end = _shown(parameter, axis[side])
             if not _close(axis[side], search[index][side], step):
-                if crowded or cut:
-                    found.append(f"{reaches} refined grid ({end}): it is wider than stated")
-            elif cut and (index, side) not in known and parameter.to_value(axis[side]) != 0.0:
+                if crowded or cut or region_cut:
+                    what = reaches if crowded or cut else region
+                    found.append(f"{what} refined grid ({end}): it is wider than stated")
+            elif (
+                (cut or region_cut)
+                and (index, side) not in known
+                and parameter.to_value(axis[side]) != 0.0
+            ):
                 values = "smaller" if side == 0 else "larger"
                 found.append(
-                    f"{reaches} search ({end}): extend the grid if {values} values are possible"
+                    f"{reaches if cut else region} search ({end}): extend the grid if {values} "
+                    "values are possible"
                 )
     return found
 

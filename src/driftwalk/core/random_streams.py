@@ -41,6 +41,7 @@ WORK: Final[dict[str, int]] = {
     "first_half_refined": 7,
     "second_half": 8,
     "coverage": 9,
+    "drawn": 15,
     # the search over several parameters: its settings, worlds to judge its answer by, and a trial
     "evolution": 10,
     "judged": 11,

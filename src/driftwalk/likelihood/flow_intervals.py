@@ -11,6 +11,7 @@ import numpy as np
 from driftwalk.core.errors import InputError
 from driftwalk.schema import FLAGS, Track, build_flow_field
 from driftwalk.schema.check import refuse_other_version, require_kind
+from driftwalk.schema.kinds.flow import FIT_PREFIX
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -186,6 +187,11 @@ def fitted_flow(fit: xr.Dataset, *, interval: int | None = None) -> xr.Dataset:
         "cell_size_m": float(fit["cell_size"]),
         **{key: fit.attrs[key] for key in ("arena", "source")},
     }
+    # A calibration in this flow compares its answer with that of the fit.
+    for name in ("drag_coefficient", "force_noise_intensity"):
+        if name in fit["parameter"].values:
+            ends = fit["interval"].sel(parameter=name).values
+            attrs[f"{FIT_PREFIX}{name}"] = [float(end) for end in ends]
     x, y = fit["x"].values, fit["y"].values
     if intervals.steady:
         return build_flow_field(x, y, attrs=attrs, **_field_variables(fit))

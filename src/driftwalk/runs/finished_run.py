@@ -16,6 +16,7 @@ from driftwalk.core.files.run_layout import MANIFEST_FILE, faults_of, run_file, 
 from driftwalk.core.provenance import read_manifest
 from driftwalk.motion import MotionModel, estimated_values
 from driftwalk.schema.answers.facts import sentences
+from driftwalk.schema.answers.verdict import stored_verdict
 from driftwalk.schema.check import check_contents, refuse_other_version, require_kind
 from driftwalk.schema.parameters import is_block
 from driftwalk.schema.runs import RUN_KINDS, RunKind, kind_of, load_maker
@@ -100,6 +101,9 @@ class FoundRun:
         """Sentences for a user who simulates the block with these values."""
         said = [*self.faults]
         said += [f"of the {self.words}: {text}" for text in sentences(self.found, "warning")]
+        verdict = stored_verdict(self.found)
+        if verdict is not None and not verdict.explains:
+            said += [f"of the {self.words}: {verdict.word}: {text}" for text in verdict.reasons]
         if "number" in self.found.coords:
             names = [str(name) for name in self.found["number"].values]
             if any(name.startswith(OF_THE_FLOW) for name in names):

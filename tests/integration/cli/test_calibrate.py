@@ -254,10 +254,10 @@ def test_an_optimum_at_the_edge_and_a_bad_fit_are_warned_of(study: Path, tmp_pat
     run = tmp_path / "run"
     done = here(*words(narrow, run, "300s"), "--flow", FLOW)
     assert done.code == 0
-    assert "driftwalk: warning: the optimum lies at the edge of the grid: drag" in done.err
-    assert "driftwalk: warning: the model does not explain the recording" in done.err
-    warnings = calibration(run)["warning"].values.tolist()
-    assert any("edge of the grid" in text for text in warnings)
+    assert "  the optimum lies at the edge of the grid: drag" in done.out
+    assert "verdict                cannot tell:" in done.out
+    reasons = calibration(run)["verdict_reason"].values.tolist()
+    assert any("edge of the grid" in text for text in reasons)
 
 
 @pytest.mark.slow

@@ -41,6 +41,9 @@ class MatchingPolicy(NamedTuple):
     """Discrepancy per summary from which on another start is no use: it is another model."""
     typical_quantile: float = 0.95
     """One recording of the model itself in twenty is called unlike it."""
+    against: float = 1.5
+    """Discrepancy, in that quantile, from which the summaries speak against the model: at most 1.23
+    in 160 recordings of the model itself (studies/motion_models), 3.5 and more on wrong models."""
     unsettled: float = 1.0
     """Last move of a mean, in standard deviations, above which it is not determined."""
     unlike: float = 4.0
@@ -94,6 +97,11 @@ class Matched(NamedTuple):
     def usual(self) -> bool:
         """Whether the summaries are like those of the model's own recordings."""
         return self.discrepancy <= self.upper_discrepancy
+
+    @property
+    def against(self) -> bool:
+        """Whether the summaries speak against the model, and are not just less usual."""
+        return self.discrepancy > MATCHING.against * self.upper_discrepancy
 
     @property
     def unlike(self) -> bool:

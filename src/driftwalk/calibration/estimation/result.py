@@ -12,14 +12,20 @@ import numpy as np
 from driftwalk.calibration.estimation.estimate import Matched
 from driftwalk.calibration.estimation.identifiability import Determination
 from driftwalk.calibration.held_out.candidates import Candidate
-from driftwalk.calibration.held_out.held_out_score import HeldOutScore, recording_parts, verdict_of
+from driftwalk.calibration.held_out.held_out_score import (
+    HeldOutScore,
+    held_out_verdict,
+    recording_parts,
+)
 from driftwalk.calibration.held_out.recorded import RecordedMotion
-from driftwalk.calibration.stationarity import motion_warnings
+from driftwalk.calibration.stationarity import unsteady_motion
 from driftwalk.core.arrays import Floats
 from driftwalk.motion import ParticleModel
 from driftwalk.schema import Parameter
 from driftwalk.schema.answers.facts import BOUNDS, AnswerParts, texts
+from driftwalk.schema.answers.verdict import verdict_variables
 from driftwalk.schema.check import build_dataset
+from driftwalk.simulation.series import series_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,7 +67,9 @@ def build_model_calibration(
 ) -> xr.Dataset:
     """Return the dataset of a calibration of many parameters."""
     ranges, held_out = entry.ranges, found.held_out
-    verdict = verdict_of(held_out, motion, baseline=False)
+    against, unable = _findings(found, entry)
+    unable += unsteady_motion(motion)
+    verdict = held_out_verdict(held_out, motion, baseline=False).and_also(against, unable)
     count = len(ranges)
     # None where the summaries' answer does not count: nothing is known of the intervals then.
     known = found.known
@@ -86,11 +94,11 @@ def build_model_calibration(
         "check_high": ("check", held_out.checks.max(axis=0)),
         "score": ((), held_out.score),
         "score_std": ((), held_out.score_std),
-        "explained": ((), verdict.explained),
-        "verdict": ((), np.array(verdict.text)),
+        **verdict_variables(verdict),
         **_stages(found, entry),
     }  # fmt: skip
-    said = [*warnings, *_said(found, entry, verdict.explained), *motion_warnings(motion)]
+    series = series_warnings(motion.like.flow, duration=motion.duration)
+    said = [*warnings, *_said(found, entry), *series]
     coords: dict[str, Any] = {
         **named.coords,
         **about.coords,
@@ -155,32 +163,42 @@ def _fixed(entry: Candidate) -> dict[str, float]:
     return {**model.fixed, "clearance": model.clearance}
 
 
-def _said(found: Estimation, entry: Candidate, explained: bool) -> list[str]:
-    """Return the warnings of the estimate."""
-    said = []
+def _findings(found: Estimation, entry: Candidate) -> tuple[list[str], list[str]]:
+    """Return what the summaries and the ranges say against the model, and what they leave open."""
+    against: list[str] = []
+    unable: list[str] = []
     matched = found.matched
-    if matched is not None and found.known is None:
+    if matched is not None and not matched.usual:
+        (against if matched.against else unable).append(
+            "the summaries of the motion differ from the model's: a misfit of "
+            f"{matched.discrepancy:.0f} where its own recordings come to "
+            f"{matched.median_discrepancy:.0f} (95 % below {matched.upper_discrepancy:.0f})"
+        )
+    ended = entry.at_range_end(found.point)
+    if ended is not None:
+        unable.append(ended)
+    return against, unable
+
+
+def _said(found: Estimation, entry: Candidate) -> list[str]:
+    """Return the warnings of the estimate."""
+    said: list[str] = []
+    matched = found.matched
+    if matched is None:
+        return said
+    if found.known is None:
         said.append(
             "the summaries of the motion pull the model away from it: in the six distances their "
             f"answer comes to {found.scores['matched']:.2f} noise floors, that of the search to "
             f"{found.scores['searched']:.2f}; the values are the search's, and none is determined"
         )
-    elif matched is not None and not matched.usual:
+        return said
+    if not matched.usual:
         said.append(
-            "the summaries of the motion differ from the model's: a misfit of "
-            f"{matched.discrepancy:.0f} where its own recordings come to "
-            f"{matched.median_discrepancy:.0f} (95 % below {matched.upper_discrepancy:.0f}); the "
-            f"intervals are {matched.stretch:.1f} times as wide as the draws"
-            f"{', and no parameter is determined' if matched.unlike else ''}"
+            f"the intervals are {matched.stretch:.1f} times as wide as the draws, for what the "
+            f"model leaves of the summaries{'; nothing is determined' if matched.unlike else ''}"
         )
-    if matched is not None and found.known is not None:
-        said += _open(matched, entry)
-    if not explained:
-        said.append(
-            "the model does not explain the recording; its parameters are the best of bad fits"
-        )
-    ended = entry.at_range_end(found.point)
-    return said if ended is None else [*said, ended]
+    return [*said, *_open(matched, entry)]
 
 
 def _open(matched: Matched, entry: Candidate) -> list[str]:

@@ -29,7 +29,7 @@ from driftwalk.calibration.grid.energy_score import (
     Smoother,
     at_settings,
     lattice_of,
-    lowest_point,
+    lowest_between,
     make_smoother,
     nearest_point,
 )
@@ -254,7 +254,7 @@ class _Estimates:
     def __call__(self, unit: WorkUnit) -> dict[str, npt.NDArray[Any]]:
         rows = self.recordings.rows(slice(unit.start, unit.stop))
         found = self.surface.heights_in_floors(rows, unit.start // BOOTSTRAP.recordings_per_unit)
-        columns = np.array([lowest_point(self.surface.axes, one) for one in found]).T
+        columns = np.array([lowest_between(self.surface.axes, one) for one in found]).T
         return {
             **dict(zip(self.names, columns, strict=True)),
             "excess": self.floor * np.array([_excess(one, self.truth) for one in found]),

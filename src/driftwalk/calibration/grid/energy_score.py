@@ -80,6 +80,39 @@ def lowest_point(axes: Sequence[Floats], surface: Floats) -> tuple[float, ...]:
     return tuple(float(axis[at]) for axis, at in zip(axes, lowest, strict=True))
 
 
+def lowest_between(axes: Sequence[Floats], surface: Floats) -> tuple[float, ...]:
+    """Return where a surface is lowest, between points of its lattice: a parabola along each axis.
+
+    At the end of an axis, and where a neighbour is infinite, the point of the lattice stands.
+
+    Examples
+    --------
+    >>> axis = np.linspace(0.0, 1.0, 5)
+    >>> bowl = (axis[:, None] - 0.3) ** 2 + (axis[None, :] - 1.0) ** 2
+    >>> tuple(round(value, 6) for value in lowest_between([axis, axis], bowl))
+    (0.3, 1.0)
+    """
+    lowest = np.unravel_index(int(np.argmin(surface)), surface.shape)
+    found = []
+    for along, axis in enumerate(axes):
+        at, line = (
+            int(lowest[along]),
+            surface[
+                tuple(
+                    slice(None) if other == along else place for other, place in enumerate(lowest)
+                )
+            ],
+        )
+        value = float(axis[at])
+        if 0 < at < axis.size - 1 and np.isfinite(line[at - 1 : at + 2]).all():
+            before, here, after = map(float, line[at - 1 : at + 2])
+            bend = before - 2.0 * here + after
+            if bend > 0.0:
+                value += 0.25 * (before - after) / bend * float(axis[at + 1] - axis[at - 1])
+        found.append(value)
+    return tuple(found)
+
+
 def at_settings(surface: Floats) -> Floats:
     """Return a surface at the settings of its grid: every `FINENESS`-th point of the lattice."""
     return np.asarray(surface[(slice(None, None, FINENESS),) * surface.ndim])
@@ -166,6 +199,14 @@ class EnergyScore(NamedTuple):
     def floor_at_optimum(self) -> float:
         """Floor of the optimum."""
         return float(self.floor[nearest_point(self.smoother.axes, self.optimum.point)])
+
+    @property
+    def mean(self) -> Floats:
+        """Mean distance of the recording from simulations of each setting, on the lattice."""
+        floor, distance = self.floor_at_optimum, self.optimum.distance
+        # S is the mean less half the floor, and the surface its rise in floors of the setting.
+        rise = self.floor * (self.surface - self.surface.min()) / floor
+        return np.asarray(distance - 0.5 * floor + rise + 0.5 * self.floor)
 
     @property
     def height(self) -> Floats:

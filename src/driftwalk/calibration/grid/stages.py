@@ -8,7 +8,12 @@ from functools import partial
 
 import numpy as np
 
-from driftwalk.calibration.goodness_of_fit import GoodnessOfFit, goodness_of_fit, noise_floor_at
+from driftwalk.calibration.goodness_of_fit import (
+    GoodnessOfFit,
+    goodness_of_fit,
+    noise_floor_at,
+    within_chance,
+)
 from driftwalk.calibration.grid.bootstrap_region import (
     Bootstrap,
     Region,
@@ -25,12 +30,14 @@ from driftwalk.calibration.grid.grid_refinement import (
     locate_minimum,
     refine,
 )
+from driftwalk.calibration.misfit import drawn_distance, step_differences, undetermined
 from driftwalk.calibration.problem import Execution, Problem, limits_of
 from driftwalk.calibration.warnings import Boundary, interval_warnings, optimum_warnings
 from driftwalk.core.errors import InputError
 from driftwalk.core.run_stages import share_of_map, share_of_windows
 from driftwalk.motion.batches import no_numbers
 from driftwalk.motion.score import broken_worlds
+from driftwalk.schema.answers.verdict import Verdict, verdict_of
 
 
 class GridCalibration:
@@ -39,10 +46,17 @@ class GridCalibration:
     def __init__(self, problem: Problem, how: Execution) -> None:
         self.problem = problem
         self.warnings: list[str] = []
+        self.against: list[str] = []
+        self.unable: list[str] = []
         self.bootstrap: Bootstrap | None = None
         self.quality: GoodnessOfFit | None = None
         self.region: Region | None = None
         self._how = how
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """Whether the model explains the recording; None without a bootstrap."""
+        return None if self.quality is None else verdict_of(self.against, self.unable)
 
     def run(self) -> GridCalibration:
         """Run every stage that the study asks for."""
@@ -55,9 +69,17 @@ class GridCalibration:
         if search.refine == "auto":
             self._refine(search.refined_replicates)
         at_ends = optimum_warnings(self.problem.parameters, self.coarse.axes, self.optimum.point)
-        self.warnings += at_ends.values()
+        # No search goes on beyond 0.
+        extensible = [
+            text
+            for (index, side), text in at_ends.items()
+            if self.problem.parameters[index].to_value(self.coarse.axes[index][side]) != 0.0
+        ]
+        self.warnings += [text for text in at_ends.values() if text not in extensible]
+        self.unable += extensible
         if search.bootstrap >= 2 and self.refined is not None:
             self._bootstrap(self.refined, search.bootstrap, at_ends)
+            self._say_how_far(at_end=bool(extensible))
         return self
 
     def _coarse_map(self, replicates: int) -> Map:
@@ -97,7 +119,7 @@ class GridCalibration:
         self.optimum = self.refined.energy_score.optimum
         cell = better_cell(self.refined.map, self.refined.energy_score)
         if cell is not None:
-            self.warnings.append(self._unresolved(self.refined.map.point(cell)))
+            self.unable.append(self._unresolved(self.refined.map.point(cell)))
 
     def _unresolved(self, point: Sequence[float]) -> str:
         """Return the warning of a setting that is nearer to the recording than the optimum."""
@@ -135,24 +157,45 @@ class GridCalibration:
         self.floor = self.quality.floor
         self.region = confidence_region(
             energy_score.smoother,
-            energy_score.surface,
+            within_chance(energy_score, self.bootstrap, self.quality.stretch),
             self.bootstrap,
             confidence=self.problem.study.calibration.confidence,
             stretch=self.quality.stretch,
         )
-        self.warnings += interval_warnings(
+        self.unable += interval_warnings(
             self.problem.parameters,
             self.region.intervals,
             self.bootstrap.estimates,
+            border=self.region.border,
             search=self.coarse.axes,
             window=refined.map.axes,
             lattice=surface.axes,
             steps=self.problem.refined_steps,
             known=known,
         )
-        if not self.quality.explained:
-            self.warnings.append(
-                f"the model does not explain the recording: D = {self.quality.distance:.3f} at the "
-                f"optimum is {self.quality.distance / self.quality.floor:.1f} times the noise "
-                f"floor {self.quality.floor:.3f}; the parameters are the best of bad fits"
+        self.unable += undetermined(
+            self.problem.parameters, self.region.intervals, self.optimum.point
+        )
+
+    def _say_how_far(self, *, at_end: bool) -> None:
+        """Say where the model differs, or why that tells nothing of the model."""
+        quality, bootstrap = self.quality, self.bootstrap
+        if quality is None or bootstrap is None or quality.explained:
+            return
+        far = (
+            f"D = {quality.distance:.3f} at the optimum is {quality.distance / quality.floor:.1f} "
+            f"times the noise floor {quality.floor:.3f}"
+        )
+        drawn = drawn_distance(self.problem, bootstrap)
+        if at_end:
+            self.unable.append(f"{far}, and other values than the searched ones may be closer")
+        elif quality.distance <= drawn:
+            self.unable.append(
+                f"{far}, but simulations with other values that chance allows are {drawn:.3f} "
+                "apart: record longer"
             )
+        else:
+            self.against += [
+                f"{far}; the parameters are the best of bad fits",
+                *step_differences(self.problem, self.optimum.point),
+            ]

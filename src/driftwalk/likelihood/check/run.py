@@ -31,8 +31,8 @@ from driftwalk.likelihood.check.verdict import (
 from driftwalk.likelihood.flow_intervals import require_fit
 from driftwalk.likelihood.preparation import as_list, estimate_of
 from driftwalk.likelihood.refuse import BREAKDOWN
-from driftwalk.schema.answers.facts import texts
 from driftwalk.schema.answers.fit import with_verdict
+from driftwalk.schema.answers.verdict import verdict_of, verdict_variables
 from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:
@@ -168,11 +168,11 @@ def check_model(
     Returns
     -------
     xarray.Dataset
-        A `model_check`: ``explained`` (true, false) and ``finding`` (sentences: statistic, value,
-        expected, place or time); in its attributes ``ks_distance``, ``ks_noise_floor``,
-        ``effective_parameters``. By criterion ``p_value``; whiteness by
-        component and lag; residuals by cell, by part of the recording and by speed; densities of
-        steps with bands.
+        A `model_check`: ``verdict`` ("explains", "does not explain", "cannot tell") and
+        ``verdict_reason`` (sentences: statistic, value, expected, place or time); in its attributes
+        ``ks_distance``, ``ks_noise_floor``, ``effective_parameters``. By criterion ``p_value``;
+        whiteness by component and lag; residuals by cell, by part of the recording and by speed;
+        densities of steps with bands.
 
     Raises
     ------
@@ -185,8 +185,8 @@ def check_model(
     >>> import driftwalk as dw
     >>> recording = dw.tank30_recording()
     >>> check = dw.check_model(dw.fit_motion(recording), recording)  # doctest: +SKIP
-    >>> bool(check["explained"])  # doctest: +SKIP
-    True
+    >>> str(check["verdict"].values)  # doctest: +SKIP
+    'explains'
     """
     if replicates < FEWEST_REPLICATES:
         raise InputError(f"replicates must be at least {FEWEST_REPLICATES}, got {replicates}")
@@ -238,16 +238,14 @@ def check_model(
         motion, scan = None, None
         attrs |= {"ks_distance": np.nan, "ks_noise_floor": np.nan, "ks_left_out": str(error)}
     criteria = criteria_of(errors, found, motion, scan, fit=fit)
-    findings = findings_of(criteria)
+    verdict = verdict_of(findings_of(criteria), [])
     data = {
         "p_value": ("criterion", [one.p_value for one in criteria]),
         "failed": ("criterion", np.array([one.failed for one in criteria], dtype=np.int8)),
-        "explained": ((), np.bool_(not findings)),
+        **verdict_variables(verdict),
     }
     names = np.array([one.name for one in criteria], dtype=object)
-    parts.append(
-        (data, {"criterion": ("criterion", names), "finding": ("finding", texts(findings))})
-    )
+    parts.append((data, {"criterion": ("criterion", names)}))
     variables: dict[str, Any] = {}
     coords: dict[str, Any] = {}
     for some, places in parts:
@@ -302,8 +300,8 @@ def judge_fit(
     >>> import driftwalk as dw
     >>> recording = dw.tank30_recording()
     >>> found = judge_fit(dw.fit_motion(recording), [recording])  # doctest: +SKIP
-    >>> bool(found.fit["explained"])  # doctest: +SKIP
-    True
+    >>> str(found.fit["verdict"].values)  # doctest: +SKIP
+    'explains'
     """
     try:
         check = check_model(fit, recordings, body=body)

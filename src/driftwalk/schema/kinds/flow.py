@@ -14,6 +14,9 @@ _RECORDED: Final = "made from a recording"
 _BODY: Final = "made from the track of a body"
 _TRACERS: Final = "made from tracers"
 
+FIT_PREFIX: Final = "interval_of_"
+"""In front of the parameters of the fit that made a flow."""
+
 FLOW_FIELD: Final = kind(
     f"""
 kind: flow_field
@@ -76,6 +79,10 @@ attributes ({_TRACERS}):
     samples_unjudged number: steps with too few neighbours
     samples_across_gaps number: pairs with a gap between
     samples_ambiguous number: pairs of unsure identity
+attributes (made by a fit):
+    {FIT_PREFIX}drag_coefficient numbers: ends of the fit's interval of C_d
+    {FIT_PREFIX}force_noise_intensity numbers: ends of its interval of σ_F² times the force \
+        interval; in N² s
 attributes (with a warning):
     warning text: what to know about the field
 attributes (the flow changes, and its repeat is stated):

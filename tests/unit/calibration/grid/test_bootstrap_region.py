@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from driftwalk.calibration.goodness_of_fit import within_chance
 from driftwalk.calibration.grid.bootstrap_region import (
     Bootstrap,
     confidence_region,
     region_contains,
 )
-from driftwalk.calibration.grid.energy_score import make_smoother
+from driftwalk.calibration.grid.energy_score import EnergyScore, Optimum, make_smoother
 
 DRAG = np.linspace(0.3, 0.5, 21)
 FORCE = np.linspace(4e-4, 8e-4, 21)
@@ -95,3 +96,23 @@ def test_the_region_of_one_parameter_is_the_interval_of_its_level():
     assert region.border[:, 0] == pytest.approx(region.intervals[0])
     assert region_contains(smoother, surface, region, (0.41,))
     assert not region_contains(smoother, surface, region, (0.45,))
+
+
+def test_no_setting_is_in_the_region_whose_own_distance_is_beyond_chance():
+    """Where two recordings of a setting differ twice as much, the surface is half as high."""
+    surface = 0.02 + 0.02 * (SURFACE - SURFACE.min())
+    floor = np.where(SMOOTHER.axes[0][:, None] > 0.4, 0.04, 0.02) + 0.0 * surface
+    score = EnergyScore(SMOOTHER, Optimum((0.4, 6e-4), 0.02), floor, surface)
+    # S is the mean less half the floor; its rise over the floor is that of the surface over 0.02.
+    mean = 0.01 + (surface - 0.02) * floor / 0.02 + 0.5 * floor
+    np.testing.assert_allclose(score.mean, mean)
+    apart = np.full((2, 8), 0.02)
+    apart[:, 3] = 0.03  # one of the recordings is 1.5 floors from the others
+    bootstrap = bootstrap_with(np.linspace(0.0, 0.1, 10))._replace(to_each_other=apart)
+    raised = within_chance(score, bootstrap, 1.0)
+    beyond = mean > 1.5 * floor
+    assert 0.2 < beyond.mean() < 0.9
+    assert (raised[beyond] > surface.max()).all()
+    np.testing.assert_array_equal(raised[~beyond], surface[~beyond])
+    # A model that leaves twice the floor is allowed twice the distance.
+    assert (within_chance(score, bootstrap, 2.0) == surface).mean() > (~beyond).mean()

@@ -17,8 +17,12 @@ REFINED = f"{REACHES}refined grid (0.4): it is wider than stated"
 LARGER = f"{REACHES}search (2): extend the grid if larger values are possible"
 
 
-def warned(low: float, high: float, *, window=WINDOW, estimates=MANY, known=()) -> list[str]:
-    ends = {"search": SEARCH, "window": window, "lattice": window, "steps": [0.1]}
+def warned(
+    low: float, high: float, *, window=WINDOW, estimates=MANY, border=MANY, known=()
+) -> list[str]:
+    ends = {
+        "border": border, "search": SEARCH, "window": window, "lattice": window, "steps": [0.1],
+    }  # fmt: skip
     return interval_warnings([DRAG], [(low, high)], estimates, **ends, known=known)
 
 
@@ -57,11 +61,25 @@ def test_recordings_of_the_bootstrap_that_crowd_at_the_end_of_a_window_say_the_s
     assert warned(0.5, 1.9, estimates=crowded) == []
 
 
+def test_a_region_that_is_cut_where_the_interval_is_not_is_named():
+    reaches = "the joint region reaches, along the drag coefficient, the end of the "
+    border = np.array([[0.5], [2.0], [1.0]])
+    assert warned(0.5, 1.9, border=border) == [
+        f"{reaches}search (2): extend the grid if larger values are possible"
+    ]
+    assert warned(0.5, 2.0, border=border) == [LARGER]
+    border[0] = 0.4
+    assert warned(0.5, 2.0, border=border)[0] == (
+        f"{reaches}refined grid (0.4): it is wider than stated"
+    )
+
+
 def test_values_have_their_units_on_any_scale():
     """A rate of 1 has the coordinate 0, and is not the least that can be."""
     search = (np.linspace(0.0, 1.0, 3),)
     rate = Parameter("rate", "1/s", 1.0, 10.0, step=0.5, scale="log")
     ends = {"search": search, "window": search, "lattice": search, "steps": [0.5]}
+    ends["border"] = MANY * 0.5
     assert interval_warnings([rate], [(0.0, 0.7)], MANY * 0.5, **ends) == [
         "the interval of the rate reaches the end of the search (1 1/s): extend the grid if "
         "smaller values are possible"
