@@ -23,6 +23,7 @@ import information
 import numpy as np
 import numpy.typing as npt
 import walkers
+from flows import Flow
 from ranges import SAMPLE_S, SEEDS
 from walkers import Walker
 from worlds import LAWS, Block, Camera, World, numbers_of, worlds
@@ -51,12 +52,12 @@ def main() -> None:
 
 
 def groups(wanted: list[World]) -> list[list[World]]:
-    """Return worlds that can be simulated together: same length, and as many modes of the flow."""
+    """Return worlds to simulate together: steady flows of one length, and those that change."""
     alike: dict[tuple[Any, ...], list[World]] = defaultdict(list)
     for world in wanted:
         body = world.body
         if isinstance(body, Block):
-            alike[world.minutes, len(body.flow.modes)].append(world)
+            alike[(world.minutes if len(body.flow.modes) == 1 else "changing",)].append(world)
         else:
             alike[(world.name,)].append(world)
     found = [
@@ -69,8 +70,10 @@ def make(group: list[World], out: Path) -> list[str]:
     """Simulate some worlds and write their files."""
     if isinstance(group[0].body, Block):
         tanks = tanks_of(group)
-        motion = blocks.simulate(tanks, 60.0 * group[0].minutes)
+        longest = blocks.simulate(tanks, 60.0 * max(world.minutes for world in group))
         for k, world in enumerate(group):
+            samples = round(60.0 * world.minutes / SAMPLE_S) + 1
+            motion = blocks.Motion(*(part[:, :samples] for part in longest))
             facts = information.of_block(tanks, k, motion)
             write(out, world, motion.place[k], motion.angle[k], facts)
     else:
@@ -88,15 +91,22 @@ def make(group: list[World], out: Path) -> list[str]:
 def tanks_of(group: list[World]) -> blocks.Tanks:
     """Return the tanks of some worlds as one."""
     bodies = [world.body for world in group]
+    modes = max(len(body.flow.modes) for body in bodies)
     names = ("drag_coefficient", "force_std", "added_mass", "floating", "drag_power",
              "force_memory", "growth", "pulse", "pulse_period", "friction",
              "restitution")  # fmt: skip
     return blocks.Tanks(
-        flow=[body.flow for body in bodies],
+        flow=[padded(body.flow, modes) for body in bodies],
         seed=[world.seed for world in group],
         start=np.array([body.start for body in bodies]),
         **{name: np.array([getattr(body, name) for body in bodies]) for name in names},
     )
+
+
+def padded(flow: Flow, modes: int) -> Flow:
+    """Return a flow with modes of no velocity added."""
+    missing = modes - len(flow.modes)
+    return flow._replace(modes=np.pad(flow.modes, ((0, missing), (0, 0), (0, 0))))
 
 
 def write(
