@@ -1,0 +1,321 @@
+"""Square blocks in stirred tanks: rigid bodies in plain NumPy, many tanks at once.
+
+Places, velocities and forces are complex numbers. The drag is integrated along each face by four
+Gauss points, where driftwalk has eight strips. Steps of a millisecond take velocities first, then
+places, then contacts with the wall; the force of the water is that in the middle of five steps.
+Nothing here comes from driftwalk.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from flows import AXIS, Flow
+from ranges import (
+    DENSITY_KG_M3,
+    DEPTH_M,
+    FORCE_INTERVAL_S,
+    MASS_KG,
+    RADIUS_M,
+    REFERENCE_M_S,
+    SAMPLE_S,
+    SETTLING_S,
+    SIDE_M,
+)
+
+Floats = npt.NDArray[np.float64]
+Complexes = npt.NDArray[np.complex128]
+
+STEP_S: Final = 1e-3
+EVERY: Final = 5
+"""Steps for which the force of the water is held."""
+HOLD: Final = round(FORCE_INTERVAL_S / STEP_S)
+PERIOD: Final = round(SAMPLE_S / STEP_S)
+CHUNK: Final = 5000
+"""Steps for which forces and weights are drawn at once: whole intervals and samples."""
+PER_INERTIA: Final = 6.0 / SIDE_M**2
+"""Mass over moment of inertia."""
+BOUNCE_M_S: Final = 0.01
+"""Slower contacts do not bounce."""
+SPACING: Final = float(AXIS[1] - AXIS[0])
+NODES: Final = AXIS.size
+
+_place, _weight = np.polynomial.legendre.leggauss(4)
+_along = 0.5 * SIDE_M * (1.0 + 1j * _place)
+POINTS: Final[Complexes] = np.concatenate([_along * 1j**k for k in range(4)])
+"""Gauss points of the four faces, in the block's own frame."""
+NORMALS: Final[Complexes] = np.repeat(1j ** np.arange(4), 4)
+WIDTHS: Final[Floats] = np.tile(0.5 * SIDE_M * _weight, 4)
+CORNERS: Final[Complexes] = 0.5 * SIDE_M * (1.0 + 1j) * 1j ** np.arange(4)
+INNER: Final[Complexes] = CORNERS / np.sqrt(3.0)
+"""Gauss points of the area, for means of the water's acceleration over the block."""
+
+
+@dataclass
+class Tanks:
+    """Parameters of the blocks, one for each tank, and their flows."""
+
+    flow: list[Flow]
+    seed: list[int]
+    start: Complexes
+    drag_coefficient: Floats
+    force_std: Floats
+    """In the force interval [N]."""
+    added_mass: Floats
+    """As a share of the mass, of the moment of inertia too."""
+    floating: npt.NDArray[np.bool_]
+    """Whether the water's acceleration pushes the block."""
+    drag_power: Floats
+    force_memory: Floats
+    """[s]; 0 is a white force."""
+    growth: Floats
+    """Of the flow's strength a second."""
+    pulse: Floats
+    pulse_period: Floats
+    friction: Floats
+    restitution: Floats
+    velocity: Complexes | None = None
+    """At the start, 0 where it is not given."""
+    angle: Floats | None = None
+    spin: Floats | None = None
+
+    def only(self, kept: npt.NDArray[np.intp]) -> Tanks:
+        """Return some of the tanks."""
+        values = {}
+        for one in fields(self):
+            value = getattr(self, one.name)
+            if isinstance(value, np.ndarray):
+                values[one.name] = value[kept]
+            elif one.name in ("flow", "seed"):
+                values[one.name] = [value[k] for k in kept]
+        return Tanks(**values)
+
+
+class Motion(NamedTuple):
+    """True motion at the samples, shape (tanks, samples)."""
+
+    place: Complexes
+    velocity: Complexes
+    angle: Floats
+    spin: Floats
+    touched: npt.NDArray[np.bool_]
+    """Whether the block touched the wall since the sample before."""
+
+
+def simulate(tanks: Tanks, seconds: float, *, settling: float = SETTLING_S) -> Motion:
+    """Simulate blocks of flows with the same number of modes."""
+    water = Water(tanks)
+    state = _at_rest(tanks)
+    rngs = [np.random.default_rng(seed) for seed in tanks.seed]
+    n, first = len(rngs), round(settling / STEP_S)
+    steps = first + round(seconds / STEP_S)
+    memory = np.exp(-FORCE_INTERVAL_S / np.maximum(tanks.force_memory, 1e-12))
+    force = np.sqrt((1 - memory) / (1 + memory)) * tanks.force_std * _normal(rngs, 1)[:, 0]
+    touched, kept = np.zeros(n, dtype=bool), []
+    gain, spin_gain = np.zeros(n, dtype=complex), np.zeros(n)
+    mass = MASS_KG * (1.0 + tanks.added_mass)
+    for begin in range(0, steps + 1, CHUNK):
+        draws = tanks.force_std[:, np.newaxis] * _normal(rngs, CHUNK // HOLD)
+        times = (begin + EVERY / 2 + np.arange(0, CHUNK, EVERY)) * STEP_S - settling
+        weights = water.weights(times)
+        for k in range(0, min(CHUNK, steps + 1 - begin), EVERY):
+            step = begin + k
+            if step >= first and (step - first) % PERIOD == 0:
+                kept.append((state.place.copy(), state.velocity.copy(), state.angle.copy(),
+                             state.spin.copy(), touched))  # fmt: skip
+                touched = np.zeros(n, dtype=bool)
+            if step % HOLD == 0:
+                force = memory * force + (1 - memory) * draws[:, k // HOLD]
+            gain, spin_gain = by_water(
+                state, tanks, water, weights[k // EVERY], gain + force / mass, spin_gain
+            )
+            touched |= move(state, tanks, gain + force / mass, spin_gain)
+    return Motion(*(np.stack(part, axis=1) for part in zip(*kept, strict=True)))
+
+
+@dataclass
+class State:
+    """Of all blocks, at one time."""
+
+    place: Complexes
+    velocity: Complexes
+    angle: Floats
+    spin: Floats
+
+
+class Water:
+    """The water of the tanks: modes, and the accelerations that pairs of them make."""
+
+    def __init__(self, tanks: Tanks) -> None:
+        self.tanks = tanks
+        modes = np.stack([flow.modes for flow in tanks.flow])
+        self.modes = modes.shape[1]
+        self.pairs = [(i, j) for i in range(self.modes) for j in range(i, self.modes)]
+        self.carries = bool(tanks.floating.any())
+        layers = [modes[:, i] for i in range(self.modes)]
+        if self.carries:
+            layers += [
+                _carried(modes[:, i], modes[:, j])
+                + (_carried(modes[:, j], modes[:, i]) if i != j else 0.0)
+                for i, j in self.pairs
+            ]
+        table = np.stack(layers, axis=-1)
+        corners = [table, np.roll(table, -1, 2), np.roll(table, -1, 1)]
+        corners.append(np.roll(corners[1], -1, 1))
+        self.table = np.stack(corners, axis=3).reshape(-1, 4, table.shape[-1])
+        self.base = (np.arange(len(modes)) * NODES**2)[:, np.newaxis]
+
+    def weights(self, time: Floats) -> Floats:
+        """Return weights and their rates, shape (times, 2, tanks, modes)."""
+        t, tanks = time[:, np.newaxis], self.tanks
+        turn = 2.0 * np.pi / tanks.pulse_period
+        strength = 1.0 + tanks.growth * t + tanks.pulse * np.sin(turn * t)
+        rate = tanks.growth + tanks.pulse * turn * np.cos(turn * t)
+        period = np.array([flow.period_s for flow in tanks.flow])
+        phase, pace = 2.0 * np.pi * t / period, 2.0 * np.pi / period
+        shape = [np.ones_like(phase), np.sin(phase), np.cos(phase)][: self.modes]
+        change = [np.zeros_like(phase), pace * np.cos(phase), -pace * np.sin(phase)][: self.modes]
+        weight = np.stack([strength * part for part in shape], axis=-1)
+        rates = [rate * part + strength * moved for part, moved in zip(shape, change, strict=True)]
+        return np.stack([weight, np.stack(rates, axis=-1)], axis=1)
+
+    def layers(self, place: Complexes) -> Complexes:
+        """Return all layers at places of each tank, shape (tanks, places, layers)."""
+        column = np.clip((place.real - AXIS[0]) / SPACING, 0.0, NODES - 1.001)
+        row = np.clip((place.imag - AXIS[0]) / SPACING, 0.0, NODES - 1.001)
+        i, j = column.astype(np.intp), row.astype(np.intp)
+        fx, fy = column - i, row - j
+        shares = ((1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy)
+        found = self.table.take(self.base + j * NODES + i, axis=0)
+        return sum(share[..., np.newaxis] * found[:, :, k] for k, share in enumerate(shares))
+
+    def velocity(self, layers: Complexes, weight: Floats) -> Complexes:
+        """Return the velocity of the water, from its layers."""
+        return np.einsum("npm,nm->np", layers[..., : self.modes], weight)
+
+    def acceleration(self, layers: Complexes, weight: Floats, rate: Floats) -> Complexes:
+        """Return its acceleration Du/Dt."""
+        total = np.einsum("npm,nm->np", layers[..., : self.modes], rate)
+        for k, (i, j) in enumerate(self.pairs):
+            both = (weight[:, i] * weight[:, j])[:, np.newaxis]
+            total = total + both * layers[..., self.modes + k]
+        return total
+
+
+def by_water(
+    state: State, tanks: Tanks, water: Water, weights: Floats, gain: Complexes, spin_gain: Floats
+) -> tuple[Complexes, Floats]:
+    """Return what the water does to velocity and spin, `EVERY` / 2 steps from now."""
+    half = 0.5 * EVERY * STEP_S
+    velocity, spin = state.velocity + half * gain, state.spin + half * spin_gain
+    place = (state.place + half * velocity)[:, np.newaxis]
+    turned = np.exp(1j * (state.angle + half * spin))[:, np.newaxis]
+    mass = MASS_KG * (1.0 + tanks.added_mass)
+    arms = POINTS * turned
+    flow = water.velocity(water.layers(place + arms), weights[0])
+    push, torque = drag(tanks, flow, turned, arms, velocity, spin)
+    found, turning = push / mass, torque / (mass * SIDE_M**2 / 6.0)
+    if water.carries:
+        arms = INNER * turned
+        here = water.acceleration(water.layers(place + arms), *weights)
+        found = found + tanks.floating * here.mean(axis=1)
+        curl = (arms.conj() * here).imag.mean(axis=1) / (SIDE_M**2 / 6.0)
+        turning = turning + tanks.floating * curl
+    return found, turning
+
+
+def drag(
+    tanks: Tanks, flow: Complexes, turned: Complexes, arms: Complexes, velocity: Complexes,
+    spin: Floats,
+) -> tuple[Complexes, Floats]:  # fmt: skip
+    """Return force and torque of the water on the windward faces."""
+    slip = flow - velocity[:, np.newaxis] - 1j * spin[:, np.newaxis] * arms
+    facing = np.maximum(-((NORMALS * turned).conj() * slip).real, 0.0)
+    size = (0.5 * DENSITY_KG_M3 * DEPTH_M) * tanks.drag_coefficient[:, np.newaxis] * WIDTHS * facing
+    if np.any(tanks.drag_power != 2.0):
+        size *= (np.abs(slip) / REFERENCE_M_S + 1e-9) ** (tanks.drag_power[:, np.newaxis] - 2.0)
+    along = size * slip
+    return along.sum(axis=1), (arms.conj() * along).imag.sum(axis=1)
+
+
+def move(state: State, tanks: Tanks, gain: Complexes, spin_gain: Floats) -> npt.NDArray[np.bool_]:
+    """Make `EVERY` steps in place, all at once off the wall; return which blocks touched it."""
+    time, twice = EVERY * STEP_S, 0.5 * EVERY * (EVERY + 1) * STEP_S**2
+    margin = SIDE_M / np.sqrt(2.0) + time * np.abs(state.velocity) + 1e-4
+    near = np.flatnonzero(np.abs(state.place) > RADIUS_M - margin)
+    parts = [part[near] for part in (state.place, state.velocity, state.angle, state.spin)]
+    state.place += time * state.velocity + twice * gain
+    state.velocity += time * gain
+    state.angle += time * state.spin + twice * spin_gain
+    state.spin += time * spin_gain
+    touched = np.zeros(state.place.size, dtype=bool)
+    if not near.size:
+        return touched
+    some = State(*parts)
+    for _ in range(EVERY):
+        some.velocity += STEP_S * gain[near]
+        some.spin += STEP_S * spin_gain[near]
+        some.place += STEP_S * some.velocity
+        some.angle += STEP_S * some.spin
+        touched[near] |= meet_wall(some, tanks.friction[near], tanks.restitution[near])
+    state.place[near], state.velocity[near] = some.place, some.velocity
+    state.angle[near], state.spin[near] = some.angle, some.spin
+    return touched
+
+
+def meet_wall(state: State, friction: Floats, restitution: Floats) -> npt.NDArray[np.bool_]:
+    """Let corners beyond the circle bounce and rub, and put them back; return which did."""
+    arms = CORNERS * np.exp(1j * state.angle)[:, np.newaxis]
+    beyond = np.abs(state.place[:, np.newaxis] + arms) > RADIUS_M
+    touched = beyond.any(axis=1)
+    if touched.any():
+        for k, corner in zip(*np.nonzero(beyond), strict=True):
+            bounce(state, int(k), complex(arms[k, corner]), friction[k], restitution[k])
+    return touched
+
+
+def bounce(state: State, k: int, arm: complex, friction: float, restitution: float) -> None:
+    """Let one corner of one block meet the wall, by impulses along it and across."""
+    place, velocity, spin = complex(state.place[k]), complex(state.velocity[k]), state.spin[k]
+    away = abs(place + arm)
+    if away <= RADIUS_M:
+        return
+    normal = (place + arm) / away
+    turned = arm.conjugate() * normal
+    lever, reach = turned.imag, turned.real
+    closing = ((velocity + 1j * spin * arm) * normal.conjugate()).real
+    if closing > 0.0:
+        share = 1.0 + (restitution if closing > BOUNCE_M_S else 0.0)
+        push = closing * share / (1.0 + PER_INERTIA * lever**2)
+        velocity -= push * normal
+        spin -= push * lever * PER_INERTIA
+        sliding = ((velocity + 1j * spin * arm) * normal.conjugate()).imag
+        stop = -sliding / (1.0 + PER_INERTIA * reach**2)
+        rub = min(max(stop, -friction * push), friction * push)
+        velocity += rub * 1j * normal
+        spin += rub * reach * PER_INERTIA
+    state.place[k] = place - normal * (away - RADIUS_M)
+    state.velocity[k], state.spin[k] = velocity, spin
+
+
+def _carried(by: Complexes, what: Complexes) -> Complexes:
+    """Return (u . grad) w at the nodes."""
+    along_y, along_x = np.gradient(what, SPACING, axis=(-2, -1))
+    return by.real * along_x + by.imag * along_y
+
+
+def _at_rest(tanks: Tanks) -> State:
+    n = tanks.start.size
+    return State(
+        tanks.start.astype(complex),
+        np.zeros(n, complex) if tanks.velocity is None else tanks.velocity.astype(complex),
+        np.zeros(n) if tanks.angle is None else tanks.angle.astype(float),
+        np.zeros(n) if tanks.spin is None else tanks.spin.astype(float),
+    )
+
+
+def _normal(rngs: list[np.random.Generator], count: int) -> Complexes:
+    return np.stack([rng.normal(size=(count, 2)) @ [1.0, 1j] for rng in rngs])
