@@ -103,7 +103,6 @@ def one_open(grid: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path
     return folder, json.loads(done.out)
 
 
-@pytest.mark.slow
 def test_known_parameters_leave_a_map(one_open: tuple[Path, dict[str, Any]]) -> None:
     said = one_open[1]
     assert list(said["parameters"]) == ["speed_m_s"]

@@ -29,7 +29,7 @@ COARSE = ("--spline-spacing", "4cm", "--no-check", "--angle", "none", "--force-i
 SIZE = ("--runs", "50", "--duration", "10s", "--threads", "1")
 VARIED = ("--vary", "drag-coefficient=0.2,0.6", "--vary", "force-std=0.4mN,0.8mN")
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("undrawn")]
+pytestmark = pytest.mark.usefixtures("undrawn")
 
 
 @pytest.fixture(scope="module")
@@ -145,6 +145,7 @@ def test_a_fit_is_assembled_with_all_that_it_knows(
     assert low < float(np.median(drawn["drag_coefficient"])) < high
 
 
+@pytest.mark.slow
 def test_the_notebook_does_the_same(
     fitted: Path, assembled: tuple[Path, Done], tmp_path: Path
 ) -> None:
@@ -155,6 +156,7 @@ def test_the_notebook_does_the_same(
         assert_same_bits(dataset(tmp_path / "four" / name), dataset(assembled[0] / name))
 
 
+@pytest.mark.slow
 def test_the_fit_is_the_reference_of_a_sensitivity_analysis(fitted: Path, tmp_path: Path) -> None:
     small = ("--runs", "6", "--realisations", "2", "--duration", "5s", "--threads", "1")
     done = here("sensitivity", fitted, *VARIED, *small, "-o", tmp_path / "map", "--json")
@@ -178,6 +180,7 @@ def test_a_fit_is_simulated(fitted: Path, tmp_path: Path) -> None:
     np.testing.assert_array_equal(found["x"], again["x"])
 
 
+@pytest.mark.slow
 def test_one_page_shows_several_runs(
     fitted: Path, assembled: tuple[Path, Done], tmp_path: Path
 ) -> None:
@@ -198,6 +201,7 @@ def test_one_page_shows_several_runs(
     assert three["subtitle"] == "fit, fit 2, recording.csv"
 
 
+@pytest.mark.slow
 def test_its_flow_serves_other_commands(fitted: Path, tmp_path: Path) -> None:
     """`--flow` takes a run directory in the place of the file in it."""
     (tmp_path / "study.toml").write_text(GRID, encoding="utf-8")
@@ -211,6 +215,7 @@ def test_its_flow_serves_other_commands(fitted: Path, tmp_path: Path) -> None:
     assert "holds no flow field (flow.nc)" in line
 
 
+@pytest.mark.slow
 def test_a_fit_is_the_truth_of_a_recovery_study(fitted: Path, tmp_path: Path) -> None:
     done = here(
         *("study", "recover", fitted, "--recordings", "2", "--duration", "30s"),
@@ -224,6 +229,7 @@ def test_a_fit_is_the_truth_of_a_recovery_study(fitted: Path, tmp_path: Path) ->
     assert study.block.side_m == 0.028
 
 
+@pytest.mark.slow
 def test_a_comparison_gives_its_best_model(compared: Callable[[str], Path], tmp_path: Path) -> None:
     best = compared("block")
     done = here("assemble", best, *SIZE, "--film", "none", "--json", "-o", tmp_path / "four")
@@ -237,6 +243,7 @@ def test_a_comparison_gives_its_best_model(compared: Callable[[str], Path], tmp_
     assert study["block"]["side_m"] == 0.028
 
 
+@pytest.mark.slow
 def test_what_is_not_about_the_block(compared: Callable[[str], Path], tmp_path: Path) -> None:
     """Self-assembly says why not; a simulation takes the model, its values and its clearance."""
     active = compared("active")
@@ -257,6 +264,7 @@ def test_what_is_not_about_the_block(compared: Callable[[str], Path], tmp_path: 
     assert json.loads(with_name.out) == found
 
 
+@pytest.mark.slow
 def test_a_model_of_the_users_is_named_again(tmp_path: Path) -> None:
     """A run that someone sent executes nothing that its own files name."""
     marker = tmp_path / "executed"
@@ -288,6 +296,7 @@ def test_a_model_of_the_users_is_named_again(tmp_path: Path) -> None:
     assert not marker.exists()
 
 
+@pytest.mark.slow
 def test_what_the_run_says_is_not_said_twice(fitted: Path, tmp_path: Path) -> None:
     out = ("-o", tmp_path / "sim.nc")
     for options in (("--force-std", "1mN"), ("--study", "x.toml")):
@@ -297,6 +306,7 @@ def test_what_the_run_says_is_not_said_twice(fitted: Path, tmp_path: Path) -> No
     assert "give the directory of a finished fit" in refusal(here("simulate", RECORDING, *out))
 
 
+@pytest.mark.slow
 def test_a_recording_of_driftwalks_own_names_no_other_engine(tmp_path: Path) -> None:
     sim = tmp_path / "sim.nc"
     words = ("--duration", "60s", "--sample-rate", "10", *TANK)
