@@ -23,7 +23,7 @@ CPP := $(shell find cpp -name '*.cpp' -o -name '*.hpp')
 # Every worker imports every test file: with the bytecode of the last run that takes half the time.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-slow test-fresh test-browser fuzz fuzz-loaders doctest lint format cpp-test cpp-test-portable bench studies studies-tracking docs site web wheel cross release-check clean
+.PHONY: demo test test-slow test-fresh test-browser fuzz fuzz-loaders fuzz-dialects doctest lint format cpp-test cpp-test-portable bench studies studies-tracking docs site web wheel cross release-check clean
 
 demo: $(PACKAGE)
 	$(BIN)/driftwalk demo
@@ -70,6 +70,11 @@ LOADER_WORKERS := 2
 fuzz-loaders: $(TEST_TOOLS)
 	$(BIN)/python tests/fuzz/loader_run.py $(LOADER_FUZZ) --seed $(FUZZ_SEED) --from $(LOADER_FROM) \
 	  --cases $(LOADER_CASES) --workers $(LOADER_WORKERS)
+
+# All 10,000 dialects of recordings and 3,000 of flow fields, of which `make test-slow` tries a tenth a day.
+fuzz-dialects: $(TEST_TOOLS)
+	DRIFTWALK_ALL_DIALECTS=1 $(BIN)/python -m pytest $(SIDE_BY_SIDE) -m slow \
+	  tests/property/test_dialects.py tests/property/test_flow_dialects.py
 
 doctest: $(TEST_TOOLS)
 	$(BIN)/python -m pytest $(SIDE_BY_SIDE) --doctest-modules src/driftwalk tests/reference/twin

@@ -16,6 +16,8 @@ from pathlib import Path
 
 # Of the fit on the bundled recording: the engine's steps make its drag act some 2 % stronger.
 LARGEST_ERROR = 0.05
+# Of the map of distances: two of its finest steps, and some of the noise between settings.
+MAP_ERRORS = {"drag_coefficient": 0.04, "force_std_N": 0.1e-3}
 
 
 def command(*words: str, folder: str) -> str:
@@ -54,6 +56,11 @@ def main() -> None:
             print(f"wheel: {name} {fitted:.6g}, truth {truth:.6g}")
             if not abs(fitted / truth - 1.0) < LARGEST_ERROR:
                 raise SystemExit(f"wheel: {name} is off by more than {LARGEST_ERROR:.0%}")
+        for name, error in MAP_ERRORS.items():
+            truth, read = found["truth"][name], found["calibration"][name]
+            print(f"wheel: {name} of the map {read:.6g}, truth {truth:.6g}")
+            if not abs(read - truth) < error:
+                raise SystemExit(f"wheel: {name} of the map is off by more than {error:g}")
         if not (Path(folder) / "demo" / "report.html").is_file():
             raise SystemExit("wheel: the demo left no page")
     print("wheel: passed")

@@ -41,19 +41,28 @@ def policies() -> Iterator[Policy]:
         text = path.read_text(encoding="utf-8")
         if "Policy(NamedTuple)" not in text:
             continue
+        lines = text.encode().splitlines(keepends=True)
         for node in ast.parse(text).body:
             if isinstance(node, ast.ClassDef) and node.name.endswith("Policy"):
                 purpose = " ".join((ast.get_docstring(node) or "").split())
-                yield Policy(path.relative_to(ROOT), node.name, purpose, list(_fields(node, text)))
+                yield Policy(path.relative_to(ROOT), node.name, purpose, list(_fields(node, lines)))
 
 
-def _fields(policy: ast.ClassDef, text: str) -> Iterator[Threshold]:
+def _fields(policy: ast.ClassDef, lines: list[bytes]) -> Iterator[Threshold]:
     for field, after in zip(policy.body, [*policy.body[1:], None], strict=True):
         if isinstance(field, ast.AnnAssign) and field.value is not None:
             documented = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
             reason = " ".join(str(after.value.value).split()) if documented else ""  # type: ignore[union-attr]
-            value = " ".join((ast.get_source_segment(text, field.value) or "").split())
+            value = " ".join(_written(field.value, lines).split())
             yield Threshold(ast.unparse(field.target), value, reason)
+
+
+def _written(node: ast.expr, lines: list[bytes]) -> str:
+    """Return the source of an expression; `ast.get_source_segment` splits the file each time."""
+    own = lines[node.lineno - 1 : node.end_lineno]
+    own[-1] = own[-1][: node.end_col_offset]
+    own[0] = own[0][node.col_offset :]
+    return b"".join(own).decode()
 
 
 def thresholds_page(page: str) -> str:

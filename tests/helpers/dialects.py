@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import time
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -52,6 +54,20 @@ HEADS = [
     "# made by a tracker",
     "key,value,3",
 ]
+
+
+ALL, PARTS = "DRIFTWALK_ALL_DIALECTS", 10
+DAY_S = 86_400
+
+
+def part_of_today(number: int) -> range:
+    """Return the seeds below a number that are tried today: a tenth, and all within ten days.
+
+    All of them where the environment asks for it, as `make fuzz-dialects` does.
+    """
+    if os.environ.get(ALL):
+        return range(number)
+    return range(int(time.time()) // DAY_S % PARTS, number, PARTS)
 
 
 @dataclass

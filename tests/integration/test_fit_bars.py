@@ -45,8 +45,6 @@ def visited(recording: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     ("realisation", "angle", "most_drag", "most_flow"),
     [
         ("first", "state", 0.05, 0.02),
-        ("second", "state", 0.05, 0.02),
-        ("first", "given", 0.1, 0.04),
         ("second", "given", 0.1, 0.04),
     ],
 )

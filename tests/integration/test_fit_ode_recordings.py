@@ -23,10 +23,8 @@ NOISE_M = 0.3e-3
 @pytest.mark.parametrize(
     ("name", "angle", "most_drag", "most_flow"),
     [
-        ("ode-002", "state", 0.03, 0.03),
         ("ode-003", "state", 0.03, 0.03),
         ("ode-002", "given", 0.1, 0.08),
-        ("ode-003", "given", 0.1, 0.08),
     ],
 )
 def test_half_an_hour_of_another_engine(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -18,7 +19,8 @@ from driftwalk.cluster import Cluster, connect, parse_address
 from driftwalk.model import parse_study
 
 pytestmark = pytest.mark.slow
-pytest.importorskip("distributed", reason="workers need driftwalk[cluster]")
+if find_spec("distributed") is None:  # found, not loaded: that takes a second of every run
+    pytest.skip("workers need driftwalk[cluster]", allow_module_level=True)
 
 ACTIVE = {"speed": 0.03, "rotational_diffusion": 0.5, "turn_rate": 0.3}
 

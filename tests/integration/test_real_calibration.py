@@ -130,9 +130,9 @@ def test_calibrate_a_smarticle(
     folder, file = RECORDINGS["smarticles"]
     study = reduced(load_study(STUDIES / "smarticles.toml"), cells=8)
     recording = shared_data(folder) / file
-    found = calibrate(recording, study, tmp_path, capsys, "--body", "2", "--to", "200")
+    found = calibrate(recording, study, tmp_path, capsys, "--body", "2", "--to", "100")
     assert_consistent(found, study, tmp_path)
-    assert found["duration_s"] == pytest.approx(200.0, abs=0.2)
+    assert found["duration_s"] == pytest.approx(100.0, abs=0.2)
     assert found["step_interval_s"] == 0.2
     # Dry friction stops it within a tenth of its length: far beyond any body in water.
     assert found["drag_coefficient"] > 5.0

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from dialects import part_of_today
 
 from driftwalk.core.errors import InputError
 from driftwalk.flow import flow_format, load_flow
@@ -79,11 +80,13 @@ def dialect(rng: np.random.Generator, path: Path) -> tuple[dict[str, Any], Any, 
 
 
 @pytest.mark.parametrize(
-    "count", [40, pytest.param(3000, marks=pytest.mark.slow)], ids=["some", "many"]
+    "seeds",
+    [range(40), pytest.param(part_of_today(3000), marks=pytest.mark.slow)],
+    ids=["some", "many"],
 )
-def test_random_dialects(tmp_path: Path, count: int) -> None:
+def test_random_dialects(tmp_path: Path, seeds: range) -> None:
     refused = 0
-    for seed in range(count):
+    for seed in seeds:
         path = tmp_path / "field.txt"
         options, x, y, velocity, lost = dialect(np.random.default_rng(seed), path)
         try:
@@ -100,4 +103,4 @@ def test_random_dialects(tmp_path: Path, count: int) -> None:
             np.testing.assert_allclose(
                 found.values[known], velocity[..., at][known], rtol=1e-9, err_msg=str(seed)
             )
-    assert refused <= 0.02 * count
+    assert refused <= 0.02 * len(seeds)

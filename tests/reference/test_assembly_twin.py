@@ -126,8 +126,10 @@ def test_one_block_runs_to_its_last_step() -> None:
 
 # Seeds of starts from which connectors come face to face.
 @pytest.mark.fast_cases(2)
-@pytest.mark.parametrize(("blocks", "seed"), [(2, 202), (3, 123), (4, 104), (5, 125)])
-@pytest.mark.parametrize(("hidden", "force"), [("none", 2e-3), ("full", 0.0)])
+@pytest.mark.parametrize(
+    ("blocks", "seed", "hidden", "force"),
+    [(2, 202, "none", 2e-3), (3, 123, "full", 0.0), (4, 104, "none", 2e-3), (5, 125, "full", 0.0)],
+)
 @pytest.mark.parametrize("latching", ["none", "collision", "connector"])
 def test_events_and_poses_agree(
     latching: str, hidden: str, force: float, blocks: int, seed: int

@@ -280,7 +280,7 @@ def test_a_calibration_without_bootstrap_gives_one_distribution(
         (["--seed=-1"], "--seed"),
     ],
 )
-@pytest.mark.parametrize("source", ["calibration", "flow"])
+@pytest.mark.parametrize("source", [pytest.param("calibration", marks=pytest.mark.slow), "flow"])
 def test_a_bad_option(
     source: str, options: list[str], says: str, calibrated: Path, tmp_path: Path
 ) -> None:
@@ -290,6 +290,7 @@ def test_a_bad_option(
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.slow
 def test_a_calibration_that_cannot_be_used(calibrated: Path, tmp_path: Path) -> None:
     unfinished, empty, other = (tmp_path / name for name in ("unfinished", "empty", "other"))
     empty.mkdir()
@@ -324,6 +325,7 @@ def test_a_calibration_that_cannot_be_used(calibrated: Path, tmp_path: Path) -> 
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.slow
 def test_what_does_not_go_together(calibrated: Path, tmp_path: Path) -> None:
     for options in (["--study", "x.toml"], ["--force-std", "1mN"], ["--force-interval", "16ms"]):
         line = refusal(here("assemble", calibrated, *options, "-o", tmp_path / "run"))

@@ -60,7 +60,7 @@ def finished(study: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Pat
     return folder, here(*words(study, folder, "300s"), "--flow", FLOW, "--json")
 
 
-def words(study: Path, folder: Path, until: str = "120s") -> list[object]:
+def words(study: Path, folder: Path, until: str = "60s") -> list[object]:
     return [
         *("calibrate", RECORDING, "--to", until, "--study", study, "--out", folder),
         *("--threads", "1"),
@@ -229,7 +229,7 @@ def test_options_go_over_the_study_and_flow_formats_agree(study: Path, tmp_path:
 @pytest.mark.usefixtures("no_figures")
 def test_the_field_that_driftwalk_flow_wrote_is_taken(study: Path, tmp_path: Path) -> None:
     field = tmp_path / "flow.nc"
-    taken = ["flow", RECORDING, "--tank", "30cm", "--to", "120s", "--out", field]
+    taken = ["flow", RECORDING, "--tank", "30cm", "--to", "60s", "--out", field]
     assert here(*taken).code == 0
     first, second = tmp_path / "first", tmp_path / "second"
     assert here(*words(study, first), "--flow", field).code == 0

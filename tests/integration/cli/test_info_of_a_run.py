@@ -21,7 +21,7 @@ def stored(folder: Path, kind: str, forms: dict[str, str]) -> Path:
     return folder
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "forms", "said", "key"),
     [
@@ -52,6 +52,7 @@ def test_what_an_answer_needs_is_missed_in_one_line(tmp_path: Path) -> None:
     assert f"{run} lacks reference.nc: its answer cannot be printed" in line
 
 
+@pytest.mark.slow
 def test_files_of_other_kinds_and_options_of_recordings(tmp_path: Path) -> None:
     run = stored(tmp_path / "run", "fit", {"fit.nc": "fit", "reference.nc": REFERENCE})
     assert "C_d" in here("info", run).out

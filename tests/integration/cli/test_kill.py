@@ -131,9 +131,9 @@ sys.addaudithook(hook)
 def test_killed_between_any_two_changes(
     study: Path, uninterrupted: xr.Dataset, tmp_path: Path
 ) -> None:
-    """At every 23rd change: a calibration makes some hundred, and the moments are a sample."""
+    """At every 47th change: a calibration makes some hundred, and the moments are a sample."""
     kills = 0
-    for count in range(0, 2000, 23):
+    for count in range(0, 2000, 47):
         folder = tmp_path / f"run-{count}"
         before = PLAIN + KILL.format(count=count, folder=str(folder))
         code = apart(*words(study, folder), before=before).code
@@ -196,7 +196,7 @@ def test_other_parameters_do_not_continue_a_run(
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("no_figures")
-@pytest.mark.parametrize("bytes_allowed", [6_000, 30_000, 70_000])
+@pytest.mark.parametrize("bytes_allowed", [6_000, 70_000])
 def test_files_that_may_not_grow(
     bytes_allowed: int, study: Path, uninterrupted: xr.Dataset, tmp_path: Path
 ) -> None:
@@ -228,7 +228,7 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("no_figures")
-@pytest.mark.parametrize("free", [40_000, 600_000, 1_300_000, 2_000_000])
+@pytest.mark.parametrize("free", [40_000, 1_300_000])
 def test_a_disk_that_is_full(
     free: int, study: Path, uninterrupted: xr.Dataset, small_disk: Path
 ) -> None:

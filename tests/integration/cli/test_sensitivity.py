@@ -236,6 +236,7 @@ def test_a_bad_option(options: list[str], says: str, tmp_path: Path) -> None:
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.slow
 def test_sources_that_cannot_be_used(calibrated: Path, tmp_path: Path) -> None:
     unfinished = tmp_path / "unfinished"
     shutil.copytree(calibrated, unfinished)

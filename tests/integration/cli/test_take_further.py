@@ -202,6 +202,7 @@ def test_one_page_shows_several_runs(
     assert three["subtitle"] == "fit, fit 2, recording.csv"
 
 
+@pytest.mark.slow
 def test_its_flow_serves_other_commands(fitted: Path, tmp_path: Path) -> None:
     """`--flow` takes a run directory in the place of the file in it."""
     (tmp_path / "study.toml").write_text(GRID, encoding="utf-8")
@@ -296,6 +297,7 @@ def test_a_model_of_the_users_is_named_again(tmp_path: Path) -> None:
     assert not marker.exists()
 
 
+@pytest.mark.slow
 def test_what_the_run_says_is_not_said_twice(fitted: Path, tmp_path: Path) -> None:
     out = ("-o", tmp_path / "sim.nc")
     for options in (("--force-std", "1mN"), ("--study", "x.toml")):

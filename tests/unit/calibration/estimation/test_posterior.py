@@ -59,17 +59,18 @@ def sampled(recorded: np.ndarray, seed: int, *, width: float = 0.1) -> Sampled:
 
 
 @pytest.mark.slow
-@pytest.mark.false_alarm(1e-4)
+@pytest.mark.false_alarm(1e-3)
 def test_mean_and_covariance_are_those_of_a_normal_posterior(fresh_seed: Callable[[int], int]):
-    """Averages over 8 recordings.
+    """Averages over 5 recordings.
 
     An emulator from 512 simulations has an error of 0.09 standard deviations (of 6 coefficients,
     the constant's is the largest: 3 / 512 of the noise's variance), and 512 draws of a chain that
-    forgets within 30 to 50 steps one of 0.06: 0.04 for the mean of 8. The covariances have errors
-    of 5 %, from draws and simulations, of 2 % after averaging.
+    forgets within 30 to 50 steps one of 0.06: 0.05 for the mean of 5. The covariances have errors
+    of 5 %, from draws and simulations, of 2.2 % after averaging. A mean beyond four deviations, of
+    two, and a covariance beyond 4.5, of three: 1.5e-4, and some more for tails.
     """
     apart, spreads, correlations = [], [], []
-    for number in range(8):
+    for number in range(5):
         seed = fresh_seed(10 + number)
         rng = np.random.default_rng(seed)
         truth = rng.uniform(0.35, 0.65, 2)
@@ -90,9 +91,9 @@ def test_mean_and_covariance_are_those_of_a_normal_posterior(fresh_seed: Callabl
 
 @pytest.mark.slow
 @pytest.mark.false_alarm(1e-3)
-@pytest.mark.parametrize("outside", [-1.0, 0.0, 1.0])
+@pytest.mark.parametrize("outside", [-1.0, 1.0])
 def test_the_end_of_a_range_cuts_draws_off(outside: float, fresh_seed: Callable[[int], int]):
-    """One parameter beyond, at, or within the end of its range by a standard deviation.
+    """One parameter within or beyond the end of its range by a standard deviation.
 
     Slopes of one parameter alone make the two independent: the first is a truncated normal, with
     mean and deviation in closed form; averages of 4 recordings at either end.
@@ -128,17 +129,6 @@ def cut_off(end: float, outside: float, seed: int) -> np.ndarray:
     return sample_posterior(
         simulate, recorded, LocalOptimum(emulator, solution, 1), seed=seed
     ).sample[:, 0]
-
-
-@pytest.mark.slow
-def test_draws_at_the_end_of_a_range_pile_up_there():
-    """A normal law whose middle lies a deviation beyond the end: half of what is left is near it.
-
-    Its mean is 0.53 deviations inside; one recording's draws are known to within 0.25 of them.
-    """
-    away = cut_off(0.0, 1.0, 7) / 0.02
-    assert away.min() >= 0.0
-    assert away.mean() == pytest.approx(truncnorm(1.0, np.inf, loc=-1.0).mean(), abs=0.25)
 
 
 @pytest.mark.slow

@@ -176,7 +176,7 @@ def test_summaries_like_the_models_own_count_however_close_a_search_comes(
     monkeypatch.setattr(matching, "MATCHING", strict)
     monkeypatch.setattr(run, "MATCHING", strict)
     monkeypatch.setattr(run, "SEARCH", Budget(design=64, starts=1, short=8, long=8))
-    recording = moving(dw.motion_model("active"), ACTIVE, 100.0, seed=3, noise=NOISE)
+    recording = moving(dw.motion_model("active"), ACTIVE, 60.0, seed=3, noise=NOISE)
     told: list[str] = []
     found = calibrated(
         recording, study=study(bootstrap=20), tell=lambda stage, _done, _most: told.append(stage)
@@ -191,7 +191,7 @@ def test_summaries_like_the_models_own_count_however_close_a_search_comes(
 @pytest.mark.slow
 def test_another_model_is_not_believed() -> None:
     """A body without rests on the recording of one that rests half of the time."""
-    resting = moving(dw.motion_model("run_rest"), RESTING, 100.0, seed=3, noise=NOISE)
+    resting = moving(dw.motion_model("run_rest"), RESTING, 60.0, seed=3, noise=NOISE)
     told: list[str] = []
     found = calibrated(resting, "inertial", tell=lambda stage, _done, _most: told.append(stage))
     assert "search" in told

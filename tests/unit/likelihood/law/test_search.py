@@ -115,7 +115,7 @@ def test_a_marker_that_is_off_and_turned_is_found() -> None:
     assert fitted_value(fit, "marker_y") == pytest.approx(want[1], abs=0.5e-3)
     assert fitted_value(fit, "orientation_offset") == pytest.approx(turned, abs=np.radians(1.5))
     assert within(fit, "drag_coefficient", 1.021 * DRAG), FALSE_ALARM
-    exact = dw.fit_motion(track, study_with(), angle="none")
+    exact = dw.fit_motion(track.isel(time=slice(600)), study_with(), angle="none")
     assert "marker_x" not in exact["parameter"].values
 
 

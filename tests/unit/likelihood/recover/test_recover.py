@@ -96,6 +96,7 @@ def test_the_step_of_a_truth(asked: str | float, interval: float, step: float) -
     assert chosen == pytest.approx(step)
 
 
+@pytest.mark.slow
 def test_a_setting_is_the_fit_of_its_recording(found: xr.Dataset, flow: xr.Dataset) -> None:
     """Number 1 by hand, each value from where it belongs."""
     tracks = recorded({}, flow, number=1)
