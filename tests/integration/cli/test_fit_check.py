@@ -89,7 +89,7 @@ def test_a_check_that_cannot_be_made_says_so_and_the_fit_is_kept(tmp_path: Path)
     how = ("--spline-spacing", "3cm", "-o", tmp_path / "run")
     done = here("fit", path, *how)
     assert done.code == 0, done.err
-    line = next(line for line in done.out.splitlines() if line.startswith("model check"))
+    line = next(line for line in done.out.splitlines() if line.startswith("verdict"))
     assert "the model cannot be checked: the fit used" in line
     assert not (tmp_path / "run" / "check.nc").exists()
     found = json.loads(here("fit", path, *how, "--overwrite", "--json").out)
