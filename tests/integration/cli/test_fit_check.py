@@ -46,7 +46,7 @@ def test_the_check_is_written_with_its_figures(fitted: tuple[Path, Done]) -> Non
 def test_people_are_told_and_the_check_can_be_left_out(tmp_path: Path) -> None:
     done = here("fit", RECORDING, *SHORT, "-o", tmp_path / "run", "--no-check")
     assert done.code == 0, done.err
-    assert "model check" not in done.out
+    assert "verdict                not checked\n" in done.out
     assert not (tmp_path / "run" / "check.nc").exists()
     assert not (tmp_path / "run" / "figures" / "check_map.png").exists()
 
