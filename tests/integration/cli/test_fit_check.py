@@ -46,7 +46,7 @@ def test_the_check_is_written_with_its_figures(fitted: tuple[Path, Done]) -> Non
 def test_people_are_told_and_the_check_can_be_left_out(tmp_path: Path) -> None:
     done = here("fit", RECORDING, *SHORT, "-o", tmp_path / "run", "--no-check")
     assert done.code == 0, done.err
-    assert "model check" not in done.out
+    assert "verdict                not checked\n" in done.out
     assert not (tmp_path / "run" / "check.nc").exists()
     assert not (tmp_path / "run" / "figures" / "check_map.png").exists()
 
@@ -89,7 +89,7 @@ def test_a_check_that_cannot_be_made_says_so_and_the_fit_is_kept(tmp_path: Path)
     how = ("--spline-spacing", "3cm", "-o", tmp_path / "run")
     done = here("fit", path, *how)
     assert done.code == 0, done.err
-    line = next(line for line in done.out.splitlines() if line.startswith("model check"))
+    line = next(line for line in done.out.splitlines() if line.startswith("verdict"))
     assert "the model cannot be checked: the fit used" in line
     assert not (tmp_path / "run" / "check.nc").exists()
     found = json.loads(here("fit", path, *how, "--overwrite", "--json").out)

@@ -97,6 +97,6 @@ def test_fit_prints_its_answer_before_it_draws(
     words = ["fit", str(RECORDING), *TANK, "--to", "60s", "-o", str(tmp_path / "run")]
     assert main(words) == 0
     assert "drag coefficient" in drawn[0]
-    assert "model check" in drawn[0]
-    assert drawn[0].index("drag coefficient") < drawn[0].index("model check")
+    assert "verdict" in drawn[0]
+    assert drawn[0].index("drag coefficient") < drawn[0].index("verdict")
     assert "flow.nc" in capsys.readouterr().out
