@@ -27,7 +27,7 @@ pytest.importorskip("cv2")
 STUDY = Path(__file__).resolve().parents[2] / "studies" / "tracking"
 TANK = ("--tank", "30cm")
 NAN = float("nan")
-FRAMES = 1500
+FRAMES = 4000
 FIRST_FRAMES = f"""\
 import itertools
 from driftwalk.track.source.frames import VideoFile
@@ -188,7 +188,7 @@ def test_a_fit_of_tracked_poses_is_that_of_the_true_ones(
 def test_the_mouse_beside_its_published_track(
     shared_data: Callable[[str], Path], tmp_path: Path
 ) -> None:
-    """The first minute of the video; its background, though, is that of all of it.
+    """Two minutes of the video; its background, though, is that of all of it.
 
     The study tracks all of it: of the last 6,000 frames four are stale, the picture before again.
     """

@@ -71,11 +71,11 @@ def test_a_power_of_the_drag_is_that_of_c_d_at_its_speed(study: dict[str, Module
 
 
 def test_faces_bring_a_turning_block_to_rest(study: dict[str, ModuleType]) -> None:
-    """I domega/dt = -c omega^2, c = 4 K int_0^h (o^3 + h^2 o) do = 3 K h^4; Gauss points: 2 %."""
+    """I domega/dt = -c omega^2, c = 4 K int_0^h (o^3 + h^2 o) do = 3 K h^4, exact by Gauss."""
     motion = moved(study, 2.0, spin=3.0)
     damping = 3.0 * 0.5 * DENSITY * 0.6 * DEPTH * (SIDE / 2) ** 4
     rate = damping / (MASS * SIDE**2 / 6)
-    assert motion.angle[0, -1] == pytest.approx(np.log1p(rate * 3.0 * 2.0) / rate, rel=2e-2)
+    assert motion.angle[0, -1] == pytest.approx(np.log1p(rate * 3.0 * 2.0) / rate, rel=2e-3)
 
 
 @pytest.mark.parametrize("added_mass", [0.0, 0.5])

@@ -23,7 +23,7 @@ RESTING = {
 def test_summaries_name_the_true_model(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Run and rest tie with bursts by distance; by their summaries they do not."""
     recording = moving(
-        dw.motion_model("run_rest", clearance=0.01), RESTING, 200.0, seed=4, noise=2e-4
+        dw.motion_model("run_rest", clearance=0.01), RESTING, 300.0, seed=4, noise=2e-4
     )
     (tmp_path / "recording.nc").write_bytes(netcdf_bytes(recording))
     out = tmp_path / "run"

@@ -131,9 +131,9 @@ sys.addaudithook(hook)
 def test_killed_between_any_two_changes(
     study: Path, uninterrupted: xr.Dataset, tmp_path: Path
 ) -> None:
-    """At every 47th change: a calibration makes some hundred, and the moments are a sample."""
+    """At every 31st change: a calibration makes a hundred or more, and the moments are a sample."""
     kills = 0
-    for count in range(0, 2000, 47):
+    for count in range(0, 2000, 31):
         folder = tmp_path / f"run-{count}"
         before = PLAIN + KILL.format(count=count, folder=str(folder))
         code = apart(*words(study, folder), before=before).code

@@ -8,11 +8,17 @@ import numpy as np
 import pytest
 
 import driftwalk as dw
-from driftwalk.calibration.goodness_of_fit import could_be_best
+from driftwalk.calibration.goodness_of_fit import GoodnessOfFit, could_be_best
 from driftwalk.calibration.grid.grid_map import MapSimulator, full_map
 from driftwalk.calibration.problem import prepare_problem
 from driftwalk.schema import Track, body_track
 from driftwalk.simulation.backend import Camera
+
+
+@pytest.mark.parametrize(("distance", "stretch"), [(0.3, 3.0), (0.1, 1.0), (0.05, 1.0)])
+def test_errors_are_widened_by_the_distance_in_floors(distance: float, stretch: float):
+    """And made no smaller where chance brought the two nearer than the floor."""
+    assert GoodnessOfFit(distance, 0.01, 0.1, 0.2).stretch == pytest.approx(stretch)
 
 
 @pytest.mark.slow

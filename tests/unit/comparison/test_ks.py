@@ -51,7 +51,7 @@ def test_single_points() -> None:
     assert ks_distance([[0, 0]], [[1, 1]]) == 1.0
     same = ks_compare([[0.5, 0.5]], [[0.5, 0.5]], ties="limits")
     assert same.distance == 0.0
-    assert same.place.quadrant == -1
+    assert (same.place.quadrant, same.place.row) == (-1, -1)
     assert np.isnan(same.place.x)
     assert same.tied_fraction == 1.0
 

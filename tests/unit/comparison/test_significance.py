@@ -53,11 +53,13 @@ def test_short_and_constant_series_remember_nothing(series: list[float]) -> None
 def test_the_distance_is_that_of_the_whole_blocks() -> None:
     rng = np.random.default_rng(3)
     a, b = rng.normal(size=(305, 2)), rng.normal(size=(208, 2))
-    result = block_permutation_test(a, b, block_length=10, permutations=49, seed=1)
+    # With other seeds other permutations come first: each of them counts.
+    for seed in range(8):
+        result = block_permutation_test(a, b, block_length=10, permutations=49, seed=seed)
+        reached = int((result.permuted_distance >= result.distance).sum())
+        assert result.p_value == (1 + reached) / 50
     assert result.distance == ks_distance(a[:300], b[:200])
     assert (result.blocks_a, result.blocks_b, result.left_out) == (30, 20, 13)
-    reached = int((result.permuted_distance >= result.distance).sum())
-    assert result.p_value == (1 + reached) / 50
     assert result.noise_floor == np.median(result.permuted_distance)
     assert result.permuted_distance.size == 49
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from driftwalk.flow.arena import Circle, outline_of
-from driftwalk.likelihood.filter.series import wall_intervals
+from driftwalk.likelihood.filter.series import _continued, wall_intervals
 
 TANK = Circle(0.15)
 SIDE = 0.03
@@ -50,6 +50,12 @@ def test_the_motion_is_not_continued_over_a_gap() -> None:
     assert intervals(x, np.zeros(6)) == []
     assert intervals(x + 0.004, np.zeros(6)) == [5]
     assert intervals(x + 0.004, np.zeros(6), time) == []
+
+
+def test_a_steady_motion_is_continued_over_uneven_intervals() -> None:
+    time = np.array([0.0, 0.1, 0.3, 0.35, 0.5])
+    # The first two have no change before them, so they stay.
+    assert _continued(time, 2.0 * time) == pytest.approx([0.0, 0.2, 0.7, 1.0])
 
 
 def test_a_corner_may_swing_into_the_wall() -> None:

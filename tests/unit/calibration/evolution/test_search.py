@@ -98,7 +98,10 @@ def test_evaluations_are_numbered_and_counted():
     assert {replicates for _, _, replicates in seen} == {QUICK.replicates, QUICK.retest}
 
 
-@pytest.mark.parametrize("parameters", [1, 2, 8, 12])
-def test_a_generation_is_even_and_grows(parameters):
-    assert population(parameters) % 2 == 0
-    assert population(parameters) >= 4 + int(3 * np.log(parameters))
+@pytest.mark.parametrize(
+    ("parameters", "usual", "even"), [(1, 4, 6), (2, 6, 8), (3, 7, 8), (8, 10, 12), (12, 11, 12)]
+)
+def test_a_generation_is_the_usual_one_made_even(parameters, usual, even):
+    """4 + 3 ln n of Hansen's CMA-ES, and one or two more."""
+    assert int(4 + 3 * np.log(parameters)) == usual
+    assert population(parameters) == even

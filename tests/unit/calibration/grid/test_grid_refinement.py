@@ -15,6 +15,7 @@ from driftwalk.calibration.grid.grid_refinement import (
     first_window,
     locate_minimum,
     refine,
+    round_step,
     window_axes,
 )
 
@@ -164,3 +165,12 @@ def test_the_first_window_holds_what_could_be_the_optimum_and_a_cell_around():
 def test_one_value_of_a_parameter_is_a_grid_of_one():
     (axis,) = window_axes(((0.5, 0.5),), ((0.5, 0.5),), (12,))
     assert axis.tolist() == [0.5]
+
+
+@pytest.mark.parametrize("power", [1e-5, 1.0])
+@pytest.mark.parametrize("nice", [1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0])
+def test_a_step_is_rounded_down_to_a_round_number(nice: float, power: float) -> None:
+    for step in (nice, nice * 1.0001, nice * 1.19):
+        assert round_step(step * power) <= step * power * (1 + 1e-9)
+    assert round_step(nice * power) == pytest.approx(nice * power, rel=1e-12)
+    assert round_step(nice * 1.0001 * power) == pytest.approx(nice * power, rel=1e-12)
