@@ -38,6 +38,15 @@ def compare_models(
         ),
     ] = None,
     parameters: ComparedParameters = None,
+    clearance: Annotated[
+        float | None,
+        option(
+            "--clearance",
+            "Distance of the recorded point from the wall at contact: half the body's width. "
+            "Default: estimated from the recording.",
+            unit="m",
+        ),
+    ] = None,
     flow: FlowFile = None,
     *,
     options: RunOptions,
@@ -59,7 +68,10 @@ def compare_models(
         named = ALL_MODELS
     else:
         named = [name for name in map(str.strip, models.split(",")) if name]
-    chosen = models_knowing(named, parameter_choices(parameters))
+    known = parameter_choices(parameters)
+    if clearance is not None:
+        known["clearance"] = clearance
+    chosen = models_knowing(named, known)
     read, begun = read_for_models(recording, flow, given, how, chosen)
     with options.reported("compare models") as told:
         if not options.json:

@@ -8,24 +8,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from driftwalk.calibration.held_out.candidates import Candidate
-from driftwalk.calibration.held_out.held_out_score import (
-    VERDICT,
-    HeldOutScore,
-    Verdict,
-    recording_parts,
-    verdict_of,
-)
+from driftwalk.calibration.held_out.held_out_score import VERDICT, HeldOutScore, recording_parts
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.calibration.ranking.model_evidence import (
     Evidence,
-    EvidenceRanking,
-    discrepancy_sentence,
     rank_by_evidence,
     ranking_sentence,
 )
+from driftwalk.calibration.ranking.model_verdicts import answer_sentence, model_verdicts
 from driftwalk.calibration.stationarity import motion_warnings, stationarity_of_motion
 from driftwalk.core.arrays import Floats
 from driftwalk.schema.answers.facts import texts
+from driftwalk.schema.answers.verdict import DOES_NOT_EXPLAIN, EXPLAINS, Verdict
 from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:
@@ -49,21 +43,7 @@ def build_comparison(
     answer = rank_by_evidence(entries, evidence)
     names = [entry.model.name for entry in entries]
     behind, behind_std = np.array([one.behind(held_out[0]) for one in held_out]).T
-    # The first model is closest; the one that the summaries name stands beside it all the same.
-    clearly_behind = behind > VERDICT.tied_sigmas * behind_std
-    # Where no model gives the summaries, they speak against none in particular.
-    asked = {} if answer.best is None else evidence
-    unlike = {k: discrepancy_sentence(one) for k, one in asked.items()}
-    verdicts = [
-        verdict_of(
-            one,
-            motion,
-            baseline=entry.baseline,
-            clearly_behind=names[0] if clearly_behind[k] and k != answer.best else None,
-            unlike=unlike.get(k),
-        )
-        for k, (entry, one) in enumerate(zip(entries, held_out, strict=True))
-    ]
+    verdicts = model_verdicts(entries, held_out, motion, evidence, answer)
     # Walks of recorded steps are no answer, however close they are.
     closest = next((k for k, entry in enumerate(entries) if not entry.baseline), 0)
     apart = [one.behind(held_out[closest]) for one in held_out]
@@ -83,7 +63,8 @@ def build_comparison(
     why = _findings(names, entries, verdicts, closest, tied)
     if evidence:
         why.insert(0 if answer.best is not None else 1, ranking_sentence(names, evidence, answer))
-    best = answer_sentence(names, verdicts, closest, answer)
+    first = closest if answer.best is None else answer.best
+    best = answer_sentence(entries, verdicts, first)
     findings = [best, *(one for one in why if one != best)]
     about = recording_parts(motion)
     data: dict[str, Any] = {
@@ -94,8 +75,8 @@ def build_comparison(
         "behind_std": ("model", behind_std),
         "free_numbers": ("model", [entry.numbers for entry in entries]),
         "baseline": ("model", [entry.baseline for entry in entries]),
-        "explained": ("model", [one.explained for one in verdicts]),
-        "verdict": ("model", texts([one.text for one in verdicts])),
+        "explained": ("model", [one.word == EXPLAINS for one in verdicts]),
+        "verdict": ("model", texts(["; ".join(one.reasons) for one in verdicts])),
         "held_out_distance": (("model", "aspect"), [one.held for one in held_out]),
         "trained_distance": (("model", "aspect"), [one.trained for one in held_out]),
         "check_median": (("model", "check"), [np.median(one.checks, axis=0) for one in held_out]),
@@ -162,24 +143,6 @@ def _estimates(
     return units, values.reshape(len(entries), len(units))
 
 
-def answer_sentence(
-    names: Sequence[str], verdicts: Sequence[Verdict], closest: int, answer: EvidenceRanking
-) -> str:
-    """Return the answer in one sentence: the best model, and whether it explains the recording.
-
-    The summaries of the motion decide where they name a model, the distance otherwise; a model that
-    explains the recording is better than one that does not.
-    """
-    first = closest if answer.best is None else answer.best
-    explained = [k for k, one in enumerate(verdicts) if one.explained]
-    if not explained:
-        return f"No model explains the recording; the best one is {names[first]}"
-    best = first if first in explained else explained[0]
-    others = [names[k] for k in explained if k != best]
-    also = f"; so do others, but no better: {', '.join(others)}" if others else ""
-    return f"{names[best]} explains the recording{also}"
-
-
 def _findings(
     names: Sequence[str],
     entries: Sequence[Candidate],
@@ -192,8 +155,10 @@ def _findings(
     rivals = [names[k] for k in tied if not entries[k].baseline]
     if rivals:
         found[0] += f"; no clear difference from {', '.join(rivals)}"
-    if not any(one.explained for one in verdicts):
-        found.append(f"{names[closest]} does not explain it: {verdicts[closest].text}")
+    if all(one.word == DOES_NOT_EXPLAIN for one in verdicts):
+        found.append(
+            f"{names[closest]} does not explain it: {'; '.join(verdicts[closest].reasons)}"
+        )
     baselines = [names[k] for k in tied if entries[k].baseline]
     nearer = [names[k] for k in range(closest)]
     if nearer:
