@@ -15,9 +15,9 @@ class ClearancePolicy(NamedTuple):
     nearest_share: float = 0.01
     """The nearest samples may be tracking errors: this share is not trusted to be near the wall."""
     outward: float = 20.0
+    """How far outwards of them the contact is looked for, in noises; chosen by hand."""
     inward: float = 10.0
-    """How far from them the contact is looked for, and distances inwards, in noises; chosen by
-    hand."""
+    """How far inwards of them distances are looked at, in noises; chosen by hand."""
     least_blur: float = 3e-4
     """Noise of a recording without any, in parts of its largest distance: contact is then found
     to a tenth of that."""

@@ -19,7 +19,12 @@ from driftwalk.calibration.estimation.synthetic_likelihood import (
 )
 from driftwalk.calibration.evolution import rounded
 from driftwalk.calibration.held_out.candidates import Candidate
-from driftwalk.calibration.held_out.held_out_score import HeldOutScore, even_blocks
+from driftwalk.calibration.held_out.held_out_score import (
+    HeldOutScore,
+    even_blocks,
+    held_out_differences,
+    score_setting,
+)
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.core.arrays import Floats
 from driftwalk.core.processors import one_blas_thread
@@ -64,6 +69,8 @@ class Evidence(NamedTuple):
     """and their 99 % quantile."""
     deviance: float
     """-2 log of the evidence, but for a constant that all models share."""
+    matched: HeldOutScore | None = None
+    """The setting of the summaries, judged as that of the distances; where these are usual."""
 
     @property
     def usual(self) -> bool:
@@ -122,6 +129,24 @@ def rank_by_evidence(
     left = [k for k in usual if evidence[k].deviance < least + EVIDENCE.rival]
     best = min(left, key=lambda k: (entries[k].numbers, evidence[k].deviance))
     return EvidenceRanking(best, tuple(k for k in left if k != best))
+
+
+def with_matched_settings(
+    held_out: Sequence[HeldOutScore], evidence: Mapping[int, Evidence], motion: RecordedMotion
+) -> list[HeldOutScore]:
+    """Return the scores, of the summaries' setting where only that one has no difference.
+
+    A search by distances may miss the optimum of the true model.
+    """
+    found = list(held_out)
+    for k, one in evidence.items():
+        if one.matched is None or not held_out_differences(held_out[k], motion):
+            continue
+        if not held_out_differences(one.matched, motion):
+            found[k] = one.matched._replace(
+                optimum_scores=held_out[k].optimum_scores, evaluations=held_out[k].evaluations
+            )
+    return found
 
 
 def discrepancy_sentence(one: Evidence) -> str | None:
@@ -210,7 +235,7 @@ def estimate_evidence(
     found = synthetic_likelihood_at(
         lambda settings: simulate(settings)[:, 0], objective.recorded[0], setting, replicates
     )
-    return Evidence(
+    evidence = Evidence(
         discrepancy=found.discrepancy,
         median_discrepancy=float(np.median(found.own_discrepancies)),
         upper_discrepancy=float(np.quantile(found.own_discrepancies, EVIDENCE.typical_quantile)),
@@ -220,6 +245,9 @@ def estimate_evidence(
         - log_volume
         - parameters * float(np.log(2.0 * np.pi)),
     )
+    if not (parameters and evidence.usual):
+        return evidence
+    return evidence._replace(matched=score_setting(objective.worlds, motion, setting))
 
 
 class _Blurred:

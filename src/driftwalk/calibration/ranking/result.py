@@ -14,6 +14,7 @@ from driftwalk.calibration.ranking.model_evidence import (
     Evidence,
     rank_by_evidence,
     ranking_sentence,
+    with_matched_settings,
 )
 from driftwalk.calibration.ranking.model_verdicts import answer_sentence, model_verdicts
 from driftwalk.calibration.stationarity import motion_warnings, stationarity_of_motion
@@ -37,6 +38,7 @@ def build_comparison(
 
     `evidence_by_model` has those whose summaries were matched, by their places among them.
     """
+    held_out = with_matched_settings(held_out, evidence_by_model, motion)
     order = np.argsort([one.score for one in held_out], kind="stable")
     entries, held_out = [entries[k] for k in order], [held_out[k] for k in order]
     evidence = {at: evidence_by_model[k] for at, k in enumerate(order) if k in evidence_by_model}
