@@ -84,7 +84,20 @@ class EvidenceRanking(NamedTuple):
     best: int | None
     """The model that they speak for; None where no model gives them."""
     rivals: tuple[int, ...]
-    """Others that give them as well."""
+    """Others that are about as likely."""
+
+    def as_good(self, entries: Sequence[Candidate], evidence: Mapping[int, Evidence]) -> list[int]:
+        """Return the rivals that are likelier than the best or have no more parameters."""
+        best = self.best
+        return [
+            k
+            for k in self.rivals
+            if best is not None
+            and (
+                evidence[k].deviance < evidence[best].deviance
+                or entries[k].numbers <= entries[best].numbers
+            )
+        ]
 
 
 class Shortlist(NamedTuple):

@@ -58,8 +58,8 @@ def model_verdicts(
         allowed = motion.clearance_distance if recorded else 0.0
         against = held_out_differences(one, motion, allowed=allowed)
         against += _unlike(k, entries, evidence, answer)
-        # The one that the summaries name stands beside the first.
-        if not against and clearly_behind[k] and k != answer.best:
+        # Those that the summaries speak for stand beside the first.
+        if not against and clearly_behind[k] and k not in (answer.best, *answer.rivals):
             against.append(f"{entries[0].model.name} is clearly closer")
         if entry.baseline:
             against.insert(0, "it repeats recorded steps and knows no arena")
@@ -110,12 +110,17 @@ def _wall_limit(motion: RecordedMotion) -> float:
     return VERDICT.most_over_own * float(own.get("wall", np.inf))
 
 
-def answer_sentence(entries: Sequence[Candidate], verdicts: Sequence[Verdict], first: int) -> str:
+def answer_sentence(
+    entries: Sequence[Candidate],
+    verdicts: Sequence[Verdict],
+    first: int,
+    as_good: Sequence[int] = (),
+) -> str:
     """Return the verdict of the comparison in one sentence.
 
     `first` is the model that the summaries name, or the closest one where they name none. A model
-    that explains the recording is better than one that does not; where others with as few
-    parameters explain it too, the recording does not tell them apart.
+    that explains the recording is better than one that does not. Where those that are `as_good` as
+    the first explain it too, the recording does not tell them apart.
     """
     words = [one.word for one in verdicts]
     names = [entry.model.name for entry in entries]
@@ -128,11 +133,11 @@ def answer_sentence(entries: Sequence[Candidate], verdicts: Sequence[Verdict], f
         return f"No model explains the recording; the best one is {names[first]}"
     best = first if first in explaining else explaining[0]
     others = [k for k in explaining if k != best]
-    equal = [names[k] for k in others if entries[k].numbers <= entries[best].numbers]
+    equal = [names[k] for k in as_good if best == first and k in others]
     if equal:
         return (
-            f"Cannot tell which model explains the recording: {names[best]} does, and so do "
-            f"others with no more parameters: {', '.join(equal)}. A longer recording is needed"
+            f"Cannot tell which model explains the recording: {names[best]} does, and as likely "
+            f"{' and '.join(equal)}; a longer recording is needed"
         )
     also = f"; so do others, but no better: {', '.join(names[k] for k in others)}" if others else ""
     return f"{names[best]} explains the recording{also}"

@@ -129,23 +129,39 @@ def test_the_place_near_the_wall_may_be_off_by_the_error_of_the_clearance() -> N
 
 
 @pytest.mark.parametrize(
-    ("words", "first", "sentence"),
+    ("words", "first", "as_good", "sentence"),
     [
-        ("ynn", 0, "run_tumble explains the recording"),
-        ("yyn", 1, "active explains the recording; so do others, but no better: run_tumble"),
-        ("nny", 1, "burst_coast explains the recording"),
-        ("nnn", 1, "No model explains the recording; the best one is active"),
-        ("n?n", 0, "Cannot tell whether active explains the recording: longer"),
-        ("?yn", 0, "active explains the recording"),
+        ("ynn", 0, [1], "run_tumble explains the recording"),
+        ("yyn", 1, [], "active explains the recording; so do others, but no better: run_tumble"),
+        ("nny", 1, [0], "burst_coast explains the recording"),
+        ("nnn", 1, [0], "No model explains the recording; the best one is active"),
+        ("n?n", 0, [], "Cannot tell whether active explains the recording: longer"),
+        ("?yn", 0, [1], "active explains the recording"),
         (
-            "yny", 0,
-            "Cannot tell which model explains the recording: run_tumble does, and so do others "
-            "with no more parameters: burst_coast. A longer recording is needed",
+            "yny", 0, [1, 2],
+            "Cannot tell which model explains the recording: run_tumble does, and as likely "
+            "burst_coast; a longer recording is needed",
         ),
     ],
 )  # fmt: skip
-def test_the_answer_is_one_sentence(words: str, first: int, sentence: str) -> None:
+def test_the_answer_is_one_sentence(
+    words: str, first: int, as_good: list[int], sentence: str
+) -> None:
     entries = [candidate(name) for name in ("run_tumble", "active", "burst_coast")]
     meant = {"y": EXPLAINS, "n": DOES_NOT_EXPLAIN, "?": CANNOT_TELL}
     verdicts = [Verdict(meant[word], () if word == "y" else ("longer",)) for word in words]
-    assert answer_sentence(entries, verdicts, first) == sentence
+    assert answer_sentence(entries, verdicts, first, as_good) == sentence
+
+
+def test_of_models_that_are_as_likely_none_is_rejected_for_its_distance() -> None:
+    """Ten blocks of a short recording may prefer the simpler one by two standard errors."""
+    evidence = {0: TYPICAL, 1: TYPICAL._replace(deviance=-408.0)}
+    scores = [scored(1.0), scored(1.1)]
+    names = ["active", "run_tumble"]
+    assert [one.word for one in verdicts_of(names, evidence, scores=scores)] == [EXPLAINS] * 2
+    entries = [candidate(name) for name in names]
+    answer = rank_by_evidence(entries, evidence)
+    assert answer.best == 0
+    assert answer.as_good(entries, evidence) == [1]
+    less_likely = {0: TYPICAL, 1: TYPICAL._replace(deviance=-395.0)}
+    assert rank_by_evidence(entries, less_likely).as_good(entries, less_likely) == []
