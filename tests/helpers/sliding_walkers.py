@@ -84,8 +84,17 @@ def levy(random: np.random.Generator) -> Step:
     return step
 
 
+def run_and_rest(random: np.random.Generator) -> Step:
+    """Exponential runs of 2 s and exponential rests of 3 s."""
+    return _resting(lambda random: random.exponential(3.0))
+
+
 def heavy_rests(random: np.random.Generator) -> Step:
     """Exponential runs of 2 s and rests with a power law, exponent 1.2, from 0.5 s on."""
+    return _resting(lambda random: min(0.5 * (1.0 + random.pareto(1.2)), 300.0))
+
+
+def _resting(rest: Callable[[np.random.Generator], float]) -> Step:
     state = {"left": 0.0, "heading": 0.0, "moves": 0.0}
 
     def step(random: np.random.Generator, _depth: float, _normal: float) -> tuple[float, float]:
@@ -96,7 +105,7 @@ def heavy_rests(random: np.random.Generator) -> Step:
                 state["left"] = random.exponential(2.0)
                 state["heading"] += random.normal(0.0, 1.0)
             else:
-                state["left"] = min(0.5 * (1.0 + random.pareto(1.2)), 300.0)
+                state["left"] = rest(random)
         if not state["moves"]:
             return 0.0, state["heading"]
         state["heading"] += np.sqrt(2.0 * 0.05 * TICK) * random.normal()
@@ -131,7 +140,10 @@ def sees_the_wall(random: np.random.Generator) -> Step:
 
 WALKERS = {
     one.__name__: one
-    for one in (run_and_tumble, active_chiral, two_state, levy, heavy_rests, sees_the_wall)
+    for one in (
+        *(run_and_tumble, active_chiral, two_state, run_and_rest),
+        *(levy, heavy_rests, sees_the_wall),
+    )
 }
 
 

@@ -18,8 +18,10 @@ from driftwalk.calibration.estimation.synthetic_likelihood import (
     synthetic_likelihood_at,
 )
 from driftwalk.calibration.evolution import rounded
+from driftwalk.calibration.held_out.bouts import BoutDistance, bout_distances
 from driftwalk.calibration.held_out.candidates import Candidate
 from driftwalk.calibration.held_out.held_out_score import (
+    HELD_OUT_REPLICATES,
     HeldOutScore,
     even_blocks,
     held_out_differences,
@@ -71,6 +73,8 @@ class Evidence(NamedTuple):
     """-2 log of the evidence, but for a constant that all models share."""
     matched: HeldOutScore | None = None
     """The setting of the summaries, judged as that of the distances; where these are usual."""
+    bouts: tuple[BoutDistance, ...] = ()
+    """How long bouts last there, against the model's own recordings."""
 
     @property
     def usual(self) -> bool:
@@ -258,9 +262,13 @@ def estimate_evidence(
         - log_volume
         - parameters * float(np.log(2.0 * np.pi)),
     )
-    if not (parameters and evidence.usual):
+    if entry.baseline or not evidence.usual:
         return evidence
-    return evidence._replace(matched=score_setting(objective.worlds, motion, setting))
+    worlds = objective.worlds.simulated(setting[None], HELD_OUT_REPLICATES, stage="judged")
+    return evidence._replace(
+        matched=score_setting(objective.worlds, motion, setting),
+        bouts=bout_distances(motion, worlds),
+    )
 
 
 class _Blurred:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from driftwalk.calibration.held_out.bouts import bout_sentences
 from driftwalk.calibration.held_out.candidates import Candidate, takes_recorded_clearance
 from driftwalk.calibration.held_out.held_out_score import (
     VERDICT,
@@ -90,6 +91,8 @@ def _unlike(
         return []
     if (misfit := discrepancy_sentence(evidence[k])) is not None:
         return [misfit]
+    if others := list(bout_sentences(evidence[k].bouts)):
+        return others
     if answer.best is None or k == answer.best or k in answer.rivals or entries[k].baseline:
         return []
     return [f"{entries[answer.best].model.name} is clearly likelier by the summaries of the motion"]

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from driftwalk.calibration.held_out.bouts import BoutDistance
 from driftwalk.calibration.held_out.candidates import Candidate
 from driftwalk.calibration.held_out.held_out_score import HeldOutScore
 from driftwalk.calibration.held_out.recorded import CHECKS
@@ -165,3 +166,10 @@ def test_of_models_that_are_as_likely_none_is_rejected_for_its_distance() -> Non
     assert answer.as_good(entries, evidence) == [1]
     less_likely = {0: TYPICAL, 1: TYPICAL._replace(deviance=-395.0)}
     assert rank_by_evidence(entries, less_likely).as_good(entries, less_likely) == []
+
+
+def test_bouts_of_another_law_are_against_a_model_that_gives_the_summaries() -> None:
+    for distance, word in ((0.31, DOES_NOT_EXPLAIN), (0.13, EXPLAINS)):
+        bouts = (BoutDistance("slow", distance, 0.14), BoutDistance("fast", 0.1, 0.2))
+        (found,) = verdicts_of(["active"], {0: TYPICAL._replace(bouts=bouts)})
+        assert found.word == word
