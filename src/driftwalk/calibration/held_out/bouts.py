@@ -23,8 +23,9 @@ class BoutPolicy(NamedTuple):
     hand."""
     most_ratio: float = 1.5
     """Distance of the recorded lengths from the model's, in largest ones of 20 simulated
-    recordings. By the distribution of Kolmogorov's statistic the right law exceeds it once in some
-    ten thousand."""
+    recordings, and longest bout in longest ones of these. By the distribution of Kolmogorov's
+    statistic, and of the largest of exponential lengths, the right law exceeds either once in a
+    thousand."""
     fewest: int = 20
     """Bouts without which nothing is said; chosen by hand."""
 
@@ -41,13 +42,17 @@ class BoutDistance(NamedTuple):
     """Kolmogorov-Smirnov distance of the recorded lengths from those of all simulated ones."""
     limit: float
     """Up to which it is like that of a simulated recording from the others."""
+    longest: float
+    """The longest recorded one [s]."""
+    longest_limit: float
+    """Up to which it is like that of simulated recordings [s]."""
 
 
 def bout_distances(motion: RecordedMotion, worlds: Worlds) -> tuple[BoutDistance, ...]:
     """Compare the lengths of slow and fast bouts with those of simulated recordings.
 
     A law of the family has bouts of a Weibull distribution. Rests with a power law may have the
-    same mean and spread.
+    same distribution but for the longest.
     """
     steps = motion.steps.points[:, 0]
     level = BOUTS.level * float(np.quantile(steps, 0.9))
@@ -65,7 +70,16 @@ def bout_distances(motion: RecordedMotion, worlds: Worlds) -> tuple[BoutDistance
             for k, one in enumerate(others)
         ]
         apart = _distance(recorded[at], np.concatenate(others))
-        found.append(BoutDistance(kind, apart, BOUTS.most_ratio * max(own)))
+        interval = motion.plan.short.step_interval
+        longest, others_longest = (
+            interval * float(one.max()) for one in (recorded[at], np.concatenate(others))
+        )
+        found.append(
+            BoutDistance(
+                *(kind, apart, BOUTS.most_ratio * max(own)),
+                *(longest, BOUTS.most_ratio * others_longest),
+            )
+        )
     return tuple(found)
 
 
@@ -74,7 +88,7 @@ def bout_sentences(found: tuple[BoutDistance, ...]) -> Iterator[str]:
 
     Examples
     --------
-    >>> list(bout_sentences((BoutDistance("slow", 0.31, 0.14), BoutDistance("fast", 0.1, 0.2))))
+    >>> list(bout_sentences((BoutDistance("slow", 0.31, 0.14, 9.1, 12.0),)))
     ['slow bouts last otherwise: D = 0.310, of its own recordings below 0.140']
     """
     for one in found:
@@ -82,6 +96,11 @@ def bout_sentences(found: tuple[BoutDistance, ...]) -> Iterator[str]:
             yield (
                 f"{one.kind} bouts last otherwise: D = {one.distance:.3f}, "
                 f"of its own recordings below {one.limit:.3f}"
+            )
+        if one.longest > one.longest_limit:
+            yield (
+                f"the longest {one.kind} bout lasts {one.longest:.3g} s, of its own recordings "
+                f"below {one.longest_limit:.3g} s"
             )
 
 

@@ -71,7 +71,7 @@ def compare_models(
     where no more than one of eight facts that are not fitted is far off, where its misfit of the
     summaries is usual for it, and where no other one is clearly closer or likelier. Where a walk of
     recorded steps passes all of that as well, or the summaries were not matched, or the wall was
-    hardly touched, nothing can be told.
+    hardly touched, the comparison cannot tell.
 
     Parameters
     ----------

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.stats import ks_2samp
 
-from driftwalk.calibration.held_out.bouts import bout_distances
+from driftwalk.calibration.held_out.bouts import bout_distances, bout_sentences
 from driftwalk.comparison.aspects import plan_aspects
 
 STEPS = 6000
@@ -63,6 +63,19 @@ def test_rests_of_the_law_itself_are_like_its_own_and_a_power_law_is_not() -> No
         (slow, fast), _ = compared(power_law, seed)
         assert slow.distance > slow.limit
         assert fast.distance < fast.limit
+        assert max(one.longest / one.longest_limit for one in found) < 1.0
+
+
+def test_one_rest_that_lasts_for_long_counts() -> None:
+    """The longest of 100 exponential ones of 2 s lasts some 10 s, of 2000 some 15 s."""
+
+    def sometimes_long(random: np.random.Generator) -> float:
+        return 600.0 if random.random() < 0.02 else exponential(random)
+
+    (slow, _), (rests, *_) = compared(sometimes_long, 5)
+    assert slow.longest == pytest.approx(0.1 * max(rests), abs=0.2)
+    assert slow.longest > slow.longest_limit
+    assert "the longest slow bout lasts 60" in " ".join(bout_sentences((slow,)))
 
 
 def test_the_distance_is_that_of_kolmogorov_and_smirnov() -> None:

@@ -169,7 +169,9 @@ def test_of_models_that_are_as_likely_none_is_rejected_for_its_distance() -> Non
 
 
 def test_bouts_of_another_law_are_against_a_model_that_gives_the_summaries() -> None:
-    for distance, word in ((0.31, DOES_NOT_EXPLAIN), (0.13, EXPLAINS)):
-        bouts = (BoutDistance("slow", distance, 0.14), BoutDistance("fast", 0.1, 0.2))
+    for distance, longest, word in (
+        (0.31, 5.0, DOES_NOT_EXPLAIN), (0.13, 13.0, DOES_NOT_EXPLAIN), (0.13, 5.0, EXPLAINS),
+    ):  # fmt: skip
+        bouts = (BoutDistance("slow", distance, 0.14, longest, 12.0),)
         (found,) = verdicts_of(["active"], {0: TYPICAL._replace(bouts=bouts)})
         assert found.word == word
