@@ -39,9 +39,9 @@ def model_verdicts(
 
     `evidence` has the models whose summaries were matched, by their places. Against a model are
     the aspects and facts of the odd blocks that it misses, its misfit of the summaries beyond its
-    own limit, and another model that is clearly closer or likelier. Its verdict is "cannot tell"
-    where the summaries were not matched, where a walk of recorded steps passes all tests as well,
-    and where the place near the wall cannot be judged.
+    own limit, bouts that last otherwise, and another model that is clearly closer or likelier. Its
+    verdict is "cannot tell" where the summaries were not matched, where a walk of recorded steps
+    passes all tests as well, and where the place near the wall cannot be judged.
     """
     behind, error = np.array([one.behind(held_out[0]) for one in held_out]).T
     clearly_behind = behind > VERDICT.tied_sigmas * error
