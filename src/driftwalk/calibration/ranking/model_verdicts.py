@@ -40,8 +40,9 @@ def model_verdicts(
     `evidence` has the models whose summaries were matched, by their places. Against a model are
     the aspects and facts of the odd blocks that it misses, its misfit of the summaries beyond its
     own limit, bouts that last otherwise, and another model that is clearly closer or likelier. Its
-    verdict is "cannot tell" where the summaries were not matched, where a walk of recorded steps
-    passes all tests as well, and where the place near the wall cannot be judged.
+    verdict is "cannot tell" where the summaries were not matched, or not in a flow that has errors,
+    where a walk of recorded steps passes all tests as well, and where the place near the wall
+    cannot be judged.
     """
     behind, error = np.array([one.behind(held_out[0]) for one in held_out]).T
     clearly_behind = behind > VERDICT.tied_sigmas * error
@@ -58,13 +59,21 @@ def model_verdicts(
         recorded = takes_recorded_clearance(entry.model, motion)
         allowed = motion.clearance_distance if recorded else 0.0
         against = held_out_differences(one, motion, allowed=allowed)
-        against += _unlike(k, entries, evidence, answer)
+        unlike = _unlike(k, entries, evidence, answer)
+        # Its own recordings have the flow without error.
+        unsure = unlike if entry.model.needs_flow else []
+        against += [] if unsure else unlike
         # Those that the summaries speak for stand beside the first.
         if not against and clearly_behind[k] and k not in (answer.best, *answer.rivals):
             against.append(f"{entries[0].model.name} is clearly closer")
         if entry.baseline:
             against.insert(0, "it repeats recorded steps and knows no arena")
         unable = [] if k in evidence else [_not_matched(motion)]
+        if unsure:
+            unable.append(
+                f"{'; '.join(unsure)}; errors of the flow may do that: fit flow and body together "
+                "(`driftwalk fit`)"
+            )
         if passing:
             unable.append(
                 f"a walk that only repeats recorded steps ({passing[0]}) passes every test as "

@@ -49,7 +49,7 @@ def scored(score: float = 1.0, held: float = 0.12, wall: float = 0.12) -> HeldOu
 def candidate(name: str, *, clearance: float = 0.015) -> Candidate:
     like: Any = None
     if " " in name:
-        walk: Any = SimpleNamespace(name=name)
+        walk: Any = SimpleNamespace(name=name, needs_flow=False)
         return Candidate(walk, like, (), 0, baseline=True)
     model = motion_model(name, clearance=clearance)
     return Candidate(model, like, model.parameters, len(model.parameters), baseline=False)
@@ -78,6 +78,16 @@ def test_a_misfit_beyond_its_own_limit_is_against_a_model_even_where_all_miss() 
     (found,) = verdicts_of(["run_tumble"], {0: TYPICAL._replace(discrepancy=388.0)})
     assert found.word == DOES_NOT_EXPLAIN
     assert "a misfit of 388, that of the model's own recordings is below 110" in found.reasons[0]
+
+
+def test_errors_of_the_flow_are_no_misfit_of_a_model_that_needs_one() -> None:
+    """The block in a flow that was extracted from its own recording had 4305 against 140."""
+    evidence = {0: TYPICAL._replace(discrepancy=4305.0)}
+    (found,) = verdicts_of(["active+flow"], evidence)
+    assert found.word == CANNOT_TELL
+    assert "errors of the flow may do that" in found.reasons[0]
+    (far,) = verdicts_of(["active+flow"], evidence, scores=[scored(held=0.3)])
+    assert far.word == DOES_NOT_EXPLAIN
 
 
 def test_a_likelier_model_is_against_one_that_gives_the_summaries_too() -> None:
