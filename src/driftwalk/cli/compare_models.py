@@ -13,6 +13,7 @@ from driftwalk.cli.options.shared_types import FlowFile, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_result, printable
 from driftwalk.cli.terminal.progress import ProgressReporter
+from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.study_keys import CALIBRATION_KEYS
 
 
@@ -69,6 +70,8 @@ def compare_models(
     else:
         named = [name for name in map(str.strip, models.split(",")) if name]
     known = parameter_choices(parameters)
+    if isinstance(clearance, tuple):
+        raise ConfigurationError("--clearance is a length without a standard deviation")
     if clearance is not None:
         known["clearance"] = clearance
     chosen = models_knowing(named, known)

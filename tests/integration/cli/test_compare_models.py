@@ -145,6 +145,8 @@ def test_a_parameter_that_no_model_has_is_named(tmp_path: Path) -> None:
     assert "--parameter sped: none of the named models has it" in said
     assert "did you mean 'speed'" in said
     assert "expected NAME=VALUE" in refusal(here(*words, "speed"))
+    uncertain = ("--clearance", "15±0.2mm", "-o", tmp_path / "run")
+    assert "without a standard deviation" in refusal(here("compare-models", *SHORT, *uncertain))
 
 
 @pytest.mark.slow
