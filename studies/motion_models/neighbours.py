@@ -104,7 +104,7 @@ def print_directions(motion: RecordedMotion) -> None:
 def searched(motion: RecordedMotion, name: str) -> dict[str, Any]:
     """Search a model on the even blocks with the displacements besides."""
     ranges = RANGES if "neighbours" in name else {}
-    model = dw.motion_model(name, clearance=motion.clearance, **ranges)
+    model = dw.motion_model(name, clearance=motion.clearance.distance, **ranges)
     (entry,), _ = prepare_candidates([model], motion)
     objective = FarObjective(**{**vars(even_blocks(entry, motion)), "seed": SEED}, motion=motion)
     found = search_minimum(objective, len(entry.ranges), budget=Budget(), seed=SEED)

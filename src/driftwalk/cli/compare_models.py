@@ -13,6 +13,7 @@ from driftwalk.cli.options.shared_types import FlowFile, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_result, printable
 from driftwalk.cli.terminal.progress import ProgressReporter
+from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.study_keys import CALIBRATION_KEYS
 
 
@@ -38,6 +39,15 @@ def compare_models(
         ),
     ] = None,
     parameters: ComparedParameters = None,
+    clearance: Annotated[
+        float | None,
+        option(
+            "--clearance",
+            "Distance of the recorded point from the wall at contact: half the body's width. "
+            "Default: estimated from the recording.",
+            unit="m",
+        ),
+    ] = None,
     flow: FlowFile = None,
     *,
     options: RunOptions,
@@ -59,7 +69,12 @@ def compare_models(
         named = ALL_MODELS
     else:
         named = [name for name in map(str.strip, models.split(",")) if name]
-    chosen = models_knowing(named, parameter_choices(parameters))
+    known = parameter_choices(parameters)
+    if isinstance(clearance, tuple):
+        raise ConfigurationError("--clearance is a length without a standard deviation")
+    if clearance is not None:
+        known["clearance"] = clearance
+    chosen = models_knowing(named, known)
     read, begun = read_for_models(recording, flow, given, how, chosen)
     with options.reported("compare models") as told:
         if not options.json:

@@ -101,6 +101,7 @@ def compare_models(
     models: Sequence[str | MotionModel] | Literal["usual", "all"] = "usual",
     *,
     parameters: Mapping[str, float | tuple[float, float]] | None = None,
+    clearance: float | None = None,
     study: Study | None = None,
     flow: xr.Dataset | None = None,
     body: str | None = None,
@@ -122,8 +123,10 @@ def compare_models(
         the block and the family with an interaction with the wall.
     parameters : mapping, optional
         From the name of a parameter to a value that is known, or to a range of the search, in SI
-        units: for each of the named models that has it. ``clearance`` is the distance of the
-        recorded point from the wall at contact [m]. Models of `motion_model` hold their own.
+        units: for each of the named models that has it. Models of `motion_model` hold their own.
+    clearance : float, optional
+        Distance of the recorded point from the wall at contact [m], half the body's width, for the
+        named models; default: estimated from the recording.
     study : Study, optional
         Tank, camera, step interval and seed; default: the paper's.
     flow : xarray.Dataset, optional
@@ -177,7 +180,10 @@ def compare_models(
 
     named = {"usual": DEFAULT_MODELS, "all": ALL_MODELS}
     asked = named.get(models, (models,)) if isinstance(models, str) else models
-    chosen = models_knowing(asked, parameters or {})
+    known = dict(parameters or {})
+    if clearance is not None:
+        known["clearance"] = clearance
+    chosen = models_knowing(asked, known)
     require_motion(recording, body=body)
     overrides = study_overrides(keys=CALIBRATION_KEYS, **settings)
     conditions = study_for([recording], study, overrides, body=body, needs_tank=chosen == ["block"])

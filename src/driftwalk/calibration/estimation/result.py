@@ -14,7 +14,7 @@ from driftwalk.calibration.estimation.identifiability import Determination
 from driftwalk.calibration.held_out.candidates import Candidate
 from driftwalk.calibration.held_out.held_out_score import (
     HeldOutScore,
-    held_out_verdict,
+    held_out_differences,
     recording_parts,
 )
 from driftwalk.calibration.held_out.recorded import RecordedMotion
@@ -23,7 +23,7 @@ from driftwalk.core.arrays import Floats
 from driftwalk.motion import ParticleModel
 from driftwalk.schema import Parameter
 from driftwalk.schema.answers.facts import BOUNDS, AnswerParts, texts
-from driftwalk.schema.answers.verdict import verdict_variables
+from driftwalk.schema.answers.verdict import verdict_of, verdict_variables
 from driftwalk.schema.check import build_dataset
 from driftwalk.simulation.series import series_warnings
 
@@ -69,7 +69,7 @@ def build_model_calibration(
     ranges, held_out = entry.ranges, found.held_out
     against, unable = _findings(found, entry)
     unable += unsteady_motion(motion)
-    verdict = held_out_verdict(held_out, motion, baseline=False).and_also(against, unable)
+    verdict = verdict_of([*held_out_differences(held_out, motion), *against], unable)
     count = len(ranges)
     # None where the summaries' answer does not count: nothing is known of the intervals then.
     known = found.known

@@ -6,10 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final, NamedTuple
 
-import numpy as np
-
 from driftwalk.calibration.estimation.identifiability import DETERMINED
-from driftwalk.calibration.evolution import wall_distance
 from driftwalk.calibration.held_out.baselines import HiddenMarkovWalk, ResampledSteps, runs_of
 from driftwalk.calibration.held_out.hidden_markov import fit_hidden_markov_model
 from driftwalk.calibration.held_out.recorded import RecordedMotion, recorded_ranges
@@ -105,11 +102,7 @@ def resampling_baselines(motion: RecordedMotion) -> list[Candidate]:
 def _made(one: Chosen, motion: RecordedMotion) -> MotionModel:
     if one == BLOCK:
         return BlockModel(motion.study)
-    model = motion_model(one) if isinstance(one, str) else one
-    # Only the family leaves its distance from the wall to the recording.
-    if isinstance(model, ParticleModel) and not model.states_clearance:
-        return model.with_clearance(motion.clearance)
-    return model
+    return with_contact_clearance(motion_model(one) if isinstance(one, str) else one, motion)
 
 
 def _within_reach(parameter: Parameter, motion: RecordedMotion) -> Parameter:
@@ -139,39 +132,14 @@ def _prepare_candidate(model: MotionModel, motion: RecordedMotion) -> Candidate:
     return Candidate(model, like, ranges, len(ranges), baseline=False)
 
 
-def contact_distance(from_wall: Floats, noise: float) -> float:
-    """Return the distance from the wall at contact [m], 0 or more.
-
-    The nearest samples are there by the noise of the camera. Of a body that is often at the wall,
-    the 1 % quantile lies two standard deviations too near; with a share s of the samples at the
-    wall it is the 0.01 / s quantile of the noise about the contact.
-
-    Examples
-    --------
-    >>> recorded = 0.015 + 3e-4 * np.random.default_rng(1).normal(size=10_000)
-    >>> round(contact_distance(recorded, 3e-4), 4)
-    0.015
-    """
-    from scipy.stats import norm
-
-    # A few of the nearest samples may be tracking errors: the nearest 1 % are not trusted.
-    nearest_share = 0.01
-    nearest = float(np.quantile(from_wall, nearest_share))
-    at_wall = float(np.mean(from_wall < nearest + 4.0 * noise))
-    deep = -float(norm.ppf(min(nearest_share / max(at_wall, nearest_share), 0.5)))
-    return max(nearest + noise * deep, 0.0)
-
-
 def with_contact_clearance(model: MotionModel, motion: RecordedMotion) -> MotionModel:
-    """Return the model with the recording's distance from the wall at contact, if it has no own.
+    """Return the model with the recording's distance from the wall at contact, if it has no own."""
+    # Only the family leaves its distance from the wall to the recording.
+    if isinstance(model, ParticleModel) and not model.states_clearance:
+        return model.with_clearance(motion.clearance.distance)
+    return model
 
-    A comparison gives its models the least recorded distance but for one sample in a hundred, and
-    that one counts as no own.
-    """
-    if not isinstance(model, ParticleModel):
-        return model
-    if model.states_clearance and model.clearance != motion.clearance:
-        return model
-    from_wall = wall_distance(motion.like)(motion.track.x, motion.track.y)
-    noise = motion.like.camera.position_noise
-    return model.with_clearance(contact_distance(from_wall, noise))
+
+def takes_recorded_clearance(model: MotionModel, motion: RecordedMotion) -> bool:
+    """Return whether a model has its distance from the wall at contact from the recording."""
+    return isinstance(model, ParticleModel) and model.clearance == motion.clearance.distance

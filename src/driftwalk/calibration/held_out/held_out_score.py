@@ -17,7 +17,6 @@ from driftwalk.motion.batches import no_numbers
 from driftwalk.motion.score import broken_worlds
 from driftwalk.schema.answers.facts import AnswerParts, texts
 from driftwalk.schema.answers.model_comparison import ASPECT_WORDS, CHECK_WORDS
-from driftwalk.schema.answers.verdict import Verdict, verdict_of
 
 HELD_OUT_REPLICATES: Final = 20
 """Worlds by which the answer of a search is judged."""
@@ -150,18 +149,17 @@ class VerdictPolicy(NamedTuple):
 VERDICT: Final = VerdictPolicy()
 
 
-def held_out_verdict(
-    held_out: HeldOutScore,
-    motion: RecordedMotion,
-    *,
-    baseline: bool,
-    clearly_behind: str | None = None,
-    unlike: str | None = None,
-) -> Verdict:
-    """Compare a model with the recording's own differences, and with facts that are not fitted."""
-    over = held_out.held / motion.own
+def held_out_differences(
+    held_out: HeldOutScore, motion: RecordedMotion, *, allowed: float = 0.0
+) -> list[str]:
+    """Return where a model differs from the odd blocks, in sentences, the worst aspect first.
+
+    `allowed` is what the KS distance of the place near the wall may exceed its limit by.
+    """
+    at_wall = np.array([name == "wall" for name in motion.held.names])
+    over = (held_out.held - allowed * at_wall) / motion.own
     off = checks_off(held_out.checks, motion.recorded_checks)
-    parts = [
+    found = [
         f"{ASPECT_WORDS[motion.held.names[k]]}: D = {held_out.held[k]:.3f}, "
         f"the recording's own parts {motion.own[k]:.3f}"
         for k in np.argsort(-over)
@@ -169,14 +167,8 @@ def held_out_verdict(
     ]
     if np.count_nonzero(off) > VERDICT.most_checks_off:
         names = [words for words, is_off in zip(CHECK_WORDS.values(), off, strict=True) if is_off]
-        parts.append(f"far beyond all its worlds: {', '.join(names)}")
-    if unlike is not None:
-        parts.append(unlike)
-    if not parts and clearly_behind is not None:
-        parts.append(f"{clearly_behind} is clearly closer")
-    if baseline:
-        parts.insert(0, "it repeats recorded steps and knows no arena")
-    return verdict_of(parts, [])
+        found.append(f"far beyond all its worlds: {', '.join(names)}")
+    return found
 
 
 def checks_off(worlds: Floats, recorded: Floats) -> Bools:

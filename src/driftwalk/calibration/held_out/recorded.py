@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.calibration.evolution import wall_distance
+from driftwalk.calibration.held_out.wall_clearance import Clearance, estimate_clearance
 from driftwalk.calibration.problem import require_samples
 from driftwalk.comparison import KsReference
 from driftwalk.comparison.aspects import (
@@ -26,6 +27,7 @@ from driftwalk.comparison.aspects import (
     interleaved,
     own_distance,
     plan_aspects,
+    points_distance,
     resampled,
 )
 from driftwalk.conditions import (
@@ -228,8 +230,8 @@ class RecordedMotion:
         be expected below it.
     scales : Scales
         Of the motion.
-    clearance : float
-        Distance from the wall at contact [m].
+    clearance : Clearance
+        Distance from the wall at contact, as the recording shows it.
     depth : float
         Largest recorded distance from the wall [m].
     usual_step : float
@@ -254,7 +256,7 @@ class RecordedMotion:
     held_aspects: list[Aspect]
     own: Floats
     scales: Scales
-    clearance: float
+    clearance: Clearance
     depth: float
     usual_step: float
     noises: tuple[float, ...]
@@ -278,6 +280,19 @@ class RecordedMotion:
             )
             found.append(AspectReference(self.held.names, self.held.floor, natives))
         return tuple(found)
+
+    @cached_property
+    def clearance_distance(self) -> float:
+        """Largest KS distance of the place near the wall that an error of the clearance makes.
+
+        That of the odd blocks from themselves, moved by two standard errors.
+        """
+        wall = next((one.points for one in self.held_aspects if one.name == "wall"), None)
+        if wall is None:
+            return 0.0
+        reference = KsReference(wall)
+        moved = (wall + np.array([sign * 2.0 * self.clearance.std, 0.0]) for sign in (-1, 1))
+        return max(points_distance(reference, np.ascontiguousarray(one)) for one in moved)
 
     @cached_property
     def recorded_checks(self) -> Floats:
@@ -387,8 +402,7 @@ def body_motion(
             [own_distance(one, duration=duration) for one in aspects if one.name in held.names]
         ),
         scales=scales_of(track, step_interval=plan.short.step_interval, steps=steps),
-        # Not the least: a few of the nearest samples may be tracking errors.
-        clearance=max(float(np.quantile(from_wall, 0.01)), 0.0),
+        clearance=estimate_clearance(wall(track.x, track.y), camera.position_noise),
         depth=depth,
         usual_step=usual_step,
         noises=noises,

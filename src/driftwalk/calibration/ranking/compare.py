@@ -61,15 +61,17 @@ def compare_models(
     seen, and so are two walks that only repeat recorded steps: independent draws of them, and a
     hidden Markov walk of three states. Models are ranked by their distance there.
 
-    A model explains the recording where, in each aspect, it is no farther from the odd blocks than
-    twice the distance of the recording's own parts, made of interleaved blocks, from each other,
-    where no more than one of eight facts that are not fitted is far off, and where no other one is
-    clearly closer.
-
     The closest model, and those about as close, are matched with the recording by a hundred
     summaries of the motion, as in a calibration (`driftwalk.calibration.estimation`), and compared
     by their evidence. A model counts there if the recording's summaries are like those of its own
     simulated recordings. While none is, models farther off are asked as well, five in all at most.
+
+    A model explains the recording where, in each aspect, it is no farther from the odd blocks than
+    twice the distance of the recording's own parts, made of interleaved blocks, from each other,
+    where no more than one of eight facts that are not fitted is far off, where its misfit of the
+    summaries is usual for it, and where no other one is clearly closer or likelier. Where a walk of
+    recorded steps passes all of that as well, or the summaries were not matched, or the wall was
+    hardly touched, the comparison cannot tell.
 
     Parameters
     ----------

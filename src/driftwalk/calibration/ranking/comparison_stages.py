@@ -13,7 +13,11 @@ import numpy as np
 
 from driftwalk.calibration.evolution import Budget
 from driftwalk.calibration.held_out.candidates import Candidate
-from driftwalk.calibration.held_out.held_out_score import HeldOutScore, score_candidate
+from driftwalk.calibration.held_out.held_out_score import (
+    HeldOutScore,
+    held_out_differences,
+    score_candidate,
+)
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.calibration.parallel_search import (
     SearchProgress,
@@ -112,7 +116,11 @@ class Stages:
         ]
 
     def evidence(self, held_out: Sequence[HeldOutScore]) -> dict[int, Evidence]:
-        """Ask the summaries of those that tie, and of others while none of them gives them."""
+        """Match the summaries with those that tie, and with others while none reproduces them.
+
+        Where one does, so is each walk of recorded steps that the distances do not reject: whether
+        it passes all tests is their power.
+        """
         if self.replicates < 2:
             return {}
         shortlist = shortlist_models(self.work.entries, held_out)
@@ -122,13 +130,21 @@ class Stages:
                 break
             planned = max(shortlist.tied, 1)
             found[index] = self._matched(number, index, held_out[index].point, planned)
+        walks = [
+            index
+            for index, entry in enumerate(self.work.entries)
+            if entry.baseline and not held_out_differences(held_out[index], self.work.motion)
+        ]
+        if any(one.usual for one in found.values()):
+            for index in walks:
+                found[index] = self._matched(len(found), index, np.empty(0), len(found) + 1)
         return found
 
     @cached_property
     def course(self) -> Course:
         """How far all stages are together."""
-        able = [one for one in self.work.entries if one.ranges and not one.baseline]
-        asks = self.replicates > 1 and len(able) > 1
+        able = [one for one in self.work.entries if not one.baseline]
+        asks = self.replicates > 1
         # Most searches are given up after a few rounds, or find their optimum soon.
         usual = sorted(most_settings(len(one.ranges), self.replicates) // 4 for one in able)
         # A setting takes three times as long as one of the first stage (5 minutes of the bundled

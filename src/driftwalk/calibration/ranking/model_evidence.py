@@ -18,8 +18,15 @@ from driftwalk.calibration.estimation.synthetic_likelihood import (
     synthetic_likelihood_at,
 )
 from driftwalk.calibration.evolution import rounded
-from driftwalk.calibration.held_out.candidates import Candidate, with_contact_clearance
-from driftwalk.calibration.held_out.held_out_score import HeldOutScore, even_blocks
+from driftwalk.calibration.held_out.bouts import BoutDistance, bout_distances
+from driftwalk.calibration.held_out.candidates import Candidate
+from driftwalk.calibration.held_out.held_out_score import (
+    HELD_OUT_REPLICATES,
+    HeldOutScore,
+    even_blocks,
+    held_out_differences,
+    score_setting,
+)
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.core.arrays import Floats
 from driftwalk.core.processors import one_blas_thread
@@ -64,6 +71,10 @@ class Evidence(NamedTuple):
     """and their 99 % quantile."""
     deviance: float
     """-2 log of the evidence, but for a constant that all models share."""
+    matched: HeldOutScore | None = None
+    """The setting of the summaries, judged as that of the distances; where these are usual."""
+    bouts: tuple[BoutDistance, ...] = ()
+    """How long bouts last there, against the model's own recordings."""
 
     @property
     def usual(self) -> bool:
@@ -77,7 +88,20 @@ class EvidenceRanking(NamedTuple):
     best: int | None
     """The model that they speak for; None where no model gives them."""
     rivals: tuple[int, ...]
-    """Others that give them as well."""
+    """Others that are about as likely."""
+
+    def as_good(self, entries: Sequence[Candidate], evidence: Mapping[int, Evidence]) -> list[int]:
+        """Return the rivals that are likelier than the best or have no more parameters."""
+        best = self.best
+        return [
+            k
+            for k in self.rivals
+            if best is not None
+            and (
+                evidence[k].deviance < evidence[best].deviance
+                or entries[k].numbers <= entries[best].numbers
+            )
+        ]
 
 
 class Shortlist(NamedTuple):
@@ -91,14 +115,9 @@ class Shortlist(NamedTuple):
 
 
 def shortlist_models(entries: Sequence[Candidate], held_out: Sequence[HeldOutScore]) -> Shortlist:
-    """Return the models whose summaries decide; none where there are not two to choose from.
-
-    Walks of recorded steps are never asked, nor are models without parameters.
-    """
+    """Return the models whose summaries are matched; walks of recorded steps are none."""
     order = np.argsort([one.score for one in held_out], kind="stable")
-    able = [int(k) for k in order if not entries[k].baseline and entries[k].ranges]
-    if len(able) < 2:
-        return Shortlist((), 0)
+    able = [int(k) for k in order if not entries[k].baseline]
     closest = held_out[able[0]]
 
     def is_tied(k: int) -> bool:
@@ -120,13 +139,31 @@ def rank_by_evidence(
     Among those whose discrepancy is usual it is the one of the largest evidence, which has a price
     for each parameter. Where others are equally likely, it is the one with the fewest numbers.
     """
-    usual = [k for k, one in evidence.items() if one.usual]
+    usual = [k for k, one in evidence.items() if one.usual and not entries[k].baseline]
     if not usual:
         return EvidenceRanking(None, ())
     least = min(evidence[k].deviance for k in usual)
     left = [k for k in usual if evidence[k].deviance < least + EVIDENCE.rival]
     best = min(left, key=lambda k: (entries[k].numbers, evidence[k].deviance))
     return EvidenceRanking(best, tuple(k for k in left if k != best))
+
+
+def with_matched_settings(
+    held_out: Sequence[HeldOutScore], evidence: Mapping[int, Evidence], motion: RecordedMotion
+) -> list[HeldOutScore]:
+    """Return the scores, of the summaries' setting where only that one has no difference.
+
+    A search by distances may miss the optimum of the true model.
+    """
+    found = list(held_out)
+    for k, one in evidence.items():
+        if one.matched is None or not held_out_differences(held_out[k], motion):
+            continue
+        if not held_out_differences(one.matched, motion):
+            found[k] = one.matched._replace(
+                optimum_scores=held_out[k].optimum_scores, evaluations=held_out[k].evaluations
+            )
+    return found
 
 
 def discrepancy_sentence(one: Evidence) -> str | None:
@@ -152,8 +189,8 @@ def ranking_sentence(
     discrepancies = {k: f"{names[k]} {one.discrepancy:.0f}" for k, one in evidence.items()}
     if answer.best is None:
         return (
-            "The summaries of the motion tell nothing more, for no model gives them: the misfits "
-            f"are {', '.join(discrepancies.values())}, those of the models' own recordings below "
+            "No model reproduces the summaries of the motion: the misfits are "
+            f"{', '.join(discrepancies.values())}, those of the models' own recordings below "
             f"{max(one.upper_discrepancy for one in evidence.values()):.0f}"
         )
     best = evidence[answer.best]
@@ -172,6 +209,8 @@ def ranking_sentence(
 
 def most_settings(parameters: int, replicates: int) -> int:
     """Return how many settings `estimate_evidence` simulates at most."""
+    if not parameters:
+        return SIMULATIONS + replicates
     narrow = EVIDENCE.starts * simulations_of(parameters)[0] * GAUSS_NEWTON.most_rounds
     return REGRESSION.most_simulations + narrow + SIMULATIONS + replicates
 
@@ -187,7 +226,6 @@ def estimate_evidence(
     tell: Progress,
 ) -> Evidence:
     """Match the summaries of a recording with a model, and say how well that went."""
-    entry = entry._replace(model=with_contact_clearance(entry.model, motion))
     parameters, replicates = len(entry.ranges), motion.replicates
     objective = SummaryObjective(
         even_blocks(entry, motion),
@@ -198,32 +236,38 @@ def estimate_evidence(
         most=most_settings(parameters, replicates),
     )
     simulate = _Blurred(objective, motion.seed)
-    order = label_order(entry)
-    optima = find_optima(
-        simulate,
-        parameters,
-        lambda: answer[None],
-        order=order,
-        seed=motion.seed,
-        hopeless=EVIDENCE.hopeless,
-        give_up=EVIDENCE.hopeless,
-    )
-    best = optima[0].solution
+    setting, log_volume = np.empty(0), 0.0
+    if parameters:
+        optima = find_optima(
+            simulate,
+            parameters,
+            lambda: answer[None],
+            order=label_order(entry),
+            seed=motion.seed,
+            hopeless=EVIDENCE.hopeless,
+            give_up=EVIDENCE.hopeless,
+        )
+        best = optima[0].solution
+        setting, log_volume = rounded(np.clip(best.setting, 0.0, 1.0)), best.log_volume
     found = synthetic_likelihood_at(
-        lambda settings: simulate(settings)[:, 0],
-        objective.recorded[0],
-        rounded(np.clip(best.setting, 0.0, 1.0)),
-        replicates,
+        lambda settings: simulate(settings)[:, 0], objective.recorded[0], setting, replicates
     )
-    return Evidence(
+    evidence = Evidence(
         discrepancy=found.discrepancy,
         median_discrepancy=float(np.median(found.own_discrepancies)),
         upper_discrepancy=float(np.quantile(found.own_discrepancies, EVIDENCE.typical_quantile)),
         # Laplace's approximation, with a prior that is even over the ranges.
         deviance=found.discrepancy
         + found.log_variance
-        - best.log_volume
+        - log_volume
         - parameters * float(np.log(2.0 * np.pi)),
+    )
+    if entry.baseline or not evidence.usual:
+        return evidence
+    worlds = objective.worlds.simulated(setting[None], HELD_OUT_REPLICATES, stage="judged")
+    return evidence._replace(
+        matched=score_setting(objective.worlds, motion, setting),
+        bouts=bout_distances(motion, worlds),
     )
 
 

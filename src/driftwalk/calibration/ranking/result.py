@@ -8,24 +8,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from driftwalk.calibration.held_out.candidates import Candidate
-from driftwalk.calibration.held_out.held_out_score import (
-    VERDICT,
-    HeldOutScore,
-    held_out_verdict,
-    recording_parts,
-)
+from driftwalk.calibration.held_out.held_out_score import VERDICT, HeldOutScore, recording_parts
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.calibration.ranking.model_evidence import (
     Evidence,
-    EvidenceRanking,
-    discrepancy_sentence,
     rank_by_evidence,
     ranking_sentence,
+    with_matched_settings,
 )
+from driftwalk.calibration.ranking.model_verdicts import answer_sentence, model_verdicts
 from driftwalk.calibration.stationarity import motion_warnings, stationarity_of_motion
 from driftwalk.core.arrays import Floats
 from driftwalk.schema.answers.facts import texts
-from driftwalk.schema.answers.verdict import Verdict
+from driftwalk.schema.answers.verdict import DOES_NOT_EXPLAIN, Verdict
 from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:
@@ -43,27 +38,14 @@ def build_comparison(
 
     `evidence_by_model` has those whose summaries were matched, by their places among them.
     """
+    held_out = with_matched_settings(held_out, evidence_by_model, motion)
     order = np.argsort([one.score for one in held_out], kind="stable")
     entries, held_out = [entries[k] for k in order], [held_out[k] for k in order]
     evidence = {at: evidence_by_model[k] for at, k in enumerate(order) if k in evidence_by_model}
     answer = rank_by_evidence(entries, evidence)
     names = [entry.model.name for entry in entries]
     behind, behind_std = np.array([one.behind(held_out[0]) for one in held_out]).T
-    # The first model is closest; the one that the summaries name stands beside it all the same.
-    clearly_behind = behind > VERDICT.tied_sigmas * behind_std
-    # Where no model gives the summaries, they speak against none in particular.
-    asked = {} if answer.best is None else evidence
-    unlike = {k: discrepancy_sentence(one) for k, one in asked.items()}
-    verdicts = [
-        held_out_verdict(
-            one,
-            motion,
-            baseline=entry.baseline,
-            clearly_behind=names[0] if clearly_behind[k] and k != answer.best else None,
-            unlike=unlike.get(k),
-        )
-        for k, (entry, one) in enumerate(zip(entries, held_out, strict=True))
-    ]
+    verdicts = model_verdicts(entries, held_out, motion, evidence, answer)
     # Walks of recorded steps are no answer, however close they are.
     closest = next((k for k, entry in enumerate(entries) if not entry.baseline), 0)
     apart = [one.behind(held_out[closest]) for one in held_out]
@@ -83,7 +65,9 @@ def build_comparison(
     why = _findings(names, entries, verdicts, closest, tied)
     if evidence:
         why.insert(0 if answer.best is not None else 1, ranking_sentence(names, evidence, answer))
-    best = answer_sentence(names, verdicts, closest, answer)
+    first = closest if answer.best is None else answer.best
+    as_good = answer.as_good(entries, evidence)
+    best = answer_sentence(entries, verdicts, first, as_good)
     findings = [best, *(one for one in why if one != best)]
     about = recording_parts(motion)
     data: dict[str, Any] = {
@@ -162,24 +146,6 @@ def _estimates(
     return units, values.reshape(len(entries), len(units))
 
 
-def answer_sentence(
-    names: Sequence[str], verdicts: Sequence[Verdict], closest: int, answer: EvidenceRanking
-) -> str:
-    """Return the answer in one sentence: the best model, and whether it explains the recording.
-
-    The summaries of the motion decide where they name a model, the distance otherwise; a model that
-    explains the recording is better than one that does not.
-    """
-    first = closest if answer.best is None else answer.best
-    explained = [k for k, one in enumerate(verdicts) if one.explains]
-    if not explained:
-        return f"No model explains the recording; the best one is {names[first]}"
-    best = first if first in explained else explained[0]
-    others = [names[k] for k in explained if k != best]
-    also = f"; so do others, but no better: {', '.join(others)}" if others else ""
-    return f"{names[best]} explains the recording{also}"
-
-
 def _findings(
     names: Sequence[str],
     entries: Sequence[Candidate],
@@ -192,7 +158,7 @@ def _findings(
     rivals = [names[k] for k in tied if not entries[k].baseline]
     if rivals:
         found[0] += f"; no clear difference from {', '.join(rivals)}"
-    if not any(one.explains for one in verdicts):
+    if all(one.word == DOES_NOT_EXPLAIN for one in verdicts):
         found.append(
             f"{names[closest]} does not explain it: {'; '.join(verdicts[closest].reasons)}"
         )

@@ -42,3 +42,21 @@ def test_others_than_those_that_tie_are_asked_until_one_gives_the_summaries(
     assert list(made.evidence(judged)) == wanted
     # With fewer than two recordings that could judge a misfit nobody is asked.
     assert Stages(work, 0, in_memory, None, lambda *_: None).evidence(judged) == {}
+
+
+@pytest.mark.parametrize(("reproduced", "wanted"), [(True, [0, 1]), (False, [0])])
+def test_a_walk_that_the_distances_do_not_reject_is_asked_where_a_model_gives_the_summaries(
+    reproduced: bool, wanted: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of two walks, the second is rejected by its distances."""
+    entries = [SimpleNamespace(ranges=(), baseline=number > 0) for number in range(3)]
+    work: Any = SimpleNamespace(entries=entries, motion=None, costs=lambda: [1] * 3)
+    rejected: Any = {0: [], 1: [], 2: ["place near the wall"]}
+    judged: Any = [SimpleNamespace(point=np.zeros(0), number=number) for number in range(3)]
+    misfit = 100.0 if reproduced else 500.0
+    monkeypatch.setattr(comparison_stages, "shortlist_models", lambda *_: Shortlist((0,), 1))
+    monkeypatch.setattr(
+        comparison_stages, "held_out_differences", lambda one, _: rejected[one.number]
+    )
+    monkeypatch.setattr(Stages, "_matched", lambda *_: Evidence(misfit, 90.0, 140.0, 0.0))
+    assert list(Stages(work, 20, in_memory, None, lambda *_: None).evidence(judged)) == wanted
