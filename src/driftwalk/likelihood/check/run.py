@@ -11,28 +11,31 @@ from driftwalk.core.errors import InputError, reason_of
 from driftwalk.core.processors import one_blas_thread
 from driftwalk.likelihood.check.errors import Innovations, innovations_of
 from driftwalk.likelihood.check.place import Residuals, residuals_of
+from driftwalk.likelihood.check.criteria import (
+    VERDICT,
+    components_of,
+    criteria_of,
+    distance_limit,
+)
 from driftwalk.likelihood.check.posterior_predictive import (
     BAND,
     FEWEST_REPLICATES,
     MotionComparison,
     compare_motion,
+)
+from driftwalk.likelihood.check.replicates import (
     posterior_replicates,
     problems_of,
     replicates_at_estimate,
 )
 from driftwalk.likelihood.check.scan import scan_of
-from driftwalk.likelihood.check.verdict import (
-    VERDICT,
-    components_of,
-    criteria_of,
-    distance_limit,
-    findings_of,
-)
+from driftwalk.likelihood.check.verdict import verdict_on
 from driftwalk.likelihood.flow_intervals import require_fit
 from driftwalk.likelihood.preparation import as_list, estimate_of
 from driftwalk.likelihood.refuse import BREAKDOWN
 from driftwalk.schema.answers.facts import texts
 from driftwalk.schema.answers.fit import with_verdict
+from driftwalk.schema.answers.verdict import EXPLAINS
 from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:
@@ -224,12 +227,12 @@ def check_model(
         )
         motion = compare_motion(
             np.concatenate([problem.steps for problem in problems]),
-            replicates_at_estimate(fit, problems, count=replicates, seed=seed),
+            replicates_at_estimate(fit, estimate, problems, count=replicates, seed=seed),
             drawn,
             threads=problems[0].like.threads,
         )
         paths = [(one.series.time, one.series.x, one.series.y) for one in errors]
-        scan = scan_of(paths, drawn.paths, found.layout)
+        scan = scan_of(paths, drawn.paths, found.layout, level=VERDICT.level)
         parts.append(motion_variables(motion))
         attrs |= motion_facts(motion)
     except InputError as error:
@@ -238,15 +241,25 @@ def check_model(
         motion, scan = None, None
         attrs |= {"ks_distance": np.nan, "ks_noise_floor": np.nan, "ks_left_out": str(error)}
     criteria = criteria_of(errors, found, motion, scan, fit=fit)
-    findings = findings_of(criteria)
+    verdict = verdict_on(fit, criteria, study=estimate.study)
     data = {
         "p_value": ("criterion", [one.p_value for one in criteria]),
         "failed": ("criterion", np.array([one.failed for one in criteria], dtype=np.int8)),
-        "explained": ((), np.bool_(not findings)),
+        "detectable": ("criterion", [one.detectable for one in criteria]),
+        "detectable_of": ("criterion", texts([one.words for one in criteria])),
+        "explained": ((), np.bool_(verdict.word == EXPLAINS)),
+        "verdict": ((), np.array(verdict.word, dtype=np.str_)),
     }
     names = np.array([one.name for one in criteria], dtype=object)
     parts.append(
-        (data, {"criterion": ("criterion", names), "finding": ("finding", texts(findings))})
+        (
+            data,
+            {
+                "criterion": ("criterion", names),
+                "finding": ("finding", texts(verdict.reasons)),
+                "verdict_reason": ("verdict_reason", texts(verdict.reasons)),
+            },
+        )
     )
     variables: dict[str, Any] = {}
     coords: dict[str, Any] = {}
