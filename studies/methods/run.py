@@ -134,7 +134,7 @@ def by_likelihood(known: Known, fit: xr.Dataset, seconds: float) -> Answer:
         dw.fitted_flow(fit),
         check.attrs["ks_distance"],
         check.attrs["ks_noise_floor"],
-        check["finding"].values.tolist(),
+        check["verdict_reason"].values.tolist(),
         seconds,
         time.process_time() - begin,
     )
@@ -145,10 +145,11 @@ def by_distance(known: Known, flow_of: Callable[[], xr.Dataset]) -> Answer:
     begin = time.process_time()
     flow = flow_of()
     study = dw.apply_overrides(known.study, SEARCH)
-    found = facts_of(dw.calibrate(known.recording, study, flow=flow, threads=1))
+    calibration = dw.calibrate(known.recording, study, flow=flow, threads=1)
+    found = facts_of(calibration)
     distance, floor = found["ks_distance"], found["noise_floor"]
     warnings = found["warnings"]
-    findings = [one for one in warnings if "does not explain" in one]
+    findings = calibration["verdict_reason"].values.tolist()
     return Answer(
         found | {"warnings": warnings},
         flow,

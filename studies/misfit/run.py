@@ -163,8 +163,8 @@ def fit_one(kind: str, name: str, number: int, minutes: float, motions: Path) ->
             facts[f"{parameter}_any_covered"] = bool(low <= truth[parameter] <= high)
     try:
         check = check_model(fit, recording)
-        facts["explained"] = bool(check["explained"])
-        facts["findings"] = [str(text) for text in check["finding"].values]
+        facts["explained"] = str(check["verdict"].values) == "explains"
+        facts["findings"] = [str(text) for text in check["verdict_reason"].values]
         facts["least_p_value"] = float(check["p_value"].min())
     except DriftwalkError as error:
         facts["explained"], facts["findings"] = None, [str(error)]

@@ -106,7 +106,7 @@ def distance_table(line: Line) -> str:
                 f"{one['evaluations']:,}" if one["evaluations"] else "",
                 f"{one['score']:.2f} ± {one['score_std']:.2f}",
                 *distances_of(one["held_out_distance"]),
-                "yes" if one["explained"] else "",
+                "yes" if one["verdict"] == "explains" else "",
             ]
         )
     return rows_of(cells)

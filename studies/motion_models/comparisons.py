@@ -64,7 +64,7 @@ def compared_table(lines: list[Line]) -> str:
                 f"{walk['score']:.2f} ± {walk['score_std']:.2f}",
                 f"{best['held_out_distance']['steps']:.3f}",
                 f"{line['own_distance']['steps']:.3f}",
-                ", ".join(one["model"] for one in models if one["explained"]) or "none",
+                ", ".join(one["model"] for one in models if one["verdict"] == "explains") or "none",
                 f"{line['seconds']:.0f}",
             ]
         )

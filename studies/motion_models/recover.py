@@ -105,7 +105,7 @@ def recovered(model: str, number: int, threads: int) -> dict[str, Any]:
         "estimate_from": found.attrs["estimate_from"],
         "misfit": [float(found[name]) for name in ("misfit", "usual_misfit", "most_misfit")],
         "score": float(found["score"]),
-        "explained": bool(found["explained"]),
+        "explained": str(found["verdict"].values) == "explains",
         "seconds": round(time.perf_counter() - began, 1),
         "processor_seconds": round(time.process_time() - used, 1),
     }

@@ -64,9 +64,11 @@ def compared(
         "behind": float(found["behind"][at]),
         "behind_std": float(found["behind_std"][at]),
         "explained": [
-            name for name, one in zip(names, found["explained"].values, strict=True) if one
+            name
+            for name, one in zip(names, found["verdict"].values, strict=True)
+            if one == "explains"
         ],
-        "verdict": str(found["verdict"].values[at]),
+        "verdict_reason": str(found["verdict_reason"].values[at]),
         "summaries": summaries_of(found),
         "held_out_distance": found["held_out_distance"].values.tolist(),
         "own_distance": found["own_distance"].values.tolist(),

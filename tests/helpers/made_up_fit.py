@@ -7,6 +7,7 @@ import xarray as xr
 from synthetic_calibration import ARENA, bundled_flow
 
 from driftwalk.schema.answers.facts import fit_parts
+from driftwalk.schema.answers.verdict import verdict_of, verdict_variables
 
 LAGS, CELLS, PARTS, BINS = 5, 4, 4, 6
 
@@ -33,8 +34,8 @@ def made_up_fit(*, flows: tuple[str, ...] = ()) -> xr.Dataset:
     return fit.assign(numbers).assign_coords(names).assign_attrs(words, kind="fit")
 
 
-def made_up_check(*, explained: str = "no") -> xr.Dataset:
-    """Return a `model_check` of two recordings."""
+def made_up_check(*against: str) -> xr.Dataset:
+    """Return a `model_check` of two recordings, with sentences against the model."""
     generator = np.random.default_rng(1)
     plane = ("y", "x")
     data = {
@@ -70,8 +71,6 @@ def made_up_check(*, explained: str = "no") -> xr.Dataset:
         for part, factor in (("recording", 1.0), ("median", 1.2), ("low", 0.9), ("high", 1.4)):
             data[f"{name}_density_{part}"] = (f"{name}_bin", np.full(BINS, factor))
     facts = {"ks_distance": 0.05, "ks_noise_floor": 0.02, "level": 0.002, "band": 0.9}
-    findings = ["the flow changes in time"] if explained == "no" else []
-    data["explained"] = ((), explained == "yes")
-    coords["finding"] = ("finding", np.array(findings, dtype=np.str_))
+    data |= verdict_variables(verdict_of(against, []))
     attrs = {"kind": "model_check", "arena": ARENA}
     return xr.Dataset(data, coords, attrs | facts)

@@ -23,6 +23,7 @@ from driftwalk.core.arrays import Floats
 from driftwalk.motion.score import broken_worlds, excerpt_samples
 from driftwalk.schema import Parameter
 from driftwalk.schema.answers.facts import FAR_ABOVE_FLOOR, calibration_parts
+from driftwalk.schema.answers.verdict import verdict_variables
 from driftwalk.schema.check import build_dataset
 from driftwalk.schema.kinds.calibration import CELL_STATUS
 from driftwalk.simulation.backend import STATUS
@@ -70,6 +71,8 @@ def build_calibration(
         coords.update(_axes(parameters, refined.map.axes, "refined_"))
     if stages.bootstrap is not None and stages.region is not None:
         data.update(_uncertainty(parameters, stages.bootstrap, stages.region))
+    if stages.verdict is not None:
+        data.update(verdict_variables(stages.verdict))
     return build_dataset("calibration", data, coords, answer.attrs)
 
 
@@ -114,7 +117,6 @@ def _facts(
             "noise_floor_upper": quality.floor_upper,
             "distance_to_floor_ratio": quality.distance / quality.floor,
             "far_above_floor": FAR_ABOVE_FLOOR,
-            "explained": quality.explained,
             "region_level": region.level,
             "interval_stretch": quality.stretch,
         }

@@ -98,7 +98,7 @@ def calibrate(
     xarray.Dataset
         A `calibration`. ``estimate`` and ``interval`` are the answer, by parameter:
         ``drag_coefficient`` and ``force_std`` [N] of the block. ``optimum_ks_distance`` is to be
-        compared with ``noise_floor``; ``explained`` and ``warning`` say what comes of that. Of the
+        compared with ``noise_floor``; ``verdict`` and ``warning`` say what comes of that. Of the
         block also ``force_interval`` [s] and ``force_noise_intensity`` [N2 s], which is what the
         recording can tell.
 

@@ -225,13 +225,11 @@ def print_fit(fit: xr.Dataset) -> None:
 
 
 def print_check(fitted: Fitted) -> None:
-    """Print how far the flow is off, whether the model explains the recording, and what warns."""
+    """Print how far the flow is off, the verdict on the model, and what warns."""
     fit = fit_json(fitted.fit, fitted.check)
     _print_row("flow past the block", "", f"{fitted.flow_error:.1%} off")
     _print_row("KS distance, floor", "", _distance(fit, "ks_noise_floor"))
-    _print_row("model explains it", "", _word(fit["explained"]))
-    for finding in fit["findings"]:
-        print_note(f"model check: {finding}")
+    _print_verdict(fit)
     for warning in fit["warnings"]:
         print_note(f"warning: fit: {warning}")
 
@@ -248,7 +246,7 @@ def print_calibration(calibration: xr.Dataset) -> None:
     search = calibration_answer(calibration).facts
     _print_estimates("KS map in the fitted flow", calibration)
     _print_row("KS distance, floor", "", _distance(search))
-    _print_row("model explains it", "", _word(bool(calibration["explained"])))
+    _print_verdict(search)
     for warning in search["warnings"]:
         print_note(f"warning: KS map: {warning}")
 
@@ -286,5 +284,7 @@ def _distance(facts: dict[str, Any], floor: str = "noise_floor") -> str:
     return f"{facts['ks_distance']:.3f}, {facts[floor]:.3f}"
 
 
-def _word(yes: bool) -> str:
-    return "yes" if yes else "no"
+def _print_verdict(facts: dict[str, Any]) -> None:
+    _print_row("verdict", "", facts["verdict"])
+    for reason in facts["verdict_reasons"]:
+        print_note(f"{facts['verdict']}: {reason}")

@@ -114,8 +114,10 @@ def plot_models(comparison: xr.Dataset, ax: Axes | None = None) -> Axes:
     own = own_score(comparison)
     ax.axvline(own, color=style.INK, lw=0.6, ls="--", label="the recording's own parts")
     names = [
-        f"{name}{' (explains)' if explained else ''}"
-        for name, explained in zip(shown["model"].values, shown["explained"].values, strict=True)
+        str(name) if walk else f"{name} ({verdict})"
+        for name, walk, verdict in zip(
+            *(shown[of].values for of in ("model", "baseline", "verdict")), strict=True
+        )
     ]
     ax.set_yticks(place, names)
     ax.set_ylim(-0.6, place.size - 0.4)

@@ -53,8 +53,8 @@ def fit(
         recording, check of the model, figures and manifest.
     check : bool
         Whether to check if the model explains the recordings: some seconds. The fit then holds the
-        verdict (``explained``, ``finding``, ``p_value``) and the residuals by cell; `check_model`
-        returns all of the check.
+        ``verdict`` with each ``verdict_reason``, ``p_value`` by criterion and the residuals by
+        cell; `check_model` returns all of the check.
     overwrite : bool
         Whether a finished run there is moved aside; it is refused otherwise.
     progress : callable, optional

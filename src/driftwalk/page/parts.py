@@ -17,6 +17,7 @@ from driftwalk.page.number_words import percent
 from driftwalk.plot.parts.arena import arena_of
 from driftwalk.schema.answers.facts import facts_of, sentences
 from driftwalk.schema.answers.parts import NOT_DETERMINED, Answer, Estimate, Table
+from driftwalk.schema.answers.verdict import Verdict
 from driftwalk.schema.check import kind_name
 
 if TYPE_CHECKING:
@@ -154,6 +155,17 @@ def stated_warnings(found: xr.Dataset) -> list[str]:
     """
     said = [SIMULATED] if is_simulated(found) else []
     return [*said, *sentences(found, "warning")]
+
+
+def verdict_paragraphs(
+    verdict: Verdict | None, unchecked: str = "", *, more: str = ""
+) -> list[str]:
+    """Return the verdict on a model, and a paragraph for each reason; `more` where it explains."""
+    if verdict is None:
+        return [f"Verdict: not checked{': ' if unchecked else ''}{unchecked}."]
+    after = more if verdict.explains else ""
+    reasons = (f"{text[:1].upper()}{text[1:]}." for text in verdict.reasons)
+    return [f"Verdict: {verdict.word}{':' if verdict.reasons else '.'} {after}".rstrip(), *reasons]
 
 
 def arena_part(dataset: xr.Dataset) -> dict[str, Any] | None:

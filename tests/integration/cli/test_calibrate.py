@@ -255,7 +255,7 @@ def test_an_optimum_at_the_edge_and_a_bad_fit_are_warned_of(study: Path, tmp_pat
     done = here(*words(narrow, run, "300s"), "--flow", FLOW)
     assert done.code == 0
     assert "driftwalk: warning: the optimum lies at the edge of the grid: drag" in done.err
-    assert "driftwalk: warning: the model does not explain the recording" in done.err
+    assert "verdict                does not explain:" in done.out
     warnings = calibration(run)["warning"].values.tolist()
     assert any("edge of the grid" in text for text in warnings)
 

@@ -45,7 +45,7 @@ def test_json_holds_the_ranking(run: tuple[Path, dict]) -> None:
     assert set(inertial["held_out_distance"]) == set(said["own_distance"])
     walk = said["models"][names.index("resampled steps")]
     assert walk["baseline"]
-    assert not walk["explained"]
+    assert walk["verdict"] == "does not explain"
     assert walk["estimate"] == {}
 
 

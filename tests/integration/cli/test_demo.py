@@ -74,7 +74,7 @@ def test_both_answers_stand_beside_the_truth(finished: tuple[Path, Done]) -> Non
         assert rows["drag coefficient C_d"][0] == "0.3948"
         assert rows["stochastic force σ_F [mN]"][0] == "0.6123"
         assert rows["tracking noise [mm]"][0] == "0.3"
-        assert rows["model explains it"] == ["yes"]
+        assert rows["verdict"] == ["explains"]
     assert lines[-1] == f"open in a browser: {folder / 'report.html'}"
     page = page_in((folder / "report.html").read_text(encoding="utf-8"))
     assert page["title"] == "Demo"
@@ -109,7 +109,7 @@ def test_a_finished_demo_is_read(finished: tuple[Path, Done]) -> None:
     assert found["fit"]["force_std_N"] == pytest.approx(TRUTH["force_std_N"], rel=0.03)
     assert found["fit"]["tracking_noise_m"] == pytest.approx(TRUTH["tracking_noise_m"], rel=0.03)
     assert 0.0 < found["fit"]["flow_error"] < 0.02
-    assert found["fit"]["explained"]
+    assert found["fit"]["verdict"] == "explains"
     for name, error in (("drag_coefficient", 0.04), ("force_std_N", 0.1e-3)):
         assert found["calibration"][name] == pytest.approx(TRUTH[name], abs=error)
     assert found["calibration"]["ks_distance"] < 2 * found["calibration"]["noise_floor"]

@@ -23,8 +23,8 @@ FIGURES = ("check_innovations", "check_map", "check_time", "check_steps")
 def test_json_says_whether_the_model_explains_it(fitted: tuple[Path, Done]) -> None:
     assert fitted[1].code == 0, fitted[1].err
     found = json.loads(fitted[1].out)
-    assert found["explained"] is True
-    assert found["findings"] == []
+    assert found["verdict"] == "explains"
+    assert found["verdict_reasons"] == []
     # Two halves of a short recording: a distance is of the size of its floor, within a factor.
     assert 0.0 < found["ks_distance"] < 4.0 * found["ks_noise_floor"] < 1.0
 
@@ -37,7 +37,7 @@ def test_the_check_is_written_with_its_figures(fitted: tuple[Path, Done]) -> Non
         assert (folder / "figures" / f"{name}.svg").stat().st_size > 1000
     with xr.open_dataset(folder / "check.nc", engine="h5netcdf") as stored:
         assert stored.attrs["kind"] == "model_check"
-        assert bool(stored["explained"])
+        assert stored["verdict"] == "explains"
         assert stored.attrs["ks_distance"] == json.loads(fitted[1].out)["ks_distance"]
         assert stored["x"].attrs["units"] == "m"
 
@@ -71,7 +71,7 @@ def test_a_recording_that_is_not_explained_gets_the_reasons(tmp_path: Path) -> N
     path.write_text("\n".join(lines), encoding="utf-8")
     done = here("fit", path, *SHORT, "-o", tmp_path / "run")
     assert done.code == 0, done.err
-    assert "THE MODEL DOES NOT EXPLAIN THIS RECORDING" in done.out
+    assert "verdict                does not explain:" in done.out
     assert "excess kurtosis" in done.out
     assert "noise floor" in done.out
 
@@ -93,7 +93,7 @@ def test_a_check_that_cannot_be_made_says_so_and_the_fit_is_kept(tmp_path: Path)
     assert "the model cannot be checked: the fit used" in line
     assert not (tmp_path / "run" / "check.nc").exists()
     found = json.loads(here("fit", path, *how, "--overwrite", "--json").out)
-    assert found["explained"] is None
+    assert found["verdict"] is None
     assert found["check_left_out"] in line
     with xr.open_dataset(tmp_path / "run" / "fit.nc", engine="h5netcdf") as stored:
         assert stored.attrs["check_left_out"] == found["check_left_out"]
@@ -116,8 +116,8 @@ def test_a_robot_that_drives_itself_is_not_explained(
     done = here("fit", recording, *words)
     assert done.code == 0, done.err
     found = json.loads(done.out)
-    assert found["explained"] is False
-    assert any("excess kurtosis" in text for text in found["findings"])
+    assert found["verdict"] == "does not explain"
+    assert any("excess kurtosis" in text for text in found["verdict_reasons"])
     assert found["ks_distance"] > 3.0 * found["ks_noise_floor"]
 
 

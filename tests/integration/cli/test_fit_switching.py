@@ -43,7 +43,7 @@ def answer(done: Done) -> dict[str, Any]:
 def test_the_model_with_the_switch_explains_the_recording(finished: tuple[Path, Done]) -> None:
     """A right model fails once in fifty; C_d within 4 of its standard deviations."""
     found = answer(finished[1])
-    assert found["explained"], found["findings"]
+    assert found["verdict"] == "explains", found["verdict_reasons"]
     assert found["switching_times_s"] == [START_S + SWITCH_S]
     assert found["recordings"] == 1
     sd = found["drag_coefficient_relative_std"]
@@ -59,8 +59,8 @@ def test_without_the_switch_it_does_not(recording: Path, tmp_path: Path) -> None
             "fit", recording, *COARSE, "--flow-strength", "constant", "-o", tmp_path / "s", "--json"
         )
     )
-    assert not found["explained"]
-    assert any("the motion changes" in finding for finding in found["findings"])
+    assert found["verdict"] == "does not explain"
+    assert any("the motion changes" in reason for reason in found["verdict_reasons"])
 
 
 @pytest.mark.slow
@@ -80,7 +80,7 @@ def test_the_run_directory_holds_every_flow(finished: tuple[Path, Done]) -> None
     with xr.open_dataset(folder / "fit.nc", engine="h5netcdf") as stored:
         assert dw.fitted_flow(stored, interval=1)["u"].values == pytest.approx(flow["u"].values[1])
         check = dw.check_model(stored, dw.load(folder / "recording.nc"), replicates=4)
-        assert bool(check["explained"])
+        assert check["verdict"] == "explains"
 
 
 @pytest.mark.slow

@@ -22,6 +22,7 @@ from driftwalk.model import Study
 from driftwalk.runs import read_found
 from driftwalk.schema import build_dataset
 from driftwalk.schema.answers.facts import facts_of, fitted_value
+from driftwalk.schema.answers.verdict import DOES_NOT_EXPLAIN, EXPLAINS
 
 TANK = ("--tank", "30cm")
 BODY = ("--side", "28mm", "--mass", "10g", "--depth", "9mm")
@@ -75,8 +76,8 @@ def comparison(best: str) -> xr.Dataset:
         {
             **number, **aspect, **check,
             "baseline": ("model", [True, False, False]),
-            "explained": ("model", [False, True, False]),
-            "verdict": ("model", np.array(["", "", ""], dtype=object)),
+            "verdict": ("model", np.array([DOES_NOT_EXPLAIN, EXPLAINS, DOES_NOT_EXPLAIN])),
+            "verdict_reason": ("model", np.array(["far", "", "far"])),
             "own_distance": ("aspect", [1.0]),
             "floor": ("aspect", [1.0]),
             "check_recorded": ("check", [1.0]),

@@ -45,7 +45,7 @@ def test_a_last_part_shorter_than_the_lags_is_checked(left_over: int) -> None:
     """A tadpole's recording ended so: its last part had 8 samples, the check looks at 20 lags."""
     track = recording(600.0).isel(time=slice(0, BLOCK + left_over))
     check = dw.check_model(dw.fit_motion(track, coarse_study()), track)
-    assert bool(check["explained"])
+    assert check["verdict"] == "explains"
     assert check.attrs["samples"] == BLOCK + left_over
 
 

@@ -33,30 +33,31 @@ def answer(**more: object) -> xr.Dataset:
 
 
 def test_the_answer_comes_first() -> None:
-    found = as_result(answer(explained=True))
+    found = as_result(answer(verdict="explains"))
     assert repr(found).splitlines()[:4] == [
         "drag coefficient C_d   0.3930   90% interval 0.3880 to 0.3980",
         "stochastic force σ_F   0.5500 mN, redrawn every 16 ms   90% interval 0.5400 to 0.5600",
         "tracking noise         not determined by this recording",
-        "model check            the model explains this recording",
+        "verdict                explains",
     ]
     assert "0.3880 to 0.3980" in found._repr_html_()
 
 
 def test_what_speaks_against_the_model_is_said() -> None:
-    found = answer(explained=False).assign_coords(
-        finding=("finding", ["the flow <changes>"]), warning=("warning", ["few samples"])
+    found = answer(verdict="does not explain").assign_coords(
+        verdict_reason=("verdict_reason", ["the flow <changes>"]),
+        warning=("warning", ["few samples"]),
     )
     lines = answer_lines(found)
     assert lines[-3:] == [
-        "model check            THE MODEL DOES NOT EXPLAIN THIS RECORDING:",
+        "verdict                does not explain:",
         "  the flow <changes>",
         "warning: few samples",
     ]
     # Text of a dataset is no markup of the page that shows it.
     assert "the flow &lt;changes&gt;" in as_result(found)._repr_html_()
     left_out = answer().assign_attrs(check_left_out="too few samples")
-    assert answer_lines(left_out)[-1] == "model check            too few samples"
+    assert answer_lines(left_out)[-1] == "verdict                not checked: too few samples"
 
 
 def test_a_parameter_without_an_interval_has_none() -> None:

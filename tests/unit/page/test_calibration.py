@@ -12,6 +12,7 @@ from synthetic_calibration import answered, bundled_recording, synthetic_calibra
 
 from driftwalk.core.errors import InputError
 from driftwalk.page import calibration_sections, map_section
+from driftwalk.schema.answers.verdict import Verdict, verdict_of, verdict_variables
 
 SAMPLES = 51
 
@@ -162,20 +163,27 @@ def test_the_summary_has_the_answer_with_its_uncertainty(
         "289 settings",
         "4 runs each",
         "17999 pairs of steps of 100 ms",
-        "1.28 times it, near the chance level",
+        "1.28 times it.",
     ):
         assert words in text
 
 
 @pytest.mark.parametrize(
-    ("distance", "words"),
-    [(0.041, "does not prove that the model is right"), (0.2, "does not explain")],
+    ("verdict", "words"),
+    [
+        (verdict_of([], []), "explains. A small distance does not prove that the model is right."),
+        (verdict_of(["D is far"], []), "does not explain: D is far."),
+        (None, "not checked: it takes a refined map and a bootstrap."),
+    ],
 )
-def test_a_distance_is_judged_by_the_floor(
-    calibration: xr.Dataset, distance: float, words: str
+def test_the_verdict_is_the_stored_one(
+    calibration: xr.Dataset, verdict: Verdict | None, words: str
 ) -> None:
-    made = calibration_sections(answered(calibration, {"ks_distance": distance}))
-    assert words in " ".join(part_of(made, "summary")["paragraphs"])
+    plain = calibration.drop_vars(["verdict", "verdict_reason"], errors="ignore")
+    made = calibration_sections(
+        plain if verdict is None else plain.assign(verdict_variables(verdict))
+    )
+    assert f"Verdict: {words}" in " ".join(part_of(made, "summary")["paragraphs"])
 
 
 def test_a_real_recording_is_not_called_simulated(calibration: xr.Dataset) -> None:

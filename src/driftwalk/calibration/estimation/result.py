@@ -12,13 +12,18 @@ import numpy as np
 from driftwalk.calibration.estimation.estimate import Matched
 from driftwalk.calibration.estimation.identifiability import Determination
 from driftwalk.calibration.held_out.candidates import Candidate
-from driftwalk.calibration.held_out.held_out_score import HeldOutScore, recording_parts, verdict_of
+from driftwalk.calibration.held_out.held_out_score import (
+    HeldOutScore,
+    held_out_verdict,
+    recording_parts,
+)
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.calibration.stationarity import motion_warnings
 from driftwalk.core.arrays import Floats
 from driftwalk.motion import ParticleModel
 from driftwalk.schema import Parameter
 from driftwalk.schema.answers.facts import BOUNDS, AnswerParts, texts
+from driftwalk.schema.answers.verdict import verdict_variables
 from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:
@@ -61,7 +66,7 @@ def build_model_calibration(
 ) -> xr.Dataset:
     """Return the dataset of a calibration of many parameters."""
     ranges, held_out = entry.ranges, found.held_out
-    verdict = verdict_of(held_out, motion, baseline=False)
+    verdict = held_out_verdict(held_out, motion, baseline=False)
     count = len(ranges)
     # None where the summaries' answer does not count: nothing is known of the intervals then.
     known = found.known
@@ -86,11 +91,10 @@ def build_model_calibration(
         "check_high": ("check", held_out.checks.max(axis=0)),
         "score": ((), held_out.score),
         "score_std": ((), held_out.score_std),
-        "explained": ((), verdict.explained),
-        "verdict": ((), np.array(verdict.text)),
+        **verdict_variables(verdict),
         **_stages(found, entry),
     }  # fmt: skip
-    said = [*warnings, *_said(found, entry, verdict.explained), *motion_warnings(motion)]
+    said = [*warnings, *_said(found, entry), *motion_warnings(motion)]
     coords: dict[str, Any] = {
         **named.coords,
         **about.coords,
@@ -155,7 +159,7 @@ def _fixed(entry: Candidate) -> dict[str, float]:
     return {**model.fixed, "clearance": model.clearance}
 
 
-def _said(found: Estimation, entry: Candidate, explained: bool) -> list[str]:
+def _said(found: Estimation, entry: Candidate) -> list[str]:
     """Return the warnings of the estimate."""
     said = []
     matched = found.matched
@@ -175,10 +179,6 @@ def _said(found: Estimation, entry: Candidate, explained: bool) -> list[str]:
         )
     if matched is not None and found.known is not None:
         said += _open(matched, entry)
-    if not explained:
-        said.append(
-            "the model does not explain the recording; its parameters are the best of bad fits"
-        )
     ended = entry.at_range_end(found.point)
     return said if ended is None else [*said, ended]
 

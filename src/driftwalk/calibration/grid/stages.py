@@ -31,6 +31,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.run_stages import share_of_map, share_of_windows
 from driftwalk.motion.batches import no_numbers
 from driftwalk.motion.score import broken_worlds
+from driftwalk.schema.answers.verdict import Verdict, verdict_of
 
 
 class GridCalibration:
@@ -42,6 +43,7 @@ class GridCalibration:
         self.bootstrap: Bootstrap | None = None
         self.quality: GoodnessOfFit | None = None
         self.region: Region | None = None
+        self.verdict: Verdict | None = None
         self._how = how
 
     def run(self) -> GridCalibration:
@@ -150,9 +152,11 @@ class GridCalibration:
             steps=self.problem.refined_steps,
             known=known,
         )
+        against = []
         if not self.quality.explained:
-            self.warnings.append(
-                f"the model does not explain the recording: D = {self.quality.distance:.3f} at the "
-                f"optimum is {self.quality.distance / self.quality.floor:.1f} times the noise "
-                f"floor {self.quality.floor:.3f}; the parameters are the best of bad fits"
+            against.append(
+                f"D = {self.quality.distance:.3f} at the optimum is "
+                f"{self.quality.distance / self.quality.floor:.1f} times the noise floor "
+                f"{self.quality.floor:.3f}; the parameters are the best of bad fits"
             )
+        self.verdict = verdict_of(against, [])

@@ -17,6 +17,7 @@ from driftwalk.motion.batches import no_numbers
 from driftwalk.motion.score import broken_worlds
 from driftwalk.schema.answers.facts import AnswerParts, texts
 from driftwalk.schema.answers.model_comparison import ASPECT_WORDS, CHECK_WORDS
+from driftwalk.schema.answers.verdict import Verdict, verdict_of
 
 HELD_OUT_REPLICATES: Final = 20
 """Worlds by which the answer of a search is judged."""
@@ -149,15 +150,7 @@ class VerdictPolicy(NamedTuple):
 VERDICT: Final = VerdictPolicy()
 
 
-class Verdict(NamedTuple):
-    """Whether a model explains a recording."""
-
-    explained: bool
-    text: str
-    """Where it does not, the worst first; empty where it does."""
-
-
-def verdict_of(
+def held_out_verdict(
     held_out: HeldOutScore,
     motion: RecordedMotion,
     *,
@@ -183,7 +176,7 @@ def verdict_of(
         parts.append(f"{clearly_behind} is clearly closer")
     if baseline:
         parts.insert(0, "it repeats recorded steps and knows no arena")
-    return Verdict(not parts, "; ".join(parts))
+    return verdict_of(parts, [])
 
 
 def checks_off(worlds: Floats, recorded: Floats) -> Bools:

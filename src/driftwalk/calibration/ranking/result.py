@@ -11,9 +11,8 @@ from driftwalk.calibration.held_out.candidates import Candidate
 from driftwalk.calibration.held_out.held_out_score import (
     VERDICT,
     HeldOutScore,
-    Verdict,
+    held_out_verdict,
     recording_parts,
-    verdict_of,
 )
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.calibration.ranking.model_evidence import (
@@ -26,6 +25,7 @@ from driftwalk.calibration.ranking.model_evidence import (
 from driftwalk.calibration.stationarity import motion_warnings, stationarity_of_motion
 from driftwalk.core.arrays import Floats
 from driftwalk.schema.answers.facts import texts
+from driftwalk.schema.answers.verdict import Verdict
 from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def build_comparison(
     asked = {} if answer.best is None else evidence
     unlike = {k: discrepancy_sentence(one) for k, one in asked.items()}
     verdicts = [
-        verdict_of(
+        held_out_verdict(
             one,
             motion,
             baseline=entry.baseline,
@@ -94,8 +94,8 @@ def build_comparison(
         "behind_std": ("model", behind_std),
         "free_numbers": ("model", [entry.numbers for entry in entries]),
         "baseline": ("model", [entry.baseline for entry in entries]),
-        "explained": ("model", [one.explained for one in verdicts]),
-        "verdict": ("model", texts([one.text for one in verdicts])),
+        "verdict": ("model", texts([one.word for one in verdicts])),
+        "verdict_reason": ("model", texts(["; ".join(one.reasons) for one in verdicts])),
         "held_out_distance": (("model", "aspect"), [one.held for one in held_out]),
         "trained_distance": (("model", "aspect"), [one.trained for one in held_out]),
         "check_median": (("model", "check"), [np.median(one.checks, axis=0) for one in held_out]),
@@ -171,7 +171,7 @@ def answer_sentence(
     explains the recording is better than one that does not.
     """
     first = closest if answer.best is None else answer.best
-    explained = [k for k, one in enumerate(verdicts) if one.explained]
+    explained = [k for k, one in enumerate(verdicts) if one.explains]
     if not explained:
         return f"No model explains the recording; the best one is {names[first]}"
     best = first if first in explained else explained[0]
@@ -192,8 +192,10 @@ def _findings(
     rivals = [names[k] for k in tied if not entries[k].baseline]
     if rivals:
         found[0] += f"; no clear difference from {', '.join(rivals)}"
-    if not any(one.explained for one in verdicts):
-        found.append(f"{names[closest]} does not explain it: {verdicts[closest].text}")
+    if not any(one.explains for one in verdicts):
+        found.append(
+            f"{names[closest]} does not explain it: {'; '.join(verdicts[closest].reasons)}"
+        )
     baselines = [names[k] for k in tied if entries[k].baseline]
     nearer = [names[k] for k in range(closest)]
     if nearer:

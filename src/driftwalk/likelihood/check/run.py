@@ -35,7 +35,7 @@ from driftwalk.likelihood.preparation import as_list, estimate_of
 from driftwalk.likelihood.refuse import BREAKDOWN
 from driftwalk.schema.answers.facts import texts
 from driftwalk.schema.answers.fit import with_verdict
-from driftwalk.schema.answers.verdict import EXPLAINS
+from driftwalk.schema.answers.verdict import verdict_variables
 from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:
@@ -171,11 +171,11 @@ def check_model(
     Returns
     -------
     xarray.Dataset
-        A `model_check`: ``explained`` (true, false) and ``finding`` (sentences: statistic, value,
-        expected, place or time); in its attributes ``ks_distance``, ``ks_noise_floor``,
-        ``effective_parameters``. By criterion ``p_value``; whiteness by
-        component and lag; residuals by cell, by part of the recording and by speed; densities of
-        steps with bands.
+        A `model_check`: ``verdict`` ("explains", "does not explain", "cannot tell") and
+        ``verdict_reason`` (sentences: statistic, value, expected, place or time); in its attributes
+        ``ks_distance``, ``ks_noise_floor``, ``effective_parameters``. By criterion ``p_value``;
+        whiteness by component and lag; residuals by cell, by part of the recording and by speed;
+        densities of steps with bands.
 
     Raises
     ------
@@ -188,8 +188,8 @@ def check_model(
     >>> import driftwalk as dw
     >>> recording = dw.tank30_recording()
     >>> check = dw.check_model(dw.fit_motion(recording), recording)  # doctest: +SKIP
-    >>> bool(check["explained"])  # doctest: +SKIP
-    True
+    >>> str(check["verdict"].values)  # doctest: +SKIP
+    'explains'
     """
     if replicates < FEWEST_REPLICATES:
         raise InputError(f"replicates must be at least {FEWEST_REPLICATES}, got {replicates}")
@@ -247,20 +247,10 @@ def check_model(
         "failed": ("criterion", np.array([one.failed for one in criteria], dtype=np.int8)),
         "detectable": ("criterion", [one.detectable for one in criteria]),
         "detectable_of": ("criterion", texts([one.words for one in criteria])),
-        "explained": ((), np.bool_(verdict.word == EXPLAINS)),
-        "verdict": ((), np.array(verdict.word, dtype=np.str_)),
+        **verdict_variables(verdict),
     }
     names = np.array([one.name for one in criteria], dtype=object)
-    parts.append(
-        (
-            data,
-            {
-                "criterion": ("criterion", names),
-                "finding": ("finding", texts(verdict.reasons)),
-                "verdict_reason": ("verdict_reason", texts(verdict.reasons)),
-            },
-        )
-    )
+    parts.append((data, {"criterion": ("criterion", names)}))
     variables: dict[str, Any] = {}
     coords: dict[str, Any] = {}
     for some, places in parts:
@@ -315,8 +305,8 @@ def judge_fit(
     >>> import driftwalk as dw
     >>> recording = dw.tank30_recording()
     >>> found = judge_fit(dw.fit_motion(recording), [recording])  # doctest: +SKIP
-    >>> bool(found.fit["explained"])  # doctest: +SKIP
-    True
+    >>> str(found.fit["verdict"].values)  # doctest: +SKIP
+    'explains'
     """
     try:
         check = check_model(fit, recordings, body=body)

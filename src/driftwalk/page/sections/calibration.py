@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from driftwalk.page.parts import (
     summary_section,
     table_section,
     value_of,
+    verdict_paragraphs,
 )
 from driftwalk.page.sections.flow import flow_sections
 from driftwalk.page.sections.map import (
@@ -36,16 +37,14 @@ from driftwalk.page.sections.map import (
 )
 from driftwalk.page.sections.recording import Noise, recording_sections
 from driftwalk.plot.parts.labels import interval_of
+from driftwalk.schema.answers.calibration import UNCHECKED
 from driftwalk.schema.answers.facts import sentences
 from driftwalk.schema.answers.parts import estimates
+from driftwalk.schema.answers.verdict import stored_verdict
 from driftwalk.schema.parameters import is_block
 
 if TYPE_CHECKING:
     import xarray as xr
-
-FAR: Final = 2.0
-"""From this ratio of distance to floor on a fit is far off; without a bootstrap nothing else says
-so."""
 
 
 def calibration_sections(
@@ -299,24 +298,23 @@ def _how_good(calibration: xr.Dataset) -> list[str]:
     distance, floor = (value_of(calibration, name) for name in ("ks_distance", "noise_floor"))
     if distance is None or floor is None:
         return []
-    ratio = distance / floor
-    far = not bool(calibration["explained"]) if "explained" in calibration else ratio >= FAR
-    verdict = (
-        "far above the chance level: the model does not explain this motion"
-        if far
-        else "near the chance level; a small distance does not prove that the model is right"
+    verdict = verdict_paragraphs(
+        stored_verdict(calibration),
+        UNCHECKED,
+        more="A small distance does not prove that the model is right.",
     )
-    words = (
+    words = [
         f"There D = {distance:.4g}, where two runs of the same model are {floor:.4g} apart "
-        f"(noise floor): {ratio:.2f} times it, {verdict}."
-    )
+        f"(noise floor): {distance / floor:.2f} times it.",
+        *verdict,
+    ]
     second, second_floor = (
         value_of(calibration, f"second_half_{name}") for name in ("ks_distance", "noise_floor")
     )
     if second is None or second_floor is None:
-        return [words]
+        return words
     return [
-        words,
+        *words,
         f"Calibrated on the first half, it is {second:.4g} from the second (noise floor "
         f"{second_floor:.4g}). This includes the errors of the parameters and the "
         "flow of half a recording, so a few floors are normal for a short recording.",

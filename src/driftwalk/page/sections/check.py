@@ -60,13 +60,13 @@ def check_sections(check: xr.Dataset) -> list[Section]:
 def _criteria(check: xr.Dataset) -> Section:
     require(check, "criterion", "p_value", "failed")
     rows = [
-        [str(name).replace("_", " "), number(p), "finding" if failed else ""]
+        [str(name).replace("_", " "), number(p), "failed" if failed else ""]
         for name, p, failed in zip(
             check["criterion"].values, check["p_value"].values, check["failed"].values, strict=True
         )
     ]
     level = value_of(check, "level")
-    note = "" if level is None else f"A p value below {level:.3g} is a finding."
+    note = "" if level is None else f"A criterion fails where its p value is below {level:.3g}."
     return table_section("", "", ["criterion", "p value", ""], rows, note)
 
 

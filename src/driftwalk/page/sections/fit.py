@@ -17,11 +17,11 @@ from driftwalk.page.parts import (
     empty_section,
     figure,
     is_simulated,
-    require,
     sections_of,
     summary_section,
     table_section,
     value_of,
+    verdict_paragraphs,
 )
 from driftwalk.page.sections.check import check_sections
 from driftwalk.page.sections.flow import flow_sections
@@ -39,7 +39,7 @@ from driftwalk.schema.answers.force_law import (
     wall_estimates,
 )
 from driftwalk.schema.answers.parts import NOT_DETERMINED, Estimate, estimates
-from driftwalk.schema.check import kind_name
+from driftwalk.schema.answers.verdict import stored_verdict
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -97,7 +97,7 @@ def fit_sections(
         fit,
         "There is no fit yet.",
         lambda found: fit_summary(found, check),
-        lambda found: _warnings(found, check),
+        lambda found: sentences(found, "warning"),
         [("law", "The force law", law_sections)],
     )
     noise = None if fit is None else _noise(fit)
@@ -110,7 +110,7 @@ def fit_sections(
         made += parts
     if fit is not None:
         made += flow_sections(fit)
-        if check is None and "explained" not in fit:
+        if check is None and "verdict" not in fit:
             why = fit.attrs.get("check_left_out")
             reason = f"{why}." if why else "The model was not checked against the recording."
             made.append(empty_section("check", "Does the model explain the recording?", reason))
@@ -123,8 +123,7 @@ def fit_summary(fit: xr.Dataset, check: xr.Dataset | None = None) -> Section:
     """Return the answer of a fit in words and numbers."""
     paragraphs = [SIMULATED] if is_simulated(fit) else []
     paragraphs += [_what_was_done(fit), _what_was_found(fit)]
-    judge = _judge(fit, check)
-    paragraphs += [] if judge is None else [_verdict(judge)]
+    paragraphs += _verdict(fit, check)
     error = value_of(fit, "chi_squared_per_dof")
     shown = figure("mean squared error of prediction", error, note="1 if the model is right")
     return summary_section(paragraphs, [*map(card, model_estimates(fit)), shown])
@@ -184,40 +183,29 @@ def _value_words(one: Estimate) -> str:
     return f"{symbol}{value}{one.after}"
 
 
-def _verdict(check: xr.Dataset) -> str:
-    require(check, "explained")
-    explained = bool(check["explained"])
-    words = (
-        "The check found no evidence against the model. It finds many faults, but not all."
-        if explained
-        else "THE MODEL DOES NOT EXPLAIN THIS RECORDING: see the warnings."
+def _verdict(fit: xr.Dataset, check: xr.Dataset | None) -> list[str]:
+    """Return the verdict and its reasons, and the KS distance of a check."""
+    said = verdict_paragraphs(
+        stored_verdict(fit if check is None else check),
+        str(fit.attrs.get("check_left_out", "")),
+        more="The check found no evidence against the model. It finds many faults, but not all.",
     )
-    if kind_name(check) == "fit":
-        return words
+    if check is None:
+        return said
     distance, floor = (value_of(check, name) for name in ("ks_distance", "ks_noise_floor"))
     if distance is None or floor is None:
-        return f"{words} There is no KS distance: {check.attrs.get('ks_left_out', 'left out')}."
-    return (
-        f"{words} Recordings simulated with these parameters have a KS distance of {distance:.3g} "
-        f"to the real one, and of {floor:.3g} among themselves (noise floor){_chance(check)}."
-    )
+        return [*said, f"There is no KS distance: {check.attrs.get('ks_left_out', 'left out')}."]
+    return [
+        *said,
+        f"Recordings simulated with these parameters have a KS distance of {distance:.3g} to the "
+        f"real one, and of {floor:.3g} among themselves (noise floor){_chance(check)}.",
+    ]
 
 
 def _chance(check: xr.Dataset) -> str:
     """Return the p-value of the distance in words, nothing where there is none."""
     found = value_of(check, "ks_p_value")
     return "" if found is None else f"; the p-value of that distance is {found:.2g}"
-
-
-def _judge(fit: xr.Dataset, check: xr.Dataset | None) -> xr.Dataset | None:
-    """Return the dataset that holds the verdict: the check, or the fit that keeps it."""
-    return fit if check is None and "explained" in fit else check
-
-
-def _warnings(fit: xr.Dataset, check: xr.Dataset | None) -> list[str]:
-    judge = _judge(fit, check)
-    findings = [] if judge is None else sentences(judge, "finding")
-    return [*sentences(fit, "warning"), *(f"model check: {text}" for text in findings)]
 
 
 def _noise(fit: xr.Dataset) -> Noise | None:

@@ -18,6 +18,7 @@ from driftwalk.page.parts import (
     stated_warnings,
     summary_section,
     table_section,
+    verdict_paragraphs,
 )
 from driftwalk.page.sections.recording import recording_sections
 from driftwalk.schema.answers.model_comparison import (
@@ -27,6 +28,7 @@ from driftwalk.schema.answers.model_comparison import (
     ranking_table,
 )
 from driftwalk.schema.answers.parts import each
+from driftwalk.schema.answers.verdict import stored_verdict
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -76,14 +78,13 @@ def model_calibration_sections(
 
 def calibration_summary(found: xr.Dataset) -> Section:
     """Return the answer in words and numbers."""
-    require(found, "determined", "score", "explained", "verdict")
+    require(found, "determined", "score", "verdict")
     names = [str(name) for name in found["parameter"].values]
     known = [name for name, one in zip(names, found["determined"].values, strict=True) if one]
     model = required(found, "model")
-    verdict = "explains" if bool(found["explained"]) else "does not explain"
-    where = str(found["verdict"].values)
     paragraphs = [
-        f"The model {model} {verdict} the recording{f': {where}' if where else ''}.",
+        f"The model {model} was calibrated on the recording.",
+        *verdict_paragraphs(stored_verdict(found)),
         f"The recording determines {len(known)} of {len(names)} parameters"
         f"{': ' + ', '.join(known) if known else ''}.",
     ]
@@ -278,13 +279,10 @@ def scores_section(comparison: xr.Dataset) -> Section:
 
 def verdicts_section(comparison: xr.Dataset) -> Section:
     """Return the table of where each model differs from the recording."""
-    require(comparison, "verdict", "explained")
-    rows = [
-        [str(name), str(text) or "nowhere: it explains the recording"]
-        for name, text in zip(comparison["model"].values, comparison["verdict"].values, strict=True)
-    ]
-    title = "Where the models differ from the recording"
-    return table_section("verdicts", title, ["model", "where"], rows, "The worst aspect first.")
+    require(comparison, "verdict", "verdict_reason")
+    columns = [comparison[name].values for name in ("model", "verdict", "verdict_reason")]
+    rows = [list(map(str, row)) for row in zip(*columns, strict=True)]
+    return table_section("verdicts", "Verdicts", ["model", "verdict", "why"], rows)
 
 
 def compared_aspects(comparison: xr.Dataset) -> Section:

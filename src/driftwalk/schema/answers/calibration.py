@@ -18,13 +18,17 @@ from driftwalk.schema.answers.parts import (
     intensity_row,
     origin,
 )
+from driftwalk.schema.answers.verdict import stored_verdict, verdict_facts, verdict_parts
 from driftwalk.schema.kinds.calibration import CALIBRATION
 from driftwalk.schema.parameters import flat_name, is_block, stored_parameters
 
 if TYPE_CHECKING:
     import xarray as xr
 
-_NOT_IN_JSON: Final = ("explained", "far_above_floor", "region_level", "position_quantum_m")
+_NOT_IN_JSON: Final = ("far_above_floor", "region_level", "position_quantum_m")
+
+UNCHECKED: Final = "it takes a refined map and a bootstrap"
+"""Why a calibration has no verdict."""
 
 
 def calibration_answer(found: xr.Dataset) -> Answer:
@@ -47,8 +51,8 @@ def calibration_answer(found: xr.Dataset) -> Answer:
             f"{facts['halves_ks_distance_expected']:.4f}"
         )
         parts.append(Row("its own halves", said))
-    if "explained" in facts:
-        parts.append(Row("explained", facts["explained"]))
+    if estimates(found):
+        parts += verdict_parts(stored_verdict(found), UNCHECKED)
     warnings = sentences(found, "warning")
     return Answer(parts, _json(found, facts, warnings), warnings)
 
@@ -62,6 +66,7 @@ def _json(found: xr.Dataset, facts: dict[str, Any], warnings: list[str]) -> dict
         shown = {key: facts.get(key) for key in keys}
     else:
         shown = {key: facts[key] for key in ("model", *keys) if key in facts}
+    shown |= verdict_facts(stored_verdict(found))
     return {**shown, "recording": facts.get("recording_name"), "warnings": warnings}
 
 
@@ -79,8 +84,8 @@ def model_calibration_answer(found: xr.Dataset) -> Answer:
             f"{float(found['usual_misfit']):.0f} (95 % below {float(found['most_misfit']):.0f})"
         )
         parts.append(Row("summaries", said))
-    explained = bool(found["explained"])
-    parts.append(Row("explained", "yes" if explained else f"no: {found['verdict'].values}"))
+    verdict = stored_verdict(found)
+    parts += verdict_parts(verdict)
     warnings = sentences(found, "warning")
     numbers = (
         *("score", "score_std", "searched_score", "matched_score", "misfit", "usual_misfit"),
@@ -92,8 +97,7 @@ def model_calibration_answer(found: xr.Dataset) -> Answer:
         "parameters": {_key(one): _parameter(one) for one in each(found, "parameter")},
         "fixed": json.loads(found.attrs["fixed"]),
         "estimate_from": found.attrs["estimate_from"],
-        "explained": explained,
-        "verdict": str(found["verdict"].values),
+        **verdict_facts(verdict),
         "held_out_distance": by_name(found, "aspect", "held_out_distance"),
         "own_distance": by_name(found, "aspect", "own_distance"),
         **{name: float(found[name]) for name in numbers if name in found},

@@ -34,6 +34,7 @@ from driftwalk.schema.answers.parts import (
     intensity_row,
     origin,
 )
+from driftwalk.schema.answers.verdict import stored_verdict, verdict_facts, verdict_parts
 from driftwalk.schema.check import described
 from driftwalk.schema.kinds.fit import FIT, LAW_NUMBERS, PARAMETERS
 
@@ -47,7 +48,7 @@ _ATTRIBUTES: Final = (
 )
 _NOT_IN_JSON: Final = frozenset(
     {
-        *("force_lever_m", "force_lever_m_interval", "explained", "residual_cell_size_m"),
+        *("force_lever_m", "force_lever_m_interval", "residual_cell_size_m"),
         *("orientation_noise_rad", "orientation_noise_rad_interval"),
         *("drag_coefficient_angle_given", "drag_coefficient_angle_given_interval"),
         *("angle_disagreement_std", "filter_drag_coefficient", "intervals_usable", "restricted"),
@@ -128,21 +129,18 @@ def checked_parts(fit: xr.Dataset, check: xr.Dataset | None) -> list[Part]:
 
 def _verdict(fit: xr.Dataset, check: xr.Dataset | None) -> list[Part]:
     """Return whether the model explains the recording, and what speaks against it."""
-    judge = fit if check is None else check
-    if "explained" not in judge:
-        left_out = fit.attrs.get("check_left_out")
-        return [] if left_out is None else [Row("model check", str(left_out))]
-    parts: list[Part] = [Row("model check", "the model explains this recording")]
-    explained = bool(judge["explained"])
-    if not explained:
-        findings = [f"  {text}" for text in sentences(judge, "finding")]
-        parts = [Row("model check", "THE MODEL DOES NOT EXPLAIN THIS RECORDING:"), *findings]
+    verdict = stored_verdict(fit if check is None else check)
+    if verdict is None and not estimates(fit):
+        # A part of a fit.
+        return []
+    parts = verdict_parts(verdict, str(fit.attrs.get("check_left_out", "")))
     if check is None:
         return parts
     distance, floor = (float(check.attrs[name]) for name in ("ks_distance", "ks_noise_floor"))
     if not isfinite(distance):
         return [*parts, Row("KS distance", f"not available: {check.attrs['ks_left_out']}")]
-    far = explained and distance > FAR_ABOVE_FLOOR * floor
+    explains = verdict is not None and verdict.explains
+    far = explains and distance > FAR_ABOVE_FLOOR * floor
     more = ": far, but within the uncertainty of the fit" if far else ""
     parts.append(Row("KS distance", f"{distance:.3f}, noise floor {floor:.3f}{more}"))
     chance = float(check.attrs.get("ks_p_value", "nan"))
@@ -163,15 +161,14 @@ def fit_json(fit: xr.Dataset, check: xr.Dataset | None = None) -> dict[str, Any]
     if "compared_law" in fit.dims:
         shown["compared_laws"] = _laws(fit)
     shown |= {"recording": facts.get("source"), "warnings": facts["warnings"]}
+    shown |= verdict_facts(stored_verdict(fit if check is None else check))
     if check is None:
         left_out = fit.attrs.get("check_left_out")
-        return shown | ({} if left_out is None else {"explained": None, "check_left_out": left_out})
+        return shown if left_out is None else {**shown, "check_left_out": left_out}
     measured = ("ks_distance", "ks_noise_floor", "ks_p_value")
     distances = {key: float(check.attrs.get(key, "nan")) for key in measured}
     return {
         **shown,
-        "explained": bool(check["explained"]),
-        "findings": sentences(check, "finding"),
         **{key: value if isfinite(value) else None for key, value in distances.items()},
     }
 
@@ -208,10 +205,10 @@ def with_verdict(fit: xr.Dataset, check: xr.Dataset) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        The `fit`, with ``explained`` (boolean), ``finding`` (sentences), ``p_value`` by criterion
-        and the residuals by cell.
+        The `fit`, with ``verdict``, ``verdict_reason`` (sentences), ``p_value`` by criterion and
+        the residuals by cell.
     """
-    kept = check[["explained", "finding", "p_value", *BY_CELL]].rename(PLACES)
+    kept = check[["verdict", "verdict_reason", "p_value", *BY_CELL]].rename(PLACES)
     found = fit.merge(kept, combine_attrs="override", compat="override", join="outer")
     found["residual_cell_size"] = ((), check.attrs["cell_size_m"])
     return described(found)

@@ -102,11 +102,11 @@ def ranking_table(found: xr.Dataset) -> Table:
             f"{float(one['behind']):.2f} ± {float(one['behind_std']):.2f}" if index else "",
             f"{float(one['held_out_distance'][0]):.3f}",
             *((_misfit(one),) if asked else ()),
-            _explained(one),
+            _verdict(one),
         )
         for index, one in enumerate(each(found, "model"))
     ]
-    columns = (*_COLUMNS, *(("misfit",) if asked else ()), "explained")
+    columns = (*_COLUMNS, *(("misfit",) if asked else ()), "verdict")
     return Table(rows, columns, "models, the closest first")
 
 
@@ -116,10 +116,8 @@ def _misfit(one: xr.Dataset) -> str:
     return f"{float(one['misfit']):.0f} (own below {float(one['most_misfit']):.0f})"
 
 
-def _explained(one: xr.Dataset) -> str:
-    if bool(one["baseline"]):
-        return "a walk of steps"
-    return "yes" if bool(one["explained"]) else "no"
+def _verdict(one: xr.Dataset) -> str:
+    return "a walk of steps" if bool(one["baseline"]) else str(one["verdict"].values)
 
 
 def _model(one: xr.Dataset) -> dict[str, Any]:
@@ -131,8 +129,8 @@ def _model(one: xr.Dataset) -> dict[str, Any]:
     known = one.isel(parameter=np.flatnonzero(np.isfinite(one["estimate"].values)))
     return {
         "model": str(one["model"].values),
-        "explained": bool(one["explained"]),
         "verdict": str(one["verdict"].values),
+        "verdict_reasons": [text for text in str(one["verdict_reason"].values).split("; ") if text],
         "baseline": bool(one["baseline"]),
         "numbers": int(one["free_numbers"]),
         **{name: float(one[name]) for name in ("score", "score_std", "behind", "behind_std")},

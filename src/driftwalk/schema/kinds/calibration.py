@@ -81,13 +81,14 @@ def _calibration(
     return kind(
         f"""
 kind: calibration
-version: 3
+version: 4
 read: ks_distance {grid} estimate parameter {read}
 read_attributes: study
 dimensions:
     parameter: parameters of the model, by name
     bound: lower, upper
     warning: sentences
+    verdict_reason: sentences
     {rows}
     replicate: simulations of a setting
     refined_replicate: simulations of a setting of the refined map
@@ -133,8 +134,9 @@ variables:
 variables ({_BOOTSTRAPPED}):
     interval(parameter bound): intervals of the parameters; at the confidence
     bound(bound) text: end of an interval
-    explained bool: whether the model explains the recording; a distance near the floor is no \
-        proof
+    verdict text: whether the model explains the recording; "explains", "does not explain" or \
+        "cannot tell"
+    verdict_reason(verdict_reason) text: reason for the verdict
     confidence [1]: confidence of the intervals
     {OPTIMUM}ks_distance_standard_error [1]: its standard error
     noise_floor_upper [1]: its 95 % quantile

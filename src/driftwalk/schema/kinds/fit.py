@@ -12,7 +12,7 @@ _ON: Final = "[flow] y x"
 FIT: Final = kind(
     f"""
 kind: fit
-version: 2
+version: 3
 dimensions:
     flow: flows, by name, with switching times
     y: nodes of the flow
@@ -23,7 +23,7 @@ dimensions:
     parameter: fitted parameters, by name
     bound: lower, upper
     warning: sentences
-    finding: sentences
+    verdict_reason: sentences
     criterion: criteria of the check, by name
     residual_component: errors in x, in y, and in the angle where it is in the state
     cell_y: centres of the cells of the check
@@ -109,8 +109,9 @@ variables:
     axis text
     profile(profile) [1]: C_d
 variables (the model was checked):
-    explained bool: whether the model explains the recordings
-    finding(finding) text: evidence against the model
+    verdict text: whether the model explains the recordings; "explains", "does not explain" or \
+        "cannot tell"
+    verdict_reason(verdict_reason) text: reason for the verdict
     p_value(criterion) [1]: p value of the criterion
     residual(residual_component cell_y cell_x) [1]: mean error in its sd; by cell
     residual_count(cell_y cell_x) [1]: samples

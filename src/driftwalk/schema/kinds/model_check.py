@@ -26,9 +26,9 @@ variables ({_COMPARED}):
 MODEL_CHECK: Final = kind(
     f"""
 kind: model_check
-version: 2
+version: 3
 dimensions:
-    finding: sentences
+    verdict_reason: sentences
     criterion: criteria, by name
     component: errors in x, in y, and in the angle where it is in the state
     lag: samples
@@ -44,8 +44,9 @@ dimensions:
     step_length_edge: edges of the bins
     turning_angle_edge: edges of the bins
 variables:
-    explained bool: whether the model explains the recordings
-    finding(finding) text: evidence against the model
+    verdict text: whether the model explains the recordings; "explains", "does not explain" or \
+        "cannot tell"
+    verdict_reason(verdict_reason) text: reason for the verdict
     p_value(criterion) [1]: p value of the criterion; [the criteria]({_CRITERIA})
     failed(criterion) int: 1 where the criterion failed
     detectable(criterion) [1]: size of misfit that the criterion would find nine times in ten

@@ -30,7 +30,7 @@ _ORIGIN: Final = """
 
 MODEL_CALIBRATION: Final = kind(f"""
 kind: model_calibration
-version: 1
+version: 2
 dimensions:
     parameter: parameters of the model
     bound: lower and upper end
@@ -39,6 +39,7 @@ dimensions:
     aspect: aspects of the motion, by name
     check: facts of the motion that no model is fitted to
     warning: sentences
+    verdict_reason: sentences
 variables:
     estimate(parameter): value of the parameter; in its unit
     interval(parameter bound): interval of the parameter; NaN where the estimate is the search's
@@ -59,8 +60,9 @@ variables:
     {_RECORDED}
     score [1]: mean over the aspects of distance over floor; held out
     score_std [1]: its standard error; from leaving blocks out
-    explained bool: whether the model explains the recording
-    verdict text: where the model is farther than the recording
+    verdict text: whether the model explains the recording; "explains", "does not explain" or \
+        "cannot tell"
+    verdict_reason(verdict_reason) text: reason for the verdict
     bound(bound) text: end of an interval
 variables (the model was searched):
     searched_estimate(parameter): answer of the search by KS distances
@@ -92,7 +94,7 @@ _HELD: Final = "odd blocks of time, which no model has seen"
 
 MODEL_COMPARISON: Final = kind(f"""
 kind: model_comparison
-version: 1
+version: 2
 dimensions:
     model: motion models, from the closest to the farthest
     aspect: aspects of the motion, by name
@@ -107,9 +109,10 @@ variables:
     behind(model) [1]: score above that of the first model
     behind_std(model) [1]: its standard error
     free_numbers(model) int: numbers that were fitted
-    baseline(model) bool: whether it is a walk of recorded steps, never explained
-    explained(model) bool: whether the model explains the recording
-    verdict(model) text: where the model is farther than the recording
+    baseline(model) bool: whether it is a walk of recorded steps, which is no answer
+    verdict(model) text: whether the model explains the recording; "explains", "does not explain" \
+        or "cannot tell"
+    verdict_reason(model) text: reasons for the verdict, separated by "; "
     held_out_distance(model aspect) [1]: KS distance; {_HELD}
     trained_distance(model aspect) [1]: KS distance; even blocks
     check_median(model check): fact of the model, median of its worlds

@@ -162,7 +162,7 @@ def test_a_model_is_found_again_and_says_how_well() -> None:
     assert bool(by_name["determined"])
     assert float(found["misfit"]) <= float(found["most_misfit"])
     assert float(found["interval_stretch"]) == 1.0
-    assert bool(found["explained"])
+    assert found["verdict"] == "explains"
     (said,) = found["warning"].values
     assert said.startswith("the tank was not stated: ")
 
@@ -206,5 +206,4 @@ def test_another_model_is_not_believed() -> None:
         assert float(found["interval_stretch"]) > 2.0
         assert "the summaries of the motion differ from the model's" in warnings
         assert "no parameter is determined" in warnings
-    assert not bool(found["explained"])
-    assert "the model does not explain the recording" in warnings
+    assert found["verdict"] == "does not explain"

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from driftwalk.calibration.held_out.candidates import Candidate
-from driftwalk.calibration.held_out.held_out_score import HeldOutScore, Verdict, without_error
+from driftwalk.calibration.held_out.held_out_score import HeldOutScore, without_error
 from driftwalk.calibration.ranking.model_evidence import (
     EVIDENCE,
     Evidence,
@@ -21,6 +21,7 @@ from driftwalk.calibration.ranking.model_evidence import (
     shortlist_models,
 )
 from driftwalk.calibration.ranking.result import answer_sentence
+from driftwalk.schema.answers.verdict import verdict_of
 
 ERROR = 0.05
 
@@ -139,6 +140,6 @@ def test_a_model_that_does_not_give_them_is_told_by_how_much() -> None:
     ],
 )
 def test_the_answer_names_one_model(explained: set[int], named: int | None, sentence: str) -> None:
-    verdicts = [Verdict(k in explained, "" if k in explained else "far off") for k in range(3)]
+    verdicts = [verdict_of([] if k in explained else ["far off"], []) for k in range(3)]
     names = ["nine", "three", "twelve"]
     assert answer_sentence(names, verdicts, 0, EvidenceRanking(named, ())) == sentence

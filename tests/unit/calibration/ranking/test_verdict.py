@@ -11,7 +11,7 @@ from driftwalk.calibration.held_out.held_out_score import (
     HELD_OUT_REPLICATES,
     HeldOutScore,
     checks_off,
-    verdict_of,
+    held_out_verdict,
 )
 from driftwalk.calibration.held_out.recorded import CHECKS
 
@@ -41,31 +41,31 @@ def judged(held: float = 0.12, facts: float = 1.0) -> HeldOutScore:
 
 
 def test_a_model_as_near_as_the_recording_itself_explains_it() -> None:
-    found = verdict_of(judged(), motion(), baseline=False)
-    assert found.explained
-    assert found.text == ""
+    found = held_out_verdict(judged(), motion(), baseline=False)
+    assert found.explains
+    assert found.reasons == ()
 
 
 def test_a_walk_of_recorded_steps_is_never_explained() -> None:
-    found = verdict_of(judged(held=0.0), motion(), baseline=True)
-    assert not found.explained
-    assert found.text.startswith("it repeats recorded steps")
+    found = held_out_verdict(judged(held=0.0), motion(), baseline=True)
+    assert not found.explains
+    assert found.reasons[0].startswith("it repeats recorded steps")
 
 
 def test_a_model_that_another_one_clearly_beats_explains_nothing() -> None:
-    found = verdict_of(judged(), motion(), baseline=False, clearly_behind="run_rest")
-    assert not found.explained
-    assert found.text == "run_rest is clearly closer"
+    found = held_out_verdict(judged(), motion(), baseline=False, clearly_behind="run_rest")
+    assert not found.explains
+    assert found.reasons == ("run_rest is clearly closer",)
 
 
 def test_the_worst_aspect_is_named_first() -> None:
     one = judged()
     far = one._replace(held=np.array([0.12, 0.21, 0.12, 0.12, 0.3, 0.12]))
-    found = verdict_of(far, motion(), baseline=False)
-    assert not found.explained
-    assert found.text == (
-        "place near the wall: D = 0.300, the recording's own parts 0.100; "
-        "steps of 3 intervals: D = 0.210, the recording's own parts 0.100"
+    found = held_out_verdict(far, motion(), baseline=False)
+    assert not found.explains
+    assert found.reasons == (
+        "place near the wall: D = 0.300, the recording's own parts 0.100",
+        "steps of 3 intervals: D = 0.210, the recording's own parts 0.100",
     )
 
 
@@ -74,9 +74,9 @@ def test_facts_that_were_not_fitted_count() -> None:
     for off, explained in ((1, True), (2, False)):
         recorded = SimpleNamespace(**{**vars(motion()), "recorded_checks": np.ones(8)})
         recorded.recorded_checks[:off] = 2.0
-        found = verdict_of(judged(), recorded, baseline=False)
-        assert found.explained == explained
-    assert "over 1 step interval, mean squared displacement over 3" in found.text
+        found = held_out_verdict(judged(), recorded, baseline=False)
+        assert found.explains == explained
+    assert "over 1 step interval, mean squared displacement over 3" in found.reasons[0]
 
 
 def test_a_fact_is_far_off_by_a_factor_and_a_share_by_a_tenth() -> None:
