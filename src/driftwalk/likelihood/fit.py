@@ -29,7 +29,12 @@ from driftwalk.likelihood.preparation import (
     prepare,
 )
 from driftwalk.likelihood.prior import Prior
-from driftwalk.likelihood.refuse import BREAKDOWN, require_noise_below_motion, solved
+from driftwalk.likelihood.refuse import (
+    BREAKDOWN,
+    reason_of_no_solution,
+    require_noise_below_motion,
+    solved,
+)
 from driftwalk.likelihood.reml import Restricted, restricted_drag
 from driftwalk.likelihood.result import build_fit, law_facts, visited_shares, whiteness_of
 from driftwalk.likelihood.start import first_point, first_weights
@@ -106,8 +111,9 @@ def fit_motion(
         chosen, ready.angle, recordings=len(ready.tracks), flows=passes.flows
     )
     course = Course(tell or tell_nobody, _usual_parts(passes))
+    reason = reason_of_no_solution(ready.wall_share, ready.tracks, chosen)
     # The stages stay in one function: they share most of their variables.
-    with solved(ready.wall_share):
+    with solved(reason):
         passed = _work_listener(course, _usual_search(passes))
         search = ModeSearch(passes, Prior(passes), chosen.fit.iterations, passed)
         law = LawSearch(search, assumptions).find(start, first_weights(ready.tracks, passes.spline))
@@ -118,8 +124,8 @@ def fit_motion(
             # What was opened may have no restricted likelihood; the law without it has one.
             law = replace(law, mode=law.base)
             restricted = restricted_drag(search, law.mode)
-    require_noise_below_motion(math.exp(restricted.point.log_noise), ready.tracks, ready.wall_share)
-    with solved(ready.wall_share):
+    require_noise_below_motion(math.exp(restricted.point.log_noise), ready.tracks, reason)
+    with solved(reason):
         innovations = passes.innovations(restricted.point)
     counted = [
         (white, used & one.settled)
@@ -133,7 +139,7 @@ def fit_motion(
         course.begin("angle as given")
         given = ready.with_angle("given").passes
         turning |= angle_given_facts(given, law.mode, restricted, chosen)
-    with solved(ready.wall_share):
+    with solved(reason):
         parameters = _parameter_facts(search, law.mode, restricted, ready)
     facts = {
         **parameters,

@@ -9,6 +9,7 @@ import numpy as np
 
 from driftwalk.core.errors import InputError, reason_of
 from driftwalk.core.processors import one_blas_thread
+from driftwalk.likelihood.angle_consistency import log_evidence, negated
 from driftwalk.likelihood.check.errors import Innovations, innovations_of
 from driftwalk.likelihood.check.place import Residuals, residuals_of
 from driftwalk.likelihood.check.criteria import (
@@ -30,13 +31,22 @@ from driftwalk.likelihood.check.replicates import (
 )
 from driftwalk.likelihood.check.scan import scan_of
 from driftwalk.likelihood.check.verdict import verdict_on
+from driftwalk.likelihood.fit import fit_motion
 from driftwalk.likelihood.flow_intervals import require_fit
 from driftwalk.likelihood.preparation import as_list, estimate_of
 from driftwalk.likelihood.refuse import BREAKDOWN
-from driftwalk.schema.answers.facts import texts
+from driftwalk.likelihood.warnings import against_water, is_against_water
+from driftwalk.schema.answers.facts import facts_of, fitted_value, sentences, texts
 from driftwalk.schema.answers.fit import with_verdict
-from driftwalk.schema.answers.verdict import verdict_variables
-from driftwalk.schema.check import build_dataset
+from driftwalk.schema.answers.force_law import LEAST_EVIDENCE
+from driftwalk.schema.answers.verdict import (
+    CANNOT_TELL,
+    EXPLAINS,
+    Verdict,
+    stored_verdict,
+    verdict_variables,
+)
+from driftwalk.schema.check import build_dataset, described
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -315,4 +325,41 @@ def judge_fit(
     except BREAKDOWN as error:
         why = f"the model cannot be checked: the check broke down ({reason_of(error)})"
         return Judged(fit.assign_attrs(check_left_out=why), None)
+    if is_against_water(facts_of(fit)):
+        fit, check = _with_angle_tried(fit, check, recordings, body=body)
     return Judged(with_verdict(fit, check), check)
+
+
+def _with_angle_tried(
+    fit: xr.Dataset, check: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str | None
+) -> tuple[xr.Dataset, xr.Dataset]:
+    """Fit with the orientation negated, and return fit and check with what came of it."""
+    from driftwalk.model import parse_study
+
+    seen, gain = against_water(facts_of(fit)), 0.0
+    other = negated(recordings)
+    try:
+        study = parse_study(fit.attrs["study"])
+        rival = fit_motion(other, study, angle=fit.attrs["angle"], body=body)
+        before, after = (
+            log_evidence(estimate_of(one, many, body=body))
+            for one, many in ((fit, recordings), (rival, other))
+        )
+        gain = after - before
+        helps = gain > LEAST_EVIDENCE and check_model(rival, other, body=body)["verdict"] == EXPLAINS
+    except (InputError, *BREAKDOWN):
+        helps = False
+    said = f"{seen}; the fit was repeated with the angle negated, and that is no better"
+    if helps:
+        said = (
+            f"{seen}: with the angle negated the model explains the recording, C_d is "
+            f"{fitted_value(rival, 'drag_coefficient'):.3g}, and the likelihood is higher by "
+            f"e^{gain:.0f}: negate the angle, or turn y upwards"
+        )
+        word, reasons = stored_verdict(check)
+        word = CANNOT_TELL if word == EXPLAINS else word
+        check = check.drop_dims("verdict_reason").assign(
+            verdict_variables(Verdict(word, (*reasons, said)))
+        )
+    warnings = [said if text == seen else text for text in sentences(fit, "warning")]
+    return fit.assign_coords(warning=("warning", texts(warnings))), described(check)
