@@ -15,7 +15,7 @@ from driftwalk.schema import build_trajectory
 
 SIDE_M, MASS_KG, DEPTH_M, DENSITY = 0.03, 0.0116, 0.03, 1000.0
 STRIPS = 5
-STEP_S = 0.01
+STEP_S = 0.02
 DRAG, FORCE_N, FORCE_INTERVAL_S = 0.45, 0.55e-3, 0.01
 POSITION_NOISE_M, ORIENTATION_NOISE_RAD = 3e-4, 0.009
 

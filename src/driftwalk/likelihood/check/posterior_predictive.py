@@ -19,6 +19,7 @@ from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood.check.power import POWER
 from driftwalk.likelihood.check.replicates import Replicates
+from driftwalk.schema.answers.facts import FAR_ABOVE_FLOOR
 
 BAND: Final = 0.9
 """Share of the replicates within the bands of the densities."""
@@ -55,6 +56,11 @@ class MotionComparison(NamedTuple):
     """Number of drawn flows."""
     step_length: Density
     turning_angle: Density
+
+    @property
+    def far(self) -> bool:
+        """Whether the recording is far from replicates at the estimate."""
+        return float(np.median(self.distance)) > FAR_ABOVE_FLOOR * float(np.median(self.floor))
 
     @property
     def rank_p_value(self) -> float:

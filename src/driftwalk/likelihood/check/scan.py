@@ -51,8 +51,6 @@ class Scan(NamedTuple):
     p_value: float
     detectable: float
     """Difference of a usual stretch that fails at the level nine times in ten [m/s]."""
-    speed: float
-    """Root mean square of the mean velocities in the cells [m/s]."""
 
 
 def scan_of(
@@ -93,15 +91,7 @@ def scan_of(
         float(chosen.std(ddof=1)),
         float(largest_of.sf(off[best])),
         float(np.exp(np.median(theirs.mean(axis=0)) + sigmas * spread)),
-        _mean_speed(real, layout),
     )
-
-
-def _mean_speed(paths: Sequence[Path], layout: Layout) -> float:
-    """Return the root mean square of the mean velocities in the cells [m/s]."""
-    count, *along = sum(_sums(path, index, layout).sum(axis=0) for index, path in enumerate(paths))
-    seen = count > 0
-    return float(np.sqrt(sum((one[seen] ** 2 / count[seen]).sum() for one in along) / count.sum()))
 
 
 def _stretches(layout: Layout) -> list[tuple[int, int]]:

@@ -58,7 +58,7 @@ def _without_power(criteria: Sequence[Criterion]) -> Iterator[str]:
     for one in criteria:
         if one.powerless and not one.failed:
             yield (
-                f"the criterion '{one.name}' could not have failed: it finds a misfit of "
+                f"the criterion '{one.name}' has no power: the smallest misfit that it finds is "
                 f"{one.detectable:.2g} ({one.words}), and {one.most:.2g} would matter; record for "
                 "longer, or over more of the tank"
             )
