@@ -1,4 +1,4 @@
-"""Blocks in water that changes, by Euler and Maruyama's scheme in plain NumPy: no code of driftwalk.
+"""Blocks in water that changes, by Euler and Maruyama's scheme in plain NumPy.
 
 Each strip of the four faces feels the square law where the water comes towards it. Force and noise
 are added in fine steps; there is no wall, so the flow has to keep the block away from it.
@@ -15,7 +15,7 @@ from driftwalk.schema import build_trajectory
 
 SIDE_M, MASS_KG, DEPTH_M, DENSITY = 0.03, 0.0116, 0.03, 1000.0
 STRIPS = 5
-STEP_S = 0.02
+STEP_S = 0.01
 DRAG, FORCE_N, FORCE_INTERVAL_S = 0.45, 0.55e-3, 0.01
 POSITION_NOISE_M, ORIENTATION_NOISE_RAD = 3e-4, 0.009
 
@@ -86,9 +86,7 @@ def _acceleration(
     u, v = velocity(x, y, time)
     east, west = velocity(x + 1e-3, y, time), velocity(x - 1e-3, y, time)
     north, south = velocity(x, y + 1e-3, time), velocity(x, y - 1e-3, time)
-    ax, ay = (
-        (u * (east[k] - west[k]) + v * (north[k] - south[k])) / 2e-3 for k in range(2)
-    )
+    ax, ay = ((u * (east[k] - west[k]) + v * (north[k] - south[k])) / 2e-3 for k in range(2))
     return ax, ay
 
 

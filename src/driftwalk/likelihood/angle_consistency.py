@@ -17,14 +17,14 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.likelihood.filter.filter_pass import Passes
-from driftwalk.likelihood.law.search import evidence_of
-from driftwalk.likelihood.preparation import Estimate
 from driftwalk.likelihood.interval_inflation import (
     open_where_undetermined,
     parameter_covariance,
     parameter_facts,
 )
+from driftwalk.likelihood.law.search import evidence_of
 from driftwalk.likelihood.newton import FROM_NEAR, Mode, ModeSearch, inverse, require_mode
+from driftwalk.likelihood.preparation import Estimate
 from driftwalk.likelihood.prior import Prior
 from driftwalk.likelihood.refuse import BREAKDOWN
 from driftwalk.likelihood.reml import Restricted, restricted_drag

@@ -102,9 +102,9 @@ def along_a_line(length: float) -> Track:
 def test_the_reason_of_no_solution_is_named() -> None:
     wide = [along_a_line(0.1)]
     for share, said in ((0.97, "97% of the intervals are at the wall"), (0.3, "at all, or the")):
-        with pytest.raises(InputError, match=said):
-            with solved(reason_of_no_solution(share, wide, Study())):
-                raise np.linalg.LinAlgError
+        reason = reason_of_no_solution(share, wide, Study())
+        with pytest.raises(InputError, match=said), solved(reason):
+            raise np.linalg.LinAlgError
     # A standard deviation is the length of the line over the root of 12.
     reason = reason_of_no_solution(0.0, [along_a_line(0.02)], Study())
     assert reason.startswith("the block stays in one place (its positions scatter by 5.8 mm")

@@ -121,8 +121,8 @@ def _in_frames(flow: xr.Dataset, series: Series, point: Point) -> xr.Dataset:
         name: (("time", "y", "x"), strength[:, None, None] * flow[name].values)
         for name in ("u", "v")
     }
-    return flow[["u", "v", "flag"]].assign(frames).assign_coords(time=time).assign_attrs(
-        repeat=repeat
+    return (
+        flow[["u", "v", "flag"]].assign(frames).assign_coords(time=time).assign_attrs(repeat=repeat)
     )
 
 

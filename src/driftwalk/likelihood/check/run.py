@@ -10,14 +10,14 @@ import numpy as np
 from driftwalk.core.errors import InputError, reason_of
 from driftwalk.core.processors import one_blas_thread
 from driftwalk.likelihood.angle_consistency import log_evidence, negated
-from driftwalk.likelihood.check.errors import Innovations, innovations_of
-from driftwalk.likelihood.check.place import Residuals, residuals_of
 from driftwalk.likelihood.check.criteria import (
     VERDICT,
     components_of,
     criteria_of,
     distance_limit,
 )
+from driftwalk.likelihood.check.errors import Innovations, innovations_of
+from driftwalk.likelihood.check.place import Residuals, residuals_of
 from driftwalk.likelihood.check.posterior_predictive import (
     BAND,
     FEWEST_REPLICATES,
@@ -346,7 +346,9 @@ def _with_angle_tried(
             for one, many in ((fit, recordings), (rival, other))
         )
         gain = after - before
-        helps = gain > LEAST_EVIDENCE and check_model(rival, other, body=body)["verdict"] == EXPLAINS
+        helps = (
+            gain > LEAST_EVIDENCE and check_model(rival, other, body=body)["verdict"] == EXPLAINS
+        )
     except (InputError, *BREAKDOWN):
         helps = False
     said = f"{seen}; the fit was repeated with the angle negated, and that is no better"

@@ -22,8 +22,10 @@ if TYPE_CHECKING:
 
 
 class PlacePolicy(NamedTuple):
-    """How much of the tank a fit has to know. Both limits count, so that a large tank is not asked
-    for more than a small one."""
+    """How much of the tank a fit has to know; below both limits it knows too little.
+
+    Both count, so that in a large tank a block need not go further than in a small one.
+    """
 
     least_visited: float = 0.08
     """Share of the tank. In two orbits over 4 and 6 % of it C_d came out 41 and 83 % off, and every

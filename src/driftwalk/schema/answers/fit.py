@@ -52,7 +52,13 @@ _NOT_IN_JSON: Final = frozenset(
         *("force_lever_m", "force_lever_m_interval", "residual_cell_size_m"),
         *("orientation_noise_rad", "orientation_noise_rad_interval"),
         *("drag_coefficient_angle_given", "drag_coefficient_angle_given_interval"),
-        *("spin_correlation", "angle_disagreement_std", "filter_drag_coefficient", "intervals_usable", "restricted"),
+        *(
+            "spin_correlation",
+            "angle_disagreement_std",
+            "filter_drag_coefficient",
+            "intervals_usable",
+            "restricted",
+        ),
         *("roughness_weight", "size_weight", "spline_origin_m", "spline_spacing_m"),
         *("cell_size_m", "recording_start_s"),
     }

@@ -10,6 +10,7 @@ from scipy.stats import chi2
 
 from driftwalk.comparison import ks_distance
 from driftwalk.core.errors import InputError
+from driftwalk.likelihood.check.criteria import motion_criterion
 from driftwalk.likelihood.check.errors import Contrast, Innovations, Leverage, velocity_at
 from driftwalk.likelihood.check.place import (
     Layout,
@@ -20,7 +21,6 @@ from driftwalk.likelihood.check.place import (
     spread_of,
     trend_of,
 )
-from driftwalk.likelihood.check.criteria import motion_criterion
 from driftwalk.likelihood.check.posterior_predictive import compare_motion
 from driftwalk.likelihood.check.replicates import Replicates
 from driftwalk.likelihood.check.scan import scan_of
