@@ -74,7 +74,7 @@ MISFITS: Final = {
     "change": "difference of the velocities, m/s",
     "steps": "KS distance",
 }
-"""What the detectable misfit of each criterion is a size of."""
+"""The misfit that each criterion measures, with its unit."""
 
 
 class Criterion(NamedTuple):
@@ -92,7 +92,7 @@ class Criterion(NamedTuple):
 
     @property
     def words(self) -> str:
-        """What its detectable misfit is a size of, with the unit."""
+        """The misfit that it measures, with its unit."""
         return MISFITS[self.name]
 
     @property

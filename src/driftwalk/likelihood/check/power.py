@@ -12,7 +12,7 @@ from typing import Final, NamedTuple
 
 
 class PowerPolicy(NamedTuple):
-    """What a criterion has to be able to find."""
+    """The power at which detectable misfits are stated."""
 
     share: float = 0.9
     """Share of recordings in which a misfit of the stated size is found."""

@@ -42,11 +42,11 @@ class FramePolicy(NamedTuple):
     """Frames of a flow whose strength changes; between them it is linear in time."""
 
     per_half_wave: int = 10
-    """Of the fastest cosine: its amplitude comes out 1 % too small."""
+    """Frames in half a wave of the fastest cosine: its amplitude comes out 1 % too small."""
     per_period: int = 16
-    """Of a pulse, likewise."""
+    """Frames in a period of a pulse: its amplitude comes out 1 % too small."""
     most: int = 2000
-    """With the flow's 50 by 50 nodes they take some 100 MB. Chosen by hand."""
+    """Most frames: with the 50 by 50 nodes of a flow they take some 100 MB. Chosen by hand."""
 
 
 FRAMES: Final = FramePolicy()
