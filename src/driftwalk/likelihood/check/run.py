@@ -358,10 +358,10 @@ def _with_angle_tried(
             f"{fitted_value(rival, 'drag_coefficient'):.3g}, and the likelihood is higher by "
             f"e^{gain:.0f}: negate the angle, or turn y upwards"
         )
-        word, reasons = stored_verdict(check)
-        word = CANNOT_TELL if word == EXPLAINS else word
-        check = check.drop_dims("verdict_reason").assign(
-            verdict_variables(Verdict(word, (*reasons, said)))
-        )
+        found = stored_verdict(check)
+        assert found is not None
+        word = CANNOT_TELL if found.explains else found.word
+        verdict = Verdict(word, (*found.reasons, said))
+        check = check.drop_dims("verdict_reason").assign(verdict_variables(verdict))
     warnings = [said if text == seen else text for text in sentences(fit, "warning")]
     return fit.assign_coords(warning=("warning", texts(warnings))), described(check)
