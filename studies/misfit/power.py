@@ -23,7 +23,7 @@ from run import FIRST_SEED, SETS, current, file_of
 import driftwalk as dw
 from driftwalk.core.files.atomic import write_atomic
 from driftwalk.core.provenance import manifest, write_manifest
-from driftwalk.likelihood.check.verdict import VERDICT
+from driftwalk.likelihood.check.criteria import VERDICT
 from driftwalk.likelihood.law.forward_selection import (
     MEMORY_SIGMAS,
     OPENED_SIGMAS,

@@ -41,6 +41,8 @@ def made_up_check(*against: str) -> xr.Dataset:
     data = {
         "p_value": ("criterion", [0.5, 0.0001]),
         "failed": ("criterion", np.array([0, 1], np.int8)),
+        "detectable": ("criterion", [0.09, 0.01]),
+        "detectable_of": ("criterion", np.array(["autocorrelation at one lag", "relative change"])),
         "autocorrelation": (("component", "lag"), 0.01 * generator.normal(size=(2, LAGS))),
         "autocorrelation_expected": (("component", "lag"), np.full((2, LAGS), -0.002)),
         "autocorrelation_std": (("component", "lag"), np.full((2, LAGS), 0.01)),

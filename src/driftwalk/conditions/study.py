@@ -314,11 +314,7 @@ def estimated_study(
                 f"little of it; take its flow field alone (`flow`), and state `forces.{key}`"
             )
     estimates = {f"forces.{key}": fitted_value(found, name) for key, name in FORCE_KEYS.items()}
-    estimates |= fitted_law(found)
-    if "wall_friction" in found:
-        estimates["tank.wall_restitution"] = float(found["wall_restitution"])
-        # With a friction of 10, every contact with the wall sticks.
-        estimates["tank.wall_friction"] = min(float(found["wall_friction"]), 10.0)
+    estimates |= fitted_law(found) | fitted_wall(found)
     study = parse_study(found.attrs["study"], source=source)
     return apply_overrides(study, {**estimates, **stated})
 
@@ -345,6 +341,29 @@ def fitted_law(found: xr.Dataset) -> dict[str, Any]:
         if name in known:
             law[f"forces.{key}"] = max(fitted_value(found, name), 0.0)
     return law
+
+
+def fitted_wall(found: xr.Dataset) -> dict[str, float]:
+    """Return the keys of the section [tank] that say what a fit has found of the wall.
+
+    Parameters
+    ----------
+    found : xarray.Dataset
+        A `fit`; one whose wall was not estimated has no keys.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> fitted_wall(xr.Dataset({"wall_restitution": 0.4, "wall_friction": float("inf")}))
+    {'tank.wall_restitution': 0.4, 'tank.wall_friction': 10.0}
+    """
+    if "wall_friction" not in found:
+        return {}
+    return {
+        "tank.wall_restitution": float(found["wall_restitution"]),
+        # With a friction of 10, every contact with the wall sticks.
+        "tank.wall_friction": min(float(found["wall_friction"]), 10.0),
+    }
 
 
 def unstated_warning(study: Study, *, about: About) -> str | None:

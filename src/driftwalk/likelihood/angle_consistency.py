@@ -9,6 +9,7 @@ its orientation is counted clockwise.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +22,9 @@ from driftwalk.likelihood.interval_inflation import (
     parameter_covariance,
     parameter_facts,
 )
-from driftwalk.likelihood.newton import FROM_NEAR, Mode, ModeSearch, require_mode
+from driftwalk.likelihood.law.search import evidence_of
+from driftwalk.likelihood.newton import FROM_NEAR, Mode, ModeSearch, inverse, require_mode
+from driftwalk.likelihood.preparation import Estimate
 from driftwalk.likelihood.prior import Prior
 from driftwalk.likelihood.refuse import BREAKDOWN
 from driftwalk.likelihood.reml import Restricted, restricted_drag
@@ -29,7 +32,13 @@ from driftwalk.likelihood.spline import Spline
 from driftwalk.schema.answers.facts import is_open
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from driftwalk.model import Study
+
+LEFT_OUT_NATS = 18.0
+"""Least loss of log likelihood by a sample that the filter leaves out, as it is 6 standard
+deviations from its prediction: so a fit cannot gain by leaving samples out."""
 
 
 def angle_given_facts(
@@ -82,6 +91,24 @@ def spin_correlation(coefficients: Floats, passes: Passes) -> float:
         size = float(np.sqrt((spin**2).mean() * (vorticity**2).mean()))
         found = float((spin * vorticity).mean()) / size if size > 0.0 else 0.0
     return found if math.isfinite(found) else 0.0
+
+
+def negated(recordings: Sequence[xr.Dataset]) -> list[xr.Dataset]:
+    """Return recordings with the orientation counted the other way round."""
+    return [one.assign(theta=-one["theta"]) for one in recordings]
+
+
+def log_evidence(estimate: Estimate) -> float:
+    """Return the logarithm of the evidence for a stored fit, in the restricted likelihood.
+
+    Fits of the same samples can be compared by it, with the orientation negated too.
+    """
+    passes, point, weights = estimate.passes, estimate.point, estimate.weights
+    prior = Prior(passes)
+    sums = prior.add(passes.sums(point), point, weights)
+    covariance = inverse(sums.information)
+    mode = Mode(point, weights, covariance, sums.used, 0, converged=True, deviance=sums.deviance)
+    return evidence_of(mode, prior) + LEFT_OUT_NATS * sums.used
 
 
 def _vorticity(coefficients: Floats, spline: Spline, x: Floats, y: Floats) -> Floats:

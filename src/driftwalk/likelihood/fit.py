@@ -41,7 +41,12 @@ from driftwalk.likelihood.preparation import (
     prepare,
 )
 from driftwalk.likelihood.prior import Prior, Weights
-from driftwalk.likelihood.refuse import BREAKDOWN, require_noise_below_motion, solved
+from driftwalk.likelihood.refuse import (
+    BREAKDOWN,
+    reason_of_no_solution,
+    require_noise_below_motion,
+    solved,
+)
 from driftwalk.likelihood.reml import Restricted, restricted_drag
 from driftwalk.likelihood.result import build_fit, law_facts, visited_shares, whiteness_of
 from driftwalk.likelihood.start import first_point, first_weights
@@ -118,8 +123,9 @@ def fit_motion(
         chosen, ready.angle, recordings=len(ready.tracks), flows=passes.flows
     )
     course = Course(tell or tell_nobody, _usual_parts(passes))
+    reason = reason_of_no_solution(ready.wall_share, ready.tracks, chosen)
     # The stages stay in one function: they share most of their variables.
-    with solved(ready.wall_share):
+    with solved(reason):
         passed = _work_listener(course, _usual_search(passes))
         search = ModeSearch(passes, Prior(passes), chosen.fit.iterations, passed)
         law = _law_of(search, assumptions, start, first_weights(ready.tracks, passes.spline))
@@ -133,8 +139,8 @@ def fit_motion(
                 base = require_mode(search.find(base.point, base.weights, held=FROM_ANOTHER))
             law = replace(law, mode=base)
             restricted = restricted_drag(search, law.mode)
-    require_noise_below_motion(math.exp(restricted.point.log_noise), ready.tracks, ready.wall_share)
-    with solved(ready.wall_share):
+    require_noise_below_motion(math.exp(restricted.point.log_noise), ready.tracks, reason)
+    with solved(reason):
         innovations = passes.innovations(restricted.point)
     counted = [
         (white, used & one.settled)
@@ -148,7 +154,7 @@ def fit_motion(
         course.begin("angle as given")
         given = thinned(ready.with_angle("given").passes)
         turning |= angle_given_facts(given, law.mode, restricted, chosen)
-    with solved(ready.wall_share):
+    with solved(reason):
         parameters = _parameter_facts(search, law.mode, restricted, ready)
     facts = {
         **parameters,

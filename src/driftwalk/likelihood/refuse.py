@@ -89,6 +89,10 @@ class LimitPolicy(NamedTuple):
     most_wall_share: float = 0.3
     """Share of intervals at the wall above which C_d means little (docs/explanation/likelihood.md).
     The accuracy is measured below it."""
+    least_scatter: float = 0.25
+    """Standard deviation of the positions, over the side of the block, below which it stays in one
+    place. In a sink or in the core of a vortex it was 0.1 to 0.2, on a narrow orbit 0.6. Chosen by
+    hand."""
     most_at_own_wall: float = 0.9
     """Share of the intervals at the wall of a tank that was fitted to the positions themselves.
     Chosen by hand."""
@@ -256,7 +260,7 @@ is no longer a number, the root of a negative variance, a value that the filter 
 
 
 @contextmanager
-def solved(wall_share: float = 0.0) -> Iterator[None]:
+def solved(reason: str) -> Iterator[None]:
     """Turn every way in which a search breaks down into one error for people."""
     try:
         with np.errstate(all="ignore"):
@@ -264,13 +268,18 @@ def solved(wall_share: float = 0.0) -> Iterator[None]:
     except InputError:
         raise
     except BREAKDOWN as error:
-        raise InputError(
-            f"the fit has no solution for this recording: {_reason(wall_share)}"
-        ) from error
+        raise InputError(f"the fit has no solution for this recording: {reason}") from error
 
 
-def _reason(wall_share: float) -> str:
+def reason_of_no_solution(wall_share: float, tracks: Sequence[Track], study: Study) -> str:
     """Return why a search may break down, and what to do."""
+    scatter, side = _scatter(tracks), study.block.side_m
+    if scatter < LIMIT.least_scatter * side:
+        return (
+            f"the block stays in one place (its positions scatter by {1e3 * scatter:.2g} mm, and "
+            f"its side is {1e3 * side:.3g} mm), and nothing is learned there of the flow and the "
+            "drag; record it on a wider path, with another setting of the pumps"
+        )
     if wall_share > LIMIT.most_wall_share:
         return (
             f"{wall_share:.0%} of the intervals are at the wall and were left out, and the motion "
@@ -291,14 +300,17 @@ def cholesky(information: Floats) -> Any:
     return cho_factor(information, check_finite=False)
 
 
-def require_noise_below_motion(
-    noise: float, tracks: Sequence[Track], wall_share: float = 0.0
-) -> None:
+def require_noise_below_motion(noise: float, tracks: Sequence[Track], reason: str) -> None:
     """Refuse a solution that takes the whole motion for tracking noise."""
-    scatter = max(float(axis.std()) for track in tracks for axis in (track.x, track.y))
+    scatter = _scatter(tracks)
     if noise > scatter:
         raise InputError(
             "the fit has no solution for this recording: it attributes the whole "
             f"motion to tracking noise ({1e3 * noise:.3g} mm, while the positions "
-            f"scatter by {1e3 * scatter:.3g} mm); {_reason(wall_share)}"
+            f"scatter by {1e3 * scatter:.3g} mm); {reason}"
         )
+
+
+def _scatter(tracks: Sequence[Track]) -> float:
+    """Return the standard deviation of the positions along the axis where it is largest [m]."""
+    return max(float(axis.std()) for track in tracks for axis in (track.x, track.y))

@@ -33,8 +33,8 @@ class WarningPolicy(NamedTuple):
     """Combined standard deviations between the two estimates of C_d, with the angle in the state
     and as an input, beyond which they do not agree: chance exceeds it once in 370."""
     mirrored_correlation: float = -0.35
-    """Correlation of the block's spin with the vorticity of the water below which orientations are
-    taken for mirrored. Chosen by hand: a block turns with the water around it."""
+    """Correlation of the block's spin with the vorticity of the water below which the fit is
+    tried with orientations negated. Chosen by hand: a block turns with the water around it."""
 
 
 WARNING: Final = WarningPolicy()
@@ -55,22 +55,73 @@ def warnings_of(
 ) -> list[str]:
     """Return the warnings; `visited` is the share of the tank that was visited in each flow."""
     return [
+        *meaningless_of(facts, side_m=side_m),
         *_on_the_data(facts, visited, intervals),
         *_on_the_search(facts),
         *_on_the_model(facts),
-        *_on_the_turning(facts, side_m),
+        *_on_the_turning(facts),
     ]
 
 
-def _on_the_data(
-    facts: Mapping[str, Any], visited: Sequence[float], intervals: Intervals
-) -> Iterator[str]:
+def meaningless_of(facts: Mapping[str, Any], *, side_m: float) -> list[str]:
+    """Return the warnings that say that a number of the fit has no meaning."""
+    return [
+        *_on_the_wall(facts),
+        *_on_the_likelihood(facts),
+        *_on_two_uses_of_the_angle(facts),
+        *_on_the_lever(facts, side_m),
+    ]
+
+
+def _on_the_wall(facts: Mapping[str, Any]) -> Iterator[str]:
     if facts["wall_share"] > LIMIT.most_wall_share:
         yield (
             f"{facts['wall_share']:.0%} of the intervals are at the wall and were "
             "left out: do not trust C_d above 30 %; record where the block stays "
             "away from the wall"
         )
+
+
+def _on_the_likelihood(facts: Mapping[str, Any]) -> Iterator[str]:
+    left = facts.get("search_left", 0.0)
+    if left:
+        yield (
+            f"the search was given up after {facts['iterations']} steps ([fit] iterations), "
+            f"{left:.2g} standard deviations from a maximum of the likelihood: this recording does "
+            "not determine the parameters of the model; a motion without random force, as that of "
+            "a driven body, tells nothing of them"
+        )
+    if facts["restricted"] == "no":
+        yield (
+            "the restricted likelihood has no minimum: C_d comes from the plain "
+            "likelihood and is likely too large; the motion says little about C_d or "
+            "does not follow the model"
+        )
+
+
+def _on_two_uses_of_the_angle(facts: Mapping[str, Any]) -> Iterator[str]:
+    if facts.get("angle_disagreement_std", 0.0) > WARNING.disagreement_stds:
+        yield (
+            f"with the angle as an input C_d is {facts['drag_coefficient_angle_given']:.3g}, "
+            f"{facts['angle_disagreement_std']:.1f} combined standard deviations away: the turning "
+            "of the block and its motion do not follow one drag law, and the intervals are too "
+            "narrow"
+        )
+
+
+def _on_the_lever(facts: Mapping[str, Any], side_m: float) -> Iterator[str]:
+    lever = facts.get("force_lever_m_interval", (0.0, 0.0))[0]
+    if lever > LAW.notable_lever * side_m:
+        yield (
+            f"the block turns as if the force acted {1e3 * facts['force_lever_m']:.2g} mm from its "
+            "centre: the recorded angle is late, or not that of the block's faces, "
+            "or something else makes the block turn; C_d and the force are then wrong"
+        )
+
+
+def _on_the_data(
+    facts: Mapping[str, Any], visited: Sequence[float], intervals: Intervals
+) -> Iterator[str]:
     if facts["mistakes"]:
         yield (
             f"{facts['mistakes']} of {facts['samples']} samples were left out: each lies far from "
@@ -115,15 +166,9 @@ def _on_the_data(
 
 
 def _on_the_search(facts: Mapping[str, Any]) -> Iterator[str]:
-    left = facts.get("search_left", 0.0)
-    if left:
-        yield (
-            f"the search was given up after {facts['iterations']} steps ([fit] iterations), "
-            f"{left:.2g} standard deviations from a maximum of the likelihood: this recording does "
-            "not determine the parameters of the model; a motion without random force, as that of "
-            "a driven body, tells nothing of them"
-        )
-    elif facts["converged"] == "no":
+    if facts.get("search_left", 0.0):
+        return
+    if facts["converged"] == "no":
         yield (f"the search has not converged in {facts['iterations']} steps ([fit] iterations)")
     elif is_open(facts, "drag_coefficient"):
         yield (
@@ -132,12 +177,6 @@ def _on_the_search(facts: Mapping[str, Any]) -> Iterator[str]:
             if facts.get("drag_law") == "mixed"
             else "the recording says less of C_d than the fit assumes of it beforehand (0.5, "
             "within a factor of two): it does not determine C_d"
-        )
-    if facts["restricted"] == "no":
-        yield (
-            "the restricted likelihood has no minimum: C_d comes from the plain "
-            "likelihood and is likely too large; the motion says little about C_d or "
-            "does not follow the model"
         )
 
 
@@ -156,32 +195,26 @@ def _on_the_model(facts: Mapping[str, Any]) -> Iterator[str]:
         )
 
 
-def _on_the_turning(facts: Mapping[str, Any], side_m: float) -> Iterator[str]:
-    along = facts.get("spin_correlation", 0.0)
-    if along < WARNING.mirrored_correlation:
-        yield (
-            f"the block seems to turn against the water (correlation {along:.2f} of its spin with "
-            "the vorticity of the flow): the recorded orientation is likely mirrored, counted "
-            "clockwise; C_d is then meaningless; negate the angle, or turn y upwards"
-        )
-    apart = facts.get("angle_disagreement_std", 0.0)
-    if math.isnan(apart):
+def _on_the_turning(facts: Mapping[str, Any]) -> Iterator[str]:
+    if is_against_water(facts):
+        yield against_water(facts)
+    if math.isnan(facts.get("angle_disagreement_std", 0.0)):
         yield (
             "the fit with the angle as an input has no solution, or does not determine C_d, and "
             "was left out: whether the turning of the block and its motion follow one drag law is "
             "not known"
         )
-    if apart > WARNING.disagreement_stds:
-        yield (
-            f"with the angle as an input C_d is {facts['drag_coefficient_angle_given']:.3g}, "
-            f"{apart:.1f} combined standard deviations away: the turning of the block "
-            "and its motion do not follow one drag law, and the intervals are too "
-            "narrow"
-        )
-    lever = facts.get("force_lever_m_interval", (0.0, 0.0))[0]
-    if lever > LAW.notable_lever * side_m:
-        yield (
-            f"the block turns as if the force acted {1e3 * facts['force_lever_m']:.2g} mm from its "
-            "centre: the recorded angle is late, or not that of the block's faces, "
-            "or something else makes the block turn; C_d and the force are then wrong"
-        )
+
+
+def is_against_water(facts: Mapping[str, Any]) -> bool:
+    """Return whether the block seems to turn against the water."""
+    return bool(facts.get("spin_correlation", 0.0) < WARNING.mirrored_correlation)
+
+
+def against_water(facts: Mapping[str, Any]) -> str:
+    """Return what is seen of a block that seems to turn against the water."""
+    return (
+        "the block seems to turn against the water (correlation "
+        f"{facts['spin_correlation']:.2f} of its spin with the vorticity of a first estimate of "
+        "the flow), as it does where orientations are counted clockwise"
+    )

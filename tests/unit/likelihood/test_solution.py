@@ -14,7 +14,12 @@ from driftwalk.core.errors import InputError
 from driftwalk.likelihood.check.errors import used_pairs
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.interval_inflation import parameter_facts
-from driftwalk.likelihood.refuse import cholesky, require_noise_below_motion, solved
+from driftwalk.likelihood.refuse import (
+    cholesky,
+    reason_of_no_solution,
+    require_noise_below_motion,
+    solved,
+)
 from driftwalk.model import Study, apply_overrides
 from driftwalk.schema import Track, build_trajectory
 from driftwalk.schema.answers.facts import facts_of
@@ -83,20 +88,28 @@ def test_a_body_that_jumps_once_is_at_rest() -> None:
 
 def test_a_search_that_runs_away_is_an_error_for_people() -> None:
     for error in (np.linalg.LinAlgError("803-th minor"), OverflowError("math range error")):
-        with pytest.raises(InputError, match="has no solution") as caught, solved():
+        with pytest.raises(InputError, match="has no solution") as caught, solved("why"):
             raise error
         assert str(error) not in str(caught.value)
     with pytest.raises(np.linalg.LinAlgError):
         cholesky(np.array([[np.nan, 0.0], [0.0, 1.0]]))
 
 
-def test_a_body_at_the_wall_is_named_as_the_reason() -> None:
+def along_a_line(length: float) -> Track:
+    return Track(0.1 * np.arange(99), np.linspace(0.0, length, 99), np.zeros(99), np.full(99, 0.0))
+
+
+def test_the_reason_of_no_solution_is_named() -> None:
+    wide = [along_a_line(0.1)]
     for share, said in ((0.97, "97% of the intervals are at the wall"), (0.3, "at all, or the")):
-        with pytest.raises(InputError, match=said), solved(share):
+        reason = reason_of_no_solution(share, wide, Study())
+        with pytest.raises(InputError, match=said), solved(reason):
             raise np.linalg.LinAlgError
-    track = Track(0.1 * np.arange(9), np.linspace(0.0, 1e-3, 9), np.zeros(9), np.full(9, np.nan))
-    with pytest.raises(InputError, match=r"mm\); 80% of the intervals are at the wall"):
-        require_noise_below_motion(0.1, [track], 0.8)
+    # A standard deviation is the length of the line over the root of 12.
+    reason = reason_of_no_solution(0.0, [along_a_line(0.02)], Study())
+    assert reason.startswith("the block stays in one place (its positions scatter by 5.8 mm")
+    with pytest.raises(InputError, match=r"scatter by 29.2 mm\); because"):
+        require_noise_below_motion(0.1, wide, "because")
 
 
 def test_a_fit_that_breaks_down_at_the_wall_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -115,9 +128,9 @@ def test_a_fit_that_breaks_down_at_the_wall_says_so(monkeypatch: pytest.MonkeyPa
 def test_motion_that_is_all_noise_is_no_solution() -> None:
     time = 0.1 * np.arange(200)
     track = Track(time, 0.02 * np.sin(time), 0.0 * time, np.full(200, np.nan))
-    require_noise_below_motion(0.01, [track])
+    require_noise_below_motion(0.01, [track], "")
     with pytest.raises(InputError, match=r"noise \(174 mm, while the positions scatter by 14"):
-        require_noise_below_motion(0.174, [track])
+        require_noise_below_motion(0.174, [track], "")
 
 
 @pytest.mark.slow

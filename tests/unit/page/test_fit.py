@@ -71,7 +71,10 @@ def test_every_flow_of_a_fit_has_a_section() -> None:
 def test_the_check_of_a_fit(sections: list[dict[str, Any]]) -> None:
     check = made_up_check()
     rows = part_of(sections, "check")["rows"]
-    assert rows == [["autocorrelation", 0.5, ""], ["flow change", 0.0001, "failed"]]
+    assert rows == [
+        ["autocorrelation", 0.5, "", 0.09, "autocorrelation at one lag"],
+        ["flow_change", 0.0001, "failed", 0.01, "relative change"],
+    ]
     band, x, _ = part_of(sections, "check-innovations")["series"]
     np.testing.assert_allclose(values(band["low"]), -0.002 - 0.0196)
     np.testing.assert_allclose(values(x["y"]), check["autocorrelation"].values[0])

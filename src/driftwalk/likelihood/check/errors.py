@@ -18,7 +18,7 @@ import numpy as np
 
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.likelihood.filter.filter_pass import Place, Sums
-from driftwalk.likelihood.filter.series import Series
+from driftwalk.likelihood.filter.series import Series, strength_of
 from driftwalk.likelihood.preparation import Estimate
 from driftwalk.likelihood.prior import Prior
 from driftwalk.likelihood.spline import DEGREE, Spline, basis
@@ -62,6 +62,9 @@ def innovations_of(estimate: Estimate) -> list[Innovations]:
         # The state before the sample: to sort errors by what they caused would bias them.
         before = states[:-1]
         flow = velocity_at(estimate.passes.spline, point.coefficients, before[:, 0], before[:, 1])
+        strength = strength_of(series, point)
+        if strength is not None:
+            flow = strength[:-1] * flow
         # Coordinates come first, as many as velocities.
         velocity = before[:, before.shape[1] // 2 :]
         speed[1:] = np.hypot(flow[0] - velocity[:, 0], flow[1] - velocity[:, 1])

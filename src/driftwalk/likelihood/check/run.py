@@ -9,6 +9,13 @@ import numpy as np
 
 from driftwalk.core.errors import InputError, reason_of
 from driftwalk.core.processors import one_blas_thread
+from driftwalk.likelihood.angle_consistency import log_evidence, negated
+from driftwalk.likelihood.check.criteria import (
+    VERDICT,
+    components_of,
+    criteria_of,
+    distance_limit,
+)
 from driftwalk.likelihood.check.errors import Innovations, innovations_of
 from driftwalk.likelihood.check.place import Residuals, residuals_of
 from driftwalk.likelihood.check.posterior_predictive import (
@@ -16,24 +23,30 @@ from driftwalk.likelihood.check.posterior_predictive import (
     FEWEST_REPLICATES,
     MotionComparison,
     compare_motion,
+)
+from driftwalk.likelihood.check.replicates import (
     posterior_replicates,
     problems_of,
     replicates_at_estimate,
 )
 from driftwalk.likelihood.check.scan import scan_of
-from driftwalk.likelihood.check.verdict import (
-    VERDICT,
-    components_of,
-    criteria_of,
-    distance_limit,
-    findings_of,
-)
+from driftwalk.likelihood.check.verdict import verdict_on
+from driftwalk.likelihood.fit import fit_motion
 from driftwalk.likelihood.flow_intervals import require_fit
 from driftwalk.likelihood.preparation import as_list, estimate_of
 from driftwalk.likelihood.refuse import BREAKDOWN
+from driftwalk.likelihood.warnings import against_water, is_against_water
+from driftwalk.schema.answers.facts import facts_of, fitted_value, sentences, texts
 from driftwalk.schema.answers.fit import with_verdict
-from driftwalk.schema.answers.verdict import verdict_of, verdict_variables
-from driftwalk.schema.check import build_dataset
+from driftwalk.schema.answers.force_law import LEAST_EVIDENCE
+from driftwalk.schema.answers.verdict import (
+    CANNOT_TELL,
+    EXPLAINS,
+    Verdict,
+    stored_verdict,
+    verdict_variables,
+)
+from driftwalk.schema.check import build_dataset, described
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -224,12 +237,12 @@ def check_model(
         )
         motion = compare_motion(
             np.concatenate([problem.steps for problem in problems]),
-            replicates_at_estimate(fit, problems, count=replicates, seed=seed),
+            replicates_at_estimate(fit, estimate, problems, count=replicates, seed=seed),
             drawn,
             threads=problems[0].like.threads,
         )
         paths = [(one.series.time, one.series.x, one.series.y) for one in errors]
-        scan = scan_of(paths, drawn.paths, found.layout)
+        scan = scan_of(paths, drawn.paths, found.layout, level=VERDICT.level)
         parts.append(motion_variables(motion))
         attrs |= motion_facts(motion)
     except InputError as error:
@@ -238,10 +251,12 @@ def check_model(
         motion, scan = None, None
         attrs |= {"ks_distance": np.nan, "ks_noise_floor": np.nan, "ks_left_out": str(error)}
     criteria = criteria_of(errors, found, motion, scan, fit=fit)
-    verdict = verdict_of(findings_of(criteria), [])
+    verdict = verdict_on(fit, criteria, study=estimate.study)
     data = {
         "p_value": ("criterion", [one.p_value for one in criteria]),
         "failed": ("criterion", np.array([one.failed for one in criteria], dtype=np.int8)),
+        "detectable": ("criterion", [one.detectable for one in criteria]),
+        "detectable_of": ("criterion", texts([one.words for one in criteria])),
         **verdict_variables(verdict),
     }
     names = np.array([one.name for one in criteria], dtype=object)
@@ -310,4 +325,43 @@ def judge_fit(
     except BREAKDOWN as error:
         why = f"the model cannot be checked: the check broke down ({reason_of(error)})"
         return Judged(fit.assign_attrs(check_left_out=why), None)
+    if is_against_water(facts_of(fit)):
+        fit, check = _with_angle_tried(fit, check, recordings, body=body)
     return Judged(with_verdict(fit, check), check)
+
+
+def _with_angle_tried(
+    fit: xr.Dataset, check: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str | None
+) -> tuple[xr.Dataset, xr.Dataset]:
+    """Fit with the orientation negated, and return fit and check with what came of it."""
+    from driftwalk.model import parse_study
+
+    seen, gain = against_water(facts_of(fit)), 0.0
+    other = negated(recordings)
+    try:
+        study = parse_study(fit.attrs["study"])
+        rival = fit_motion(other, study, angle=fit.attrs["angle"], body=body)
+        before, after = (
+            log_evidence(estimate_of(one, many, body=body))
+            for one, many in ((fit, recordings), (rival, other))
+        )
+        gain = after - before
+        helps = (
+            gain > LEAST_EVIDENCE and check_model(rival, other, body=body)["verdict"] == EXPLAINS
+        )
+    except (InputError, *BREAKDOWN):
+        helps = False
+    said = f"{seen}; the fit was repeated with the angle negated, and that is no better"
+    if helps:
+        said = (
+            f"{seen}: with the angle negated the model explains the recording, C_d is "
+            f"{fitted_value(rival, 'drag_coefficient'):.3g}, and the likelihood is higher by "
+            f"e^{gain:.0f}: negate the angle, or turn y upwards"
+        )
+        found = stored_verdict(check)
+        assert found is not None
+        word = CANNOT_TELL if found.explains else found.word
+        verdict = Verdict(word, (*found.reasons, said))
+        check = check.drop_dims("verdict_reason").assign(verdict_variables(verdict))
+    warnings = [said if text == seen else text for text in sentences(fit, "warning")]
+    return fit.assign_coords(warning=("warning", texts(warnings))), described(check)

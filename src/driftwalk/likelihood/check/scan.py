@@ -4,7 +4,7 @@ The errors of prediction see a change of the flow badly: a wrong flow makes the 
 one sample tells little of the next. So the body's own velocity is looked at. For every stretch of
 the recording (one part, or several that follow each other) its mean in each cell is compared with
 the mean in the same cell during the rest; how far apart chance alone brings them is known from
-simulated recordings, whose flow is steady.
+simulated recordings, whose flow changes as the fitted one does.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.likelihood.check.place import Layout, cell_of
-from driftwalk.likelihood.check.posterior_predictive import Path
+from driftwalk.likelihood.check.power import POWER
+from driftwalk.likelihood.check.replicates import Path
 
 
 class ScanPolicy(NamedTuple):
@@ -48,13 +49,18 @@ class Scan(NamedTuple):
     """Its median among simulated recordings [m/s]."""
     expected_std: float
     p_value: float
+    detectable: float
+    """Difference of a usual stretch that fails at the level nine times in ten [m/s]."""
 
 
 def scan_of(
-    real: Sequence[Path], simulated: Sequence[Sequence[Path]], layout: Layout
+    real: Sequence[Path], simulated: Sequence[Sequence[Path]], layout: Layout, *, level: float
 ) -> Scan | None:
-    """Return the stretch that differs most from the rest; None where there is only one part."""
-    from scipy.stats import gumbel_r
+    """Return the stretch that differs most from the rest; None where there is only one part.
+
+    `level` is the p value at which a change is found.
+    """
+    from scipy.stats import gumbel_r, norm
 
     stretches = _stretches(layout)
     if not stretches:
@@ -73,11 +79,19 @@ def scan_of(
     best = int(off.argmax())
     # The largest of many has a tail like Gumbel's: two numbers, from mean and standard deviation.
     scale = largest.std(ddof=1) * np.sqrt(6.0) / np.pi
-    p_value = float(gumbel_r.sf(off[best], largest.mean() - np.euler_gamma * scale, scale))
+    largest_of = gumbel_r(largest.mean() - np.euler_gamma * scale, scale)
     first, last = stretches[int(np.flatnonzero(known)[best])]
     chosen = np.exp(theirs[:, best])
-    median, std = float(np.median(chosen)), float(chosen.std(ddof=1))
-    return Scan(first, last, float(np.exp(mine[best])), median, std, p_value)
+    sigmas = float(largest_of.isf(level) + norm.ppf(POWER.share))
+    return Scan(
+        first,
+        last,
+        float(np.exp(mine[best])),
+        float(np.median(chosen)),
+        float(chosen.std(ddof=1)),
+        float(largest_of.sf(off[best])),
+        float(np.exp(np.median(theirs.mean(axis=0)) + sigmas * spread)),
+    )
 
 
 def _stretches(layout: Layout) -> list[tuple[int, int]]:

@@ -58,16 +58,16 @@ def check_sections(check: xr.Dataset) -> list[Section]:
 
 
 def _criteria(check: xr.Dataset) -> Section:
-    require(check, "criterion", "p_value", "failed")
+    require(check, "criterion", "p_value", "failed", "detectable", "detectable_of")
+    columns = ("criterion", "p_value", "failed", "detectable", "detectable_of")
     rows = [
-        [str(name).replace("_", " "), number(p), "failed" if failed else ""]
-        for name, p, failed in zip(
-            check["criterion"].values, check["p_value"].values, check["failed"].values, strict=True
-        )
+        [str(name), number(p), "failed" if failed else "", number(size), str(of)]
+        for name, p, failed, size, of in zip(*(check[one].values for one in columns), strict=True)
     ]
     level = value_of(check, "level")
     note = "" if level is None else f"A criterion fails where its p value is below {level:.3g}."
-    return table_section("", "", ["criterion", "p value", ""], rows, note)
+    heads = ["criterion", "p value", "", "misfit found in 9 of 10", "of what"]
+    return table_section("", "", heads, rows, note)
 
 
 def _innovations(check: xr.Dataset) -> Section:

@@ -30,6 +30,7 @@ from driftwalk.schema.answers.parts import (
     Part,
     Row,
     Table,
+    by_name,
     estimates,
     intensity_row,
     origin,
@@ -51,7 +52,13 @@ _NOT_IN_JSON: Final = frozenset(
         *("force_lever_m", "force_lever_m_interval", "residual_cell_size_m"),
         *("orientation_noise_rad", "orientation_noise_rad_interval"),
         *("drag_coefficient_angle_given", "drag_coefficient_angle_given_interval"),
-        *("angle_disagreement_std", "filter_drag_coefficient", "intervals_usable", "restricted"),
+        *(
+            "spin_correlation",
+            "angle_disagreement_std",
+            "filter_drag_coefficient",
+            "intervals_usable",
+            "restricted",
+        ),
         *("roughness_weight", "size_weight", "spline_origin_m", "spline_spacing_m"),
         *("cell_size_m", "recording_start_s"),
     }
@@ -144,7 +151,14 @@ def _verdict(fit: xr.Dataset, check: xr.Dataset | None) -> list[Part]:
     more = ": far, but within the uncertainty of the fit" if far else ""
     parts.append(Row("KS distance", f"{distance:.3f}, noise floor {floor:.3f}{more}"))
     chance = float(check.attrs.get("ks_p_value", "nan"))
-    return [*parts, Row("  p-value", f"{chance:.2g}")] if isfinite(chance) else parts
+    parts += [Row("  p-value", f"{chance:.2g}")] if isfinite(chance) else []
+    columns = ("criterion", "p_value", "detectable", "detectable_of")
+    rows = [
+        [str(name), *(f"{one:.2g}" if isfinite(one) else "–" for one in (p, size)), str(of)]
+        for name, p, size, of in zip(*(check[one].values for one in columns), strict=True)
+    ]
+    heads = ["criterion", "p value", "misfit found in 9 of 10", "of what"]
+    return [*parts, Table(rows, heads, "criteria of the check")]
 
 
 def fit_json(fit: xr.Dataset, check: xr.Dataset | None = None) -> dict[str, Any]:
@@ -170,6 +184,10 @@ def fit_json(fit: xr.Dataset, check: xr.Dataset | None = None) -> dict[str, Any]
     return {
         **shown,
         **{key: value if isfinite(value) else None for key, value in distances.items()},
+        "detectable": {
+            name: size if isfinite(size) else None
+            for name, size in by_name(check, "criterion", "detectable").items()
+        },
     }
 
 

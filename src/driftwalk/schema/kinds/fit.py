@@ -124,6 +124,9 @@ variables (the model was checked):
     residual_component(residual_component) text: component
     cell_x(cell_x) [m]: x
     cell_y(cell_y) [m]: y
+variables (with orientations, in one flow):
+    spin_correlation [1]: correlation of the block's spin with the vorticity of a first estimate \
+        of the flow
 variables (a precision of C_d is asked for):
     drag_coefficient_precision [1]: precision of C_d that is asked for
 variables (the angle is in the state, and the second fit has a solution):

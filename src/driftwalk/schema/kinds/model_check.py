@@ -49,6 +49,8 @@ variables:
     verdict_reason(verdict_reason) text: reason for the verdict
     p_value(criterion) [1]: p value of the criterion; [the criteria]({_CRITERIA})
     failed(criterion) int: 1 where the criterion failed
+    detectable(criterion) [1]: size of misfit that the criterion would find nine times in ten
+    detectable_of(criterion) text: misfit that is meant, with its unit
     autocorrelation(component lag) [1]: autocorrelation of the errors
     autocorrelation_expected(component lag) [1]: value after fitting if the model is right
     autocorrelation_std(component lag) [1]: its standard deviation

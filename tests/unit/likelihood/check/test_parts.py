@@ -10,6 +10,7 @@ from scipy.stats import chi2
 
 from driftwalk.comparison import ks_distance
 from driftwalk.core.errors import InputError
+from driftwalk.likelihood.check.criteria import motion_criterion
 from driftwalk.likelihood.check.errors import Contrast, Innovations, Leverage, velocity_at
 from driftwalk.likelihood.check.place import (
     Layout,
@@ -20,9 +21,9 @@ from driftwalk.likelihood.check.place import (
     spread_of,
     trend_of,
 )
-from driftwalk.likelihood.check.posterior_predictive import Replicates, compare_motion
+from driftwalk.likelihood.check.posterior_predictive import compare_motion
+from driftwalk.likelihood.check.replicates import Replicates
 from driftwalk.likelihood.check.scan import scan_of
-from driftwalk.likelihood.check.verdict import motion_criterion
 from driftwalk.likelihood.check.whiteness import whiteness_tests
 from driftwalk.likelihood.filter.series import Series
 from driftwalk.likelihood.spline import Spline
@@ -279,7 +280,7 @@ def ten_parts() -> Layout:
 
 def test_scan_names_the_stretch_that_differs() -> None:
     simulated = [turning(seed) for seed in range(1, 17)]
-    found = scan_of(turning(100, backwards=(180.0, 300.0)), simulated, ten_parts())
+    found = scan_of(turning(100, backwards=(180.0, 300.0)), simulated, ten_parts(), level=5e-4)
     assert found is not None
     assert (found.first, found.last) == (3, 4)
     # The other way round at 5 cm/s: 10 cm/s apart.
@@ -295,7 +296,7 @@ def test_scan_of_steady_motion_is_not_alarmed(fresh_seed: Callable[[int], int]) 
     simulated = [turning(seed) for seed in map(fresh_seed, range(1, 17))]
     p_values = []
     for seed in map(fresh_seed, range(200, 220)):
-        found = scan_of(turning(seed), simulated, ten_parts())
+        found = scan_of(turning(seed), simulated, ten_parts(), level=5e-4)
         assert found is not None
         p_values.append(found.p_value)
     assert np.count_nonzero(np.array(p_values) < 0.05) <= 4
