@@ -36,7 +36,7 @@ from driftwalk.likelihood.filter.series import (
     Body,
     Series,
     corrected,
-    cosine_of,
+    slow_change,
     strength_of,
 )
 from driftwalk.likelihood.spline import Spline
@@ -109,8 +109,8 @@ class Passes:
         The kernel is called from here, and not from a function for each pass: a call of it is then
         at most eight frames below `driftwalk.fit`.
         """
-        # A closed cosine of the flow's strength changes so slowly that its derivative is the one
-        # by a constant change of the strength, times the cosine: all of them share one pair.
+        # A closed number of the flow's slow change has the derivative by a constant change of the
+        # strength, times its shape: all of them share one pair.
         waves = [name for name in names if name in STRENGTHS and name not in point.opened]
         found: dict[str, Pair] = {}
         for name in [*names, *(["strength_0"] if waves else [])]:
@@ -132,8 +132,7 @@ class Passes:
                 pair = Pair(one, other, step, most)
             found[name] = pair
         for name in waves:
-            cosine = cosine_of(series, STRENGTHS.index(name) + 1)
-            found[name] = found["strength_0"]._replace(wave=cosine)
+            found[name] = found["strength_0"]._replace(wave=slow_change(series, name))
         return [found[name] for name in names]
 
     def _sums_of(

@@ -28,8 +28,8 @@ class PulsePolicy(NamedTuple):
     """Frequencies of the spectrum for each period that the recording holds. A line between two of
     them loses 5 % of its height at most."""
     least_periods: float = 6.0
-    """Periods that a recording holds at least. A slower change is one of the six cosines of the
-    flow's strength."""
+    """Periods that a recording holds at least. A slower change is one of the six cosines, or the
+    line, of the flow's strength."""
     false_alarms: float = 1e-6
     """Chance that a steady flow seems to pulse at any frequency. Chosen by hand."""
 
@@ -57,6 +57,12 @@ class ScoreTests(NamedTuple):
         """Return estimate and standard deviation of a number."""
         at = self.names.index(name)
         return float(self.estimate[at]), float(self.std[at])
+
+    def together(self, names: Sequence[str]) -> Mapping[str, float]:
+        """Return the joint estimate of some of the numbers, the others closed."""
+        at = [self.names.index(name) for name in names]
+        found = np.linalg.solve(self.information[np.ix_(at, at)], self.score[at])
+        return dict(zip(names, found.tolist(), strict=True))
 
     def chi_squared(self, values: Mapping[str, float]) -> float:
         """Return how far the joint estimate is from some values of these numbers alone."""
