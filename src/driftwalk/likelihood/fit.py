@@ -21,6 +21,7 @@ from driftwalk.likelihood.interval_inflation import (
 from driftwalk.likelihood.law.force_law import assumptions_of, side_slopes, stated_drag
 from driftwalk.likelihood.law.forward_selection import LawResult
 from driftwalk.likelihood.law.search import LawSearch
+from driftwalk.likelihood.law.shape_changes import shape_facts
 from driftwalk.likelihood.newton import WORK, Mode, ModeSearch, Passed, Tell, pieces, work_of_pass
 from driftwalk.likelihood.preparation import (
     AngleUse,
@@ -36,6 +37,7 @@ from driftwalk.likelihood.start import first_point, first_weights
 from driftwalk.likelihood.warnings import precision_facts, warnings_of
 from driftwalk.schema.answers.facts import texts
 from driftwalk.schema.check import described
+from driftwalk.schema.kinds.fit import BLOCK_NUMBERS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -110,7 +112,8 @@ def fit_motion(
     with solved(ready.wall_share):
         passed = _work_listener(course, _usual_search(passes))
         search = ModeSearch(passes, Prior(passes), chosen.fit.iterations, passed)
-        law = LawSearch(search, assumptions).find(start, first_weights(ready.tracks, passes.spline))
+        laws = LawSearch(search, assumptions, ready.undisturbed)
+        law = laws.find(start, first_weights(ready.tracks, passes.spline))
         course.begin("drag")
         try:
             restricted = restricted_drag(search, law.mode)
@@ -135,9 +138,13 @@ def fit_motion(
         turning |= angle_given_facts(given, law.mode, restricted, chosen)
     with solved(ready.wall_share):
         parameters = _parameter_facts(search, law.mode, restricted, ready)
+        for rival in law.rivals:
+            parameters = _with_rival(parameters, search, rival, ready)
+        shape = laws.alternatives.shape_change(law.mode)
     facts = {
         **parameters,
         **law_facts(law, assumptions),
+        **shape_facts(shape, law.tests),
         **turning,
         **whiteness_of(counted)._asdict(),
         **ready.facts,
@@ -151,6 +158,9 @@ def fit_motion(
     for recording, track in zip(ready.recordings, ready.tracks, strict=True):
         warnings += jump_warnings(recording, body, track=track)
     warnings += warnings_of(facts, shares, ready.intervals, side_m=chosen.block.side_m)
+    warnings += law.unsettled
+    if shape is not None and shape.significant:
+        warnings.append(shape.sentence)
     if law.left_out:
         beside = " and ".join(law.left_out)
         warnings.append(f"the search for {beside} has no solution and was left out")
@@ -175,6 +185,25 @@ def _parameter_facts(
         **parameter_facts(restricted.point, stated, study, by_side=slopes),
         "maximum_likelihood_drag_coefficient": stated_drag(mode.point, study),
         **precision_facts(std, ready.duration, study),
+    }
+
+
+def _with_rival(
+    facts: dict[str, Any], search: ModeSearch, rival: Mode, ready: PreparedRecordings
+) -> dict[str, Any]:
+    """Return the facts with intervals that hold those of another law as well."""
+    try:
+        other = _parameter_facts(search, rival, restricted_drag(search, rival), ready)
+    except BREAKDOWN:
+        return facts
+    shared = {
+        f"{one.key}_interval": (facts[f"{one.key}_interval"], other[f"{one.key}_interval"])
+        for one in BLOCK_NUMBERS
+        if f"{one.key}_interval" in facts and f"{one.key}_interval" in other
+    }
+    return facts | {
+        key: [min(first[0], second[0]), max(first[1], second[1])]
+        for key, (first, second) in shared.items()
     }
 
 

@@ -183,10 +183,11 @@ class Passes:
         """Return coordinates and velocities after each sample, shape (n, 2 D); NaN without."""
         return np.asarray(self.run(series, point)["state"])
 
-    def strength_products(self, series: Series, point: Point) -> tuple[Floats, Floats]:
+    def strength_products(self, series: Series, point: Point) -> tuple[Floats, Floats, Floats]:
         """Return products of the errors with their derivatives by the flow's strength, and squares.
 
-        Shapes (n,); 0 where a sample is not used.
+        Shapes (n,); the whitened errors themselves come third, (n, D). 0 where a sample is not
+        used.
         """
         base = dict(self.kernel(series, point).run(series.time.size))
         (pair,) = self._pairs(series, point, ["strength_0"], base)
@@ -195,7 +196,9 @@ class Passes:
         products, squares = np.zeros(used.size), np.zeros(used.size)
         products[used] = (white * change).sum(axis=1)
         squares[used] = (change**2).sum(axis=1)
-        return products, squares
+        errors = np.zeros((used.size, white.shape[1]))
+        errors[used] = white
+        return products, squares, errors
 
     def run(self, series: Series, point: Point) -> dict[str, Any]:
         """Return innovations, covariances and states of a pass over one series."""

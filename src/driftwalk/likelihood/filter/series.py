@@ -217,13 +217,20 @@ hand."""
 
 
 def wall_intervals(
-    time: Floats, x: Floats, y: Floats, theta: Floats | None, *, outline: Outline, side: float
+    time: Floats,
+    x: Floats,
+    y: Floats,
+    theta: Floats | None,
+    *,
+    outline: Outline,
+    side: float,
+    margin: float = MARGIN,
 ) -> Bools:
     """Return which intervals, by the sample at their end, may hold a contact with the wall, (n,).
 
-    In the one from k - 1 to k a corner comes within 2 mm of the wall: at k - 1, or where the motion
-    and the turning from k - 3 to k - 1 lead by k. Without orientations the circle around the block
-    replaces its corners.
+    In the one from k - 1 to k a corner comes within the margin of the wall, 2 mm: at k - 1, or
+    where the motion and the turning from k - 3 to k - 1 lead by k. Without orientations the circle
+    around the block replaces its corners.
     """
     turned = None if theta is None else np.unwrap(theta)
     ahead_x, ahead_y = (_continued(time, axis) for axis in (x, y))
@@ -231,7 +238,7 @@ def wall_intervals(
     here = _least_depth(x[:-1], y[:-1], None if turned is None else turned[:-1], outline, side)
     there = _least_depth(ahead_x, ahead_y, ahead, outline, side)
     near = np.zeros(time.size, dtype=bool)
-    near[1:] = np.minimum(here, there) < MARGIN
+    near[1:] = np.minimum(here, there) < margin
     return near
 
 

@@ -15,7 +15,13 @@ import numpy as np
 
 from driftwalk.likelihood.filter.parameters import DRAG_SHAPES, NUMBERS, PULSES, STRENGTHS, Point
 from driftwalk.likelihood.law.force_law import FLOATING, Assumptions
-from driftwalk.likelihood.law.score_tests import Pulses, ScoreTests, find_pulses, score_tests
+from driftwalk.likelihood.law.score_tests import (
+    Pulses,
+    ScoreTests,
+    StrengthScores,
+    find_pulses,
+    score_tests,
+)
 from driftwalk.likelihood.newton import FROM_NEAR, Mode, ModeSearch
 from driftwalk.likelihood.prior import Weights
 from driftwalk.schema.answers.force_law import MEMORY_SIGMAS, OPENED_SIGMAS
@@ -82,6 +88,10 @@ class LawResult:
     """The last score tests of closed numbers; None where they broke down."""
     left_out: tuple[str, ...] = ()
     """Further searches that broke down, in words."""
+    unsettled: tuple[str, ...] = ()
+    """Reasons why a number of the law was not opened, or why another law may be right."""
+    rivals: tuple[Mode, ...] = ()
+    """Modes of the laws that may be right as well."""
 
 
 def least_effects(side: float) -> dict[str, float]:
@@ -114,6 +124,7 @@ class ForwardSelection:
     def __init__(self, search: ModeSearch, assumptions: Assumptions) -> None:
         self.search, self.assumptions = search, assumptions
         self.least = least_effects(search.passes.body.side)
+        self.scores = StrengthScores(search.passes)
 
     def select(self, found: LawResult) -> LawResult:
         """Return the law found, with the departures that the recording asks for."""
@@ -126,7 +137,7 @@ class ForwardSelection:
             pulses = None
             untried = not set(PULSES) & {*mode.point.opened, *rejected}
             if tests is not None and self.assumptions.pulses and untried:
-                pulses = find_pulses(self.search.passes, mode)
+                pulses = find_pulses(self.search.passes.series, self.scores.at(mode))
             candidates = self._candidates(tests, pulses)
             if not candidates:
                 break
@@ -137,7 +148,7 @@ class ForwardSelection:
             tests = score_tests(self.search, mode, names) if names else None
         # Backward elimination: numbers that are idle since others were opened.
         opened = set(mode.point.opened) - set(self.assumptions.opened)
-        mode = self._without(mode, self._idle(mode, opened)) or mode
+        mode = self.without(mode, self._idle(mode, opened)) or mode
         return replace(found, mode=mode, tests=tests)
 
     def _closed_names(self, mode: Mode, closed: Set[str]) -> list[str]:
@@ -217,7 +228,7 @@ class ForwardSelection:
         idle = self._idle(found, set(candidates))
         if idle >= set(candidates):
             return mode, idle
-        return self._without(found, idle) or mode, idle
+        return self.without(found, idle) or mode, idle
 
     def _idle(self, mode: Mode, names: Set[str]) -> set[str]:
         """Return which of some opened numbers are too near the model to stay open."""
@@ -244,7 +255,7 @@ class ForwardSelection:
         chi_squared = float(values @ np.linalg.solve(covariance, values))
         return chi_squared > SELECTION.retained_chi_squared
 
-    def _without(self, mode: Mode, idle: Set[str]) -> Mode | None:
+    def without(self, mode: Mode, idle: Set[str]) -> Mode | None:
         """Return the mode without some opened numbers; nothing where the search breaks down."""
         if not idle:
             return mode

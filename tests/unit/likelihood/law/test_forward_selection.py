@@ -86,7 +86,8 @@ def test_a_law_that_was_found_amid_departures_is_compared_again(settled_by: floa
     ready = prepare([driven(5, 200.0, {})], study, None, None)
     passes = ready.passes
     assumptions = assumptions_of(study, ready.angle, recordings=1, flows=1)
-    search = LawSearch(ModeSearch(passes, Prior(passes), study.fit.iterations), assumptions)
+    modes = ModeSearch(passes, Prior(passes), study.fit.iterations)
+    search = LawSearch(modes, assumptions, ready.undisturbed)
     start = first_point(ready, passes.spline)
     weights = first_weights(ready.tracks, passes.spline)
     afar = replace(start, opened={"linear_share": 0.1}, fixed=dict(FLOATING))
