@@ -50,7 +50,7 @@ class ShapeChange(NamedTuple):
     """The highest line in the spectra of the cells."""
 
     frequency: float
-    """[Hz]"""
+    """[Hz]; NaN where the strength itself has no line."""
     p_value: float
     """Chance that a steady flow has a line so high at any frequency."""
     periods: float
@@ -71,13 +71,15 @@ class ShapeChange(NamedTuple):
     @property
     def sentence(self) -> str:
         """What to tell the user of it."""
-        pace = f"with a period of {self.period:.3g} s"
-        if math.isnan(self.period):
-            pace = f"slowly, over {1.0 / self.frequency:.3g} s or more"
+        pace = ""
+        if self.periods >= SHAPE.least_periods:
+            pace = f" with a period of {self.period:.3g} s"
+        elif self.periods < SHAPE.least_periods:
+            pace = f" slowly, over {0.5 / self.frequency:.3g} s or more"
         return (
-            f"the shape of the flow changes {pace}: the errors of prediction in different parts of "
+            f"the shape of the flow changes{pace}: the errors of prediction in different parts of "
             f"the tank go to and fro together (p = {self.p_value:.1g}). A steady flow does not "
-            "describe it: C_d, σ_F and the force law are those of another world"
+            "describe it: the fitted C_d, σ_F and force law do not hold"
         )
 
 
@@ -150,9 +152,11 @@ def _highest_line(series: Series, score: Scores, size: float) -> ShapeChange | N
         best = int(height.argmax())
         chance = 2.0 * height.size * float(chdtrc(number, height[best]))
         lines.append((min(1.0, chance), float(frequencies[inside][best])))
-    # The errors' line may lie beside the change's, by the frequency at which the block goes round.
-    p_value = min(lines)[0]
-    frequency = (lines[0] if lines[0][0] < SHAPE.false_alarms else min(lines))[1]
+    p_value, frequency = min(lines)[0], lines[0][1]
+    # The errors' line may lie beside the change's, by the frequency at which the block goes round:
+    # it names no period.
+    if lines[0][0] >= SHAPE.false_alarms:
+        frequency = math.nan
     least = _found_nine_in_ten(float(degrees[0]), 2 * heights[0].size)
     return ShapeChange(frequency, p_value, frequency * duration, least)
 

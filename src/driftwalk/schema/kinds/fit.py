@@ -137,7 +137,7 @@ variables (two laws were fitted):
 variables (one flow is fitted, and the recording is long enough to see its shape change):
     flow_shape_p_value [1]: chance that the errors of a steady flow go to and fro so much in the \
         cells of the tank together; below 1e-6 the shape of the flow changes
-    flow_shape_frequency [Hz]: at which they do most
+    flow_shape_frequency [Hz]: at which the strength of the flow does most; NaN where it does not
     flow_shape_detectable [1]: change, over the strength of the flow, that this test finds nine \
         times in ten; NaN where it is not known
 variables (numbers of departures were tested):
