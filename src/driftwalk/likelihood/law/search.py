@@ -154,7 +154,15 @@ class LawSearch:
         numbers = set(sigmas) - set(FLOATING)
         if any(abs(sigmas[name]) > OPENED_SIGMAS for name in numbers):
             return True
-        return self._turns_by_itself(paper)
+        return self._turns_by_itself(paper) or self._stays_on_a_small_orbit()
+
+    def _stays_on_a_small_orbit(self) -> bool:
+        """Return whether the block is within a side of one place, as a standard deviation."""
+        passes = self.search.passes
+        return passes.flows == 1 and all(
+            math.hypot(float(np.nanstd(one.x)), float(np.nanstd(one.y))) < passes.body.side
+            for one in passes.series
+        )
 
     @property
     def _floating_names(self) -> tuple[str, ...]:

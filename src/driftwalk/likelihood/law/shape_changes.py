@@ -136,10 +136,13 @@ def _highest_line(series: Series, score: Scores, size: float) -> ShapeChange | N
     # Powers of the strength, and of the errors themselves: where a jet turns, the direction of the
     # flow changes and its strength may not.
     powers, degrees = np.zeros((2, np.count_nonzero(inside))), np.zeros(2)
+    phased = np.zeros(powers.shape, dtype=np.complex128)
     for members in _cells(series, score, size):
         for row, values in _unexplained(series, score, members):
             wave = np.fft.rfft(np.bincount(place[members], weights=values), padded)[inside]
-            powers[row] += 2.0 * np.abs(wave) ** 2 / float((values**2).sum())
+            norm = 2.0 / float((values**2).sum())
+            powers[row] += norm * np.abs(wave) ** 2
+            phased[row] += norm * wave**2
             degrees[row] += 2
     if not degrees.all():
         return None
@@ -147,16 +150,17 @@ def _highest_line(series: Series, score: Scores, size: float) -> ShapeChange | N
         power * float(chdtri(number, 0.5)) / _background(power)
         for power, number in zip(powers, degrees, strict=True)
     ]
-    lines = []
-    for height, number in zip(heights, degrees, strict=True):
-        best = int(height.argmax())
-        chance = 2.0 * height.size * float(chdtrc(number, height[best]))
-        lines.append((min(1.0, chance), float(frequencies[inside][best])))
-    p_value, frequency = min(lines)[0], lines[0][1]
-    # The errors' line may lie beside the change's, by the frequency at which the block goes round:
-    # it names no period.
-    if lines[0][0] >= SHAPE.false_alarms:
-        frequency = math.nan
+    chances = [
+        2.0 * height.size * float(chdtrc(number, height.max()))
+        for height, number in zip(heights, degrees, strict=True)
+    ]
+    # On an orbit each cell is seen once a round, so that there are lines beside the change's by the
+    # frequency of the orbit. At the right one the cells have one phase, or the opposite one.
+    frequency = math.nan
+    if chances[0] < SHAPE.false_alarms:
+        together = (powers[0] + np.abs(phased[0])) / _background(powers[0])
+        frequency = float(frequencies[inside][together.argmax()])
+    p_value = min(1.0, *chances)
     least = _found_nine_in_ten(float(degrees[0]), 2 * heights[0].size)
     return ShapeChange(frequency, p_value, frequency * duration, least)
 
