@@ -142,8 +142,8 @@ class LawSearch:
 
         A body that floats seems, under the paper's law, to have a weak drag with a linear part. On
         a small orbit, where the flow is nearly linear in the place, another flow and a far smaller
-        C_d imitate the water's push so well that its test finds nothing. What they cannot imitate
-        is how the drag grows with the speed, and how the block turns.
+        C_d imitate the water's push so well that its test finds nothing. They cannot imitate how
+        the drag grows with the speed, nor how the block turns.
         """
         sigmas = tests.sigmas
         if tests.chi_squared(dict.fromkeys(self._floating_names, 0.0)) > LAW.doubted_chi_squared:
@@ -286,7 +286,7 @@ class LawSearch:
         return replace(found, mode=closed, unsettled=unsettled, rivals=(*found.rivals, mode))
 
     def _with_rival(self, found: LawResult, start: Point) -> LawResult:
-        """Return the law, with the other one beside it where the recording cannot tell them."""
+        """Return the law, and the other one as well where the recording cannot tell them."""
         if self.assumptions.pressure_gradient != "auto" or found.settled_by >= LEAST_EVIDENCE:
             return found
         rival = self._other_law(found, start)
@@ -294,7 +294,7 @@ class LawSearch:
             return found
         why = (
             "the recording cannot tell the paper's force law from a floating body's: the intervals "
-            "of C_d and σ_F hold those of both; state --pressure-gradient on or off"
+            "of C_d and σ_F hold those of both; state the law if you know it"
         )
         unsettled = (*found.unsettled, why)
         return replace(found, unsettled=unsettled, rivals=(*found.rivals, rival))

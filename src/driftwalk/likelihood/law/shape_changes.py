@@ -70,7 +70,7 @@ class ShapeChange(NamedTuple):
 
     @property
     def sentence(self) -> str:
-        """What to tell the user of it."""
+        """Return a sentence for the user."""
         pace = ""
         if self.periods >= SHAPE.least_periods:
             pace = f" with a period of {self.period:.3g} s"
@@ -88,8 +88,8 @@ def find_shape_change(
 ) -> ShapeChange | None:
     """Return the most significant line of all series; nothing where all are too short.
 
-    What is constant in a cell, or linear in the place there, belongs to a steady flow and is taken
-    out: on an orbit it comes again and again.
+    The part that is constant in a cell, or linear in the place there, belongs to a steady flow and
+    is taken out: on an orbit it comes again and again.
     """
     found = [
         _highest_line(one, score, SHAPE.cell_sides * side)
