@@ -116,8 +116,8 @@ class PreparedRecordings:
     def undisturbed(self) -> list[Series]:
         """Return the series without what near the wall, or after a mistake, is no free motion.
 
-        Left out as well are intervals in which a corner is within a side of the wall, and those
-        next to a gap: a sample or a frame that is missing may be a mistake of its own.
+        Left out as well are intervals with a corner within half a side of the wall, and those next
+        to a gap: a sample or a frame that is missing may be a mistake of its own.
         """
         outline, side = outline_of(self.study.tank.to_arena()), self.study.block.side_m
         found = []
@@ -125,7 +125,7 @@ class PreparedRecordings:
             corners = None if self.angle == "none" else one.angle
             left_out = one.excluded != 0
             left_out |= wall_intervals(
-                one.time, one.x, one.y, corners, outline=outline, side=side, margin=side
+                one.time, one.x, one.y, corners, outline=outline, side=side, margin=0.5 * side
             )
             # An interval of 1.5 usual ones lacks a frame; the filter's velocity settles in three.
             gaps = np.flatnonzero(np.diff(one.time) > 1.5 * float(np.median(np.diff(one.time)))) + 1

@@ -164,7 +164,7 @@ def build_fit(
         facts["recording_start_s"] = float(ready.tracks[0].time[0])
     numbers, names_of, _ = fit_parts(facts)
     found, names_found = number_variables(restricted.point, law)
-    attrs = {
+    attrs: dict[str, Any] = {
         "kind": "fit",
         "schema_version": KINDS["fit"].version,
         "arena": json.dumps(study.tank.to_arena()),

@@ -87,7 +87,7 @@ class Alternatives:
 
     def _without(self, alone: Mode | None, name: str, share: float) -> str:
         left = (
-            f"the {share:.0%} of the intervals that are more than a side from the wall and not "
+            f"the {share:.0%} of the intervals that are half a side or more from the wall and not "
             "next to a gap"
         )
         if alone is None or not alone.converged:

@@ -147,11 +147,11 @@ def _highest_line(series: Series, score: Scores, size: float) -> ShapeChange | N
     if not degrees.all():
         return None
     heights = [
-        power * float(chdtri(number, 0.5)) / _background(power)
+        power * float(chdtri(float(number), 0.5)) / _background(power)
         for power, number in zip(powers, degrees, strict=True)
     ]
     chances = [
-        2.0 * height.size * float(chdtrc(number, height.max()))
+        2.0 * height.size * float(chdtrc(float(number), float(height.max())))
         for height, number in zip(heights, degrees, strict=True)
     ]
     # On an orbit each cell is seen once a round, so that there are lines beside the change's by the
