@@ -13,6 +13,7 @@ from driftwalk.core.run_stages import Course, share_of_search, tell_nobody
 from driftwalk.likelihood.angle_consistency import angle_given_facts, spin_correlation
 from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.filter.series import Series
 from driftwalk.likelihood.interval_inflation import (
     open_where_undetermined,
     parameter_covariance,
@@ -22,7 +23,9 @@ from driftwalk.likelihood.interval_inflation import (
 from driftwalk.likelihood.law.force_law import Assumptions, assumptions_of, side_slopes, stated_drag
 from driftwalk.likelihood.law.forward_selection import LawResult
 from driftwalk.likelihood.law.search import LawSearch
+from driftwalk.likelihood.law.shape_changes import shape_facts
 from driftwalk.likelihood.newton import (
+    EXCERPT,
     FROM_ANOTHER,
     WORK,
     Mode,
@@ -40,7 +43,7 @@ from driftwalk.likelihood.preparation import (
     as_list,
     prepare,
 )
-from driftwalk.likelihood.prior import Prior, Weights
+from driftwalk.likelihood.prior import Prior
 from driftwalk.likelihood.refuse import (
     BREAKDOWN,
     reason_of_no_solution,
@@ -53,6 +56,7 @@ from driftwalk.likelihood.start import first_point, first_weights
 from driftwalk.likelihood.warnings import precision_facts, warnings_of
 from driftwalk.schema.answers.facts import texts
 from driftwalk.schema.check import described
+from driftwalk.schema.kinds.fit import BLOCK_NUMBERS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -128,7 +132,7 @@ def fit_motion(
     with solved(reason):
         passed = _work_listener(course, _usual_search(passes))
         search = ModeSearch(passes, Prior(passes), chosen.fit.iterations, passed)
-        law = _law_of(search, assumptions, start, first_weights(ready.tracks, passes.spline))
+        laws, law = _laws_of(search, assumptions, start, ready)
         course.begin("drag")
         try:
             restricted = restricted_drag(search, law.mode)
@@ -156,9 +160,13 @@ def fit_motion(
         turning |= angle_given_facts(given, law.mode, restricted, chosen)
     with solved(reason):
         parameters = _parameter_facts(search, law.mode, restricted, ready)
+        for rival in law.rivals:
+            parameters = _with_rival(parameters, search, rival, ready)
+        shape = laws.alternatives.shape_change(law.mode)
     facts = {
         **parameters,
         **law_facts(law, assumptions),
+        **shape_facts(shape, law.tests),
         **turning,
         **whiteness_of(counted)._asdict(),
         **ready.facts,
@@ -172,6 +180,9 @@ def fit_motion(
     for recording, track in zip(ready.recordings, ready.tracks, strict=True):
         warnings += jump_warnings(recording, body, track=track)
     warnings += warnings_of(facts, shares, ready.intervals, side_m=chosen.block.side_m)
+    warnings += law.unsettled
+    if shape is not None and shape.significant:
+        warnings.append(shape.sentence)
     if law.left_out:
         beside = " and ".join(law.left_out)
         warnings.append(f"the search for {beside} has no solution and was left out")
@@ -182,18 +193,30 @@ def fit_motion(
     )
 
 
-def _law_of(
-    search: ModeSearch, assumptions: Assumptions, start: Point, weights: Weights
-) -> LawResult:
-    """Return the law that the recording supports, of a fast camera from samples further apart."""
-    few = thinned(search.passes)
-    law = LawSearch(replace(search, passes=few), assumptions).find(start, weights)
-    if few is search.passes:
-        return law
-    mode = search.find(law.mode.point, law.mode.weights, held=FROM_ANOTHER)
-    if mode is None or not mode.converged:
-        return LawSearch(search, assumptions).find(start, weights)
-    return replace(law, mode=mode, base=mode if law.base is law.mode else law.base)
+def _laws_of(
+    search: ModeSearch, assumptions: Assumptions, start: Point, ready: PreparedRecordings
+) -> tuple[LawSearch, LawResult]:
+    """Return the search of the law and its result, of a fast camera from samples further apart."""
+    passes = search.passes
+    weights = first_weights(ready.tracks, passes.spline)
+    few = thinned(passes)
+    if few is not passes:
+
+        def undisturbed() -> list[Series]:
+            return [one.thinned(EXCERPT.interval_s) for one in ready.undisturbed()]
+
+        def of_all(mode: Mode) -> Mode | None:
+            return search.find(mode.point, mode.weights, held=FROM_ANOTHER)
+
+        laws = LawSearch(replace(search, passes=few), assumptions, undisturbed)
+        law = laws.find(start, weights)
+        mode, rivals = of_all(law.mode), [of_all(one) for one in law.rivals]
+        if mode is not None and mode.converged:
+            known = tuple(one for one in rivals if one is not None and one.converged)
+            base = mode if law.base is law.mode else law.base
+            return laws, replace(law, mode=mode, base=base, rivals=known)
+    laws = LawSearch(search, assumptions, ready.undisturbed)
+    return laws, laws.find(start, weights)
 
 
 def _parameter_facts(
@@ -210,6 +233,25 @@ def _parameter_facts(
         **parameter_facts(restricted.point, stated, study, by_side=slopes),
         "maximum_likelihood_drag_coefficient": stated_drag(mode.point, study),
         **precision_facts(std, ready.duration, study),
+    }
+
+
+def _with_rival(
+    facts: dict[str, Any], search: ModeSearch, rival: Mode, ready: PreparedRecordings
+) -> dict[str, Any]:
+    """Return the facts with intervals that hold those of another law as well."""
+    try:
+        other = _parameter_facts(search, rival, restricted_drag(search, rival), ready)
+    except BREAKDOWN:
+        return facts
+    shared = {
+        f"{one.key}_interval": (facts[f"{one.key}_interval"], other[f"{one.key}_interval"])
+        for one in BLOCK_NUMBERS
+        if f"{one.key}_interval" in facts and f"{one.key}_interval" in other
+    }
+    return facts | {
+        key: [min(first[0], second[0]), max(first[1], second[1])]
+        for key, (first, second) in shared.items()
     }
 
 

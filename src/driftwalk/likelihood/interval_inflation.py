@@ -147,7 +147,11 @@ def parameter_facts(
     for name, (value, width) in values.items():
         facts[name] = value
         facts[f"{name}_interval"] = _ends(value, width)
-    return {**facts, **inertia_facts(heavier, facts, normal), **number_facts(point, reach, study)}
+    return {
+        **facts,
+        **inertia_facts(heavier, facts, normal),
+        **number_facts(point, normal**2 * covariance, study),
+    }
 
 
 def _log_drag_std(point: Point, covariance: Floats) -> float:

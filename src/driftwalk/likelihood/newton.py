@@ -111,9 +111,15 @@ class Mode:
 
     def value_of(self, name: str) -> tuple[float, float]:
         """Return a noise or an opened number, and its standard deviation by theory."""
+        (value,), covariance = self.values_of([name])
+        return float(value), math.sqrt(float(covariance[0, 0]))
+
+    def values_of(self, names: Sequence[str]) -> tuple[Floats, Floats]:
+        """Return noises or opened numbers, and their covariance by theory."""
         extras = self.point.extras
-        at = self.point.coefficients.size + 1 + list(extras).index(name)
-        return extras[name], math.sqrt(float(self.covariance[at, at]))
+        first, order = self.point.coefficients.size + 1, list(extras)
+        at = [first + order.index(name) for name in names]
+        return np.array([extras[name] for name in names]), self.covariance[np.ix_(at, at)]
 
 
 def known_numbers_variance(mode: Mode) -> float:

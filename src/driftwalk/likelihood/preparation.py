@@ -18,11 +18,13 @@ from driftwalk.flow.arena import outline_of, read_arena
 from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import (
+    FILTER,
     ORIENTED_SHARE,
     Series,
     body_of,
     series_of,
     usable_intervals,
+    wall_intervals,
 )
 from driftwalk.likelihood.flow_intervals import Intervals, cut_track, intervals_of, require_fit
 from driftwalk.likelihood.law.force_law import effective_logs, stored_numbers
@@ -110,6 +112,27 @@ class PreparedRecordings:
         """The filter over these recordings."""
         body, spline = body_of(self.study, self.angle), spline_of(self.study)
         return Passes(self.series, body, spline, len(self.intervals.labels))
+
+    def undisturbed(self) -> list[Series]:
+        """Return the series without what near the wall, or after a mistake, is no free motion.
+
+        Left out as well are intervals with a corner within half a side of the wall, and those next
+        to a gap: a sample or a frame that is missing may be a mistake of its own.
+        """
+        outline, side = outline_of(self.study.tank.to_arena()), self.study.block.side_m
+        found = []
+        for one in self.series:
+            corners = None if self.angle == "none" else one.angle
+            left_out = one.excluded != 0
+            left_out |= wall_intervals(
+                one.time, one.x, one.y, corners, outline=outline, side=side, margin=0.5 * side
+            )
+            # An interval of 1.5 usual ones lacks a frame; the filter's velocity settles in three.
+            gaps = np.flatnonzero(np.diff(one.time) > 1.5 * float(np.median(np.diff(one.time)))) + 1
+            for later in range(FILTER.settling_samples + 1):
+                left_out[np.minimum(gaps + later, one.time.size - 1)] = True
+            found.append(replace(one, excluded=left_out.astype(np.uint8)))
+        return found
 
     def with_angle(self, angle: str) -> PreparedRecordings:
         """Return the same with another use of the orientations."""

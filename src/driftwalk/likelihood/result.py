@@ -50,6 +50,8 @@ WORDS: Final = (
     *("force_law", "force_law_stated", "drag_law", "drag_law_stated"),
 )
 """Facts in words, which are attributes."""
+REASONS: Final = ("law_unsettled", "flow_shape_change")
+"""The same where there is anything to say."""
 
 
 class Whiteness(NamedTuple):
@@ -162,11 +164,12 @@ def build_fit(
         facts["recording_start_s"] = float(ready.tracks[0].time[0])
     numbers, names_of, _ = fit_parts(facts)
     found, names_found = number_variables(restricted.point, law)
-    attrs = {
+    attrs: dict[str, Any] = {
         "kind": "fit",
         "schema_version": KINDS["fit"].version,
         "arena": json.dumps(study.tank.to_arena()),
         **{name: facts[name] for name in WORDS},
+        **{name: facts[name] for name in REASONS if name in facts},
         "study": study.to_toml(),
     }
     return xr.Dataset(data | found | numbers, coords | names_found | names_of, attrs)
@@ -188,6 +191,8 @@ def law_facts(law: LawResult, assumptions: Assumptions) -> dict[str, Any]:
         "drag_law": drag,
         "drag_law_stated": "no" if searched else "yes",
     }
+    if law.unsettled:
+        facts["law_unsettled"] = "; ".join(law.unsettled)
     if math.isfinite(law.settled_by):
         facts["law_settled_by"] = law.settled_by
     return facts

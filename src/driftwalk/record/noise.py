@@ -59,6 +59,8 @@ class NoiseEstimate(NamedTuple):
     acceleration_intensity_m2_s3: float
     """Intensity q of the path's white acceleration, per axis [m^2/s^3]; rough where q h^3 is well
     below the variance of the noise."""
+    orientation_intensity_rad2_s3: float
+    """The same of the orientation [rad^2/s^3]."""
     windows: int
     """Windows of five samples that were used."""
 
@@ -114,6 +116,7 @@ def estimate_tracking_noise(track: Track) -> NoiseEstimate:
         position_noise_standard_error_m=position.standard_error,
         orientation_noise_standard_error_rad=orientation.standard_error,
         acceleration_intensity_m2_s3=position.intensity,
+        orientation_intensity_rad2_s3=orientation.intensity,
         windows=position.windows,
     )
 

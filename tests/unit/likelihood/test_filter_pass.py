@@ -12,7 +12,8 @@ from fit_worlds import coarse_study, driven, recording
 from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.filter.difference_pairs import Pair
 from driftwalk.likelihood.filter.filter_pass import Passes, Sums
-from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.filter.parameters import STRENGTHS, Point
+from driftwalk.likelihood.filter.series import Series, strength_of
 from driftwalk.likelihood.fit import fit_motion
 from driftwalk.likelihood.newton import inverse, limited, newton_step
 from driftwalk.likelihood.preparation import body_of, estimate_of, series_of
@@ -173,7 +174,26 @@ def test_wrong_times_are_tried_on_all_samples_of_an_accurate_camera() -> None:
     assert sums.score[-1] == pytest.approx(-slope, rel=0.05)
 
 
-def test_a_slow_cosine_of_the_flow_is_a_steady_change_times_the_cosine(
+def test_a_slow_change_of_the_flow_holds_a_straight_line() -> None:
+    """1 + g (t / T - 1/2) exactly, and its change g; six cosines alone leave a part of the line.
+
+    Of a line the odd cosines hold 8 / pi^2 (1 + 1/9 + 1/25) from its beginning to its end.
+    """
+    time = np.linspace(0.0, 60.0, 601)
+    some = np.zeros(time.size)
+    series = Series(time, some, some, some, some, some.astype(np.uint8), span=60.0)
+    growth = 0.2
+    names = ("strength_trend", *(f"strength_{k}" for k in range(1, 7)))
+    assert names == STRENGTHS
+    ramp = Point(some, 0.0, 0.0, 0.0, opened={"strength_trend": -0.5 * growth})
+    assert strength_of(series, ramp) == pytest.approx(1.0 + growth * (time / 60.0 - 0.5), rel=1e-14)
+    odd = {f"strength_{k}": -growth * 4.0 / (np.pi * k) ** 2 for k in (1, 3, 5)}
+    cosines = strength_of(series, Point(some, 0.0, 0.0, 0.0, opened=odd))
+    assert cosines is not None
+    assert (cosines[-1] - cosines[0]) / growth == pytest.approx(0.933, abs=5e-4)
+
+
+def test_a_slow_change_of_the_flow_is_a_steady_change_times_its_shape(
     passes: Passes, point: Point
 ) -> None:
     """Closed, a cosine is tried with the errors of a steady change; opened, with its own.
@@ -181,7 +201,7 @@ def test_a_slow_cosine_of_the_flow_is_a_steady_change_times_the_cosine(
     What a change of the flow did is forgotten within a second or so, in which cosine 6 of a
     recording of a minute turns by 6 pi / 60, a third of a radian: off by half of its square.
     """
-    named = [f"strength_{k}" for k in range(1, 7)]
+    named = list(STRENGTHS)
     tried = passes.sums(point, tried=named)
     opened = passes.sums(replace(point, opened=dict.fromkeys(named, 0.0)))
     at = slice(-len(named), None)

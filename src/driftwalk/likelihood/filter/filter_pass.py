@@ -36,7 +36,7 @@ from driftwalk.likelihood.filter.series import (
     Body,
     Series,
     corrected,
-    cosine_of,
+    slow_change,
     strength_of,
 )
 from driftwalk.likelihood.spline import Spline
@@ -109,8 +109,8 @@ class Passes:
         The kernel is called from here, and not from a function for each pass: a call of it is then
         at most eight frames below `driftwalk.fit`.
         """
-        # A closed cosine of the flow's strength changes so slowly that its derivative is the one
-        # by a constant change of the strength, times the cosine: all of them share one pair.
+        # A closed number of the flow's slow change has the derivative by a constant change of the
+        # strength, times its shape: all of them share one pair.
         waves = [name for name in names if name in STRENGTHS and name not in point.opened]
         found: dict[str, Pair] = {}
         for name in [*names, *(["strength_0"] if waves else [])]:
@@ -135,8 +135,7 @@ class Passes:
             other.pop("state", None)
             found[name] = pair
         for name in waves:
-            cosine = cosine_of(series, STRENGTHS.index(name) + 1)
-            found[name] = found["strength_0"]._replace(wave=cosine)
+            found[name] = found["strength_0"]._replace(wave=slow_change(series, name))
         return [found[name] for name in names]
 
     def _sums_of(
@@ -187,10 +186,11 @@ class Passes:
         """Return coordinates and velocities after each sample, shape (n, 2 D); NaN without."""
         return np.asarray(self.run(series, point)["state"])
 
-    def strength_products(self, series: Series, point: Point) -> tuple[Floats, Floats]:
+    def strength_products(self, series: Series, point: Point) -> tuple[Floats, Floats, Floats]:
         """Return products of the errors with their derivatives by the flow's strength, and squares.
 
-        Shapes (n,); 0 where a sample is not used.
+        Shapes (n,); the whitened errors themselves come third, (n, D). 0 where a sample is not
+        used.
         """
         base = dict(self.kernel(series, point).run(series.time.size))
         (pair,) = self._pairs(series, point, ["strength_0"], base)
@@ -199,7 +199,9 @@ class Passes:
         products, squares = np.zeros(used.size), np.zeros(used.size)
         products[used] = (white * change).sum(axis=1)
         squares[used] = (change**2).sum(axis=1)
-        return products, squares
+        errors = np.zeros((used.size, white.shape[1]))
+        errors[used] = white
+        return products, squares, errors
 
     def run(self, series: Series, point: Point) -> dict[str, Any]:
         """Return innovations, covariances and states of a pass over one series."""

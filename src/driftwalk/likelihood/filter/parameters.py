@@ -38,10 +38,11 @@ class Number(NamedTuple):
         return value, value + self.step
 
 
-STRENGTH_TERMS: Final = 6
-"""Cosines over the recording that the strength of the flow may have."""
-STRENGTHS: Final = tuple(f"strength_{k}" for k in range(1, STRENGTH_TERMS + 1))
-"""Their numbers, in the order of the cosines."""
+STRENGTHS: Final = ("strength_trend", *(f"strength_{k}" for k in range(1, 7)))
+"""Numbers of a slow change of the flow's strength over the recording: a straight line, then cosines
+of half a period, of one and so on. Cosines alone hold 0.93 of a straight line."""
+CHANGES: Final = ("strength_trend", *STRENGTHS[1::2])
+"""Those whose shapes go from 1 to -1 between the first sample and the last."""
 DRAG_SHAPES: Final = ("linear_share", "drag_power")
 """How the drag may go with the speed otherwise: one of them at most is opened."""
 PULSES: Final = ("pulse_cosine", "pulse_sine")
@@ -74,9 +75,9 @@ NUMBERS: Final[Mapping[str, Number]] = {
     "marker_x": Number(0.0, 1e-6, 0.01, 3e-3, -0.05, 0.05),
     "marker_y": Number(0.0, 1e-6, 0.01, 3e-3, -0.05, 0.05),
     **{
-        f"strength_{k}": Number(0.0, 1e-4, 0.3 / max(k, 1), 0.2, -1.0, 1.0)
-        for k in range(STRENGTH_TERMS + 1)
+        name: Number(0.0, 1e-4, 0.3 / max(k, 1), 0.2, -1.0, 1.0) for k, name in enumerate(STRENGTHS)
     },
+    "strength_0": Number(0.0, 1e-4, 0.3, 0.2, -1.0, 1.0),
     "pulse_cosine": Number(0.0, 1e-4, 0.3, 0.2, -1.0, 1.0),
     "pulse_sine": Number(0.0, 1e-4, 0.3, 0.2, -1.0, 1.0),
     "pulse_frequency": Number(0.0, 1e-7, 1e-2, 1e-3, 0.0, 10.0),

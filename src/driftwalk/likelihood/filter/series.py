@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.flow.arena import Outline, outline_of
-from driftwalk.likelihood.filter.parameters import STRENGTH_TERMS, Point
+from driftwalk.likelihood.filter.parameters import STRENGTHS, Point
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
@@ -129,20 +129,24 @@ def corrected(series: Series, point: Point) -> tuple[Floats, Floats, Floats]:
 
 def strength_of(series: Series, point: Point) -> Floats | None:
     """Return the strength of the flow at the samples; nothing where it is 1 all the time."""
-    terms = {k: point.number(f"strength_{k}") for k in range(STRENGTH_TERMS + 1)}
+    terms = {name: point.number(name) for name in ("strength_0", *STRENGTHS)}
     waves = point.number("pulse_cosine"), point.number("pulse_sine")
     if not any(terms.values()) and not any(waves):
         return None
     strength = np.ones_like(series.time)
-    for k, term in terms.items():
-        strength += term * cosine_of(series, k)
+    for name, term in terms.items():
+        strength += term * slow_change(series, name)
     phase = 2.0 * np.pi * point.number("pulse_frequency") * series.time
     return np.asarray(strength + waves[0] * np.cos(phase) + waves[1] * np.sin(phase))
 
 
-def cosine_of(series: Series, number: int) -> Floats:
-    """Return one of the cosines over the recording, at the samples."""
-    return np.asarray(np.cos(number * np.pi * series.time / max(series.span, 1e-300)))
+def slow_change(series: Series, name: str) -> Floats:
+    """Return the shape of a slow change over the recording, at the samples."""
+    span = max(series.span, 1e-300)
+    if name == "strength_trend":
+        return np.asarray(1.0 - 2.0 * series.time / span)
+    number = int(name.removeprefix("strength_"))
+    return np.asarray(np.cos(number * np.pi * series.time / span))
 
 
 ORIENTED_SHARE: Final = 0.5
@@ -227,13 +231,20 @@ hand."""
 
 
 def wall_intervals(
-    time: Floats, x: Floats, y: Floats, theta: Floats | None, *, outline: Outline, side: float
+    time: Floats,
+    x: Floats,
+    y: Floats,
+    theta: Floats | None,
+    *,
+    outline: Outline,
+    side: float,
+    margin: float = MARGIN,
 ) -> Bools:
     """Return which intervals, by the sample at their end, may hold a contact with the wall, (n,).
 
-    In the one from k - 1 to k a corner comes within 2 mm of the wall: at k - 1, or where the motion
-    and the turning from k - 3 to k - 1 lead by k. Without orientations the circle around the block
-    replaces its corners.
+    In the one from k - 1 to k a corner comes within the margin of the wall, 2 mm: at k - 1, or
+    where the motion and the turning from k - 3 to k - 1 lead by k. Without orientations the circle
+    around the block replaces its corners.
     """
     turned = None if theta is None else np.unwrap(theta)
     ahead_x, ahead_y = (_continued(time, axis) for axis in (x, y))
@@ -241,7 +252,7 @@ def wall_intervals(
     here = _least_depth(x[:-1], y[:-1], None if turned is None else turned[:-1], outline, side)
     there = _least_depth(ahead_x, ahead_y, ahead, outline, side)
     near = np.zeros(time.size, dtype=bool)
-    near[1:] = np.minimum(here, there) < MARGIN
+    near[1:] = np.minimum(here, there) < margin
     return near
 
 

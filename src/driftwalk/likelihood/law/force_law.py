@@ -7,9 +7,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
+import numpy as np
+
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
-from driftwalk.likelihood.filter.parameters import DRAG_SHAPES, DRAGS, STRENGTHS, Point
+from driftwalk.likelihood.filter.parameters import (
+    CHANGES,
+    DRAG_SHAPES,
+    DRAGS,
+    STRENGTHS,
+    Point,
+)
 from driftwalk.likelihood.filter.series import body_of
 from driftwalk.likelihood.newton import Mode, ModeSearch, inverse
 from driftwalk.likelihood.refuse import BREAKDOWN
@@ -158,9 +166,14 @@ def inertia_facts(inertia: Inertia, facts: dict[str, Any], normal: float) -> dic
     }
 
 
-def number_facts(point: Point, reach: Floats, study: Study) -> dict[str, Any]:
-    """Return the opened numbers with their intervals, and the stated ones, units in the keys."""
+def number_facts(point: Point, covariance: Floats, study: Study) -> dict[str, Any]:
+    """Return the opened numbers with their intervals, and the stated ones, units in the keys.
+
+    `covariance` is that of ln C_d, noises and numbers, times the square of the interval's width in
+    standard deviations.
+    """
     first = 1 + len(point.noises)
+    reach = np.sqrt(np.diag(covariance))
     widths = dict(zip(point.opened, reach[first:].tolist(), strict=True))
     facts: dict[str, Any] = {}
 
@@ -186,11 +199,12 @@ def number_facts(point: Point, reach: Floats, study: Study) -> dict[str, Any]:
         area = side * study.wetted_depth_m
         drag = 0.5 * study.water.density_kg_m3 * math.exp(point.log_drag) * area * side
         state("linear_drag_kg_s", share, width, drag * inertia_of(study, point).share)
-    if "strength_1" in widths:
-        # From the beginning of the recording to its end the odd cosines change their signs.
-        odd = STRENGTHS[::2]
-        change = -2.0 * sum(point.opened[name] for name in odd)
-        state("flow_strength_change", change, 2.0 * math.hypot(*(widths[name] for name in odd)))
+    if "strength_trend" in widths:
+        change = -2.0 * sum(point.opened[name] for name in CHANGES)
+        # Line and cosines share what the recording says of the change: their errors go together.
+        at = [k for k, name in enumerate(point.opened, first) if name in CHANGES]
+        spread = 4.0 * float(covariance[np.ix_(at, at)].sum())
+        state("flow_strength_change", change, math.sqrt(spread))
     if "pulse_sine" in widths:
         size = math.hypot(point.opened["pulse_cosine"], point.opened["pulse_sine"])
         state("pulse_amplitude", size, max(widths["pulse_cosine"], widths["pulse_sine"]))

@@ -11,9 +11,17 @@ from collections.abc import Mapping, Set
 from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
+import numpy as np
+
 from driftwalk.likelihood.filter.parameters import DRAG_SHAPES, NUMBERS, PULSES, STRENGTHS, Point
 from driftwalk.likelihood.law.force_law import FLOATING, Assumptions
-from driftwalk.likelihood.law.score_tests import Pulses, ScoreTests, find_pulses, score_tests
+from driftwalk.likelihood.law.score_tests import (
+    Pulses,
+    ScoreTests,
+    StrengthScores,
+    find_pulses,
+    score_tests,
+)
 from driftwalk.likelihood.newton import FROM_NEAR, Mode, ModeSearch
 from driftwalk.likelihood.prior import Weights
 from driftwalk.schema.answers.force_law import MEMORY_SIGMAS, OPENED_SIGMAS
@@ -34,8 +42,10 @@ class SelectionPolicy(NamedTuple):
     """The same for the memory of the force: a flow with more detail than the spline acts like a
     memory of 0.1 s (docs/explanation/likelihood.md)."""
     strength_chi_squared: float = 50.0
-    """Chi squared (6 degrees of freedom) of the flow's strength from which on its cosines are
-    opened: chance exceeds it once in 2e8."""
+    """Chi squared (7 degrees of freedom) of the flow's strength from which on its slow change is
+    opened: chance exceeds it once in 7e7."""
+    retained_chi_squared: float = 21.8
+    """The same from which on it stays open: the chance of 3 standard deviations, once in 370."""
     rounds: int = 3
     """Rounds of score tests and openings. Chosen by hand."""
     linear_share: float = 0.15
@@ -52,7 +62,7 @@ class SelectionPolicy(NamedTuple):
     marker: float = 0.012
     """Least offset of the marker, in sides of the block."""
     strength: float = 0.01
-    """Least amplitude of a cosine of the flow's strength."""
+    """Least amplitude of the line or of a cosine of the flow's strength."""
     pulse: float = 0.02
     """Least amplitude of a pulse."""
 
@@ -78,6 +88,10 @@ class LawResult:
     """The last score tests of closed numbers; None where they broke down."""
     left_out: tuple[str, ...] = ()
     """Further searches that broke down, in words."""
+    unsettled: tuple[str, ...] = ()
+    """Reasons why a number of the law was not opened, or why another law may be right."""
+    rivals: tuple[Mode, ...] = ()
+    """Modes of the laws that may be right as well."""
 
 
 def least_effects(side: float) -> dict[str, float]:
@@ -110,6 +124,7 @@ class ForwardSelection:
     def __init__(self, search: ModeSearch, assumptions: Assumptions) -> None:
         self.search, self.assumptions = search, assumptions
         self.least = least_effects(search.passes.body.side)
+        self.scores = StrengthScores(search.passes)
 
     def select(self, found: LawResult) -> LawResult:
         """Return the law found, with the departures that the recording asks for."""
@@ -122,7 +137,7 @@ class ForwardSelection:
             pulses = None
             untried = not set(PULSES) & {*mode.point.opened, *rejected}
             if tests is not None and self.assumptions.pulses and untried:
-                pulses = find_pulses(self.search.passes, mode)
+                pulses = find_pulses(self.search.passes.series, self.scores.at(mode))
             candidates = self._candidates(tests, pulses)
             if not candidates:
                 break
@@ -133,7 +148,7 @@ class ForwardSelection:
             tests = score_tests(self.search, mode, names) if names else None
         # Backward elimination: numbers that are idle since others were opened.
         opened = set(mode.point.opened) - set(self.assumptions.opened)
-        mode = self._without(mode, self._idle(mode, opened)) or mode
+        mode = self.without(mode, self._idle(mode, opened)) or mode
         return replace(found, mode=mode, tests=tests)
 
     def _closed_names(self, mode: Mode, closed: Set[str]) -> list[str]:
@@ -178,10 +193,10 @@ class ForwardSelection:
         strengths = [name for name in STRENGTHS if name in tests.names]
         if strengths:
             joint = tests.chi_squared(dict.fromkeys(strengths, 0.0))
-            estimates = {name: tests.of(name)[0] for name in strengths}
-            largest = max(map(abs, estimates.values()))
+            largest = max(abs(tests.of(name)[0]) for name in strengths)
             if joint > SELECTION.strength_chi_squared and largest > SELECTION.strength:
-                candidates.update({name: _within(name, value) for name, value in estimates.items()})
+                found = tests.together(strengths)
+                candidates.update({name: _within(name, value) for name, value in found.items()})
         if pulses is not None and pulses.significant and pulses.amplitude > SELECTION.pulse:
             candidates.update(zip(PULSES, (pulses.cosine, pulses.sine), strict=True))
             candidates["pulse_frequency"] = pulses.frequency
@@ -213,7 +228,7 @@ class ForwardSelection:
         idle = self._idle(found, set(candidates))
         if idle >= set(candidates):
             return mode, idle
-        return self._without(found, idle) or mode, idle
+        return self.without(found, idle) or mode, idle
 
     def _idle(self, mode: Mode, names: Set[str]) -> set[str]:
         """Return which of some opened numbers are too near the model to stay open."""
@@ -222,15 +237,25 @@ class ForwardSelection:
             for name in names
             if name != "pulse_frequency" and not is_retained(mode, name, self.least)
         }
-        # The cosines of the strength, and the two parts of a pulse, stay or go together.
-        strengths = set(STRENGTHS) & set(mode.point.opened)
-        if strengths - idle:
-            idle -= strengths
+        # The line and the cosines of the strength, and the two parts of a pulse, stay or go
+        # together.
+        if set(STRENGTHS) <= set(mode.point.opened) and self._has_changed(mode):
+            idle -= set(STRENGTHS)
         if set(PULSES) & set(names) and not set(PULSES) <= idle:
             idle -= set(PULSES)
         return idle
 
-    def _without(self, mode: Mode, idle: Set[str]) -> Mode | None:
+    def _has_changed(self, mode: Mode) -> bool:
+        """Return whether the slow change of the flow's strength is more than chance.
+
+        Line and cosines are alike: each alone may be within its error where all of them are not.
+        """
+        values, covariance = mode.values_of(STRENGTHS)
+        covariance = covariance + (0.5 * SELECTION.strength) ** 2 * np.eye(values.size)
+        chi_squared = float(values @ np.linalg.solve(covariance, values))
+        return chi_squared > SELECTION.retained_chi_squared
+
+    def without(self, mode: Mode, idle: Set[str]) -> Mode | None:
         """Return the mode without some opened numbers; nothing where the search breaks down."""
         if not idle:
             return mode

@@ -28,8 +28,8 @@ class PulsePolicy(NamedTuple):
     """Frequencies of the spectrum for each period that the recording holds. A line between two of
     them loses 5 % of its height at most."""
     least_periods: float = 6.0
-    """Periods that a recording holds at least. A slower change is one of the six cosines of the
-    flow's strength."""
+    """Periods that a recording holds at least. A slower change is one of the six cosines, or the
+    line, of the flow's strength."""
     false_alarms: float = 1e-6
     """Chance that a steady flow seems to pulse at any frequency. Chosen by hand."""
 
@@ -57,6 +57,12 @@ class ScoreTests(NamedTuple):
         """Return estimate and standard deviation of a number."""
         at = self.names.index(name)
         return float(self.estimate[at]), float(self.std[at])
+
+    def together(self, names: Sequence[str]) -> Mapping[str, float]:
+        """Return the joint estimate of some of the numbers, the others closed."""
+        at = [self.names.index(name) for name in names]
+        found = np.linalg.solve(self.information[np.ix_(at, at)], self.score[at])
+        return dict(zip(names, found.tolist(), strict=True))
 
     def chi_squared(self, values: Mapping[str, float]) -> float:
         """Return how far the joint estimate is from some values of these numbers alone."""
@@ -114,21 +120,50 @@ class Pulses(NamedTuple):
         return self.height > 2.0 * float(np.log(self.frequencies / PULSE.false_alarms))
 
 
-def find_pulses(passes: Passes, mode: Mode) -> Pulses | None:
+class Scores(NamedTuple):
+    """Products of the errors of one series with their derivatives by the flow's strength."""
+
+    products: Floats
+    """Shape (n,); 0 where a sample is not used."""
+    squares: Floats
+    """Of the derivatives."""
+    errors: Floats
+    """Whitened, (n, D)."""
+
+
+class StrengthScores:
+    """Scores of the flow's strength in every series; those at the last mode are kept."""
+
+    def __init__(self, passes: Passes) -> None:
+        self.passes = passes
+        self._mode: Mode | None = None
+        self._found: list[Scores] = []
+
+    def at(self, mode: Mode) -> list[Scores]:
+        """Return the scores at a mode."""
+        if mode is not self._mode:
+            points = [mode.point.in_flow(one.flow) for one in self.passes.series]
+            pairs = zip(self.passes.series, points, strict=True)
+            self._found = [Scores(*self.passes.strength_products(*pair)) for pair in pairs]
+            self._mode = mode
+        return self._found
+
+
+def find_pulses(series: Sequence[Series], scores: Sequence[Scores]) -> Pulses | None:
     """Return the strongest pulse of the flow, or nothing where the recording is too short.
 
     The derivative of the errors by a constant change of the flow's strength is, at each sample,
     nearly that by a change then. So the products of errors and derivatives have a line in their
     spectrum where the strength pulses. The median of the spectrum is its height without pulses.
     """
-    found = [_highest_line(passes, mode, series) for series in passes.series]
+    found = [_highest_line(one, score) for one, score in zip(series, scores, strict=True)]
     lines = [line for line in found if line is not None]
     return max(lines, key=lambda one: one.height) if lines else None
 
 
-def _highest_line(passes: Passes, mode: Mode, series: Series) -> Pulses | None:
+def _highest_line(series: Series, score: Scores) -> Pulses | None:
     """Return the highest line of one series; nothing where it is too short."""
-    products, squares = passes.strength_products(series, mode.point.in_flow(series.flow))
+    products, squares, _ = score
     time = series.time - series.time[0]
     interval = float(np.median(np.diff(time)))
     place = np.round(time / interval).astype(np.intp)

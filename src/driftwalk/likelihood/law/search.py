@@ -9,13 +9,15 @@ fitted, and closed again where nothing comes of them.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.likelihood.filter.parameters import DRAG_SHAPES, DRAGS, NUMBERS, Point
+from driftwalk.likelihood.filter.parameters import DRAGS, NUMBERS, Point
+from driftwalk.likelihood.filter.series import Series
+from driftwalk.likelihood.law.alternatives import LAW_NUMBERS, Alternatives
 from driftwalk.likelihood.law.force_law import FLOATING, Assumptions
 from driftwalk.likelihood.law.forward_selection import ForwardSelection, LawResult, is_retained
 from driftwalk.likelihood.law.score_tests import ScoreTests, score_tests
@@ -73,9 +75,16 @@ def evidence_of(mode: Mode, prior: Prior) -> float:
 class LawSearch:
     """Searches over laws for the recordings of one fit."""
 
-    def __init__(self, search: ModeSearch, assumptions: Assumptions) -> None:
+    def __init__(
+        self,
+        search: ModeSearch,
+        assumptions: Assumptions,
+        undisturbed: Callable[[], Sequence[Series]],
+    ) -> None:
+        """Keep the search, and what makes the series without contacts and mistakes."""
         self.assumptions, self.search = assumptions, search
         self.selection = ForwardSelection(search, assumptions)
+        self.alternatives = Alternatives(search, self.selection, undisturbed)
 
     def find(self, start: Point, weights: Weights) -> LawResult:
         """Return the law and the mode that the recording supports."""
@@ -88,7 +97,9 @@ class LawSearch:
                 "another power of the drag",
                 lambda: self._powered(base, found, start, weights),
             )
-        return self._beside(found, "the other law", lambda: self._reconsidered(found, start))
+        found = self._beside(found, "the other law", lambda: self._reconsidered(found, start))
+        found = self._beside(found, "other explanations", lambda: self._supported(found))
+        return self._beside(found, "the other law", lambda: self._with_rival(found, start))
 
     def _beside(self, found: LawResult, what: str, search: Callable[[], LawResult]) -> LawResult:
         """Return what a further search finds; the law found before it where it breaks down."""
@@ -115,7 +126,7 @@ class LawSearch:
         paper = self.search.find_from_afar(start, weights)
         if paper is not None and paper.converged:
             tests = score_tests(self.search, paper, (*FLOATING, *self.assumptions.tried))
-            if tests is not None and not self._is_doubted(tests):
+            if tests is not None and not self._is_doubted(tests, paper):
                 return self._undoubted(paper, tests)
         starts = {"paper": start, "floating": floating}
         if paper is None:
@@ -126,10 +137,13 @@ class LawSearch:
             lambda: self._compared(starts, weights, paper),
         )
 
-    def _is_doubted(self, tests: ScoreTests) -> bool:
-        """Return whether the law may be another, from the score tests under the paper's.
+    def _is_doubted(self, tests: ScoreTests, paper: Mode) -> bool:
+        """Return whether the law may be another, from the mode of the paper's and its score tests.
 
-        A body that floats seems, under the paper's law, to have a weak drag with a linear part.
+        A body that floats seems, under the paper's law, to have a weak drag with a linear part. On
+        a small orbit, where the flow is nearly linear in the place, another flow and a far smaller
+        C_d imitate the water's push so well that its test finds nothing. They cannot imitate how
+        the drag grows with the speed, nor how the block turns.
         """
         sigmas = tests.sigmas
         if tests.chi_squared(dict.fromkeys(self._floating_names, 0.0)) > LAW.doubted_chi_squared:
@@ -137,8 +151,18 @@ class LawSearch:
         linear = max(sigmas.get("linear_share", 0.0), -sigmas.get("drag_power", 0.0))
         if linear > LAW.doubted_linear_sigmas:
             return True
-        numbers = set(sigmas) - set(FLOATING) - set(DRAG_SHAPES)
-        return any(abs(sigmas[name]) > OPENED_SIGMAS for name in numbers)
+        numbers = set(sigmas) - set(FLOATING)
+        if any(abs(sigmas[name]) > OPENED_SIGMAS for name in numbers):
+            return True
+        return self._turns_by_itself(paper) or self._stays_on_a_small_orbit()
+
+    def _stays_on_a_small_orbit(self) -> bool:
+        """Return whether the block is within a side of one place, as a standard deviation."""
+        passes = self.search.passes
+        return passes.flows == 1 and all(
+            math.hypot(float(np.nanstd(one.x)), float(np.nanstd(one.y))) < passes.body.side
+            for one in passes.series
+        )
 
     @property
     def _floating_names(self) -> tuple[str, ...]:
@@ -229,11 +253,8 @@ class LawSearch:
             return found
         if found.settled_by > LAW.decisive_evidence and not self._is_challenged(mode):
             return found
-        fixed = {name: value for name, value in mode.point.fixed.items() if name not in FLOATING}
-        fixed |= {} if found.floating else FLOATING
-        point = replace(start, opened=mode.point.opened, fixed=fixed)
-        rival = self.search.find_from_afar(point, mode.weights)
-        if rival is None or not rival.converged:
+        rival = self._other_law(found, start)
+        if rival is None:
             return found
         ahead = self._ahead(rival, mode)
         if ahead <= LEAST_EVIDENCE:
@@ -243,6 +264,40 @@ class LawSearch:
         evidence = {"paper": evidence_of(paper, prior), "floating": evidence_of(floating, prior)}
         other = LawResult(rival, rival, not found.floating, evidence, ahead, None)
         return self.selection.select(other)
+
+    def _other_law(self, found: LawResult, start: Point) -> Mode | None:
+        """Return the mode of the other law with the same numbers opened; nothing without one."""
+        mode = found.mode
+        fixed = {name: value for name, value in mode.point.fixed.items() if name not in FLOATING}
+        fixed |= {} if found.floating else FLOATING
+        point = replace(start, opened=mode.point.opened, fixed=fixed)
+        rival = self.search.find_from_afar(point, mode.weights)
+        return rival if rival is not None and rival.converged else None
+
+    def _supported(self, found: LawResult) -> LawResult:
+        """Return the law without the numbers that other explanations account for."""
+        mode, known = found.mode, self.assumptions.opened
+        names = [name for name in LAW_NUMBERS if name in mode.point.opened and name not in known]
+        objections = self.alternatives.objections(mode, names) if names else {}
+        if not objections:
+            return found
+        closed = self.selection.without(mode, set(objections)) or found.base
+        unsettled = (*found.unsettled, *objections.values())
+        return replace(found, mode=closed, unsettled=unsettled, rivals=(*found.rivals, mode))
+
+    def _with_rival(self, found: LawResult, start: Point) -> LawResult:
+        """Return the law, and the other one as well where the recording cannot tell them."""
+        if self.assumptions.pressure_gradient != "auto" or found.settled_by >= LEAST_EVIDENCE:
+            return found
+        rival = self._other_law(found, start)
+        if rival is None:
+            return found
+        why = (
+            "the recording cannot tell the paper's force law from a floating body's: the intervals "
+            "of C_d and σ_F hold those of both; state the law if you know it"
+        )
+        unsettled = (*found.unsettled, why)
+        return replace(found, unsettled=unsettled, rivals=(*found.rivals, rival))
 
     def _is_challenged(self, mode: Mode) -> bool:
         """Return whether the score tests of a floating body's numbers contradict the law."""

@@ -331,34 +331,27 @@ def _windows(lengths: Floats) -> npt.NDArray[np.intp]:
 
 def _axes(track: Track, time: Floats) -> list[Axis]:
     """Return x and y, and the orientation where most samples have one."""
-    unknown = np.full(time.size, np.nan)
-    axes = _alike(Track(time, track.x, track.y, unknown))
+    known = estimate_tracking_noise(track._replace(time=time))
+    moving = known.position_noise_m, known.acceleration_intensity_m2_s3
+    axes = [_axis(time, values, *moving) for values in (track.x, track.y)]
     seen = np.isfinite(track.theta)
     if seen.mean() < ORIENTED_SHARE or np.ptp(track.theta[seen]) == 0.0:
         return axes
-    turned = np.unwrap(track.theta[seen])
-    # Estimated as if it were both coordinates of a position: those have noise and intensity.
-    found = _alike(Track(time[seen], turned, turned, unknown[seen]))[0]
-    theta = unknown.copy()
-    theta[seen] = turned
-    return [*axes, found._replace(values=theta)]
+    theta = np.full(time.size, np.nan)
+    theta[seen] = np.unwrap(track.theta[seen])
+    turning = known.orientation_noise_rad, known.orientation_intensity_rad2_s3
+    return [*axes, _axis(time, theta, *turning)]
 
 
-def _alike(track: Track) -> list[Axis]:
-    """Return two coordinates that share their noise and intensity."""
-    noise = estimate_tracking_noise(track)
-    interval = float(np.median(np.diff(track.time)))
-    axes = []
-    for values in (track.x, track.y):
-        steps = np.abs(np.diff(values))
-        slow = np.minimum(steps, np.quantile(steps, DROPPED.fast_quantile))
-        usual = math.sqrt(float((slow**2).mean()))
-        # Neither is exactly zero: a covariance has to be one.
-        least = max(1e-2 * usual, 1e-12)
-        std = max(np.nan_to_num(noise.position_noise_m), least)
-        intensity = max(noise.acceleration_intensity_m2_s3, 1e-6 * std**2 / interval**3)
-        axes.append(Axis(values, std, intensity, usual))
-    return axes
+def _axis(time: Floats, values: Floats, noise: float, intensity: float) -> Axis:
+    seen = np.isfinite(values)
+    interval = float(np.median(np.diff(time[seen])))
+    steps = np.abs(np.diff(values[seen]))
+    slow = np.minimum(steps, np.quantile(steps, DROPPED.fast_quantile))
+    usual = math.sqrt(float((slow**2).mean()))
+    # Neither is exactly zero: a covariance has to be one.
+    std = max(np.nan_to_num(noise), 1e-2 * usual, 1e-12)
+    return Axis(values, std, max(intensity, 1e-6 * std**2 / interval**3), usual)
 
 
 def _rates(likelihood: Floats, *, without: tuple[int, ...] = ()) -> tuple[Floats, float]:

@@ -56,6 +56,7 @@ TESTED: Final = {
     "angle_offset": "orientation offset",
     "marker_x": "marker off by, x",
     "marker_y": "marker off by, y",
+    "strength_trend": "strength of the flow, straight line",
     **{f"strength_{k}": f"strength of the flow, cosine {k}" for k in range(1, 7)},
 }
 """Words for the numbers that score tests look at."""
@@ -294,7 +295,7 @@ def _why(name: str, sigmas: float) -> str:
     if name.startswith("water_"):
         return "the two force laws were compared as a whole"
     if name.startswith("strength_"):
-        return "the cosines are tested together, and fitted together or not at all"
+        return "line and cosines are tested together, and fitted together or not at all"
     if abs(sigmas) <= least:
         return f"too weak: fitted from {least:g} on"
     return "too small to matter, of the wrong sign, or not found by the fit"

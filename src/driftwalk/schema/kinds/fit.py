@@ -138,6 +138,12 @@ variables (the angle is in the state):
 variables (two laws were fitted):
     law_settled_by [1]: difference of the logarithms of the evidence for the law and for the other \
         one; below 3 the recording cannot tell them apart
+variables (one flow is fitted, and the recording is long enough to see its shape change):
+    flow_shape_p_value [1]: chance that the errors of a steady flow go to and fro so much in the \
+        cells of the tank together; below 1e-6 the shape of the flow changes
+    flow_shape_frequency [Hz]: at which the strength of the flow does most; NaN where it does not
+    flow_shape_detectable [1]: change, over the strength of the flow, that this test finds nine \
+        times in ten; NaN where it is not known
 variables (numbers of departures were tested):
     departure_estimate(departure): estimates of closed numbers by score tests at the end of the \
         search; in SI units; the model is 0
@@ -180,6 +186,11 @@ attributes:
     arena
     source
     study
+attributes (the shape of the flow changes):
+    flow_shape_change text: how, in a sentence
+attributes (the law is not settled):
+    law_unsettled text: reasons why a number of the law was not opened, or why the intervals hold \
+        those of another law, too
 attributes (the model was not checked):
     check_left_out text: reason why the model was not checked
 attributes (the wall was to be estimated, and was not):

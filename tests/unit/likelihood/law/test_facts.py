@@ -12,6 +12,7 @@ from fit_worlds import fitted
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.law.force_law import FLOATING, assumptions_of
 from driftwalk.likelihood.law.forward_selection import LawResult
+from driftwalk.likelihood.newton import Mode
 from driftwalk.likelihood.result import law_facts
 from driftwalk.model import Study, apply_overrides
 from driftwalk.schema.check import check_dataset
@@ -24,8 +25,9 @@ def facts_of(stated: dict[str, Any]) -> dict[str, Any]:
     floating = assumptions.pressure_gradient == "on"
     fixed = {**assumptions.fixed, **(FLOATING if floating else {})}
     point = Point(np.zeros((2, 1, 1)), 0.0, 0.0, 0.0, opened=assumptions.opened, fixed=fixed)
-    law = SimpleNamespace(floating=floating, settled_by=np.inf, mode=SimpleNamespace(point=point))
-    return law_facts(cast(LawResult, law), assumptions)
+    mode = cast(Mode, SimpleNamespace(point=point))
+    law = LawResult(mode, mode, floating, {}, np.inf, None)
+    return law_facts(law, assumptions)
 
 
 @pytest.mark.parametrize(

@@ -30,8 +30,8 @@ def trial_of(sigmas: Mapping[str, float]) -> ScoreTests:
 
 
 def test_what_the_recording_asks_for_most_comes_first() -> None:
-    """By chi squared less its degrees of freedom: of the strengths 6 times 3 squared, less 6."""
-    trial = trial_of({"force_memory": 6.0, "marker_x": 7.5, **dict.fromkeys(STRENGTHS, 3.0)})
+    """By chi squared less its degrees of freedom: of the strengths 7 times 3 squared, less 7."""
+    trial = trial_of({"force_memory": 6.0, "marker_x": 7.6, **dict.fromkeys(STRENGTHS, 3.0)})
     asked = dict.fromkeys(trial.names, 0.1) | PULSE
     assert _parts(asked, trial) == [("marker_x",), STRENGTHS, ("force_memory",), tuple(PULSE)]
 
@@ -86,7 +86,8 @@ def test_a_law_that_was_found_amid_departures_is_compared_again(settled_by: floa
     ready = prepare([driven(5, 200.0, {})], study, None, None)
     passes = ready.passes
     assumptions = assumptions_of(study, ready.angle, recordings=1, flows=1)
-    search = LawSearch(ModeSearch(passes, Prior(passes), study.fit.iterations), assumptions)
+    modes = ModeSearch(passes, Prior(passes), study.fit.iterations)
+    search = LawSearch(modes, assumptions, ready.undisturbed)
     start = first_point(ready, passes.spline)
     weights = first_weights(ready.tracks, passes.spline)
     afar = replace(start, opened={"linear_share": 0.1}, fixed=dict(FLOATING))

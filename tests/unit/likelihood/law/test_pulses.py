@@ -8,16 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from driftwalk.likelihood.law.score_tests import find_pulses
+from driftwalk.likelihood.law.score_tests import Scores, find_pulses
 
 
 def spectrum_of(time: np.ndarray, products: np.ndarray) -> Any:
-    """Return what `find_pulses` needs of passes and mode, with given products of each sample."""
-    series = SimpleNamespace(time=time, flow=0)
-    passes = SimpleNamespace(
-        series=[series], strength_products=lambda *_: (products, np.ones(time.size))
-    )
-    return find_pulses(passes, SimpleNamespace(point=SimpleNamespace(in_flow=lambda _: None)))
+    """Return the pulse of a series with given products of each sample."""
+    series: Any = SimpleNamespace(time=time)
+    return find_pulses([series], [Scores(products, np.ones(time.size), np.zeros((time.size, 2)))])
 
 
 @pytest.mark.parametrize("first", [0.0, 23.7])

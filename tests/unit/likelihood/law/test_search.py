@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +22,9 @@ from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.interval_inflation import _log_drag_std
 from driftwalk.likelihood.law.force_law import assumptions_of
 from driftwalk.likelihood.law.held_out import LAWS
+from driftwalk.likelihood.law.search import LawSearch
 from driftwalk.model import Study, apply_overrides
+from driftwalk.schema import build_flow_field, build_trajectory
 from driftwalk.schema.answers.facts import facts_of, fitted_value
 from driftwalk.schema.check import check_dataset
 
@@ -94,6 +98,52 @@ def test_the_law_of_a_floating_body_is_found(floating: xr.Dataset) -> None:
     assert forces.pressure_gradient
     assert forces.added_mass_share == 0.5
     assert forces.drag_coefficient == facts["drag_coefficient"]
+
+
+@pytest.mark.slow
+def test_on_a_small_orbit_the_two_laws_are_compared() -> None:
+    """A body that floats near the core of an eddy, over 5 % of the tank.
+
+    There the flow is nearly linear in the place, and another flow with a twentieth of the drag
+    imitates the push of the water: under the paper's law no score test objects.
+    """
+    truth = 0.41
+    world = {
+        "forces.drag_coefficient": truth,
+        "forces.force_std_N": 0.4e-3,
+        "forces.pressure_gradient": True,
+        "simulation.time_step_s": 0.002,
+        "observation.position_noise_m": 3e-4,
+        "observation.orientation_noise_rad": 0.009,
+    }
+    axis = np.linspace(-0.15, 0.15, 61)
+    x, y = np.meshgrid(axis - 0.05, axis - 0.02)
+    turn = 1.3 * np.exp(-0.5 * (x**2 + y**2) / 0.05**2)
+    inside = np.ones(x.shape, dtype=np.int8)
+    flow = build_flow_field(axis, axis, u=-turn * y - 0.1 * x, v=turn * x - 0.1 * y, flag=inside)
+    start = dw.simulation.Start(0.06, 0.02, 0.0)
+    time = np.arange(0.0, 420.0, 0.1)
+    run = dw.simulate(
+        apply_overrides(coarse_study(), world), flow, sample_time=time, start=start, seed=5
+    )
+    seen = run.isel(replicate=0, body=0, time=slice(200, None))
+    track = build_trajectory(
+        seen["time"].values - 20.0, *(seen[name].values for name in ("x", "y", "theta"))
+    )
+    fit = dw.fit_motion(track, study_with(keys=FIT_KEYS, added_mass="0"))
+    assert fit.attrs["force_law"] == "floating body"
+    assert within(fit, "drag_coefficient", truth), FALSE_ALARM
+
+
+@pytest.mark.parametrize(("radius", "small"), [(0.02, True), (0.04, False)])
+def test_a_small_orbit_is_one_of_a_side(radius: float, small: bool) -> None:
+    """The rms distance from the centre of a circle is its radius; the side is 3 cm."""
+    angle = np.linspace(0.0, 20.0 * np.pi, 2001)
+    series = SimpleNamespace(x=0.05 + radius * np.cos(angle), y=radius * np.sin(angle))
+    laws = object.__new__(LawSearch)
+    passes: Any = SimpleNamespace(series=[series], flows=1, body=SimpleNamespace(side=0.03))
+    laws.search = SimpleNamespace(passes=passes)  # type: ignore[assignment]
+    assert laws._stays_on_a_small_orbit() is small
 
 
 @pytest.mark.slow

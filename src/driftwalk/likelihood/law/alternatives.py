@@ -1,0 +1,102 @@
+"""Alternatives to an opened law: what else feigns a power of the drag or a memory of the force.
+
+Contacts with the wall that the filter takes for free motion, mistakes of the tracker and a flow
+whose shape changes leave errors that another law absorbs. Such a law is opened only where the
+recording asks for it without them, too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Final, NamedTuple
+
+from driftwalk.likelihood.filter.series import Series, usable_intervals
+from driftwalk.likelihood.law.forward_selection import ForwardSelection, is_retained
+from driftwalk.likelihood.law.shape_changes import ShapeChange, find_shape_change
+from driftwalk.likelihood.newton import FROM_ANOTHER, Mode, ModeSearch
+
+LAW_NUMBERS: Final[Mapping[str, tuple[str, str]]] = {
+    "linear_share": ("a linear part of the drag, a share", ""),
+    "drag_power": ("a power of the drag", ""),
+    "force_memory": ("a memory of the force", " s"),
+}
+"""Numbers of the law, in words, with their units."""
+
+
+class AlternativesPolicy(NamedTuple):
+    """When an alternative explains what a number of the law was opened for."""
+
+    least_disturbed: float = 0.02
+    """Share of the intervals near the wall or next to a gap from which on they are tried as an
+    alternative. Chosen by hand."""
+    same_sigmas: float = 3.0
+    """Standard deviations within which the number is the same without them: half of its least
+    effect counts as an error of the filter. Chosen by hand, as the retained sigmas."""
+
+
+ALTERNATIVE: Final = AlternativesPolicy()
+
+
+class Alternatives:
+    """Tries alternatives for the recordings of one fit."""
+
+    def __init__(
+        self,
+        search: ModeSearch,
+        selection: ForwardSelection,
+        undisturbed: Callable[[], Sequence[Series]],
+    ) -> None:
+        """Keep the selection of the numbers, and what makes the undisturbed series."""
+        self.search, self.undisturbed = search, undisturbed
+        self.least, self.scores = selection.least, selection.scores
+
+    def shape_change(self, mode: Mode) -> ShapeChange | None:
+        """Return the change of the flow's shape at a mode; nothing with several flows."""
+        passes = self.search.passes
+        if passes.flows > 1:
+            return None
+        return find_shape_change(passes.series, self.scores.at(mode), side=passes.body.side)
+
+    def objections(self, mode: Mode, names: Sequence[str]) -> dict[str, str]:
+        """Return for each number of the law that an alternative explains why, in a sentence."""
+        shape = self.shape_change(mode)
+        if shape is not None and shape.significant:
+            why = "the shape of the flow changes, which feigns such a law"
+            return {name: f"{_found(mode, name)} was not opened: {why}" for name in names}
+        series, usable = self.undisturbed(), usable_intervals(self.search.passes.series)
+        share = usable_intervals(series) / max(usable, 1)
+        if share > 1.0 - ALTERNATIVE.least_disturbed:
+            return {}
+        alone = self.search.of(series).shortened().find(mode.point, mode.weights, held=FROM_ANOTHER)
+        return {
+            name: (
+                f"{_found(mode, name)} was not opened: {self._without(alone, name, share)}; "
+                "contacts with the wall or mistakes of the tracker feign such a law: record where "
+                "the block stays away from the wall"
+            )
+            for name in names
+            if alone is None or not alone.converged or not self._same(mode, alone, name)
+        }
+
+    def _same(self, mode: Mode, alone: Mode, name: str) -> bool:
+        (value, _), (other, std) = mode.value_of(name), alone.value_of(name)
+        error = math.hypot(std, 0.5 * self.least.get(name, 0.0))
+        same = abs(value - other) <= ALTERNATIVE.same_sigmas * error
+        return same and is_retained(alone, name, self.least)
+
+    def _without(self, alone: Mode | None, name: str, share: float) -> str:
+        left = (
+            f"the {share:.0%} of the intervals that are half a side or more from the wall and not "
+            "next to a gap"
+        )
+        if alone is None or not alone.converged:
+            return f"{left} do not determine it"
+        value, std = alone.value_of(name)
+        return f"in {left} it is {value:.3g} ± {std:.2g}{LAW_NUMBERS[name][1]}"
+
+
+def _found(mode: Mode, name: str) -> str:
+    value, std = mode.value_of(name)
+    words, unit = LAW_NUMBERS[name]
+    return f"{words} of {value:.3g} ± {std:.2g}{unit}"
