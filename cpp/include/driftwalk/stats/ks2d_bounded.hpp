@@ -256,16 +256,21 @@ private:
   // so many that the sweep takes less time.
   bool count_candidates() {
     constexpr std::int64_t most_looks = 16; // for each point; measured
-    std::int32_t* const candidate = ks_take_later<std::int32_t>(n_);
+    char* scratch = at_;
+    std::int32_t* const candidate = ks_take<std::int32_t>(scratch, n_);
+    std::int32_t* const row_met = ks_take<std::int32_t>(scratch, columns_.count);
     std::int64_t count = 0;
     Weight highest[2] = {surely_[0], surely_[1]};
-    for (std::int64_t r = 0; r < rows_.count; ++r) {
-      std::int64_t k = rows_.begin[r];
-      for (int sample = 0; sample < 2; ++sample) {
-        const std::int64_t end = k + rows_.size[sample][r];
-        for (; k < end; ++k) {
+    for (int sample = 0; sample < 2; ++sample) {
+      for (std::int64_t c = 0; c < columns_.count; ++c) {
+        row_met[c] = -1;
+      }
+      for (std::int64_t r = 0; r < rows_.count; ++r) {
+        const std::int64_t begin = rows_.begin[r] + (sample == 0 ? 0 : rows_.size[0][r]);
+        const std::int64_t end = begin + rows_.size[sample][r];
+        for (std::int64_t k = end - 1; k >= begin; --k) {
           candidate[count] = std::int32_t(k);
-          count += bound_[k] >= surely_[sample];
+          count += bound_[k] >= surely_[sample] && !is_met(k, r, row_met);
           highest[sample] = ks_larger(highest[sample], bound_[k]);
         }
       }
@@ -302,6 +307,19 @@ private:
     }
     return true;
   }
+
+  // Whether a point of the same sample and the same two numbers was met before; it is the later one
+  // of the sample. Known where the column and the row have one number each.
+  bool is_met(std::int64_t k, std::int64_t r, std::int32_t* row_met) const {
+    const std::int32_t c = in_row_[k].bucket();
+    if (rows_.is_value[r] == 0 || columns_.is_value[c] == 0) {
+      return false;
+    }
+    const bool is_met = row_met[c] == r;
+    row_met[c] = std::int32_t(r);
+    return is_met;
+  }
+
   // Points that an origin of a column and a row is compared with.
   std::int64_t looks(std::int64_t c, std::int64_t r) const {
     return columns_.begin[c + 1] - columns_.begin[c] + rows_.begin[r + 1] - rows_.begin[r];
