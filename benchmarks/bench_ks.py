@@ -7,6 +7,8 @@ out; medians of processor time:
 
 * "unsorted": both samples as they come; "prepared": the first one prepared (`ks_reference`), as a
   calibration does with the recording; both again on every instruction set that this processor has;
+* a line below: "pixels", steps between positions on a pixel grid, where lengths and angles repeat,
+  and "grid", samples rounded to some 70 values an axis, in turn with the samples without ties;
 * "ns a point": the unsorted time over the 2 n points of both samples;
 * "merging": an O(n log^2 n) merge of prefix sums, vectorised in NumPy; once;
 * "loop": one origin at a time with boolean masks, O(n^2), as the usual pure-Python packages do. It
@@ -45,6 +47,28 @@ def samples(n: int) -> tuple[Points, Points]:
         np.column_stack([rng.gamma(4.0, 1.6e-3 * scale, n), rng.vonmises(0.0, 4.0, n)])
         for scale in (1.0, 1.02)
     )
+    return a, b
+
+
+def pixel_samples(n: int, pixel: float = 2.5e-4) -> tuple[Points, Points]:
+    """Steps of a drifting block whose positions [m] were read off a grid of pixels."""
+    rng = np.random.default_rng(n)
+    found = []
+    for scale in (1.0, 1.02):
+        length = rng.gamma(4.0, 1.6e-3 * scale, 2 * n)
+        heading = np.cumsum(rng.vonmises(0.0, 4.0, 2 * n))
+        path = np.cumsum(length[:, None] * np.column_stack([np.cos(heading), np.sin(heading)]), 0)
+        step = np.diff(np.round(path / pixel) * pixel, axis=0)
+        step = step[np.hypot(*step.T) > 0][: n + 1]
+        turn = np.diff(np.arctan2(step[:, 1], step[:, 0]))
+        found.append(np.column_stack([np.hypot(*step[1:].T), np.angle(np.exp(1j * turn))]))
+    return found[0], found[1]
+
+
+def grid_samples(n: int) -> tuple[Points, Points]:
+    """Normal numbers rounded to tenths."""
+    rng = np.random.default_rng(n)
+    a, b = (np.round(rng.normal(size=(n, 2)) * scale, 1) for scale in (1.0, 1.02))
     return a, b
 
 
@@ -111,6 +135,15 @@ def check(name: str, found: tuple[int, int], expected: tuple[int, int]) -> None:
         sys.exit(f"wrong answer: {name} gives {found}, expected {expected}")
 
 
+def check_tied(name: str, a: Points, b: Points) -> None:
+    """Check against the loop up to 5,000 points, and against all mirrored axes."""
+    found = _core.ks_compare(a, b, False)[:2]
+    if len(a) <= 5000:
+        check(name, found, by_loop(a, b))
+    for mirror in ((-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)):
+        check(f"{name}, mirrored", _core.ks_compare(a * mirror, b * mirror, False)[:2], found)
+
+
 def on(instruction_set: str, call: Callable[[], KsComparison]) -> Callable[[], KsComparison]:
     """Return the call, made on an instruction set; "" is the one that the core chooses."""
 
@@ -151,6 +184,20 @@ def bench(n: int, rounds: int) -> None:
             f"{merging_ms:>9.0f} {mark}{loop_ms:>10.0f} {merging_ms / ours_ms:>12.0f} "
             f"{loop_ms / ours_ms:>9.0f}"
         )
+    tied_ways: dict[str, Callable[[], object]] = {}
+    for kind, (first, second) in (("pixels", pixel_samples(n)), ("grid", grid_samples(n))):
+        prepared = ks_reference(first)
+        check_tied(f"{n} {kind}", first, second)
+        tied_ways[f"{kind}"] = lambda first=first, second=second: _core.ks_compare(
+            first, second, False
+        )
+        tied_ways[f"{kind}, prepared"] = lambda prepared=prepared, second=second: (
+            prepared.native.compare(second, False)
+        )
+    tied_ways["no ties"] = lambda: _core.ks_compare(a, b, False)
+    tied_ways["no ties, prepared"] = lambda: reference.native.compare(b, False)
+    tied = median_ms(tied_ways, rounds)
+    print(f"{'':>7} " + ", ".join(f"{name} {ms:.3f}" for name, ms in tied.items()), flush=True)
     if n > OTHERS_UP_TO:
         return
     others = median_ms(

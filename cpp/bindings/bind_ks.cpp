@@ -52,7 +52,7 @@ struct Columns {
 // What a thread keeps between calls, so that a call allocates nothing once it is warm.
 struct Scratch {
   KsWorkspace workspace;
-  KsReference reference;
+  Columns first;
   Columns columns;
 };
 Scratch& scratch() {
@@ -64,27 +64,27 @@ Place place_of(const KsPlace& place) {
   return {place.x, place.y, place.quadrant, place.index};
 }
 
-Result compare_with(const KsReference& reference, const Points& points, bool limits) {
-  Scratch& own = scratch();
-  own.columns.assign(points);
-  const KsResult r =
-      ks_two_sample(reference, own.columns.x.data(), own.columns.y.data(), own.columns.size(),
-                    own.workspace, limits ? KsTies::limits : KsTies::strict);
+Result result_of(const KsResult& r) {
   return {r.d1, r.d2, r.n1, r.n2, r.tied, place_of(r.place1), place_of(r.place2)};
 }
 
 Result compare(const KsReference& reference, const Points& points, bool limits) {
   const nb::gil_scoped_release released;
-  return compare_with(reference, points, limits);
+  Scratch& own = scratch();
+  own.columns.assign(points);
+  return result_of(ks_two_sample(reference, own.columns.x.data(), own.columns.y.data(),
+                                 own.columns.size(), own.workspace,
+                                 limits ? KsTies::limits : KsTies::strict));
 }
 
 Result compare_once(const Points& a, const Points& b, bool limits) {
   const nb::gil_scoped_release released;
   Scratch& own = scratch();
-  own.columns.assign(a);
-  own.reference.assign(own.columns.x.data(), own.columns.y.data(), own.columns.size(),
-                       own.workspace);
-  return compare_with(own.reference, b, limits);
+  own.first.assign(a);
+  own.columns.assign(b);
+  return result_of(ks_two_sample(own.first.x.data(), own.first.y.data(), own.first.size(),
+                                 own.columns.x.data(), own.columns.y.data(), own.columns.size(),
+                                 own.workspace, limits ? KsTies::limits : KsTies::strict));
 }
 
 // (D n1 n2, points that tie, place)

@@ -26,6 +26,20 @@ void sweep_with(InstructionSet set, const KsSweep& sweep, KsBest best[2]) {
   ks_sweep_baseline(sweep, best);
 }
 
+bool bounded_with(InstructionSet set, const KsPlain& samples, KsFound found[2],
+                  std::int64_t& tied) {
+#if defined(DRIFTWALK_X86_LANES)
+  if (set == InstructionSet::avx512) {
+    return ks_bounded_avx512(samples, found, tied);
+  }
+  if (set == InstructionSet::avx2) {
+    return ks_bounded_avx2(samples, found, tied);
+  }
+#endif
+  (void)set;
+  return ks_bounded_baseline(samples, found, tied);
+}
+
 constexpr std::int64_t alignment = 64;
 
 } // namespace
@@ -40,14 +54,22 @@ struct KsReference::Data {
   KsSortedSample sorted;
   std::vector<double> x;
   std::vector<double> y;
+  bool is_tied() const { return sorted.x.tied || sorted.y.tied; }
 };
 
 struct KsWorkspace::Data {
   KsSortScratch sort;
   KsSortedSample sorted;
+  KsReference first; // where sample 1 comes unprepared
   KsGeometry geometry;
   KsTiedWeights tied;
   std::vector<unsigned char> scratch;
+
+  void* aligned_scratch(std::int64_t bytes) {
+    ks_grow(scratch, bytes + alignment);
+    const std::uintptr_t begin = reinterpret_cast<std::uintptr_t>(scratch.data());
+    return scratch.data() + (alignment - begin % alignment) % alignment;
+  }
 
   // Run the sweep over the geometry with its labels.
   void sweep(std::int64_t n1, std::int64_t n2, KsTies ties, InstructionSet set, KsBest best[2]) {
@@ -66,9 +88,7 @@ struct KsWorkspace::Data {
       job.tied_in_x = tied.in_x.data();
       job.tied_in_y = tied.in_y.data();
     }
-    ks_grow(scratch, ks_scratch_bytes(geometry.n) + alignment);
-    const std::uintptr_t begin = reinterpret_cast<std::uintptr_t>(scratch.data());
-    job.scratch = scratch.data() + (alignment - begin % alignment) % alignment;
+    job.scratch = aligned_scratch(ks_scratch_bytes(geometry.n));
     sweep_with(set, job, best);
     best[0].value *= common;
     best[1].value *= common;
@@ -147,6 +167,34 @@ KsResult compare_sorted(const KsReference::Data& first, const KsSortedSample& se
   return result;
 }
 
+// The same of two samples as they come; false where it has to be found by the sorted way.
+bool compare_plain(const double* x1, const double* y1, std::int64_t n1, const double* x2,
+                   const double* y2, std::int64_t n2, KsWorkspace::Data& work, KsTies ties,
+                   KsResult& result) {
+  if (ties != KsTies::strict || n1 + n2 < ks_bounded_from || n1 + n2 > ks_bounded_to) {
+    return false;
+  }
+  const std::int64_t common = std::gcd(n1, n2);
+  const KsPlain samples{{x1, x2},           {y1, y2},
+                        {n1, n2},           {n2 / common, -(n1 / common)},
+                        n1 * (n2 / common), work.aligned_scratch(ks_bounded_bytes(n1 + n2))};
+  KsFound found[2];
+  result.n1 = n1;
+  result.n2 = n2;
+  if (!bounded_with(chosen_instruction_set(), samples, found, result.tied)) {
+    return false;
+  }
+  result.d1 = found[0].value * common;
+  result.d2 = found[1].value * common;
+  if (found[0].row >= 0) {
+    result.place1 = {x1[found[0].row], y1[found[0].row], found[0].quadrant, found[0].row};
+  }
+  if (found[1].row >= 0) {
+    result.place2 = {x2[found[1].row], y2[found[1].row], found[1].quadrant, found[1].row};
+  }
+  return true;
+}
+
 KsResult without_points(std::int64_t n1, std::int64_t n2) {
   KsResult result;
   result.n1 = n1;
@@ -162,8 +210,14 @@ KsResult ks_two_sample(const KsReference& reference, const double* x2, const dou
     return without_points(reference.size(), n2);
   }
   KsWorkspace::Data& work = workspace.data();
+  const KsReference::Data& first = reference.data();
+  KsResult result;
+  if (compare_plain(first.x.data(), first.y.data(), first.sorted.n, x2, y2, n2, work, ties,
+                    result)) {
+    return result;
+  }
   ks_sort(x2, y2, n2, work.sort, work.sorted);
-  return compare_sorted(reference.data(), work.sorted, x2, y2, work, ties);
+  return compare_sorted(first, work.sorted, x2, y2, work, ties);
 }
 
 KsResult ks_two_sample(const KsReference& first, const KsReference& second, KsWorkspace& workspace,
@@ -171,9 +225,32 @@ KsResult ks_two_sample(const KsReference& first, const KsReference& second, KsWo
   if (first.size() == 0 || second.size() == 0) {
     return without_points(first.size(), second.size());
   }
+  const KsReference::Data& one = first.data();
   const KsReference::Data& other = second.data();
-  return compare_sorted(first.data(), other.sorted, other.x.data(), other.y.data(),
-                        workspace.data(), ties);
+  KsWorkspace::Data& work = workspace.data();
+  KsResult result;
+  // Of sorted samples without ties the sweep takes no longer.
+  if ((one.is_tied() || other.is_tied()) &&
+      compare_plain(one.x.data(), one.y.data(), one.sorted.n, other.x.data(), other.y.data(),
+                    other.sorted.n, work, ties, result)) {
+    return result;
+  }
+  return compare_sorted(one, other.sorted, other.x.data(), other.y.data(), work, ties);
+}
+
+KsResult ks_two_sample(const double* x1, const double* y1, std::int64_t n1, const double* x2,
+                       const double* y2, std::int64_t n2, KsWorkspace& workspace, KsTies ties) {
+  if (n1 == 0 || n2 == 0) {
+    return without_points(n1, n2);
+  }
+  KsWorkspace::Data& work = workspace.data();
+  KsResult result;
+  if (compare_plain(x1, y1, n1, x2, y2, n2, work, ties, result)) {
+    return result;
+  }
+  work.first.assign(x1, y1, n1, workspace);
+  ks_sort(x2, y2, n2, work.sort, work.sorted);
+  return compare_sorted(work.first.data(), work.sorted, x2, y2, work, ties);
 }
 
 KsPeacock ks_peacock(const KsReference& reference, const double* x2, const double* y2,

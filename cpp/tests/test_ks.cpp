@@ -96,6 +96,102 @@ void compare_with_definition() {
   }
 }
 
+// What the whole result must be: the largest difference and, of origins that reach it, the first in
+// the order of x, then the highest, then the last of its sample.
+struct Expected {
+  std::int64_t value = 0;
+  std::int64_t row = -1;
+  int quadrant = -1;
+};
+Expected by_every_origin(const Sample& origins, const Sample& a, const Sample& b) {
+  Expected best;
+  for (std::size_t o = 0; o < origins.x.size(); ++o) {
+    for (int quadrant = 0; quadrant < 4; ++quadrant) {
+      const std::int64_t c1 = inside(a, origins.x[o], origins.y[o], quadrant, false, false);
+      const std::int64_t c2 = inside(b, origins.x[o], origins.y[o], quadrant, false, false);
+      const std::int64_t value = std::abs(b.size() * c1 - a.size() * c2);
+      const std::size_t other = best.row < 0 ? o : std::size_t(best.row);
+      const bool first = origins.x[o] != origins.x[other]   ? origins.x[o] < origins.x[other]
+                         : origins.y[o] != origins.y[other] ? origins.y[o] > origins.y[other]
+                                                            : o > other;
+      if (value > best.value || (value == best.value && value > 0 && first)) {
+        best = {value, std::int64_t(o), quadrant};
+      }
+    }
+  }
+  return best;
+}
+
+std::int64_t count_tied(const Sample& a, const Sample& b) {
+  Sample all = a;
+  all.x.insert(all.x.end(), b.x.begin(), b.x.end());
+  all.y.insert(all.y.end(), b.y.begin(), b.y.end());
+  std::int64_t tied = 0;
+  for (std::size_t i = 0; i < all.x.size(); ++i) {
+    bool is_tied = false;
+    for (std::size_t j = 0; j < all.x.size() && !is_tied; ++j) {
+      is_tied = i != j && (all.x[i] == all.x[j] || all.y[i] == all.y[j]);
+    }
+    tied += is_tied;
+  }
+  return tied;
+}
+
+void check_whole_result(const KsResult& r, const Sample& a, const Sample& b) {
+  const Expected first = by_every_origin(a, a, b);
+  const Expected second = by_every_origin(b, a, b);
+  CHECK(r.d1 == first.value && r.d2 == second.value);
+  CHECK(r.place1.index == first.row && r.place1.quadrant == first.quadrant);
+  CHECK(r.place2.index == second.row && r.place2.quadrant == second.quadrant);
+  CHECK(r.tied == count_tied(a, b));
+}
+
+// Samples large enough for bounds, with numbers that are hard to cut into buckets: those of a pixel
+// grid, the same but for rounding, far outliers, one column, samples that share most points.
+void compare_bounds_with_definition() {
+  std::mt19937_64 generator(20260102);
+  KsWorkspace workspace;
+  for (int kind = 0; kind < 9; ++kind) {
+    const int levels = kind == 1 ? 2 : kind == 2 || kind == 3 ? 9 : kind == 4 ? 200 : 0;
+    Sample a = random_sample(generator, 560 + std::int64_t(generator() % 40), levels);
+    Sample b = random_sample(generator, kind == 6 ? 30 + a.size() : 600, levels);
+    for (double& x : b.x) {
+      x += kind % 2 == 1 ? 1.0 : 0.0;
+    }
+    if (kind == 3) {
+      for (Values* values : {&a.x, &b.x, &a.y, &b.y}) {
+        for (double& value : *values) {
+          value += 0x1p-52 * double(generator() % 16);
+        }
+      }
+    }
+    if (kind == 5) {
+      a.x[7] = 1e300;
+      b.y[9] = -1e300;
+      std::fill_n(b.y.begin() + 100, 200, 0.25);
+    }
+    if (kind == 6) { // all but the last points
+      std::copy(a.x.begin(), a.x.end(), b.x.begin());
+      std::copy(a.y.begin(), a.y.end(), b.y.begin());
+    }
+    if (kind == 7) {
+      std::fill(a.x.begin(), a.x.end(), -0.0);
+      std::fill(b.x.begin(), b.x.end(), 0.0);
+    }
+    if (kind == 8) {
+      std::fill(a.y.begin(), a.y.end(), 2.0);
+      std::fill(b.y.begin(), b.y.begin() + 300, 2.0);
+    }
+    const KsReference first(a.x.data(), a.y.data(), a.size());
+    const KsReference second(b.x.data(), b.y.data(), b.size());
+    check_whole_result(ks_two_sample(a.x.data(), a.y.data(), a.size(), b.x.data(), b.y.data(),
+                                     b.size(), workspace),
+                       a, b);
+    check_whole_result(ks_two_sample(first, b.x.data(), b.y.data(), b.size(), workspace), a, b);
+    check_whole_result(ks_two_sample(first, second, workspace), a, b);
+  }
+}
+
 // Beyond 65,536 points positions need 32 bits; sizes without a common factor need wide weights.
 void compare_wide_with_narrow() {
   std::mt19937_64 generator(7);
@@ -181,6 +277,7 @@ int main() {
     }
     environment::choose_instruction_set(name(set));
     compare_with_definition();
+    compare_bounds_with_definition();
     compare_wide_with_narrow();
     check_permutations();
     check_edges();

@@ -17,6 +17,9 @@ void check_pair(const Sample& a, const Sample& b, KsTies ties, KsWorkspace& work
   const Differences expected = by_tree(a, b, ties);
   const KsResult r = ks_two_sample(first, b.x.data(), b.y.data(), b.size(), workspace, ties);
   CHECK(r.d1 == expected.d1 && r.d2 == expected.d2);
+  const KsResult plain = ks_two_sample(a.x.data(), a.y.data(), a.size(), b.x.data(), b.y.data(),
+                                       b.size(), workspace, ties);
+  CHECK(plain.d1 == expected.d1 && plain.d2 == expected.d2 && plain.tied == r.tied);
   const KsResult prepared = ks_two_sample(first, second, workspace, ties);
   CHECK(prepared.d1 == expected.d1 && prepared.d2 == expected.d2);
 }
@@ -59,6 +62,11 @@ void check_sizes() {
       check_pair(a, random_sample(generator, size[1], levels),
                  levels > 0 ? KsTies::limits : KsTies::strict, workspace);
     }
+  }
+  // On a pixel grid, where the bounds serve.
+  for (const std::int64_t n : {1'000, 20'000, 100'003}) {
+    check_pair(random_sample(generator, n, 40), random_sample(generator, n + 1, 40), KsTies::strict,
+               workspace);
   }
   // Equal to itself everywhere, so that no difference is there to be found.
   const Sample a = random_sample(generator, 3'000, 0);

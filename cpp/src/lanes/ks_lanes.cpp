@@ -1,4 +1,5 @@
-// The sweep of the KS statistic, compiled once per instruction set.
+// The KS statistic by bounds and by the sweep, compiled once per instruction set.
+#include "driftwalk/stats/ks2d_bounded.hpp"
 #include "driftwalk/stats/ks2d_kernel.hpp"
 
 DRIFTWALK_LANES_BEGIN
@@ -17,9 +18,10 @@ void sweep_with(const KsSweep& sweep, KsBest best[2]) {
   }
 }
 
+// A quadrant is a sum of at most four terms, none beyond the total.
+constexpr std::int64_t narrow = std::numeric_limits<std::int32_t>::max() / 4;
+
 void sweep_any(const KsSweep& sweep, KsBest best[2]) {
-  // A quadrant is a sum of at most four terms, none beyond the total.
-  constexpr std::int64_t narrow = std::numeric_limits<std::int32_t>::max() / 4;
   if (sweep.total <= narrow) {
     sweep_with<std::int32_t>(sweep, best);
   } else {
@@ -32,4 +34,10 @@ DRIFTWALK_LANES_END
 
 void driftwalk::DRIFTWALK_PER_ISA(ks_sweep_)(const KsSweep& sweep, KsBest best[2]) {
   sweep_any(sweep, best);
+}
+
+bool driftwalk::DRIFTWALK_PER_ISA(ks_bounded_)(const KsPlain& samples, KsFound found[2],
+                                               std::int64_t& tied) {
+  return samples.total <= narrow ? KsBounded<std::int32_t>(samples).run(found, tied)
+                                 : KsBounded<std::int64_t>(samples).run(found, tied);
 }

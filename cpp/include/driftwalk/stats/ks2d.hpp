@@ -92,6 +92,11 @@ KsResult ks_two_sample(const KsReference& reference, const double* x2, const dou
 KsResult ks_two_sample(const KsReference& first, const KsReference& second, KsWorkspace& workspace,
                        KsTies ties = KsTies::strict);
 
+// The same where neither is: nothing is sorted in most cases.
+KsResult ks_two_sample(const double* x1, const double* y1, std::int64_t n1, const double* x2,
+                       const double* y2, std::int64_t n2, KsWorkspace& workspace,
+                       KsTies ties = KsTies::strict);
+
 // Peacock's statistic: the largest difference over every cut of the plane, not only over cuts at a
 // point. A cut at (X, Y) parts {x <= X} from {x > X} and {y <= Y} from {y > Y}.
 struct KsPeacock {

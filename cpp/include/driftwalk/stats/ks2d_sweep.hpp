@@ -51,4 +51,53 @@ void ks_sweep_baseline(const KsSweep& sweep, KsBest best[2]);
 void ks_sweep_avx2(const KsSweep& sweep, KsBest best[2]);
 void ks_sweep_avx512(const KsSweep& sweep, KsBest best[2]);
 
+// The same statistic without an order, of two samples as they come; see KsBounded.
+struct KsPlain {
+  const double* x[2];
+  const double* y[2];
+  std::int64_t n[2];
+  std::int64_t weight[2]; // as in KsSweep
+  std::int64_t total;
+  void* scratch; // ks_bounded_bytes(n[0] + n[1]), aligned to 64
+};
+
+// The largest |weight| with an origin of one sample, the row of that origin and the quadrant.
+struct KsFound {
+  std::int64_t value;
+  std::int64_t row; // -1 when the value is zero
+  std::int32_t quadrant;
+};
+
+// Points of both samples; with fewer the sweep takes no longer.
+constexpr std::int64_t ks_bounded_from = 1024;
+constexpr std::int64_t ks_bounded_to = std::int64_t(1) << 23;
+
+// Points that a bucket should hold. More make the bounds wide, fewer make many buckets.
+constexpr std::int64_t ks_bucket_points(std::int64_t n) {
+  std::int64_t points = 8;
+  while (64 * points * points < n) {
+    points += points / 8;
+  }
+  return points;
+}
+// Bins that an axis is dealt to: some to each bucket.
+constexpr std::int64_t ks_bins(std::int64_t n) {
+  std::int64_t bins = 128;
+  while (bins * ks_bucket_points(n) < 4 * n && bins < 1 << 16) {
+    bins *= 2;
+  }
+  return bins;
+}
+constexpr std::int64_t ks_most_buckets(std::int64_t n) {
+  return 5 * n / (2 * ks_bucket_points(n)) + 64;
+}
+constexpr std::int64_t ks_bounded_bytes(std::int64_t n) {
+  return 80 * n + 24 * ks_bins(n) + 96 * ks_most_buckets(n) + 16 * 1024;
+}
+
+// False, with nothing found, where the bounds do not pay; the sweep has to be run.
+bool ks_bounded_baseline(const KsPlain& samples, KsFound found[2], std::int64_t& tied);
+bool ks_bounded_avx2(const KsPlain& samples, KsFound found[2], std::int64_t& tied);
+bool ks_bounded_avx512(const KsPlain& samples, KsFound found[2], std::int64_t& tied);
+
 } // namespace driftwalk
