@@ -300,9 +300,7 @@ def test_the_truth_of_a_slow_orbit_is_in_the_intervals():
             "calibration.drag_coefficient_max": 1.2,
             "calibration.drag_coefficient_step": 0.1,
             "calibration.force_std_max_N": 0.5e-3,
-            "calibration.replicates": 2,
-            "calibration.refined_replicates": 4,
-            "calibration.bootstrap": 40,
+            "calibration.bootstrap": 60,
         },
     )
     recording = slow_recording(seed=11)

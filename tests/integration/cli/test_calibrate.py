@@ -328,7 +328,8 @@ def test_threads_and_instruction_sets_do_not_change_a_bit(
 
 @pytest.mark.slow
 def test_progress_through_a_pipe_is_plain_lines(study: Path, tmp_path: Path) -> None:
-    done = apart(*words(study, tmp_path / "run"), "--flow", FLOW, before=NO_FIGURES + CHATTY)
+    started = words(study, tmp_path / "run", "120s")
+    done = apart(*started, "--flow", FLOW, before=NO_FIGURES + CHATTY)
     assert done.code == 0
     lines = [line for line in done.err.splitlines() if line.startswith("calibrate: ")]
     assert len(lines) > 5
