@@ -46,8 +46,14 @@ def verdict_on(fit: xr.Dataset, criteria: Sequence[Criterion], *, study: Study) 
         *_too_little_seen(fit, side_m=side),
         *_not_determined(fit),
         *meaningless_of(facts_of(fit), side_m=side),
+        *_told(fit, "law_unsettled"),
     ]
-    return verdict_of(findings_of(criteria), unable)
+    return verdict_of([*_told(fit, "flow_shape_change"), *findings_of(criteria)], unable)
+
+
+def _told(fit: xr.Dataset, attribute: str) -> list[str]:
+    """Return what the search of the law has found, as a reason."""
+    return [fit.attrs[attribute]] if fit.attrs.get(attribute) else []
 
 
 def findings_of(criteria: Sequence[Criterion]) -> list[str]:

@@ -16,6 +16,7 @@ from driftwalk.schema.answers.facts import (
     flat_variables,
     is_open,
     sentences,
+    texts,
 )
 from driftwalk.schema.answers.force_law import (
     LINEAR_DRAG_ALONE,
@@ -224,9 +225,13 @@ def with_verdict(fit: xr.Dataset, check: xr.Dataset) -> xr.Dataset:
     -------
     xarray.Dataset
         The `fit`, with ``verdict``, ``verdict_reason`` (sentences), ``p_value`` by criterion and
-        the residuals by cell.
+        the residuals by cell; a warning that is a reason as well is told as a reason alone.
     """
     kept = check[["verdict", "verdict_reason", "p_value", *BY_CELL]].rename(PLACES)
+    rest = [
+        text for text in sentences(fit, "warning") if text not in sentences(check, "verdict_reason")
+    ]
+    fit = fit.drop_vars("warning").assign_coords(warning=("warning", texts(rest)))
     found = fit.merge(kept, combine_attrs="override", compat="override", join="outer")
     found["residual_cell_size"] = ((), check.attrs["cell_size_m"])
     return described(found)
