@@ -23,7 +23,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.processors import map_in_threads
 from driftwalk.core.random_streams import CheckStream
 from driftwalk.core.seeds import world_keys
-from driftwalk.likelihood.filter.parameters import PULSES, STRENGTH_TERMS, STRENGTHS, Point
+from driftwalk.likelihood.filter.parameters import PULSES, STRENGTHS, Point
 from driftwalk.likelihood.filter.series import Series, strength_of
 from driftwalk.likelihood.flow_intervals import fitted_flow, fitted_intervals
 from driftwalk.likelihood.preparation import Estimate
@@ -101,7 +101,7 @@ def _in_frames(flow: xr.Dataset, series: Series, point: Point) -> xr.Dataset:
     first, span = float(series.time[0]), float(series.time[-1] - series.time[0])
     if strength_of(series, point) is None:
         return flow
-    steps = [series.span / (FRAMES.per_half_wave * STRENGTH_TERMS)]
+    steps = [series.span / (FRAMES.per_half_wave * len(STRENGTHS))]
     repeat, end = "hold", span
     if any(point.number(name) for name in PULSES):
         period = 1.0 / max(point.number("pulse_frequency"), 1e-300)
