@@ -30,7 +30,6 @@ def fit(numbers: dict[str, float] | None = None, *, scale: float = 1.0) -> xr.Da
     axes = ("log_parameter", "other_log_parameter")
     found = made_up_fit().assign(covariance=(axes, scale * covariance))
     found = found.assign_coords(log_parameter=names, other_log_parameter=names)
-    found.attrs["schema_version"] = 2
     if not numbers:
         return found
     values, opened = list(numbers.values()), np.ones(len(numbers), bool)
@@ -107,7 +106,7 @@ def test_a_fit_without_covariance() -> None:
     assert has_uncertainty(fit())
     assert not has_uncertainty(made_up_fit())
     with pytest.raises(InputError, match="no covariance to draw parameters from"):
-        draw_parameters(made_up_fit().assign_attrs(schema_version=2), runs=2)
+        draw_parameters(made_up_fit(), runs=2)
 
 
 def test_every_run_has_its_drawn_law() -> None:

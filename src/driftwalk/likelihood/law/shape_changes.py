@@ -116,6 +116,7 @@ def shape_facts(found: ShapeChange | None, tests: ScoreTests | None) -> dict[str
         "flow_shape_frequency_Hz": found.frequency,
         "flow_shape_detectable": math.sqrt(found.found_nine_in_ten / SHAPE.efficiency) * std,
     }
+    facts = {name: value for name, value in facts.items() if math.isfinite(value)}
     return facts | ({"flow_shape_change": found.sentence} if found.significant else {})
 
 

@@ -225,7 +225,7 @@ def with_verdict(fit: xr.Dataset, check: xr.Dataset) -> xr.Dataset:
     -------
     xarray.Dataset
         The `fit`, with ``verdict``, ``verdict_reason`` (sentences), ``p_value`` by criterion and
-        the residuals by cell; a warning that is a reason as well is told as a reason alone.
+        the residuals by cell. A warning that is a reason of the verdict is left out.
     """
     kept = check[["verdict", "verdict_reason", "p_value", *BY_CELL]].rename(PLACES)
     rest = [
