@@ -16,6 +16,7 @@ import driftwalk as dw
 from driftwalk.assembly import assemble_drawn, draw_parameters, has_uncertainty
 from driftwalk.assembly.runs.draws import RUNS_PER_FLOW, draw_flow, draw_posterior
 from driftwalk.core.errors import InputError
+from driftwalk.schema.kinds.fit import FIT
 
 DRAG, FORCE = 0.39, 6e-4
 STD, CORRELATION = (0.08, 0.12), -0.6
@@ -30,6 +31,7 @@ def fit(numbers: dict[str, float] | None = None, *, scale: float = 1.0) -> xr.Da
     axes = ("log_parameter", "other_log_parameter")
     found = made_up_fit().assign(covariance=(axes, scale * covariance))
     found = found.assign_coords(log_parameter=names, other_log_parameter=names)
+    found.attrs["schema_version"] = FIT.version
     if not numbers:
         return found
     values, opened = list(numbers.values()), np.ones(len(numbers), bool)
@@ -106,7 +108,7 @@ def test_a_fit_without_covariance() -> None:
     assert has_uncertainty(fit())
     assert not has_uncertainty(made_up_fit())
     with pytest.raises(InputError, match="no covariance to draw parameters from"):
-        draw_parameters(made_up_fit(), runs=2)
+        draw_parameters(made_up_fit().assign_attrs(schema_version=FIT.version), runs=2)
 
 
 def test_every_run_has_its_drawn_law() -> None:
