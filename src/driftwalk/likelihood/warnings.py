@@ -63,22 +63,31 @@ def warnings_of(
     ]
 
 
-def meaningless_of(facts: Mapping[str, Any], *, side_m: float) -> list[str]:
-    """Return the warnings that say that a number of the fit has no meaning."""
+def meaningless_of(
+    facts: Mapping[str, Any],
+    *,
+    side_m: float,
+    wall_share: float = LIMIT.most_wall_share,
+    lever: float = LAW.notable_lever,
+) -> list[str]:
+    """Return the warnings that a number of the fit may mean nothing.
+
+    `wall_share` and `lever`, in sides of the block, are the largest ones without a warning.
+    """
     return [
-        *_on_the_wall(facts),
+        *_on_the_wall(facts, wall_share),
         *_on_the_likelihood(facts),
         *_on_two_uses_of_the_angle(facts),
-        *_on_the_lever(facts, side_m),
+        *_on_the_lever(facts, lever * side_m),
     ]
 
 
-def _on_the_wall(facts: Mapping[str, Any]) -> Iterator[str]:
-    if facts["wall_share"] > LIMIT.most_wall_share:
+def _on_the_wall(facts: Mapping[str, Any], most: float) -> Iterator[str]:
+    if facts["wall_share"] > most:
         yield (
             f"{facts['wall_share']:.0%} of the intervals are at the wall and were "
-            "left out: do not trust C_d above 30 %; record where the block stays "
-            "away from the wall"
+            "left out: C_d comes from the others alone; record where the block stays away from "
+            "the wall"
         )
 
 
@@ -109,13 +118,12 @@ def _on_two_uses_of_the_angle(facts: Mapping[str, Any]) -> Iterator[str]:
         )
 
 
-def _on_the_lever(facts: Mapping[str, Any], side_m: float) -> Iterator[str]:
-    lever = facts.get("force_lever_m_interval", (0.0, 0.0))[0]
-    if lever > LAW.notable_lever * side_m:
+def _on_the_lever(facts: Mapping[str, Any], most_m: float) -> Iterator[str]:
+    if facts.get("force_lever_m_interval", (0.0, 0.0))[0] > most_m:
         yield (
             f"the block turns as if the force acted {1e3 * facts['force_lever_m']:.2g} mm from its "
             "centre: the recorded angle is late, or not that of the block's faces, "
-            "or something else makes the block turn; C_d and the force are then wrong"
+            "or something else makes the block turn; C_d and the force may be wrong"
         )
 
 

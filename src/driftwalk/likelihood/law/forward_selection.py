@@ -13,7 +13,14 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.likelihood.filter.parameters import DRAG_SHAPES, NUMBERS, PULSES, STRENGTHS, Point
+from driftwalk.likelihood.filter.parameters import (
+    CHANGES,
+    DRAG_SHAPES,
+    NUMBERS,
+    PULSES,
+    STRENGTHS,
+    Point,
+)
 from driftwalk.likelihood.law.force_law import FLOATING, Assumptions
 from driftwalk.likelihood.law.score_tests import (
     Pulses,
@@ -218,11 +225,12 @@ class ForwardSelection:
         point = replace(mode.point, opened={**mode.point.opened, **candidates}, fixed=fixed)
         found = self._near(point, mode.weights)
         if found is not None and frequency is not None:
-            # A frequency has a derivative only once there are pulses.
-            fixed.pop("pulse_frequency")
+            # A frequency has a derivative only once there are pulses. Where it does not settle, the
+            # one of the spectrum stands.
+            free = {name: value for name, value in fixed.items() if name != "pulse_frequency"}
             opened = {**found.point.opened, "pulse_frequency": frequency}
-            point = replace(found.point, opened=opened, fixed=fixed)
-            found = self._near(point, found.weights)
+            point = replace(found.point, opened=opened, fixed=free)
+            found = self._near(point, found.weights) or found
         if found is None:
             return mode, set(candidates)
         idle = self._idle(found, set(candidates))
@@ -248,9 +256,14 @@ class ForwardSelection:
     def _has_changed(self, mode: Mode) -> bool:
         """Return whether the slow change of the flow's strength is more than chance.
 
-        Line and cosines are alike: each alone may be within its error where all of them are not.
+        Line and cosines are alike: each alone may be within its error where all of them are not,
+        or the change from the first sample to the last is not.
         """
         values, covariance = mode.values_of(STRENGTHS)
+        ends = np.array([name in CHANGES for name in STRENGTHS], dtype=np.float64)
+        error = math.hypot(math.sqrt(ends @ covariance @ ends), 0.5 * SELECTION.strength)
+        if abs(ends @ values) > SELECTION.retained_sigmas * error:
+            return True
         covariance = covariance + (0.5 * SELECTION.strength) ** 2 * np.eye(values.size)
         chi_squared = float(values @ np.linalg.solve(covariance, values))
         return chi_squared > SELECTION.retained_chi_squared

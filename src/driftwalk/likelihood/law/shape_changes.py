@@ -34,8 +34,10 @@ class ShapePolicy(NamedTuple):
     """Frequencies for each period that the recording holds."""
     block: int = 120
     """Frequencies in a block, whose median is the power without a line. Chosen by hand."""
-    false_alarms: float = 1e-6
-    """Chance that a steady flow has such a line at any frequency. Chosen by hand, as of pulses."""
+    false_alarms: float = 1e-14
+    """Chance that a steady flow has such a line at any frequency, were the errors normal. A body in
+    a steady flow whose tracker made mistakes had 2e-13, in flows that change it is below 1e-100
+    (development set of studies/verdict)."""
     efficiency: float = 0.2
     """Part of the information on a change that the cells hold: eddies that alternate by 11 to 46 %
     of the flow in 5 to 60 s had lines of 0.1 to 0.22 of it (docs/explanation/likelihood.md)."""

@@ -11,6 +11,7 @@ from fit_worlds import DRAG, FORCE_N, coarse_study, fitted, recording
 
 import driftwalk as dw
 from driftwalk.core.errors import InputError
+from driftwalk.likelihood.check.place import GROUP
 from driftwalk.model import apply_overrides
 from driftwalk.schema import build_trajectory
 from driftwalk.schema.answers.facts import facts_of
@@ -102,8 +103,8 @@ def test_sums_by_place_and_by_time_agree(check: xr.Dataset) -> None:
     by_time = (check["part_residual"] * check["part_count"]).sum("part").values
     assert by_place == pytest.approx(by_time)
     known = np.isfinite(check["residual_distance"].values)
-    assert (count[known] >= 10).all()
-    assert (count[~known] < 10).all()
+    assert (count[known] >= GROUP.fewest_in_cell).all()
+    assert (count[~known] < GROUP.fewest_in_cell).all()
 
 
 @pytest.mark.slow

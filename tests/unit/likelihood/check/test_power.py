@@ -61,6 +61,7 @@ def fit_of(*, measured: int, **facts: float) -> Any:
         "confidence": 0.9,
         "wall_share": 0.0,
         "restricted": True,
+        "drag_coefficient_relative_std": 0.02,
         **facts,
     }
     coords = {
@@ -88,7 +89,7 @@ def test_a_sound_fit_explains() -> None:
     ("facts", "why"),
     [
         ({"measured": 100}, "over 4% of the tank, 4.0 times its own area"),
-        ({"wall_share": 0.54}, "54% of the intervals are at the wall"),
+        ({"wall_share": 0.64}, "64% of the intervals are at the wall"),
         ({"restricted": False}, "the restricted likelihood has no minimum"),
         (
             {"angle_disagreement_std": 4.0, "drag_coefficient_angle_given": 0.8},
@@ -105,12 +106,18 @@ def test_a_number_without_a_meaning_cannot_tell(facts: dict[str, Any], why: str)
 
 def test_a_criterion_without_power_cannot_tell_unless_it_failed() -> None:
     blind = GOOD._replace(detectable=0.9)
-    word, reasons = said(fit_of(measured=1000), blind)
+    assert said(fit_of(measured=1000), blind)[0] == "explains"
+    word, reasons = said(fit_of(measured=1000, drag_coefficient_relative_std=0.15), blind)
     assert word == "cannot tell"
     assert "'steps' has no power: the smallest misfit that it finds is 0.9 (KS distance)" in reasons
     assert said(fit_of(measured=1000), GOOD._replace(p_value=np.nan))[0] == "cannot tell"
     failed = blind._replace(p_value=1e-6)
     assert said(fit_of(measured=1000), failed) == ("does not explain", failed.sentence)
+    word, reasons = said(fit_of(measured=1000, wall_share=0.2), failed)
+    assert word == "cannot tell"
+    assert "contacts with the wall, which are not fitted, can do that" in reasons
+    both = (failed, failed._replace(name="place"))
+    assert said(fit_of(measured=1000, wall_share=0.2), *both)[0] == "does not explain"
 
 
 def test_a_block_of_another_size_has_another_area() -> None:
