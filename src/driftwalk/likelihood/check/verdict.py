@@ -25,7 +25,7 @@ class EvidencePolicy(NamedTuple):
     """When a recording tells too little for a verdict.
 
     The visited share and area count together, so that in a large tank a block need not go further
-    than in a small one. What was chosen on the development set of studies/verdict is named so.
+    than in a small one. The development set is that of studies/verdict.
     """
 
     least_visited: float = 0.08
