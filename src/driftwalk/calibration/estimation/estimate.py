@@ -204,7 +204,10 @@ def find_optima(
 def _corrected(sample: Floats, bias: Floats, wider: Floats) -> Floats:
     """Return draws less the bias of the estimate, spread about their median."""
     middle = np.median(sample, axis=0)
-    return np.clip(middle - bias + wider * (sample - middle), 0.0, 1.0)
+    apart = sample - middle
+    # Where nothing is known of the spread it is infinite, and the median stays where it is.
+    spread = np.multiply(wider, apart, out=np.zeros_like(apart), where=apart != 0.0)
+    return np.clip(middle - bias + spread, 0.0, 1.0)
 
 
 def _profiles(
