@@ -95,7 +95,7 @@ def test_what_was_tested_is_a_table() -> None:
         ("angle_offset", -3.2, "too weak: fitted from 6 on"),
         ("force_memory", 4.5, "too small to matter, of the wrong sign, or not found by the fit"),
         ("water_spin", 7.0, "the two force laws were compared as a whole"),
-        ("strength_3", 4.0, "the cosines are tested together"),
+        ("strength_3", 4.0, "line and cosines are tested together"),
         ("marker_x", np.nan, "it has no estimate"),
     ],
 )
