@@ -175,9 +175,13 @@ bool compare_plain(const double* x1, const double* y1, std::int64_t n1, const do
     return false;
   }
   const std::int64_t common = std::gcd(n1, n2);
-  const KsPlain samples{{x1, x2},           {y1, y2},
-                        {n1, n2},           {n2 / common, -(n1 / common)},
-                        n1 * (n2 / common), work.aligned_scratch(ks_bounded_bytes(n1 + n2))};
+  const KsPlain samples{{x1, x2},
+                        {y1, y2},
+                        {n1, n2},
+                        {n2 / common, -(n1 / common)},
+                        n1 * (n2 / common),
+                        ks_bucket_sizes(n1 + n2),
+                        work.aligned_scratch(ks_bounded_bytes(n1 + n2))};
   KsFound found[2];
   result.n1 = n1;
   result.n2 = n2;

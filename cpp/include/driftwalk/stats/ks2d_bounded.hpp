@@ -72,7 +72,7 @@ class KsBounded {
 public:
   explicit KsBounded(const KsPlain& samples)
       : samples_(samples), n_(samples.n[0] + samples.n[1]),
-        weight_{Weight(samples.weight[0]), Weight(samples.weight[1])}, least_(ks_bucket_points(n_)),
+        weight_{Weight(samples.weight[0]), Weight(samples.weight[1])},
         at_(static_cast<char*>(samples.scratch)) {
     take_buckets(columns_);
     take_buckets(rows_);
@@ -89,7 +89,7 @@ public:
     const KsNumbers lists[2] = {
         {of_column_.first, reinterpret_cast<std::int32_t*>(of_column_.second)},
         {of_row_.first, reinterpret_cast<std::int32_t*>(of_row_.second)}};
-    KsBucketer bucketer(samples_.n, least_, at_, lists);
+    KsBucketer bucketer(samples_.n, samples_.buckets, at_, lists);
     if (!bucketer.cut(samples_.x, columns_) || !bucketer.cut(samples_.y, rows_)) {
       return false;
     }
@@ -118,7 +118,7 @@ private:
   };
 
   void take_buckets(KsBuckets& buckets) {
-    const std::int64_t most = ks_most_buckets(n_);
+    const std::int64_t most = samples_.buckets.most;
     buckets.of_point = ks_take<std::uint16_t>(at_, n_);
     buckets.size[0] = ks_take<std::int32_t>(at_, most);
     buckets.size[1] = ks_take<std::int32_t>(at_, most);
@@ -449,7 +449,6 @@ private:
   KsPlain samples_;
   std::int64_t n_;
   Weight weight_[2];
-  std::int64_t least_;
   char* at_; // where free scratch begins
   KsBuckets columns_{};
   KsBuckets rows_{};

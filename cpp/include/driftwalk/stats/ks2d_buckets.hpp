@@ -11,7 +11,6 @@
 #include "driftwalk/stats/ks2d_sweep.hpp"
 
 #include <cstdint>
-#include <limits>
 
 DRIFTWALK_LANES_BEGIN
 
@@ -48,7 +47,7 @@ struct KsEvenScale {
   bool set(double lowest, double highest, std::int64_t bins) {
     smallest = lowest;
     factor = double(bins - 1) / (highest - lowest);
-    return factor > 0 && factor <= std::numeric_limits<double>::max();
+    return factor > 0 && factor <= 0x1.fffffffffffffp+1023;
   }
   std::int32_t bin(double value) const { return std::int32_t((value - smallest) * factor); }
 };
@@ -95,10 +94,11 @@ inline int ks_bit_width(std::int64_t n) {
 
 class KsBucketer {
 public:
-  // `least`: the points that a bucket should hold. `lists`: room for n + 1 numbers in each.
-  KsBucketer(const std::int64_t n[2], std::int64_t least, char* scratch, const KsNumbers lists[2])
-      : n_{n[0], n[1]}, least_(std::int32_t(least)), lists_{lists[0], lists[1]} {
-    bins_ = ks_bins(n[0] + n[1]);
+  // `lists`: room for n + 1 numbers in each.
+  KsBucketer(const std::int64_t n[2], const KsBucketSizes& sizes, char* scratch,
+             const KsNumbers lists[2])
+      : n_{n[0], n[1]}, least_(std::int32_t(sizes.points)), lists_{lists[0], lists[1]} {
+    bins_ = sizes.bins;
     counts_ = ks_take<std::int32_t>(scratch, bins_);
     ends_ = ks_take<End>(scratch, bins_);
     bucket_ = ks_take<std::uint16_t>(scratch, bins_);

@@ -51,6 +51,26 @@ void ks_sweep_baseline(const KsSweep& sweep, KsBest best[2]);
 void ks_sweep_avx2(const KsSweep& sweep, KsBest best[2]);
 void ks_sweep_avx512(const KsSweep& sweep, KsBest best[2]);
 
+// Sizes of the buckets of an axis. They come with the samples: a function of all instruction sets
+// must not be compiled for one.
+struct KsBucketSizes {
+  std::int64_t points; // that a bucket should hold: more make wide bounds, fewer many buckets
+  std::int64_t bins;   // that an axis is dealt to: some to each bucket
+  std::int64_t most;   // buckets
+};
+
+constexpr KsBucketSizes ks_bucket_sizes(std::int64_t n) {
+  std::int64_t points = 8;
+  while (64 * points * points < n) {
+    points += points / 8;
+  }
+  std::int64_t bins = 128;
+  while (bins * points < 4 * n && bins < 1 << 16) {
+    bins *= 2;
+  }
+  return {points, bins, 5 * n / (2 * points) + 64};
+}
+
 // The same statistic without an order, of two samples as they come; see KsBounded.
 struct KsPlain {
   const double* x[2];
@@ -58,7 +78,8 @@ struct KsPlain {
   std::int64_t n[2];
   std::int64_t weight[2]; // as in KsSweep
   std::int64_t total;
-  void* scratch; // ks_bounded_bytes(n[0] + n[1]), aligned to 64
+  KsBucketSizes buckets; // ks_bucket_sizes(n[0] + n[1])
+  void* scratch;         // ks_bounded_bytes(n[0] + n[1]), aligned to 64
 };
 
 // The largest |weight| with an origin of one sample, the row of that origin and the quadrant.
@@ -72,27 +93,9 @@ struct KsFound {
 constexpr std::int64_t ks_bounded_from = 1024;
 constexpr std::int64_t ks_bounded_to = std::int64_t(1) << 23;
 
-// Points that a bucket should hold. More make the bounds wide, fewer make many buckets.
-constexpr std::int64_t ks_bucket_points(std::int64_t n) {
-  std::int64_t points = 8;
-  while (64 * points * points < n) {
-    points += points / 8;
-  }
-  return points;
-}
-// Bins that an axis is dealt to: some to each bucket.
-constexpr std::int64_t ks_bins(std::int64_t n) {
-  std::int64_t bins = 128;
-  while (bins * ks_bucket_points(n) < 4 * n && bins < 1 << 16) {
-    bins *= 2;
-  }
-  return bins;
-}
-constexpr std::int64_t ks_most_buckets(std::int64_t n) {
-  return 5 * n / (2 * ks_bucket_points(n)) + 64;
-}
 constexpr std::int64_t ks_bounded_bytes(std::int64_t n) {
-  return 80 * n + 24 * ks_bins(n) + 96 * ks_most_buckets(n) + 16 * 1024;
+  const KsBucketSizes buckets = ks_bucket_sizes(n);
+  return 80 * n + 24 * buckets.bins + 96 * buckets.most + 16 * 1024;
 }
 
 // False, with nothing found, where the bounds do not pay; the sweep has to be run.
