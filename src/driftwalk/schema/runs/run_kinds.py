@@ -318,8 +318,8 @@ def answer_of(found: xr.Dataset, **more: Any) -> Answer | None:
     >>> values = {"estimate": ("parameter", [0.4]), "confidence": 0.9}
     >>> values["interval"] = (("parameter", "bound"), [[0.38, 0.42]])
     >>> answer = answer_of(xr.Dataset(values, names, {"kind": "fit"}))
-    >>> lines_of(answer.parts)
-    ['drag coefficient C_d   0.4000   90% interval 0.3800 to 0.4200']
+    >>> lines_of(answer.parts)[0]
+    'drag coefficient C_d   0.4000   90% interval 0.3800 to 0.4200'
     """
     kind = kind_of(found)
     if kind is None or kind.answer is None:
