@@ -238,8 +238,9 @@ def test_the_field_that_driftwalk_flow_wrote_is_taken(study: Path, tmp_path: Pat
     found = [calibration(folder) for folder in (first, second)]
     halves = [name for name in found[0].variables if "_half_" in str(name)]
     assert len(halves) == 3
-    assert_same_bits(*(item.drop_vars([*halves, "warning"]) for item in found))
-    given, own = (item["warning"].values.tolist() for item in found)
+    told = ["warning", "verdict", "verdict_reason"]
+    assert_same_bits(*(item.drop_vars([*halves, *told]) for item in found))
+    given, own = ([*item["warning"].values, *item["verdict_reason"].values] for item in found)
     assert [text for text in own if not text.startswith("the flow was taken from")] == given
 
 
