@@ -139,7 +139,7 @@ def fit_motion(
         except BREAKDOWN:
             # What was opened may have no restricted likelihood; the law without it has one.
             base = law.base
-            if thinned(passes) is not passes:
+            if laws.search.passes is not passes:
                 base = require_mode(search.find(base.point, base.weights, held=FROM_ANOTHER))
             law = replace(law, mode=base)
             restricted = restricted_drag(search, law.mode)

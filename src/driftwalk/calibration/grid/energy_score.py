@@ -92,18 +92,11 @@ def lowest_between(axes: Sequence[Floats], surface: Floats) -> tuple[float, ...]
     >>> tuple(round(value, 6) for value in lowest_between([axis, axis], bowl))
     (0.3, 1.0)
     """
-    lowest = np.unravel_index(int(np.argmin(surface)), surface.shape)
+    lowest = tuple(map(int, np.unravel_index(int(np.argmin(surface)), surface.shape)))
     found = []
     for along, axis in enumerate(axes):
-        at, line = (
-            int(lowest[along]),
-            surface[
-                tuple(
-                    slice(None) if other == along else place for other, place in enumerate(lowest)
-                )
-            ],
-        )
-        value = float(axis[at])
+        at, value = lowest[along], float(axis[lowest[along]])
+        line = np.moveaxis(surface, along, -1)[lowest[:along] + lowest[along + 1 :]]
         if 0 < at < axis.size - 1 and np.isfinite(line[at - 1 : at + 2]).all():
             before, here, after = map(float, line[at - 1 : at + 2])
             bend = before - 2.0 * here + after

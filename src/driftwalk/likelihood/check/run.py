@@ -39,13 +39,7 @@ from driftwalk.likelihood.warnings import against_water, is_against_water
 from driftwalk.schema.answers.facts import facts_of, fitted_value, sentences, texts
 from driftwalk.schema.answers.fit import with_verdict
 from driftwalk.schema.answers.force_law import LEAST_EVIDENCE
-from driftwalk.schema.answers.verdict import (
-    CANNOT_TELL,
-    EXPLAINS,
-    Verdict,
-    stored_verdict,
-    verdict_variables,
-)
+from driftwalk.schema.answers.verdict import EXPLAINS, stored_verdict, verdict_variables
 from driftwalk.schema.check import build_dataset, described
 
 if TYPE_CHECKING:
@@ -360,8 +354,7 @@ def _with_angle_tried(
         )
         found = stored_verdict(check)
         assert found is not None
-        word = CANNOT_TELL if found.explains else found.word
-        verdict = Verdict(word, (*found.reasons, said))
-        check = check.drop_dims("verdict_reason").assign(verdict_variables(verdict))
+        verdict = verdict_variables(found.and_also([], [said]))
+        check = check.drop_dims("verdict_reason").assign(verdict)
     warnings = [said if text == seen else text for text in sentences(fit, "warning")]
     return fit.assign_coords(warning=("warning", texts(warnings))), described(check)

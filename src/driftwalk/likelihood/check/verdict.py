@@ -6,9 +6,8 @@ from collections.abc import Iterator, Sequence
 from math import isnan
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-import numpy as np
-
 from driftwalk.likelihood.check.criteria import Criterion
+from driftwalk.likelihood.result import visited_shares
 from driftwalk.likelihood.warnings import meaningless_of
 from driftwalk.schema import FLAGS
 from driftwalk.schema.answers.facts import facts_of
@@ -21,7 +20,7 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 
-class EvidencePolicy(NamedTuple):
+class InformationPolicy(NamedTuple):
     """When a recording tells too little for a verdict.
 
     The visited share and area count together, so that in a large tank a block need not go further
@@ -48,7 +47,7 @@ class EvidencePolicy(NamedTuple):
     the steps differ where nothing else does. Chosen by hand."""
 
 
-EVIDENCE: Final = EvidencePolicy()
+INFORMATION: Final = InformationPolicy()
 
 
 def verdict_on(fit: xr.Dataset, criteria: Sequence[Criterion], *, study: Study) -> Verdict:
@@ -60,12 +59,16 @@ def verdict_on(fit: xr.Dataset, criteria: Sequence[Criterion], *, study: Study) 
         *_too_little_seen(fit, side_m=side),
         *_not_determined(fit),
         *meaningless_of(
-            facts, side_m=side, wall_share=EVIDENCE.most_wall_share, lever=EVIDENCE.most_lever
+            facts, side_m=side, wall_share=INFORMATION.most_wall_share, lever=INFORMATION.most_lever
         ),
         *_told(fit, "law_unsettled"),
     ]
     failed = [one.name for one in criteria if one.failed]
-    if len(against) == 1 and failed == ["steps"] and facts["wall_share"] > EVIDENCE.contact_share:
+    if (
+        len(against) == 1
+        and failed == ["steps"]
+        and facts["wall_share"] > INFORMATION.contact_share
+    ):
         contacts = "contacts with the wall, which are not fitted, can do that: state its friction"
         return verdict_of([], [f"{against[0]}; {contacts}", *unable])
     return verdict_of(against, unable)
@@ -84,7 +87,7 @@ def findings_of(criteria: Sequence[Criterion]) -> list[str]:
 
 def _without_power(criteria: Sequence[Criterion], drag_std: float) -> Iterator[str]:
     for one in criteria:
-        settled = one.name == "steps" and drag_std < EVIDENCE.most_drag_std
+        settled = one.name == "steps" and drag_std < INFORMATION.most_drag_std
         if one.powerless and not one.failed and not settled:
             yield (
                 f"the criterion '{one.name}' has no power: the smallest misfit that it finds is "
@@ -97,18 +100,15 @@ def _without_power(criteria: Sequence[Criterion], drag_std: float) -> Iterator[s
 
 def _too_little_seen(fit: xr.Dataset, *, side_m: float) -> Iterator[str]:
     """Say where the block has been over too little of the tank, in any of the flows."""
-    flags = fit["flag"].values.reshape(-1, *fit["flag"].shape[-2:])
-    cell = float(fit["cell_size"]) / side_m
-    for flag in flags:
-        visited = int(np.count_nonzero(flag == FLAGS["measured"]))
-        share = visited / max(int(np.count_nonzero(flag != FLAGS["outside"])), 1)
-        if share < EVIDENCE.least_visited and visited * cell**2 < EVIDENCE.least_blocks:
-            yield (
-                f"the block has been over {share:.0%} of the tank, {visited * cell**2:.1f} times "
-                "its own area: the flow, and with it C_d, is not known from so little; record it "
-                "on a wider path, with another setting of the pumps"
-            )
-            return
+    share = min(visited_shares(fit))
+    inside = fit["flag"].isel(flow=0, missing_dims="ignore") != FLAGS["outside"]
+    blocks = share * int(inside.sum()) * (float(fit["cell_size"]) / side_m) ** 2
+    if share < INFORMATION.least_visited and blocks < INFORMATION.least_blocks:
+        yield (
+            f"the block has been over {share:.0%} of the tank, {blocks:.1f} times its own area: "
+            "the flow, and with it C_d, is not known from so little; record it on a wider path, "
+            "with another setting of the pumps"
+        )
 
 
 def _not_determined(fit: xr.Dataset) -> Iterator[str]:
