@@ -149,6 +149,12 @@ def test_a_parameter_that_no_model_has_is_named(tmp_path: Path) -> None:
     assert "without a standard deviation" in refusal(here("compare-models", *SHORT, *uncertain))
 
 
+def test_a_clearance_larger_than_the_tank_is_refused(tmp_path: Path) -> None:
+    words = ("compare-models", *SHORT, "--clearance", "2", "-o", tmp_path / "run")
+    said = refusal(here(*words))
+    assert "a clearance of 2000 mm: the body was recorded no further than" in said
+
+
 @pytest.mark.slow
 def test_the_notebook_takes_what_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
     compare_after_little(monkeypatch)

@@ -133,10 +133,24 @@ def _prepare_candidate(model: MotionModel, motion: RecordedMotion) -> Candidate:
 
 
 def with_contact_clearance(model: MotionModel, motion: RecordedMotion) -> MotionModel:
-    """Return the model with the recording's distance from the wall at contact, if it has no own."""
+    """Return the model with the recording's distance from the wall at contact, if it has no own.
+
+    Raises
+    ------
+    InputError
+        When the model's own is larger than any recorded distance from the wall.
+    """
     # Only the family leaves its distance from the wall to the recording.
-    if isinstance(model, ParticleModel) and not model.states_clearance:
+    if not isinstance(model, ParticleModel):
+        return model
+    if not model.states_clearance:
         return model.with_clearance(motion.clearance.distance)
+    if model.clearance >= motion.depth:
+        raise InputError(
+            f"a clearance of {1e3 * model.clearance:.4g} mm: the body was recorded no further than "
+            f"{1e3 * motion.depth:.4g} mm from the wall; state its distance from the wall at "
+            "contact, in metres or with a unit"
+        )
     return model
 
 
