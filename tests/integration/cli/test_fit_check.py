@@ -89,12 +89,15 @@ def test_a_check_that_cannot_be_made_says_so_and_the_fit_is_kept(tmp_path: Path)
     how = ("--spline-spacing", "3cm", "-o", tmp_path / "run")
     done = here("fit", path, *how)
     assert done.code == 0, done.err
-    line = next(line for line in done.out.splitlines() if line.startswith("verdict"))
-    assert "the model cannot be checked: the fit used" in line
+    lines = done.out.splitlines()
+    at = next(k for k, line in enumerate(lines) if line.startswith("verdict"))
+    assert lines[at].endswith("cannot tell:")
+    assert "the model cannot be checked: the fit used" in lines[at + 1]
     assert not (tmp_path / "run" / "check.nc").exists()
     found = json.loads(here("fit", path, *how, "--overwrite", "--json").out)
-    assert found["verdict"] is None
-    assert found["check_left_out"] in line
+    assert found["verdict"] == "cannot tell"
+    assert found["verdict_reasons"] == [found["check_left_out"]]
+    assert found["check_left_out"] in lines[at + 1]
     with xr.open_dataset(tmp_path / "run" / "fit.nc", engine="h5netcdf") as stored:
         assert stored.attrs["check_left_out"] == found["check_left_out"]
         assert not np.isfinite(facts_of(stored)["drag_coefficient_interval"][1])

@@ -3,31 +3,41 @@
 They hold everything that the fit has opened. The law of the force and its memory stand in the
 study of the estimate, samples that are missing in the time stamps. Here the flow gets the strength
 that changes during the recording, the wall what was estimated of it, and the camera its errors.
+They begin again on the recorded path from time to time (restarts.py).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk.calibration.problem import Problem, prepare_problem
-from driftwalk.comparison import apply_steps, plan_steps
+from driftwalk.comparison import StepPlan, apply_steps, plan_steps
+from driftwalk.comparison.statistic import FEWEST_PAIRS
 from driftwalk.conditions import recorded_camera
-from driftwalk.core.arrays import Floats, Integers
+from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.core.processors import map_in_threads
 from driftwalk.core.random_streams import CheckStream
 from driftwalk.core.seeds import world_keys
+from driftwalk.flow.arena import Outline, outline_of
+from driftwalk.likelihood.check.restarts import (
+    Sections,
+    first_samples,
+    sections_of,
+    within_sections,
+)
 from driftwalk.likelihood.filter.parameters import PULSES, STRENGTHS, Point
-from driftwalk.likelihood.filter.series import Series, strength_of
+from driftwalk.likelihood.filter.series import Series, strength_of, wall_intervals
 from driftwalk.likelihood.flow_intervals import fitted_flow, fitted_intervals
 from driftwalk.likelihood.preparation import Estimate
 from driftwalk.schema.answers.facts import fitted_value
+from driftwalk.simulation.initial import Start
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -52,6 +62,36 @@ class FramePolicy(NamedTuple):
 FRAMES: Final = FramePolicy()
 
 
+@dataclass(frozen=True, eq=False)
+class Replicated:
+    """A series ready for comparison, and where its replicates begin again."""
+
+    problem: Problem
+    first: Integers
+    """Samples at which replicates begin again."""
+    sections: list[Sections]
+    plan: StepPlan
+    """Of the steps within the sections."""
+    outline: Outline
+    side: float
+    angle: str
+    """Use of the orientations, of which "none" is without them."""
+    recorded: Floats
+    """The recording's steps, (pairs, 2)."""
+
+    def steps(self, x: Floats, y: Floats, theta: Floats) -> Floats:
+        """Return the step lengths [m] and turning angles [rad] away from the wall, (pairs, 2).
+
+        What a wall does is not fitted, and next to it the flow is not known.
+        """
+        turned = None if self.angle == "none" else theta
+        time = self.problem.like.sample_time
+        left_out = wall_intervals(time, x, y, turned, outline=self.outline, side=self.side)
+        left_out[:-1] |= left_out[1:]
+        found = apply_steps(self.plan, *(np.where(left_out, np.nan, axis) for axis in (x, y)))
+        return np.column_stack([found.step_length, found.turning_angle])
+
+
 class Replicates(NamedTuple):
     """Simulated recordings, those that broke down left out."""
 
@@ -67,7 +107,7 @@ class Replicates(NamedTuple):
 
 def problems_of(
     fit: xr.Dataset, estimate: Estimate, recordings: Sequence[xr.Dataset]
-) -> list[Problem]:
+) -> list[Replicated]:
     """Return the series ready for comparison, each in its fitted flow, with one step interval."""
     from driftwalk.conditions.study import fitted_wall
     from driftwalk.model import apply_overrides
@@ -83,17 +123,40 @@ def problems_of(
         interval = max(plan_steps(track.time).step_interval for track in tracks)
         study = apply_overrides(study, {"steps.step_interval_s": interval})
     noise = fitted_value(fit, "tracking_noise")
-    problems = []
+    found = []
     for track, one in zip(tracks, series, strict=True):
         quantum = float(recordings[one.recording].attrs.get("position_quantum_m", 0.0))
         # The rounding of the file is part of the noise that the fit finds, and is simulated apart.
         plain = float(np.sqrt(max(noise**2 - quantum**2 / 12.0, 0.0)))
-        camera = {"observation.position_noise_m": plain, "observation.orientation_noise_rad": 0.0}
+        camera = {
+            "observation.position_noise_m": plain,
+            "observation.orientation_noise_rad": 0.0,
+            "observation.gaps": "recording",
+        }
         seen = apply_overrides(study, camera)
         made = recorded_camera(track, seen, position_quantum=quantum)
         flow = _in_frames(flows[one.flow], one, estimate.point)
-        problems.append(prepare_problem(track, seen, flow, camera=made))
-    return problems
+        problem = prepare_problem(track, seen, flow, camera=made)
+        first = first_samples(track)
+        ready = Replicated(
+            problem,
+            first,
+            sections_of(track, first, window=study.flow.smoothing_window_s),
+            within_sections(problem.reference.plan, first),
+            outline_of(study.tank.to_arena()),
+            study.block.side_m,
+            estimate.passes.body.orientation,
+            np.zeros((0, 2)),
+        )
+        theta = np.where(np.isfinite(track.theta), track.theta, one.angle)
+        found.append(replace(ready, recorded=ready.steps(track.x, track.y, theta)))
+    pairs = sum(len(one.recorded) for one in found)
+    if pairs < FEWEST_PAIRS:
+        raise InputError(
+            f"the recording has {pairs} pairs of steps away from the wall, and {FEWEST_PAIRS} at "
+            "least are needed"
+        )
+    return found
 
 
 def _in_frames(flow: xr.Dataset, series: Series, point: Point) -> xr.Dataset:
@@ -127,15 +190,14 @@ def _in_frames(flow: xr.Dataset, series: Series, point: Point) -> xr.Dataset:
 
 
 def replicates_at_estimate(
-    fit: xr.Dataset, estimate: Estimate, problems: Sequence[Problem], *, count: int, seed: int
+    fit: xr.Dataset, estimate: Estimate, series: Sequence[Replicated], *, count: int, seed: int
 ) -> Replicates:
     """Simulate the recordings with what the fit found."""
     drag, force = fitted_value(fit, "drag_coefficient"), fitted_value(fit, "force_std")
+    point = estimate.point
     parts = [
-        _simulated(
-            problem, _keys(seed, CheckStream.ESTIMATE, index, count), drag, force, estimate.point
-        )
-        for index, problem in enumerate(problems)
+        _simulated(one, _keys(seed, CheckStream.ESTIMATE, index, one, count), drag, force, point)
+        for index, one in enumerate(series)
     ]
     return _joined(parts, np.zeros(count, dtype=np.int64))
 
@@ -143,44 +205,43 @@ def replicates_at_estimate(
 def posterior_replicates(
     fit: xr.Dataset,
     estimate: Estimate,
-    problems: Sequence[Problem],
+    series: Sequence[Replicated],
     spread: Floats,
     *,
     count: int,
     seed: int,
 ) -> Replicates:
     """Simulate the recordings with flow and parameters drawn from what the fit leaves open."""
-    # Eight flow fields: a world on its own takes as long as eight together.
-    flows = min(8, count)
-    flow_of = np.arange(count) % flows
-    points, factors = _posterior_samples(fit, estimate, spread, flows, seed)
+    points, factors = _posterior_samples(fit, estimate, spread, count, seed)
     drag = fitted_value(fit, "drag_coefficient") * factors[:, 0]
     force = fitted_value(fit, "force_std") * factors[:, 1]
     parts: list[list[_World]] = []
-    for index, problem in enumerate(problems):
-        keys = _keys(seed, CheckStream.DRAWN, index, count)
-        series = estimate.passes.series[index]
+    for index, one in enumerate(series):
+        keys = _keys(seed, CheckStream.DRAWN, index, one, count)
+        filtered = estimate.passes.series[index]
 
         def simulated(
-            k: int, problem: Problem = problem, keys: Keys = keys, series: Series = series
+            k: int, one: Replicated = one, keys: Keys = keys, filtered: Series = filtered
         ) -> list[_World]:
-            like = problem.like
+            like = one.problem.like
             assert like.flow is not None
             x, y = like.flow["x"].values, like.flow["y"].values
-            point = points[k].in_flow(series.flow)
+            point = points[k].in_flow(filtered.flow)
             u, v = estimate.passes.spline.values(point.coefficients, x, y)
-            flow = _in_frames(like.flow.assign(u=(("y", "x"), u), v=(("y", "x"), v)), series, point)
+            steady = like.flow.assign(u=(("y", "x"), u), v=(("y", "x"), v))
             noise = like.camera.position_noise * float(factors[k, 2])
             camera = replace(like.camera, position_noise=noise)
-            own = replace(problem, like=replace(like, flow=flow, camera=camera, threads=1))
-            begin = float(series.time[0])
+            flow = _in_frames(steady, filtered, point)
+            own = replace(like, flow=flow, camera=camera, threads=1)
+            drawn = replace(one, problem=replace(one.problem, like=own))
             return _simulated(
-                own, keys[flow_of == k], float(drag[k]), float(force[k]), point, begin
-            )
+                drawn, keys[k : k + 1], float(drag[k]), float(force[k]), point,
+                float(filtered.time[0]),
+            )  # fmt: skip
 
-        found = map_in_threads(simulated, range(flows), problem.like.threads)
-        parts.append([found[k][j // flows] for j, k in enumerate(flow_of)])
-    return _joined(parts, flow_of)
+        found = map_in_threads(simulated, range(count), one.problem.like.threads)
+        parts.append([world for (world,) in found])
+    return _joined(parts, np.arange(count))
 
 
 def _posterior_samples(
@@ -225,25 +286,51 @@ class _World(NamedTuple):
     sound: bool
 
 
-def _keys(seed: int, kind: int, index: int, count: int) -> Keys:
-    return world_keys(seed, trial=2 * index + kind, replicate=np.arange(count))
+def _keys(seed: int, kind: int, index: int, one: Replicated, count: int) -> Keys:
+    """Return the keys of a series' worlds, (replicates, sections)."""
+    number = np.arange(count * one.first.size)
+    return world_keys(seed, trial=2 * index + kind, replicate=number).reshape(count, -1)
 
 
 def _simulated(
-    problem: Problem, keys: Keys, drag: float, force: float, point: Point, begin: float = 0.0
+    one: Replicated, keys: Keys, drag: float, force: float, point: Point, begin: float = 0.0
 ) -> list[_World]:
-    like = problem.like
-    values = {"drag_coefficient": np.full(keys.size, drag), "force_std": np.full(keys.size, force)}
-    poses = problem.model.simulate(values, like, keys)
+    time = one.problem.like.sample_time
+    poses, sound = _poses(one, keys, drag, force)
+    # Without the last sample of a section no velocity is taken across a restart.
+    shown = np.delete(np.arange(time.size), np.append(one.first[1:] - 1, time.size - 1))
     worlds = []
-    for k, key in enumerate(keys):
-        pose = [one[k].astype(np.float64) for one in (poses.x, poses.y, poses.theta)]
-        x, y = _as_seen(*pose, time=like.sample_time, point=point, key=int(key))
-        found = apply_steps(problem.reference.plan, x, y)
-        steps = np.column_stack([found.step_length, found.turning_angle])
-        path = (begin + like.sample_time, x, y)
-        worlds.append(_World(steps, path, bool(poses.status[k] == 0 and len(steps) > 0)))
+    for k, key in enumerate(keys[:, 0]):
+        x, y = _as_seen(*poses[:, k], time=time, point=point, key=int(key))
+        steps = one.steps(x, y, poses[2, k])
+        path = (begin + time[shown], x[shown], y[shown])
+        worlds.append(_World(steps, path, bool(sound[k] and len(steps) > 0)))
     return worlds
+
+
+def _poses(one: Replicated, keys: Keys, drag: float, force: float) -> tuple[Floats, Bools]:
+    """Return x, y [m] and theta [rad], (3, replicates, samples), and which replicates are sound."""
+    like, count, done = one.problem.like, len(keys), 0
+    assert like.flow is not None
+    poses, sound = np.empty((3, count, like.sample_time.size)), np.ones(count, dtype=bool)
+    for some in one.sections:
+        each = some.begin.size
+        own = replace(
+            like,
+            sample_time=some.time,
+            start=Start(*(np.tile(axis, count) for axis in some.start)),
+            flow_start=np.tile(some.begin, count) if "time" in like.flow.dims else None,
+        )
+        values = {
+            "drag_coefficient": np.full(count * each, drag),
+            "force_std": np.full(count * each, force),
+        }
+        found = one.problem.model.simulate(values, own, keys[:, done : done + each].ravel())
+        for axis, pose in zip(poses, (found.x, found.y, found.theta), strict=True):
+            axis[:, some.sample] = pose.reshape(count, each, -1)[:, some.section, some.place]
+        sound &= (found.status == 0).reshape(count, each).all(axis=1)
+        done += each
+    return poses, sound
 
 
 def _as_seen(

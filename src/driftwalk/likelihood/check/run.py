@@ -39,7 +39,12 @@ from driftwalk.likelihood.warnings import against_water, is_against_water
 from driftwalk.schema.answers.facts import facts_of, fitted_value, sentences, texts
 from driftwalk.schema.answers.fit import with_verdict
 from driftwalk.schema.answers.force_law import LEAST_EVIDENCE
-from driftwalk.schema.answers.verdict import EXPLAINS, stored_verdict, verdict_variables
+from driftwalk.schema.answers.verdict import (
+    EXPLAINS,
+    stored_verdict,
+    verdict_of,
+    verdict_variables,
+)
 from driftwalk.schema.check import build_dataset, described
 
 if TYPE_CHECKING:
@@ -230,10 +235,10 @@ def check_model(
             fit, estimate, problems, found.leverage.spread, count=replicates, seed=seed
         )
         motion = compare_motion(
-            np.concatenate([problem.steps for problem in problems]),
+            np.concatenate([one.recorded for one in problems]),
             replicates_at_estimate(fit, estimate, problems, count=replicates, seed=seed),
             drawn,
-            threads=problems[0].like.threads,
+            threads=problems[0].problem.like.threads,
         )
         paths = [(one.series.time, one.series.x, one.series.y) for one in errors]
         scan = scan_of(paths, drawn.paths, found.layout, level=VERDICT.level)
@@ -302,7 +307,7 @@ def judge_fit(
     -------
     Judged
         The `fit` with the verdict, and the `model_check`. A fit that cannot be checked is no
-        error: its attribute ``check_left_out`` says why.
+        error: its verdict is "cannot tell", and its attribute ``check_left_out`` says why.
 
     Examples
     --------
@@ -315,13 +320,21 @@ def judge_fit(
     try:
         check = check_model(fit, recordings, body=body)
     except InputError as error:
-        return Judged(fit.assign_attrs(check_left_out=str(error)), None)
+        return _unchecked(fit, str(error))
     except BREAKDOWN as error:
-        why = f"the model cannot be checked: the check broke down ({reason_of(error)})"
-        return Judged(fit.assign_attrs(check_left_out=why), None)
+        return _unchecked(
+            fit, f"the model cannot be checked: the check broke down ({reason_of(error)})"
+        )
     if is_against_water(facts_of(fit)):
         fit, check = _with_angle_tried(fit, check, recordings, body=body)
     return Judged(with_verdict(fit, check), check)
+
+
+def _unchecked(fit: xr.Dataset, why: str) -> Judged:
+    """Return a fit of which the recording cannot tell whether it explains it."""
+    verdict = verdict_of([], [why])
+    stored = fit.assign(verdict_variables(verdict)).assign_attrs(check_left_out=why)
+    return Judged(described(stored), None)
 
 
 def _with_angle_tried(

@@ -42,9 +42,6 @@ class InformationPolicy(NamedTuple):
     most_drag_std: float = 0.1
     """Relative standard deviation of C_d beyond which the steps have to have power: the errors of
     prediction alone do not settle the model then. Chosen by hand."""
-    contact_share: float = 0.1
-    """Share of the intervals at the wall from which on contacts, which are not fitted, may be why
-    the steps differ where nothing else does. Chosen by hand."""
 
 
 INFORMATION: Final = InformationPolicy()
@@ -63,14 +60,6 @@ def verdict_on(fit: xr.Dataset, criteria: Sequence[Criterion], *, study: Study) 
         ),
         *_told(fit, "law_unsettled"),
     ]
-    failed = [one.name for one in criteria if one.failed]
-    if (
-        len(against) == 1
-        and failed == ["steps"]
-        and facts["wall_share"] > INFORMATION.contact_share
-    ):
-        contacts = "contacts with the wall, which are not fitted, can do that: state its friction"
-        return verdict_of([], [f"{against[0]}; {contacts}", *unable])
     return verdict_of(against, unable)
 
 

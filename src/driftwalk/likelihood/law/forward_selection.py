@@ -233,7 +233,8 @@ class ForwardSelection:
             found = self._near(point, found.weights) or found
         if found is None:
             return mode, set(candidates)
-        idle = self._idle(found, set(candidates))
+        closed = set(candidates) - set(found.point.opened)
+        idle = closed | self._idle(found, set(candidates) - closed)
         if idle >= set(candidates):
             return mode, idle
         return self.without(found, idle) or mode, idle
@@ -283,7 +284,18 @@ class ForwardSelection:
         Opened numbers must not spoil a fit that has a solution without them.
         """
         mode = self.search.shortened().find(point, weights, held=FROM_NEAR)
-        return mode if mode is not None and mode.converged else None
+        if mode is None or mode.converged:
+            return mode
+        # A number that another one makes idle may end at the edge of its range, where no search
+        # converges: a memory of the force that was really a pulse of the flow.
+        inside = {
+            name: value
+            for name, value in mode.point.opened.items()
+            if NUMBERS[name].low < value < NUMBERS[name].high
+        }
+        if not inside or len(inside) == len(mode.point.opened):
+            return None
+        return self._near(replace(mode.point, opened=inside), mode.weights)
 
 
 def _parts(candidates: Mapping[str, float], tests: ScoreTests) -> list[tuple[str, ...]]:

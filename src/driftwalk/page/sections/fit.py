@@ -111,8 +111,8 @@ def fit_sections(
         made += parts
     if fit is not None:
         made += flow_sections(fit)
-        if check is None and "verdict" not in fit:
-            why = fit.attrs.get("check_left_out")
+        why = fit.attrs.get("check_left_out")
+        if check is None and (why or "verdict" not in fit):
             reason = f"{why}." if why else "The model was not checked against the recording."
             made.append(empty_section("check", "Does the model explain the recording?", reason))
     if check is not None:

@@ -339,6 +339,9 @@ def test_steps_that_differ_are_put_into_words() -> None:
     assert f"KS distance {motion.drawn_distance.mean():.3f}" in found["given"].sentence
     assert "averaged the drag over all orientations" in found["none"].sentence
     assert "orientations" not in found["given"].sentence
+    # However sure, a difference that does not matter is no finding.
+    assert found["given"].size == pytest.approx(motion.drawn_distance.mean())
+    assert not found["given"]._replace(size=0.09).failed
     assert not motion_criterion(None, angle="given").failed
 
 

@@ -15,7 +15,7 @@ from driftwalk.likelihood import Judged, fit_motion, judge_fit
 from driftwalk.page.sections.fit import fit_sections
 from driftwalk.plot import residuals as plot_residual_map
 from driftwalk.schema.answers.fit import BY_CELL, residuals_of
-from driftwalk.schema.answers.verdict import stored_verdict
+from driftwalk.schema.answers.verdict import Verdict, stored_verdict
 from driftwalk.schema.check import check_dataset, unknown_names
 from driftwalk.schema.stores.netcdf import netcdf_bytes, open_netcdf
 
@@ -93,8 +93,8 @@ def test_a_fit_that_could_not_be_checked_says_why() -> None:
     other = track.isel(time=slice(0, 100))
     found = judge_fit(fit, [other])
     assert found.check is None
-    assert "verdict" not in found.fit
     why = found.fit.attrs["check_left_out"]
+    assert stored_verdict(found.fit) == Verdict("cannot tell", (why,))
     with pytest.raises(InputError, match="not checked") as error:
         residuals_of(found.fit)
     assert why in str(error.value)

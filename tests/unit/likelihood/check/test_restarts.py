@@ -1,0 +1,94 @@
+"""Restarts of simulated recordings on the recorded path."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from driftwalk.comparison import StepDistance, apply_steps
+from driftwalk.core.arrays import Floats
+from driftwalk.likelihood.check.restarts import RESTART, first_samples, sections_of, within_sections
+from driftwalk.schema import Track
+
+WINDOW_S = 0.7
+
+
+def track_at(time: Floats, *, seed: int = 1) -> Track:
+    """Return a walk that turns (synthetic), with samples at these times."""
+    generator = np.random.default_rng(seed)
+    x, y = np.cumsum(0.002 * generator.normal(size=(2, time.size)), axis=1)
+    return Track(time, x, y, 0.1 * time)
+
+
+def regular(minutes: float) -> Floats:
+    return 5.0 + 0.1 * np.arange(round(600 * minutes) + 1)
+
+
+def test_a_regular_recording_begins_again_every_ten_seconds() -> None:
+    track = track_at(regular(3.0))
+    first = first_samples(track)
+    np.testing.assert_allclose(track.time[first] - 5.0, RESTART.every_s * np.arange(18), atol=1e-9)
+    (one,) = sections_of(track, first, window=WINDOW_S)
+    np.testing.assert_allclose(one.time, 0.1 * np.arange(101), atol=1e-9)
+
+
+@pytest.mark.parametrize(("dropped", "jitter"), [(0.0, 0.0), (0.03, 1e-4), (0.0, 0.02)])
+def test_sections_hold_each_sample_at_its_time(dropped: float, jitter: float) -> None:
+    generator = np.random.default_rng(2)
+    time = regular(4.0)
+    time = time[(generator.random(time.size) >= dropped) | (time == time[0])]
+    time = time + jitter * generator.uniform(-1.0, 1.0, time.size)
+    track = track_at(np.concatenate([time, time[-1] + 7.0 + 0.1 * np.arange(100)]))
+    first = first_samples(track)
+    parts = sections_of(track, first, window=WINDOW_S)
+    assert len(parts) == (1 if jitter < 1e-3 else first.size)
+    samples = np.concatenate([one.sample for one in parts])
+    assert np.array_equal(samples, np.arange(track.time.size))
+    past = track.time - track.time[0]
+    for one in parts:
+        own = one.begin[one.section] + one.time[one.place]
+        np.testing.assert_allclose(
+            own, past[one.sample], atol=4.0 * jitter * (len(parts) == 1) + 1e-9
+        )
+        assert np.diff(one.time).max() <= 1.0  # none goes over the gap of 7 s
+
+
+def test_an_irregular_recording_begins_again_less_often() -> None:
+    generator = np.random.default_rng(3)
+    time = 5.0 + np.cumsum(generator.uniform(0.05, 0.15, size=12_000))
+    assert first_samples(track_at(time)).size == RESTART.most_irregular
+
+
+def test_starts_are_where_the_recording_is_and_how_it_moves() -> None:
+    time = regular(2.0)
+    angle = 0.7 * time
+    track = Track(time, 0.1 * np.cos(angle), 0.1 * np.sin(angle), angle)
+    first = first_samples(track)
+    for one in sections_of(track, first, window=WINDOW_S):
+        at = angle[first]
+        start = [np.asarray(axis) for axis in one.start]
+        np.testing.assert_allclose(start[0], 0.1 * np.cos(at), atol=1e-4)
+        np.testing.assert_allclose(start[3], -0.07 * np.sin(at), atol=2e-3)
+        np.testing.assert_allclose(start[4], 0.07 * np.cos(at), atol=2e-3)
+        np.testing.assert_allclose(start[5], 0.7, atol=1e-6)
+
+
+@pytest.mark.parametrize("interval", [0.1, 0.2, 0.25])
+def test_steps_are_those_of_the_sections_alone(interval: float) -> None:
+    track = track_at(regular(2.0))
+    reference = StepDistance().prepare(track, step_interval=interval)
+    plan = within_sections(reference.plan, first_samples(track))
+    steps = apply_steps(plan, track.x, track.y)
+    found = np.column_stack([steps.step_length, steps.turning_angle])
+    lengths, angles = [], []
+    for begin, end in zip(range(0, 1200, 100), [*range(100, 1200, 100), 1201], strict=True):
+        own = slice(begin, end)
+        time = track.time[own]
+        grid = time[0] + interval * np.arange(int((time[-1] - time[0]) / interval + 1e-6) + 1)
+        path = np.interp(grid, time, track.x[own]) + 1j * np.interp(grid, time, track.y[own])
+        step = np.diff(path)
+        lengths.append(np.abs(step[1:]))
+        angles.append(np.angle(step[1:] / step[:-1]))
+    expected = np.column_stack([np.concatenate(lengths), np.concatenate(angles)])
+    np.testing.assert_allclose(found, expected, atol=1e-7)
+    assert len(expected) < len(reference.steps)
