@@ -82,7 +82,7 @@ class Replicated:
     def steps(self, x: Floats, y: Floats, theta: Floats) -> Floats:
         """Return the step lengths [m] and turning angles [rad] away from the wall, (pairs, 2).
 
-        What a wall does is not fitted, and next to it the flow is not known.
+        Contacts are not fitted, and next to the wall the flow is not known.
         """
         turned = None if self.angle == "none" else theta
         time = self.problem.like.sample_time

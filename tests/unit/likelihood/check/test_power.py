@@ -113,11 +113,6 @@ def test_a_criterion_without_power_cannot_tell_unless_it_failed() -> None:
     assert said(fit_of(measured=1000), GOOD._replace(p_value=np.nan))[0] == "cannot tell"
     failed = blind._replace(p_value=1e-6)
     assert said(fit_of(measured=1000), failed) == ("does not explain", failed.sentence)
-    word, reasons = said(fit_of(measured=1000, wall_share=0.2), failed)
-    assert word == "cannot tell"
-    assert "contacts with the wall, which are not fitted, can do that" in reasons
-    both = (failed, failed._replace(name="place"))
-    assert said(fit_of(measured=1000, wall_share=0.2), *both)[0] == "does not explain"
 
 
 def test_a_block_of_another_size_has_another_area() -> None:
