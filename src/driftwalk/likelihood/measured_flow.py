@@ -1,0 +1,378 @@
+"""A measured flow as prior of the fitted one: vectors on a grid, with errors and a common scale.
+
+The vectors are ``m = k B c + e``: the fitted flow B c at the nodes, times the scale k of the
+measurement (a ruler or frame interval that is off), and independent normal errors e. The best k of
+every c, with a weak normal prior around 1, is known in closed form; what is left is a sum of
+squares of the coefficients alone. See docs/explanation/likelihood.md.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+
+from driftwalk.core.arrays import Floats
+from driftwalk.core.errors import InputError, argument_text
+from driftwalk.likelihood.spline import Spline, products
+from driftwalk.schema import FLAGS, build_flow_field
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+
+class MeasuredPolicy(NamedTuple):
+    """How errors are estimated, and when a measured flow contradicts the recording."""
+
+    fewest_surplus: int = 50
+    """Components of vectors beyond those that the spline takes up, from which their scatter tells
+    the errors: to a tenth. Chosen by hand."""
+    level: float = 0.0005
+    """Chance below which the measured flow and the motion contradict each other: that of a
+    criterion of the check."""
+    least_known: float = 0.7
+    """Standard deviation of the scale over that of its prior, above which the recording does not
+    determine it: data and prior tell as much."""
+
+
+MEASURED: Final = MeasuredPolicy()
+NAMES: Final = ("u", "v")
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredFlow:
+    """Measured vectors, and their sums of products with the bases of the spline."""
+
+    x: Floats
+    y: Floats
+    velocity: Floats
+    """Shape (2, y, x); NaN where nothing was measured."""
+    error: Floats
+    """Standard deviations, same shape, as the fit takes them."""
+    spline: Spline
+    scale_std: float
+    """Of the prior of the scale; 0 if it is exact."""
+    source: str
+    errors: str
+    """Where the errors are from, in words."""
+    normal: Floats
+    """``B' W B`` of either component, shape (2, n, n)."""
+    right: Floats
+    """``B' W m``, shape (2, n)."""
+    own: Floats
+    """Coefficients of the least squares, shape (2, n); the smallest where they are not unique."""
+    rank: int
+    """Coefficients that the vectors determine."""
+
+    @property
+    def count(self) -> int:
+        """Number of vectors."""
+        return int(np.isfinite(self.velocity).all(axis=0).sum())
+
+    @property
+    def sentence(self) -> str:
+        """What was read, for the user."""
+        size = float(np.sqrt(np.nanmean(self.error**2)))
+        known = f"scale known to {self.scale_std:.2g}" if self.scale_std > 0.0 else "scale exact"
+        return (
+            f"{self.source}: {self.count} vectors, errors of {1e3 * size:.2g} mm/s {self.errors}; "
+            f"{known}"
+        )
+
+    def scale(self, coefficients: Floats, determined: float) -> tuple[float, float]:
+        """Return the best scale k for a flow, and the precision of k.
+
+        A flow that is k times smaller is k times more likely under its prior of smoothness, for
+        each coefficient that the vectors determine, though its true size is unknown. The term
+        ``determined ln k`` takes that out.
+        """
+        if self.scale_std == 0.0:
+            return 1.0, math.inf
+        flow, weight = coefficients.reshape(2, -1), 1.0 / self.scale_std**2
+        power = float(np.einsum("ka,kab,kb->", flow, self.normal, flow)) + weight
+        middle = 0.5 * (float((flow * self.right).sum()) + weight) / power
+        k = middle + math.sqrt(max(middle**2 - determined / power, 0.0))
+        return k, max(power - determined / k**2, weight)
+
+    def deviance(self, coefficients: Floats, determined: float) -> tuple[float, Floats, Floats]:
+        """Return half the sum of squares, its negative gradient, and its curvature.
+
+        The best k is a function of the coefficients, so their curvature is that with k projected
+        out. The least squares' own sum, which no flow changes, is left out.
+        """
+        flow = coefficients.reshape(2, -1)
+        k, precision = self.scale(coefficients, determined)
+        off = self.own - k * flow
+        pull = np.einsum("kab,kb->ka", self.normal, off)
+        value = 0.5 * float((off * pull).sum()) + determined * math.log(k)
+        if self.scale_std > 0.0:
+            value += 0.5 * ((k - 1.0) / self.scale_std) ** 2
+        return value, k * pull.ravel(), self._curvature(flow, k, precision)
+
+    def determined(self, coefficients: Floats, covariance: Floats, before: float) -> float:
+        """Return how many coefficients the vectors determine, of a flow with a covariance."""
+        if self.scale_std == 0.0:
+            return 0.0
+        k, _ = self.scale(coefficients, before)
+        size = self.spline.size
+        parts = (covariance[a : a + size, a : a + size] for a in (0, size))
+        found = sum(float((n * c).sum()) for n, c in zip(self.normal, parts, strict=True))
+        return min(k**2 * found, float(self.rank))
+
+    def _curvature(self, flow: Floats, k: float, precision: float) -> Floats:
+        size = self.spline.size
+        found = np.zeros((2 * size, 2 * size))
+        for component in range(2):
+            part = slice(component * size, (component + 1) * size)
+            found[part, part] = k**2 * self.normal[component]
+        along = np.einsum("kab,kb->ka", self.normal, flow).ravel()
+        return np.asarray(found - (k**2 / precision) * np.outer(along, along))
+
+    def stored(self) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
+        """Return the variables, coordinates and attributes with which a fit holds it."""
+        on = ("measured_y", "measured_x")
+        data = {f"measured_{name}": (on, self.velocity[k]) for k, name in enumerate(NAMES)}
+        data |= {f"measured_{name}_error": (on, self.error[k]) for k, name in enumerate(NAMES)}
+        coords = {"measured_y": ("measured_y", self.y), "measured_x": ("measured_x", self.x)}
+        words = {"measured_flow": self.source, "measured_flow_errors": self.errors}
+        return data, coords, words
+
+
+def measured_flow(
+    field: xr.Dataset, study: Study, spline: Spline, *, sources: tuple[str, ...] = ()
+) -> MeasuredFlow:
+    """Return a flow field as prior of the fit; refuse one that is no measurement.
+
+    `sources` are those of the recordings: a flow that was taken from one of them is none.
+    """
+    _require_measurement(field, study, sources)
+    x, y = (field[axis].values.astype(np.float64) for axis in "xy")
+    # The knots cover the tank and a little more.
+    ends_x, ends_y = (
+        (first, first + (count - 3) * spline.spacing)
+        for first, count in ((spline.origin_x, spline.columns), (spline.origin_y, spline.rows))
+    )
+    inside = ((y >= ends_y[0]) & (y <= ends_y[1]))[:, None] & (x >= ends_x[0]) & (x <= ends_x[1])
+    there = inside & (field["flag"].values == FLAGS["measured"])
+    velocity = np.stack([np.where(there, field[name].values, np.nan) for name in NAMES])
+    stated = study.fit.flow_error_m_s
+    error, words = None, ""
+    if stated != "auto":
+        error, words = np.where(there, stated, np.nan)[None].repeat(2, axis=0), "as stated"
+    elif all(f"{name}_standard_error" in field for name in NAMES):
+        found = np.stack([field[f"{name}_standard_error"].values for name in NAMES])
+        known = there & np.isfinite(found).all(axis=0) & (found > 0.0).all(axis=0)
+        if known.any():
+            there = known
+            error = np.where(there, found, np.nan)
+            velocity = np.where(there, velocity, np.nan)
+            words = str(field.attrs.get("errors", "from the file"))
+    if not there.any():
+        raise InputError(
+            "no vector of the measured flow lies in the tank: is its origin the centre of the "
+            "tank, and its scale right?"
+        )
+    unit = np.where(there, 1.0, np.nan)[None].repeat(2, axis=0)
+    normal, right, own, rank, squares = _least_squares(
+        spline, x, y, velocity, unit if error is None else error
+    )
+    surplus = 2 * int(there.sum()) - rank
+    if error is None and surplus < MEASURED.fewest_surplus:
+        raise InputError(
+            f"the measured flow has {int(there.sum())} vectors in the tank, too few to tell their "
+            f"errors from their scatter: state them with {argument_text('flow_error', '2mm/s')}"
+        )
+    factor = math.sqrt(squares / surplus) if surplus >= MEASURED.fewest_surplus else 1.0
+    if error is None:
+        error, words = factor * unit, "estimated from their scatter around smooth flow"
+    elif factor > 1.0:
+        # The flow has details that the knots are too far apart for; the fit cannot follow them.
+        error = factor * error
+        words += f", times {factor:.2g} as they scatter more around smooth flow"
+    else:
+        factor = 1.0
+    size = factor if factor > 0.0 else 1.0
+    return MeasuredFlow(
+        x, y, velocity, error, spline, study.fit.flow_scale_std,
+        str(field.attrs.get("source", "flow")), words,
+        normal / size**2, right / size**2, own, rank,
+    )  # fmt: skip
+
+
+def _require_measurement(field: xr.Dataset, study: Study, sources: tuple[str, ...]) -> None:
+    if "time" in field.dims:
+        raise InputError(
+            f"the measured flow is a series of {field.sizes['time']} frames, and the fit takes a "
+            "steady one: average it over the time of the recording"
+        )
+    if study.fit.switching_times_s:
+        raise InputError(
+            "a measured flow is that of one setting of the pumps: fit each interval between the "
+            f"switching times by itself, with its flow ({argument_text('flow', 'FILE')})"
+        )
+    method, source = (str(field.attrs.get(name, "")) for name in ("method", "source"))
+    if "likelihood" in method:
+        raise InputError(
+            "the flow was fitted to a recording and is no measurement of the water: fit both "
+            "recordings together (driftwalk fit FIRST SECOND)"
+        )
+    if method != "file" and source and source in sources:
+        raise InputError(
+            f"the flow was taken from the recording itself ({source}), which would count twice: "
+            "leave it out, or give one that was measured by other means"
+        )
+
+
+class _Solved(NamedTuple):
+    normal: Floats
+    right: Floats
+    own: Floats
+    rank: int
+    squares: float
+
+
+def _least_squares(
+    spline: Spline, x: Floats, y: Floats, velocity: Floats, error: Floats
+) -> _Solved:
+    """Return the sums of products, and the spline that fits the vectors best."""
+    along_x, along_y = spline.design(x, y)
+    weight = np.where(np.isfinite(error), 1.0 / np.where(error > 0.0, error, np.inf) ** 2, 0.0)
+    values = np.where(weight > 0.0, velocity, 0.0)
+    normal = np.stack([products(one, along_x, along_y) for one in weight])
+    right = np.stack(
+        [
+            (along_y.T @ (one * value) @ along_x).ravel()
+            for one, value in zip(weight, values, strict=True)
+        ]
+    )
+    own, rank, squares = np.zeros_like(right), 0, 0.0
+    for k in range(2):
+        spread, base = np.linalg.eigh(normal[k])
+        known = spread > 1e-9 * spread[-1]
+        own[k] = (base[:, known] / spread[known]) @ (base[:, known].T @ right[k])
+        rank += int(known.sum())
+        off = values[k] - along_y @ own[k].reshape(spline.rows, spline.columns) @ along_x.T
+        squares += float((weight[k] * off**2).sum())
+    return _Solved(normal, right, own, rank, squares)
+
+
+def agreement_facts(
+    measured: MeasuredFlow | None,
+    coefficients: Floats,
+    covariance: Floats,
+    *,
+    determined: float,
+    confidence: float,
+) -> dict[str, Any]:
+    """Return how far a measured flow and the fitted one agree.
+
+    The sum of squares of their difference is compared with that of a flow drawn from what the
+    recording and the prior of smoothness leave open. `covariance` is that of the coefficients.
+    """
+    if measured is None:
+        return {}
+    from scipy.special import ndtri
+    from scipy.stats import chi2, norm
+
+    flow = coefficients.reshape(2, -1)
+    k, precision = measured.scale(coefficients, determined)
+    off = k * flow - measured.own
+    squares = float(np.einsum("ka,kab,kb->", off, measured.normal, off))
+    curvature = _of_difference(measured, flow, k, precision)
+    absorbed = covariance @ curvature
+    along = np.einsum("kab,kb->ka", measured.normal, flow).ravel()
+    power = float(along @ flow.ravel())
+    # In the directions of the least squares the difference has the covariance 1 - C M, where C is
+    # that of the fitted flow and M the precision of the measurement.
+    mean = measured.rank - float(np.trace(absorbed)) - power / precision
+    half_variance = (
+        measured.rank - 2.0 * float(np.trace(absorbed)) + float((absorbed * absorbed.T).sum())
+    )
+    mean, half_variance = max(mean, 1e-3), max(half_variance, 1e-6)
+    # A chi squared with the same mean and variance (Satterthwaite).
+    unit, dof = half_variance / mean, mean**2 / half_variance
+    facts = {
+        "measured_flow_chi_squared": squares / unit,
+        "measured_flow_dof": dof,
+        "measured_flow_determined": determined,
+        "measured_flow_p_value": float(chi2.sf(squares / unit, dof)),
+    }
+    place = _farthest(measured, off)
+    facts |= {"measured_flow_farthest_m": list(place[:2]), "measured_flow_difference_m_s": place[2]}
+    if measured.scale_std > 0.0:
+        variance = 1.0 / precision + (k / precision) ** 2 * float(along @ covariance @ along)
+        free = max(measured.scale_std**2 - variance, 0.0)
+        std = math.sqrt(variance)
+        reach = float(ndtri(0.5 + 0.5 * confidence)) * std
+        chance = 2.0 * float(norm.sf(abs(k - 1.0) / math.sqrt(free))) if free > 0.0 else 1.0
+        facts |= {
+            "measured_flow_scale": k,
+            "measured_flow_scale_interval": [k - reach, k + reach],
+            "measured_flow_scale_std": std,
+            "measured_flow_scale_p_value": chance,
+        }
+    return facts
+
+
+def _of_difference(measured: MeasuredFlow, flow: Floats, k: float, precision: float) -> Floats:
+    """Return the quadratic form of a change of the flow in the sum of squares of the vectors."""
+    along = np.einsum("kab,kb->ka", measured.normal, flow).ravel()
+    power = float(along @ flow.ravel())
+    found = measured._curvature(flow, k, math.inf)
+    share = 2.0 / precision - power / precision**2
+    return np.asarray(found - k**2 * share * np.outer(along, along))
+
+
+def _farthest(measured: MeasuredFlow, off: Floats) -> tuple[float, float, float]:
+    """Return where two flows differ most among the measured nodes, and by how much."""
+    spline = measured.spline
+    values = spline.values(off.reshape(2, spline.rows, spline.columns), measured.x, measured.y)
+    size = np.where(np.isfinite(measured.velocity[0]), np.hypot(*values), -1.0)
+    row, column = np.unravel_index(int(size.argmax()), size.shape)
+    return float(measured.x[column]), float(measured.y[row]), float(size[row, column])
+
+
+def contradictions(facts: Mapping[str, Any]) -> dict[str, str]:
+    """Return what in a measured flow contradicts the motion, in sentences by criterion."""
+    found = {}
+    if facts.get("measured_flow_p_value", 1.0) < MEASURED.level:
+        x, y = facts["measured_flow_farthest_m"]
+        found["measured flow"] = (
+            "the measured flow is not the one that moves the block: chi squared of their "
+            f"difference {facts['measured_flow_chi_squared']:.0f}, expected "
+            f"{facts['measured_flow_dof']:.0f} ± {math.sqrt(2 * facts['measured_flow_dof']):.0f}; "
+            f"most at x = {x:.3g} m, y = {y:.3g} m, where they are "
+            f"{1e3 * facts['measured_flow_difference_m_s']:.2g} mm/s apart: is it mirrored, shifted, "
+            "of another setting of the pumps, or are its errors larger?"
+        )
+    if facts.get("measured_flow_scale_p_value", 1.0) < MEASURED.level:
+        off = facts["measured_flow_scale"] - 1.0
+        found["measured scale"] = (
+            f"the measured flow is {abs(off):.0%} too {'fast' if off > 0.0 else 'slow'} for the "
+            f"motion (± {facts['measured_flow_scale_std']:.1%}): are its scale and frame interval "
+            "right?"
+        )
+    return found
+
+
+def stored_flow(fit: xr.Dataset) -> xr.Dataset | None:
+    """Return the measured flow that a fit was made with, as a flow field with its errors."""
+    if "measured_u" not in fit:
+        return None
+    names = ("measured_u", "measured_v", "measured_u_error", "measured_v_error")
+    u, v, u_error, v_error = (fit[name].values for name in names)
+    x, y = fit["measured_x"].values, fit["measured_y"].values
+    flag = np.where(np.isfinite(u), FLAGS["measured"], FLAGS["outside"])
+    return build_flow_field(
+        x, y, u=np.nan_to_num(u), v=np.nan_to_num(v), flag=flag,
+        u_standard_error=u_error, v_standard_error=v_error,
+        attrs={
+            "method": "file", "cell_size_m": float(x[1] - x[0]),
+            "source": fit.attrs["measured_flow"], "errors": fit.attrs["measured_flow_errors"],
+        },
+    )  # fmt: skip
