@@ -185,7 +185,7 @@ def fit_motion(
     for recording, track in zip(ready.recordings, ready.tracks, strict=True):
         warnings += jump_warnings(recording, body, track=track)
     warnings += warnings_of(facts, shares, ready.intervals, side_m=chosen.block.side_m)
-    warnings += [*law.unsettled, *contradictions(facts).values()]
+    warnings += [*law.unsettled, *contradictions(facts)]
     if shape is not None and shape.significant:
         warnings.append(shape.sentence)
     if law.left_out:
@@ -260,9 +260,7 @@ def _with_rival(
     }
 
 
-def _agreement(
-    ready: PreparedRecordings, mode: Mode, restricted: Restricted
-) -> dict[str, Any]:
+def _agreement(ready: PreparedRecordings, mode: Mode, restricted: Restricted) -> dict[str, Any]:
     """Return how far the measured flow and the fitted one agree; nothing without one."""
     found = restricted.point.coefficients
     own = mode.covariance[: found.size, : found.size]

@@ -230,6 +230,11 @@ def prepare(
     )  # fmt: skip
 
 
+def describe_measured(flow: xr.Dataset, study: Study) -> str:
+    """Return what a fit takes from a measured flow, in words."""
+    return measured_flow(flow, study, spline_of(study)).sentence
+
+
 def _jumps_removed(recording: xr.Dataset, body: str | None) -> int:
     """Return how many samples of a body the reading of its recording left out as jumps."""
     found = parse_json(str(recording.attrs.get("counts", "{}")))

@@ -85,9 +85,7 @@ class Prior:
         deviance = sums.deviance + 0.5 * float((pull * coefficients).sum())
         drag = coefficients.size
         if self.measured is not None:
-            off, force, curvature = self.measured.deviance(
-                point.coefficients, weights.determined
-            )
+            off, force, curvature = self.measured.deviance(point.coefficients, weights.determined)
             deviance += off
             score[:drag] += force
             information[:drag, :drag] += curvature

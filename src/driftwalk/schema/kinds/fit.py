@@ -135,6 +135,7 @@ variables (a measured flow was given):
         over its variance
     measured_flow_dof [1]: its expected value where they agree
     measured_flow_p_value [1]: chance of such a difference
+    measured_flow_detectable [m s-1]: random difference of the flows that is found nine times in ten
     measured_flow_determined [1]: coefficients of the flow that it determines
     measured_flow_farthest(axis) [m]: where they differ most
     measured_flow_difference [m s-1]: by how much, there
@@ -143,6 +144,7 @@ variables (a measured flow was given):
 variables (a measured flow was given, and its scale is not exact):
     measured_flow_scale_std [1]: standard deviation of its scale
     measured_flow_scale_p_value [1]: chance of a scale so far from 1
+    measured_flow_scale_detectable [1]: relative change of the scale that is found nine times in ten
 variables (with orientations, in one flow):
     spin_correlation [1]: correlation of the block's spin with the vorticity of a first estimate \
         of the flow
