@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.core.arrays import Bools, Floats
+from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.likelihood.flow_intervals import fitted_flow
 from driftwalk.likelihood.measured_flow import MeasuredFlow
 from driftwalk.schema import FLAGS
@@ -47,41 +47,42 @@ def best_placement(measured: MeasuredFlow, free: xr.Dataset) -> Placement:
     x, y = flow["x"].values, flow["y"].values
     want = np.stack([flow[name].values for name in ("u", "v")])
     enough = 0.5 * np.count_nonzero(known)
-    ends = measured.x[[0, -1]], measured.y[[0, -1]]
     return max(
         (
-            Placement(words, _correlation(moved, want, known & inside, enough))
-            for words, moved, inside in _moved(measured, x, y, ends)
+            Placement(words, _correlation(moved, want, known & there, enough))
+            for words, moved, there in _moved(measured, x, y)
         ),
         key=lambda one: one.correlation,
     )
 
 
-def _moved(
-    measured: MeasuredFlow, x: Floats, y: Floats, ends: tuple[Floats, Floats]
-) -> Iterator[tuple[str, Floats, Bools]]:
-    """Yield the flow turned, mirrored and shifted: words, velocities, where it is known."""
+def _moved(measured: MeasuredFlow, x: Floats, y: Floats) -> Iterator[tuple[str, Floats, Bools]]:
+    """Yield the flow turned, mirrored and shifted: words, velocities, where it was measured."""
     spline = measured.spline
     own = measured.own.reshape(2, spline.rows, spline.columns)
     count = round(PLACEMENT.farthest_m / PLACEMENT.step_m)
     shifts = PLACEMENT.step_m * np.arange(-count, count + 1)
+    known = np.pad(np.isfinite(measured.velocity[0]), 1)
     for mirrored, (sign_x, sign_y) in _SIGNS.items():
         for shift_x in shifts:
             for shift_y in shifts:
                 at_x, at_y = sign_x * x + shift_x, sign_y * y + shift_y
-                inside = np.outer(
-                    (at_y >= ends[1][0]) & (at_y <= ends[1][1]),
-                    (at_x >= ends[0][0]) & (at_x <= ends[0][1]),
-                )
+                there = known[np.ix_(_nearest(measured.y, at_y), _nearest(measured.x, at_x))]
                 moved = spline.values(own, at_x, at_y)
                 words = mirrored
                 if shift_x or shift_y:
                     words = (
                         f"{mirrored}{' and ' if mirrored else ''}shifted by "
-                        f"{-1e3 * sign_x * shift_x:+.0f} mm in x and "
-                        f"{-1e3 * sign_y * shift_y:+.0f} mm in y"
-                    )
-                yield words, np.stack([sign_x * moved[0], sign_y * moved[1]]), inside
+                        f"{-1e3 * sign_x * shift_x:.0f} mm in x and "
+                        f"{-1e3 * sign_y * shift_y:.0f} mm in y"
+                    ).replace("-0 mm", "0 mm")
+                yield words, np.stack([sign_x * moved[0], sign_y * moved[1]]), there
+
+
+def _nearest(nodes: Floats, places: Floats) -> Integers:
+    """Return the nodes nearest to places, counted from 1; 0 or one more beyond the ends."""
+    found = np.rint((places - nodes[0]) / (nodes[1] - nodes[0])).astype(np.intp) + 1
+    return np.clip(found, 0, nodes.size + 1)
 
 
 _SIGNS: Final = {
