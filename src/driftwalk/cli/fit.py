@@ -66,8 +66,7 @@ def fit(
     the fit (fit.nc), the flow (flow.nc) for every command that takes one, the recording, the check
     of the model (check.nc), figures and manifest.json.
     """
-    from driftwalk.likelihood import fit_work
-    from driftwalk.likelihood.preparation import describe_measured
+    from driftwalk.likelihood import describe_measured, fit_work
     from driftwalk.runs import FitWork, run_work
     from driftwalk.schema.answers.facts import sentences
     from driftwalk.schema.answers.fit import checked_parts, fitted_parts

@@ -74,7 +74,7 @@ class MeasuredFlow:
 
     @property
     def sentence(self) -> str:
-        """What was read, for the user."""
+        """The vectors and their errors, for the user."""
         size = float(np.sqrt(np.nanmean(self.error**2)))
         known = f"scale known to {self.scale_std:.2g}" if self.scale_std > 0.0 else "scale exact"
         return (
@@ -116,11 +116,10 @@ class MeasuredFlow:
         """Return how many coefficients the vectors determine, of a flow with a covariance."""
         if self.scale_std == 0.0:
             return 0.0
-        k, _ = self.scale(coefficients, before)
-        size = self.spline.size
-        parts = (covariance[a : a + size, a : a + size] for a in (0, size))
-        found = sum(float((n * c).sum()) for n, c in zip(self.normal, parts, strict=True))
-        return min(k**2 * found, float(self.rank))
+        flow = coefficients.reshape(2, -1)
+        curvature = self._curvature(flow, *self.scale(coefficients, before))
+        size = len(curvature)
+        return min(float((curvature * covariance[:size, :size]).sum()), float(self.rank))
 
     def _curvature(self, flow: Floats, k: float, precision: float) -> Floats:
         size = self.spline.size
@@ -351,7 +350,7 @@ class Agreement(NamedTuple):
     name: str
     p_value: float
     sentence: str
-    """What is wrong, if anything is."""
+    """The finding, where it is one."""
     detectable: float
     """Misfit that is found nine times in ten."""
 

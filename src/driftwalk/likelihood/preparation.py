@@ -231,7 +231,31 @@ def prepare(
 
 
 def describe_measured(flow: xr.Dataset, study: Study) -> str:
-    """Return what a fit takes from a measured flow, in words."""
+    """Return what a fit takes from a measured flow, in words.
+
+    Parameters
+    ----------
+    flow : xarray.Dataset
+        A `flow_field`.
+    study : Study
+        Tank, block and the section [fit].
+
+    Returns
+    -------
+    str
+        Source, number of vectors, their errors and where those are from.
+
+    Raises
+    ------
+    InputError
+        When the flow is no measurement of a steady flow in the tank.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> dw.likelihood.describe_measured(dw.tank30_flow(), dw.Study())[:23]
+    'flow_true.csv: 1976 vec'
+    """
     return measured_flow(flow, study, spline_of(study)).sentence
 
 
