@@ -17,7 +17,7 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError, argument_text
-from driftwalk.likelihood.check.power import detectable_noncentrality, detectable_sigmas
+from driftwalk.likelihood.check.power import POWER, detectable_sigmas
 from driftwalk.likelihood.spline import Spline, products
 from driftwalk.schema import FLAGS, build_flow_field
 
@@ -36,6 +36,9 @@ class MeasuredPolicy(NamedTuple):
     level: float = 0.0005
     """Chance below which the measured flow and the motion contradict each other: that of a
     criterion of the check."""
+    tolerated: float = 0.02
+    """Difference of the flows, over the speed, that is no contradiction: what lies between the
+    knots. The exact flow of the bundled recording is 1 % off its best spline at the wall."""
 
 
 MEASURED: Final = MeasuredPolicy()
@@ -273,8 +276,9 @@ def agreement_facts(
     """
     if measured is None:
         return {}
+    from scipy.optimize import brentq
     from scipy.special import ndtri
-    from scipy.stats import chi2, norm
+    from scipy.stats import norm
 
     flow = coefficients.reshape(2, -1)
     k, precision = measured.scale(coefficients, determined)
@@ -293,29 +297,36 @@ def agreement_facts(
     mean, half_variance = max(mean, 1e-3), max(half_variance, 1e-6)
     # A chi squared with the same mean and variance (Satterthwaite).
     unit, dof = half_variance / mean, mean**2 / half_variance
-    facts = {
-        "measured_flow_chi_squared": squares / unit,
-        "measured_flow_dof": dof,
-        "measured_flow_determined": determined,
-        "measured_flow_p_value": float(chi2.sf(squares / unit, dof)),
-    }
-    # A random difference of the flows, as detailed as the knots, is found nine times in ten.
+    # A random difference of the flows, as detailed as the knots, by which the sum grows by 1.
     left = curvature - curvature @ absorbed
     shift = float(np.trace(left)) - float((left * absorbed.T).sum())
-    needed = unit * detectable_noncentrality(dof, MEASURED.level) / max(shift, 1e-300)
     along_x, along_y = measured.spline.design(measured.x, measured.y)
     there = np.isfinite(measured.velocity[0])
     spread = np.outer((along_y**2).sum(axis=1), (along_x**2).sum(axis=1))[there].mean()
-    facts["measured_flow_detectable_m_s"] = math.sqrt(needed * float(spread))
+    one = math.sqrt(unit * float(spread) / max(shift, 1e-300))
+    size = math.sqrt(float(np.mean(measured.velocity[:, there] ** 2)))
+    more = (MEASURED.tolerated * size / one) ** 2
+    found = {
+        "measured_flow_chi_squared": squares / unit,
+        "measured_flow_expected": dof + more,
+        "measured_flow_expected_std": math.sqrt(2.0 * (dof + 2.0 * more)),
+        "measured_flow_p_value": _tail(squares / unit, dof, more),
+        "measured_flow_determined": determined,
+    }
+    least, most = more, 4.0 * (dof + more) + 1e3
+    limit = brentq(lambda sum_: _tail(sum_, dof, more) - MEASURED.level, 0.0, 10.0 * most)
+    found["measured_flow_detectable_m_s"] = one * math.sqrt(
+        brentq(lambda shift: _tail(limit, dof, shift) - POWER.share, least, most)
+    )
     place = _farthest(measured, off)
-    facts |= {"measured_flow_farthest_m": list(place[:2]), "measured_flow_difference_m_s": place[2]}
+    found |= {"measured_flow_farthest_m": list(place[:2]), "measured_flow_difference_m_s": place[2]}
     if measured.scale_std > 0.0:
         variance = 1.0 / precision + (k / precision) ** 2 * float(along @ covariance @ along)
         free = max(measured.scale_std**2 - variance, 0.0)
         std = math.sqrt(variance)
         reach = float(ndtri(0.5 + 0.5 * confidence)) * std
         chance = 2.0 * float(norm.sf(abs(k - 1.0) / math.sqrt(free))) if free > 0.0 else 1.0
-        facts |= {
+        found |= {
             "measured_flow_scale": k,
             "measured_flow_scale_interval": [k - reach, k + reach],
             "measured_flow_scale_std": std,
@@ -323,7 +334,17 @@ def agreement_facts(
             "measured_flow_scale_detectable": detectable_sigmas(0.5 * MEASURED.level)
             * math.sqrt(free),
         }
-    return facts
+    return found
+
+
+def _tail(value: float, dof: float, shift: float) -> float:
+    """Return the chance of a noncentral chi squared above a value."""
+    from scipy.stats import ncx2, norm
+
+    # Where its noncentrality is large it is normal, and its series takes long.
+    if shift > 1e4:
+        return float(norm.sf((value - dof - shift) / math.sqrt(2.0 * (dof + 2.0 * shift))))
+    return float(ncx2.sf(value, dof, shift))
 
 
 def _of_difference(measured: MeasuredFlow, flow: Floats, k: float, precision: float) -> Floats:
@@ -360,14 +381,14 @@ def agreement_tests(facts: Mapping[str, Any]) -> list[Agreement]:
     if "measured_flow_p_value" not in facts:
         return []
     x, y = facts["measured_flow_farthest_m"]
-    dof = facts["measured_flow_dof"]
+    expected, std = facts["measured_flow_expected"], facts["measured_flow_expected_std"]
     found = [
         Agreement(
             "measured flow",
             facts["measured_flow_p_value"],
             "the measured flow is not the one that moves the block: chi squared of their "
-            f"difference {facts['measured_flow_chi_squared']:.0f}, expected {dof:.0f} ± "
-            f"{math.sqrt(2 * dof):.0f}; most at x = {x:.3g} m, y = {y:.3g} m, where they are "
+            f"difference {facts['measured_flow_chi_squared']:.0f}, expected {expected:.0f} ± "
+            f"{std:.0f}; most at x = {x:.3g} m, y = {y:.3g} m, where they are "
             f"{1e3 * facts['measured_flow_difference_m_s']:.2g} mm/s apart: is it mirrored, "
             "shifted, of another setting of the pumps, or are its errors larger?",
             facts["measured_flow_detectable_m_s"],

@@ -6,7 +6,7 @@ map of residuals, so that one dataset answers whether its numbers may be used.
 
 from __future__ import annotations
 
-from math import isfinite, sqrt
+from math import isfinite
 from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.core.errors import InputError
@@ -97,8 +97,11 @@ def fitted_parts(fit: xr.Dataset, *, hint: str = "") -> list[Part]:
     parts += [Row(label, words) for label, words in law_words(facts).items()]
     parts += law_estimates(fit)
     if "measured_flow_p_value" in facts:
-        dof = facts["measured_flow_dof"]
-        said = f"{facts['measured_flow_chi_squared']:.0f}, expected {dof:.0f} ± {sqrt(2 * dof):.0f}"
+        chi, mean, std = (
+            f"{facts[f'measured_flow_{name}']:.0f}"
+            for name in ("chi_squared", "expected", "expected_std")
+        )
+        said = f"{chi}, expected {mean} ± {std}"
         parts.append(
             Row(
                 "measured flow",

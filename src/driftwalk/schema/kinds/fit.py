@@ -133,7 +133,8 @@ variables (a measured flow was given):
     measured_v_error(measured_y measured_x) [m s-1]: the same of y
     measured_flow_chi_squared [1]: squared difference of the measured flow from the fitted one, \
         over its variance
-    measured_flow_dof [1]: its expected value where they agree
+    measured_flow_expected [1]: its expected value where they agree to 2 %
+    measured_flow_expected_std [1]: its standard deviation
     measured_flow_p_value [1]: chance of such a difference
     measured_flow_detectable [m s-1]: random difference of the flows that is found nine times in ten
     measured_flow_determined [1]: coefficients of the flow that it determines
