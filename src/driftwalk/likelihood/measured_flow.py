@@ -17,7 +17,9 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError, argument_text
+from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.check.power import POWER, detectable_sigmas
+from driftwalk.likelihood.measured_series import averaged
 from driftwalk.likelihood.spline import Spline, products
 from driftwalk.schema import FLAGS, build_flow_field
 
@@ -151,13 +153,10 @@ def measured_flow(
     `sources` are those of the recordings: a flow that was taken from one of them is none.
     """
     _require_measurement(field, study, sources)
+    field = averaged(field)
     x, y = (field[axis].values.astype(np.float64) for axis in "xy")
-    # The knots cover the tank and a little more.
-    ends_x, ends_y = (
-        (first, first + (count - 3) * spline.spacing)
-        for first, count in ((spline.origin_x, spline.columns), (spline.origin_y, spline.rows))
-    )
-    inside = ((y >= ends_y[0]) & (y <= ends_y[1]))[:, None] & (x >= ends_x[0]) & (x <= ends_x[1])
+    at_x, at_y = (axis.ravel() for axis in np.meshgrid(x, y))
+    inside = outline_of(study.tank.to_arena()).depth(at_x, at_y).reshape(y.size, x.size) >= 0.0
     there = inside & (field["flag"].values == FLAGS["measured"])
     velocity = np.stack([np.where(there, field[name].values, np.nan) for name in NAMES])
     stated = study.fit.flow_error_m_s
@@ -190,7 +189,7 @@ def measured_flow(
     factor = math.sqrt(squares / surplus) if surplus >= MEASURED.fewest_surplus else 1.0
     if error is None:
         error, words = factor * unit, "estimated from their scatter around smooth flow"
-    elif factor > 1.0:
+    elif factor > 1.001:
         # The flow has details that the knots are too far apart for; the fit cannot follow them.
         error = factor * error
         words += f", times {factor:.2g} as they scatter more around smooth flow"
@@ -205,11 +204,6 @@ def measured_flow(
 
 
 def _require_measurement(field: xr.Dataset, study: Study, sources: tuple[str, ...]) -> None:
-    if "time" in field.dims:
-        raise InputError(
-            f"the measured flow is a series of {field.sizes['time']} frames, and the fit takes a "
-            "steady one: average it over the time of the recording"
-        )
     if study.fit.switching_times_s:
         raise InputError(
             "a measured flow is that of one setting of the pumps: fit each interval between the "

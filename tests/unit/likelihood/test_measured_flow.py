@@ -107,6 +107,13 @@ def test_errors_are_estimated_from_the_scatter_around_a_smooth_flow() -> None:
     assert "scatter" in one.sentence
 
 
+def test_vectors_beyond_the_wall_do_not_count() -> None:
+    field = of_fit(2e-3)
+    beyond = field.assign(flag=xr.ones_like(field["flag"]))
+    one = read(beyond)
+    assert one.count == np.count_nonzero(np.hypot(*np.meshgrid(one.x, one.y)) <= 0.15)
+
+
 def test_errors_of_the_file_and_stated_ones_are_taken() -> None:
     field = of_fit(2e-3)
     error = np.full(field["u"].shape, 2.5e-3)
@@ -254,9 +261,6 @@ def test_one_level_is_that_of_the_check() -> None:
 
 def test_what_is_no_measurement_of_a_steady_flow_is_refused() -> None:
     field = of_fit(1e-3)
-    series = field.expand_dims(time=[0.0, 1.0]).transpose("time", "y", "x")
-    with pytest.raises(InputError, match="a series of 2 frames"):
-        read(series)
     with pytest.raises(InputError, match="one setting of the pumps"):
         read(field, switching_times_s=[100.0])
     with pytest.raises(InputError, match="fit both recordings together"):
@@ -270,3 +274,39 @@ def test_what_is_no_measurement_of_a_steady_flow_is_refused() -> None:
         read(of_fit(1e-3, step=0.03))
     with pytest.raises(InputError, match="no vector"):
         read(field.assign_coords(x=field["x"] + 1.0))
+
+
+def frames(change: float, *, count: int = 40, error: float = 4e-3) -> xr.Dataset:
+    """Return frames of the flow with errors, and with a change of its right half in time."""
+    field, generator = of_fit(), np.random.default_rng(8)
+    shape = (count, *field["u"].shape)
+    pulse = np.where(field["x"].values > 0.0, np.sin(np.arange(count))[:, None, None], 0.0)
+    made = {
+        name: (1.0 + change * pulse) * field[name].values + error * generator.normal(size=shape)
+        for name in ("u", "v")
+    }
+    flag = np.broadcast_to(field["flag"].values, shape).copy()
+    flag[::3, 5, 15] = 2  # a vector that is rejected now and then
+    axis = field["x"].values
+    return build_flow_field(
+        axis, axis, **made, flag=flag, time=0.1 * np.arange(count), attrs=field.attrs
+    )
+
+
+def test_frames_of_a_steady_flow_are_averaged_with_the_error_of_their_spread() -> None:
+    one = read(frames(0.0))
+    there = np.isfinite(one.velocity[0])
+    expected = np.where(np.isfinite(one.error[0]), 4e-3 / np.sqrt(40), np.nan)
+    expected[5, 15] = 4e-3 / np.sqrt(26)
+    np.testing.assert_allclose(one.error[0][there], expected[there], rtol=0.4)
+    assert np.nanmean(one.error) == pytest.approx(np.nanmean(expected), rel=0.05)
+    assert "from the spread of 40 frames" in one.sentence
+    off = one.velocity[0] - of_fit()["u"].values
+    assert np.nanstd(off / one.error[0]) == pytest.approx(1.0, abs=0.15)
+
+
+def test_frames_of_a_flow_that_changes_are_refused() -> None:
+    with pytest.raises(InputError, match=r"changes in time, by \d+% in one mode"):
+        read(frames(0.5))
+    # Two frames without a change differ by their errors alone.
+    assert read(frames(0.0, count=2)).count > 600
