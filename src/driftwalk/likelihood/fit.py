@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from driftwalk.conditions import jump_warnings, unstated_warning
 from driftwalk.core.processors import one_blas_thread
 from driftwalk.core.run_stages import Course, share_of_search, tell_nobody
@@ -44,6 +46,7 @@ from driftwalk.likelihood.preparation import (
     as_list,
     prepare,
 )
+from driftwalk.likelihood.prior import PRIOR
 from driftwalk.likelihood.refuse import (
     BREAKDOWN,
     reason_of_no_solution,
@@ -261,13 +264,16 @@ def _with_rival(
 
 
 def _agreement(ready: PreparedRecordings, mode: Mode, restricted: Restricted) -> dict[str, Any]:
-    """Return how far the measured flow and the fitted one agree; nothing without one."""
-    found = restricted.point.coefficients
-    own = mode.covariance[: found.size, : found.size]
+    """Return how far the measured flow and the motion agree; nothing without a measured flow."""
+    if ready.measured is None:
+        return {}
+    sums = ready.passes.sums(restricted.point, noise="without")
+    across, own = sums.information[:-1, -1], sums.information[-1, -1] + PRIOR.log_drag_std**-2
     return agreement_facts(
         ready.measured,
-        found,
-        own,
+        restricted.point.coefficients,
+        sums.information[:-1, :-1] - np.outer(across, across) / own,
+        smoothness=ready.prior.matrix(mode.weights),
         determined=mode.weights.determined,
         confidence=ready.study.fit.confidence,
     )

@@ -115,14 +115,15 @@ class MeasuredFlow:
         value = 0.5 * float((off * pull).sum()) + determined * math.log(k)
         if self.scale_std > 0.0:
             value += 0.5 * ((k - 1.0) / self.scale_std) ** 2
-        return value, k * pull.ravel(), self._curvature(flow, k, precision)
+        # As k goes with the inverse of the flow's size, ``determined ln k`` bends upwards along it.
+        bent = self._curvature(flow, k, precision + 2.0 * determined / k**2)
+        return value, k * pull.ravel(), bent
 
     def determined(self, coefficients: Floats, covariance: Floats, before: float) -> float:
         """Return how many coefficients the vectors determine, of a flow with a covariance."""
         if self.scale_std == 0.0:
             return 0.0
-        flow = coefficients.reshape(2, -1)
-        curvature = self._curvature(flow, *self.scale(coefficients, before))
+        _, _, curvature = self.deviance(coefficients, before)
         size = len(curvature)
         return min(float((curvature * covariance[:size, :size]).sum()), float(self.rank))
 
@@ -256,48 +257,48 @@ def _least_squares(
 
 
 def agreement_facts(
-    measured: MeasuredFlow | None,
+    measured: MeasuredFlow,
     coefficients: Floats,
-    covariance: Floats,
+    information: Floats,
     *,
+    smoothness: Floats,
     determined: float,
     confidence: float,
 ) -> dict[str, Any]:
-    """Return how far a measured flow and the fitted one agree.
+    """Return how far the motion pulls the flow away from the measured one.
 
-    The sum of squares of their difference is compared with that of a flow drawn from what the
-    recording and the prior of smoothness leave open. `covariance` is that of the coefficients.
+    The fitted flow is compared with that of the vectors and the prior of smoothness alone, in
+    errors of the vectors. `information` is that of the motion on the coefficients, `smoothness` the
+    precision of one component under its prior.
     """
-    if measured is None:
-        return {}
+    from scipy.linalg import block_diag
     from scipy.optimize import brentq
     from scipy.special import ndtri
     from scipy.stats import norm
 
     flow = coefficients.reshape(2, -1)
     k, precision = measured.scale(coefficients, determined)
-    off = k * flow - measured.own
-    squares = float(np.einsum("ka,kab,kb->", off, measured.normal, off))
-    curvature = _of_difference(measured, flow, k, precision)
-    absorbed = covariance @ curvature
-    along = np.einsum("kab,kb->ka", measured.normal, flow).ravel()
-    power = float(along @ flow.ravel())
-    # In the directions of the least squares the difference has the covariance 1 - C M, where C is
-    # that of the fitted flow and M the precision of the measurement.
-    mean = measured.rank - float(np.trace(absorbed)) - power / precision
-    half_variance = (
-        measured.rank - 2.0 * float(np.trace(absorbed)) + float((absorbed * absorbed.T).sum())
-    )
-    mean, half_variance = max(mean, 1e-3), max(half_variance, 1e-6)
+    _, score, precise = measured.deviance(coefficients, determined)
+    score = score - (flow @ smoothness).ravel()
+    precise = precise + block_diag(smoothness, smoothness)
+    alone, covariance = np.linalg.inv(precise), np.linalg.inv(precise + information)
+    off = -alone @ score
+    form = _of_difference(measured, flow, k, precision)
+    squares = float(off @ form @ off)
+    # Two estimates of which one knows more: their difference has the difference of the covariances.
+    less = alone - covariance
+    spread = form @ less
+    mean = max(float(np.trace(spread)), 1e-6)
+    half_variance = max(float((spread * spread.T).sum()), 1e-12)
     # A chi squared with the same mean and variance (Satterthwaite).
     unit, dof = half_variance / mean, mean**2 / half_variance
     # A random difference of the flows, as detailed as the knots, by which the sum grows by 1.
-    left = curvature - curvature @ absorbed
-    shift = float(np.trace(left)) - float((left * absorbed.T).sum())
+    shift = float(((less @ form) * (form @ less @ form).T).sum())
+    along = np.einsum("kab,kb->ka", measured.normal, flow).ravel()
     along_x, along_y = measured.spline.design(measured.x, measured.y)
     there = np.isfinite(measured.velocity[0])
-    spread = np.outer((along_y**2).sum(axis=1), (along_x**2).sum(axis=1))[there].mean()
-    one = math.sqrt(unit * float(spread) / max(shift, 1e-300))
+    bases = np.outer((along_y**2).sum(axis=1), (along_x**2).sum(axis=1))[there].mean()
+    one = math.sqrt(unit * float(bases) / max(shift, 1e-300))
     size = math.sqrt(float(np.mean(measured.velocity[:, there] ** 2)))
     more = (MEASURED.tolerated * size / one) ** 2
     found = {
@@ -312,7 +313,7 @@ def agreement_facts(
     found["measured_flow_detectable_m_s"] = one * math.sqrt(
         brentq(lambda shift: _tail(limit, dof, shift) - POWER.share, least, most)
     )
-    place = _farthest(measured, off)
+    place = _farthest(measured, k * off)
     found |= {"measured_flow_farthest_m": list(place[:2]), "measured_flow_difference_m_s": place[2]}
     if measured.scale_std > 0.0:
         variance = 1.0 / precision + (k / precision) ** 2 * float(along @ covariance @ along)
