@@ -301,7 +301,7 @@ def agreement_facts(
     one = math.sqrt(unit * float(bases) / max(shift, 1e-300))
     size = math.sqrt(float(np.mean(measured.velocity[:, there] ** 2)))
     more = (MEASURED.tolerated * size / one) ** 2
-    found = {
+    found: dict[str, Any] = {
         "measured_flow_chi_squared": squares / unit,
         "measured_flow_expected": dof + more,
         "measured_flow_expected_std": math.sqrt(2.0 * (dof + 2.0 * more)),

@@ -218,9 +218,9 @@ def prepare(
         require_own_arena(series, study, where=prefix_of(many[0]))
     require_usable(series, study)
     # Each flow has its own coefficients, so each needs enough intervals.
-    for flow in range(0 if intervals.steady else len(intervals.labels)):
-        in_flow = [one for one in series if one.flow == flow]
-        require_usable(in_flow, study, where=f"{intervals.describe_flow(flow)}: ")
+    for number in range(0 if intervals.steady else len(intervals.labels)):
+        in_flow = [one for one in series if one.flow == number]
+        require_usable(in_flow, study, where=f"{intervals.describe_flow(number)}: ")
     if study.fit.camera == "auto":
         for raw, recording in zip(raws, many, strict=True):
             require_raw(raw, where=prefix_of(recording))

@@ -127,7 +127,7 @@ class Prior:
             determined = self.measured.determined(
                 point.coefficients, covariance, weights.determined
             )
-        return Weights(*new, determined)
+        return Weights(new[0], new[1], determined)
 
     def log_scale(self, point: Point, weights: Weights) -> float:
         """Return what of the deviance goes with the scale of a measured flow alone.

@@ -67,6 +67,7 @@ def design(spline: Spline, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return np.einsum("yj,xi->yxji", along_y, along_x).reshape(y.size * x.size, -1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scale_std", [0.0, 0.03])
 def test_the_sum_of_squares_is_that_of_every_vector(scale_std: float) -> None:
     field = of_fit(2e-3, scale=1.05)
@@ -134,6 +135,7 @@ def test_errors_of_the_file_and_stated_ones_are_taken() -> None:
     assert "times 3" in small.errors or "times 2.9" in small.errors
 
 
+@pytest.mark.slow
 def test_a_fit_with_useless_vectors_is_a_fit_without_them() -> None:
     without = fitted(SECONDS)
     fit = dw.fit_motion(recording(SECONDS), study_with(flow_error_m_s=100.0), flow=of_fit())
@@ -145,6 +147,7 @@ def test_a_fit_with_useless_vectors_is_a_fit_without_them() -> None:
     assert float(fit["measured_flow_scale_std"]) == pytest.approx(0.03, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_with_exact_vectors_the_flow_is_the_measured_one() -> None:
     """C_d is the maximum of the likelihood in that flow, from values of the filter alone."""
     field, exact = of_fit(), study_with(flow_error_m_s=1e-6, flow_scale_std=0.0)
@@ -169,6 +172,7 @@ def test_with_exact_vectors_the_flow_is_the_measured_one() -> None:
     assert abs(best - at) < 0.5 * std
 
 
+@pytest.mark.slow
 def test_a_scale_that_is_off_is_found_and_leaves_the_drag_alone() -> None:
     vectors = of_fit(1e-3)
     right, wrong = (
@@ -189,6 +193,7 @@ def test_a_scale_that_is_off_is_found_and_leaves_the_drag_alone() -> None:
     assert high - low < before[1] - before[0]
 
 
+@pytest.mark.slow
 def test_the_statistic_of_agreement_has_its_distribution(monkeypatch: pytest.MonkeyPatch) -> None:
     """P values of flows and scales that are drawn as the fit takes them are uniform."""
     exact = MEASURED._replace(tolerated=0.0)
@@ -229,6 +234,7 @@ def _sums(field: xr.Dataset) -> dict[str, Any]:
     return {name: getattr(made, name) for name in ("velocity", "normal", "right", "own", "rank")}
 
 
+@pytest.mark.slow
 def test_a_mirrored_or_shifted_flow_is_recognised() -> None:
     free, axis = fitted(SECONDS), np.arange(-15, 16) * 0.01
     spline = spline_of(coarse_study())
@@ -242,6 +248,7 @@ def test_a_mirrored_or_shifted_flow_is_recognised() -> None:
     assert words(1.0, 0.02) == "shifted by 20 mm in x and 0 mm in y"
 
 
+@pytest.mark.slow
 def test_a_stored_fit_has_the_same_prior() -> None:
     flow = of_fit(2e-3)
     fit = dw.fit_motion(recording(SECONDS), study_with(), flow=flow)

@@ -82,7 +82,7 @@ def _moved(measured: MeasuredFlow, x: Floats, y: Floats) -> Iterator[tuple[str, 
 def _nearest(nodes: Floats, places: Floats) -> Integers:
     """Return the nodes nearest to places, counted from 1; 0 or one more beyond the ends."""
     found = np.rint((places - nodes[0]) / (nodes[1] - nodes[0])).astype(np.intp) + 1
-    return np.clip(found, 0, nodes.size + 1)
+    return np.asarray(np.clip(found, 0, nodes.size + 1))
 
 
 _SIGNS: Final = {
