@@ -320,3 +320,19 @@ def test_frames_of_a_flow_that_changes_are_refused() -> None:
         read(frames(0.5))
     # Two frames without a change differ by their errors alone.
     assert read(frames(0.0, count=2)).count > 600
+
+
+@pytest.mark.slow
+def test_the_check_repeats_the_fit_without_a_flow_that_contradicts_the_motion() -> None:
+    field = of_fit(1e-3)
+    mirrored = field.assign(
+        u=field["u"].copy(data=field["u"].values[::-1]),
+        v=field["v"].copy(data=-field["v"].values[::-1]),
+    )
+    fit = dw.fit_motion(recording(SECONDS), coarse_study(), flow=mirrored)
+    judged = dw.likelihood.judge_fit(fit, [recording(SECONDS)])
+    assert judged.fit["verdict"] == "does not explain"
+    said = str(judged.fit["verdict_reason"].values[0])
+    drag = float(fitted(SECONDS)["estimate"].sel(parameter="drag_coefficient"))
+    assert f"without it, with a C_d of {drag:.3g}" in said
+    assert "mirrored in y it is the one" in said
