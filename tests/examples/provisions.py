@@ -515,6 +515,7 @@ PAGES: dict[str, Page] = {
             _recording(90.0, "second.csv"),
             _search("small.toml"),
             _study,
+            _flow("piv.csv"),
             _minutes(first=1, second=1.5),
         ),
         instead={
@@ -522,6 +523,7 @@ PAGES: dict[str, Page] = {
             "sensitivity fit/": f"sensitivity fit/ {FEW_SETTINGS}",
             "fit first.csv": "fit --no-check first.csv",
             "fit recording.csv --mass": "fit --no-check first.csv --mass",
+            "fit recording.csv --flow": "fit --no-check first.csv --flow",
             "fit recording.csv --law": "fit --no-check first.csv --law",
             "fit recording.csv --wall": "fit --no-check first.csv --wall",
             "fit recording.csv --compare": "fit --no-check first.csv --compare",

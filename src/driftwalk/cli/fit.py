@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
+from driftwalk.cli.inputs.model_source import load_flow_for
 from driftwalk.cli.inputs.recordings import opening_note, read_for_run
 from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared_types import Json, Overwrite, argument, option
+from driftwalk.cli.options.shared_types import Json, Overwrite, argument, flow_of_run, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import print_note, print_parts, print_places, print_result
@@ -26,13 +27,22 @@ RecordingFiles = Annotated[
     *("side", "mass", "depth", "force_interval"),
     *("angle", "spline_spacing", "confidence", "switching_times", "flow_labels", "precision"),
     *("law", "pressure_gradient", "added_mass", "force_memory", "flow_strength", "camera"),
-    *("added_mass_std", "mass_std", "side_std"),
+    *("added_mass_std", "mass_std", "side_std", "flow_error", "flow_scale_error"),
 )
 def fit(
     recordings: RecordingFiles,
     out: Annotated[Path, option("--out -o DIR", "Run directory to make.")],
     given: StudyOptions,
     how: RecordingOptions,
+    flow: Annotated[
+        Path | None,
+        option(
+            "--flow FILE",
+            "Steady flow that was measured, as by PIV: the prior of the fitted flow.",
+            callback=flow_of_run,
+            show_default=False,
+        ),
+    ] = None,
     no_check: Annotated[
         bool, option("--no-check", "Skip the check whether the model explains the recording.")
     ] = False,
@@ -56,19 +66,22 @@ def fit(
     the fit (fit.nc), the flow (flow.nc) for every command that takes one, the recording, the check
     of the model (check.nc), figures and manifest.json.
     """
-    from driftwalk.likelihood import fit_work
+    from driftwalk.likelihood import describe_measured, fit_work
     from driftwalk.runs import FitWork, run_work
     from driftwalk.schema.answers.facts import sentences
     from driftwalk.schema.answers.fit import checked_parts, fitted_parts
 
     read = read_for_run(recordings, given, how)
     inputs = {"recording" if n == 0 else f"recording-{n + 1}": p for n, p in enumerate(recordings)}
-    inputs.update({"study": given.file} if given.file is not None else {})
+    inputs |= {role: path for role, path in (("study", given.file), ("flow", flow)) if path}
+    field = None if flow is None else load_flow_for(flow, read.study)
     effort = fit_work(sum(one.sizes["time"] for one in read.trajectories))
     opening = opening_note(read.study, given, how=how, about="block")
 
     def begun() -> None:
         opening()
+        if field is not None:
+            print_note(f"measured flow {describe_measured(field, read.study)}")
         if effort.notable:
             print_note(to_options(f"{effort.describe()}; to take less, {effort.advice()}"))
 
@@ -86,6 +99,7 @@ def fit(
         check=not no_check,
         compare_laws=compare_laws,
         wall=wall,
+        flow=field,
         **({} if json else said),
     )
     with reported("fit") as told:

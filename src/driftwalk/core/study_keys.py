@@ -90,6 +90,8 @@ class FitSettings(StudySettings, total=False):
     force_memory: Annotated[Number, "fit.force_memory_s"]
     flow_strength: Annotated[str, "fit.flow_strength"]
     camera: Annotated[str, "fit.camera"]
+    flow_error: Annotated[Number, "fit.flow_error_m_s"]
+    flow_scale_error: Annotated[Number, "fit.flow_scale_std"]
 
 
 def _keys_of(settings: type) -> dict[str, str]:

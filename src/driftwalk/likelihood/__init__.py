@@ -5,6 +5,7 @@ from driftwalk.likelihood.contacts.estimate import estimate_wall
 from driftwalk.likelihood.fit import check_fit, fit_motion
 from driftwalk.likelihood.flow_intervals import fitted_flow
 from driftwalk.likelihood.law.held_out import compare_laws
+from driftwalk.likelihood.preparation import describe_measured
 from driftwalk.likelihood.recovery import FitRecovery, recovery_study
 from driftwalk.likelihood.refuse import fit_work
 from driftwalk.likelihood.score import score_fit
@@ -15,6 +16,7 @@ __all__ = [
     "check_fit",
     "check_model",
     "compare_laws",
+    "describe_measured",
     "estimate_wall",
     "fit_motion",
     "fit_work",

@@ -42,7 +42,7 @@ deviations from its prediction: so a fit cannot gain by leaving samples out."""
 
 
 def angle_given_facts(
-    passes: Passes, mode: Mode, restricted: Restricted, study: Study
+    passes: Passes, prior: Prior, mode: Mode, restricted: Restricted, study: Study
 ) -> dict[str, Any]:
     """Fit once more with the angle as an input (`passes`), and compare.
 
@@ -54,7 +54,7 @@ def angle_given_facts(
     known = {**found.fixed, **found.opened}
     start = replace(found, log_lever=None, log_angle_noise=None, opened={}, fixed=known)
     try:
-        search = ModeSearch(passes, Prior(passes), study.fit.iterations)
+        search = ModeSearch(passes, prior, study.fit.iterations)
         other = require_mode(search.find(start, mode.weights, held=FROM_NEAR))
         again = restricted_drag(search, other, intensity=False)
         covariance = parameter_covariance(other, again)
@@ -104,7 +104,7 @@ def log_evidence(estimate: Estimate) -> float:
     Fits of the same samples can be compared by it, with the orientation negated too.
     """
     passes, point, weights = estimate.passes, estimate.point, estimate.weights
-    prior = Prior(passes)
+    prior = estimate.prior
     sums = prior.add(passes.sums(point), point, weights)
     covariance = inverse(sums.information)
     mode = Mode(point, weights, covariance, sums.used, 0, converged=True, deviance=sums.deviance)

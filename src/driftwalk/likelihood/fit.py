@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from driftwalk.conditions import jump_warnings, unstated_warning
 from driftwalk.core.processors import one_blas_thread
 from driftwalk.core.run_stages import Course, share_of_search, tell_nobody
@@ -24,6 +26,7 @@ from driftwalk.likelihood.law.force_law import Assumptions, assumptions_of, side
 from driftwalk.likelihood.law.forward_selection import LawResult
 from driftwalk.likelihood.law.search import LawSearch
 from driftwalk.likelihood.law.shape_changes import shape_facts
+from driftwalk.likelihood.measured_flow import agreement_facts, contradictions
 from driftwalk.likelihood.newton import (
     EXCERPT,
     FROM_ANOTHER,
@@ -43,7 +46,7 @@ from driftwalk.likelihood.preparation import (
     as_list,
     prepare,
 )
-from driftwalk.likelihood.prior import Prior
+from driftwalk.likelihood.prior import PRIOR
 from driftwalk.likelihood.refuse import (
     BREAKDOWN,
     reason_of_no_solution,
@@ -71,6 +74,7 @@ def fit_motion(
     *,
     angle: AngleUse | None = None,
     body: str | None = None,
+    flow: xr.Dataset | None = None,
     tell: Tell | None = None,
 ) -> xr.Dataset:
     """Fit flow, drag coefficient, stochastic force and tracking noise to a recording, together.
@@ -91,6 +95,9 @@ def fit_motion(
         How the recorded orientation is used; default: what the study says.
     body : str, optional
         The body, where a recording has several.
+    flow : xarray.Dataset, optional
+        A steady flow that was measured, a `flow_field` as `load_flow` returns it: its *measured*
+        nodes, with their errors, become the prior of the fitted flow.
     tell : callable, optional
         Called with the thousandths of the work that are done, 1000, and the present task.
 
@@ -107,8 +114,8 @@ def fit_motion(
     ------
     InputError
         When a recording is too short or does not move, several bodies are there and none named, the
-        block is at the wall all the time, angles are asked for where there are none, or switching
-        times are outside a recording or too near to each other.
+        block is at the wall all the time, angles are asked for where there are none, switching
+        times are outside a recording or too near to each other, or the flow is no measurement.
 
     Examples
     --------
@@ -120,7 +127,7 @@ def fit_motion(
     from driftwalk.model import Study
 
     chosen = study if study is not None else Study()
-    ready = prepare(as_list(recordings), chosen, angle, body)
+    ready = prepare(as_list(recordings), chosen, angle, body, flow)
     passes = ready.passes
     start = first_point(ready, passes.spline)
     assumptions = assumptions_of(
@@ -131,7 +138,7 @@ def fit_motion(
     # The stages stay in one function: they share most of their variables.
     with solved(reason):
         passed = _work_listener(course, _usual_search(passes))
-        search = ModeSearch(passes, Prior(passes), chosen.fit.iterations, passed)
+        search = ModeSearch(passes, ready.prior, chosen.fit.iterations, passed)
         laws, law = _laws_of(search, assumptions, start, ready)
         course.begin("drag")
         try:
@@ -157,7 +164,7 @@ def fit_motion(
     if ready.angle == "state":
         course.begin("angle as given")
         given = thinned(ready.with_angle("given").passes)
-        turning |= angle_given_facts(given, law.mode, restricted, chosen)
+        turning |= angle_given_facts(given, ready.prior, law.mode, restricted, chosen)
     with solved(reason):
         parameters = _parameter_facts(search, law.mode, restricted, ready)
         for rival in law.rivals:
@@ -171,6 +178,7 @@ def fit_motion(
         **whiteness_of(counted)._asdict(),
         **ready.facts,
         **_search_facts(law, restricted),
+        **_agreement(ready, law.mode, restricted),
         "wetted_depth_m": chosen.wetted_depth_m,
     }
     fit = build_fit(ready, law, restricted, facts)
@@ -180,7 +188,7 @@ def fit_motion(
     for recording, track in zip(ready.recordings, ready.tracks, strict=True):
         warnings += jump_warnings(recording, body, track=track)
     warnings += warnings_of(facts, shares, ready.intervals, side_m=chosen.block.side_m)
-    warnings += law.unsettled
+    warnings += [*law.unsettled, *contradictions(facts)]
     if shape is not None and shape.significant:
         warnings.append(shape.sentence)
     if law.left_out:
@@ -255,6 +263,22 @@ def _with_rival(
     }
 
 
+def _agreement(ready: PreparedRecordings, mode: Mode, restricted: Restricted) -> dict[str, Any]:
+    """Return how far the measured flow and the motion agree; nothing without a measured flow."""
+    if ready.measured is None:
+        return {}
+    sums = ready.passes.sums(restricted.point, noise="without")
+    across, own = sums.information[:-1, -1], sums.information[-1, -1] + PRIOR.log_drag_std**-2
+    return agreement_facts(
+        ready.measured,
+        restricted.point.coefficients,
+        sums.information[:-1, :-1] - np.outer(across, across) / own,
+        smoothness=ready.prior.matrix(mode.weights),
+        determined=mode.weights.determined,
+        confidence=ready.study.fit.confidence,
+    )
+
+
 def _search_facts(law: LawResult, restricted: Restricted) -> dict[str, Any]:
     """Return what stands in a fit of its search."""
     mode = law.mode
@@ -275,12 +299,13 @@ def check_fit(
     *,
     angle: AngleUse | None = None,
     body: str | None = None,
+    flow: xr.Dataset | None = None,
 ) -> None:
     """Refuse recordings that `fit_motion` would refuse; takes almost no time.
 
     Parameters
     ----------
-    recordings, study, angle, body
+    recordings, study, angle, body, flow
         As of `fit_motion`.
 
     Raises
@@ -295,7 +320,7 @@ def check_fit(
     """
     from driftwalk.model import Study
 
-    prepare(as_list(recordings), study if study is not None else Study(), angle, body)
+    prepare(as_list(recordings), study if study is not None else Study(), angle, body, flow)
 
 
 def _usual_search(passes: Passes) -> float:

@@ -28,7 +28,8 @@ from driftwalk.likelihood.filter.series import (
 )
 from driftwalk.likelihood.flow_intervals import Intervals, cut_track, intervals_of, require_fit
 from driftwalk.likelihood.law.force_law import effective_logs, stored_numbers
-from driftwalk.likelihood.prior import Weights
+from driftwalk.likelihood.measured_flow import MeasuredFlow, measured_flow, stored_flow
+from driftwalk.likelihood.prior import Prior, Weights
 from driftwalk.likelihood.refuse import (
     LIMIT,
     require_length,
@@ -90,6 +91,12 @@ class PreparedRecordings:
     """Frames of each recording that are missing though the stamps say a constant rate."""
     mistakes: int
     """Samples that are left out as mistakes of the tracker."""
+    measured: MeasuredFlow | None = None
+
+    @property
+    def prior(self) -> Prior:
+        """The prior of the fit."""
+        return Prior(self.passes, self.measured)
 
     @property
     def duration(self) -> float:
@@ -167,9 +174,17 @@ class PreparedRecordings:
 
 
 def prepare(
-    many: Sequence[xr.Dataset], study: Study, angle: AngleUse | None, body: str | None
+    many: Sequence[xr.Dataset],
+    study: Study,
+    angle: AngleUse | None,
+    body: str | None,
+    flow: xr.Dataset | None = None,
 ) -> PreparedRecordings:
     """Return recordings ready for the filter; refuse what cannot be fitted."""
+    sources = tuple(str(one.attrs.get("source", "")) for one in many)
+    measured = None
+    if flow is not None:
+        measured = measured_flow(flow, study, spline_of(study), sources=sources)
     # The cheap refusals come first: memory and size need no track to be read.
     require_memory(sum(one.sizes["time"] for one in many))
     intervals = intervals_of(study)
@@ -203,15 +218,45 @@ def prepare(
         require_own_arena(series, study, where=prefix_of(many[0]))
     require_usable(series, study)
     # Each flow has its own coefficients, so each needs enough intervals.
-    for flow in range(0 if intervals.steady else len(intervals.labels)):
-        in_flow = [one for one in series if one.flow == flow]
-        require_usable(in_flow, study, where=f"{intervals.describe_flow(flow)}: ")
+    for number in range(0 if intervals.steady else len(intervals.labels)):
+        in_flow = [one for one in series if one.flow == number]
+        require_usable(in_flow, study, where=f"{intervals.describe_flow(number)}: ")
     if study.fit.camera == "auto":
         for raw, recording in zip(raws, many, strict=True):
             require_raw(raw, where=prefix_of(recording))
     return PreparedRecordings(
-        many, study, body, tracks, parts, places, intervals, series, used_angle, dropped, mistakes
-    )
+        many, study, body, tracks, parts, places, intervals, series, used_angle, dropped, mistakes,
+        measured,
+    )  # fmt: skip
+
+
+def describe_measured(flow: xr.Dataset, study: Study) -> str:
+    """Return what a fit takes from a measured flow, in words.
+
+    Parameters
+    ----------
+    flow : xarray.Dataset
+        A `flow_field`.
+    study : Study
+        Tank, block and the section [fit].
+
+    Returns
+    -------
+    str
+        Source, number of vectors, their errors and where those are from.
+
+    Raises
+    ------
+    InputError
+        When the flow is no measurement of a steady flow in the tank.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> dw.likelihood.describe_measured(dw.tank30_flow(), dw.Study())[:23]
+    'flow_true.csv: 1976 vec'
+    """
+    return measured_flow(flow, study, spline_of(study)).sentence
 
 
 def _jumps_removed(recording: xr.Dataset, body: str | None) -> int:
@@ -263,6 +308,7 @@ class Estimate:
     weights: Weights
     tracks: Sequence[Track]
     """Sources of the series of the passes: the recordings, cut at the switching times."""
+    prior: Prior
 
 
 def estimate_of(fit: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str | None) -> Estimate:
@@ -272,7 +318,7 @@ def estimate_of(fit: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str 
     fit = require_fit(fit)
     study = parse_study(fit.attrs["study"])
     study = apply_overrides(study, fitted_law(fit))
-    ready = prepare(recordings, study, fit.attrs["angle"], body)
+    ready = prepare(recordings, study, fit.attrs["angle"], body, stored_flow(fit))
     if ready.samples != int(fit["samples"]):
         raise InputError(
             f"the recordings have {ready.samples} positions, the fit was made of "
@@ -289,5 +335,8 @@ def estimate_of(fit: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str 
             math.log(fitted_value(fit, name)) for name in ("force_lever", "orientation_noise")
         )
         point = replace(point, log_lever=lever, log_angle_noise=turning)
-    weights = Weights(float(fit["roughness_weight"]), float(fit["size_weight"]))
-    return Estimate(study, replace(ready.passes, spline=spline), point, weights, ready.parts)
+    determined = float(fit["measured_flow_determined"]) if "measured_u" in fit else 0.0
+    weights = Weights(float(fit["roughness_weight"]), float(fit["size_weight"]), determined)
+    passes = replace(ready.passes, spline=spline)
+    prior = Prior(passes, ready.measured)
+    return Estimate(study, passes, point, weights, ready.parts, prior)

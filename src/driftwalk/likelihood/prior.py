@@ -4,7 +4,8 @@ Prior of the flow's coefficients: ``exp(-(lam_r c' R c + lam_s c' S c) / 2)`` pe
 the roughness and the size of `driftwalk.likelihood.spline.penalties`; with several flows the
 weights are the same for all. The two weights follow from the data: each step sets a weight to the
 degrees of freedom that the data have taken from its prior, over ``c' R c`` or ``c' S c`` (MacKay's
-fixed point of the evidence).
+fixed point of the evidence). A measured flow (`driftwalk.likelihood.measured_flow`) adds what it
+says of the coefficients.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import numpy as np
 from driftwalk.core.arrays import Floats
 from driftwalk.likelihood.filter.filter_pass import Passes, Sums
 from driftwalk.likelihood.filter.parameters import NUMBERS, Point
+from driftwalk.likelihood.measured_flow import MeasuredFlow
 from driftwalk.likelihood.spline import penalties
 
 
@@ -53,12 +55,15 @@ class Weights:
 
     roughness: float
     size: float
+    determined: float = 0.0
+    """Coefficients that a measured flow of uncertain scale determines."""
 
 
 class Prior:
     """The prior of all parameters as a quadratic form."""
 
-    def __init__(self, passes: Passes) -> None:
+    def __init__(self, passes: Passes, measured: MeasuredFlow | None = None) -> None:
+        self.measured = measured
         self.roughness, self.size = penalties(passes.spline)
         self.log_lever = math.log(PRIOR.lever * passes.body.side)
 
@@ -79,6 +84,11 @@ class Prior:
             score[part] -= pull[component]
         deviance = sums.deviance + 0.5 * float((pull * coefficients).sum())
         drag = coefficients.size
+        if self.measured is not None:
+            off, force, curvature = self.measured.deviance(point.coefficients, weights.determined)
+            deviance += off
+            score[:drag] += force
+            information[:drag, :drag] += curvature
         single = [(drag, point.log_drag - math.log(PRIOR.drag), PRIOR.log_drag_std)]
         if point.log_lever is not None:
             single.append((drag + LEVER, point.log_lever - self.log_lever, PRIOR.log_lever_std))
@@ -112,4 +122,20 @@ class Prior:
             value = float(np.einsum("ka,ab,kb->", coefficients, form, coefficients))
             wanted = old * (prior - posterior) / max(value, 1e-300)
             new.append(float(np.clip(wanted, old / MOST_FACTOR, old * MOST_FACTOR)))
-        return Weights(*new)
+        determined = 0.0
+        if self.measured is not None:
+            determined = self.measured.determined(
+                point.coefficients, covariance, weights.determined
+            )
+        return Weights(new[0], new[1], determined)
+
+    def log_scale(self, point: Point, weights: Weights) -> float:
+        """Return what of the deviance goes with the scale of a measured flow alone.
+
+        The determinant of the information goes with it as well, so criteria that hold both leave it
+        out.
+        """
+        if self.measured is None:
+            return 0.0
+        k, _ = self.measured.scale(point.coefficients, weights.determined)
+        return weights.determined * math.log(k)

@@ -89,7 +89,7 @@ def profile_at(search: ModeSearch, mode: Mode, log_drag: float, coefficients: Fl
         log_drag,
         sums.deviance - 0.5 * float(step @ sums.score[:-1]),
         -float(sums.score[-1] - sums.information[-1, :-1] @ step),
-        float(np.log(np.diag(factor[0])).sum()),
+        float(np.log(np.diag(factor[0])).sum()) - search.prior.log_scale(point, mode.weights),
         coefficients.ravel() + step,
     )
 

@@ -164,6 +164,10 @@ def build_fit(
         facts["recording_start_s"] = float(ready.tracks[0].time[0])
     numbers, names_of, _ = fit_parts(facts)
     found, names_found = number_variables(restricted.point, law)
+    words: dict[str, Any] = {}
+    if ready.measured is not None:
+        more, places, words = ready.measured.stored()
+        found, names_found = found | more, names_found | places
     attrs: dict[str, Any] = {
         "kind": "fit",
         "schema_version": KINDS["fit"].version,
@@ -171,6 +175,7 @@ def build_fit(
         **{name: facts[name] for name in WORDS},
         **{name: facts[name] for name in REASONS if name in facts},
         "study": study.to_toml(),
+        **words,
     }
     return xr.Dataset(data | found | numbers, coords | names_found | names_of, attrs)
 

@@ -109,6 +109,15 @@ def basis_matrix(position: Floats, count: int) -> Floats:
     return matrix
 
 
+def products(weight: Floats, along_x: Floats, along_y: Floats) -> Floats:
+    """Return the weighted sum over the nodes of a grid of products of two basis functions."""
+    pairs_x = np.einsum("xi,xk->xik", along_x, along_x)
+    pairs_y = np.einsum("yj,yl->yjl", along_y, along_y)
+    found = np.einsum("yx,yjl,xik->jilk", weight, pairs_y, pairs_x, optimize=True)
+    size = along_x.shape[1] * along_y.shape[1]
+    return np.asarray(found.reshape(size, size))
+
+
 def penalties(spline: Spline) -> tuple[Floats, Floats]:
     """Return the matrices R, S of the two penalties on one velocity component f.
 

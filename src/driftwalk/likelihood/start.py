@@ -14,9 +14,10 @@ from driftwalk.conditions.recorded import flow_from_track
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.measured_flow import MeasuredFlow
 from driftwalk.likelihood.preparation import PreparedRecordings
 from driftwalk.likelihood.prior import PRIOR, Weights
-from driftwalk.likelihood.spline import Spline, penalties
+from driftwalk.likelihood.spline import Spline, penalties, products
 from driftwalk.schema import FLAGS, Track
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ def first_point(ready: PreparedRecordings, spline: Spline) -> Point:
     # small one makes the filter lose the track.
     unrest = 0.1 * typical_speed(tracks) ** 3 / study.block.side_m
     if ready.intervals.steady:
-        coefficients = _flow_coefficients(tracks[0], study, spline)
+        coefficients = _flow_coefficients(tracks[0], study, spline, ready.measured)
     else:
         # Each flow begins with the longest stretch that was recorded in it.
         longest: dict[int, Track] = {}
@@ -72,23 +73,36 @@ def first_weights(tracks: Sequence[Track], spline: Spline) -> Weights:
     return Weights(roughness=10.0 * spline.spacing**4 / power, size=0.02 / power)
 
 
-def _flow_coefficients(track: Track, study: Study, spline: Spline) -> Floats:
-    """Return a smooth spline through the flow field of Eq. 4; still water where there is none."""
-    try:
-        field = flow_from_track(track, study)
-    except InputError:
+def _flow_coefficients(
+    track: Track, study: Study, spline: Spline, measured: MeasuredFlow | None = None
+) -> Floats:
+    """Return a smooth spline through the flow of Eq. 4, and through a measured one; else still."""
+    found = _field_sums(track, study, spline)
+    if measured is not None:
+        # Where vectors were measured they count a thousand times as much as those of Eq. 4.
+        own = measured.normal.mean(axis=0)
+        weight = 1e3 * float(np.trace(found[0])) / float(np.trace(own)) if found is not None else 1
+        normal, right = weight * own, weight * measured.right
+        found = (normal, right) if found is None else (normal + found[0], right + found[1])
+    if found is None:
         return np.zeros((2, spline.rows, spline.columns))
-    along_x, along_y = spline.design(field["x"].values, field["y"].values)
-    weight = (field["flag"].values == FLAGS["measured"]).astype(np.float64)
-    # Products of the bases over a node, for all pairs of coefficients of a direction.
-    pairs_x = np.einsum("xi,xk->xik", along_x, along_x)
-    pairs_y = np.einsum("yj,yl->yjl", along_y, along_y)
-    normal = np.einsum("yx,yjl,xik->jilk", weight, pairs_y, pairs_x, optimize=True)
-    normal = normal.reshape(spline.size, spline.size)
+    normal, right = found
     roughness, size = penalties(spline)
     share = float(np.trace(normal)) / float(np.trace(roughness))
     # Little smoothing: the roughness has a thousandth of the weight of the data.
-    normal += 1e-3 * share * (roughness + 1e-3 * size / spline.spacing**4)
+    normal = normal + 1e-3 * share * (roughness + 1e-3 * size / spline.spacing**4)
+    solved = np.linalg.solve(normal, np.stack(list(right), axis=1)).T
+    return np.ascontiguousarray(solved.reshape(2, spline.rows, spline.columns))
+
+
+def _field_sums(track: Track, study: Study, spline: Spline) -> tuple[Floats, Floats] | None:
+    """Return the sums of products of the flow of Eq. 4 with the bases; nothing without one."""
+    try:
+        field = flow_from_track(track, study)
+    except InputError:
+        return None
+    along_x, along_y = spline.design(field["x"].values, field["y"].values)
+    weight = (field["flag"].values == FLAGS["measured"]).astype(np.float64)
+    normal = products(weight, along_x, along_y)
     right = [(along_y.T @ (weight * field[name].values) @ along_x).ravel() for name in ("u", "v")]
-    found = np.linalg.solve(normal, np.stack(right, axis=1)).T
-    return np.ascontiguousarray(found.reshape(2, spline.rows, spline.columns))
+    return normal, np.stack(right)

@@ -105,6 +105,20 @@ class Fit(Section):
     the recording supports them, and refuses smoothed positions; "exact" takes the positions as
     recorded.
     """
+    flow_error_m_s: Annotated[
+        float | Literal["auto"], Quantity("m/s", gt=0, le=100, words=("auto",))
+    ] = "auto"
+    """Standard deviation of each component of the vectors of a measured flow.
+
+    Standard deviation of each component of the vectors of a measured flow. "auto" takes the errors
+    that its file holds, else estimates one from the scatter of the vectors around a smooth flow.
+    """
+    flow_scale_std: Annotated[float, Quantity("1", ge=0, le=10)] = 0.03
+    """Relative standard deviation of the common scale of a measured flow (ruler, frame interval).
+
+    Relative standard deviation of the common scale of a measured flow: of the ruler and of the
+    interval between its frames. The fit estimates the scale; 0 takes it as exact.
+    """
     drag_coefficient_precision: Annotated[float | None, Quantity("1", gt=0, lt=1)] = Field(
         default=None, examples=[0.05]
     )

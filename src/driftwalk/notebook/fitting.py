@@ -30,6 +30,7 @@ def fit(
     recordings: xr.Dataset | Sequence[xr.Dataset],
     study: Study | None = None,
     *,
+    flow: xr.Dataset | None = None,
     body: str | None = None,
     folder: str | PathLike[str] | None = None,
     check: bool = True,
@@ -46,6 +47,9 @@ def fit(
         block are those that they were loaded with.
     study : Study, optional
         Default: the paper's.
+    flow : xarray.Dataset, optional
+        A steady flow that was measured, a `flow_field`; with its errors it is the prior of the
+        fitted flow.
     body : str, optional
         The body, where a recording has several.
     folder : path-like, optional
@@ -92,9 +96,9 @@ def fit(
         require_motion(one, body=body)
     chosen = study_for(many, study, study_overrides(keys=FIT_KEYS, **settings), body=body)
     if folder is not None:
-        work = FitWork(many, chosen, body, {}, check=check)
+        work = FitWork(many, chosen, body, {}, check=check, flow=flow)
         return as_result(run_in_folder(folder, "fit", work, overwrite, progress or silent).fit)
-    found = fit_motion(many, chosen, body=body, tell=progress)
+    found = fit_motion(many, chosen, body=body, flow=flow, tell=progress)
     return as_result(judge_fit(found, many, body=body).fit if check else found)
 
 

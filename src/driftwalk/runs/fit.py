@@ -46,6 +46,8 @@ class FitWork:
         Whether force laws are compared, which takes some eight fits.
     wall : bool
         Whether restitution and friction of the wall are estimated, which takes as long as a fit.
+    flow : xarray.Dataset or None
+        A measured `flow_field`.
     fitted : callable
         Called with the fit as soon as it is stored, before all that follows.
     checked_model : callable
@@ -59,6 +61,7 @@ class FitWork:
     check: bool = True
     compare_laws: bool = False
     wall: bool = False
+    flow: xr.Dataset | None = None
     fitted: Callable[[xr.Dataset], None] = tell_nobody
     checked_model: Callable[[xr.Dataset, xr.Dataset | None], None] = tell_nobody
 
@@ -69,7 +72,7 @@ class FitWork:
         """Refuse recordings that cannot be fitted."""
         from driftwalk.likelihood import check_fit
 
-        check_fit(self.recordings, self.study, body=self.body)
+        check_fit(self.recordings, self.study, body=self.body, flow=self.flow)
         return self
 
     def specification(self) -> dict[str, Any]:
@@ -83,6 +86,7 @@ class FitWork:
             "recordings_sha256": [
                 dataset_hash(one, ("x", "y", "theta")) for one in self.recordings
             ],
+            **({} if self.flow is None else {"flow_sha256": _hash_of(self.flow)}),
         }
 
     def compute(self, run: Run) -> Fitted:
@@ -97,7 +101,8 @@ class FitWork:
 
         course = run.course(self._usual_parts())
         course.begin("fit")
-        found = fit_motion(self.recordings, self.study, body=self.body, tell=course.stage("fit"))
+        tell = course.stage("fit")
+        found = fit_motion(self.recordings, self.study, body=self.body, flow=self.flow, tell=tell)
         run.keep("fit.nc", found)
         run.keep("flow.nc", fitted_flow(found))
         for number, recording in enumerate(self.recordings, start=1):
@@ -133,6 +138,12 @@ class FitWork:
             **({"check": 2.2 + 2.2e-4 * samples} if self.check else {}),
             "figures": 6.7 if self.check else 3.8,
         }
+
+
+def _hash_of(flow: xr.Dataset) -> str | None:
+    """Return the hash of what a fit takes from a measured flow."""
+    errors = tuple(name for name in ("u_standard_error", "v_standard_error") if name in flow)
+    return dataset_hash(flow, ("u", "v", "flag", *errors))
 
 
 def figures_of_fit(

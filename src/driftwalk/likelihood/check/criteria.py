@@ -15,6 +15,8 @@ from driftwalk.likelihood.check.posterior_predictive import MotionComparison
 from driftwalk.likelihood.check.power import POWER, detectable_noncentrality, detectable_sigmas
 from driftwalk.likelihood.check.scan import Scan
 from driftwalk.likelihood.check.whiteness import WhitenessTests
+from driftwalk.likelihood.measured_flow import agreement_tests
+from driftwalk.schema.answers.facts import facts_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -83,6 +85,8 @@ MISFITS: Final = {
     "noise by time": "relative change of the mean square in a part of the recording",
     "change": "difference of the velocities, m/s",
     "steps": "KS distance",
+    "measured flow": "difference of the flows, m/s",
+    "measured scale": "relative change of the scale",
 }
 """The misfit that each criterion measures, with its unit."""
 
@@ -148,6 +152,7 @@ def criteria_of(
         noise_criterion(found.noise_by_part, layout, by="time"),
         change_criterion(scan, layout),
         motion_criterion(motion, angle=fit.attrs["angle"]),
+        *(Criterion(*one) for one in agreement_tests(facts_of(fit))),
     ]
 
 

@@ -20,7 +20,6 @@ from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.likelihood.filter.filter_pass import Place, Sums
 from driftwalk.likelihood.filter.series import Series, strength_of
 from driftwalk.likelihood.preparation import Estimate
-from driftwalk.likelihood.prior import Prior
 from driftwalk.likelihood.spline import DEGREE, Spline, basis
 
 SAMPLES_AT_ONCE: Final = 2048
@@ -218,9 +217,8 @@ def collect(
             for own_column, column in places:
                 data[row, column] += whole[own, own_column]
     # C = (J'J + Lambda)^-1, held as a root so that samples and traces take one product.
-    prior = Prior(estimate.passes)
     sums = Sums(0.0, np.zeros(len(data)), data, 0)
-    full = prior.add(sums, estimate.point, estimate.weights).information
+    full = estimate.prior.add(sums, estimate.point, estimate.weights).information
     spread = solve_triangular(np.linalg.cholesky(full), np.eye(len(full)), lower=True).T
     parameters = float(((data @ spread) * spread).sum())
     return Leverage(spread, parameters, _autocovariance(spread, errors, retained, lags))

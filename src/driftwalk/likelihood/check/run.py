@@ -17,6 +17,7 @@ from driftwalk.likelihood.check.criteria import (
     distance_limit,
 )
 from driftwalk.likelihood.check.errors import Innovations, innovations_of
+from driftwalk.likelihood.check.measured import left_out_sentence
 from driftwalk.likelihood.check.place import Residuals, residuals_of
 from driftwalk.likelihood.check.posterior_predictive import (
     BAND,
@@ -33,13 +34,15 @@ from driftwalk.likelihood.check.scan import scan_of
 from driftwalk.likelihood.check.verdict import verdict_on
 from driftwalk.likelihood.fit import fit_motion
 from driftwalk.likelihood.flow_intervals import require_fit
-from driftwalk.likelihood.preparation import as_list, estimate_of
+from driftwalk.likelihood.measured_flow import measured_flow, stored_flow
+from driftwalk.likelihood.preparation import as_list, estimate_of, spline_of
 from driftwalk.likelihood.refuse import BREAKDOWN
 from driftwalk.likelihood.warnings import against_water, is_against_water
 from driftwalk.schema.answers.facts import facts_of, fitted_value, sentences, texts
 from driftwalk.schema.answers.fit import with_verdict
 from driftwalk.schema.answers.force_law import LEAST_EVIDENCE
 from driftwalk.schema.answers.verdict import (
+    DOES_NOT_EXPLAIN,
     EXPLAINS,
     stored_verdict,
     verdict_of,
@@ -327,6 +330,7 @@ def judge_fit(
         )
     if is_against_water(facts_of(fit)):
         fit, check = _with_angle_tried(fit, check, recordings, body=body)
+    check = _with_flow_left_out(fit, check, recordings, body=body)
     return Judged(with_verdict(fit, check), check)
 
 
@@ -347,7 +351,7 @@ def _with_angle_tried(
     other = negated(recordings)
     try:
         study = parse_study(fit.attrs["study"])
-        rival = fit_motion(other, study, angle=fit.attrs["angle"], body=body)
+        rival = fit_motion(other, study, angle=fit.attrs["angle"], body=body, flow=stored_flow(fit))
         before, after = (
             log_evidence(estimate_of(one, many, body=body))
             for one, many in ((fit, recordings), (rival, other))
@@ -371,3 +375,29 @@ def _with_angle_tried(
         check = check.drop_dims("verdict_reason").assign(verdict)
     warnings = [said if text == seen else text for text in sentences(fit, "warning")]
     return fit.assign_coords(warning=("warning", texts(warnings))), described(check)
+
+
+def _with_flow_left_out(
+    fit: xr.Dataset, check: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str | None
+) -> xr.Dataset:
+    """Fit without the measured flow where the check fails, and return it with what came of it."""
+    from driftwalk.model import parse_study
+
+    flow, verdict = stored_flow(fit), stored_verdict(check)
+    failed = check["criterion"].values[check["failed"].values != 0].tolist()
+    if flow is None or verdict is None or verdict.word != DOES_NOT_EXPLAIN:
+        return check
+    if failed == ["measured scale"]:
+        return check
+    study = parse_study(fit.attrs["study"])
+    try:
+        free = fit_motion(recordings, study, angle=fit.attrs["angle"], body=body)
+        against = check_model(free, recordings, body=body)["verdict"] == DOES_NOT_EXPLAIN
+    except (InputError, *BREAKDOWN):
+        return check
+    if against:
+        return check
+    measured = measured_flow(flow, study, spline_of(study))
+    said = left_out_sentence(measured, free)
+    found = verdict_of([said, *verdict.reasons], [])
+    return described(check.drop_dims("verdict_reason").assign(verdict_variables(found)))

@@ -19,7 +19,6 @@ from driftwalk.likelihood.law.force_law import FLOATING
 from driftwalk.likelihood.law.search import evidence_of
 from driftwalk.likelihood.newton import ModeSearch, Passed, Tell
 from driftwalk.likelihood.preparation import Estimate, estimate_of
-from driftwalk.likelihood.prior import Prior
 from driftwalk.likelihood.refuse import BREAKDOWN
 from driftwalk.schema.answers.parts import undetermined
 from driftwalk.schema.check import described
@@ -137,7 +136,7 @@ def _counted(course: Course, name: str, estimate: Estimate) -> Passed:
 
 def _under(estimate: Estimate, floating: bool, drag: str, *, passed: Passed) -> _Compared | None:
     """Fit a law to the first part and predict the rest; nothing where it has no solution."""
-    passes, prior = estimate.passes, Prior(estimate.passes)
+    passes, prior = estimate.passes, estimate.prior
     training = replace(passes, series=[one.part(0, _training(one)) for one in passes.series])
     start = _start(estimate.point, floating=floating, drag=drag)
     search = ModeSearch(training, prior, estimate.study.fit.iterations, passed)

@@ -65,7 +65,8 @@ def evidence_of(mode: Mode, prior: Prior) -> float:
     precision = np.linalg.slogdet(prior.matrix(mode.weights))[1]
     widths = sum(math.log(NUMBERS[name].prior_std) for name in mode.point.opened)
     return float(
-        -mode.deviance
+        prior.log_scale(mode.point, mode.weights)
+        - mode.deviance
         + 0.5 * np.linalg.slogdet(mode.covariance)[1]
         + 0.5 * components * float(precision)
         - widths

@@ -47,6 +47,7 @@ TELLING_SHARE: Final = 0.02
 """Share of the intervals at the wall from which there may be enough contacts to estimate it."""
 _ATTRIBUTES: Final = (
     *("angle", "force_law", "force_law_stated", "drag_law", "drag_law_stated", "wall_left_out"),
+    *("measured_flow", "measured_flow_errors"),
 )
 _NOT_IN_JSON: Final = frozenset(
     {
@@ -61,7 +62,7 @@ _NOT_IN_JSON: Final = frozenset(
             "restricted",
         ),
         *("roughness_weight", "size_weight", "spline_origin_m", "spline_spacing_m"),
-        *("cell_size_m", "recording_start_s"),
+        *("cell_size_m", "recording_start_s", "measured_flow_determined"),
     }
 )
 """Facts for programs that read fit.nc: of the second fit, of the flow's splines, of the search."""
@@ -95,6 +96,19 @@ def fitted_parts(fit: xr.Dataset, *, hint: str = "") -> list[Part]:
     ]
     parts += [Row(label, words) for label, words in law_words(facts).items()]
     parts += law_estimates(fit)
+    if "measured_flow_p_value" in facts:
+        chi, mean, std = (
+            f"{facts[f'measured_flow_{name}']:.0f}"
+            for name in ("chi_squared", "expected", "expected_std")
+        )
+        said = f"{chi}, expected {mean} ± {std}"
+        parts.append(
+            Row(
+                "measured flow",
+                f"{facts['measured_flow']}, chi squared of its difference from the fitted one "
+                f"{said} (p = {facts['measured_flow_p_value']:.2g})",
+            )
+        )
     if "wall_share" in facts:
         asked = "wall_contacts" in facts or "wall_left_out" in facts
         tells = facts.get("angle") == "state" and facts["wall_share"] > TELLING_SHARE

@@ -38,6 +38,8 @@ dimensions:
     number: numbers of departures from the model, by name
     law: force laws that were fitted, by name
     departure: numbers of departures that were tested, by name
+    measured_y: nodes of a measured flow
+    measured_x: nodes of a measured flow
 variables:
     estimate(parameter): estimates of the parameters; drag_coefficient C_d, force_std σ_F, \
         force_noise_intensity σ_F² times the force interval, tracking_noise; with the angle in the \
@@ -124,6 +126,26 @@ variables (the model was checked):
     residual_component(residual_component) text: component
     cell_x(cell_x) [m]: x
     cell_y(cell_y) [m]: y
+variables (a measured flow was given):
+    measured_u(measured_y measured_x) [m s-1]: measured velocity x; NaN where nothing was measured
+    measured_v(measured_y measured_x) [m s-1]: measured velocity y
+    measured_u_error(measured_y measured_x) [m s-1]: its standard deviation, as the fit takes it
+    measured_v_error(measured_y measured_x) [m s-1]: the same of y
+    measured_flow_chi_squared [1]: squared difference of the measured flow from the fitted one, \
+        over its variance
+    measured_flow_expected [1]: its expected value where they agree to 2 %
+    measured_flow_expected_std [1]: its standard deviation
+    measured_flow_p_value [1]: chance of such a difference
+    measured_flow_detectable [m s-1]: random difference of the flows that is found nine times in ten
+    measured_flow_determined [1]: coefficients of the flow that it determines
+    measured_flow_farthest(axis) [m]: where they differ most
+    measured_flow_difference [m s-1]: by how much, there
+    measured_x(measured_x) [m]: x
+    measured_y(measured_y) [m]: y
+variables (a measured flow was given, and its scale is not exact):
+    measured_flow_scale_std [1]: standard deviation of its scale
+    measured_flow_scale_p_value [1]: chance of a scale so far from 1
+    measured_flow_scale_detectable [1]: relative change of the scale that is found nine times in ten
 variables (with orientations, in one flow):
     spin_correlation [1]: correlation of the block's spin with the vorticity of a first estimate \
         of the flow
@@ -186,6 +208,9 @@ attributes:
     arena
     source
     study
+attributes (a measured flow was given):
+    measured_flow text: its source
+    measured_flow_errors text: where its errors are from
 attributes (the shape of the flow changes):
     flow_shape_change text: how, in a sentence
 attributes (the law is not settled):
@@ -229,6 +254,8 @@ LAW_NUMBERS: Final = (
            note="from the beginning to the end; corrected"),
     Number("pulse_amplitude", "1", "pulses of the flow", shown="%", note="amplitude; corrected"),
     Number("pulse_frequency", "Hz", "frequency of pulses", shown="Hz", note=_CORRECTED),
+    Number("measured_flow_scale", label="scale of the measured flow",
+           note="over that of the fitted one"),
 )  # fmt: skip
 """Numbers of a fit where the recording asks for it, or the user states it."""
 WALL_NUMBERS: Final = (

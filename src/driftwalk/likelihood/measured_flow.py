@@ -1,0 +1,427 @@
+"""A measured flow as prior of the fitted one: vectors on a grid, with errors and a common scale.
+
+The vectors are ``m = k B c + e``: the fitted flow B c at the nodes, times the scale k of the
+measurement (a ruler or frame interval that is off), and independent normal errors e. The best k of
+every c, with a weak normal prior around 1, is known in closed form; what is left is a sum of
+squares of the coefficients alone. See docs/explanation/likelihood.md.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+
+from driftwalk.core.arrays import Floats
+from driftwalk.core.errors import InputError, argument_text
+from driftwalk.flow.arena import outline_of
+from driftwalk.likelihood.check.power import POWER, detectable_sigmas
+from driftwalk.likelihood.measured_series import averaged
+from driftwalk.likelihood.spline import Spline, products
+from driftwalk.schema import FLAGS, build_flow_field
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+
+class MeasuredPolicy(NamedTuple):
+    """How errors are estimated, and when a measured flow contradicts the recording."""
+
+    fewest_surplus: int = 50
+    """Components of vectors beyond those that the spline takes up, from which their scatter tells
+    the errors: to a tenth. Chosen by hand."""
+    level: float = 0.0005
+    """Chance below which the measured flow and the motion contradict each other: that of a
+    criterion of the check."""
+    tolerated: float = 0.02
+    """Difference of the flows, over the speed, that is no contradiction: what lies between the
+    knots. The exact flow of the bundled recording is 1 % off its best spline at the wall."""
+
+
+MEASURED: Final = MeasuredPolicy()
+NAMES: Final = ("u", "v")
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredFlow:
+    """Measured vectors, and their sums of products with the bases of the spline."""
+
+    x: Floats
+    y: Floats
+    velocity: Floats
+    """Shape (2, y, x); NaN where nothing was measured."""
+    error: Floats
+    """Standard deviations, same shape, as the fit takes them."""
+    spline: Spline
+    scale_std: float
+    """Of the prior of the scale; 0 if it is exact."""
+    source: str
+    errors: str
+    """Where the errors are from, in words."""
+    normal: Floats
+    """``B' W B`` of either component, shape (2, n, n)."""
+    right: Floats
+    """``B' W m``, shape (2, n)."""
+    own: Floats
+    """Coefficients of the least squares, shape (2, n); the smallest where they are not unique."""
+    rank: int
+    """Coefficients that the vectors determine."""
+
+    @property
+    def count(self) -> int:
+        """Number of vectors."""
+        return int(np.isfinite(self.velocity).all(axis=0).sum())
+
+    @property
+    def sentence(self) -> str:
+        """The vectors and their errors, for the user."""
+        size = float(np.sqrt(np.nanmean(self.error**2)))
+        known = f"scale known to {self.scale_std:.2g}" if self.scale_std > 0.0 else "scale exact"
+        return (
+            f"{self.source}: {self.count} vectors, errors of {1e3 * size:.2g} mm/s {self.errors}; "
+            f"{known}"
+        )
+
+    def scale(self, coefficients: Floats, determined: float) -> tuple[float, float]:
+        """Return the best scale k for a flow, and the precision of k.
+
+        A flow that is k times smaller is k times more likely under its prior of smoothness, for
+        each coefficient that the vectors determine, though its true size is unknown. The term
+        ``determined ln k`` takes that out.
+        """
+        if self.scale_std == 0.0:
+            return 1.0, math.inf
+        flow, weight = coefficients.reshape(2, -1), 1.0 / self.scale_std**2
+        power = float(np.einsum("ka,kab,kb->", flow, self.normal, flow)) + weight
+        middle = 0.5 * (float((flow * self.right).sum()) + weight) / power
+        k = middle + math.sqrt(max(middle**2 - determined / power, 0.0))
+        return k, max(power - determined / k**2, weight)
+
+    def deviance(self, coefficients: Floats, determined: float) -> tuple[float, Floats, Floats]:
+        """Return half the sum of squares, its negative gradient, and its curvature.
+
+        The best k is a function of the coefficients, so their curvature is that with k projected
+        out. The least squares' own sum, which no flow changes, is left out.
+        """
+        flow = coefficients.reshape(2, -1)
+        k, precision = self.scale(coefficients, determined)
+        off = self.own - k * flow
+        pull = np.einsum("kab,kb->ka", self.normal, off)
+        value = 0.5 * float((off * pull).sum()) + determined * math.log(k)
+        if self.scale_std > 0.0:
+            value += 0.5 * ((k - 1.0) / self.scale_std) ** 2
+        # As k goes with the inverse of the flow's size, ``determined ln k`` bends upwards along it.
+        bent = self._curvature(flow, k, precision + 2.0 * determined / k**2)
+        return value, k * pull.ravel(), bent
+
+    def determined(self, coefficients: Floats, covariance: Floats, before: float) -> float:
+        """Return how many coefficients the vectors determine, of a flow with a covariance."""
+        if self.scale_std == 0.0:
+            return 0.0
+        _, _, curvature = self.deviance(coefficients, before)
+        size = len(curvature)
+        return min(float((curvature * covariance[:size, :size]).sum()), float(self.rank))
+
+    def _curvature(self, flow: Floats, k: float, precision: float) -> Floats:
+        size = self.spline.size
+        found = np.zeros((2 * size, 2 * size))
+        for component in range(2):
+            part = slice(component * size, (component + 1) * size)
+            found[part, part] = k**2 * self.normal[component]
+        along = np.einsum("kab,kb->ka", self.normal, flow).ravel()
+        return np.asarray(found - (k**2 / precision) * np.outer(along, along))
+
+    def stored(self) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
+        """Return the variables, coordinates and attributes with which a fit holds it."""
+        on = ("measured_y", "measured_x")
+        data = {f"measured_{name}": (on, self.velocity[k]) for k, name in enumerate(NAMES)}
+        data |= {f"measured_{name}_error": (on, self.error[k]) for k, name in enumerate(NAMES)}
+        coords = {"measured_y": ("measured_y", self.y), "measured_x": ("measured_x", self.x)}
+        words = {"measured_flow": self.source, "measured_flow_errors": self.errors}
+        return data, coords, words
+
+
+def measured_flow(
+    field: xr.Dataset, study: Study, spline: Spline, *, sources: tuple[str, ...] = ()
+) -> MeasuredFlow:
+    """Return a flow field as prior of the fit; refuse one that is no measurement.
+
+    `sources` are those of the recordings: a flow that was taken from one of them is none.
+    """
+    _require_measurement(field, study, sources)
+    field = averaged(field)
+    x, y = (field[axis].values.astype(np.float64) for axis in "xy")
+    at_x, at_y = (axis.ravel() for axis in np.meshgrid(x, y))
+    inside = outline_of(study.tank.to_arena()).depth(at_x, at_y).reshape(y.size, x.size) >= 0.0
+    there = inside & (field["flag"].values == FLAGS["measured"])
+    velocity = np.stack([np.where(there, field[name].values, np.nan) for name in NAMES])
+    stated = study.fit.flow_error_m_s
+    error, words = None, ""
+    if stated != "auto":
+        error, words = np.where(there, stated, np.nan)[None].repeat(2, axis=0), "as stated"
+    elif all(f"{name}_standard_error" in field for name in NAMES):
+        found = np.stack([field[f"{name}_standard_error"].values for name in NAMES])
+        known = there & np.isfinite(found).all(axis=0) & (found > 0.0).all(axis=0)
+        if known.any():
+            there = known
+            error = np.where(there, found, np.nan)
+            velocity = np.where(there, velocity, np.nan)
+            words = str(field.attrs.get("errors", "from the file"))
+    if not there.any():
+        raise InputError(
+            "no vector of the measured flow lies in the tank: is its origin the centre of the "
+            "tank, and its scale right?"
+        )
+    unit = np.where(there, 1.0, np.nan)[None].repeat(2, axis=0)
+    normal, right, own, rank, squares = _least_squares(
+        spline, x, y, velocity, unit if error is None else error
+    )
+    surplus = 2 * int(there.sum()) - rank
+    if error is None and surplus < MEASURED.fewest_surplus:
+        raise InputError(
+            f"the measured flow has {int(there.sum())} vectors in the tank, too few to tell their "
+            f"errors from their scatter: state them with {argument_text('flow_error', '2mm/s')}"
+        )
+    factor = math.sqrt(squares / surplus) if surplus >= MEASURED.fewest_surplus else 1.0
+    if error is None:
+        error, words = factor * unit, "estimated from their scatter around smooth flow"
+    elif factor > 1.001:
+        # The flow has details that the knots are too far apart for; the fit cannot follow them.
+        error = factor * error
+        words += f", times {factor:.2g} as they scatter more around smooth flow"
+    else:
+        factor = 1.0
+    size = factor if factor > 0.0 else 1.0
+    return MeasuredFlow(
+        x, y, velocity, error, spline, study.fit.flow_scale_std,
+        str(field.attrs.get("source", "flow")), words,
+        normal / size**2, right / size**2, own, rank,
+    )  # fmt: skip
+
+
+def _require_measurement(field: xr.Dataset, study: Study, sources: tuple[str, ...]) -> None:
+    if study.fit.switching_times_s:
+        raise InputError(
+            "a measured flow is that of one setting of the pumps: fit each interval between the "
+            f"switching times by itself, with its flow ({argument_text('flow', 'FILE')})"
+        )
+    method, source = (str(field.attrs.get(name, "")) for name in ("method", "source"))
+    if "likelihood" in method:
+        raise InputError(
+            "the flow was fitted to a recording and is no measurement of the water: fit both "
+            "recordings together (driftwalk fit FIRST SECOND)"
+        )
+    if method != "file" and source and source in sources:
+        raise InputError(
+            f"the flow was taken from the recording itself ({source}), which would count twice: "
+            "leave it out, or give one that was measured by other means"
+        )
+
+
+class _Solved(NamedTuple):
+    normal: Floats
+    right: Floats
+    own: Floats
+    rank: int
+    squares: float
+
+
+def _least_squares(
+    spline: Spline, x: Floats, y: Floats, velocity: Floats, error: Floats
+) -> _Solved:
+    """Return the sums of products, and the spline that fits the vectors best."""
+    along_x, along_y = spline.design(x, y)
+    weight = np.where(np.isfinite(error), 1.0 / np.where(error > 0.0, error, np.inf) ** 2, 0.0)
+    values = np.where(weight > 0.0, velocity, 0.0)
+    normal = np.stack([products(one, along_x, along_y) for one in weight])
+    right = np.stack(
+        [
+            (along_y.T @ (one * value) @ along_x).ravel()
+            for one, value in zip(weight, values, strict=True)
+        ]
+    )
+    own, rank, squares = np.zeros_like(right), 0, 0.0
+    for k in range(2):
+        spread, base = np.linalg.eigh(normal[k])
+        known = spread > 1e-9 * spread[-1]
+        own[k] = (base[:, known] / spread[known]) @ (base[:, known].T @ right[k])
+        rank += int(known.sum())
+        off = values[k] - along_y @ own[k].reshape(spline.rows, spline.columns) @ along_x.T
+        squares += float((weight[k] * off**2).sum())
+    return _Solved(normal, right, own, rank, squares)
+
+
+def agreement_facts(
+    measured: MeasuredFlow,
+    coefficients: Floats,
+    information: Floats,
+    *,
+    smoothness: Floats,
+    determined: float,
+    confidence: float,
+) -> dict[str, Any]:
+    """Return how far the motion pulls the flow away from the measured one.
+
+    The fitted flow is compared with that of the vectors and the prior of smoothness alone, in
+    errors of the vectors. `information` is that of the motion on the coefficients, `smoothness` the
+    precision of one component under its prior.
+    """
+    from scipy.linalg import block_diag
+    from scipy.optimize import brentq
+    from scipy.special import ndtri
+    from scipy.stats import norm
+
+    flow = coefficients.reshape(2, -1)
+    k, precision = measured.scale(coefficients, determined)
+    _, score, precise = measured.deviance(coefficients, determined)
+    score = score - (flow @ smoothness).ravel()
+    precise = precise + block_diag(smoothness, smoothness)
+    alone, covariance = np.linalg.inv(precise), np.linalg.inv(precise + information)
+    off = -alone @ score
+    form = _of_difference(measured, flow, k, precision)
+    squares = float(off @ form @ off)
+    # Two estimates of which one knows more: their difference has the difference of the covariances.
+    less = alone - covariance
+    spread = form @ less
+    mean = max(float(np.trace(spread)), 1e-6)
+    half_variance = max(float((spread * spread.T).sum()), 1e-12)
+    # A chi squared with the same mean and variance (Satterthwaite).
+    unit, dof = half_variance / mean, mean**2 / half_variance
+    # A random difference of the flows, as detailed as the knots, by which the sum grows by 1.
+    shift = float(((less @ form) * (form @ less @ form).T).sum())
+    along = np.einsum("kab,kb->ka", measured.normal, flow).ravel()
+    along_x, along_y = measured.spline.design(measured.x, measured.y)
+    there = np.isfinite(measured.velocity[0])
+    bases = np.outer((along_y**2).sum(axis=1), (along_x**2).sum(axis=1))[there].mean()
+    one = math.sqrt(unit * float(bases) / max(shift, 1e-300))
+    size = math.sqrt(float(np.mean(measured.velocity[:, there] ** 2)))
+    more = (MEASURED.tolerated * size / one) ** 2
+    found: dict[str, Any] = {
+        "measured_flow_chi_squared": squares / unit,
+        "measured_flow_expected": dof + more,
+        "measured_flow_expected_std": math.sqrt(2.0 * (dof + 2.0 * more)),
+        "measured_flow_p_value": _tail(squares / unit, dof, more),
+        "measured_flow_determined": determined,
+    }
+    least, most = more, 4.0 * (dof + more) + 1e3
+    limit = brentq(lambda sum_: _tail(sum_, dof, more) - MEASURED.level, 0.0, 10.0 * most)
+    found["measured_flow_detectable_m_s"] = one * math.sqrt(
+        brentq(lambda shift: _tail(limit, dof, shift) - POWER.share, least, most)
+    )
+    place = _farthest(measured, k * off)
+    found |= {"measured_flow_farthest_m": list(place[:2]), "measured_flow_difference_m_s": place[2]}
+    if measured.scale_std > 0.0:
+        variance = 1.0 / precision + (k / precision) ** 2 * float(along @ covariance @ along)
+        free = max(measured.scale_std**2 - variance, 0.0)
+        std = math.sqrt(variance)
+        reach = float(ndtri(0.5 + 0.5 * confidence)) * std
+        chance = 2.0 * float(norm.sf(abs(k - 1.0) / math.sqrt(free))) if free > 0.0 else 1.0
+        found |= {
+            "measured_flow_scale": k,
+            "measured_flow_scale_interval": [k - reach, k + reach],
+            "measured_flow_scale_std": std,
+            "measured_flow_scale_p_value": chance,
+            "measured_flow_scale_detectable": detectable_sigmas(0.5 * MEASURED.level)
+            * math.sqrt(free),
+        }
+    return found
+
+
+def _tail(value: float, dof: float, shift: float) -> float:
+    """Return the chance of a noncentral chi squared above a value."""
+    from scipy.stats import ncx2, norm
+
+    # Where its noncentrality is large it is normal, and its series takes long.
+    if shift > 1e4:
+        return float(norm.sf((value - dof - shift) / math.sqrt(2.0 * (dof + 2.0 * shift))))
+    return float(ncx2.sf(value, dof, shift))
+
+
+def _of_difference(measured: MeasuredFlow, flow: Floats, k: float, precision: float) -> Floats:
+    """Return the quadratic form of a change of the flow in the sum of squares of the vectors."""
+    along = np.einsum("kab,kb->ka", measured.normal, flow).ravel()
+    power = float(along @ flow.ravel())
+    found = measured._curvature(flow, k, math.inf)
+    share = 2.0 / precision - power / precision**2
+    return np.asarray(found - k**2 * share * np.outer(along, along))
+
+
+def _farthest(measured: MeasuredFlow, off: Floats) -> tuple[float, float, float]:
+    """Return where two flows differ most among the measured nodes, and by how much."""
+    spline = measured.spline
+    values = spline.values(off.reshape(2, spline.rows, spline.columns), measured.x, measured.y)
+    size = np.where(np.isfinite(measured.velocity[0]), np.hypot(*values), -1.0)
+    row, column = np.unravel_index(int(size.argmax()), size.shape)
+    return float(measured.x[column]), float(measured.y[row]), float(size[row, column])
+
+
+class Agreement(NamedTuple):
+    """One question to a measured flow."""
+
+    name: str
+    p_value: float
+    sentence: str
+    """The finding, where it is one."""
+    detectable: float
+    """Misfit that is found nine times in ten."""
+
+
+def agreement_tests(facts: Mapping[str, Any]) -> list[Agreement]:
+    """Return whether a measured flow and its scale are those that move the block."""
+    if "measured_flow_p_value" not in facts:
+        return []
+    x, y = facts["measured_flow_farthest_m"]
+    expected, std = facts["measured_flow_expected"], facts["measured_flow_expected_std"]
+    found = [
+        Agreement(
+            "measured flow",
+            facts["measured_flow_p_value"],
+            "the measured flow is not the one that moves the block: chi squared of their "
+            f"difference {facts['measured_flow_chi_squared']:.0f}, expected {expected:.0f} ± "
+            f"{std:.0f}; most at x = {x:.3g} m, y = {y:.3g} m, where they are "
+            f"{1e3 * facts['measured_flow_difference_m_s']:.2g} mm/s apart: is it mirrored, "
+            "shifted, of another setting of the pumps, or are its errors larger?",
+            facts["measured_flow_detectable_m_s"],
+        )
+    ]
+    if "measured_flow_scale_p_value" in facts:
+        off = facts["measured_flow_scale"] - 1.0
+        found.append(
+            Agreement(
+                "measured scale",
+                facts["measured_flow_scale_p_value"],
+                f"the measured flow is {abs(off):.0%} too {'fast' if off > 0.0 else 'slow'} for "
+                f"the motion (± {facts['measured_flow_scale_std']:.1%}): are its length scale and "
+                "frame interval right?",
+                facts["measured_flow_scale_detectable"],
+            )
+        )
+    return found
+
+
+def contradictions(facts: Mapping[str, Any]) -> list[str]:
+    """Return what in a measured flow contradicts the motion, in sentences."""
+    return [one.sentence for one in agreement_tests(facts) if one.p_value < MEASURED.level]
+
+
+def stored_flow(fit: xr.Dataset) -> xr.Dataset | None:
+    """Return the measured flow that a fit was made with, as a flow field with its errors."""
+    if "measured_u" not in fit:
+        return None
+    names = ("measured_u", "measured_v", "measured_u_error", "measured_v_error")
+    u, v, u_error, v_error = (fit[name].values for name in names)
+    x, y = fit["measured_x"].values, fit["measured_y"].values
+    flag = np.where(np.isfinite(u), FLAGS["measured"], FLAGS["outside"])
+    return build_flow_field(
+        x, y, u=np.nan_to_num(u), v=np.nan_to_num(v), flag=flag,
+        u_standard_error=u_error, v_standard_error=v_error,
+        attrs={
+            "method": "file", "cell_size_m": float(x[1] - x[0]),
+            "source": fit.attrs["measured_flow"], "errors": fit.attrs["measured_flow_errors"],
+        },
+    )  # fmt: skip
