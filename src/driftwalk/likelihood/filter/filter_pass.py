@@ -219,6 +219,7 @@ class Passes:
         # mass and the angle of the faces only.
         x, y, theta = corrected(series, point)
         share = point.number("linear_share")
+        strength = strength_of(series, point)
         return _core.InnovationsFilter(
             series.time,
             x,
@@ -235,7 +236,7 @@ class Passes:
             largest_step=FILTER.largest_step_s,
             longest_gap=FILTER.longest_gap_s,
             sensitivities=sensitivities,
-            strength=strength_of(series, point),
+            strength=None if strength is None else strength[np.newaxis],
             quadratic=1.0 - share,
             # Linear drag acts on all four faces, windward or not: a quarter on each. At a speed of
             # one side of the block a second it is as strong as the quadratic one in its place.
