@@ -53,6 +53,8 @@ class Weights:
 
     roughness: float
     size: float
+    modes: float = 1.0
+    """Factor of both for the modes of the flow in time, which may be weaker than its mean."""
 
 
 class Prior:
@@ -60,11 +62,25 @@ class Prior:
 
     def __init__(self, passes: Passes) -> None:
         self.roughness, self.size = penalties(passes.spline)
+        self.layers = passes.layers
         self.log_lever = math.log(PRIOR.lever * passes.body.side)
 
     def matrix(self, weights: Weights) -> Floats:
-        """Return the precision of one component's coefficients."""
+        """Return the precision of one component's coefficients, of the modes' but for a factor."""
         return weights.roughness * self.roughness + weights.size * self.size
+
+    def factors(self, weights: Weights, components: int) -> Floats:
+        """Return the factor of that precision for each component of all flows or layers."""
+        factors = np.ones(components)
+        if self.layers > 1:
+            factors[2:] = weights.modes
+        return factors
+
+    def log_determinant(self, weights: Weights, components: int) -> float:
+        """Return the logarithm of the determinant of the precision of all coefficients."""
+        one = float(np.linalg.slogdet(self.matrix(weights))[1])
+        scales = np.log(self.factors(weights, components)).sum()
+        return components * one + len(self.roughness) * float(scales)
 
     def add(self, sums: Sums, point: Point, weights: Weights) -> Sums:
         """Return the sums with the prior of the coefficients, of C_d and of the lever in them."""
@@ -72,10 +88,11 @@ class Prior:
         count = len(precision)
         coefficients = point.coefficients.reshape(-1, count)
         score, information = sums.score.copy(), sums.information.copy()
-        pull = coefficients @ precision
-        for component in range(len(coefficients)):
+        factors = self.factors(weights, len(coefficients))
+        pull = (factors[:, None] * coefficients) @ precision
+        for component, factor in enumerate(factors):
             part = slice(component * count, (component + 1) * count)
-            information[part, part] += precision
+            information[part, part] += factor * precision
             score[part] -= pull[component]
         deviance = sums.deviance + 0.5 * float((pull * coefficients).sum())
         drag = coefficients.size
@@ -105,11 +122,20 @@ class Prior:
             covariance[k * count : (k + 1) * count, k * count : (k + 1) * count]
             for k in range(len(coefficients))
         ]
+        steady = parts if self.layers == 1 else parts[:2]
         new = []
         for old, form in ((weights.roughness, self.roughness), (weights.size, self.size)):
-            prior = len(parts) * float((form * inverse).sum())
-            posterior = sum(float((form * part).sum()) for part in parts)
-            value = float(np.einsum("ka,ab,kb->", coefficients, form, coefficients))
+            prior = len(steady) * float((form * inverse).sum())
+            posterior = sum(float((form * part).sum()) for part in steady)
+            of_steady = coefficients[: len(steady)]
+            value = float(np.einsum("ka,ab,kb->", of_steady, form, of_steady))
             wanted = old * (prior - posterior) / max(value, 1e-300)
             new.append(float(np.clip(wanted, old / MOST_FACTOR, old * MOST_FACTOR)))
-        return Weights(*new)
+        if self.layers == 1:
+            return Weights(*new)
+        # The same step for the factor of the modes.
+        form, modes = self.matrix(weights), coefficients[2:]
+        taken = modes.size - weights.modes * sum(float((form * one).sum()) for one in parts[2:])
+        value = float(np.einsum("ka,ab,kb->", modes, form, modes))
+        least, most = weights.modes / MOST_FACTOR, weights.modes * MOST_FACTOR
+        return Weights(*new, float(np.clip(taken / max(value, 1e-300), least, most)))
