@@ -204,7 +204,7 @@ def fitted_flow(fit: xr.Dataset, *, interval: int | None = None) -> xr.Dataset:
             name: np.broadcast_to(one, (time.size, *one.shape)) for name, one in still.items()
         }
         attrs["repeat"] = "loop"
-        return build_flow_field(x, y, time=time, attrs=attrs, **{**fields, **moving})
+        return build_flow_field(x, y, time=time, attrs=attrs, **frames)
     if intervals.steady:
         return build_flow_field(x, y, attrs=attrs, **_field_variables(fit))
     fields = [_field_variables(fit.isel(flow=index)) for index in range(fit.sizes["flow"])]

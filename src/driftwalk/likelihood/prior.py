@@ -138,4 +138,4 @@ class Prior:
         taken = modes.size - weights.modes * sum(float((form * one).sum()) for one in parts[2:])
         value = float(np.einsum("ka,ab,kb->", modes, form, modes))
         least, most = weights.modes / MOST_FACTOR, weights.modes * MOST_FACTOR
-        return Weights(*new, float(np.clip(taken / max(value, 1e-300), least, most)))
+        return Weights(new[0], new[1], float(np.clip(taken / max(value, 1e-300), least, most)))

