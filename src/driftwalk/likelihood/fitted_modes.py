@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -52,11 +53,16 @@ def stored_coefficients(fit: xr.Dataset) -> Floats:
     return np.concatenate([mean[np.newaxis], fit["mode_coefficient"].values])
 
 
-def mode_frames(fit: xr.Dataset) -> tuple[Floats, dict[str, Floats]]:
-    """Return times and frames of u and v over a period of a fit with modes."""
+def mode_frames(
+    fit: xr.Dataset, mean: Mapping[str, np.ndarray]
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Return times and frames over a period of a fit with modes, from the fields of its mean."""
     amplitudes = fit["mode_amplitude"].values
     frames = {
+        name: np.broadcast_to(one, (amplitudes.shape[1], *one.shape)) for name, one in mean.items()
+    }
+    moving = {
         name: fit[name].values + np.tensordot(amplitudes.T, fit[f"{name}_mode"].values, 1)
         for name in ("u", "v")
     }
-    return fit["mode_time"].values, frames
+    return fit["mode_time"].values, frames | moving

@@ -198,12 +198,8 @@ def fitted_flow(fit: xr.Dataset, *, interval: int | None = None) -> xr.Dataset:
             attrs[f"{FIT_PREFIX}{name}"] = [float(end) for end in ends]
     x, y = fit["x"].values, fit["y"].values
     if "flow_mode" in fit.dims and interval is None:
-        time, moving = mode_frames(fit)
-        still = _field_variables(fit)
-        fields = {
-            name: np.broadcast_to(one, (time.size, *one.shape)) for name, one in still.items()
-        }
-        attrs["repeat"] = "loop"
+        time, frames = mode_frames(fit, _field_variables(fit))
+        attrs["repeat"] = "loop"  # a whole period
         return build_flow_field(x, y, time=time, attrs=attrs, **frames)
     if intervals.steady:
         return build_flow_field(x, y, attrs=attrs, **_field_variables(fit))

@@ -137,8 +137,8 @@ def modes_at(
 
 def _best_of(search: ModeSearch, steady: Mode, candidates: Sequence[float]) -> float | None:
     """Return the frequency whose modes come nearest to the recording in a few steps."""
-    if len(candidates) == 1:
-        return candidates[0]
+    if len(candidates) < 2:
+        return candidates[0] if candidates else None
     few = replace(search, iterations=FLOW_MODES.few_steps)
     tried = {one: _both(few, steady, one) for one in candidates}
     found = {one: mode.deviance for one, mode in tried.items() if mode is not None}
