@@ -35,13 +35,14 @@ DragModel drag_model(double side, double mass, double depth, int strips, double 
                      double origin_x, double origin_y, double spacing, int columns, int rows,
                      const In<double, 3>& coefficients, double drag_coefficient,
                      const std::string& orientation, const driftwalk::ForceLaw& law) {
-  if (coefficients.shape(0) != 2 || coefficients.shape(1) != std::size_t(rows) ||
+  const auto layers = static_cast<int>(coefficients.shape(0) / 2);
+  if (layers < 1 || coefficients.shape(0) % 2 != 0 || coefficients.shape(1) != std::size_t(rows) ||
       coefficients.shape(2) != std::size_t(columns)) {
-    throw std::invalid_argument("coefficients must have shape (2, rows, columns)");
+    throw std::invalid_argument("coefficients must have shape (2 layers, rows, columns)");
   }
   return DragModel({side, mass, depth, strips, water_density},
-                   {nullptr, origin_x, origin_y, spacing, columns, rows}, coefficients.data(),
-                   drag_coefficient, angle_of(orientation), law);
+                   {nullptr, origin_x, origin_y, spacing, columns, rows, layers},
+                   coefficients.data(), drag_coefficient, angle_of(orientation), law);
 }
 
 // Left as it comes: the filter writes every number of it, and the Jacobian is large.
@@ -167,14 +168,17 @@ void register_infer(nb::module_& module) {
              double drag_coefficient, double noise_intensity, double position_noise,
              double force_lever, double angle_noise, double largest_step, double longest_gap,
              const std::string& orientation, bool sensitivities,
-             const std::optional<In<double, 1>>& strength, double quadratic, double linear,
+             const std::optional<In<double, 2>>& strength, double quadratic, double linear,
              double water_acceleration, double water_spin, double drag_power, double drag_speed,
              double time_noise, double force_memory) {
             const std::size_t n = time.size();
             if (x.size() != n || y.size() != n || theta.size() != n || omega.size() != n ||
-                excluded.size() != n || (strength && strength->size() != n)) {
+                excluded.size() != n || (strength && strength->shape(1) != n)) {
               throw std::invalid_argument(
                   "time, x, y, theta, omega, excluded and strength differ in length");
+            }
+            if (strength && 2 * strength->shape(0) != coefficients.shape(0)) {
+              throw std::invalid_argument("strength must have shape (layers, n)");
             }
             new (self) InnovationsFilter(
                 {time.data(), x.data(), y.data(), theta.data(), omega.data(),

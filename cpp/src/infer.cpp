@@ -28,7 +28,7 @@ bool all_finite(const double* values, std::int64_t count) {
   return std::all_of(values, values + count, [](double value) { return std::isfinite(value); });
 }
 
-void check(const Track& track, Angle angle) {
+void check(const Track& track, Angle angle, int layers) {
   require(all_finite(track.time, track.samples), "times must be finite");
   require(std::adjacent_find(track.time, track.time + track.samples, std::greater_equal<>()) ==
               track.time + track.samples,
@@ -37,7 +37,8 @@ void check(const Track& track, Angle angle) {
     require(!std::isinf(track.x[k]) && !std::isinf(track.y[k]),
             "positions must be finite, or NaN where a sample is missing");
   }
-  require(track.strength == nullptr || all_finite(track.strength, track.samples),
+  require(track.strength != nullptr || layers == 1, "several layers need their strengths");
+  require(track.strength == nullptr || all_finite(track.strength, layers * track.samples),
           "the strength of the flow must be finite");
   if (angle == Angle::given) {
     require(all_finite(track.theta, track.samples) && all_finite(track.omega, track.samples),
@@ -86,12 +87,16 @@ DragModel::DragModel(const FloatingBlock& block, const SplineView& flow, const d
   require(positive(flow.spacing) && std::isfinite(flow.origin_x) && std::isfinite(flow.origin_y),
           "the flow's spacing must be positive and its origin finite");
   require(flow.rows >= 4 && flow.columns >= 4, "a bicubic flow needs at least 4 rows and columns");
+  require(flow.layers >= 1, "a flow has at least one layer");
   const std::int64_t nodes = std::int64_t(flow.rows) * flow.columns;
-  require(all_finite(coefficients, 2 * nodes), "coefficients must be finite");
-  nodes_.resize(std::size_t(2 * nodes));
-  for (std::int64_t k = 0; k < nodes; ++k) {
-    nodes_[std::size_t(2 * k)] = coefficients[k];
-    nodes_[std::size_t(2 * k + 1)] = coefficients[nodes + k];
+  const std::int64_t layers = flow.layers;
+  require(all_finite(coefficients, 2 * nodes * layers), "coefficients must be finite");
+  nodes_.reserve(std::size_t(2 * nodes * layers));
+  for (std::int64_t first = 0; first < 2 * nodes * layers; first += 2 * nodes) {
+    for (std::int64_t k = first; k < first + nodes; ++k) {
+      nodes_.push_back(coefficients[k]);
+      nodes_.push_back(coefficients[nodes + k]);
+    }
   }
   block_.half_side = block.side / 2;
   block_.strip_width = block.side / block.strips;
@@ -134,6 +139,7 @@ const InferKernelOf<D>& kernel_of(const InferKernel& kernel) {
 template <int D>
 DragResponse<D> DragModel::drag(double theta, double omega, const double* mean,
                                 const double (*covariance)[2 * D], double* by_coefficients) const {
+  require(flow_.layers == 1, "the drag alone is that of a flow of one layer");
   std::vector<StripShare<D>> room(by_coefficients == nullptr ? 0 : std::size_t(shares()));
   std::vector<PointShare<D>> points(room.empty() ? 0 : std::size_t(water_points));
   const InferKernel kernel = chosen_infer_kernel();
@@ -160,7 +166,7 @@ InnovationsFilter::InnovationsFilter(const Track& track, DragModel model,
   require(settings.longest_gap > 0, "the longest gap must be positive");
   require(settings.longest_gap / settings.largest_step <= 1e6,
           "the longest gap must not be above a million of the largest steps");
-  check(track, model_.angle());
+  check(track, model_.angle(), model_.layers());
   copy(track);
   const double q = settings.noise_intensity;
   const double position = settings.position_noise * settings.position_noise;
@@ -197,6 +203,18 @@ void InnovationsFilter::make_memory() {
   Memory<D, F>& memory = memory_.emplace<Memory<D, F>>();
   memory.state = {};
   memory.scratch = {};
+  const std::int64_t layers = memory.scratch.layers = model_.layers();
+  if (layers > 1) {
+    for (std::vector<double>* const sum : {&memory.sum, &memory.sum_rate}) {
+      sum->assign(std::size_t(model_.coefficients() / layers), 0.0);
+    }
+    memory.weight.resize(std::size_t(layers));
+    memory.weight_rate.resize(std::size_t(layers));
+    memory.scratch.sum = memory.sum.data();
+    memory.scratch.sum_rate = memory.sum_rate.data();
+    memory.scratch.weight = memory.weight.data();
+    memory.scratch.weight_rate = memory.weight_rate.data();
+  }
   if (sensitivities_) {
     memory.shares.resize(std::size_t(model_.shares()));
     memory.scratch.shares = memory.shares.data();
@@ -222,7 +240,7 @@ void InnovationsFilter::copy(const Track& track) {
   }
   const std::int64_t n = track.samples;
   if (track.strength != nullptr) {
-    track_.insert(track_.end(), track.strength, track.strength + n);
+    track_.insert(track_.end(), track.strength, track.strength + model_.layers() * n);
   }
   excluded_.assign(track.excluded, track.excluded + n);
   const double* const first = track_.data();

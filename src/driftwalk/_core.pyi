@@ -197,15 +197,17 @@ class LiveWorld:
 class InnovationsFilter:
     # Time [s] increasing; x and y [m], NaN where a sample is missing. excluded: 1 where the
     # interval that ends at the sample says nothing about the water. Coefficients of u and v
-    # (2, rows, columns) [m/s]. noise_intensity: sigma_F^2 * force_interval / mass^2 [m^2/s^3].
+    # (2, rows, columns) [m/s], or (2 K, rows, columns) of K layers whose sum is the flow.
+    # noise_intensity: sigma_F^2 * force_interval / mass^2 [m^2/s^3].
     # orientation: "given": theta [rad], without jumps by 2 pi, and omega [rad/s] are inputs, finite
     # everywhere; "none": the drag is averaged over the angle; "state": theta is measured like x and
     # y, NaN where missing, with angle_noise [rad], and the force acts force_lever [m] from the
-    # centre. strength: of the flow at the samples, 1 without. quadratic, linear [m/s]: a strip's
-    # drag is K (quadratic max(0, closing) + linear) times its slip; with another drag_power than 2,
-    # and no linear part, that times (speed past the strip / drag_speed [m/s])^(drag_power - 2).
-    # water_acceleration and water_spin: how strongly Du/Dt and half its curl push the block, 0 or
-    # 1. time_noise: of the stamps [s]. force_memory: correlation time of the force [s].
+    # centre. strength: of each layer at the samples (K, n), linear between them; one layer without
+    # it has the strength 1. quadratic, linear [m/s]: a strip's drag is K (quadratic
+    # max(0, closing) + linear) times its slip; with another drag_power than 2, and no linear part,
+    # that times (speed past the strip / drag_speed [m/s])^(drag_power - 2). water_acceleration and
+    # water_spin: how strongly Du/Dt and half its curl push the block, 0 or 1. time_noise: of the
+    # stamps [s]. force_memory: correlation time of the force [s].
     def __init__(
         self,
         time: _Floats,

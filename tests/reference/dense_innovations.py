@@ -139,10 +139,25 @@ def sample_of(
     return value, noise
 
 
+def strengths_at(strength: Floats | None, k: int, share: float) -> Floats:
+    """Of each layer, between the samples k - 1 and k; of one alone by default."""
+    if strength is None:
+        return np.ones(1)
+    return (1 - share) * strength[:, k - 1] + share * strength[:, k]
+
+
 def dense_filter(
-    track: dict[str, Any], coefficients: Floats, *, orientation: str = "given", largest: float
+    track: dict[str, Any],
+    layers: Floats,
+    *,
+    orientation: str = "given",
+    largest: float,
+    strength: Floats | None = None,
 ) -> dict[str, Floats]:
-    """Run the filter; the outputs are named as those of the core."""
+    """Run the filter; the outputs are named as those of the core.
+
+    With `strength` (K, n) there are K layers of coefficients, (K, 2, rows, columns).
+    """
     time = track["time"]
     d = 3 if orientation == "state" else 2
     eye, still, half = np.eye(d), np.zeros(d), np.eye(2 * d)
@@ -151,7 +166,8 @@ def dense_filter(
     intensity = NOISE_INTENSITY * np.diag([1, 1, lever**2][:d])
     noise = np.diag([POSITION_NOISE**2, POSITION_NOISE**2, ANGLE_NOISE**2][:d])
     unknown = np.diag(unknown_variances(d))
-    width = 2 * NODES + 1
+    layers = np.reshape(layers, (-1, *WAVY.shape))
+    width = 2 * NODES * len(layers) + 1
     lower = np.tril_indices(d)
     rows: dict[str, list[Any]] = {"innovation": [], "covariance": [], "used": [], "state": []}
     rows |= {"whitened": [], "jacobian": []}
@@ -172,6 +188,8 @@ def dense_filter(
                 s, P, M = half @ s, half @ P @ half.T, half @ M
                 middle = P + scipy.linalg.block_diag(0 * eye, h / 2 * intensity)
                 options = {"orientation": orientation}
+                weights = strengths_at(strength, k, share)
+                coefficients = np.tensordot(weights, layers, 1)
                 if d == 2:
                     options |= {
                         name: np.interp(share, [0, 1], track[name][k - 1 : k + 1])
@@ -183,7 +201,10 @@ def dense_filter(
                 kick = np.eye(2 * d)
                 kick[d:] += h * W @ np.hstack([found["by_position"], found["by_velocity"]])
                 by_parameters = np.hstack(
-                    [found["by_coefficients"].reshape(d, -1), found["acceleration"][:, None]]
+                    [
+                        *(w * found["by_coefficients"].reshape(d, -1) for w in weights),
+                        found["acceleration"][:, None],
+                    ]
                 )
                 s = s + np.concatenate([still, h * W @ found["acceleration"]])
                 M = kick @ M

@@ -26,7 +26,8 @@ RecordingFiles = Annotated[
     FIT_KEYS,
     *("side", "mass", "depth", "force_interval"),
     *("angle", "spline_spacing", "confidence", "switching_times", "flow_labels", "precision"),
-    *("law", "pressure_gradient", "added_mass", "force_memory", "flow_strength", "camera"),
+    *("law", "pressure_gradient", "added_mass", "force_memory", "flow_strength"),
+    *("flow_modes", "camera"),
     *("added_mass_std", "mass_std", "side_std", "flow_error", "flow_scale_error"),
 )
 def fit(

@@ -89,6 +89,7 @@ class FitSettings(StudySettings, total=False):
     side_std: Annotated[Number, "fit.side_std_m"]
     force_memory: Annotated[Number, "fit.force_memory_s"]
     flow_strength: Annotated[str, "fit.flow_strength"]
+    flow_modes: Annotated[str, "fit.flow_modes"]
     camera: Annotated[str, "fit.camera"]
     flow_error: Annotated[Number, "fit.flow_error_m_s"]
     flow_scale_error: Annotated[Number, "fit.flow_scale_std"]

@@ -22,6 +22,13 @@ from driftwalk.likelihood.interval_inflation import (
     parameter_facts,
     with_mended_frames,
 )
+from driftwalk.likelihood.law.flow_modes import (
+    FlowModes,
+    find_flow_modes,
+    modes_at,
+    require_one_flow,
+    with_layers,
+)
 from driftwalk.likelihood.law.force_law import Assumptions, assumptions_of, side_slopes, stated_drag
 from driftwalk.likelihood.law.forward_selection import LawResult
 from driftwalk.likelihood.law.search import LawSearch
@@ -46,7 +53,7 @@ from driftwalk.likelihood.preparation import (
     as_list,
     prepare,
 )
-from driftwalk.likelihood.prior import PRIOR
+from driftwalk.likelihood.prior import PRIOR, Weights
 from driftwalk.likelihood.refuse import (
     BREAKDOWN,
     reason_of_no_solution,
@@ -128,6 +135,7 @@ def fit_motion(
 
     chosen = study if study is not None else Study()
     ready = prepare(as_list(recordings), chosen, angle, body, flow)
+    require_one_flow(ready)
     passes = ready.passes
     start = first_point(ready, passes.spline)
     assumptions = assumptions_of(
@@ -139,7 +147,8 @@ def fit_motion(
     with solved(reason):
         passed = _work_listener(course, _usual_search(passes))
         search = ModeSearch(passes, ready.prior, chosen.fit.iterations, passed)
-        laws, law = _laws_of(search, assumptions, start, ready)
+        search, laws, law, modes = _laws_with_modes(search, assumptions, start, ready)
+        passes = search.passes
         course.begin("drag")
         try:
             restricted = restricted_drag(search, law.mode)
@@ -160,11 +169,11 @@ def fit_motion(
     turning: dict[str, Any] = {}
     # How the block's spin goes with the water's, where orientations and one flow are.
     if ready.angle != "none" and ready.intervals.steady:
-        turning["spin_correlation"] = spin_correlation(start.coefficients, passes)
+        turning["spin_correlation"] = spin_correlation(start.coefficients, ready.passes)
     if ready.angle == "state":
         course.begin("angle as given")
-        given = thinned(ready.with_angle("given").passes)
-        turning |= angle_given_facts(given, ready.prior, law.mode, restricted, chosen)
+        given = replace(thinned(ready.with_angle("given").passes), layers=passes.layers)
+        turning |= angle_given_facts(given, search.prior, law.mode, restricted, chosen)
     with solved(reason):
         parameters = _parameter_facts(search, law.mode, restricted, ready)
         for rival in law.rivals:
@@ -174,6 +183,7 @@ def fit_motion(
         **parameters,
         **law_facts(law, assumptions),
         **shape_facts(shape, law.tests),
+        **({"flow_modes_unsettled": modes.unsettled} if modes.unsettled else {}),
         **turning,
         **whiteness_of(counted)._asdict(),
         **ready.facts,
@@ -189,6 +199,7 @@ def fit_motion(
         warnings += jump_warnings(recording, body, track=track)
     warnings += warnings_of(facts, shares, ready.intervals, side_m=chosen.block.side_m)
     warnings += [*law.unsettled, *contradictions(facts)]
+    warnings += [modes.unsettled] if modes.unsettled else []
     if shape is not None and shape.significant:
         warnings.append(shape.sentence)
     if law.left_out:
@@ -201,12 +212,38 @@ def fit_motion(
     )
 
 
-def _laws_of(
+def _laws_with_modes(
     search: ModeSearch, assumptions: Assumptions, start: Point, ready: PreparedRecordings
+) -> tuple[ModeSearch, LawSearch, LawResult, FlowModes]:
+    """Return the search, that of the law, its result, and the modes of the flow with which."""
+    wanted, modes = ready.study.fit.flow_modes, FlowModes()
+    weights = first_weights(ready.tracks, search.passes.spline)
+    if wanted != "none":
+        modes = find_flow_modes(search, start, weights, wanted)
+    if modes.start is None:
+        laws, law = _laws_of(search, assumptions, start, weights, ready)
+        if wanted != "none":
+            # Under the right law the line may stand out that did not under the paper's.
+            modes = modes_at(
+                laws.search, law.base, laws.alternatives.shape_change(law.base), wanted
+            )
+        if modes.start is None:
+            return search, laws, law, modes
+    search = with_layers(search, modes.layers)
+    assumptions = replace(assumptions, opened={**assumptions.opened, **modes.opened})
+    laws, law = _laws_of(search, assumptions, modes.start, modes.weights or weights, ready)
+    return search, laws, law, modes
+
+
+def _laws_of(
+    search: ModeSearch,
+    assumptions: Assumptions,
+    start: Point,
+    weights: Weights,
+    ready: PreparedRecordings,
 ) -> tuple[LawSearch, LawResult]:
     """Return the search of the law and its result, of a fast camera from samples further apart."""
     passes = search.passes
-    weights = first_weights(ready.tracks, passes.spline)
     few = thinned(passes)
     if few is not passes:
 
@@ -290,6 +327,7 @@ def _search_facts(law: LawResult, restricted: Restricted) -> dict[str, Any]:
         "search_left": mode.left if mode.diverged else 0.0,
         "roughness_weight": mode.weights.roughness,
         "size_weight": mode.weights.size,
+        **({"mode_weight": mode.weights.modes} if mode.point.layers > 1 else {}),
     }
 
 
@@ -320,7 +358,8 @@ def check_fit(
     """
     from driftwalk.model import Study
 
-    prepare(as_list(recordings), study if study is not None else Study(), angle, body, flow)
+    chosen = study if study is not None else Study()
+    require_one_flow(prepare(as_list(recordings), chosen, angle, body, flow))
 
 
 def _usual_search(passes: Passes) -> float:

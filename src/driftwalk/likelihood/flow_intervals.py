@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from driftwalk.core.errors import InputError
+from driftwalk.likelihood.fitted_modes import mode_frames
 from driftwalk.schema import FLAGS, Track, build_flow_field
 from driftwalk.schema.check import refuse_other_version, require_kind
 from driftwalk.schema.kinds.flow import FIT_PREFIX
@@ -159,6 +160,9 @@ def fitted_flow(fit: xr.Dataset, *, interval: int | None = None) -> xr.Dataset:
         switch, as fields are linear in time between frames; times count from the first sample of
         the first recording, as those of a simulation do.
 
+        With modes in time it is the period of the flow that returns, and with `interval` 0 the
+        mean flow.
+
     Returns
     -------
     xarray.Dataset
@@ -193,6 +197,10 @@ def fitted_flow(fit: xr.Dataset, *, interval: int | None = None) -> xr.Dataset:
             ends = fit["interval"].sel(parameter=name).values
             attrs[f"{FIT_PREFIX}{name}"] = [float(end) for end in ends]
     x, y = fit["x"].values, fit["y"].values
+    if "flow_mode" in fit.dims and interval is None:
+        time, frames = mode_frames(fit, _field_variables(fit))
+        attrs["repeat"] = "loop"  # a whole period
+        return build_flow_field(x, y, time=time, attrs=attrs, **frames)
     if intervals.steady:
         return build_flow_field(x, y, attrs=attrs, **_field_variables(fit))
     fields = [_field_variables(fit.isel(flow=index)) for index in range(fit.sizes["flow"])]

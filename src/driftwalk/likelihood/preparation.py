@@ -26,6 +26,7 @@ from driftwalk.likelihood.filter.series import (
     usable_intervals,
     wall_intervals,
 )
+from driftwalk.likelihood.fitted_modes import stored_coefficients
 from driftwalk.likelihood.flow_intervals import Intervals, cut_track, intervals_of, require_fit
 from driftwalk.likelihood.law.force_law import effective_logs, stored_numbers
 from driftwalk.likelihood.measured_flow import MeasuredFlow, measured_flow, stored_flow
@@ -324,7 +325,7 @@ def estimate_of(fit: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str 
             f"the recordings have {ready.samples} positions, the fit was made of "
             f"{int(fit['samples'])}: check it with the recordings that it was fitted to"
         )
-    coefficients = np.asarray(fit["coefficient"].values, dtype=np.float64)
+    coefficients = stored_coefficients(fit)
     x, y = fit["spline_origin"].values
     spline = Spline(float(x), float(y), float(fit["spline_spacing"]), *coefficients.shape[:-3:-1])
     opened, fixed = stored_numbers(fit)
@@ -335,8 +336,11 @@ def estimate_of(fit: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str 
             math.log(fitted_value(fit, name)) for name in ("force_lever", "orientation_noise")
         )
         point = replace(point, log_lever=lever, log_angle_noise=turning)
+    modes = float(fit["mode_weight"]) if point.layers > 1 else 1.0
     determined = float(fit["measured_flow_determined"]) if "measured_u" in fit else 0.0
-    weights = Weights(float(fit["roughness_weight"]), float(fit["size_weight"]), determined)
-    passes = replace(ready.passes, spline=spline)
+    weights = Weights(
+        float(fit["roughness_weight"]), float(fit["size_weight"]), determined, modes
+    )
+    passes = replace(ready.passes, spline=spline, layers=point.layers)
     prior = Prior(passes, ready.measured)
     return Estimate(study, passes, point, weights, ready.parts, prior)

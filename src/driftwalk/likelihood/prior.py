@@ -57,6 +57,8 @@ class Weights:
     size: float
     determined: float = 0.0
     """Coefficients that a measured flow of uncertain scale determines."""
+    modes: float = 1.0
+    """Factor of both for the modes of the flow in time, which may be weaker than its mean."""
 
 
 class Prior:
@@ -65,11 +67,25 @@ class Prior:
     def __init__(self, passes: Passes, measured: MeasuredFlow | None = None) -> None:
         self.measured = measured
         self.roughness, self.size = penalties(passes.spline)
+        self.layers = passes.layers
         self.log_lever = math.log(PRIOR.lever * passes.body.side)
 
     def matrix(self, weights: Weights) -> Floats:
-        """Return the precision of one component's coefficients."""
+        """Return the precision of one component's coefficients, of the modes' but for a factor."""
         return weights.roughness * self.roughness + weights.size * self.size
+
+    def factors(self, weights: Weights, components: int) -> Floats:
+        """Return the factor of that precision for each component of all flows or layers."""
+        factors = np.ones(components)
+        if self.layers > 1:
+            factors[2:] = weights.modes
+        return factors
+
+    def log_determinant(self, weights: Weights, components: int) -> float:
+        """Return the logarithm of the determinant of the precision of all coefficients."""
+        one = float(np.linalg.slogdet(self.matrix(weights))[1])
+        scales = np.log(self.factors(weights, components)).sum()
+        return components * one + len(self.roughness) * float(scales)
 
     def add(self, sums: Sums, point: Point, weights: Weights) -> Sums:
         """Return the sums with the prior of the coefficients, of C_d and of the lever in them."""
@@ -77,10 +93,11 @@ class Prior:
         count = len(precision)
         coefficients = point.coefficients.reshape(-1, count)
         score, information = sums.score.copy(), sums.information.copy()
-        pull = coefficients @ precision
-        for component in range(len(coefficients)):
+        factors = self.factors(weights, len(coefficients))
+        pull = (factors[:, None] * coefficients) @ precision
+        for component, factor in enumerate(factors):
             part = slice(component * count, (component + 1) * count)
-            information[part, part] += precision
+            information[part, part] += factor * precision
             score[part] -= pull[component]
         deviance = sums.deviance + 0.5 * float((pull * coefficients).sum())
         drag = coefficients.size
@@ -115,11 +132,13 @@ class Prior:
             covariance[k * count : (k + 1) * count, k * count : (k + 1) * count]
             for k in range(len(coefficients))
         ]
+        steady = parts if self.layers == 1 else parts[:2]
         new = []
         for old, form in ((weights.roughness, self.roughness), (weights.size, self.size)):
-            prior = len(parts) * float((form * inverse).sum())
-            posterior = sum(float((form * part).sum()) for part in parts)
-            value = float(np.einsum("ka,ab,kb->", coefficients, form, coefficients))
+            prior = len(steady) * float((form * inverse).sum())
+            posterior = sum(float((form * part).sum()) for part in steady)
+            of_steady = coefficients[: len(steady)]
+            value = float(np.einsum("ka,ab,kb->", of_steady, form, of_steady))
             wanted = old * (prior - posterior) / max(value, 1e-300)
             new.append(float(np.clip(wanted, old / MOST_FACTOR, old * MOST_FACTOR)))
         determined = 0.0
@@ -127,7 +146,15 @@ class Prior:
             determined = self.measured.determined(
                 point.coefficients, covariance, weights.determined
             )
-        return Weights(new[0], new[1], determined)
+        if self.layers == 1:
+            return Weights(new[0], new[1], determined)
+        # The same step for the factor of the modes.
+        form, modes = self.matrix(weights), coefficients[2:]
+        taken = modes.size - weights.modes * sum(float((form * one).sum()) for one in parts[2:])
+        value = float(np.einsum("ka,ab,kb->", modes, form, modes))
+        least, most = weights.modes / MOST_FACTOR, weights.modes * MOST_FACTOR
+        factor = float(np.clip(taken / max(value, 1e-300), least, most))
+        return Weights(new[0], new[1], determined, factor)
 
     def log_scale(self, point: Point, weights: Weights) -> float:
         """Return what of the deviance goes with the scale of a measured flow alone.

@@ -23,6 +23,7 @@ from driftwalk.flow.arena import Outline, outline_of
 from driftwalk.flow.grid import Grid, make_grid
 from driftwalk.likelihood.filter.parameters import DRAG_SHAPES, Point
 from driftwalk.likelihood.filter.series import Series
+from driftwalk.likelihood.fitted_modes import mode_variables
 from driftwalk.likelihood.interval_inflation import open_where_undetermined, parameter_covariance
 from driftwalk.likelihood.law.force_law import Assumptions
 from driftwalk.likelihood.law.forward_selection import LawResult
@@ -50,7 +51,7 @@ WORDS: Final = (
     *("force_law", "force_law_stated", "drag_law", "drag_law_stated"),
 )
 """Facts in words, which are attributes."""
-REASONS: Final = ("law_unsettled", "flow_shape_change")
+REASONS: Final = ("law_unsettled", "flow_shape_change", "flow_modes_unsettled")
 """The same where there is anything to say."""
 
 
@@ -111,7 +112,7 @@ def build_fit(
         )
         # Where the coefficients of this flow are among all parameters.
         own = slice(flow * 2 * spline.size, (flow + 1) * 2 * spline.size)
-        coefficients = restricted.point.in_flow(flow).coefficients
+        coefficients = restricted.point.in_flow(flow).mean_coefficients
         u, v = spline.values(coefficients, grid.x, grid.y)
         errors = spline.standard_errors(mode.covariance[own, own], grid.x, grid.y)
         flows.append(
@@ -162,6 +163,10 @@ def build_fit(
         data["interval_flow"] = ("flow_interval", np.array(intervals.flows, dtype=np.int32))
         facts["switching_times_s"] = list(intervals.times)
         facts["recording_start_s"] = float(ready.tracks[0].time[0])
+    if restricted.point.layers > 1:
+        count = flows[0]["count"][1]
+        modes, of_modes = mode_variables(restricted.point, ready.series[0], spline, grid, count)
+        data, coords = data | modes, coords | of_modes
     numbers, names_of, _ = fit_parts(facts)
     found, names_found = number_variables(restricted.point, law)
     words: dict[str, Any] = {}

@@ -98,6 +98,12 @@ class Fit(Section):
     Strength of the flow over time: "constant", or "smooth". "auto" is constant unless the recording
     supports changes; it also searches for pulses.
     """
+    flow_modes: Literal["none", "auto", "1", "2"] = "none"
+    """Modes by which the flow changes its shape in time.
+
+    Number of modes, periodic in time, by which the flow changes its shape: "1", or "2" in
+    quadrature. "auto" takes the number with the most evidence. For one recording in one flow.
+    """
     camera: Literal["auto", "exact"] = "auto"
     """Errors of the camera that are estimated.
 
@@ -127,6 +133,11 @@ class Fit(Section):
     Wanted relative standard error of C_d: the fit says whether it is reached, and if not, how long
     a recording must be. Without it, a warning appears above 0.1.
     """
+
+    @field_validator("flow_modes", mode="before")
+    @classmethod
+    def _number_in_words(cls, value: object) -> object:
+        return str(value) if isinstance(value, int) else value
 
     @field_validator("switching_times_s")
     @classmethod

@@ -163,7 +163,7 @@ def _flows(fit: xr.Dataset) -> list[xr.Dataset]:
     from driftwalk.likelihood import fitted_flow
 
     if "flow" not in fit.dims:
-        return [fitted_flow(fit)]
+        return [fitted_flow(fit, interval=0)]
     interval_flow = fit["interval_flow"].values.tolist()
     return [
         fitted_flow(fit, interval=interval_flow.index(flow)) for flow in range(fit.sizes["flow"])

@@ -7,6 +7,7 @@
 #pragma once
 
 #include "driftwalk/infer/expected_drag.hpp"
+#include "driftwalk/infer/flow_layers.hpp"
 #include "driftwalk/infer/kalman.hpp"
 #include "driftwalk/infer/products.hpp"
 #include "driftwalk/infer/sensitivity.hpp"
@@ -234,10 +235,19 @@ private:
   DragResponse<D> response_at(const Square<2 * D>& covariance, std::int64_t k, double share) const {
     UncertainBlock<D> block{state_.mean[0], state_.mean[1], state_.mean[D], state_.mean[D + 1], 0,
                             covariance};
-    if (track_.strength != nullptr) {
-      const double before = track_.strength[k - 1], after = track_.strength[k];
-      block.strength = before + (after - before) * share;
-      block.strength_rate = (after - before) / (track_.time[k] - track_.time[k - 1]);
+    SplineView flow = problem_.flow;
+    const double* rate_nodes = nullptr;
+    if (flow.layers > 1) {
+      layer_strengths(track_, flow.layers, k, share, scratch_.weight, scratch_.weight_rate);
+      const NodesNear near = nodes_near(flow, block.x, block.y, reach_);
+      sum_layers(flow, near, scratch_.weight, scratch_.sum);
+      if (pushed_) {
+        sum_layers(flow, near, scratch_.weight_rate, scratch_.sum_rate);
+        rate_nodes = scratch_.sum_rate;
+      }
+      flow.nodes = scratch_.sum;
+    } else if (track_.strength != nullptr) {
+      layer_strengths(track_, 1, k, share, &block.strength, &block.strength_rate);
     }
     double theta;
     if constexpr (D == 3) {
@@ -249,10 +259,10 @@ private:
       block.omega = spin[-1] + (spin[0] - spin[-1]) * share;
     }
     DragResponse<D> response =
-        expected_drag<D>(law_, problem_.law.power, problem_.flow, problem_.block,
-                         problem_.orientations, theta, block, scratch_.shares);
-    add_water_acceleration<D>(problem_.flow, problem_.block, problem_.law, block, scratch_.points,
-                              response);
+        expected_drag<D>(law_, problem_.law.power, flow, problem_.block, problem_.orientations,
+                         theta, block, scratch_.shares);
+    add_water_acceleration<D>(flow, rate_nodes, problem_.block, problem_.law, block,
+                              scratch_.points, response);
     return response;
   }
 
@@ -366,6 +376,10 @@ private:
   Sensitivity<D, F> sensitivity_;
   const ProductSums* sums_;
   Products products_;
+  // Whether the water's acceleration pushes the block; how far it reaches, and somewhat further
+  // [m].
+  bool pushed_ = problem_.law.water_acceleration != 0 || problem_.law.water_spin != 0;
+  double reach_ = 1.5 * problem_.block.half_side;
 };
 
 DRIFTWALK_LANES_END

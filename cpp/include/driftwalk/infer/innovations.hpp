@@ -28,7 +28,7 @@ enum class Angle {
 // A block in a spline flow. Copies the coefficients.
 class DragModel {
 public:
-  // `flow.nodes` is not read; coefficients are [2][rows][columns], of u and of v.
+  // `flow.nodes` is not read; coefficients are [layers][2][rows][columns], of u and of v.
   // Throws std::invalid_argument.
   DragModel(const FloatingBlock& block, const SplineView& flow, const double* coefficients,
             double drag_coefficient, Angle angle, const ForceLaw& law = {});
@@ -40,12 +40,16 @@ public:
   Angle angle() const { return angle_; }
   // Flow, block, law and orientations, with pointers into this object.
   FilterProblem problem() const;
-  std::int64_t coefficients() const { return 2 * std::int64_t(flow_.rows) * flow_.columns; }
+  std::int64_t coefficients() const {
+    return 2 * std::int64_t(flow_.rows) * flow_.columns * flow_.layers;
+  }
+  int layers() const { return flow_.layers; }
   // The most strips that can take part at once.
   std::int64_t shares() const;
 
   // The mean acceleration, and if not null its derivative by the coefficients [D][coefficients()].
-  // `mean` and `covariance` are those of UncertainBlock<D>; D = 3 with Angle::state, else 2.
+  // With one layer only. `mean` and `covariance` are those of UncertainBlock<D>; D = 3 with
+  // Angle::state, else 2.
   template <int D>
   DragResponse<D> drag(double theta, double omega, const double* mean,
                        const double (*covariance)[2 * D], double* by_coefficients) const;
@@ -104,6 +108,7 @@ private:
     std::vector<StripShare<D>> shares;
     std::vector<PointShare<D>> points;
     std::vector<double> sensitivity, row;
+    std::vector<double> sum, sum_rate, weight, weight_rate;
     std::vector<std::uint8_t> touched;
     std::vector<std::int32_t> active;
   };

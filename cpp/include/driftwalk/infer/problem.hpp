@@ -9,13 +9,15 @@ namespace driftwalk {
 // The flow of the water: uniform bicubic B-splines,
 //     u(x, y) = sum over j, i of c[j][i] B((x - origin_x)/spacing - i) B((y - origin_y)/spacing -
 //     j)
-// with B the cubic B-spline of support [-3, 1]: on the cell [k, k + 1] the nodes k .. k + 3 count,
-// so the grid covers columns - 3 by rows - 3 cells. Beyond it the value at its edge goes on.
+// times its strength. With several layers it is their sum, each times its own strength.
+// B is the cubic B-spline of support [-3, 1]: on the cell [k, k + 1] the nodes k .. k + 3 count, so
+// the grid covers columns - 3 by rows - 3 cells. Beyond it the value at its edge goes on.
 struct SplineView {
-  const double* nodes;       // [rows][columns][2]: coefficients of u and v [m/s]
+  const double* nodes;       // [layers][rows][columns][2]: coefficients of u and v [m/s]
   double origin_x, origin_y; // [m]
   double spacing;            // [m]
   int columns, rows;         // at least 4 each
+  int layers = 1;
 };
 
 // The sides of the block, cut into strips.
@@ -57,12 +59,13 @@ struct Orientations {
 // What is known of the block's angle is either an input, in `theta` and `omega` without holes, or a
 // measurement like the position, in `theta` alone, NaN where it is missing.
 struct Track {
-  const double* time;           // [s], increasing
-  const double* x;              // [m], NaN where a sample is missing
-  const double* y;              // [m]
-  const double* theta;          // [rad]; an input has no jumps by 2 pi
-  const double* omega;          // [rad/s]
-  const double* strength;       // of the flow, linear between samples; null: 1 all the time
+  const double* time;  // [s], increasing
+  const double* x;     // [m], NaN where a sample is missing
+  const double* y;     // [m]
+  const double* theta; // [rad]; an input has no jumps by 2 pi
+  const double* omega; // [rad/s]
+  // Of each layer, [layers][samples], linear between samples; null with one layer: 1 all the time.
+  const double* strength;
   const std::uint8_t* excluded; // 1: the interval that ends here says nothing about the water
   std::int64_t samples;
 };
@@ -109,6 +112,7 @@ struct StripShare {
 template <int D>
 struct PointShare {
   double by_value[D][2], by_slope[D][2];
+  double by_rate[D][2];            // of the derivative of the flow by time, with several layers
   double u, v;                     // the flow there, without its strength [m/s]
   double weight_x[4], weight_y[4]; // B at the four columns and rows of nodes
   double slope_x[4], slope_y[4];   // its derivatives [1/m]
@@ -119,14 +123,20 @@ inline constexpr int water_points = 4;
 // Memory of a filter, made once.
 template <int D>
 struct FilterScratch {
-  StripShare<D>* shares;   // one for each strip of each orientation; null without sensitivities
-  PointShare<D>* points;   // [water_points]; null without sensitivities
-  double* sensitivity;     // [2 D + F][stride]: d(state)/d(parameters)
-  double* row;             // [D][stride]
-  std::uint8_t* touched;   // [stride / 8]: whether eight columns are not zero
-  std::int32_t* active;    // [stride / 8]: the groups of eight columns that are not
-  std::int64_t stride;     // a multiple of 8, at least parameters
-  std::int64_t parameters; // 2 rows columns + 1: coefficients of u, of v, then ln C_d
+  // With several layers: their sum near the block, and its derivative by time, as the nodes of one;
+  // the strength of each layer and its derivative.
+  double *sum, *sum_rate;       // [rows][columns][2]
+  double *weight, *weight_rate; // [layers]
+  StripShare<D>* shares; // one for each strip of each orientation; null without sensitivities
+  PointShare<D>* points; // [water_points]; null without sensitivities
+  double* sensitivity;   // [2 D + F][stride]: d(state)/d(parameters)
+  double* row;           // [D][stride]
+  std::uint8_t* touched; // [stride / 8]: whether eight columns are not zero
+  std::int32_t* active;  // [stride / 8]: the groups of eight columns that are not
+  std::int64_t stride;   // a multiple of 8, at least parameters
+  std::int64_t
+      parameters; // 2 rows columns layers + 1: coefficients of u, of v of each layer, then ln C_d
+  int layers;
 };
 
 // Results of `count` samples. An innovation that does not exist is NaN.

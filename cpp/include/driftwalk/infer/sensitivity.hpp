@@ -65,8 +65,8 @@ class Sensitivity {
 public:
   // The sensitivities are those of an earlier run of the same scratch, or zero.
   explicit Sensitivity(const FilterScratch<D>& scratch)
-      : parameters_(scratch.parameters), stride_(scratch.stride), touched_(scratch.touched),
-        active_(scratch.active) {
+      : parameters_(scratch.parameters), nodes_((scratch.parameters - 1) / (2 * scratch.layers)),
+        stride_(scratch.stride), touched_(scratch.touched), active_(scratch.active) {
     for (int a = 0; a < 2 * D + F; ++a) {
       rows_[a] = scratch.sensitivity + a * scratch.stride;
     }
@@ -100,11 +100,23 @@ public:
   }
 
   // What the parameters themselves add to the velocity in a kick: the flow at each strip and point,
-  // and the drag as a whole.
+  // by layer, and the drag as a whole.
   void add_flow(const FilterScratch<D>& scratch, const DragResponse<D>& drag, int columns,
                 const Kick<D>& kick, double h) {
-    add_strips(scratch.shares, drag.shares, columns, kick, h);
-    add_points(scratch.points, drag.points, columns, kick, h);
+    if (scratch.layers == 1) {
+      add_strips(scratch.shares, drag.shares, columns, kick, -h, 0);
+      add_points(scratch.points, drag.points, columns, kick, h, 0, 0);
+    }
+    for (int layer = 0; scratch.layers > 1 && layer < scratch.layers; ++layer) {
+      const double weight = scratch.weight[layer], rate = scratch.weight_rate[layer];
+      const std::int64_t first = 2 * nodes_ * layer;
+      if (weight != 0) {
+        add_strips(scratch.shares, drag.shares, columns, kick, -h * weight, first);
+      }
+      if (weight != 0 || rate != 0) {
+        add_points(scratch.points, drag.points, columns, kick, h * weight, h * rate, first);
+      }
+    }
     touch_group((parameters_ - 1) / 8);
     for (int a = 0; a < D; ++a) {
       rows_[a + D][parameters_ - 1] += kick.by_log_drag[a];
@@ -188,12 +200,14 @@ private:
     }
   }
 
+  // `first` is the column of the layer's first coefficient.
   void add_strips(const StripShare<D>* shares, int count, int columns, const Kick<D>& kick,
-                  double h) {
-    const std::int64_t nodes = (parameters_ - 1) / 2;
+                  double scale, std::int64_t first) {
+    double* rows[D];
+    rows_from(first, rows);
     for (int k = 0; k < count; ++k) {
-      touch(shares[k].node, columns);
-      touch(shares[k].node + nodes, columns);
+      touch(first + shares[k].node, columns);
+      touch(first + shares[k].node + nodes_, columns);
       double damped[D][2] = {};
       for (int a = 0; a < D; ++a) {
         for (int c = 0; c < D; ++c) {
@@ -201,26 +215,37 @@ private:
           damped[a][1] += kick.inverse[a][c] * shares[k].response[c][1];
         }
       }
-      add_share<D>(shares[k], columns, nodes, damped, -h, rows_ + D);
+      add_share<D>(shares[k], columns, nodes_, damped, scale, rows);
     }
   }
 
   void add_points(const PointShare<D>* points, int count, int columns, const Kick<D>& kick,
-                  double h) {
-    const std::int64_t nodes = (parameters_ - 1) / 2;
+                  double scale, double rate, std::int64_t first) {
+    double* rows[D];
+    rows_from(first, rows);
     for (int k = 0; k < count; ++k) {
-      touch(points[k].node, columns);
-      touch(points[k].node + nodes, columns);
+      touch(first + points[k].node, columns);
+      touch(first + points[k].node + nodes_, columns);
       double by_value[D][2] = {}, by_slope[D][2] = {};
       for (int a = 0; a < D; ++a) {
         for (int c = 0; c < D; ++c) {
           for (int along = 0; along < 2; ++along) {
-            by_value[a][along] += h * kick.inverse[a][c] * points[k].by_value[c][along];
-            by_slope[a][along] += h * kick.inverse[a][c] * points[k].by_slope[c][along];
+            by_value[a][along] += scale * kick.inverse[a][c] * points[k].by_value[c][along];
+            by_slope[a][along] += scale * kick.inverse[a][c] * points[k].by_slope[c][along];
+            if (rate != 0) {
+              by_value[a][along] += rate * kick.inverse[a][c] * points[k].by_rate[c][along];
+            }
           }
         }
       }
-      add_point<D>(points[k], columns, nodes, by_value, by_slope, rows_ + D);
+      add_point<D>(points[k], columns, nodes_, by_value, by_slope, rows);
+    }
+  }
+
+  // The rows of the velocities from a column on.
+  void rows_from(std::int64_t first, double* (&rows)[D]) const {
+    for (int a = 0; a < D; ++a) {
+      rows[a] = rows_[a + D] + first;
     }
   }
 
@@ -265,7 +290,7 @@ private:
     }
   }
 
-  std::int64_t parameters_, stride_;
+  std::int64_t parameters_, nodes_, stride_;
   std::uint8_t* touched_;
   std::int32_t* active_;
   int count_ = 0;

@@ -8,6 +8,7 @@
 //
 // With the flow s(t) u(x, y),
 //     Du/Dt = s^2 (u . grad) u + s' u
+// and with a sum of layers, (u . grad) u + sum_k s_k' u_k.
 // That the position is uncertain is left out.
 #pragma once
 
@@ -105,6 +106,7 @@ inline void keep_point(const FlowAtPoint& at, const SplineAxis& x, const SplineA
                        PointShare<D>& share) {
   for (int a = 0; a < D; ++a) {
     for (int c = 0; c < 2; ++c) {
+      share.by_rate[a][c] = factor[a][c];
       share.by_value[a][c] = factor[a][0] * push.by_flow[0][c] + factor[a][1] * push.by_flow[1][c];
       share.by_slope[a][c] = factor[a][c] * push.by_slope;
     }
@@ -120,12 +122,14 @@ inline void keep_point(const FlowAtPoint& at, const SplineAxis& x, const SplineA
   share.node = y.cell * columns + x.cell;
 }
 
-// Adds the push to the drag's response. `points`, if not null, takes what each point contributes to
+// Adds the push to the drag's response. `rate_nodes`, if not null, are those of the derivative of
+// the flow by time, its strength aside. `points`, if not null, takes what each point contributes to
 // the derivative by the coefficients.
 template <int D>
-inline void add_water_acceleration(const SplineView& flow, const StripBlock& block,
-                                   const ForceLaw& law, const UncertainBlock<D>& state,
-                                   PointShare<D>* points, DragResponse<D>& response) {
+inline void add_water_acceleration(const SplineView& flow, const double* rate_nodes,
+                                   const StripBlock& block, const ForceLaw& law,
+                                   const UncertainBlock<D>& state, PointShare<D>* points,
+                                   DragResponse<D>& response) {
   if (law.water_acceleration == 0 && law.water_spin == 0) {
     return;
   }
@@ -137,7 +141,18 @@ inline void add_water_acceleration(const SplineView& flow, const StripBlock& blo
     const SplineAxis x = spline_axis(state.x + arm_x, flow.origin_x, flow.spacing, flow.columns);
     const SplineAxis y = spline_axis(state.y + arm_y, flow.origin_y, flow.spacing, flow.rows);
     const FlowAtPoint at = flow_at_point(flow, x, y);
-    const AccelerationAtPoint push = acceleration_at_point(at, state.strength, state.strength_rate);
+    AccelerationAtPoint push = acceleration_at_point(at, state.strength, state.strength_rate);
+    if (rate_nodes != nullptr) {
+      SplineView rate_flow = flow;
+      rate_flow.nodes = rate_nodes;
+      const FlowAtPoint rate = flow_at_point(rate_flow, x, y);
+      for (int a = 0; a < 2; ++a) {
+        push.value[a] += rate.value[a];
+        for (int c = 0; c < 2; ++c) {
+          push.by_place[a][c] += rate.slope[a][c];
+        }
+      }
+    }
     // Of the axes' accelerations by those of the water.
     double factor[D][2] = {{share, 0}, {0, share}};
     if constexpr (D == 3) {

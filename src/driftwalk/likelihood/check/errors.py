@@ -18,7 +18,7 @@ import numpy as np
 
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.likelihood.filter.filter_pass import Place, Sums
-from driftwalk.likelihood.filter.series import Series, strength_of
+from driftwalk.likelihood.filter.series import Series, layer_strengths
 from driftwalk.likelihood.preparation import Estimate
 from driftwalk.likelihood.spline import DEGREE, Spline, basis
 
@@ -60,10 +60,14 @@ def innovations_of(estimate: Estimate) -> list[Innovations]:
         speed = np.full(series.time.size, np.nan)
         # The state before the sample: to sort errors by what they caused would bias them.
         before = states[:-1]
-        flow = velocity_at(estimate.passes.spline, point.coefficients, before[:, 0], before[:, 1])
-        strength = strength_of(series, point)
-        if strength is not None:
-            flow = strength[:-1] * flow
+        spline, (x, y) = estimate.passes.spline, before[:, :2].T
+        layers = point.coefficients.reshape(-1, *point.coefficients.shape[-3:])
+        strengths = layer_strengths(series, point)
+        if strengths is None:
+            flow = velocity_at(spline, layers[0], x, y)
+        else:
+            parts = zip(strengths, layers, strict=True)
+            flow = sum(strength[:-1] * velocity_at(spline, one, x, y) for strength, one in parts)
         # Coordinates come first, as many as velocities.
         velocity = before[:, before.shape[1] // 2 :]
         speed[1:] = np.hypot(flow[0] - velocity[:, 0], flow[1] - velocity[:, 1])

@@ -33,9 +33,10 @@ from driftwalk.likelihood.check.restarts import (
     within_sections,
 )
 from driftwalk.likelihood.filter.parameters import PULSES, STRENGTHS, Point
-from driftwalk.likelihood.filter.series import Series, strength_of, wall_intervals
+from driftwalk.likelihood.filter.series import Series, layer_strengths, wall_intervals
 from driftwalk.likelihood.flow_intervals import fitted_flow, fitted_intervals
 from driftwalk.likelihood.preparation import Estimate
+from driftwalk.likelihood.spline import Spline
 from driftwalk.schema.answers.facts import fitted_value
 from driftwalk.simulation.initial import Start
 
@@ -135,7 +136,7 @@ def problems_of(
         }
         seen = apply_overrides(study, camera)
         made = recorded_camera(track, seen, position_quantum=quantum)
-        flow = _in_frames(flows[one.flow], one, estimate.point)
+        flow = _in_frames(flows[one.flow], one, estimate.point, estimate.passes.spline)
         problem = prepare_problem(track, seen, flow, camera=made)
         first = first_samples(track)
         ready = Replicated(
@@ -159,17 +160,19 @@ def problems_of(
     return found
 
 
-def _in_frames(flow: xr.Dataset, series: Series, point: Point) -> xr.Dataset:
-    """Return a flow with the strength that a fit has found for it; a steady one as it is."""
+def _in_frames(flow: xr.Dataset, series: Series, point: Point, spline: Spline) -> xr.Dataset:
+    """Return a flow with the strength and the modes that a fit has found; a steady one as it is."""
     first, span = float(series.time[0]), float(series.time[-1] - series.time[0])
-    if strength_of(series, point) is None:
+    if layer_strengths(series, point) is None:
         return flow
     steps = [series.span / (FRAMES.per_half_wave * len(STRENGTHS))]
     repeat, end = "hold", span
-    if any(point.number(name) for name in PULSES):
-        period = 1.0 / max(point.number("pulse_frequency"), 1e-300)
+    pulses = [point.number("pulse_frequency")] if any(point.number(one) for one in PULSES) else []
+    frequencies = [*pulses, *([point.number("mode_frequency")] if point.layers > 1 else [])]
+    if frequencies:
+        period = 1.0 / max(*frequencies, 1e-300)
         steps.append(period / FRAMES.per_period)
-        if not any(point.number(name) for name in STRENGTHS):
+        if len(frequencies) == 1 and not any(point.number(name) for name in STRENGTHS):
             repeat, end = "loop", min(period, span)
     count = math.ceil(end / min(steps)) + 1
     if count > FRAMES.most:
@@ -178,12 +181,15 @@ def _in_frames(flow: xr.Dataset, series: Series, point: Point) -> xr.Dataset:
             f"needed, and {FRAMES.most} are possible"
         )
     time = np.linspace(0.0, end, count)
-    strength = strength_of(replace(series, time=first + time), point)
-    assert strength is not None
-    frames = {
-        name: (("time", "y", "x"), strength[:, None, None] * flow[name].values)
-        for name in ("u", "v")
-    }
+    strengths = layer_strengths(replace(series, time=first + time), point)
+    assert strengths is not None
+    water = np.stack([flow["u"].values, flow["v"].values])
+    total = strengths[0][:, None, None, None] * water
+    if point.layers > 1:
+        x, y = flow["x"].values, flow["y"].values
+        for strength, layer in zip(strengths[1:], point.coefficients[1:], strict=True):
+            total += strength[:, None, None, None] * spline.values(layer, x, y)
+    frames = {name: (("time", "y", "x"), total[:, k]) for k, name in enumerate(("u", "v"))}
     return (
         flow[["u", "v", "flag"]].assign(frames).assign_coords(time=time).assign_attrs(repeat=repeat)
     )
@@ -226,12 +232,12 @@ def posterior_replicates(
             like = one.problem.like
             assert like.flow is not None
             x, y = like.flow["x"].values, like.flow["y"].values
-            point = points[k].in_flow(filtered.flow)
-            u, v = estimate.passes.spline.values(point.coefficients, x, y)
-            steady = like.flow.assign(u=(("y", "x"), u), v=(("y", "x"), v))
+            point, spline = points[k].in_flow(filtered.flow), estimate.passes.spline
+            u, v = spline.values(point.mean_coefficients, x, y)
+            mean = like.flow.assign(u=(("y", "x"), u), v=(("y", "x"), v))
             noise = like.camera.position_noise * float(factors[k, 2])
             camera = replace(like.camera, position_noise=noise)
-            flow = _in_frames(steady, filtered, point)
+            flow = _in_frames(mean, filtered, point, spline)
             own = replace(like, flow=flow, camera=camera, threads=1)
             drawn = replace(one, problem=replace(one.problem, like=own))
             return _simulated(

@@ -59,6 +59,7 @@ def verdict_on(fit: xr.Dataset, criteria: Sequence[Criterion], *, study: Study) 
             facts, side_m=side, wall_share=INFORMATION.most_wall_share, lever=INFORMATION.most_lever
         ),
         *_told(fit, "law_unsettled"),
+        *_told(fit, "flow_modes_unsettled"),
     ]
     return verdict_of(against, unable)
 

@@ -234,6 +234,10 @@ def estimate_wall(
     def left_out(why: str) -> xr.Dataset:
         return fit.assign_attrs(wall_left_out=why)
 
+    if estimate is not None and estimate.point.layers > 1:
+        return left_out(
+            "the contacts are simulated in a steady flow, and this one has modes in time"
+        )
     if estimate is None:
         return left_out(
             f"the estimate of the wall needs {' and '.join(unknown)}, which this recording does "

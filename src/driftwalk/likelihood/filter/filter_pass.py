@@ -36,8 +36,8 @@ from driftwalk.likelihood.filter.series import (
     Body,
     Series,
     corrected,
+    layer_strengths,
     slow_change,
-    strength_of,
 )
 from driftwalk.likelihood.spline import Spline
 
@@ -66,10 +66,12 @@ class Passes:
     spline: Spline
     flows: int = 1
     """Number of flows, each with its own coefficients."""
+    layers: int = 1
+    """Layers of each flow: its mean, and its modes in time."""
 
     def columns_of(self, flow: int, others: int) -> tuple[Place, Place]:
         """Return where a flow's coefficients and the `others` stand: in one flow, and among all."""
-        count = 2 * self.spline.size
+        count = 2 * self.spline.size * self.layers
         shared = self.flows * count
         return (
             (slice(0, count), slice(flow * count, (flow + 1) * count)),
@@ -84,7 +86,7 @@ class Passes:
         """
         names = [*point.extras, *tried] if noise == "with" else []
         others = 1 + len(names)
-        size = 2 * self.spline.size * self.flows + others
+        size = 2 * self.spline.size * self.layers * self.flows + others
         deviance, used = 0.0, 0
         score, information = np.zeros(size), np.zeros((size, size))
         for series in self.series:
@@ -228,14 +230,16 @@ class Passes:
             series.excluded,
             **vars(body),
             **vars(spline),
-            coefficients=np.ascontiguousarray(point.coefficients),
+            coefficients=np.ascontiguousarray(
+                point.coefficients.reshape(-1, spline.rows, spline.columns)
+            ),
             drag_coefficient=math.exp(point.log_drag),
             noise_intensity=math.exp(point.log_intensity),
             position_noise=math.exp(point.log_noise),
             largest_step=FILTER.largest_step_s,
             longest_gap=FILTER.longest_gap_s,
             sensitivities=sensitivities,
-            strength=strength_of(series, point),
+            strength=layer_strengths(series, point),
             quadratic=1.0 - share,
             # Linear drag acts on all four faces, windward or not: a quarter on each. At a speed of
             # one side of the block a second it is as strong as the quadratic one in its place.

@@ -11,6 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Final, NamedTuple
 
+import numpy as np
+
 from driftwalk.core.arrays import Floats
 
 
@@ -46,6 +48,8 @@ CHANGES: Final = ("strength_trend", *STRENGTHS[1::2])
 DRAG_SHAPES: Final = ("linear_share", "drag_power")
 """How the drag may go with the speed otherwise: one of them at most is opened."""
 PULSES: Final = ("pulse_cosine", "pulse_sine")
+MODES: Final = ("mode_frequency", "mode_phase")
+"""Numbers of the flow's modes in time: their frequency, and the phase of one mode alone."""
 
 
 class Drag(NamedTuple):
@@ -81,6 +85,8 @@ NUMBERS: Final[Mapping[str, Number]] = {
     "pulse_cosine": Number(0.0, 1e-4, 0.3, 0.2, -1.0, 1.0),
     "pulse_sine": Number(0.0, 1e-4, 0.3, 0.2, -1.0, 1.0),
     "pulse_frequency": Number(0.0, 1e-7, 1e-2, 1e-3, 0.0, 10.0),
+    "mode_frequency": Number(0.0, 1e-7, 1e-2, 2e-4, 0.0, 10.0),
+    "mode_phase": Number(0.0, 1e-4, 2.0, 0.3, -10.0, 10.0),
 }
 
 
@@ -89,7 +95,8 @@ class Point:
     """Values of everything that is estimated."""
 
     coefficients: Floats
-    """Of the flow, shape (2, rows, columns) [m/s]; (flows, 2, rows, columns) with several flows."""
+    """Of the flow [m/s], shape (2, rows, columns); with several flows (flows, 2, rows, columns),
+    with modes in time (1 + modes, 2, rows, columns)."""
     log_drag: float
     """ln C_d."""
     log_intensity: float
@@ -129,9 +136,19 @@ class Point:
         changed: dict[str, Any] = {name: value}
         return replace(self, **changed)
 
+    @property
+    def layers(self) -> int:
+        """Number of layers of the flow: its mean, and its modes in time."""
+        return len(self.coefficients) if self.number("mode_frequency") else 1
+
+    @property
+    def mean_coefficients(self) -> Floats:
+        """Coefficients of the mean flow, (2, rows, columns), of a point in one flow."""
+        return np.asarray(self.coefficients[0] if self.layers > 1 else self.coefficients)
+
     def in_flow(self, flow: int) -> Point:
-        """Return the point with the coefficients of one flow alone."""
-        if self.coefficients.ndim == 3:
+        """Return the point with the coefficients of one flow alone, its modes included."""
+        if self.coefficients.ndim == 3 or self.layers > 1:
             return self
         return replace(self, coefficients=self.coefficients[flow])
 

@@ -140,6 +140,21 @@ def strength_of(series: Series, point: Point) -> Floats | None:
     return np.asarray(strength + waves[0] * np.cos(phase) + waves[1] * np.sin(phase))
 
 
+def layer_strengths(series: Series, point: Point) -> Floats | None:
+    """Return the strength of each layer of the flow at the samples, (layers, n); None for 1."""
+    strength = strength_of(series, point)
+    if point.layers == 1:
+        return None if strength is None else strength[np.newaxis]
+    layers = np.concatenate([np.ones((1, series.time.size)), mode_amplitudes(series.time, point)])
+    return layers if strength is None else strength * layers
+
+
+def mode_amplitudes(time: Floats, point: Point) -> Floats:
+    """Return the amplitude of each mode, of unit rms, shape (modes, n)."""
+    turned = 2.0 * np.pi * point.number("mode_frequency") * time + point.number("mode_phase")
+    return math.sqrt(2.0) * np.stack([np.cos(turned), np.sin(turned)])[: point.layers - 1]
+
+
 def slow_change(series: Series, name: str) -> Floats:
     """Return the shape of a slow change over the recording, at the samples."""
     span = max(series.span, 1e-300)

@@ -104,6 +104,7 @@ PLAIN: Final = {
     "marker_x": "marker_x_m",
     "marker_y": "marker_y_m",
     "pulse_frequency": "pulse_frequency_Hz",
+    "mode_frequency": "mode_frequency_Hz",
 }
 """Numbers that are stated as they are."""
 

@@ -62,13 +62,13 @@ LAW: Final = LawPolicy()
 def evidence_of(mode: Mode, prior: Prior) -> float:
     """Return the logarithm of the evidence by Laplace's approximation, without its constant."""
     components = mode.point.coefficients.reshape(-1, len(prior.roughness)).shape[0]
-    precision = np.linalg.slogdet(prior.matrix(mode.weights))[1]
+    precision = prior.log_determinant(mode.weights, components)
     widths = sum(math.log(NUMBERS[name].prior_std) for name in mode.point.opened)
     return float(
         prior.log_scale(mode.point, mode.weights)
         - mode.deviance
         + 0.5 * np.linalg.slogdet(mode.covariance)[1]
-        + 0.5 * components * float(precision)
+        + 0.5 * precision
         - widths
     )
 

@@ -41,6 +41,9 @@ class ShapePolicy(NamedTuple):
     efficiency: float = 0.2
     """Part of the information on a change that the cells hold: eddies that alternate by 11 to 46 %
     of the flow in 5 to 60 s had lines of 0.1 to 0.22 of it (docs/explanation/likelihood.md)."""
+    candidates: int = 2
+    """Lines of each spectrum that may be the change's where the strength has no significant one.
+    Chosen by hand: an orbit adds lines."""
     least_periods: float = 3.0
     """Periods in the recording from which on the change is called periodic. Chosen by hand."""
 
@@ -59,6 +62,9 @@ class ShapeChange(NamedTuple):
     """Of the line, in the recording."""
     found_nine_in_ten: float
     """Power of a line that is found nine times in ten: the non-centrality of its chi squared."""
+    candidates: tuple[float, ...] = ()
+    """The frequency, or where there is none, those of the highest lines of the strength and of the
+    errors themselves [Hz]."""
 
     @property
     def significant(self) -> bool:
@@ -160,12 +166,27 @@ def _highest_line(series: Series, score: Scores, size: float) -> ShapeChange | N
     # On an orbit each cell is seen once a round, so that there are lines beside the change's by the
     # frequency of the orbit. At the right one the cells have one phase, or the opposite one.
     frequency = math.nan
+    together = [
+        (power + np.abs(phase)) / _background(power)
+        for power, phase in zip(powers, phased, strict=True)
+    ]
+    candidates: tuple[float, ...] = ()
     if chances[0] < SHAPE.false_alarms:
-        together = (powers[0] + np.abs(phased[0])) / _background(powers[0])
-        frequency = float(frequencies[inside][together.argmax()])
+        frequency = float(frequencies[inside][together[0].argmax()])
+        candidates = (frequency,)
+    elif chances[1] < SHAPE.false_alarms:
+        highest = [at for one in together for at in _highest(one)]
+        candidates = tuple(dict.fromkeys(frequencies[inside][highest].tolist()))
     p_value = min(1.0, *chances)
     least = _found_nine_in_ten(float(degrees[0]), 2 * heights[0].size)
-    return ShapeChange(frequency, p_value, frequency * duration, least)
+    return ShapeChange(frequency, p_value, frequency * duration, least, candidates)
+
+
+def _highest(power: Floats) -> list[int]:
+    """Return the places of the highest lines; those next to a higher one are no lines."""
+    inner = power[1:-1]
+    peaks = 1 + np.flatnonzero((inner >= power[:-2]) & (inner > power[2:]))
+    return [int(at) for at in peaks[np.argsort(power[peaks])[::-1][: SHAPE.candidates]]]
 
 
 def _cells(series: Series, score: Scores, size: float) -> list[Integers]:

@@ -35,6 +35,8 @@ dimensions:
     profile: values of C_d, by their value
     flow_interval: between the switching times
     compared_law: force laws that were compared, by name
+    flow_mode: modes of the flow in time
+    mode_time: times in a period of the modes
     number: numbers of departures from the model, by name
     law: force laws that were fitted, by name
     departure: numbers of departures that were tested, by name
@@ -166,6 +168,17 @@ variables (one flow is fitted, and the recording is long enough to see its shape
     flow_shape_frequency [Hz]: at which the strength of the flow does most; NaN where it does not
     flow_shape_detectable [1]: change, over the strength of the flow, that this test finds nine \
         times in ten; NaN where it is not known
+variables (modes of the flow in time were fitted):
+    mode_coefficient(flow_mode component knot_y knot_x) [m s-1]: coefficients of the modes; for \
+        amplitudes of unit rms
+    u_mode(flow_mode y x) [m s-1]: velocity x of the modes
+    v_mode(flow_mode y x) [m s-1]: velocity y of the modes
+    mode_amplitude(flow_mode mode_time) [1]: amplitudes of the modes; over one period, from the \
+        first sample on
+    mode_time(mode_time) [s]
+    mode_share(flow_mode) [1]: speed of the mode over that of the mean flow, both as rms where the \
+        block has been
+    mode_weight [1]: factor of the two weights for the modes
 variables (numbers of departures were tested):
     departure_estimate(departure): estimates of closed numbers by score tests at the end of the \
         search; in SI units; the model is 0
@@ -213,6 +226,8 @@ attributes (a measured flow was given):
     measured_flow_errors text: where its errors are from
 attributes (the shape of the flow changes):
     flow_shape_change text: how, in a sentence
+attributes (modes of the flow in time were asked for, and not found):
+    flow_modes_unsettled text: why
 attributes (the law is not settled):
     law_unsettled text: reasons why a number of the law was not opened, or why the intervals hold \
         those of another law, too
@@ -254,6 +269,8 @@ LAW_NUMBERS: Final = (
            note="from the beginning to the end; corrected"),
     Number("pulse_amplitude", "1", "pulses of the flow", shown="%", note="amplitude; corrected"),
     Number("pulse_frequency", "Hz", "frequency of pulses", shown="Hz", note=_CORRECTED),
+    Number("mode_frequency", "Hz", "frequency of the modes", shown="Hz",
+           note="of the flow, whose shape changes; corrected"),
     Number("measured_flow_scale", label="scale of the measured flow",
            note="over that of the fitted one"),
 )  # fmt: skip
