@@ -27,6 +27,7 @@ from driftwalk.likelihood.law.shape_changes import shape_facts
 from driftwalk.likelihood.newton import (
     EXCERPT,
     FROM_ANOTHER,
+    FROM_NEAR,
     WORK,
     Mode,
     ModeSearch,
@@ -206,7 +207,8 @@ def _laws_of(
             return [one.thinned(EXCERPT.interval_s) for one in ready.undisturbed()]
 
         def of_all(mode: Mode) -> Mode | None:
-            return search.find(mode.point, mode.weights, held=FROM_ANOTHER)
+            # The same path at a finer interval: flow and noises are nearly there.
+            return search.find(mode.point, mode.weights, held=FROM_NEAR)
 
         laws = LawSearch(replace(search, passes=few), assumptions, undisturbed)
         law = laws.find(start, weights)

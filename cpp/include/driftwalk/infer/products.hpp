@@ -4,6 +4,9 @@
 // Within a second or two the block comes near some of the coefficients only. So the samples are
 // taken some at a time, and the columns with derivatives that count are moved together before they
 // are multiplied.
+//
+// From one sample of a fast camera to the next the derivatives hardly change: J' J is then made of
+// means over some samples, J' R of all.
 #pragma once
 
 #include "driftwalk/infer/problem.hpp"
@@ -43,6 +46,7 @@ public:
       sums_.beside[rows_ * sums_.columns + k] = right[k];
     }
     rows_ += rows;
+    per_sample_ = rows;
     if (rows_ + most_coordinates > ProductSums::most_rows) {
       flush();
     }
@@ -50,7 +54,8 @@ public:
 
   // Multiplies what has been collected.
   void flush() {
-    const int columns = move_together(multiply_beside());
+    const double most = multiply_beside();
+    const int columns = sums_.pooled > 1 ? move_means_together(most) : move_together(most);
     for (int down = 0; down < columns; down += 8) {
       for (int across = down; across < columns; across += 8) {
         multiply(down, across, columns);
@@ -98,7 +103,39 @@ private:
   }
 
   // Copies the columns that count, in order and without gaps. Returns their number.
-  int move_together(double most) const {
+  int move_together(double most) {
+    dense_rows_ = rows_;
+    return each_that_counts(most, [&](const double* from, double* to) {
+      for (int row = 0; row < rows_; ++row) {
+        to[8 * row] = from[8 * row];
+      }
+    });
+  }
+
+  // The same of the means over some samples, each times the root of their number.
+  int move_means_together(double most) {
+    const std::int64_t samples = per_sample_ > 0 ? rows_ / per_sample_ : 0;
+    const std::int64_t pools = (samples + sums_.pooled - 1) / sums_.pooled;
+    dense_rows_ = int(pools) * per_sample_;
+    return each_that_counts(most, [&](const double* from, double* to) {
+      for (std::int64_t pool = 0; pool < pools; ++pool) {
+        const std::int64_t begin = pool * samples / pools, end = (pool + 1) * samples / pools;
+        const double per_root = 1 / __builtin_sqrt(double(end - begin));
+        for (int a = 0; a < per_sample_; ++a) {
+          double sum = 0;
+          for (std::int64_t sample = begin; sample < end; ++sample) {
+            sum += from[8 * (sample * per_sample_ + a)];
+          }
+          to[8 * (pool * per_sample_ + a)] = sum * per_root;
+        }
+      }
+    });
+  }
+
+  // Calls `move` for every column that counts with its place and its place among those. Returns
+  // their number.
+  template <class Move>
+  int each_that_counts(double most, const Move& move) const {
     int count = 0;
     for (std::int64_t group = 0; group < stride_ / 8; ++group) {
       if (sums_.written[group] == 0) {
@@ -106,11 +143,8 @@ private:
       }
       for (std::int64_t column = 8 * group; column < 8 * (group + 1); ++column) {
         if (sums_.size[column] > as_good_as_zero * most) {
-          const double* from = block_of(sums_.rows, group) + column % 8;
-          double* to = block_of(sums_.dense, count / 8) + count % 8;
-          for (int row = 0; row < rows_; ++row) {
-            to[8 * row] = from[8 * row];
-          }
+          move(block_of(sums_.rows, group) + column % 8,
+               block_of(sums_.dense, count / 8) + count % 8);
           sums_.chosen[count++] = static_cast<std::int32_t>(column);
         }
       }
@@ -128,7 +162,7 @@ private:
       for (Eight& line : block) {
         line = Eight(0);
       }
-      for (int row = 0; row < rows_; ++row) {
+      for (int row = 0; row < dense_rows_; ++row) {
         const Eight values = Eight::load(right + 8 * row);
         for (int line = 0; line < lines; ++line) {
           block[line] += left[8 * row + line] * values;
@@ -160,6 +194,8 @@ private:
   ProductSums sums_;
   std::int64_t stride_;
   int rows_ = 0;
+  int per_sample_ = 0;
+  int dense_rows_ = 0; // those that are multiplied
 };
 
 DRIFTWALK_LANES_END

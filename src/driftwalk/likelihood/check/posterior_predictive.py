@@ -13,8 +13,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk import _core
 from driftwalk.comparison import step_length_edges
+from driftwalk.comparison.statistic import StepDistance, StepTable, distances_among
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood.check.power import POWER
@@ -111,7 +111,7 @@ def compare_motion(
             )
     half = len(at_estimate.steps) // 2
     floor = _distances(at_estimate.steps[:half], at_estimate.steps[half:], threads)
-    among = _distances(drawn.steps, drawn.steps, threads)
+    among = _distances_among(drawn.steps, threads)
     among[drawn.flow[:, None] == drawn.flow[None, :]] = np.nan
     lengths, angles = (
         np.abs(np.concatenate([real[:, k], *(steps[:, k] for steps in drawn.steps)]))
@@ -131,15 +131,23 @@ def compare_motion(
 
 def _distances(first: Sequence[Floats], second: Sequence[Floats], threads: int) -> Floats:
     """Return the KS distances of every recording to every other, (first, second)."""
-    return np.asarray(_core.ks_matrix(*_padded(first), *_padded(second), threads=threads))
+    return StepDistance().matrix(_padded(first), _padded(second), threads=threads)
 
 
-def _padded(steps: Sequence[Floats]) -> tuple[Floats, Floats, np.ndarray]:
+def _distances_among(steps: Sequence[Floats], threads: int) -> Floats:
+    """Return the KS distance of every recording to every other, (recordings, recordings)."""
+    found = np.zeros((len(steps), len(steps)))
+    above = np.triu_indices(len(steps), 1)
+    found[above] = distances_among(StepDistance(), _padded(steps), threads=threads)
+    return found + found.T
+
+
+def _padded(steps: Sequence[Floats]) -> StepTable:
     pairs = np.array([len(one) for one in steps], dtype=np.int64)
     length, angle = np.zeros((2, pairs.size, int(pairs.max())))
     for k, one in enumerate(steps):
         length[k, : len(one)], angle[k, : len(one)] = one.T
-    return length, angle, pairs
+    return StepTable(length, angle, pairs)
 
 
 def _density(real: Floats, drawn: Replicates, column: int, edge: Floats) -> Density:

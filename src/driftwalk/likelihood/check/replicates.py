@@ -58,7 +58,7 @@ class Replicates(NamedTuple):
     steps: list[Floats]
     """Step lengths [m] and turning angles [rad] of each, (pairs, 2)."""
     paths: list[list[Path]]
-    """Each one's recordings: times [s], x and y [m]."""
+    """Each one's recordings, where they are wanted: times [s], x and y [m]."""
     flow: Integers
     """Which drawn flow each was in."""
     broken: int
@@ -133,7 +133,12 @@ def replicates_at_estimate(
     drag, force = fitted_value(fit, "drag_coefficient"), fitted_value(fit, "force_std")
     parts = [
         _simulated(
-            problem, _keys(seed, CheckStream.ESTIMATE, index, count), drag, force, estimate.point
+            problem,
+            _keys(seed, CheckStream.ESTIMATE, index, count),
+            drag,
+            force,
+            estimate.point,
+            with_path=False,
         )
         for index, problem in enumerate(problems)
     ]
@@ -221,7 +226,7 @@ def _posterior_samples(
 
 class _World(NamedTuple):
     steps: Floats
-    path: Path
+    path: Path | None
     sound: bool
 
 
@@ -230,19 +235,33 @@ def _keys(seed: int, kind: int, index: int, count: int) -> Keys:
 
 
 def _simulated(
-    problem: Problem, keys: Keys, drag: float, force: float, point: Point, begin: float = 0.0
+    problem: Problem,
+    keys: Keys,
+    drag: float,
+    force: float,
+    point: Point,
+    begin: float = 0.0,
+    *,
+    with_path: bool = True,
 ) -> list[_World]:
     like = problem.like
     values = {"drag_coefficient": np.full(keys.size, drag), "force_std": np.full(keys.size, force)}
     poses = problem.model.simulate(values, like, keys)
+    time = begin + like.sample_time
     worlds = []
     for k, key in enumerate(keys):
         pose = [one[k].astype(np.float64) for one in (poses.x, poses.y, poses.theta)]
         x, y = _as_seen(*pose, time=like.sample_time, point=point, key=int(key))
         found = apply_steps(problem.reference.plan, x, y)
         steps = np.column_stack([found.step_length, found.turning_angle])
-        path = (begin + like.sample_time, x, y)
-        worlds.append(_World(steps, path, bool(poses.status[k] == 0 and len(steps) > 0)))
+        # Of a fast camera paths that are not read would take half of the memory.
+        worlds.append(
+            _World(
+                steps,
+                (time, x, y) if with_path else None,
+                bool(poses.status[k] == 0 and len(steps) > 0),
+            )
+        )
     return worlds
 
 
@@ -270,7 +289,7 @@ def _joined(parts: Sequence[Sequence[_World]], flow_of: Integers) -> Replicates:
     retained = [whole[k] for k in np.flatnonzero(sound)]
     return Replicates(
         [np.concatenate([world.steps for world in one]) for one in retained],
-        [[world.path for world in one] for one in retained],
+        [[world.path for world in one if world.path is not None] for one in retained],
         flow_of[sound],
         int(np.count_nonzero(~sound)),
     )

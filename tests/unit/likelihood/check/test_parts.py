@@ -346,3 +346,30 @@ def test_too_few_sound_replicates_are_refused() -> None:
     few = Replicates(replicates(4).steps[:2], [[], []], np.arange(2), 6)
     with pytest.raises(InputError, match="6 of 8 simulated recordings broke down"):
         compare_motion(np.ones((40, 2)), replicates(5), few, threads=1)
+
+
+def test_sums_of_means_over_samples_are_those_of_all() -> None:
+    """Derivatives, weights and groups that are the same within ten samples."""
+    generator = np.random.default_rng(7)
+    samples, pooled = 396, 10  # the last mean is of six
+    pools = -(-samples // pooled)
+    shape = (pools, COMPONENTS)
+    jacobian = generator.normal(size=(*shape, PARAMETERS))
+    weight, group = generator.normal(size=shape), generator.integers(-1, 5, shape)
+    every = np.repeat(np.arange(pools), pooled)[:samples]
+    groups = np.where(generator.random((samples, COMPONENTS)) < 0.1, -1, group[every])
+    white = generator.normal(size=(samples, COMPONENTS))
+    whole, means = (Contrast([groups], 5) for _ in range(2))
+    for one in (whole, means):
+        one.begin(PARAMETERS)
+    whole.add(
+        groups.ravel(),
+        weight[every].ravel(),
+        white.ravel(),
+        jacobian[every].reshape(-1, PARAMETERS),
+    )
+    rows = jacobian.reshape(-1, PARAMETERS)
+    means.add(groups, weight.ravel(), white, rows, pooled=pooled)
+    assert means.score == pytest.approx(whole.score)
+    assert means.power == pytest.approx(whole.power)
+    assert means.slope == pytest.approx(whole.slope)
