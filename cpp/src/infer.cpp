@@ -269,15 +269,26 @@ InnovationsFilter::Sums InnovationsFilter::sums(const std::uint8_t* kept, const 
   std::vector<double> information(std::size_t(stride * stride), 0.0);
   std::vector<double> products(std::size_t(columns * stride), 0.0);
   const auto width = std::size_t(stride), block = ProductSums::most_rows * width;
-  std::vector<double> rows(block, 0.0), dense(block, 0.0);
+  std::vector<double> rows(block, 0.0), means(pooled > 1 ? block : 0, 0.0), dense(block, 0.0);
   std::vector<double> beside(std::size_t(ProductSums::most_rows * columns));
   std::vector<double> size(width, 0.0);
-  std::vector<std::uint8_t> written(width / 8, 0);
+  std::vector<std::uint8_t> written(width / 8, 0), written_means(width / 8, 0);
   std::vector<std::int32_t> chosen(width);
-  const ProductSums sums{
-      columns,         pooled,      samples() - n,  kept,        right,        information.data(),
-      products.data(), rows.data(), written.data(), size.data(), dense.data(), chosen.data(),
-      beside.data()};
+  const ProductSums sums{columns,
+                         pooled,
+                         samples() - n,
+                         kept,
+                         right,
+                         information.data(),
+                         products.data(),
+                         rows.data(),
+                         written.data(),
+                         means.data(),
+                         written_means.data(),
+                         size.data(),
+                         dense.data(),
+                         chosen.data(),
+                         beside.data()};
   run(n, out, &sums);
   Sums found;
   found.information.resize(std::size_t(count * count));

@@ -27,7 +27,7 @@ from driftwalk.likelihood.law.shape_changes import shape_facts
 from driftwalk.likelihood.newton import (
     EXCERPT,
     FROM_ANOTHER,
-    FROM_NEAR,
+    FROM_THINNED,
     WORK,
     Mode,
     ModeSearch,
@@ -154,7 +154,7 @@ def fit_motion(
     turning: dict[str, Any] = {}
     # How the block's spin goes with the water's, where orientations and one flow are.
     if ready.angle != "none" and ready.intervals.steady:
-        turning["spin_correlation"] = spin_correlation(start.coefficients, passes)
+        turning["spin_correlation"] = spin_correlation(start.coefficients, thinned(passes))
     if ready.angle == "state":
         course.begin("angle as given")
         given = thinned(ready.with_angle("given").passes)
@@ -207,8 +207,7 @@ def _laws_of(
             return [one.thinned(EXCERPT.interval_s) for one in ready.undisturbed()]
 
         def of_all(mode: Mode) -> Mode | None:
-            # The same path at a finer interval: flow and noises are nearly there.
-            return search.find(mode.point, mode.weights, held=FROM_NEAR)
+            return search.refined().find(mode.point, mode.weights, held=FROM_THINNED)
 
         laws = LawSearch(replace(search, passes=few), assumptions, undisturbed)
         law = laws.find(start, weights)

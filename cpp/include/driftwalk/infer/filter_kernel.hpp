@@ -343,7 +343,9 @@ private:
       }
       return;
     }
-    __builtin_memset(scratch_.row, 0, sizeof(double) * std::size_t(D * scratch_.stride));
+    if (out_.pooled == 1) {
+      __builtin_memset(scratch_.row, 0, sizeof(double) * std::size_t(D * scratch_.stride));
+    }
     sensitivity_.write_whitened(*e, [&](int a, std::int32_t group) {
       return scratch_.row + a * scratch_.stride + 8 * std::int64_t(group);
     });
@@ -352,10 +354,8 @@ private:
       const double* const from = scratch_.row + a * scratch_.stride;
       if (out_.pooled == 1) {
         __builtin_memcpy(to, from, bytes);
-        continue;
-      }
-      for (std::int64_t p = 0; p < scratch_.parameters; ++p) {
-        to[p] += from[p];
+      } else {
+        sensitivity_.add_row(from, to);
       }
     }
   }

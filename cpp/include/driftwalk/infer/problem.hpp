@@ -155,10 +155,12 @@ struct ProductSums {
   double* products;         // [columns][stride]: R' J
   double* rows;             // [stride / 8][most_rows][8], zero before
   std::uint8_t* written;    // [stride / 8], zero before: whether eight columns are not zero
-  double* size;             // [stride]: of the largest derivative in a column
-  double* dense;            // [stride / 8][most_rows][8]: the columns that count
-  std::int32_t* chosen;     // [stride]: which they are
-  double* beside;           // [most_rows][columns]
+  double* means;            // as rows; of several samples each, read where pooled is above 1
+  std::uint8_t* written_means;
+  double* size;         // [stride]: of the largest derivative in a column
+  double* dense;        // [stride / 8][most_rows][8]: the columns that count
+  std::int32_t* chosen; // [stride]: which they are
+  double* beside;       // [most_rows][columns]
 };
 
 // The mean acceleration of a block whose state is uncertain: of x, y and for D = 3 of the angle.

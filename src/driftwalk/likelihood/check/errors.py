@@ -131,11 +131,13 @@ class Contrast:
         places: Sequence[Place] = WHOLE,
         *,
         pooled: int = 1,
+        moving: Integers | None = None,
     ) -> None:
         """Add the rows of one part; `places` says where its columns stand among all parameters.
 
         Rows of `weight` and `jacobian` are means of `pooled` samples; `group` and `white`, shapes
-        (n, D), or (n D,) where each sample has its own, are those of all.
+        (n, D), or (n D,) where each sample has its own, are those of all. `jacobian` holds the
+        columns `moving`, or all; the others are zero.
         """
         from scipy.sparse import csr_matrix
 
@@ -152,6 +154,9 @@ class Contrast:
         self.score[present] += np.asarray(matrix_of(weight) @ white)
         self.power[present] += np.bincount(local, (number * weight**2)[retained])
         slope = np.asarray(matrix_of(number * weight) @ jacobian)
+        if moving is not None:
+            known, slope = slope, np.zeros((present.size, int(moving[-1]) + 1))
+            slope[:, moving] = known
         for own, columns in places:
             self.slope[present, columns] += slope[:, own]
 
@@ -224,24 +229,39 @@ def collect(
     # J'J by flow, its lower half alone: a series has derivatives by the coefficients of its flow.
     lower: dict[int, Any] = {}
     for part in _parts(estimate, errors, chosen, retained):
-        pools = np.maximum(part.used, 1.0)[:, None]
-        # One is what most pools of a slow camera have: nothing is copied for it.
-        jacobian = part.jacobian if part.pooled == 1 else part.jacobian / pools
-        rooted = jacobian if part.pooled == 1 else part.jacobian / np.sqrt(pools)
+        jacobian, moving = part.jacobian, None
+        coefficients = estimate.point.in_flow(part.flow).coefficients.ravel()
         if part.flow not in lower:
             lower[part.flow] = np.zeros((jacobian.shape[1],) * 2, order="F")
-        lower[part.flow] = dsyrk(
-            1.0, rooted.T, beta=1.0, c=lower[part.flow], overwrite_c=1, lower=1
-        )
+        if part.pooled == 1:
+            lower[part.flow] = dsyrk(
+                1.0, jacobian.T, beta=1.0, c=lower[part.flow], overwrite_c=1, lower=1
+            )
+        else:
+            # In the seconds of such a part the block comes near few of the coefficients.
+            moving = np.flatnonzero(jacobian.any(axis=0))
+            moving = np.union1d(moving, [jacobian.shape[1] - 1])
+            sums, number = jacobian[:, moving], np.maximum(part.used, 1.0)[:, None]
+            lower[part.flow][np.ix_(moving, moving)] += dsyrk(
+                1.0, (sums / np.sqrt(number)).T, lower=1
+            )
+            jacobian, coefficients = sums / number, coefficients[moving[:-1]]
         weights = {
             "one": np.ones(len(jacobian)),
-            "flow": jacobian[:, :-1] @ estimate.point.in_flow(part.flow).coefficients.ravel(),
+            "flow": jacobian[:, :-1] @ coefficients,
             "drag": jacobian[:, -1],
         }
         for contrast in contrasts:
             group = contrast.groups[part.series][part.start : part.start + len(part.white)]
-            weight = weights[contrast.by]
-            contrast.add(group, weight, part.white, jacobian, part.places, pooled=part.pooled)
+            contrast.add(
+                group,
+                weights[contrast.by],
+                part.white,
+                jacobian,
+                part.places,
+                pooled=part.pooled,
+                moving=moving,
+            )
     data = np.zeros((size, size))
     for flow, part_of in lower.items():
         whole = np.tril(part_of) + np.tril(part_of, -1).T

@@ -35,7 +35,8 @@ if TYPE_CHECKING:
 
 Keys = npt.NDArray[np.uint64]
 
-Path = tuple[Floats, Floats, Floats]
+Path = tuple[Floats, npt.NDArray[np.floating], npt.NDArray[np.floating]]
+"""Times [s], x and y [m]."""
 
 
 class FramePolicy(NamedTuple):
@@ -254,14 +255,14 @@ def _simulated(
         x, y = _as_seen(*pose, time=like.sample_time, point=point, key=int(key))
         found = apply_steps(problem.reference.plan, x, y)
         steps = np.column_stack([found.step_length, found.turning_angle])
-        # Of a fast camera paths that are not read would take half of the memory.
-        worlds.append(
-            _World(
-                steps,
-                (time, x, y) if with_path else None,
-                bool(poses.status[k] == 0 and len(steps) > 0),
-            )
-        )
+        sound = bool(poses.status[k] == 0 and len(steps) > 0)
+        if not with_path:
+            worlds.append(_World(steps, None, sound))
+            continue
+        # In half of the memory where the camera shows the block as it was simulated.
+        exact = x is pose[0]
+        path = (time, poses.x[k].copy(), poses.y[k].copy()) if exact else (time, x, y)
+        worlds.append(_World(steps, path, sound))
     return worlds
 
 
@@ -288,7 +289,10 @@ def _joined(parts: Sequence[Sequence[_World]], flow_of: Integers) -> Replicates:
     sound = np.array([all(world.sound for world in one) for one in whole])
     retained = [whole[k] for k in np.flatnonzero(sound)]
     return Replicates(
-        [np.concatenate([world.steps for world in one]) for one in retained],
+        [
+            one[0].steps if len(one) == 1 else np.concatenate([world.steps for world in one])
+            for one in retained
+        ],
         [[world.path for world in one if world.path is not None] for one in retained],
         flow_of[sound],
         int(np.count_nonzero(~sound)),

@@ -21,7 +21,7 @@ from driftwalk.likelihood.check.place import (
     spread_of,
     trend_of,
 )
-from driftwalk.likelihood.check.posterior_predictive import compare_motion
+from driftwalk.likelihood.check.posterior_predictive import compare_motion, distances_at_estimate
 from driftwalk.likelihood.check.replicates import Replicates
 from driftwalk.likelihood.check.scan import scan_of
 from driftwalk.likelihood.check.whiteness import whiteness_tests
@@ -311,7 +311,8 @@ def replicates(seed: int, *, count: int = 8, spread: float = 1.0) -> Replicates:
 def test_distances_and_bands_by_brute_force() -> None:
     real = np.abs(np.random.default_rng(1).normal(size=(400, 2)))
     estimate, drawn = replicates(2), replicates(3)
-    found = compare_motion(real, estimate, drawn, threads=1)
+    near = distances_at_estimate(real, estimate, threads=1)
+    found = compare_motion(real, near, drawn, threads=1)
     assert found.distance == pytest.approx([ks_distance(real, one) for one in estimate.steps])
     pairs = [ks_distance(a, b) for a in estimate.steps[:4] for b in estimate.steps[4:]]
     assert found.floor == pytest.approx(pairs)
@@ -326,14 +327,16 @@ def test_distances_and_bands_by_brute_force() -> None:
     assert (found.turning_angle.median <= found.turning_angle.high).all()
     assert found.p_value > 0.01
     assert found.rank_p_value > 1 / 9
-    wide = compare_motion(1.5 * real, estimate, drawn, threads=1)
+    near = distances_at_estimate(1.5 * real, estimate, threads=1)
+    wide = compare_motion(1.5 * real, near, drawn, threads=1)
     assert wide.rank_p_value == pytest.approx(1 / 9)
     assert wide.p_value < 1e-3
 
 
 def test_steps_that_differ_are_put_into_words() -> None:
     real = 1.5 * np.abs(np.random.default_rng(1).normal(size=(400, 2)))
-    motion = compare_motion(real, replicates(2), replicates(3), threads=1)
+    near = distances_at_estimate(real, replicates(2), threads=1)
+    motion = compare_motion(real, near, replicates(3), threads=1)
     found = {angle: motion_criterion(motion, angle=angle) for angle in ("given", "none")}
     assert found["given"].failed
     assert f"KS distance {motion.drawn_distance.mean():.3f}" in found["given"].sentence
