@@ -258,7 +258,8 @@ class InnovationsFilter:
     # as xx, xy, yy, x theta, y theta, theta theta, NaN where a sample has none; used (k,) uint8;
     # state (k, 2 D) after the sample, NaN while there is none. With sensitivities whitened (D k,)
     # and jacobian (D k, parameters) of the prediction in the same units, the coordinates of a
-    # sample in turn, zero where not used; with pooled > 1 the sums of jacobian over so many samples.
+    # sample in turn, zero where not used; with pooled > 1 the sums of jacobian over that many
+    # samples.
     def run(
         self, count: int, *, states: bool = True, pooled: int = 1
     ) -> dict[str, npt.NDArray[Any]]: ...
