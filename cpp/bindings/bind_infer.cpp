@@ -57,31 +57,61 @@ Out<T> uninitialised(std::vector<std::size_t> shape) {
   return Out<T>(values, shape.size(), shape.data(), owner);
 }
 
-nb::dict run(InnovationsFilter& filter, std::int64_t wanted) {
+// What a pass finds, with room for it.
+struct PassArrays {
+  PassArrays(const InnovationsFilter& filter, std::int64_t count, bool states)
+      : n(static_cast<std::size_t>(count)), d(static_cast<std::size_t>(filter.coordinates())),
+        innovation(uninitialised<double>({n, d})),
+        covariance(uninitialised<double>({n, d * (d + 1) / 2})),
+        state(uninitialised<double>({states ? n : 0, 2 * d})),
+        used(uninitialised<std::uint8_t>({n})),
+        out{innovation.data(), covariance.data(),
+            used.data(),       states ? state.data() : nullptr,
+            nullptr,           nullptr} {}
+
+  nb::dict dict() const {
+    nb::dict found;
+    found["innovation"] = innovation;
+    found["covariance"] = covariance;
+    found["used"] = used;
+    if (out.state != nullptr) {
+      found["state"] = state;
+    }
+    return found;
+  }
+
+  std::size_t n, d;
+  Out<double> innovation, covariance, state;
+  Out<std::uint8_t> used;
+  driftwalk::FilterOutputs out;
+};
+
+nb::dict run(InnovationsFilter& filter, std::int64_t wanted, bool states, std::int64_t pooled) {
   if (wanted < 0) {
     throw std::invalid_argument("count must not be negative");
   }
-  const std::int64_t count = std::min(wanted, filter.remaining());
-  const auto n = static_cast<std::size_t>(count);
+  if (pooled < 1) {
+    throw std::invalid_argument("pooled must be at least 1");
+  }
+  PassArrays pass(filter, std::min(wanted, filter.remaining()), states);
   const auto parameters = static_cast<std::size_t>(filter.parameters());
-  const auto d = static_cast<std::size_t>(filter.coordinates());
   const bool sensitivities = filter.sensitivities();
-  Out<double> innovation = uninitialised<double>({n, d}),
-              covariance = uninitialised<double>({n, d * (d + 1) / 2});
-  Out<double> state = uninitialised<double>({n, 2 * d});
-  Out<std::uint8_t> used = uninitialised<std::uint8_t>({n});
-  Out<double> whitened = uninitialised<double>({sensitivities ? d * n : 0});
-  Out<double> jacobian = uninitialised<double>({sensitivities ? d * n : 0, parameters});
+  const std::size_t rows = sensitivities ? pass.d * pass.n : 0;
+  const auto pool = static_cast<std::size_t>(pooled);
+  const std::size_t pools = sensitivities ? pass.d * ((pass.n + pool - 1) / pool) : 0;
+  Out<double> whitened = uninitialised<double>({rows});
+  Out<double> jacobian = uninitialised<double>({pools, parameters});
+  pass.out.whitened = whitened.data();
+  pass.out.jacobian = jacobian.data();
+  pass.out.pooled = pooled;
   {
     const nb::gil_scoped_release released;
-    filter.run(count, {innovation.data(), covariance.data(), used.data(), state.data(),
-                       whitened.data(), jacobian.data()});
+    if (pooled > 1) {
+      std::fill_n(jacobian.data(), pools * parameters, 0.0);
+    }
+    filter.run(static_cast<std::int64_t>(pass.n), pass.out);
   }
-  nb::dict out;
-  out["innovation"] = innovation;
-  out["covariance"] = covariance;
-  out["used"] = used;
-  out["state"] = state;
+  nb::dict out = pass.dict();
   if (sensitivities) {
     out["whitened"] = whitened;
     out["jacobian"] = jacobian;
@@ -89,22 +119,24 @@ nb::dict run(InnovationsFilter& filter, std::int64_t wanted) {
   return out;
 }
 
-nb::dict sums(InnovationsFilter& filter, const In<std::uint8_t, 1>& kept,
-              const In<double, 3>& right) {
+nb::dict sums(InnovationsFilter& filter, const std::optional<In<std::uint8_t, 1>>& kept,
+              const std::optional<In<double, 3>>& right, std::int64_t pooled) {
   const auto n = static_cast<std::size_t>(filter.remaining());
-  if (kept.size() != n || right.shape(0) != n ||
-      right.shape(1) != std::size_t(filter.coordinates())) {
+  if ((kept && kept->size() != n) ||
+      (right && (right->shape(0) != n || right->shape(1) != std::size_t(filter.coordinates())))) {
     throw std::invalid_argument("kept must have shape (n,) and right (n, coordinates, columns), n "
                                 "the samples that remain");
   }
+  PassArrays pass(filter, filter.remaining(), false);
   const auto parameters = static_cast<std::size_t>(filter.parameters());
-  const auto columns = right.shape(2);
+  const std::size_t columns = right ? right->shape(2) : 1;
   InnovationsFilter::Sums found;
   {
     const nb::gil_scoped_release released;
-    found = filter.sums(kept.data(), right.data(), static_cast<int>(columns));
+    found = filter.sums(kept ? kept->data() : nullptr, right ? right->data() : nullptr,
+                        static_cast<int>(columns), pooled, pass.out);
   }
-  nb::dict out;
+  nb::dict out = pass.dict();
   out["information"] = hand_out(std::move(found.information), {parameters, parameters});
   out["products"] = hand_out(std::move(found.products), {columns, parameters});
   return out;
@@ -204,8 +236,8 @@ void register_infer(nb::module_& module) {
       .def_prop_ro("remaining", &InnovationsFilter::remaining)
       .def_prop_ro("parameters", &InnovationsFilter::parameters)
       .def_prop_ro("coordinates", &InnovationsFilter::coordinates)
-      .def("run", &run, "count"_a)
-      .def("sums", &sums, "kept"_a, "right"_a);
+      .def("run", &run, "count"_a, nb::kw_only(), "states"_a = true, "pooled"_a = 1)
+      .def("sums", &sums, "kept"_a.none(), "right"_a.none(), nb::kw_only(), "pooled"_a = 1);
   module.def("expected_drag", &expected_drag, nb::kw_only(), "side"_a, "mass"_a, "depth"_a,
              "strips"_a, "water_density"_a, "origin_x"_a, "origin_y"_a, "spacing"_a, "columns"_a,
              "rows"_a, "coefficients"_a, "drag_coefficient"_a, "orientation"_a, "mean"_a, "theta"_a,

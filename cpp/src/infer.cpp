@@ -278,26 +278,36 @@ void InnovationsFilter::run(std::int64_t count, const FilterOutputs& out, const 
 }
 
 InnovationsFilter::Sums InnovationsFilter::sums(const std::uint8_t* kept, const double* right,
-                                                int columns) {
+                                                int columns, std::int64_t pooled,
+                                                const FilterOutputs& out) {
   require(sensitivities_, "sums need sensitivities");
-  const std::int64_t n = remaining(), d = coordinates();
+  require(pooled >= 1, "pooled must be at least 1");
+  const std::int64_t n = remaining();
   const std::int64_t count = parameters(), stride = (count + 7) / 8 * 8;
-  std::vector<double> innovation(std::size_t(n * d)), covariance(std::size_t(n * d * (d + 1) / 2));
-  std::vector<double> state(std::size_t(2 * n * d));
-  std::vector<std::uint8_t> used(std::size_t(n), 0);
   std::vector<double> information(std::size_t(stride * stride), 0.0);
   std::vector<double> products(std::size_t(columns * stride), 0.0);
   const auto width = std::size_t(stride), block = ProductSums::most_rows * width;
-  std::vector<double> rows(block, 0.0), dense(block, 0.0);
+  std::vector<double> rows(block, 0.0), means(pooled > 1 ? block : 0, 0.0), dense(block, 0.0);
   std::vector<double> beside(std::size_t(ProductSums::most_rows * columns));
   std::vector<double> size(width, 0.0);
-  std::vector<std::uint8_t> written(width / 8, 0);
+  std::vector<std::uint8_t> written(width / 8, 0), written_means(width / 8, 0);
   std::vector<std::int32_t> chosen(width);
-  const ProductSums sums{
-      columns,     samples() - n,  kept,        right,        information.data(), products.data(),
-      rows.data(), written.data(), size.data(), dense.data(), chosen.data(),      beside.data()};
-  run(n, {innovation.data(), covariance.data(), used.data(), state.data(), nullptr, nullptr},
-      &sums);
+  const ProductSums sums{columns,
+                         pooled,
+                         samples() - n,
+                         kept,
+                         right,
+                         information.data(),
+                         products.data(),
+                         rows.data(),
+                         written.data(),
+                         means.data(),
+                         written_means.data(),
+                         size.data(),
+                         dense.data(),
+                         chosen.data(),
+                         beside.data()};
+  run(n, out, &sums);
   Sums found;
   found.information.resize(std::size_t(count * count));
   for (std::int64_t i = 0; i < count; ++i) {

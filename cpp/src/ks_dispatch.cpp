@@ -170,18 +170,15 @@ KsResult compare_sorted(const KsReference::Data& first, const KsSortedSample& se
 // The same of two samples as they come; false where it has to be found by the sorted way.
 bool compare_plain(const double* x1, const double* y1, std::int64_t n1, const double* x2,
                    const double* y2, std::int64_t n2, KsWorkspace::Data& work, KsTies ties,
-                   KsResult& result) {
+                   KsResult& result, bool counts_tied = true) {
   if (ties != KsTies::strict || n1 + n2 < ks_bounded_from || n1 + n2 > ks_bounded_to) {
     return false;
   }
   const std::int64_t common = std::gcd(n1, n2);
-  const KsPlain samples{{x1, x2},
-                        {y1, y2},
-                        {n1, n2},
-                        {n2 / common, -(n1 / common)},
-                        n1 * (n2 / common),
-                        ks_bucket_sizes(n1 + n2),
-                        work.aligned_scratch(ks_bounded_bytes(n1 + n2))};
+  const KsPlain samples{{x1, x2},           {y1, y2},
+                        {n1, n2},           {n2 / common, -(n1 / common)},
+                        n1 * (n2 / common), ks_bucket_sizes(n1 + n2),
+                        counts_tied,        work.aligned_scratch(ks_bounded_bytes(n1 + n2))};
   KsFound found[2];
   result.n1 = n1;
   result.n2 = n2;
@@ -209,15 +206,15 @@ KsResult without_points(std::int64_t n1, std::int64_t n2) {
 } // namespace
 
 KsResult ks_two_sample(const KsReference& reference, const double* x2, const double* y2,
-                       std::int64_t n2, KsWorkspace& workspace, KsTies ties) {
+                       std::int64_t n2, KsWorkspace& workspace, KsTies ties, bool counts_tied) {
   if (reference.size() == 0 || n2 == 0) {
     return without_points(reference.size(), n2);
   }
   KsWorkspace::Data& work = workspace.data();
   const KsReference::Data& first = reference.data();
   KsResult result;
-  if (compare_plain(first.x.data(), first.y.data(), first.sorted.n, x2, y2, n2, work, ties,
-                    result)) {
+  if (compare_plain(first.x.data(), first.y.data(), first.sorted.n, x2, y2, n2, work, ties, result,
+                    counts_tied)) {
     return result;
   }
   ks_sort(x2, y2, n2, work.sort, work.sorted);
@@ -255,6 +252,17 @@ KsResult ks_two_sample(const double* x1, const double* y1, std::int64_t n1, cons
   work.first.assign(x1, y1, n1, workspace);
   ks_sort(x2, y2, n2, work.sort, work.sorted);
   return compare_sorted(work.first.data(), work.sorted, x2, y2, work, ties);
+}
+
+std::optional<KsResult> ks_by_bounds(const double* x1, const double* y1, std::int64_t n1,
+                                     const double* x2, const double* y2, std::int64_t n2,
+                                     KsWorkspace& workspace) {
+  KsResult result;
+  if (n1 == 0 || n2 == 0 ||
+      !compare_plain(x1, y1, n1, x2, y2, n2, workspace.data(), KsTies::strict, result, false)) {
+    return std::nullopt;
+  }
+  return result;
 }
 
 KsPeacock ks_peacock(const KsReference& reference, const double* x2, const double* y2,

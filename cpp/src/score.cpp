@@ -5,6 +5,10 @@
 #include "driftwalk/simulate/threads.hpp"
 #include "driftwalk/stats/steps.hpp"
 
+#include <memory>
+#include <mutex>
+#include <optional>
+
 namespace driftwalk {
 
 namespace {
@@ -74,8 +78,8 @@ private:
     KsPlace place;
     double distance = 1;
     if (pairs > 0 && out_.status[world] == status_ok) {
-      const KsResult result =
-          ks_two_sample(*scoring_.reference, length_.data(), angle_.data(), pairs, workspace_);
+      const KsResult result = ks_two_sample(*scoring_.reference, length_.data(), angle_.data(),
+                                            pairs, workspace_, KsTies::strict, false);
       distance = result.distance();
       place = result.place();
     }
@@ -97,18 +101,39 @@ private:
   KsWorkspace workspace_;
 };
 
-// Rows first .. first + count - 1 of a table, sorted for comparison.
-std::vector<KsReference> prepare_rows(const StepTable& table, std::int64_t first,
-                                      std::int64_t count, int threads) {
-  std::vector<KsReference> rows(static_cast<std::size_t>(count));
-  run_tasks(count, threads, [&] {
-    return [&, workspace = KsWorkspace()](std::int64_t row) mutable {
-      const std::int64_t at = (first + row) * table.stride;
-      rows[static_cast<std::size_t>(row)].assign(table.length + at, table.angle + at,
-                                                 table.count[first + row], workspace);
-    };
-  });
-  return rows;
+// The rows of a table, sorted when that is first needed: most comparisons do without.
+class SortedRows {
+public:
+  explicit SortedRows(const StepTable& table)
+      : table_(table), rows_(static_cast<std::size_t>(table.rows)),
+        sorted_(std::make_unique<std::once_flag[]>(rows_.size())) {}
+
+  std::int64_t size(std::int64_t row) const { return table_.count[row]; }
+  const double* length(std::int64_t row) const { return table_.length + row * table_.stride; }
+  const double* angle(std::int64_t row) const { return table_.angle + row * table_.stride; }
+  const KsReference& sorted(std::int64_t row, KsWorkspace& workspace) {
+    KsReference& found = rows_[static_cast<std::size_t>(row)];
+    std::call_once(sorted_[static_cast<std::size_t>(row)],
+                   [&] { found.assign(length(row), angle(row), size(row), workspace); });
+    return found;
+  }
+
+private:
+  const StepTable& table_;
+  std::vector<KsReference> rows_;
+  std::unique_ptr<std::once_flag[]> sorted_;
+};
+
+double distance_of(SortedRows& a, std::int64_t i, SortedRows& b, std::int64_t j,
+                   KsWorkspace& workspace) {
+  if (a.size(i) == 0 || b.size(j) == 0) {
+    return 1.0;
+  }
+  const std::optional<KsResult> found = ks_by_bounds(a.length(i), a.angle(i), a.size(i),
+                                                     b.length(j), b.angle(j), b.size(j), workspace);
+  return found
+             ? found->distance()
+             : ks_two_sample(a.sorted(i, workspace), b.sorted(j, workspace), workspace).distance();
 }
 
 } // namespace
@@ -122,22 +147,12 @@ void score_batch(const PreparedRun<float>& run, const BatchWorlds& worlds, const
 }
 
 void ks_matrix(const StepTable& references, const StepTable& samples, int threads, double* out) {
-  // Prepared samples take some 40 bytes a step: a block of them at a time bounds the memory.
-  constexpr std::int64_t block = 64;
-  const std::vector<KsReference> rows = prepare_rows(references, 0, references.rows, threads);
-  for (std::int64_t first = 0; first < samples.rows; first += block) {
-    const std::int64_t width = std::min(block, samples.rows - first);
-    const std::vector<KsReference> columns = prepare_rows(samples, first, width, threads);
-    run_tasks(references.rows * width, threads, [&] {
-      return [&, workspace = KsWorkspace()](std::int64_t task) mutable {
-        const std::int64_t row = task / width, column = task % width;
-        const KsReference& a = rows[static_cast<std::size_t>(row)];
-        const KsReference& b = columns[static_cast<std::size_t>(column)];
-        out[row * samples.rows + first + column] =
-            a.size() == 0 || b.size() == 0 ? 1.0 : ks_two_sample(a, b, workspace).distance();
-      };
-    });
-  }
+  SortedRows rows(references), columns(samples);
+  run_tasks(references.rows * samples.rows, threads, [&] {
+    return [&, workspace = KsWorkspace()](std::int64_t task) mutable {
+      out[task] = distance_of(rows, task / samples.rows, columns, task % samples.rows, workspace);
+    };
+  });
 }
 
 } // namespace driftwalk

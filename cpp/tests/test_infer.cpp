@@ -342,7 +342,8 @@ void check_sums() {
     for (std::size_t k = 0; k < right.size(); ++k) {
       right[k] = std::sin(double(k));
     }
-    const InnovationsFilter::Sums sums = filter.sums(kept.data(), right.data(), 2);
+    Outputs out(n, 0, int(d));
+    const InnovationsFilter::Sums sums = filter.sums(kept.data(), right.data(), 2, 1, out.view());
     CHECK(filter.remaining() == 0);
     std::vector<double> information(std::size_t(p * p), 0), products(std::size_t(2 * p), 0);
     std::vector<double> total(std::size_t(p), 0);

@@ -260,13 +260,23 @@ class InnovationsFilter:
     # as xx, xy, yy, x theta, y theta, theta theta, NaN where a sample has none; used (k,) uint8;
     # state (k, 2 D) after the sample, NaN while there is none. With sensitivities whitened (D k,)
     # and jacobian (D k, parameters) of the prediction in the same units, the coordinates of a
-    # sample in turn, zero where not used.
-    def run(self, count: int) -> dict[str, npt.NDArray[Any]]: ...
+    # sample in turn, zero where not used; with pooled > 1 the sums of jacobian over that many
+    # samples.
+    def run(
+        self, count: int, *, states: bool = True, pooled: int = 1
+    ) -> dict[str, npt.NDArray[Any]]: ...
 
     # Over the n samples that remain: information (parameters, parameters) = J' J and products
     # (columns, parameters) = R' J, J the rows of jacobian of samples that are used and kept (n,),
-    # R right (n, D, columns).
-    def sums(self, kept: npt.NDArray[np.uint8], right: _Floats) -> dict[str, _Floats]: ...
+    # R right (n, D, columns); without them all that are used, and the whitened innovations. Up to
+    # pooled samples in a row enter J' J as their mean. With innovation, covariance and used.
+    def sums(
+        self,
+        kept: npt.NDArray[np.uint8] | None,
+        right: _Floats | None,
+        *,
+        pooled: int = 1,
+    ) -> dict[str, npt.NDArray[Any]]: ...
 
 # The mean acceleration (D,) [m/s^2, rad/s^2] of a block whose (x, y, vx, vy) has this mean and
 # covariance, by_position and by_velocity (D, D), by_coefficients (D, 2, rows, columns). With

@@ -45,6 +45,7 @@ SMALLEST = {
     "assemble_ode": ["--rounds", "1"],
     "calibrate": ["--quick", "--threads", "1"],
     "cluster": ["--quick", "--rounds", "1", "--length", "20"],
+    "fit": ["--rates", "10", "--minutes", "8"],
     "import": ["--rounds", "1"],
     "ks": ["--rounds", "1", "--sizes", "1000"],
     "laws": ["--rounds", "1", "--steps", "20"],

@@ -37,6 +37,7 @@ from driftwalk.likelihood.measured_flow import agreement_facts, contradictions
 from driftwalk.likelihood.newton import (
     EXCERPT,
     FROM_ANOTHER,
+    FROM_THINNED,
     WORK,
     Mode,
     ModeSearch,
@@ -169,7 +170,7 @@ def fit_motion(
     turning: dict[str, Any] = {}
     # How the block's spin goes with the water's, where orientations and one flow are.
     if ready.angle != "none" and ready.intervals.steady:
-        turning["spin_correlation"] = spin_correlation(start.coefficients, ready.passes)
+        turning["spin_correlation"] = spin_correlation(start.coefficients, thinned(ready.passes))
     if ready.angle == "state":
         course.begin("angle as given")
         given = replace(thinned(ready.with_angle("given").passes), layers=passes.layers)
@@ -251,7 +252,7 @@ def _laws_of(
             return [one.thinned(EXCERPT.interval_s) for one in ready.undisturbed()]
 
         def of_all(mode: Mode) -> Mode | None:
-            return search.find(mode.point, mode.weights, held=FROM_ANOTHER)
+            return search.refined().find(mode.point, mode.weights, held=FROM_THINNED)
 
         laws = LawSearch(replace(search, passes=few), assumptions, undisturbed)
         law = laws.find(start, weights)

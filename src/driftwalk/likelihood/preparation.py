@@ -338,9 +338,7 @@ def estimate_of(fit: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str 
         point = replace(point, log_lever=lever, log_angle_noise=turning)
     modes = float(fit["mode_weight"]) if point.layers > 1 else 1.0
     determined = float(fit["measured_flow_determined"]) if "measured_u" in fit else 0.0
-    weights = Weights(
-        float(fit["roughness_weight"]), float(fit["size_weight"]), determined, modes
-    )
+    weights = Weights(float(fit["roughness_weight"]), float(fit["size_weight"]), determined, modes)
     passes = replace(ready.passes, spline=spline, layers=point.layers)
     prior = Prior(passes, ready.measured)
     return Estimate(study, passes, point, weights, ready.parts, prior)

@@ -332,36 +332,48 @@ private:
 
   void add_products(const Innovation<D>* e) {
     const std::int64_t k = state_.next - sums_->first;
-    if (e == nullptr || sums_->kept[k] == 0) {
+    if (e == nullptr || (sums_->kept != nullptr && sums_->kept[k] == 0)) {
       return;
     }
     sensitivity_.write_whitened(
         *e, [&](int a, std::int32_t group) { return products_.place(a, group); });
-    products_.add(D, sums_->right + k * D * sums_->columns);
+    products_.add(D, sums_->right == nullptr ? e->white : sums_->right + k * D * sums_->columns);
   }
 
   void write_derivatives(std::int64_t row, const Innovation<D>* e) {
     const auto bytes = sizeof(double) * std::size_t(scratch_.parameters);
     double* const whitened = out_.whitened + D * row;
-    double* const jacobian = out_.jacobian + D * row * scratch_.parameters;
+    double* const jacobian = out_.jacobian + D * (row / out_.pooled) * scratch_.parameters;
     for (int a = 0; a < D; ++a) {
       whitened[a] = e == nullptr ? 0 : e->white[a];
     }
     if (e == nullptr) {
-      __builtin_memset(jacobian, 0, D * bytes);
+      if (out_.pooled == 1) {
+        __builtin_memset(jacobian, 0, D * bytes);
+      }
       return;
     }
-    __builtin_memset(scratch_.row, 0, sizeof(double) * std::size_t(D * scratch_.stride));
+    if (out_.pooled == 1) {
+      __builtin_memset(scratch_.row, 0, sizeof(double) * std::size_t(D * scratch_.stride));
+    }
     sensitivity_.write_whitened(*e, [&](int a, std::int32_t group) {
       return scratch_.row + a * scratch_.stride + 8 * std::int64_t(group);
     });
     for (int a = 0; a < D; ++a) {
-      __builtin_memcpy(jacobian + a * scratch_.parameters, scratch_.row + a * scratch_.stride,
-                       bytes);
+      double* const to = jacobian + a * scratch_.parameters;
+      const double* const from = scratch_.row + a * scratch_.stride;
+      if (out_.pooled == 1) {
+        __builtin_memcpy(to, from, bytes);
+      } else {
+        sensitivity_.add_row(from, to);
+      }
     }
   }
 
   void write_state(std::int64_t row) {
+    if (out_.state == nullptr) {
+      return;
+    }
     for (int a = 0; a < 2 * D; ++a) {
       out_.state[2 * D * row + a] = state_.open ? state_.mean[a] : __builtin_nan("");
     }

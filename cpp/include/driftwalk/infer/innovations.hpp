@@ -94,11 +94,13 @@ public:
 
   // All samples that remain: adds up J' J [parameters][parameters] and R' J [columns][parameters],
   // J the whitened derivatives of samples that are used and kept, [samples][coordinates] rows, R
-  // the numbers beside them. Needs sensitivities.
+  // the numbers beside them; null: all that are used, and the whitened innovations. Up to `pooled`
+  // samples in a row count in J' J as their mean. Needs sensitivities. Writes what a pass finds.
   struct Sums {
     std::vector<double> information, products;
   };
-  Sums sums(const std::uint8_t* kept, const double* right, int columns);
+  Sums sums(const std::uint8_t* kept, const double* right, int columns, std::int64_t pooled,
+            const FilterOutputs& out);
 
 private:
   template <int D, int F>

@@ -144,9 +144,12 @@ struct FilterOutputs {
   double* innovation; // [count][D]: sample minus prediction [m, m, rad]
   double* covariance; // [count][D (D + 1)/2]: of the innovation: xx, xy, yy, x theta, ...
   std::uint8_t* used; // [count]: whether the innovation belongs to the likelihood
-  double* state;      // [count][2 D]: after the sample
+  double* state;      // [count][2 D]: after the sample; null: not wanted
   double* whitened;   // [count][D]: L^-1 innovation, L L' its covariance; 0 where not used
   double* jacobian;   // [D count][parameters]: L^-1 d(prediction)/d(parameters); 0 where not used
+  // With more than one, the rows of so many samples are added up: [D ceil(count / pooled)], zero
+  // before.
+  std::int64_t pooled = 1;
 };
 
 // What the filter adds up instead of handing out its derivatives, and the room for it. `stride` is
@@ -154,17 +157,20 @@ struct FilterOutputs {
 struct ProductSums {
   static constexpr int most_rows = 48;
   int columns;              // R, beside the derivatives
+  std::int64_t pooled;      // most samples in a row whose derivatives count as their mean in J' J
   std::int64_t first;       // the sample with which kept and right begin
-  const std::uint8_t* kept; // [samples]: 0 leaves a sample out of the sums
-  const double* right;      // [samples][D][columns]
+  const std::uint8_t* kept; // [samples]: 0 leaves a sample out of the sums; null: none
+  const double* right;      // [samples][D][columns]; null: the whitened innovations, one column
   double* information;      // [stride][stride]: J' J, on and above the diagonal
   double* products;         // [columns][stride]: R' J
   double* rows;             // [stride / 8][most_rows][8], zero before
   std::uint8_t* written;    // [stride / 8], zero before: whether eight columns are not zero
-  double* size;             // [stride]: of the largest derivative in a column
-  double* dense;            // [stride / 8][most_rows][8]: the columns that count
-  std::int32_t* chosen;     // [stride]: which they are
-  double* beside;           // [most_rows][columns]
+  double* means;            // as rows; of several samples each, read where pooled is above 1
+  std::uint8_t* written_means;
+  double* size;         // [stride]: of the largest derivative in a column
+  double* dense;        // [stride / 8][most_rows][8]: the columns that count
+  std::int32_t* chosen; // [stride]: which they are
+  double* beside;       // [most_rows][columns]
 };
 
 // The mean acceleration of a block whose state is uncertain: of x, y and for D = 3 of the angle.

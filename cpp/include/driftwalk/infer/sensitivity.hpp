@@ -141,15 +141,27 @@ public:
         to[a] = place(a, active_[k]);
       }
       for (int column = 0; column < 8; column += native_doubles) {
-        Columns white[D];
-        for (int a = 0; a < D; ++a) {
-          white[a] = Columns::load(rows_[a] + first + column);
-          for (int b = 0; b < a; ++b) {
-            white[a] -= e.L[a][b] * white[b];
-          }
-          white[a] *= e.per_root[a];
-          white[a].store(to[a] + column);
+        // One by one, as an array of them would go through memory.
+        const auto row = [&](int a) { return Columns::load(rows_[a] + first + column); };
+        const Columns white_x = row(0) * e.per_root[0];
+        const Columns white_y = (row(1) - e.L[1][0] * white_x) * e.per_root[1];
+        white_x.store(to[0] + column);
+        white_y.store(to[1] + column);
+        if constexpr (D == 3) {
+          const Columns rest = row(2) - e.L[2][0] * white_x;
+          ((rest - e.L[2][1] * white_y) * e.per_root[2]).store(to[2] + column);
         }
+      }
+    }
+  }
+
+  // Adds the columns of a row that are not zero to a sum of such rows.
+  void add_row(const double* row, double* sum) const {
+    for (int k = 0; k < count_; ++k) {
+      const std::int64_t first = 8 * std::int64_t(active_[k]);
+      const std::int64_t end = first + 8 < parameters_ ? first + 8 : parameters_;
+      for (std::int64_t column = first; column < end; ++column) {
+        sum[column] += row[column];
       }
     }
   }

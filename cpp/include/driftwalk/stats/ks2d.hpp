@@ -12,6 +12,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 namespace driftwalk {
 
@@ -84,9 +85,11 @@ private:
   std::unique_ptr<Data> data_;
 };
 
-// The statistic between the reference (sample 1) and the points (x2, y2) (sample 2).
+// The statistic between the reference (sample 1) and the points (x2, y2) (sample 2). Who does not
+// need the number of tied points saves up to a quarter of the time; it may be 0 then.
 KsResult ks_two_sample(const KsReference& reference, const double* x2, const double* y2,
-                       std::int64_t n2, KsWorkspace& workspace, KsTies ties = KsTies::strict);
+                       std::int64_t n2, KsWorkspace& workspace, KsTies ties = KsTies::strict,
+                       bool counts_tied = true);
 
 // The same where both samples are prepared: a sample that is met many times is sorted once.
 KsResult ks_two_sample(const KsReference& first, const KsReference& second, KsWorkspace& workspace,
@@ -96,6 +99,12 @@ KsResult ks_two_sample(const KsReference& first, const KsReference& second, KsWo
 KsResult ks_two_sample(const double* x1, const double* y1, std::int64_t n1, const double* x2,
                        const double* y2, std::int64_t n2, KsWorkspace& workspace,
                        KsTies ties = KsTies::strict);
+
+// The statistic alone, without the count of tied points. Nothing where the samples are small, or
+// lie so that sorted ones take less time: see the call above.
+std::optional<KsResult> ks_by_bounds(const double* x1, const double* y1, std::int64_t n1,
+                                     const double* x2, const double* y2, std::int64_t n2,
+                                     KsWorkspace& workspace);
 
 // Peacock's statistic: the largest difference over every cut of the plane, not only over cuts at a
 // point. A cut at (X, Y) parts {x <= X} from {x > X} and {y <= Y} from {y > Y}.

@@ -102,7 +102,9 @@ public:
     for (int sample = 0; sample < 2; ++sample) {
       found[sample] = found_[sample];
     }
-    tied = KsTiedCounter(samples_, {columns_, in_column_}, {rows_, in_row_}, at_).count();
+    tied = samples_.counts_tied
+               ? KsTiedCounter(samples_, {columns_, in_column_}, {rows_, in_row_}, at_).count()
+               : 0;
     return true;
   }
 

@@ -79,6 +79,7 @@ struct KsPlain {
   std::int64_t weight[2]; // as in KsSweep
   std::int64_t total;
   KsBucketSizes buckets; // ks_bucket_sizes(n[0] + n[1])
+  bool counts_tied;      // else the number of tied points is left at 0
   void* scratch;         // ks_bounded_bytes(n[0] + n[1]), aligned to 64
 };
 

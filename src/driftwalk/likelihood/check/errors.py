@@ -9,7 +9,6 @@ that the check needs are collected in one pass; J itself is never held.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple
@@ -133,20 +132,52 @@ class Contrast:
         white: Floats,
         jacobian: Floats,
         places: Sequence[Place] = WHOLE,
+        *,
+        pooled: int = 1,
+        moving: Integers | None = None,
     ) -> None:
-        """Add the rows of one part; `places` says where its columns stand among all parameters."""
+        """Add the rows of one part; `places` says where its columns stand among all parameters.
+
+        Rows of `weight` and `jacobian` are means of `pooled` samples; `group` and `white`, shapes
+        (n, D), or (n D,) where each sample has its own, are those of all. `jacobian` holds the
+        columns `moving`, or all; the others are zero.
+        """
         from scipy.sparse import csr_matrix
 
+        group, white, number = _pooled_rows(group, white, pooled)
         retained = np.flatnonzero(group >= 0)
         if not retained.size:
             return
         present, local = np.unique(group[retained], return_inverse=True)
-        matrix = csr_matrix((weight[retained], (local, retained)), shape=(present.size, group.size))
-        self.score[present] += np.asarray(matrix @ white)
-        self.power[present] += np.bincount(local, weight[retained] ** 2)
-        slope = np.asarray(matrix @ jacobian)
+
+        def matrix_of(values: Floats) -> Any:
+            at = (local, retained)
+            return csr_matrix((values[retained], at), shape=(present.size, group.size))
+
+        self.score[present] += np.asarray(matrix_of(weight) @ white)
+        self.power[present] += np.bincount(local, (number * weight**2)[retained])
+        slope = np.asarray(matrix_of(number * weight) @ jacobian)
+        if moving is not None:
+            known, slope = slope, np.zeros((present.size, int(moving[-1]) + 1))
+            slope[:, moving] = known
         for own, columns in places:
             self.slope[present, columns] += slope[:, own]
+
+
+def _pooled_rows(group: Integers, white: Floats, pooled: int) -> tuple[Integers, Floats, Floats]:
+    """Return the group of each row of means, the sum of its errors, and how many there are.
+
+    Samples of one row that are in several groups count for the first one's.
+    """
+    if pooled == 1:
+        return group.ravel(), white.ravel(), np.ones(group.size)
+    missing = -len(group) % pooled
+    shape = (-1, pooled, group.shape[1])
+    groups = np.pad(group, ((0, missing), (0, 0)), constant_values=-1).reshape(shape)
+    counted = groups >= 0
+    sums = np.where(counted, np.pad(white, ((0, missing), (0, 0))).reshape(shape), 0.0).sum(axis=1)
+    first = np.take_along_axis(groups, counted.argmax(axis=1)[:, None], axis=1)
+    return first.ravel(), sums.ravel(), counted.sum(axis=1).ravel().astype(np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,10 +205,14 @@ class _Part(NamedTuple):
     start: int
     jacobian: Floats
     """By the coefficients of the part's flow and ln C_d, shape (rows, columns): the components of
-    a sample one after the other."""
+    a sample one after the other; sums over `pooled` samples."""
+    used: Floats
+    """Samples in each row of sums."""
     white: Floats
+    """Shape (samples, D)."""
     places: tuple[Place, Place]
     """Where its columns stand among the parameters of all flows."""
+    pooled: int
 
 
 def collect(
@@ -188,31 +223,48 @@ def collect(
     from scipy.linalg.blas import dsyrk
 
     size = estimate.point.coefficients.size + 1
-    count = sum(math.ceil(one.used.size / SAMPLES_AT_ONCE) for one in errors)
+    count = sum(len(_starts(one.series)) for one in errors)
     # Derivatives of four parts are kept, for the correction of the autocorrelation.
     chosen = set(np.linspace(0, count - 1, 4).astype(int).tolist())
-    retained = []
+    retained: list[_Part] = []
     for contrast in contrasts:
         contrast.begin(size)
     # J'J by flow, its lower half alone: a series has derivatives by the coefficients of its flow.
     lower: dict[int, Any] = {}
-    for number, part in enumerate(_parts(estimate, errors)):
-        jacobian = part.jacobian
+    for part in _parts(estimate, errors, chosen, retained):
+        jacobian, moving = part.jacobian, None
+        coefficients = estimate.point.in_flow(part.flow).coefficients.ravel()
         if part.flow not in lower:
             lower[part.flow] = np.zeros((jacobian.shape[1],) * 2, order="F")
-        lower[part.flow] = dsyrk(
-            1.0, jacobian.T, beta=1.0, c=lower[part.flow], overwrite_c=1, lower=1
-        )
+        if part.pooled == 1:
+            lower[part.flow] = dsyrk(
+                1.0, jacobian.T, beta=1.0, c=lower[part.flow], overwrite_c=1, lower=1
+            )
+        else:
+            # In the seconds of such a part the block comes near few of the coefficients.
+            moving = np.flatnonzero(jacobian.any(axis=0))
+            moving = np.union1d(moving, [jacobian.shape[1] - 1])
+            sums, number = jacobian[:, moving], np.maximum(part.used, 1.0)[:, None]
+            lower[part.flow][np.ix_(moving, moving)] += dsyrk(
+                1.0, (sums / np.sqrt(number)).T, lower=1
+            )
+            jacobian, coefficients = sums / number, coefficients[moving[:-1]]
         weights = {
-            "one": np.ones(part.white.size),
-            "flow": jacobian[:, :-1] @ estimate.point.in_flow(part.flow).coefficients.ravel(),
+            "one": np.ones(len(jacobian)),
+            "flow": jacobian[:, :-1] @ coefficients,
             "drag": jacobian[:, -1],
         }
         for contrast in contrasts:
-            group = contrast.groups[part.series][part.start : part.start + SAMPLES_AT_ONCE]
-            contrast.add(group.ravel(), weights[contrast.by], part.white, jacobian, part.places)
-        if number in chosen:
-            retained.append(part)
+            group = contrast.groups[part.series][part.start : part.start + len(part.white)]
+            contrast.add(
+                group,
+                weights[contrast.by],
+                part.white,
+                jacobian,
+                part.places,
+                pooled=part.pooled,
+                moving=moving,
+            )
     data = np.zeros((size, size))
     for flow, part_of in lower.items():
         whole = np.tril(part_of) + np.tril(part_of, -1).T
@@ -228,17 +280,42 @@ def collect(
     return Leverage(spread, parameters, _autocovariance(spread, errors, retained, lags))
 
 
-def _parts(estimate: Estimate, errors: Sequence[Innovations]) -> Iterator[_Part]:
-    """Run the filter with derivatives over every series, some samples at a time."""
+def _starts(series: Series) -> range:
+    """Return the first samples of the parts, each a whole number of pools."""
+    step = max(SAMPLES_AT_ONCE // series.pooled, 1) * series.pooled
+    return range(0, series.time.size, step)
+
+
+def _parts(
+    estimate: Estimate, errors: Sequence[Innovations], chosen: set[int], retained: list[_Part]
+) -> Iterator[_Part]:
+    """Run the filter with derivatives over every series, some samples at a time.
+
+    The `chosen` parts are retained with the derivatives of every sample.
+    """
+    number = 0
     for index, one in enumerate(errors):
-        flow = one.series.flow
+        flow, pooled = one.series.flow, one.series.pooled
         places = estimate.passes.columns_of(flow, 1)
         point = estimate.point.in_flow(flow)
         running = estimate.passes.kernel(one.series, point, sensitivities=True)
-        for start in range(0, one.used.size, SAMPLES_AT_ONCE):
-            found = running.run(SAMPLES_AT_ONCE)
-            white = np.asarray(found["whitened"]).ravel()
-            yield _Part(index, flow, start, np.asarray(found["jacobian"]), white, places)
+        starts = _starts(one.series)
+        for start in starts:
+            whole = number in chosen
+            number += 1
+            found = running.run(starts.step, states=False, pooled=1 if whole else pooled)
+            white = np.asarray(found["whitened"]).reshape(-1, one.components)
+            jacobian = np.asarray(found["jacobian"])
+            pools = np.arange(0, len(white), pooled)
+            used = np.repeat(
+                np.add.reduceat(found["used"], pools, dtype=np.float64), one.components
+            )
+            if whole:
+                retained.append(_Part(index, flow, start, jacobian, used, white, places, 1))
+                if pooled > 1:
+                    by_sample = jacobian.reshape(len(white), -1)
+                    jacobian = np.add.reduceat(by_sample, pools).reshape(used.size, -1)
+            yield _Part(index, flow, start, jacobian, used, white, places, pooled)
 
 
 def used_pairs(used: Bools, lags: int) -> Iterator[tuple[int, Bools]]:

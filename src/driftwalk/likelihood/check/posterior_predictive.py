@@ -13,8 +13,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from driftwalk import _core
 from driftwalk.comparison import step_length_edges
+from driftwalk.comparison.statistic import StepDistance, StepTable, distances_among
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood.check.power import POWER
@@ -98,48 +98,80 @@ class MotionComparison(NamedTuple):
         return float(logs.mean()), float(spread)
 
 
+class EstimateDistances(NamedTuple):
+    """KS distances of replicates at the estimate: to the recording, and to each other."""
+
+    distance: Floats
+    floor: Floats
+
+
+def distances_at_estimate(real: Floats, found: Replicates, *, threads: int) -> EstimateDistances:
+    """Compare a recording's steps with those of replicates at the estimate."""
+    _require_replicates(found)
+    half = len(found.steps) // 2
+    floor = _distances(found.steps[:half], found.steps[half:], threads)
+    return EstimateDistances(_distances([real], found.steps, threads)[0], floor.ravel())
+
+
 def compare_motion(
-    real: Floats, at_estimate: Replicates, drawn: Replicates, *, threads: int
+    real: Floats, at_estimate: EstimateDistances, drawn: Replicates, *, threads: int
 ) -> MotionComparison:
     """Compare a recording's steps with simulated ones."""
-    for replicates in (at_estimate, drawn):
-        alone = replicates is drawn and np.unique(drawn.flow).size < 2
-        if len(replicates.steps) < FEWEST_REPLICATES or alone:
-            raise InputError(
-                f"{replicates.broken} of {replicates.broken + len(replicates.steps)} simulated "
-                "recordings broke down: the fitted model cannot be simulated"
-            )
-    half = len(at_estimate.steps) // 2
-    floor = _distances(at_estimate.steps[:half], at_estimate.steps[half:], threads)
-    among = _distances(drawn.steps, drawn.steps, threads)
+    _require_replicates(drawn, fewest_flows=2)
+    among = _distances_among(drawn.steps, threads)
     among[drawn.flow[:, None] == drawn.flow[None, :]] = np.nan
-    lengths, angles = (
-        np.abs(np.concatenate([real[:, k], *(steps[:, k] for steps in drawn.steps)]))
-        for k in (0, 1)
-    )
-    widest = float(angles.max())
+    lengths = step_length_edges(*(steps[:, 0] for steps in (real, *drawn.steps)), bins=BINS)
+    widest = max(float(np.abs(steps[:, 1]).max()) for steps in (real, *drawn.steps))
     return MotionComparison(
-        _distances([real], at_estimate.steps, threads)[0],
-        floor.ravel(),
+        *at_estimate,
         _distances([real], drawn.steps, threads)[0],
         np.nanmean(among, axis=1),
         int(np.unique(drawn.flow).size),
-        _density(real, drawn, 0, step_length_edges(lengths, bins=BINS)),
+        _density(real, drawn, 0, lengths),
         _density(real, drawn, 1, np.linspace(-widest, widest, BINS + 1)),
     )
 
 
+def _require_replicates(found: Replicates, *, fewest_flows: int = 1) -> None:
+    sound = len(found.steps)
+    if sound < FEWEST_REPLICATES or np.unique(found.flow).size < fewest_flows:
+        raise InputError(
+            f"{found.broken} of {found.broken + sound} simulated recordings broke down: the fitted "
+            "model cannot be simulated"
+        )
+
+
+AT_ONCE: Final = 4
+"""Recordings that are laid out for comparison at a time: of a fast camera each takes 3 MB."""
+
+
 def _distances(first: Sequence[Floats], second: Sequence[Floats], threads: int) -> Floats:
     """Return the KS distances of every recording to every other, (first, second)."""
-    return np.asarray(_core.ks_matrix(*_padded(first), *_padded(second), threads=threads))
+    own = _padded(first)
+    others = (second[k : k + AT_ONCE] for k in range(0, len(second), AT_ONCE))
+    found = [StepDistance().matrix(own, _padded(one), threads=threads) for one in others]
+    return np.concatenate(found, axis=1)
 
 
-def _padded(steps: Sequence[Floats]) -> tuple[Floats, Floats, np.ndarray]:
+def _distances_among(steps: Sequence[Floats], threads: int) -> Floats:
+    """Return the KS distance of every recording to every other, (recordings, recordings)."""
+    found = np.zeros((len(steps), len(steps)))
+    for k in range(0, len(steps), AT_ONCE):
+        own, later = steps[k : k + AT_ONCE], steps[k + AT_ONCE :]
+        rows, columns = np.triu_indices(len(own), 1)
+        table = _padded(own)
+        found[k + rows, k + columns] = distances_among(StepDistance(), table, threads=threads)
+        if later:
+            found[k : k + AT_ONCE, k + AT_ONCE :] = _distances(own, later, threads)
+    return found + found.T
+
+
+def _padded(steps: Sequence[Floats]) -> StepTable:
     pairs = np.array([len(one) for one in steps], dtype=np.int64)
     length, angle = np.zeros((2, pairs.size, int(pairs.max())))
     for k, one in enumerate(steps):
         length[k, : len(one)], angle[k, : len(one)] = one.T
-    return length, angle, pairs
+    return StepTable(length, angle, pairs)
 
 
 def _density(real: Floats, drawn: Replicates, column: int, edge: Floats) -> Density:

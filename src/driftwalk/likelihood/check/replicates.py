@@ -46,7 +46,8 @@ if TYPE_CHECKING:
 
 Keys = npt.NDArray[np.uint64]
 
-Path = tuple[Floats, Floats, Floats]
+Path = tuple[Floats, npt.NDArray[np.floating], npt.NDArray[np.floating]]
+"""Times [s], x and y [m]."""
 
 
 class FramePolicy(NamedTuple):
@@ -99,7 +100,7 @@ class Replicates(NamedTuple):
     steps: list[Floats]
     """Step lengths [m] and turning angles [rad] of each, (pairs, 2)."""
     paths: list[list[Path]]
-    """Each one's recordings: times [s], x and y [m]."""
+    """Each one's recordings, where they are wanted: times [s], x and y [m]."""
     flow: Integers
     """Which drawn flow each was in."""
     broken: int
@@ -202,7 +203,14 @@ def replicates_at_estimate(
     drag, force = fitted_value(fit, "drag_coefficient"), fitted_value(fit, "force_std")
     point = estimate.point
     parts = [
-        _simulated(one, _keys(seed, CheckStream.ESTIMATE, index, one, count), drag, force, point)
+        _simulated(
+            one,
+            _keys(seed, CheckStream.ESTIMATE, index, one, count),
+            drag,
+            force,
+            point,
+            with_path=False,
+        )
         for index, one in enumerate(series)
     ]
     return _joined(parts, np.zeros(count, dtype=np.int64))
@@ -288,7 +296,7 @@ def _posterior_samples(
 
 class _World(NamedTuple):
     steps: Floats
-    path: Path
+    path: Path | None
     sound: bool
 
 
@@ -299,17 +307,28 @@ def _keys(seed: int, kind: int, index: int, one: Replicated, count: int) -> Keys
 
 
 def _simulated(
-    one: Replicated, keys: Keys, drag: float, force: float, point: Point, begin: float = 0.0
+    one: Replicated,
+    keys: Keys,
+    drag: float,
+    force: float,
+    point: Point,
+    begin: float = 0.0,
+    *,
+    with_path: bool = True,
 ) -> list[_World]:
     time = one.problem.like.sample_time
     poses, sound = _poses(one, keys, drag, force)
     # Without the last sample of a section no velocity is taken across a restart.
     shown = np.delete(np.arange(time.size), np.append(one.first[1:] - 1, time.size - 1))
+    at = begin + time[shown]
     worlds = []
     for k, key in enumerate(keys[:, 0]):
-        x, y = _as_seen(*poses[:, k], time=time, point=point, key=int(key))
-        steps = one.steps(x, y, poses[2, k])
-        path = (begin + time[shown], x[shown], y[shown])
+        x, y, theta = poses[:, k].astype(np.float64)
+        x, y = _as_seen(x, y, theta, time=time, point=point, key=int(key))
+        steps = one.steps(x, y, theta)
+        path = None
+        if with_path:
+            path = (at, *(axis[shown].astype(np.float32) for axis in (x, y)))
         worlds.append(_World(steps, path, bool(sound[k] and len(steps) > 0)))
     return worlds
 
@@ -318,7 +337,8 @@ def _poses(one: Replicated, keys: Keys, drag: float, force: float) -> tuple[Floa
     """Return x, y [m] and theta [rad], (3, replicates, samples), and which replicates are sound."""
     like, count, done = one.problem.like, len(keys), 0
     assert like.flow is not None
-    poses, sound = np.empty((3, count, like.sample_time.size)), np.ones(count, dtype=bool)
+    poses = np.empty((3, count, like.sample_time.size), dtype=np.float32)
+    sound = np.ones(count, dtype=bool)
     for some in one.sections:
         each = some.begin.size
         own = replace(
@@ -362,8 +382,11 @@ def _joined(parts: Sequence[Sequence[_World]], flow_of: Integers) -> Replicates:
     sound = np.array([all(world.sound for world in one) for one in whole])
     retained = [whole[k] for k in np.flatnonzero(sound)]
     return Replicates(
-        [np.concatenate([world.steps for world in one]) for one in retained],
-        [[world.path for world in one] for one in retained],
+        [
+            one[0].steps if len(one) == 1 else np.concatenate([world.steps for world in one])
+            for one in retained
+        ],
+        [[world.path for world in one if world.path is not None] for one in retained],
         flow_of[sound],
         int(np.count_nonzero(~sound)),
     )

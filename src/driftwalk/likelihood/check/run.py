@@ -24,6 +24,7 @@ from driftwalk.likelihood.check.posterior_predictive import (
     FEWEST_REPLICATES,
     MotionComparison,
     compare_motion,
+    distances_at_estimate,
 )
 from driftwalk.likelihood.check.replicates import (
     posterior_replicates,
@@ -234,15 +235,18 @@ def check_model(
     parts = [white_variables(found), place_variables(found)]
     try:
         problems = problems_of(fit, estimate, many)
+        real = np.concatenate([one.recorded for one in problems])
+        threads = problems[0].problem.like.threads
+        # One set after the other: of a fast camera each takes a hundred megabytes.
+        near = distances_at_estimate(
+            real,
+            replicates_at_estimate(fit, estimate, problems, count=replicates, seed=seed),
+            threads=threads,
+        )
         drawn = posterior_replicates(
             fit, estimate, problems, found.leverage.spread, count=replicates, seed=seed
         )
-        motion = compare_motion(
-            np.concatenate([one.recorded for one in problems]),
-            replicates_at_estimate(fit, estimate, problems, count=replicates, seed=seed),
-            drawn,
-            threads=problems[0].problem.like.threads,
-        )
+        motion = compare_motion(real, near, drawn, threads=threads)
         paths = [(one.series.time, one.series.x, one.series.y) for one in errors]
         scan = scan_of(paths, drawn.paths, found.layout, level=VERDICT.level)
         parts.append(motion_variables(motion))

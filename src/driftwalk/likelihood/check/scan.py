@@ -132,7 +132,7 @@ def _differences(
 
 def _sums(path: Path, series: int, layout: Layout) -> Floats:
     """Return number and sums of the velocities by part and cell, (parts, 3, cells)."""
-    time, x, y = path
+    time, x, y = (np.asarray(one, dtype=np.float64) for one in path)
     step = np.diff(time)
     parts = np.flatnonzero(layout.series == series)
     part = np.searchsorted(layout.start[parts][1:], time[:-1], side="right")

@@ -91,9 +91,13 @@ class Passes:
         score, information = np.zeros(size), np.zeros((size, size))
         for series in self.series:
             local = point.in_flow(series.flow)
-            base = dict(self.kernel(series, local).run(series.time.size))
-            pairs = self._pairs(series, local, names, base)
-            one = self._sums_of(series, local, base, pairs)
+            if names or series.pooled == 1:
+                base = self._errors(series, local)
+                pairs = self._pairs(series, local, names, base)
+                one = self._sums_of(series, local, base, pairs)
+                del base, pairs
+            else:
+                one = self._sums_of_flow(series, local)
             # A series is in one flow: it adds to that flow's block, and to what all flows share.
             places = self.columns_of(series.flow, others)
             for own, row in places:
@@ -111,6 +115,8 @@ class Passes:
         The kernel is called from here, and not from a function for each pass: a call of it is then
         at most eight frames below `driftwalk.fit`.
         """
+        count = series.time.size
+
         # A closed number of the flow's slow change has the derivative by a constant change of the
         # strength, times its shape: all of them share one pair.
         waves = [name for name in names if name in STRENGTHS and name not in point.opened]
@@ -121,20 +127,18 @@ class Passes:
             low, high, step, most, *_ = difference = difference_of(point, name)
             one = base
             if low is not None:
-                one = dict(self.kernel(series, point.with_extra(name, low)).run(series.time.size))
-            other = dict(self.kernel(series, point.with_extra(name, high)).run(series.time.size))
+                closed = self.kernel(series, point.with_extra(name, low))
+                one = dict(closed.run(count, states=False))
+            moved = self.kernel(series, point.with_extra(name, high))
+            other = dict(moved.run(count, states=False))
             pair = Pair(one, other, step, most)
             if difference.shortens and (excess := pair.excess) > 1.0:
                 # Where positions are known to some micrometres, a tenth of a millisecond is a long
                 # step in time: the second pass is made again with a shorter one.
                 _, high, step, *_ = difference_of(point, name, shorter=excess)
-                other = dict(
-                    self.kernel(series, point.with_extra(name, high)).run(series.time.size)
-                )
+                moved = self.kernel(series, point.with_extra(name, high))
+                other = dict(moved.run(count, states=False))
                 pair = Pair(one, other, step, most)
-            # States are the larger half of a pass, and no derivative needs them.
-            one.pop("state", None)
-            other.pop("state", None)
             found[name] = pair
         for name in waves:
             found[name] = found["strength_0"]._replace(wave=slow_change(series, name))
@@ -153,7 +157,7 @@ class Passes:
         right = np.zeros((used.size, white.shape[1], 1 + len(changes)))
         right[used] = np.stack([white, *changes], axis=-1)
         kernel = self.kernel(series, point, sensitivities=True)
-        found = kernel.sums(used.astype(np.uint8), right)
+        found = kernel.sums(used.astype(np.uint8), right, pooled=series.pooled)
         # ln det S / 2 is the sum of the logarithms on the diagonal of its Cholesky factor.
         deviance = 0.5 * float((white**2).sum()) + float(
             np.log(np.einsum("aan->an", factor(base["covariance"][used]))).sum()
@@ -176,12 +180,22 @@ class Passes:
                 ).sum()
         return Sums(deviance, score, information, int(used.sum()))
 
+    def _sums_of_flow(self, series: Series, point: Point) -> Sums:
+        """Return the sums of coefficients and ln C_d alone, from a single pass."""
+        kernel = self.kernel(series, point, sensitivities=True)
+        found = kernel.sums(None, None, pooled=series.pooled)
+        used = used_of(found)
+        root = factor(found["covariance"][used])
+        white = forward(root, found["innovation"][used].T)
+        deviance = 0.5 * float((white**2).sum()) + float(np.log(np.einsum("aan->an", root)).sum())
+        return Sums(deviance, found["products"][0], found["information"], int(used.sum()))
+
     def innovations(self, point: Point) -> list[tuple[Floats, Bools]]:
         """Return each recording's whitened innovations, shape (n, D), and which were used.
 
         D is 3 with the angle in the state, else 2. The innovation of a missing angle is 0.
         """
-        found = [self.run(series, point.in_flow(series.flow)) for series in self.series]
+        found = [self._errors(series, point.in_flow(series.flow)) for series in self.series]
         return [(_whitened(one), used_of(one)) for one in found]
 
     def states(self, series: Series, point: Point) -> Floats:
@@ -194,7 +208,7 @@ class Passes:
         Shapes (n,); the whitened errors themselves come third, (n, D). 0 where a sample is not
         used.
         """
-        base = dict(self.kernel(series, point).run(series.time.size))
+        base = self._errors(series, point)
         (pair,) = self._pairs(series, point, ["strength_0"], base)
         used = pair.comparable
         white, (change,), _ = noise_derivatives(base, [pair], used)
@@ -208,6 +222,10 @@ class Passes:
     def run(self, series: Series, point: Point) -> dict[str, Any]:
         """Return innovations, covariances and states of a pass over one series."""
         return dict(self.kernel(series, point).run(series.time.size))
+
+    def _errors(self, series: Series, point: Point) -> dict[str, Any]:
+        """Return innovations and covariances alone: the states are the larger half of a pass."""
+        return dict(self.kernel(series, point).run(series.time.size, states=False))
 
     def kernel(self, series: Series, point: Point, *, sensitivities: bool = False) -> Any:
         """Return the native filter, before the first sample of a series."""

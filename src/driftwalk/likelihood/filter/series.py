@@ -35,6 +35,9 @@ class FilterPolicy(NamedTuple):
     """Samples after the first one of a stretch until the filter knows the velocity. Its innovations
     are a hundredth to four fifths of what it expects there; when they counted, six of 42 recordings
     of the model itself were rejected."""
+    pooled_s: float = 0.1
+    """Derivatives of samples within this time [s] hardly differ: their products are made of their
+    mean. Measured at 100 Hz: docs/explanation/likelihood.md."""
 
 
 FILTER: Final = FilterPolicy()
@@ -77,6 +80,17 @@ class Series:
             settled[later:] &= ~begins[:-later]
         return settled
 
+    @property
+    def pooled(self) -> int:
+        """Samples within `FILTER.pooled_s`; 1 unless the camera is fast."""
+        return max(self._within(FILTER.pooled_s), 1)
+
+    def _within(self, interval: float) -> int:
+        """Return the usual number of samples in an interval [s]; 0 in none."""
+        if self.time.size < 2:
+            return 0
+        return round(interval / max(float(np.median(np.diff(self.time))), 1e-9))
+
     def part(self, first: int, end: int) -> Series:
         """Return the samples from a first one on, before an end."""
         columns = ("time", "x", "y", "theta", "omega", "excluded", "angle")
@@ -84,9 +98,7 @@ class Series:
 
     def thinned(self, interval: float) -> Series:
         """Return samples about an interval [s] apart; the series where they are no nearer."""
-        if self.time.size < 2:
-            return self
-        every = round(interval / max(float(np.median(np.diff(self.time))), 1e-9))
+        every = self._within(interval)
         if every < 2:
             return self
         columns = ("time", "x", "y", "theta", "omega", "angle")

@@ -21,7 +21,7 @@ from driftwalk.likelihood.check.place import (
     spread_of,
     trend_of,
 )
-from driftwalk.likelihood.check.posterior_predictive import compare_motion
+from driftwalk.likelihood.check.posterior_predictive import compare_motion, distances_at_estimate
 from driftwalk.likelihood.check.replicates import Replicates
 from driftwalk.likelihood.check.scan import scan_of
 from driftwalk.likelihood.check.whiteness import whiteness_tests
@@ -311,7 +311,8 @@ def replicates(seed: int, *, count: int = 8, spread: float = 1.0) -> Replicates:
 def test_distances_and_bands_by_brute_force() -> None:
     real = np.abs(np.random.default_rng(1).normal(size=(400, 2)))
     estimate, drawn = replicates(2), replicates(3)
-    found = compare_motion(real, estimate, drawn, threads=1)
+    near = distances_at_estimate(real, estimate, threads=1)
+    found = compare_motion(real, near, drawn, threads=1)
     assert found.distance == pytest.approx([ks_distance(real, one) for one in estimate.steps])
     pairs = [ks_distance(a, b) for a in estimate.steps[:4] for b in estimate.steps[4:]]
     assert found.floor == pytest.approx(pairs)
@@ -326,14 +327,16 @@ def test_distances_and_bands_by_brute_force() -> None:
     assert (found.turning_angle.median <= found.turning_angle.high).all()
     assert found.p_value > 0.01
     assert found.rank_p_value > 1 / 9
-    wide = compare_motion(1.5 * real, estimate, drawn, threads=1)
+    near = distances_at_estimate(1.5 * real, estimate, threads=1)
+    wide = compare_motion(1.5 * real, near, drawn, threads=1)
     assert wide.rank_p_value == pytest.approx(1 / 9)
     assert wide.p_value < 1e-3
 
 
 def test_steps_that_differ_are_put_into_words() -> None:
     real = 1.5 * np.abs(np.random.default_rng(1).normal(size=(400, 2)))
-    motion = compare_motion(real, replicates(2), replicates(3), threads=1)
+    near = distances_at_estimate(real, replicates(2), threads=1)
+    motion = compare_motion(real, near, replicates(3), threads=1)
     found = {angle: motion_criterion(motion, angle=angle) for angle in ("given", "none")}
     assert found["given"].failed
     assert f"KS distance {motion.drawn_distance.mean():.3f}" in found["given"].sentence
@@ -349,3 +352,30 @@ def test_too_few_sound_replicates_are_refused() -> None:
     few = Replicates(replicates(4).steps[:2], [[], []], np.arange(2), 6)
     with pytest.raises(InputError, match="6 of 8 simulated recordings broke down"):
         compare_motion(np.ones((40, 2)), replicates(5), few, threads=1)
+
+
+def test_sums_of_means_over_samples_are_those_of_all() -> None:
+    """Derivatives, weights and groups that are the same within ten samples."""
+    generator = np.random.default_rng(7)
+    samples, pooled = 396, 10  # the last mean is of six
+    pools = -(-samples // pooled)
+    shape = (pools, COMPONENTS)
+    jacobian = generator.normal(size=(*shape, PARAMETERS))
+    weight, group = generator.normal(size=shape), generator.integers(-1, 5, shape)
+    every = np.repeat(np.arange(pools), pooled)[:samples]
+    groups = np.where(generator.random((samples, COMPONENTS)) < 0.1, -1, group[every])
+    white = generator.normal(size=(samples, COMPONENTS))
+    whole, means = (Contrast([groups], 5) for _ in range(2))
+    for one in (whole, means):
+        one.begin(PARAMETERS)
+    whole.add(
+        groups.ravel(),
+        weight[every].ravel(),
+        white.ravel(),
+        jacobian[every].reshape(-1, PARAMETERS),
+    )
+    rows = jacobian.reshape(-1, PARAMETERS)
+    means.add(groups, weight.ravel(), white, rows, pooled=pooled)
+    assert means.score == pytest.approx(whole.score)
+    assert means.power == pytest.approx(whole.power)
+    assert means.slope == pytest.approx(whole.slope)
