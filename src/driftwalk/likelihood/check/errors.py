@@ -244,11 +244,11 @@ def collect(
             # In the seconds of such a part the block comes near few of the coefficients.
             moving = np.flatnonzero(jacobian.any(axis=0))
             moving = np.union1d(moving, [jacobian.shape[1] - 1])
-            sums, number = jacobian[:, moving], np.maximum(part.used, 1.0)[:, None]
+            rows, number = jacobian[:, moving], np.maximum(part.used, 1.0)[:, None]
             lower[part.flow][np.ix_(moving, moving)] += dsyrk(
-                1.0, (sums / np.sqrt(number)).T, lower=1
+                1.0, (rows / np.sqrt(number)).T, lower=1
             )
-            jacobian, coefficients = sums / number, coefficients[moving[:-1]]
+            jacobian, coefficients = rows / number, coefficients[moving[:-1]]
         weights = {
             "one": np.ones(len(jacobian)),
             "flow": jacobian[:, :-1] @ coefficients,
