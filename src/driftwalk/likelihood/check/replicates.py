@@ -108,9 +108,12 @@ class Replicates(NamedTuple):
 
 
 def problems_of(
-    fit: xr.Dataset, estimate: Estimate, recordings: Sequence[xr.Dataset]
+    fit: xr.Dataset, estimate: Estimate, recordings: Sequence[xr.Dataset], *, every: float
 ) -> list[Replicated]:
-    """Return the series ready for comparison, each in its fitted flow, with one step interval."""
+    """Return the series ready for comparison, each in its fitted flow, with one step interval.
+
+    Their replicates begin again after the time `every` [s].
+    """
     from driftwalk.conditions.study import fitted_wall
     from driftwalk.model import apply_overrides
 
@@ -139,7 +142,7 @@ def problems_of(
         made = recorded_camera(track, seen, position_quantum=quantum)
         flow = _in_frames(flows[one.flow], one, estimate.point, estimate.passes.spline)
         problem = prepare_problem(track, seen, flow, camera=made)
-        first = first_samples(track)
+        first = first_samples(track, every)
         ready = Replicated(
             problem,
             first,
@@ -209,7 +212,6 @@ def replicates_at_estimate(
             drag,
             force,
             point,
-            with_path=False,
         )
         for index, one in enumerate(series)
     ]
@@ -224,6 +226,7 @@ def posterior_replicates(
     *,
     count: int,
     seed: int,
+    with_path: bool = False,
 ) -> Replicates:
     """Simulate the recordings with flow and parameters drawn from what the fit leaves open."""
     points, factors = _posterior_samples(fit, estimate, spread, count, seed)
@@ -250,7 +253,7 @@ def posterior_replicates(
             drawn = replace(one, problem=replace(one.problem, like=own))
             return _simulated(
                 drawn, keys[k : k + 1], float(drag[k]), float(force[k]), point,
-                float(filtered.time[0]),
+                float(filtered.time[0]), with_path=with_path,
             )  # fmt: skip
 
         found = map_in_threads(simulated, range(count), one.problem.like.threads)
@@ -314,7 +317,7 @@ def _simulated(
     point: Point,
     begin: float = 0.0,
     *,
-    with_path: bool = True,
+    with_path: bool = False,
 ) -> list[_World]:
     time = one.problem.like.sample_time
     poses, sound = _poses(one, keys, drag, force)
@@ -326,14 +329,16 @@ def _simulated(
         x, y, theta = poses[:, k].astype(np.float64)
         x, y = _as_seen(x, y, theta, time=time, point=point, key=int(key))
         steps = one.steps(x, y, theta)
-        path = None
+        path: Path | None = None
         if with_path:
-            path = (at, *(axis[shown].astype(np.float32) for axis in (x, y)))
+            path = (at, x[shown].astype(np.float32), y[shown].astype(np.float32))
         worlds.append(_World(steps, path, bool(sound[k] and len(steps) > 0)))
     return worlds
 
 
-def _poses(one: Replicated, keys: Keys, drag: float, force: float) -> tuple[Floats, Bools]:
+def _poses(
+    one: Replicated, keys: Keys, drag: float, force: float
+) -> tuple[npt.NDArray[np.float32], Bools]:
     """Return x, y [m] and theta [rad], (3, replicates, samples), and which replicates are sound."""
     like, count, done = one.problem.like, len(keys), 0
     assert like.flow is not None

@@ -1,4 +1,4 @@
-"""Restarts of simulated recordings: every ten seconds they begin again where the recording is.
+"""Restarts of simulated recordings: from time to time they begin again where the recording is.
 
 A simulated block that runs freely for ten minutes leaves the part of the tank that the recording
 has seen. The flow that the fit continues there may hold it for good, and its steps then say nothing
@@ -24,10 +24,14 @@ from driftwalk.simulation.initial import Start
 class RestartPolicy(NamedTuple):
     """How often replicates begin again."""
 
-    every_s: float = 10.0
-    """Time between two restarts, some ten times as long as a block remembers its velocity. The
-    smallest KS distance that is found nine times in ten falls from a median of 0.4 without restarts
-    to 0.13 (ten fits of the development set of studies/verdict)."""
+    steps_s: float = 10.0
+    """Time between two restarts where steps are compared, a few times as long as a block remembers
+    its velocity. The smallest KS distance that is found nine times in ten falls from a median of
+    0.4 without restarts to 0.11 (14 fits of the development set of studies/verdict)."""
+    change_s: float = 100.0
+    """The same where velocities at different times are compared, which have to be the replicate's
+    own: a fit of a flow that is reversed half way has so little drag that in ten seconds a block
+    hardly forgets the recorded velocity."""
     on_grid: float = 0.05
     """Share of the usual interval by which time stamps may be off a regular grid, on which all
     sections are simulated together; as for steps (`STEP_PLAN`)."""
@@ -57,10 +61,9 @@ class Sections:
     """Place of each sample on the grid."""
 
 
-def first_samples(track: Track) -> Integers:
-    """Return the samples of a track at which replicates begin again: in time, and after gaps."""
+def first_samples(track: Track, every: float) -> Integers:
+    """Return the samples at which replicates begin again: after so long [s], and after gaps."""
     time = track.time
-    every = RESTART.every_s
     if not _intervals(time)[1]:
         every = max(every, float(time[-1] - time[0]) / RESTART.most_irregular)
     found: list[int] = []

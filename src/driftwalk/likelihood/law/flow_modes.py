@@ -80,8 +80,8 @@ def require_one_flow(ready: PreparedRecordings) -> None:
         )
     if ready.measured is not None:
         raise InputError(
-            f"{argument_text('flow_modes', ready.study.fit.flow_modes)} does not go with a measured "
-            "flow, which is steady: leave one of them out"
+            f"{argument_text('flow_modes', ready.study.fit.flow_modes)} does not go with a "
+            "measured flow, which is steady: leave one of them out"
         )
 
 

@@ -26,8 +26,8 @@ def regular(minutes: float) -> Floats:
 
 def test_a_regular_recording_begins_again_every_ten_seconds() -> None:
     track = track_at(regular(3.0))
-    first = first_samples(track)
-    np.testing.assert_allclose(track.time[first] - 5.0, RESTART.every_s * np.arange(18), atol=1e-9)
+    first = first_samples(track, RESTART.steps_s)
+    np.testing.assert_allclose(track.time[first] - 5.0, RESTART.steps_s * np.arange(18), atol=1e-9)
     (one,) = sections_of(track, first, window=WINDOW_S)
     np.testing.assert_allclose(one.time, 0.1 * np.arange(101), atol=1e-9)
 
@@ -39,7 +39,7 @@ def test_sections_hold_each_sample_at_its_time(dropped: float, jitter: float) ->
     time = time[(generator.random(time.size) >= dropped) | (time == time[0])]
     time = time + jitter * generator.uniform(-1.0, 1.0, time.size)
     track = track_at(np.concatenate([time, time[-1] + 7.0 + 0.1 * np.arange(100)]))
-    first = first_samples(track)
+    first = first_samples(track, RESTART.steps_s)
     parts = sections_of(track, first, window=WINDOW_S)
     assert len(parts) == (1 if jitter < 1e-3 else first.size)
     samples = np.concatenate([one.sample for one in parts])
@@ -56,14 +56,14 @@ def test_sections_hold_each_sample_at_its_time(dropped: float, jitter: float) ->
 def test_an_irregular_recording_begins_again_less_often() -> None:
     generator = np.random.default_rng(3)
     time = 5.0 + np.cumsum(generator.uniform(0.05, 0.15, size=12_000))
-    assert first_samples(track_at(time)).size == RESTART.most_irregular
+    assert first_samples(track_at(time), 10.0).size == RESTART.most_irregular
 
 
 def test_starts_are_where_the_recording_is_and_how_it_moves() -> None:
     time = regular(2.0)
     angle = 0.7 * time
     track = Track(time, 0.1 * np.cos(angle), 0.1 * np.sin(angle), angle)
-    first = first_samples(track)
+    first = first_samples(track, RESTART.steps_s)
     for one in sections_of(track, first, window=WINDOW_S):
         at = angle[first]
         start = [np.asarray(axis) for axis in one.start]
@@ -77,7 +77,7 @@ def test_starts_are_where_the_recording_is_and_how_it_moves() -> None:
 def test_steps_are_those_of_the_sections_alone(interval: float) -> None:
     track = track_at(regular(2.0))
     reference = StepDistance().prepare(track, step_interval=interval)
-    plan = within_sections(reference.plan, first_samples(track))
+    plan = within_sections(reference.plan, first_samples(track, 10.0))
     steps = apply_steps(plan, track.x, track.y)
     found = np.column_stack([steps.step_length, steps.turning_angle])
     lengths, angles = [], []
