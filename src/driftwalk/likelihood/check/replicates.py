@@ -164,7 +164,9 @@ def problems_of(
     return found
 
 
-def _in_frames(flow: xr.Dataset, series: Series, point: Point, spline: Spline) -> xr.Dataset:
+def _in_frames(
+    flow: xr.Dataset, series: Series, point: Point, spline: Spline | None = None
+) -> xr.Dataset:
     """Return a flow with the strength and the modes that a fit has found; a steady one as it is."""
     first, span = float(series.time[0]), float(series.time[-1] - series.time[0])
     if layer_strengths(series, point) is None:
@@ -189,7 +191,7 @@ def _in_frames(flow: xr.Dataset, series: Series, point: Point, spline: Spline) -
     assert strengths is not None
     water = np.stack([flow["u"].values, flow["v"].values])
     total = strengths[0][:, None, None, None] * water
-    if point.layers > 1:
+    if spline is not None and point.layers > 1:
         x, y = flow["x"].values, flow["y"].values
         for strength, layer in zip(strengths[1:], point.coefficients[1:], strict=True):
             total += strength[:, None, None, None] * spline.values(layer, x, y)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 from euler_blocks import (
     DEPTH_M,
     DRAG,
@@ -22,19 +23,22 @@ from fit_worlds import coarse_study, fitted, recording
 import driftwalk as dw
 from driftwalk.core.errors import InputError
 from driftwalk.flow.arena import outline_of
+from driftwalk.flow.grid import make_grid
 from driftwalk.likelihood.check import replicates
 from driftwalk.likelihood.filter.filter_pass import Passes, Sums
 from driftwalk.likelihood.filter.parameters import Point
-from driftwalk.likelihood.filter.series import layer_strengths, mode_amplitudes
+from driftwalk.likelihood.filter.series import body_of, layer_strengths, mode_amplitudes, series_of
+from driftwalk.likelihood.fitted_modes import mode_frames, mode_variables
 from driftwalk.likelihood.law import flow_modes
 from driftwalk.likelihood.law.flow_modes import modes_at
 from driftwalk.likelihood.law.shape_changes import ShapeChange
-from driftwalk.likelihood.preparation import body_of, series_of
+from driftwalk.likelihood.newton import ModeSearch
+from driftwalk.likelihood.preparation import prepare
 from driftwalk.likelihood.prior import Prior, Weights
 from driftwalk.likelihood.spline import lay_spline
+from driftwalk.likelihood.start import first_point, first_weights
 from driftwalk.model import Study, apply_overrides
 from driftwalk.schema import body_track
-from driftwalk.schema.answers.facts import facts_of
 
 PERIOD, SHARE = 20.0, 0.3
 
@@ -136,7 +140,8 @@ def test_replicates_are_in_the_flow_with_its_modes(passes: Passes, point: Point)
 
 
 def line(frequency: float, p_value: float) -> ShapeChange:
-    return ShapeChange(frequency, p_value, 600.0 * frequency, 100.0)
+    candidates = (frequency,) if math.isfinite(frequency) else ()
+    return ShapeChange(frequency, p_value, 600.0 * frequency, 100.0, candidates)
 
 
 @pytest.mark.parametrize(
@@ -195,23 +200,28 @@ def test_eddies_that_alternate_are_found() -> None:
             "block.depth_m": DEPTH_M,
             "forces.force_interval_s": FORCE_INTERVAL_S,
             "fit.spline_spacing_m": 0.04,
-            "fit.law": "paper",
-            "fit.camera": "exact",
-            "fit.force_memory_s": "white",
-            "fit.flow_strength": "constant",
-            "fit.flow_modes": "auto",
         },
     )
     # Every second sample, for speed.
-    fit = dw.fit_motion(made.isel(time=slice(None, None, 2)), study)
-    facts = facts_of(fit)
-    assert facts["mode_frequency_Hz"] == pytest.approx(1.0 / PERIOD, rel=1e-3)
-    assert fit.sizes["flow_mode"] == 1
-    assert float(fit["mode_share"][0]) == pytest.approx(SHARE / math.sqrt(2.0), rel=0.15)
-    low, high = facts["drag_coefficient_interval"]
-    assert abs(np.log(DRAG / np.sqrt(low * high))) < 2.0 * np.log(high / low)
-    # The flow of the fit is a series over one period, whose mean is that of the fit.
-    flow = dw.fitted_flow(fit)
-    assert flow.attrs["repeat"] == "loop"
-    assert float(flow["time"][-1]) == pytest.approx(PERIOD, rel=1e-3)
-    np.testing.assert_allclose(flow["u"][:-1].mean("time"), fit["u"], atol=1e-9)
+    ready = prepare([made.isel(time=slice(None, None, 2))], study, "state", None)
+    search = ModeSearch(ready.passes, Prior(ready.passes), study.fit.iterations)
+    spline = ready.passes.spline
+    steady = search.find(first_point(ready, spline), first_weights(ready.tracks, spline))
+    assert steady is not None
+    assert math.exp(steady.point.log_drag) < 0.8 * DRAG
+    found = modes_at(search, steady, line(1.003 / PERIOD, 1e-40), "auto")
+    assert found.layers == 2
+    assert found.start is not None
+    assert found.opened["mode_frequency"] == pytest.approx(1.0 / PERIOD, rel=1e-3)
+    assert math.exp(found.start.log_drag) == pytest.approx(DRAG, rel=0.06)
+    # The flow of a fit is a series over one period, whose mean is the mean flow.
+    grid = make_grid(outline_of(study.tank.to_arena()), cells=50, cell_size=None)
+    x, y = grid.nodes()
+    seen = np.where(np.hypot(x, y) < 0.07, 9.0, 0.0).reshape(grid.shape)
+    data, coords = mode_variables(found.start, ready.series[0], spline, grid, seen)
+    assert float(data["mode_share"][1][0]) == pytest.approx(SHARE / math.sqrt(2.0), rel=0.3)
+    u, v = spline.values(found.start.mean_coefficients, grid.x, grid.y)
+    fit = xr.Dataset({**data, "u": (("y", "x"), u), "v": (("y", "x"), v)}, coords)
+    time, frames = mode_frames(fit, {"u": u, "v": v})
+    assert time[-1] == pytest.approx(PERIOD, rel=1e-3)
+    np.testing.assert_allclose(frames["u"][:-1].mean(axis=0), u, atol=1e-9)
