@@ -117,11 +117,7 @@ class FitWork:
             found = estimate_wall(found, self.recordings, body=self.body, tell=tell)
         if self.check:
             course.begin("check")
-            before = found
             found, check = judge_fit(found, self.recordings, body=self.body)
-            if float(found["spline_spacing"]) < float(before["spline_spacing"]):
-                run.keep("flow.nc", fitted_flow(found))
-                self.fitted(found)
             if check is not None:
                 check = run.keep("check.nc", check)
         # The fit was stored before, so that a kill does not lose it; now with all that was added.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -342,7 +342,6 @@ def judge_fit(
         return _unchecked(
             fit, f"the model cannot be checked: the check broke down ({reason_of(error)})"
         )
-    fit, check = _with_finer_knots(fit, check, recordings, body=body)
     if is_against_water(facts_of(fit)):
         fit, check = _with_angle_tried(fit, check, recordings, body=body)
     check = _with_flow_left_out(fit, check, recordings, body=body)
@@ -354,62 +353,6 @@ def _unchecked(fit: xr.Dataset, why: str) -> Judged:
     verdict = verdict_of([], [why])
     stored = fit.assign(verdict_variables(verdict)).assign_attrs(check_left_out=why)
     return Judged(described(stored), None)
-
-
-class KnotPolicy(NamedTuple):
-    """How close the knots of a flow may come where the usual ones do not explain the recording."""
-
-    factor: float = 0.7
-    """Distance between knots over that before."""
-    least_sides: float = 0.3
-    """Least distance, in sides of the block: the block averages what is smaller. Chosen by hand."""
-
-
-KNOTS: Final = KnotPolicy()
-
-
-def _with_finer_knots(
-    fit: xr.Dataset, check: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str | None
-) -> tuple[xr.Dataset, xr.Dataset]:
-    """Fit with knots closer together while the model does not explain the recording so.
-
-    Where a body stays in eddies that are hardly larger than the distance between knots, the spline
-    misses them by a percent, and a power of the drag or a turning of the block stands in for it.
-    """
-    from driftwalk.model import apply_overrides, parse_study
-
-    study = parse_study(fit.attrs["study"])
-    usual = float(fit["spline_spacing"])
-    # What was added to a fit belongs to its knots, and a change of shape needs no finer ones.
-    added = {"wall_contacts", "compared_law"} & {*fit.variables, *fit.dims}
-    if study.fit.spline_spacing_m != "auto" or added or "flow_shape_change" in fit.attrs:
-        return fit, check
-    spacing = KNOTS.factor * usual
-    while (
-        check["verdict"] == DOES_NOT_EXPLAIN and spacing >= KNOTS.least_sides * study.block.side_m
-    ):
-        finer = apply_overrides(study, {"fit.spline_spacing_m": spacing})
-        try:
-            rival = fit_motion(
-                recordings, finer, angle=fit.attrs["angle"], body=body, flow=stored_flow(fit)
-            )
-            before, after = (
-                log_evidence(estimate_of(one, recordings, body=body)) for one in (fit, rival)
-            )
-            if after - before < LEAST_EVIDENCE:
-                break
-            fit, check = rival, check_model(rival, recordings, body=body)
-        except (InputError, *BREAKDOWN):
-            break
-        spacing *= KNOTS.factor
-    found = float(fit["spline_spacing"])
-    if found < usual:
-        said = (
-            f"the flow has structure that knots {1e3 * usual:.0f} mm apart miss: it was fitted "
-            f"with knots {1e3 * found:.0f} mm apart"
-        )
-        fit = fit.assign_coords(warning=("warning", texts([*sentences(fit, "warning"), said])))
-    return fit, check
 
 
 def _with_angle_tried(
