@@ -696,6 +696,7 @@ NOT_COMPARED: dict[str, str] = {
     "driftwalk report run/ *": "the size of a page with all figures, which a test leaves out",
     "driftwalk calibrate recording.csv --study *": "takes minutes: a test has a smaller search",
     "driftwalk compare recording.csv sim.nc": "of half an hour in one world",
+    "driftwalk fit recording.csv --flow piv.csv *": "of half an hour: a test takes a part of it",
 }
 """Commands whose shown numbers no test compares with fresh ones, and why."""
 """The pages with examples. Each of `ELSEWHERE` has a test of its own."""

@@ -62,7 +62,7 @@ class Sections:
 
 
 def first_samples(track: Track, every: float) -> Integers:
-    """Return the samples at which replicates begin again: after so long [s], and after gaps."""
+    """Return the samples at which replicates begin again: every `every` seconds, and after gaps."""
     time = track.time
     if not _intervals(time)[1]:
         every = max(every, float(time[-1] - time[0]) / RESTART.most_irregular)
