@@ -252,7 +252,7 @@ def _laws_of(
             return [one.thinned(EXCERPT.interval_s) for one in ready.undisturbed()]
 
         def of_all(mode: Mode) -> Mode | None:
-            return search.refined().find(mode.point, mode.weights, held=FROM_THINNED)
+            return search.find(mode.point, mode.weights, held=FROM_THINNED)
 
         laws = LawSearch(replace(search, passes=few), assumptions, undisturbed)
         law = laws.find(start, weights)

@@ -53,9 +53,6 @@ class SearchPolicy(NamedTuple):
     """And when a whole step would raise the log likelihood by less than this [nat]. Hundreds of
     coefficients may each move by little and gain 100 nats together: on the plateau at the edge of a
     narrow jet a search ended 170 nats above its minimum."""
-    refined_nats: float = 5.0
-    """The same where the mode of samples further apart is refined with all of them: what is left
-    then are some hundredths of a standard deviation, as measured at 100 Hz."""
     most_left: float = 2.0
     """Standard deviations from the maximum beyond which an interval does not hold it. A body that
     is driven on a circle without any force was given up 5 to 80 away."""
@@ -170,10 +167,6 @@ class ModeSearch:
     def coarse(self) -> ModeSearch:
         """Return a search that ends a little earlier, where another one follows."""
         return replace(self, close=SEARCH.close_enough, close_nats=math.inf)
-
-    def refined(self) -> ModeSearch:
-        """Return the search that begins at the mode of samples further apart."""
-        return replace(self, close=SEARCH.close_enough, close_nats=SEARCH.refined_nats)
 
     def find(self, start: Point, weights: Weights, *, held: Held = FROM_AFAR) -> Mode | None:
         """Return the mode; None where the search breaks down, as under a wrong law it may."""

@@ -157,7 +157,7 @@ class Passes:
         right = np.zeros((used.size, white.shape[1], 1 + len(changes)))
         right[used] = np.stack([white, *changes], axis=-1)
         kernel = self.kernel(series, point, sensitivities=True)
-        found = kernel.sums(used.astype(np.uint8), right, pooled=series.pooled)
+        found = kernel.sums(used.astype(np.uint8), right)
         # ln det S / 2 is the sum of the logarithms on the diagonal of its Cholesky factor.
         deviance = 0.5 * float((white**2).sum()) + float(
             np.log(np.einsum("aan->an", factor(base["covariance"][used]))).sum()
