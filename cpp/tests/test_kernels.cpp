@@ -126,9 +126,9 @@ void check_infer(Numbers& all) {
     driftwalk::InnovationsFilter filter(track, model, {4.5e-5, 3e-4, 1e-4, 0.01, 0.05, 1.0}, true);
     std::vector<double> innovation(3 * 60), covariance(6 * 60);
     std::vector<std::uint8_t> used(60), kept(60, 1);
-    const auto sums = filter.sums(
-        kept.data(), right.data(), 1, 1,
-        {innovation.data(), covariance.data(), used.data(), nullptr, nullptr, nullptr});
+    const auto sums =
+        filter.sums(kept.data(), right.data(), 1, 1,
+                    {innovation.data(), covariance.data(), used.data(), nullptr, nullptr, nullptr});
     CHECK(sums.information.front() >= 0 && sums.information.back() > 0);
     append(all, sums.information);
     append(all, sums.products);
