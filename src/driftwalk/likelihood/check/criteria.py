@@ -67,8 +67,8 @@ class LeastPolicy(NamedTuple):
 
     ks_distance: float = 0.1
     """KS distance of the steps from those of drawn replicates. Fits of the model itself, with C_d
-    within 5 %, had up to 0.09 where the block was at the wall, whose friction was not known, or in
-    an orbit smaller than itself (development set of studies/verdict)."""
+    within 5 %, had up to 0.08, in an orbit smaller than the block (development set of
+    studies/verdict)."""
 
 
 LARGEST: Final = LargestPolicy()

@@ -51,9 +51,7 @@ class MotionComparison(NamedTuple):
     drawn_distance: Floats
     """KS distance of the recording to each replicate with drawn parameters."""
     drawn_between: Floats
-    """Mean distance of each of those to the others that are in another flow."""
-    flows: int
-    """Number of drawn flows."""
+    """Mean distance of each of those to the others."""
     step_length: Density
     turning_angle: Density
 
@@ -73,21 +71,19 @@ class MotionComparison(NamedTuple):
 
     @property
     def p_value(self) -> float:
-        """The same from a normal distribution of the logarithms, which goes beyond the ranks.
-
-        Replicates in one flow are alike, so the flows count the degrees of freedom.
-        """
+        """The same from a normal distribution of the logarithms, which goes beyond the ranks."""
         from scipy.stats import t
 
         mean, spread = self._logs
-        return float(t.sf((np.log(self.drawn_distance.mean()) - mean) / spread, self.flows - 1))
+        off = (np.log(self.drawn_distance.mean()) - mean) / spread
+        return float(t.sf(off, self.drawn_between.size - 1))
 
     def detectable(self, level: float) -> float:
         """Return the mean distance that fails at a level nine times in ten; above 1 none does."""
         from scipy.stats import norm, t
 
         mean, spread = self._logs
-        sigmas = t.isf(level, self.flows - 1) + norm.ppf(POWER.share)
+        sigmas = t.isf(level, self.drawn_between.size - 1) + norm.ppf(POWER.share)
         return float(np.exp(mean + spread * sigmas))
 
     @property
@@ -117,24 +113,22 @@ def compare_motion(
     real: Floats, at_estimate: EstimateDistances, drawn: Replicates, *, threads: int
 ) -> MotionComparison:
     """Compare a recording's steps with simulated ones."""
-    _require_replicates(drawn, fewest_flows=2)
+    _require_replicates(drawn)
     among = _distances_among(drawn.steps, threads)
-    among[drawn.flow[:, None] == drawn.flow[None, :]] = np.nan
     lengths = step_length_edges(*(steps[:, 0] for steps in (real, *drawn.steps)), bins=BINS)
     widest = max(float(np.abs(steps[:, 1]).max()) for steps in (real, *drawn.steps))
     return MotionComparison(
         *at_estimate,
         _distances([real], drawn.steps, threads)[0],
-        np.nanmean(among, axis=1),
-        int(np.unique(drawn.flow).size),
+        among.sum(axis=1) / (len(among) - 1),
         _density(real, drawn, 0, lengths),
         _density(real, drawn, 1, np.linspace(-widest, widest, BINS + 1)),
     )
 
 
-def _require_replicates(found: Replicates, *, fewest_flows: int = 1) -> None:
+def _require_replicates(found: Replicates) -> None:
     sound = len(found.steps)
-    if sound < FEWEST_REPLICATES or np.unique(found.flow).size < fewest_flows:
+    if sound < FEWEST_REPLICATES:
         raise InputError(
             f"{found.broken} of {found.broken + sound} simulated recordings broke down: the fitted "
             "model cannot be simulated"

@@ -75,20 +75,17 @@ class Replicated:
     plan: StepPlan
     """Of the steps within the sections."""
     outline: Outline
-    side: float
     angle: str
     """Use of the orientations, of which "none" is without them."""
-    recorded: Floats
-    """The recording's steps, (pairs, 2)."""
 
     def steps(self, x: Floats, y: Floats, theta: Floats) -> Floats:
         """Return the step lengths [m] and turning angles [rad] away from the wall, (pairs, 2).
 
         Contacts are not fitted, and next to the wall the flow is not known.
         """
-        turned = None if self.angle == "none" else theta
+        turned, side = None if self.angle == "none" else theta, self.problem.study.block.side_m
         time = self.problem.like.sample_time
-        left_out = wall_intervals(time, x, y, turned, outline=self.outline, side=self.side)
+        left_out = wall_intervals(time, x, y, turned, outline=self.outline, side=side)
         left_out[:-1] |= left_out[1:]
         found = apply_steps(self.plan, *(np.where(left_out, np.nan, axis) for axis in (x, y)))
         return np.column_stack([found.step_length, found.turning_angle])
@@ -101,19 +98,14 @@ class Replicates(NamedTuple):
     """Step lengths [m] and turning angles [rad] of each, (pairs, 2)."""
     paths: list[list[Path]]
     """Each one's recordings, where they are wanted: times [s], x and y [m]."""
-    flow: Integers
-    """Which drawn flow each was in."""
     broken: int
     """How many were left out."""
 
 
 def problems_of(
-    fit: xr.Dataset, estimate: Estimate, recordings: Sequence[xr.Dataset], *, every: float
-) -> list[Replicated]:
-    """Return the series ready for comparison, each in its fitted flow, with one step interval.
-
-    Their replicates begin again after the time `every` [s].
-    """
+    fit: xr.Dataset, estimate: Estimate, recordings: Sequence[xr.Dataset]
+) -> list[Problem]:
+    """Return the series ready for comparison, each in its fitted flow, with one step interval."""
     from driftwalk.conditions.study import fitted_wall
     from driftwalk.model import apply_overrides
 
@@ -128,7 +120,7 @@ def problems_of(
         interval = max(plan_steps(track.time).step_interval for track in tracks)
         study = apply_overrides(study, {"steps.step_interval_s": interval})
     noise = fitted_value(fit, "tracking_noise")
-    found = []
+    problems = []
     for track, one in zip(tracks, series, strict=True):
         quantum = float(recordings[one.recording].attrs.get("position_quantum_m", 0.0))
         # The rounding of the file is part of the noise that the fit finds, and is simulated apart.
@@ -141,32 +133,45 @@ def problems_of(
         seen = apply_overrides(study, camera)
         made = recorded_camera(track, seen, position_quantum=quantum)
         flow = _in_frames(flows[one.flow], one, estimate.point, estimate.passes.spline)
-        problem = prepare_problem(track, seen, flow, camera=made)
-        first = first_samples(track, every)
-        ready = Replicated(
-            problem,
-            first,
-            sections_of(track, first, window=study.flow.smoothing_window_s),
-            within_sections(problem.reference.plan, first),
-            outline_of(study.tank.to_arena()),
-            study.block.side_m,
-            estimate.passes.body.orientation,
-            np.zeros((0, 2)),
-        )
-        theta = np.where(np.isfinite(track.theta), track.theta, one.angle)
-        found.append(replace(ready, recorded=ready.steps(track.x, track.y, theta)))
-    pairs = sum(len(one.recorded) for one in found)
-    if pairs < FEWEST_PAIRS:
-        raise InputError(
-            f"the recording has {pairs} pairs of steps away from the wall, and {FEWEST_PAIRS} at "
-            "least are needed"
+        problems.append(prepare_problem(track, seen, flow, camera=made))
+    return problems
+
+
+def restarted(problems: Sequence[Problem], estimate: Estimate, *, every: float) -> list[Replicated]:
+    """Return the series, whose replicates begin again after the time `every` [s]."""
+    found = []
+    for problem, track in zip(problems, estimate.tracks, strict=True):
+        study, first = problem.study, first_samples(track, every)
+        found.append(
+            Replicated(
+                problem,
+                first,
+                sections_of(track, first, window=study.flow.smoothing_window_s),
+                within_sections(problem.reference.plan, first),
+                outline_of(study.tank.to_arena()),
+                estimate.passes.body.orientation,
+            )
         )
     return found
 
 
-def _in_frames(
-    flow: xr.Dataset, series: Series, point: Point, spline: Spline | None = None
-) -> xr.Dataset:
+def recorded_steps(series: Sequence[Replicated], estimate: Estimate) -> Floats:
+    """Return the recorded steps as those of replicates are formed, (pairs, 2)."""
+    angles = [one.angle for one in estimate.passes.series]
+    steps = [
+        one.steps(track.x, track.y, np.where(np.isfinite(track.theta), track.theta, angle))
+        for one, track, angle in zip(series, estimate.tracks, angles, strict=True)
+    ]
+    found = np.concatenate(steps)
+    if len(found) < FEWEST_PAIRS:
+        raise InputError(
+            f"the recording has {len(found)} pairs of steps away from the wall, and {FEWEST_PAIRS} "
+            "at least are needed"
+        )
+    return found
+
+
+def _in_frames(flow: xr.Dataset, series: Series, point: Point, spline: Spline) -> xr.Dataset:
     """Return a flow with the strength and the modes that a fit has found; a steady one as it is."""
     first, span = float(series.time[0]), float(series.time[-1] - series.time[0])
     if layer_strengths(series, point) is None:
@@ -191,7 +196,7 @@ def _in_frames(
     assert strengths is not None
     water = np.stack([flow["u"].values, flow["v"].values])
     total = strengths[0][:, None, None, None] * water
-    if spline is not None and point.layers > 1:
+    if point.layers > 1:
         x, y = flow["x"].values, flow["y"].values
         for strength, layer in zip(strengths[1:], point.coefficients[1:], strict=True):
             total += strength[:, None, None, None] * spline.values(layer, x, y)
@@ -208,16 +213,10 @@ def replicates_at_estimate(
     drag, force = fitted_value(fit, "drag_coefficient"), fitted_value(fit, "force_std")
     point = estimate.point
     parts = [
-        _simulated(
-            one,
-            _keys(seed, CheckStream.ESTIMATE, index, one, count),
-            drag,
-            force,
-            point,
-        )
+        _simulated(one, _keys(seed, CheckStream.ESTIMATE, index, one, count), drag, force, point)
         for index, one in enumerate(series)
     ]
-    return _joined(parts, np.zeros(count, dtype=np.int64))
+    return _joined(parts)
 
 
 def posterior_replicates(
@@ -230,7 +229,10 @@ def posterior_replicates(
     seed: int,
     with_path: bool = False,
 ) -> Replicates:
-    """Simulate the recordings with flow and parameters drawn from what the fit leaves open."""
+    """Simulate the recordings with flow and parameters drawn from what the fit leaves open.
+
+    The replicates have their steps, or their paths.
+    """
     points, factors = _posterior_samples(fit, estimate, spread, count, seed)
     drag = fitted_value(fit, "drag_coefficient") * factors[:, 0]
     force = fitted_value(fit, "force_std") * factors[:, 1]
@@ -260,7 +262,7 @@ def posterior_replicates(
 
         found = map_in_threads(simulated, range(count), one.problem.like.threads)
         parts.append([world for (world,) in found])
-    return _joined(parts, np.arange(count))
+    return _joined(parts)
 
 
 def _posterior_samples(
@@ -330,11 +332,12 @@ def _simulated(
     for k, key in enumerate(keys[:, 0]):
         x, y, theta = poses[:, k].astype(np.float64)
         x, y = _as_seen(x, y, theta, time=time, point=point, key=int(key))
-        steps = one.steps(x, y, theta)
-        path: Path | None = None
         if with_path:
             path = (at, x[shown].astype(np.float32), y[shown].astype(np.float32))
-        worlds.append(_World(steps, path, bool(sound[k] and len(steps) > 0)))
+            worlds.append(_World(np.zeros((0, 2)), path, bool(sound[k])))
+            continue
+        steps = one.steps(x, y, theta)
+        worlds.append(_World(steps, None, bool(sound[k] and len(steps) > 0)))
     return worlds
 
 
@@ -383,17 +386,15 @@ def _as_seen(
     return x, y
 
 
-def _joined(parts: Sequence[Sequence[_World]], flow_of: Integers) -> Replicates:
+def _joined(parts: Sequence[Sequence[_World]]) -> Replicates:
     """Put the recordings of each replicate together."""
     whole = list(zip(*parts, strict=True))
-    sound = np.array([all(world.sound for world in one) for one in whole])
-    retained = [whole[k] for k in np.flatnonzero(sound)]
+    retained = [one for one in whole if all(world.sound for world in one)]
     return Replicates(
         [
             one[0].steps if len(one) == 1 else np.concatenate([world.steps for world in one])
             for one in retained
         ],
         [[world.path for world in one if world.path is not None] for one in retained],
-        flow_of[sound],
-        int(np.count_nonzero(~sound)),
+        len(whole) - len(retained),
     )

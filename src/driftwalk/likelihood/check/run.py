@@ -29,7 +29,9 @@ from driftwalk.likelihood.check.posterior_predictive import (
 from driftwalk.likelihood.check.replicates import (
     posterior_replicates,
     problems_of,
+    recorded_steps,
     replicates_at_estimate,
+    restarted,
 )
 from driftwalk.likelihood.check.restarts import RESTART
 from driftwalk.likelihood.check.scan import scan_of
@@ -235,23 +237,23 @@ def check_model(
     }
     parts = [white_variables(found), place_variables(found)]
     try:
-        problems = problems_of(fit, estimate, many, every=RESTART.steps_s)
-        real = np.concatenate([one.recorded for one in problems])
-        threads = problems[0].problem.like.threads
+        problems = problems_of(fit, estimate, many)
+        series = restarted(problems, estimate, every=RESTART.steps_s)
+        real, threads = recorded_steps(series, estimate), problems[0].like.threads
         # One set after the other: of a fast camera each takes a hundred megabytes.
         near = distances_at_estimate(
             real,
-            replicates_at_estimate(fit, estimate, problems, count=replicates, seed=seed),
+            replicates_at_estimate(fit, estimate, series, count=replicates, seed=seed),
             threads=threads,
         )
         drawn = posterior_replicates(
-            fit, estimate, problems, found.leverage.spread, count=replicates, seed=seed
+            fit, estimate, series, found.leverage.spread, count=replicates, seed=seed
         )
         motion = compare_motion(real, near, drawn, threads=threads)
         free = posterior_replicates(
             fit,
             estimate,
-            problems_of(fit, estimate, many, every=RESTART.change_s),
+            restarted(problems, estimate, every=RESTART.change_s),
             found.leverage.spread,
             count=replicates,
             seed=seed,

@@ -24,6 +24,7 @@ import driftwalk as dw
 from driftwalk.likelihood.check import replicates
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import Series
+from driftwalk.likelihood.spline import Spline
 from driftwalk.model import Study, apply_overrides
 from driftwalk.schema.answers.facts import facts_of
 
@@ -101,6 +102,9 @@ def point_of(**numbers: float) -> Point:
     return Point(np.zeros((2, 4, 4)), 0.0, 0.0, 0.0, opened=numbers)
 
 
+SPLINE = Spline(-0.15, -0.15, 0.3, 4, 4)
+
+
 def at(flow: xr.Dataset, time: Any) -> np.ndarray:
     return np.asarray(flow["u"].isel(x=0, y=0).interp(time=time).values)
 
@@ -108,12 +112,12 @@ def at(flow: xr.Dataset, time: Any) -> np.ndarray:
 def test_frames_follow_the_cosines_and_the_pulses() -> None:
     series, time = made_up_series(100.0), np.linspace(0.0, 100.0, 77)
     slow = point_of(strength_1=-0.1, strength_6=0.02)
-    flow = replicates._in_frames(one_flow(), series, slow)
+    flow = replicates._in_frames(one_flow(), series, slow, SPLINE)
     expected = 1.0 - 0.1 * np.cos(np.pi * time / 100.0) + 0.02 * np.cos(6 * np.pi * time / 100.0)
     assert at(flow, time) / 0.02 == pytest.approx(expected, abs=1e-3)
     assert flow.attrs["repeat"] == "hold"
     pulsing = point_of(pulse_cosine=0.1, pulse_sine=0.2, pulse_frequency=0.05)
-    flow = replicates._in_frames(one_flow(), series, pulsing)
+    flow = replicates._in_frames(one_flow(), series, pulsing, SPLINE)
     phase = 2.0 * np.pi * 0.05 * time
     expected = 1.0 + 0.1 * np.cos(phase) + 0.2 * np.sin(phase)
     # One period of 20 s, which is repeated.
@@ -123,10 +127,10 @@ def test_frames_follow_the_cosines_and_the_pulses() -> None:
 
 def test_a_steady_flow_stays_as_it_is_and_a_fast_one_is_refused() -> None:
     series, flow = made_up_series(100.0), one_flow()
-    assert replicates._in_frames(flow, series, point_of()) is flow
+    assert replicates._in_frames(flow, series, point_of(), SPLINE) is flow
     fast = point_of(strength_1=0.1, pulse_sine=0.1, pulse_frequency=4.0)
     with pytest.raises(dw.core.errors.InputError, match="6401 frames would be needed"):
-        replicates._in_frames(flow, series, fast)
+        replicates._in_frames(flow, series, fast, SPLINE)
 
 
 def test_a_camera_sees_the_marker_and_is_late() -> None:

@@ -305,7 +305,7 @@ def test_scan_of_steady_motion_is_not_alarmed(fresh_seed: Callable[[int], int]) 
 def replicates(seed: int, *, count: int = 8, spread: float = 1.0) -> Replicates:
     generator = np.random.default_rng(seed)
     steps = [np.abs(generator.normal(size=(500, 2))) * spread for _ in range(count)]
-    return Replicates(steps, [[] for _ in steps], np.arange(count) % 4, 0)
+    return Replicates(steps, [[] for _ in steps], 0)
 
 
 def test_distances_and_bands_by_brute_force() -> None:
@@ -317,7 +317,7 @@ def test_distances_and_bands_by_brute_force() -> None:
     pairs = [ks_distance(a, b) for a in estimate.steps[:4] for b in estimate.steps[4:]]
     assert found.floor == pytest.approx(pairs)
     for k, one in enumerate(drawn.steps):
-        others = [s for j, s in enumerate(drawn.steps) if drawn.flow[j] != drawn.flow[k]]
+        others = [s for j, s in enumerate(drawn.steps) if j != k]
         assert found.drawn_between[k] == pytest.approx(
             np.mean([ks_distance(one, s) for s in others])
         )
@@ -349,7 +349,7 @@ def test_steps_that_differ_are_put_into_words() -> None:
 
 
 def test_too_few_sound_replicates_are_refused() -> None:
-    few = Replicates(replicates(4).steps[:2], [[], []], np.arange(2), 6)
+    few = Replicates(replicates(4).steps[:2], [[], []], 6)
     with pytest.raises(InputError, match="6 of 8 simulated recordings broke down"):
         compare_motion(np.ones((40, 2)), replicates(5), few, threads=1)
 

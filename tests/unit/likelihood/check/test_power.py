@@ -33,9 +33,7 @@ def test_nine_in_ten_simulated_alternatives_fail() -> None:
 def motion(*, distance: float, floor: float, between: np.ndarray) -> MotionComparison:
     none = Density(*np.zeros((5, 1)))
     drawn = np.full(16, distance)
-    return MotionComparison(
-        np.full(16, distance), np.full(64, floor), drawn, between, 8, none, none
-    )
+    return MotionComparison(np.full(16, distance), np.full(64, floor), drawn, between, none, none)
 
 
 def test_the_detectable_distance_fails_at_the_level_and_nine_times_in_ten() -> None:
