@@ -31,16 +31,44 @@ driftwalk::Angle angle_of(const std::string& orientation) {
   return driftwalk::Angle::state;
 }
 
+// A body that is no single square block; empty for the block.
+struct BodyArrays {
+  std::optional<In<double, 2>> panels, moment_points;
+  double mass_by_inertia = 0;
+  int symmetry = 4;
+  bool round = false;
+};
+
+driftwalk::FloatingBlock floating_block(double side, double mass, double depth, int strips,
+                                        double water_density, const BodyArrays& body) {
+  driftwalk::FloatingBlock block{side, mass, depth, strips, water_density};
+  if (body.panels.has_value() != body.moment_points.has_value() ||
+      (body.panels && (body.panels->shape(0) == 0 || body.panels->shape(1) != 5 ||
+                       body.moment_points->shape(0) != 4 || body.moment_points->shape(1) != 2))) {
+    throw std::invalid_argument("panels must have shape (n, 5) and moment_points (4, 2)");
+  }
+  if (body.panels) {
+    block.panels = body.panels->data();
+    block.panel_count = static_cast<int>(body.panels->shape(0));
+    block.moment_points = body.moment_points->data();
+    block.mass_by_inertia = body.mass_by_inertia;
+    block.symmetry = body.symmetry;
+    block.round = body.round;
+  }
+  return block;
+}
+
 DragModel drag_model(double side, double mass, double depth, int strips, double water_density,
                      double origin_x, double origin_y, double spacing, int columns, int rows,
                      const In<double, 3>& coefficients, double drag_coefficient,
-                     const std::string& orientation, const driftwalk::ForceLaw& law) {
+                     const std::string& orientation, const driftwalk::ForceLaw& law,
+                     const BodyArrays& body) {
   const auto layers = static_cast<int>(coefficients.shape(0) / 2);
   if (layers < 1 || coefficients.shape(0) % 2 != 0 || coefficients.shape(1) != std::size_t(rows) ||
       coefficients.shape(2) != std::size_t(columns)) {
     throw std::invalid_argument("coefficients must have shape (2 layers, rows, columns)");
   }
-  return DragModel({side, mass, depth, strips, water_density},
+  return DragModel(floating_block(side, mass, depth, strips, water_density, body),
                    {nullptr, origin_x, origin_y, spacing, columns, rows, layers},
                    coefficients.data(), drag_coefficient, angle_of(orientation), law);
 }
@@ -176,11 +204,14 @@ nb::dict expected_drag(double side, double mass, double depth, int strips, doubl
                        const std::string& orientation, const In<double, 1>& mean, double theta,
                        double omega, const In<double, 2>& covariance, double quadratic,
                        double linear, double water_acceleration, double water_spin,
-                       double drag_power, double drag_speed) {
+                       double drag_power, double drag_speed, std::optional<In<double, 2>> panels,
+                       std::optional<In<double, 2>> moment_points, double mass_by_inertia,
+                       int symmetry, bool round) {
   const DragModel model =
       drag_model(side, mass, depth, strips, water_density, origin_x, origin_y, spacing, columns,
                  rows, coefficients, drag_coefficient, orientation,
-                 {quadratic, linear, water_acceleration, water_spin, {drag_power, drag_speed}});
+                 {quadratic, linear, water_acceleration, water_spin, {drag_power, drag_speed}},
+                 {std::move(panels), std::move(moment_points), mass_by_inertia, symmetry, round});
   return model.angle() == driftwalk::Angle::state
              ? response_of<3>(model, coefficients, mean, theta, omega, covariance)
              : response_of<2>(model, coefficients, mean, theta, omega, covariance);
@@ -202,7 +233,9 @@ void register_infer(nb::module_& module) {
              const std::string& orientation, bool sensitivities,
              const std::optional<In<double, 2>>& strength, double quadratic, double linear,
              double water_acceleration, double water_spin, double drag_power, double drag_speed,
-             double time_noise, double force_memory) {
+             double time_noise, double force_memory, std::optional<In<double, 2>> panels,
+             std::optional<In<double, 2>> moment_points, double mass_by_inertia, int symmetry,
+             bool round) {
             const std::size_t n = time.size();
             if (x.size() != n || y.size() != n || theta.size() != n || omega.size() != n ||
                 excluded.size() != n || (strength && strength->shape(1) != n)) {
@@ -219,7 +252,9 @@ void register_infer(nb::module_& module) {
                 drag_model(
                     side, mass, depth, strips, water_density, origin_x, origin_y, spacing, columns,
                     rows, coefficients, drag_coefficient, orientation,
-                    {quadratic, linear, water_acceleration, water_spin, {drag_power, drag_speed}}),
+                    {quadratic, linear, water_acceleration, water_spin, {drag_power, drag_speed}},
+                    {std::move(panels), std::move(moment_points), mass_by_inertia, symmetry,
+                     round}),
                 {noise_intensity, position_noise, force_lever, angle_noise, largest_step,
                  longest_gap, time_noise, force_memory},
                 sensitivities);
@@ -231,7 +266,9 @@ void register_infer(nb::module_& module) {
           "largest_step"_a = 0.05, "longest_gap"_a = 1.0, "orientation"_a = "given",
           "sensitivities"_a = false, "strength"_a = nb::none(), "quadratic"_a = 1.0,
           "linear"_a = 0.0, "water_acceleration"_a = 0.0, "water_spin"_a = 0.0,
-          "drag_power"_a = 2.0, "drag_speed"_a = 0.03, "time_noise"_a = 0.0, "force_memory"_a = 0.0)
+          "drag_power"_a = 2.0, "drag_speed"_a = 0.03, "time_noise"_a = 0.0, "force_memory"_a = 0.0,
+          "panels"_a = nb::none(), "moment_points"_a = nb::none(), "mass_by_inertia"_a = 0.0,
+          "symmetry"_a = 4, "round"_a = false)
       .def_prop_ro("samples", &InnovationsFilter::samples)
       .def_prop_ro("remaining", &InnovationsFilter::remaining)
       .def_prop_ro("parameters", &InnovationsFilter::parameters)
@@ -243,5 +280,6 @@ void register_infer(nb::module_& module) {
              "rows"_a, "coefficients"_a, "drag_coefficient"_a, "orientation"_a, "mean"_a, "theta"_a,
              "omega"_a, "covariance"_a, "quadratic"_a = 1.0, "linear"_a = 0.0,
              "water_acceleration"_a = 0.0, "water_spin"_a = 0.0, "drag_power"_a = 2.0,
-             "drag_speed"_a = 0.03);
+             "drag_speed"_a = 0.03, "panels"_a = nb::none(), "moment_points"_a = nb::none(),
+             "mass_by_inertia"_a = 0.0, "symmetry"_a = 4, "round"_a = false);
 }

@@ -52,6 +52,7 @@ struct ModelArrays {
   In<double, 1> frame_time, sample_time;
   In<double, 2> view_edges;
   driftwalk::FlowRepeat repeat;
+  std::optional<In<double, 2>> panels, corners, moment_points; // of a body that is no block
 };
 
 inline driftwalk::FlowRepeat repeat_of(const std::string& name) {
@@ -89,6 +90,16 @@ inline void check(const ModelArrays& arrays) {
     throw std::invalid_argument("u and v must have the same shape (frames, rows, columns), and "
                                 "frame_time one time per frame");
   }
+  if (arrays.panels.has_value() != arrays.corners.has_value() ||
+      arrays.panels.has_value() != arrays.moment_points.has_value()) {
+    throw std::invalid_argument("panels, corners and moment_points go together");
+  }
+  if (arrays.panels && (arrays.panels->shape(0) == 0 || arrays.panels->shape(1) != 5 ||
+                        arrays.corners->shape(1) != 2 || arrays.moment_points->shape(0) != 4 ||
+                        arrays.moment_points->shape(1) != 2)) {
+    throw std::invalid_argument(
+        "panels must have shape (n, 5), corners (n, 2) and moment_points (4, 2)");
+  }
   if (arrays.sample_time.size() == 0) {
     throw std::invalid_argument("a model has at least one sample");
   }
@@ -104,6 +115,13 @@ public:
     model.edge_count = static_cast<int>(arrays.edges.shape(0));
     model.view_edges = arrays.view_edges.data();
     model.view_edge_count = static_cast<int>(arrays.view_edges.shape(0));
+    if (arrays.panels) {
+      model.panels = arrays.panels->data();
+      model.panel_count = static_cast<int>(arrays.panels->shape(0));
+      model.corners = arrays.corners->data();
+      model.corner_count = static_cast<int>(arrays.corners->shape(0));
+      model.moment_points = arrays.moment_points->data();
+    }
     model.flow_u = arrays.u.data();
     model.flow_v = arrays.v.data();
     model.frames = static_cast<int>(arrays.u.shape(0));

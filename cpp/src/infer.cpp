@@ -102,12 +102,63 @@ DragModel::DragModel(const FloatingBlock& block, const SplineView& flow, const d
   block_.strip_width = block.side / block.strips;
   block_.strips = block.strips;
   block_.mass_by_inertia = 6 / (block.side * block.side);
+  block_.reach = 1.5 * block_.half_side;
+  const double at = 0.57735026918962576 * block_.half_side;
+  for (int k = 0; k < water_points; ++k) {
+    block_.points[k][0] = k & 1 ? at : -at;
+    block_.points[k][1] = k & 2 ? at : -at;
+  }
+  orientations_ = block.round ? 1 : orientations;
+  if (block.panel_count > 0) {
+    make_panels(block);
+  }
   block_.drag_scale =
       0.5 * block.water_density * drag_coefficient * block_.strip_width * block.depth / block.mass;
   for (std::size_t k = 0; k < orientations; ++k) {
-    const double turned = std::numbers::pi / 2 * double(k) / orientations;
+    const double turned = 2 * std::numbers::pi / block.symmetry * double(k) / orientations;
     cosine_[k] = std::cos(turned);
     sine_[k] = std::sin(turned);
+  }
+}
+
+// The width of a strip becomes that of the mean panel.
+void DragModel::make_panels(const FloatingBlock& block) {
+  require(positive(block.mass_by_inertia) && block.symmetry >= 1,
+          "mass over inertia and the symmetry of the body must be positive");
+  require(!block.round || angle_ == Angle::none, "a disc has no angle");
+  require(all_finite(block.panels, 5 * std::int64_t(block.panel_count)) &&
+              all_finite(block.moment_points, 8),
+          "the panels of the body and its points must be finite");
+  const int rows = (block.panel_count + 7) / 8;
+  panels_.assign(std::size_t(48 * rows), 0.0);
+  double width = 0, reach = 0;
+  for (int k = 0; k < block.panel_count; ++k) {
+    const double* const panel = block.panels + 5 * k;
+    width += panel[4] / block.panel_count;
+    reach = std::max(reach, std::hypot(panel[0], panel[1]));
+  }
+  require(positive(width), "the panels of the body must have a width");
+  for (int k = 0; k < block.panel_count; ++k) {
+    double* const at = panels_.data() + 48 * (k / 8) + k % 8;
+    for (int number = 0; number < 5; ++number) {
+      at[8 * number] = block.panels[5 * k + number] / (number == 4 ? width : 1);
+    }
+    at[40] = 1;
+  }
+  block_.panels.count = rows;
+  block_.strip_width = width;
+  block_.mass_by_inertia = block.mass_by_inertia;
+  block_.reach = 1.1 * reach;
+  // Where the angle is not known, points with the mean second moment of both axes.
+  double square = 0;
+  for (int k = 0; k < 8; ++k) {
+    square += block.moment_points[k] * block.moment_points[k] / 8;
+  }
+  for (int k = 0; k < water_points; ++k) {
+    for (int axis = 0; axis < 2; ++axis) {
+      const double even = (k >> axis & 1) != 0 ? std::sqrt(square) : -std::sqrt(square);
+      block_.points[k][axis] = angle_ == Angle::none ? even : block.moment_points[2 * k + axis];
+    }
   }
 }
 
@@ -116,13 +167,15 @@ FilterProblem DragModel::problem() const {
   problem.flow = flow_;
   problem.flow.nodes = nodes_.data();
   problem.block = block_;
+  problem.block.panels.rows = panels_.data();
   problem.law = law_;
-  problem.orientations = {cosine_.data(), sine_.data(), angle_ == Angle::none ? orientations : 0};
+  problem.orientations = {cosine_.data(), sine_.data(), angle_ == Angle::none ? orientations_ : 0};
   return problem;
 }
 
 std::int64_t DragModel::shares() const {
-  return std::int64_t(4) * block_.strips * (angle_ == Angle::none ? orientations : 1);
+  const int panels = block_.panels.count > 0 ? 8 * block_.panels.count : 4 * block_.strips;
+  return std::int64_t(panels) * (angle_ == Angle::none ? orientations_ : 1);
 }
 
 namespace {

@@ -95,7 +95,9 @@ PreparedRun<T>::PreparedRun(const BatchModel& model) {
   view_.drag_scale = 0.5 * model.water_density * (model.side / model.strips) * model.depth;
   view_.mass = model.mass * (1 + model.added_mass_share);
   view_.inertia = model.inertia * (1 + model.added_mass_share);
-  view_.drag = {static_cast<T>(model.linear_drag / (4 * model.strips) / view_.drag_scale),
+  prepare_shape(model);
+  const int strips = model.panel_count > 0 ? model.panel_count : 4 * model.strips;
+  view_.drag = {static_cast<T>(model.linear_drag / strips / view_.drag_scale),
                 static_cast<T>(model.drag_power / 2 - 1),
                 static_cast<T>(1 / (model.drag_speed * model.drag_speed)),
                 model.linear_drag == 0 && model.drag_power == 2};
@@ -107,6 +109,50 @@ PreparedRun<T>::PreparedRun(const BatchModel& model) {
   prepare_flow(model);
   prepare_samples(model);
   prepare_view(model);
+}
+
+// The width of a strip of the drag becomes that of the mean panel.
+template <class T>
+void PreparedRun<T>::prepare_shape(const BatchModel& model) {
+  BodyShape<T>& shape = view_.shape;
+  shape = {};
+  if (model.panel_count == 0) {
+    return;
+  }
+  double width = 0, turning = 0, reach = model.disc_radius;
+  for (int k = 0; k < model.panel_count; ++k) {
+    const double* const panel = model.panels + 5 * k;
+    const double square = panel[0] * panel[0] + panel[1] * panel[1];
+    width += panel[4];
+    turning += panel[4] * square;
+    reach = std::max(reach, std::sqrt(square));
+  }
+  const double mean_width = width / model.panel_count;
+  for (int k = 0; k < model.panel_count; ++k) {
+    const double* const panel = model.panels + 5 * k;
+    panels_.push_back({static_cast<T>(panel[0]), static_cast<T>(panel[1]), static_cast<T>(panel[2]),
+                       static_cast<T>(panel[3]), static_cast<T>(panel[4] / mean_width)});
+  }
+  for (int k = 0; k < model.corner_count; ++k) {
+    const double x = model.corners[2 * k], y = model.corners[2 * k + 1];
+    corners_.push_back({static_cast<T>(x), static_cast<T>(y)});
+    reach = std::max(reach, std::hypot(x, y));
+  }
+  double radius_square = 0;
+  for (int k = 0; k < 4; ++k) {
+    const double x = model.moment_points[2 * k], y = model.moment_points[2 * k + 1];
+    shape.points[k] = {static_cast<T>(x), static_cast<T>(y)};
+    radius_square += (x * x + y * y) / 4;
+  }
+  shape.panels = panels_.data();
+  shape.panel_count = model.panel_count;
+  shape.corners = corners_.data();
+  shape.corner_count = model.corner_count;
+  shape.disc_radius = static_cast<T>(model.disc_radius);
+  shape.reach = static_cast<T>(reach);
+  shape.turning_share = static_cast<T>(turning / width);
+  shape.per_radius_square = static_cast<T>(1 / radius_square);
+  view_.drag_scale = 0.5 * model.water_density * mean_width * model.depth;
 }
 
 template <class T>
@@ -138,7 +184,8 @@ void PreparedRun<T>::prepare_flow(const BatchModel& model) {
   double low_x, high_x, low_y, high_y;
   arena_extent(model, low_x, high_x, low_y, high_y);
   // The farthest strip centre from a block's centre lies within its half diagonal.
-  const double reach = model.side * 0.5 * std::sqrt(2.0);
+  const double reach = model.panel_count > 0 ? static_cast<double>(view_.shape.reach)
+                                             : model.side * 0.5 * std::sqrt(2.0);
   const double right = model.origin_x + (model.columns - 1) * model.spacing_x;
   const double top = model.origin_y + (model.rows - 1) * model.spacing_y;
   const int left_pad = padding(std::max(model.origin_x - low_x, 0.0) + reach, model.spacing_x);
@@ -192,6 +239,7 @@ template <class T>
 void PreparedRun<T>::prepare_force(const BatchModel& model) {
   const double interval = model.steps_per_interval * model.time_step;
   const double kept = model.force_memory > 0 ? std::exp(-interval / model.force_memory) : 0;
+  view_.force_lever = static_cast<T>(model.force_lever);
   view_.force_kept = static_cast<T>(kept);
   view_.force_first = static_cast<T>(std::sqrt((1 - kept) / (1 + kept)));
 }

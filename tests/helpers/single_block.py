@@ -89,6 +89,8 @@ def model(
         "drag_power": 2.0,
         "drag_speed": 0.03,
         "displaced_mass": 0.0,
+        "disc_radius": 0.0,
+        "force_lever": 0.0,
         "radius": RADIUS,
         "edges": np.zeros((0, 3)),
         "restitution": 0.5,

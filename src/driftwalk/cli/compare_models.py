@@ -21,7 +21,7 @@ from driftwalk.core.study_keys import CALIBRATION_KEYS
 @with_recording_options
 @with_study_options(
     CALIBRATION_KEYS,
-    *("side", "mass", "depth", "force_interval"),
+    *("body_shape", "side", "mass", "depth", "force_interval"),
     *("wall_friction", "wall_restitution", "time_step", "step_interval"),
     *("position_noise", "orientation_noise", "bootstrap", "seed"),
     "flow_repeat",

@@ -24,7 +24,7 @@ RecordingFiles = Annotated[
 @with_recording_options
 @with_study_options(
     FIT_KEYS,
-    *("side", "mass", "depth", "force_interval"),
+    *("body_shape", "side", "mass", "depth", "force_interval"),
     *("angle", "spline_spacing", "confidence", "switching_times", "flow_labels", "precision"),
     *("law", "pressure_gradient", "added_mass", "force_memory", "flow_strength"),
     *("flow_modes", "camera"),

@@ -26,7 +26,15 @@ if TYPE_CHECKING:
 
     from driftwalk.model import Study
 
-OF_A_BODY: Final = ("side", "mass", "depth", "window", "inertia", "flow_drag_coefficient")
+OF_A_BODY: Final = (
+    "body_shape",
+    "side",
+    "mass",
+    "depth",
+    "window",
+    "inertia",
+    "flow_drag_coefficient",
+)
 """Options that say something of a floating body, which no tracer is."""
 NOISE: Final = FLOW_KEYS["position_noise"]
 
@@ -34,7 +42,7 @@ NOISE: Final = FLOW_KEYS["position_noise"]
 @with_recording_options
 @with_study_options(
     FLOW_KEYS,
-    *("side", "mass", "depth"),
+    *("body_shape", "side", "mass", "depth"),
     *("cells", "cell_size", "window", "inertia", "flow_drag_coefficient", "min_count"),
     "position_noise",
 )
@@ -114,7 +122,7 @@ def flow(
     warning = unstated_warning(study_for([trajectory], resolved), about="block")
     print_warnings([warning])
     run = sibling(out.with_suffix(""), "run")
-    words = [*how.words(), *given.words("side", "mass", "depth")]
+    words = [*how.words(), *given.words("body_shape", "side", "mass", "depth")]
     print_next("calibrate", recording, *words, "--flow", out, "-o", run)
 
 

@@ -41,7 +41,16 @@ OF_THE_BLOCK: Final = (
 
 @with_study_options(
     STUDY_KEYS,
-    *("tank_diameter", "side", "mass", "depth", "drag_coefficient", "force_std", "force_interval"),
+    *(
+        "tank_diameter",
+        "body_shape",
+        "side",
+        "mass",
+        "depth",
+        "drag_coefficient",
+        "force_std",
+        "force_interval",
+    ),
     *("wall_friction", "wall_restitution", "time_step", "duration", "sample_rate"),
     *("position_noise", "orientation_noise", "replicates", "seed", "flow_repeat", "flow_start"),
 )

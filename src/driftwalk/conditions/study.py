@@ -123,6 +123,8 @@ LAW_KEYS: Final = {
 }
 """Keys of [forces], and the parameters of a fit that they hold."""
 _BLOCK_ATTRIBUTES: Final = {
+    "shape": ("block_shape", "", "shape", "`block.shape`"),
+    "width_m": ("block_width_m", "m", "width", "`block.shape`"),
     "side_m": ("block_side_m", "m", "side", "`block` when the recording is loaded"),
     "mass_kg": ("block_mass_kg", "kg", "mass", "`block.mass_kg`"),
     "depth_m": ("block_depth_m", "m", "depth", "`block.depth`"),
@@ -340,7 +342,16 @@ def fitted_law(found: xr.Dataset) -> dict[str, Any]:
     for key, name in LAW_KEYS.items():
         if name in known:
             law[f"forces.{key}"] = max(fitted_value(found, name), 0.0)
+    # Forces on the cells of a glued body turn it; of one block the lever is a test of the model.
+    if "force_lever" in known and "study" in found.attrs and _is_glued(found):
+        law["forces.force_lever_m"] = fitted_value(found, "force_lever")
     return law
+
+
+def _is_glued(found: xr.Dataset) -> bool:
+    from driftwalk.model import parse_study
+
+    return len(parse_study(found.attrs["study"]).block.body().cells) > 1
 
 
 def fitted_wall(found: xr.Dataset) -> dict[str, float]:

@@ -21,6 +21,7 @@ class ModelSettings(TypedDict, total=False):
     tank_diameter: Annotated[Number, "tank.diameter_m"]
     wall_friction: Annotated[Number, "tank.wall_friction"]
     wall_restitution: Annotated[Number, "tank.wall_restitution"]
+    body_shape: Annotated[str, "block.shape"]
     side: Annotated[Number, "block.side_m"]
     mass: Annotated[Number, "block.mass_kg"]
     depth: Annotated[Number, "block.depth"]

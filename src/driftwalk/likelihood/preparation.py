@@ -127,14 +127,15 @@ class PreparedRecordings:
         Left out as well are intervals with a corner within half a side of the wall, and those next
         to a gap: a sample or a frame that is missing may be a mistake of its own.
         """
-        outline, side = outline_of(self.study.tank.to_arena()), self.study.block.side_m
+        outline, block = outline_of(self.study.tank.to_arena()), self.study.block
         found = []
         for one in self.series:
             corners = None if self.angle == "none" else one.angle
             left_out = one.excluded != 0
             left_out |= wall_intervals(
-                one.time, one.x, one.y, corners, outline=outline, side=side, margin=0.5 * side
-            )
+                one.time, one.x, one.y, corners,
+                outline=outline, block=block, margin=0.5 * block.side_m,
+            )  # fmt: skip
             # An interval of 1.5 usual ones lacks a frame; the filter's velocity settles in three.
             gaps = np.flatnonzero(np.diff(one.time) > 1.5 * float(np.median(np.diff(one.time)))) + 1
             for later in range(FILTER.settling_samples + 1):
@@ -153,7 +154,7 @@ class PreparedRecordings:
         many = self.recordings
         return {
             "wall_share": self.wall_share,
-            "angle": self.angle,
+            "angle": self.angle if self.study.block.body().symmetry else NO_HEADING,
             "samples": self.samples,
             "mistakes": self.mistakes,
             # Left out when the recordings were read: too far away for `max_speed`.
@@ -211,7 +212,8 @@ def prepare(
         parts += cut
         places += [(flow, index) for flow in intervals.flows]
     # One use of the angle for all recordings, as they share the noise of the angle.
-    used_angle = use_angle(many, tracks, study.fit.angle if angle is None else angle)
+    wanted = study.fit.angle if angle is None else angle
+    used_angle = use_angle(many, tracks, wanted) if has_heading(study, wanted) else "none"
     series = series_of(parts, study, used_angle, places)
     # A tank that was fitted to the positions touches them: say so before the wall share does.
     arena = read_arena(str(many[0].attrs.get("arena", "{}")))
@@ -268,6 +270,22 @@ def _jumps_removed(recording: xr.Dataset, body: str | None) -> int:
         found = found.get(key) if isinstance(found, dict) else None
     number = found.get("jumps_removed") if isinstance(found, dict) else None
     return number if isinstance(number, int) else 0
+
+
+NO_HEADING = "no heading"
+"""Use of the angle in a stored fit of a disc."""
+
+
+def has_heading(study: Study, wanted: str) -> bool:
+    """Return whether the body has a heading; refuse the wish to use that of a disc."""
+    if study.block.body().symmetry:
+        return True
+    if wanted in ("state", "given"):
+        raise InputError(
+            f"a disc has no heading: leave out {argument_text('angle', wanted)}; its drag is the "
+            "same at every angle, and the recorded one is not used"
+        )
+    return False
 
 
 def use_angle(many: Sequence[xr.Dataset], tracks: Sequence[Track], wanted: str) -> str:

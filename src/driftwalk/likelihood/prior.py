@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
@@ -21,6 +21,9 @@ from driftwalk.likelihood.filter.filter_pass import Passes, Sums
 from driftwalk.likelihood.filter.parameters import NUMBERS, Point
 from driftwalk.likelihood.measured_flow import MeasuredFlow
 from driftwalk.likelihood.spline import penalties
+
+if TYPE_CHECKING:
+    from driftwalk.model.bodies import RigidBody
 
 
 class PriorPolicy(NamedTuple):
@@ -61,6 +64,11 @@ class Weights:
     """Factor of both for the modes of the flow in time, which may be weaker than its mean."""
 
 
+def usual_lever(side: float, outline: RigidBody) -> float:
+    """Return the centre of the prior of the force's lever [m], and its first value."""
+    return outline.force_lever_m or PRIOR.lever * side
+
+
 class Prior:
     """The prior of all parameters as a quadratic form."""
 
@@ -68,7 +76,7 @@ class Prior:
         self.measured = measured
         self.roughness, self.size = penalties(passes.spline)
         self.layers = passes.layers
-        self.log_lever = math.log(PRIOR.lever * passes.body.side)
+        self.log_lever = math.log(usual_lever(passes.body.side, passes.body.outline))
 
     def matrix(self, weights: Weights) -> Floats:
         """Return the precision of one component's coefficients, of the modes' but for a factor."""

@@ -16,7 +16,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.measured_flow import MeasuredFlow
 from driftwalk.likelihood.preparation import PreparedRecordings
-from driftwalk.likelihood.prior import PRIOR, Weights
+from driftwalk.likelihood.prior import PRIOR, Weights, usual_lever
 from driftwalk.likelihood.spline import Spline, penalties, products
 from driftwalk.schema import FLAGS, Track
 
@@ -56,7 +56,7 @@ def first_point(ready: PreparedRecordings, spline: Spline) -> Point:
     least_angle = least / study.block.side_m
     return replace(
         point,
-        log_lever=math.log(PRIOR.lever * study.block.side_m),
+        log_lever=math.log(usual_lever(study.block.side_m, study.block.body())),
         log_angle_noise=_log_noise([camera.orientation_noise for camera in cameras], least_angle),
     )
 

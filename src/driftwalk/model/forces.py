@@ -43,6 +43,12 @@ class Forces(Section):
     exp(-force_interval / T) of the one before it, and 1 - k is new, with standard deviation
     sigma_F: the noise intensity is still sigma_F^2 * force_interval.
     """
+    force_lever_m: Annotated[float, Quantity("m", ge=0, le=10)] = 0.0
+    """Lever with which the stochastic force turns the body.
+
+    Lever of the stochastic force, rms: every interval the body feels a torque too, with the
+    standard deviation sigma_F times the lever. 0: the force acts on the centre of mass.
+    """
     linear_drag_kg_s: Annotated[float, Quantity("kg/s", ge=0, le=1e4)] = 0.0
     """Drag of the block linear in the slip.
 

@@ -172,6 +172,11 @@ class Section(_WithSignature, BaseModel):
         """Return the keys that lose their meaning when the keys given are set."""
         return set()
 
+    @classmethod
+    def expanded(cls, values: dict[str, Any]) -> dict[str, Any]:
+        """Return values of keys, those that stand for several as several."""
+        return values
+
 
 class _SectionError(ConfigurationError):
     """An error whose message names its section already."""

@@ -92,13 +92,14 @@ class Study(Section):
 
     @model_validator(mode="after")
     def _block_fits(self) -> Self:
-        side, tank = self.block.side_m, self.tank
+        side, tank, square = self.block.side_m, self.tank, self.block.shape == "square"
         # In a round tank the corners decide; between straight walls a block may lie along them.
-        needed = side * math.sqrt(2.0) if tank.shape == "circle" else side
+        widest = side * math.sqrt(2.0) if square else 2.0 * self.block.body().reach_m
+        needed = side if square and tank.shape != "circle" else widest
         if needed >= tank.narrowest_m:
             raise ConfigurationError(
                 f"the block does not fit into the tank: [block] side_m = {side:g} (diagonal "
-                f"{side * math.sqrt(2.0):.3g} m), [tank] is a {tank.describe()}"
+                f"{widest:.3g} m), [tank] is a {tank.describe()}"
             )
         return self
 
@@ -106,7 +107,7 @@ class Study(Section):
     def _start_inside(self) -> Self:
         start = self.simulation.start
         if isinstance(start, Pose) and not all(
-            self.tank.contains(x, y) for x, y in block_corners(start, side_m=self.block.side_m)
+            self.tank.contains(x, y) for x, y in block_corners(start, self.block)
         ):
             raise ConfigurationError(
                 f"[simulation] start at ({start.x_m:g}, {start.y_m:g}) m puts a corner of the "
@@ -161,13 +162,19 @@ class Study(Section):
         return write_toml({name: getattr(self, name) for name in type(self).model_fields})
 
 
-def block_corners(pose: Pose, *, side_m: float) -> list[tuple[float, float]]:
-    """Return the four corners of a square block [m] at a pose."""
-    reach = side_m / math.sqrt(2.0)
-    angles = (pose.theta_rad + math.pi * (0.25 + 0.5 * quarter) for quarter in range(4))
-    return [
-        (pose.x_m + reach * math.cos(angle), pose.y_m + reach * math.sin(angle)) for angle in angles
-    ]
+def block_corners(pose: Pose, block: Block) -> list[tuple[float, float]]:
+    """Return the corners of a body [m] at a pose; of a disc, 32 points of its rim."""
+    if block.shape == "square":
+        reach = block.side_m / math.sqrt(2.0)
+        angles = (pose.theta_rad + math.pi * (0.25 + 0.5 * quarter) for quarter in range(4))
+        return [
+            (pose.x_m + reach * math.cos(angle), pose.y_m + reach * math.sin(angle))
+            for angle in angles
+        ]
+    body, turn = block.body(), complex(math.cos(pose.theta_rad), math.sin(pose.theta_rad))
+    outline = body.panels[:, :2] if body.disc_radius_m else body.corners
+    turned = [complex(x, y) * turn + complex(pose.x_m, pose.y_m) for x, y in outline]
+    return [(corner.real, corner.imag) for corner in turned]
 
 
 def load_study(path: str | Path) -> Study:
@@ -261,6 +268,7 @@ def apply_overrides(study: Study, overrides: Mapping[str, Any]) -> Study:
         changes.setdefault(_known_section(section, name), {})[key] = value
     for section, changed in changes.items():
         kind = type(getattr(study, section))
+        changed = kind.expanded(changed)
         kept = values.setdefault(section, {})
         for key in kind.replaced_by(set(changed)) | set(changed):
             kept.pop(key, None)

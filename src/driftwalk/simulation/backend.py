@@ -109,6 +109,7 @@ def native_model(
     forces, step = study.forces, study.time_step_s
     check_sample_time(sample_time)
     require_steps(max(float(sample_time[-1]), forces.force_interval_s), step)
+    body = study.block.body(study.assembly.hidden_share)
     return _core.Model(
         side=study.block.side_m,
         mass=study.block.mass_kg,
@@ -123,7 +124,10 @@ def native_model(
         displaced_mass=study.displaced_mass_kg if forces.pressure_gradient else 0.0,
         time_step=step,
         steps_per_interval=round(forces.force_interval_s / step),
+        force_lever=forces.force_lever_m,
         force_memory=forces.force_memory_s,
+        disc_radius=body.disc_radius_m,
+        **body.arrays(),
         **_surroundings(
             study.tank, study.observation.field_of_view, flow, sample_time, camera,
             accelerating=forces.pressure_gradient,
@@ -134,7 +138,8 @@ def native_model(
 POINT: Final[dict[str, Any]] = {
     "mass": 1.0, "inertia": 1.0, "depth": 1.0, "strips": 1, "added_mass_share": 0.0,
     "water_density": 1.0, "linear_drag": 0.0, "drag_power": 2.0, "drag_speed": 1.0,
-    "displaced_mass": 0.0, "steps_per_interval": 1, "force_memory": 0.0,
+    "displaced_mass": 0.0, "disc_radius": 0.0, "steps_per_interval": 1, "force_lever": 0.0,
+    "force_memory": 0.0,
 }  # fmt: skip
 """Numbers of a block where there is none: a self-propelled particle reads nothing of them."""
 

@@ -53,13 +53,13 @@ def random_start(study: Study, keys: Keys) -> Start:
     from driftwalk.model.simulation import Pose
     from driftwalk.model.study import block_corners
 
-    tank, side = study.tank, study.block.side_m
+    tank, block = study.tank, study.block
 
     def fits(x: float, y: float, theta: float) -> bool:
-        corners = block_corners(Pose(x_m=x, y_m=y, theta_rad=theta), side_m=side)
+        corners = block_corners(Pose(x_m=x, y_m=y, theta_rad=theta), block)
         return all(tank.contains(*corner) for corner in corners)
 
-    return _draw_poses(tank, keys, fits, what=f"a block of {side:g} m")
+    return _draw_poses(tank, keys, fits, what=f"a block of {block.side_m:g} m")
 
 
 def random_place(tank: Tank, keys: Keys, *, clearance: float = 0.0) -> Start:

@@ -110,7 +110,7 @@ def test_field_of_view_may_lie_off_centre() -> None:
 
 
 def test_corners_of_a_turned_block() -> None:
-    corners = block_corners(Pose(x_m=1.0, theta_rad=math.pi / 4), side_m=math.sqrt(2.0))
+    corners = block_corners(Pose(x_m=1.0, theta_rad=math.pi / 4), Block(side_m=math.sqrt(2.0)))
     expected = [(1.0, 1.0), (0.0, 0.0), (1.0, -1.0), (2.0, 0.0)]
     for corner, wanted in zip(corners, expected, strict=True):
         assert corner == pytest.approx(wanted, abs=1e-12)

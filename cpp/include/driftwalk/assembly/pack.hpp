@@ -23,9 +23,14 @@ public:
             const AssemblyOutputs& out, AssemblyScratch& scratch, int capacity)
       : run_(run), rules_(rules), out_(out), scratch_(scratch), memory_(scratch.lanes, capacity),
         near_(rules), blocks_(rules.blocks), listed_(rules.blocks > most_blocks_all_pairs),
-        physics_{
-            Law::of(Real(T(0)), run.drag),       run.block, run.flow, run.water, run.wall, run.step,
-            {Real(T(0)), Real(T(0)), Real(T(0))}} {
+        physics_{Law::of(Real(T(0)), run.drag),
+                 run.block,
+                 run.shape,
+                 run.flow,
+                 run.water,
+                 run.wall,
+                 run.step,
+                 {Real(T(0)), Real(T(0)), Real(T(0))}} {
     const bool has_lists = capacity > most_blocks_all_pairs;
     for (int lane = 0; lane < lanes; ++lane) {
       load_lane<Real, T>(rules_, start, memory_, lane);

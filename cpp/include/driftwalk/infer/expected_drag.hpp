@@ -124,16 +124,23 @@ inline SpeedFactor speed_factor(const DragPower& power, Eight square, Eight vari
 
 inline constexpr double lane_numbers[8] = {0, 1, 2, 3, 4, 5, 6, 7};
 
-// Strips `first` .. `first + 7` of a side; `shares` may be null.
-template <int D, DragLawWithMoments Law>
+// Eight strips with outward normals (nx, ny), h from the centre along them and `offset` along the
+// tangents; one number for all of them, or one for each.
+template <class Number>
+struct Strips {
+  Number nx, ny, h;
+  Eight offset, scale;
+  Eight::Mask real;
+};
+
+// `shares` may be null.
+template <int D, class Number, DragLawWithMoments Law>
 inline void add_strips(const Law& law, const DragPower& power, const SplineView& flow,
-                       const StripBlock& block, const UncertainBlock<D>& state, Side side,
-                       int first, double scale, DragSumsOfEight<D>& sums, StripShare<D>* shares,
-                       int& count) {
-  const double nx = side.nx, ny = side.ny, tx = -ny, ty = nx, h = block.half_side;
-  const Eight strip = Eight::load(lane_numbers) + first;
-  const Eight::Mask real = strip < block.strips;
-  const Eight offset = (select(real, strip, Eight(0)) + 0.5) * block.strip_width - h;
+                       const StripBlock& block, const UncertainBlock<D>& state,
+                       const Strips<Number>& strips, DragSumsOfEight<D>& sums,
+                       StripShare<D>* shares, int& count) {
+  const Number nx = strips.nx, ny = strips.ny, tx = -ny, ty = nx, h = strips.h;
+  const Eight offset = strips.offset;
   const Eight arm_x = nx * h + tx * offset, arm_y = ny * h + ty * offset;
   StripsOnGrid grid;
   FlowAtStrips at = flow_at_strips(flow, state.x + arm_x, state.y + arm_y, grid);
@@ -165,11 +172,11 @@ inline void add_strips(const Law& law, const DragPower& power, const SplineView&
   spread_of<D>(state.covariance, along_n, along_t, variance, cross);
   const Eight slip = tx * wx + ty * wy;
   const StripMoments m = law.moments(-(nx * wx + ny * wy), slip, variance, cross);
-  const Eight::Mask part = m.takes_part & real;
+  const Eight::Mask part = m.takes_part & strips.real;
   if (!any(part)) {
     return;
   }
-  Eight K = select(part, Eight(scale), Eight(0));
+  Eight K = select(part, strips.scale, Eight(0));
   SpeedFactor speed{Eight(1), Eight(0)};
   if (power.power != 2) {
     Eight slip_variance, unused;
@@ -239,16 +246,33 @@ inline void add_strips(const Law& law, const DragPower& power, const SplineView&
   }
 }
 
-// One orientation of the block, its four sides.
+// One orientation of the body: its panels, or the four sides of the block.
 template <int D, DragLawWithMoments Law>
 inline void add_orientation(const Law& law, const DragPower& power, const SplineView& flow,
                             const StripBlock& block, const UncertainBlock<D>& state, double cosine,
                             double sine, double scale, DragSumsOfEight<D>& sums,
                             StripShare<D>* shares, int& count) {
+  for (int row = 0; row < block.panels.count; ++row) {
+    const double* const panel = block.panels.rows + 48 * row;
+    const Eight x = Eight::load(panel), y = Eight::load(panel + 8);
+    const Eight nx = Eight::load(panel + 16), ny = Eight::load(panel + 24);
+    const Strips<Eight> strips{cosine * nx - sine * ny,
+                               sine * nx + cosine * ny,
+                               nx * x + ny * y,
+                               nx * y - ny * x,
+                               Eight::load(panel + 32) * scale,
+                               Eight(0.5) < Eight::load(panel + 40)};
+    add_strips<D>(law, power, flow, block, state, strips, sums, shares, count);
+  }
+  const double h = block.half_side;
   Side side{cosine, sine};
-  for (int k = 0; k < 4; ++k) {
+  for (int k = 0; k < 4 && block.panels.count == 0; ++k) {
     for (int first = 0; first < block.strips; first += 8) {
-      add_strips<D>(law, power, flow, block, state, side, first, scale, sums, shares, count);
+      const Eight strip = Eight::load(lane_numbers) + first;
+      const Eight::Mask real = strip < block.strips;
+      const Eight offset = (select(real, strip, Eight(0)) + 0.5) * block.strip_width - h;
+      const Strips<double> strips{side.nx, side.ny, h, offset, Eight(scale), real};
+      add_strips<D>(law, power, flow, block, state, strips, sums, shares, count);
     }
     side = {-side.ny, side.nx};
   }

@@ -261,7 +261,7 @@ private:
     DragResponse<D> response =
         expected_drag<D>(law_, problem_.law.power, flow, problem_.block, problem_.orientations,
                          theta, block, scratch_.shares);
-    add_water_acceleration<D>(flow, rate_nodes, problem_.block, problem_.law, block,
+    add_water_acceleration<D>(flow, rate_nodes, problem_.block, problem_.law, block, theta,
                               scratch_.points, response);
     return response;
   }
@@ -391,7 +391,7 @@ private:
   // Whether the water's acceleration pushes the block; how far it reaches, and somewhat further
   // [m].
   bool pushed_ = problem_.law.water_acceleration != 0 || problem_.law.water_spin != 0;
-  double reach_ = 1.5 * problem_.block.half_side;
+  double reach_ = problem_.block.reach;
 };
 
 DRIFTWALK_LANES_END

@@ -16,6 +16,14 @@ struct FloatingBlock {
   double depth;         // of the wetted sides [m]
   int strips;           // a side
   double water_density; // [kg/m^3]
+  // A body that is no single square block, as of BatchModel; of a disc, `round`. Then `side` is its
+  // size, and it looks the same after a turn by 2 pi / symmetry.
+  const double* panels = nullptr;
+  int panel_count = 0;
+  const double* moment_points = nullptr;
+  double mass_by_inertia = 0; // [1/m^2]
+  int symmetry = 4;
+  bool round = false;
 };
 
 // What is known of the block's orientation.
@@ -30,11 +38,13 @@ class DragModel {
 public:
   // `flow.nodes` is not read; coefficients are [layers][2][rows][columns], of u and of v.
   // Throws std::invalid_argument.
+  // A disc has no angle: Angle::none.
   DragModel(const FloatingBlock& block, const SplineView& flow, const double* coefficients,
             double drag_coefficient, Angle angle, const ForceLaw& law = {});
 
-  // Orientations between 0 and a quarter turn that represent an unknown angle. With eight the drag
-  // is within 1 % of that of many, mostly 0.1 % (cpp/tests/test_infer.cpp).
+  // Orientations between 0 and a quarter turn, or as much as the body's symmetry leaves, that
+  // represent an unknown angle. With eight the drag is within 1 % of that of many, mostly 0.1 %
+  // (cpp/tests/test_infer.cpp).
   static constexpr int orientations = 8;
 
   Angle angle() const { return angle_; }
@@ -55,11 +65,14 @@ public:
                        const double (*covariance)[2 * D], double* by_coefficients) const;
 
 private:
+  void make_panels(const FloatingBlock& block);
+
   SplineView flow_;
   StripBlock block_;
   ForceLaw law_;
   Angle angle_;
-  std::vector<double> nodes_;
+  std::vector<double> nodes_, panels_;
+  int orientations_; // that are used, where the angle is not known
   std::array<double, orientations> cosine_, sine_;
 };
 

@@ -20,6 +20,13 @@ struct SplineView {
   int layers = 1;
 };
 
+// Panels of a body that is no single square block (physics/panels.hpp), eight a row: [rows][6][8],
+// their places x, y [m], outward normals nx, ny, weights and whether there is one.
+struct PanelRows {
+  const double* rows;
+  int count = 0; // 0: the sides of the square block
+};
+
 // The sides of the block, cut into strips.
 struct StripBlock {
   double half_side;   // [m]
@@ -27,6 +34,9 @@ struct StripBlock {
   int strips;         // a side
   double drag_scale; // acceleration by a strip's squared closing speed, 1/2 rho C_d (a/N) d/m [1/m]
   double mass_by_inertia; // m/I [1/m^2]
+  double points[4][2];    // with the second moments of its area, in its frame [m]
+  double reach;           // how far from its centre the flow matters [m]
+  PanelRows panels{};
 };
 
 // The drag's force goes with the power p of the speed |w| past a strip: it is that of the law times

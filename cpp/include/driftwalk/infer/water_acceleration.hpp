@@ -4,7 +4,8 @@
 // that water, and its added mass by the same. Averaged over a square of side a, Du/Dt is the mean
 // over the four points at +-a/sqrt(12) from its centre along x and y, and half its curl 6/a^2 times
 // the mean moment about the centre: both are exact for polynomials of the third degree. The second
-// moments of a square are the same at every angle, so the points need not turn with it.
+// moments of a square are the same at every angle, so its points need not turn with it; those of
+// another body turn by theta.
 //
 // With the flow s(t) u(x, y),
 //     Du/Dt = s^2 (u . grad) u + s' u
@@ -128,16 +129,19 @@ inline void keep_point(const FlowAtPoint& at, const SplineAxis& x, const SplineA
 template <int D>
 inline void add_water_acceleration(const SplineView& flow, const double* rate_nodes,
                                    const StripBlock& block, const ForceLaw& law,
-                                   const UncertainBlock<D>& state, PointShare<D>* points,
-                                   DragResponse<D>& response) {
+                                   const UncertainBlock<D>& state, double theta,
+                                   PointShare<D>* points, DragResponse<D>& response) {
   if (law.water_acceleration == 0 && law.water_spin == 0) {
     return;
   }
-  const double reach = 0.57735026918962576 * block.half_side;
+  const double turns = block.panels.count > 0 ? 1 : 0;
+  const double cosine = turns != 0 ? __builtin_cos(theta) : 1,
+               sine = turns != 0 ? __builtin_sin(theta) : 0;
   const double share = law.water_acceleration / water_points;
   const double spin = law.water_spin / water_points * block.mass_by_inertia;
   for (int k = 0; k < water_points; ++k) {
-    const double arm_x = k & 1 ? reach : -reach, arm_y = k & 2 ? reach : -reach;
+    const double *const point = block.points[k], arm_x = point[0] * cosine - point[1] * sine,
+                        arm_y = point[0] * sine + point[1] * cosine;
     const SplineAxis x = spline_axis(state.x + arm_x, flow.origin_x, flow.spacing, flow.columns);
     const SplineAxis y = spline_axis(state.y + arm_y, flow.origin_y, flow.spacing, flow.rows);
     const FlowAtPoint at = flow_at_point(flow, x, y);
@@ -164,7 +168,15 @@ inline void add_water_acceleration(const SplineView& flow, const double* rate_no
         response.acceleration[a] += factor[a][c] * push.value[c];
         response.by_position[a][0] += factor[a][c] * push.by_place[c][0];
         response.by_position[a][1] += factor[a][c] * push.by_place[c][1];
+        if constexpr (D == 3) {
+          // The points turn with the body.
+          response.by_position[a][2] +=
+              turns * factor[a][c] * (push.by_place[c][1] * arm_x - push.by_place[c][0] * arm_y);
+        }
       }
+    }
+    if constexpr (D == 3) {
+      response.by_position[2][2] -= turns * spin * (arm_x * push.value[0] + arm_y * push.value[1]);
     }
     if (points != nullptr) {
       keep_point<D>(at, x, y, flow.columns, push, factor, points[k]);

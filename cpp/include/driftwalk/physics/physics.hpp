@@ -27,6 +27,7 @@ template <class Real, class T, DragLaw<Real> Law>
 struct Physics {
   [[no_unique_address]] Law law;
   BlockShape<T> block;
+  BodyShape<T> shape;
   FlowView<T> flow;
   WaterView<T> water;
   WallView<T> wall;

@@ -13,6 +13,7 @@ enum class Purpose : std::uint32_t {
   motion = 4,      // noise of a self-propelled particle, one draw per step
   bout = 5,        // its bouts, at the step in which one begins
   flow = 6,        // moment of a flow in frames at which a world begins
+  torque = 7,      // of the stochastic force, one draw per force interval
 };
 
 } // namespace driftwalk

@@ -20,6 +20,7 @@ enum class Range { any, not_negative, positive, share, strip_count };
   NUMBER(double, inertia, "kg m^2", positive)                                                      \
   NUMBER(double, depth, "m", positive)                /* of the wetted sides */                    \
   NUMBER(int, strips, "1", strip_count)               /* a side */                                 \
+  NUMBER(double, disc_radius, "m", not_negative)      /* 0: the body has corners */                \
   NUMBER(double, added_mass_share, "1", not_negative) /* of the mass, and of the inertia */        \
   /* water */                                                                                      \
   NUMBER(double, water_density, "kg/m^3", positive)                                                \
@@ -40,6 +41,7 @@ enum class Range { any, not_negative, positive, share, strip_count };
   /* time */                                                                                       \
   NUMBER(double, time_step, "s", positive)                                                         \
   NUMBER(int, steps_per_interval, "1", positive)  /* force interval / time step */                 \
+  NUMBER(double, force_lever, "m", not_negative)  /* of the force's torque, rms */                 \
   NUMBER(double, force_memory, "s", not_negative) /* time after which the force has forgotten */   \
   /* camera: noise and resolution */                                                               \
   NUMBER(double, position_noise, "m", not_negative)                                                \

@@ -38,6 +38,7 @@ public:
   const Prepared<T>& view() const { return view_; }
 
 private:
+  void prepare_shape(const BatchModel& model);
   void prepare_wall(const BatchModel& model);
   void prepare_flow(const BatchModel& model);
   void prepare_water(const BatchModel& model, const TableGrid& grid);
@@ -46,6 +47,8 @@ private:
   void prepare_view(const BatchModel& model);
 
   Prepared<T> view_{};
+  std::vector<Panel<T>> panels_;
+  std::vector<Corner<T>> corners_;
   std::vector<PreparedEdge<T>> edges_;
   std::vector<PreparedEdge<T>> view_edges_;
   std::vector<typename FlowNumber<T>::type> table_, water_;

@@ -22,6 +22,33 @@ struct BlockShape {
   int strips;    // N
 };
 
+// A flat piece of a body's side, in the frame of the body about its centre of mass.
+template <class T>
+struct Panel {
+  T x, y;   // of its middle [m]
+  T nx, ny; // outward normal
+  T weight; // its width, in those of the mean panel; less where the water reaches only a share
+};
+
+template <class T>
+struct Corner {
+  T x, y; // from the centre of mass [m]
+};
+
+// A rigid body that is no single square block. Plain pointers, as in Prepared.
+template <class T>
+struct BodyShape {
+  const Panel<T>* panels;
+  int panel_count;          // 0: the square block
+  const Corner<T>* corners; // that may touch a wall
+  int corner_count;
+  T disc_radius;       // [m]; 0: a body with corners
+  T reach;             // of its farthest point from the centre of mass [m]
+  T turning_share;     // conductance for turning over that for moving [m^2]
+  Corner<T> points[4]; // with the second moments of its area, for the water's acceleration
+  T per_radius_square; // m/I of an even body: 1 / mean squared distance of the points [1/m^2]
+};
+
 template <class T>
 struct StepConstants {
   T dt;          // [s]
@@ -107,6 +134,7 @@ struct WaterView {
 template <class T>
 struct Prepared {
   BlockShape<T> block;
+  BodyShape<T> shape;
   StepConstants<T> step;
   int steps_per_interval;
   double drag_scale; // 1/2 rho (a/N) d [kg/m^2]: K = drag_scale * C_d
@@ -122,6 +150,7 @@ struct Prepared {
   WaterView<T> water;
   // force: what is kept of the last one, 0 where it has no memory, and the spread of the first
   T force_kept, force_first;
+  T force_lever; // torque of the stochastic force over the force along an axis [m]
   // sampling: sample k lies in step sample_step[k], at the fraction sample_weight[k] of it
   std::int64_t samples;
   const std::int64_t* sample_step;

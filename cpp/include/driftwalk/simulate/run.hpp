@@ -261,7 +261,7 @@ struct Motionless {
 
 template <class Real, class T>
 inline typename Numbers<Real>::Bool is_sound(const Prepared<T>& run, const Body<Real>& body) {
-  const Real margin{run.block.half_side};
+  const Real margin{run.shape.panel_count > 0 ? run.shape.reach : run.block.half_side};
   return (body.pose.x > Real(run.flow.low_x) - margin) &
          (body.pose.x < Real(run.flow.high_x) + margin) &
          (body.pose.y > Real(run.flow.low_y) - margin) &
@@ -322,6 +322,7 @@ private:
     int count; // of its worlds
     Philox<UInt> stream;
     Real normals[4], last[2];
+    Real torque[4], last_torque;
     Motionless<Real> rest;
     FlowClocks<T> clocks;
   };
@@ -332,22 +333,23 @@ private:
     Real drag_coefficient, force_std;
     load_worlds(worlds, first, count, pack.body, drag_coefficient, force_std, record.stream);
     record.count = count;
-    record.last[0] = record.last[1] = Real(T(0));
+    record.last[0] = record.last[1] = record.last_torque = Real(T(0));
     record.rest = Motionless<Real>(run_);
     const Law law = Law::of(drag_coefficient, run_.drag);
-    pack.physics = {law,
-                    run_.block,
-                    run_.flow,
-                    run_.water,
-                    run_.wall,
-                    run_.step,
-                    world_constants(law, run_, drag_coefficient, force_std)};
+    pack.physics = {law,        run_.block,
+                    run_.shape, run_.flow,
+                    run_.water, run_.wall,
+                    run_.step,  world_constants(law, run_, drag_coefficient, force_std)};
     if (run_.frames > 1) {
       record.clocks.begin(worlds, first, count, lanes);
       record.clocks.show(pack.physics.flow, pack.physics.water);
     }
-    meet_wall(run_.wall, run_.block.half_side, Real(run_.step.per_inertia), pack.body.pose,
-              pack.body.motion);
+    const Real per_inertia{run_.step.per_inertia};
+    if (run_.shape.panel_count > 0) {
+      meet_wall(run_.wall, run_.shape, per_inertia, pack.body.pose, pack.body.motion);
+    } else {
+      meet_wall(run_.wall, run_.block.half_side, per_inertia, pack.body.pose, pack.body.motion);
+    }
   }
 
   void draw_force(std::int64_t interval, Motion<Real>& noise, Record& record, Real scale) const {
@@ -365,6 +367,25 @@ private:
       record.last[1] = normals[1];
     }
     noise = {normals[0] * scale, normals[1] * scale, Real(T(0))};
+    if (run_.force_lever > T(0)) {
+      noise.omega =
+          torque_normal(interval, record) * scale * (run_.force_lever * run_.step.per_inertia);
+    }
+  }
+
+  // The normal number of the stochastic torque, as draw_force makes those of the force.
+  Real torque_normal(std::int64_t interval, Record& record) const {
+    if ((interval & 1) == 0) {
+      draw_normals(record.stream, Purpose::torque, interval >> 1, record.torque);
+    }
+    Real& normal = record.torque[interval & 1];
+    if (run_.force_kept > T(0)) {
+      const T kept = interval == 0 ? T(0) : run_.force_kept;
+      const T fresh = interval == 0 ? run_.force_first : T(1) - run_.force_kept;
+      normal = kept * record.last_torque + fresh * normal;
+      record.last_torque = normal;
+    }
+    return normal;
   }
 
   void step() {

@@ -1,4 +1,4 @@
-// One time step of several packs of blocks, each block alone: through the water, then off the wall.
+// One time step of several packs of bodies, each alone: through the water, then off the wall.
 //
 // A step is a long chain of operations that wait for each other. So each part of it is done for all
 // packs before the next: while one pack waits, the processor works on another.
@@ -6,6 +6,7 @@
 
 #include "driftwalk/physics/drag.hpp"
 #include "driftwalk/physics/integrator.hpp"
+#include "driftwalk/physics/panels.hpp"
 #include "driftwalk/physics/physics.hpp"
 #include "driftwalk/physics/wall.hpp"
 #include "driftwalk/physics/water.hpp"
@@ -32,9 +33,33 @@ inline void begin_step(BlockPack<Real, T, Law>& pack) {
   pack.axes = axes_at(pack.ahead.pose.theta);
 }
 
+// The same of a body that is no single block.
+template <class Real, class T, class Law>
+inline void feel_water_by_panels(BlockPack<Real, T, Law>& pack) {
+  const Physics<Real, T, Law>& physics = pack.physics;
+  const BodyShape<T>& shape = physics.shape;
+  const Pose<Real>& pose = pack.ahead.pose;
+  const T half = T(0.5) * physics.step.dt;
+  const DragSums<Real> sums =
+      panel_sums(physics.law, shape, physics.flow, pose.x, pose.y, pack.axes, pack.ahead.motion);
+  const Real per_mass = physics.world.drag_per_mass, per_inertia = physics.world.drag_per_inertia;
+  WaterPush<Real>& push = pack.push;
+  push.acceleration = {sums.force_x * per_mass, sums.force_y * per_mass, sums.torque * per_inertia};
+  if (physics.water.count > 0) {
+    push.acceleration =
+        push.acceleration + water_acceleration(physics.water, shape, pack.axes, pose.x, pose.y);
+  }
+  push.stiffness = sums.conductance * per_mass * half;
+  push.spin_stiffness = sums.conductance * per_inertia * (shape.turning_share * half);
+}
+
 template <class Real, class T, class Law>
 inline void feel_water(BlockPack<Real, T, Law>& pack) {
   const Physics<Real, T, Law>& physics = pack.physics;
+  if (physics.shape.panel_count > 0) {
+    feel_water_by_panels(pack);
+    return;
+  }
   const Pose<Real>& pose = pack.ahead.pose;
   const T half = T(0.5) * physics.step.dt;
   const DragSums<Real> sums = drag_sums(physics.law, physics.block, physics.flow, pose.x, pose.y,
@@ -56,7 +81,8 @@ inline void leave_walls(BlockPack<Real, T, Law>* packs, int count) {
   const WallView<T>& wall = packs[0].physics.wall;
   const T h = packs[0].physics.block.half_side;
   const Real per_inertia{packs[0].physics.step.per_inertia};
-  const bool round = wall.radius > T(0);
+  const BodyShape<T>& shape = packs[0].physics.shape;
+  const bool round = wall.radius > T(0) && shape.panel_count == 0;
   CircleContacts<Real> found[most_packs];
   for (int p = 0; p < count && round; ++p) {
     find_circle(wall, h, NoArm{}, axes_at<Real>, packs[p].body.pose, found[p]);
@@ -65,6 +91,8 @@ inline void leave_walls(BlockPack<Real, T, Law>* packs, int count) {
     Body<Real>& body = packs[p].body;
     if (round) {
       leave_circle(wall, per_inertia, found[p], body.pose, body.motion);
+    } else if (shape.panel_count > 0) {
+      found[p].touched = meet_wall(wall, shape, per_inertia, body.pose, body.motion);
     } else {
       found[p].touched = meet_wall(wall, h, per_inertia, body.pose, body.motion);
     }

@@ -20,7 +20,7 @@ from driftwalk.core.study_keys import STUDY_KEYS
 
 
 @with_recording_options
-@with_study_options(STUDY_KEYS, "side", "mass", "depth", file="none")
+@with_study_options(STUDY_KEYS, "body_shape", "side", "mass", "depth", file="none")
 def read(
     recording: RecordingFile,
     out: Annotated[Path, option("--out -o FILE", "File to write; ends in .nc or .csv.")],
@@ -71,5 +71,5 @@ def read(
     )
     words = words_to_fit(trajectory)
     if out.suffix.lower() == ".csv":
-        words = [*words, *given.words("side", "mass", "depth")]
+        words = [*words, *given.words("body_shape", "side", "mass", "depth")]
     print_next("fit", out, *words, "-o", sibling(out.with_suffix(""), "fit"))

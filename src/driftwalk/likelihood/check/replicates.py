@@ -83,9 +83,9 @@ class Replicated:
 
         Contacts are not fitted, and next to the wall the flow is not known.
         """
-        turned, side = None if self.angle == "none" else theta, self.problem.study.block.side_m
+        turned, block = None if self.angle == "none" else theta, self.problem.study.block
         time = self.problem.like.sample_time
-        left_out = wall_intervals(time, x, y, turned, outline=self.outline, side=side)
+        left_out = wall_intervals(time, x, y, turned, outline=self.outline, block=block)
         left_out[:-1] |= left_out[1:]
         found = apply_steps(self.plan, *(np.where(left_out, np.nan, axis) for axis in (x, y)))
         return np.column_stack([found.step_length, found.turning_angle])

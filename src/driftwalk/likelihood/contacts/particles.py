@@ -145,7 +145,9 @@ class WallLikelihood:
         self.angle_noise = PARTICLE.wider * math.exp(point.log_angle_noise)
         self.noises = (self.noise, self.noise, self.angle_noise)
         intensity = math.exp(point.log_intensity)
-        turning = 6.0 * math.exp(point.log_lever) / study.block.side_m**2
+        square = study.block.shape == "square"
+        moment = study.block.side_m**2 / 6.0 if square else study.block.body().moment_m2
+        turning = math.exp(point.log_lever) / moment
         self.intensity = np.array([intensity, intensity, intensity * turning**2])
 
     def log_likelihood(self, restitution: float, friction: float) -> float:

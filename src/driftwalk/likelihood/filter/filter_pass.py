@@ -246,7 +246,7 @@ class Passes:
             theta,
             series.omega,
             series.excluded,
-            **vars(body),
+            **body.native(),
             **vars(spline),
             coefficients=np.ascontiguousarray(
                 point.coefficients.reshape(-1, spline.rows, spline.columns)

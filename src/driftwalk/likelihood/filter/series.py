@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +20,8 @@ from driftwalk.likelihood.filter.parameters import STRENGTHS, Point
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
+    from driftwalk.model.block import Block
+    from driftwalk.model.bodies import RigidBody
     from driftwalk.schema import Track
 
 
@@ -123,6 +125,21 @@ class Body:
     orientation: str
     """"state", "given" or "none": the track's angle is measured like the position, is an input, or
     is not used."""
+    outline: RigidBody
+
+    def native(self) -> dict[str, Any]:
+        """Return the arguments of the native filter."""
+        numbers = {name: value for name, value in vars(self).items() if name != "outline"}
+        if self.outline.is_square:
+            return numbers
+        return {
+            **numbers,
+            "panels": self.outline.panels,
+            "moment_points": self.outline.moment_points,
+            "mass_by_inertia": 1.0 / self.outline.moment_m2,
+            "symmetry": max(self.outline.symmetry, 1),
+            "round": self.outline.disc_radius_m > 0.0,
+        }
 
 
 def corrected(series: Series, point: Point) -> tuple[Floats, Floats, Floats]:
@@ -264,7 +281,7 @@ def wall_intervals(
     theta: Floats | None,
     *,
     outline: Outline,
-    side: float,
+    block: Block,
     margin: float = MARGIN,
 ) -> Bools:
     """Return which intervals, by the sample at their end, may hold a contact with the wall, (n,).
@@ -276,8 +293,8 @@ def wall_intervals(
     turned = None if theta is None else np.unwrap(theta)
     ahead_x, ahead_y = (_continued(time, axis) for axis in (x, y))
     ahead = None if turned is None else _continued(time, turned)
-    here = _least_depth(x[:-1], y[:-1], None if turned is None else turned[:-1], outline, side)
-    there = _least_depth(ahead_x, ahead_y, ahead, outline, side)
+    here = _least_depth(x[:-1], y[:-1], None if turned is None else turned[:-1], outline, block)
+    there = _least_depth(ahead_x, ahead_y, ahead, outline, block)
     near = np.zeros(time.size, dtype=bool)
     near[1:] = np.minimum(here, there) < margin
     return near
@@ -293,12 +310,17 @@ def _continued(time: Floats, values: Floats) -> Floats:
 
 
 def _least_depth(
-    x: Floats, y: Floats, theta: Floats | None, outline: Outline, side: float
+    x: Floats, y: Floats, theta: Floats | None, outline: Outline, block: Block
 ) -> Floats:
     """Return the distance of the nearest corner to the wall [m], negative beyond it."""
-    reach = side / math.sqrt(2.0)
+    square = block.shape == "square"
+    reach = block.side_m / math.sqrt(2.0) if square else block.body().reach_m
     if theta is None:
         return outline.depth(x, y) - reach
+    if not square:
+        corners = block.body().corners @ np.array([1.0, 1.0j])
+        placed = (x + 1j * y) + corners[:, None] * np.exp(1j * theta)
+        return np.asarray(np.min([outline.depth(one.real, one.imag) for one in placed], axis=0))
     quarters = theta + math.pi * (0.25 + 0.5 * np.arange(4))[:, None]
     corners_x, corners_y = x + reach * np.cos(quarters), y + reach * np.sin(quarters)
     depths = [outline.depth(*corner) for corner in zip(corners_x, corners_y, strict=True)]
@@ -316,7 +338,7 @@ def series_of(
     `places` are the flow and the recording of each, by default one flow and recording after
     recording. Times begin with the recording's first sample.
     """
-    outline, side = outline_of(study.tank.to_arena()), study.block.side_m
+    outline = outline_of(study.tank.to_arena())
     where = places or [(0, number) for number in range(len(tracks))]
     found: list[Series] = []
     first = 0.0
@@ -334,7 +356,7 @@ def series_of(
             smooth = smooth_angle(time, track.theta)
             # A corner is where the recorded angle puts it; the smooth one only fills its holes.
             corners = np.where(np.isfinite(track.theta), track.theta, smooth.theta)
-        wall = wall_intervals(time, track.x, track.y, corners, outline=outline, side=side)
+        wall = wall_intervals(time, track.x, track.y, corners, outline=outline, block=study.block)
         found.append(
             Series(
                 time,
@@ -371,4 +393,5 @@ def body_of(study: Study, used_angle: str) -> Body:
         water_density=study.water.density_kg_m3,
         drag_speed=study.forces.drag_speed_m_s,
         orientation=used_angle,
+        outline=study.block.body(study.assembly.hidden_share),
     )

@@ -1,0 +1,38 @@
+"""A disc: no heading, and a drag that is the same in all directions."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from driftwalk.model.bodies.rigid_body import Measures, RigidBody
+
+
+def disc(measures: Measures) -> RigidBody:
+    """Return a disc of a diameter.
+
+    In a uniform flow past it at w, its panels sum to F = 1/2 rho C_d D d |w| w, the drag of a
+    cylinder of diameter D and wetted depth d: the mean over all directions is exact, and one
+    direction differs by less than pi² / (6 n²) of it, n the number of panels (0.2 % with 32).
+
+    Examples
+    --------
+    >>> body = disc(Measures(side_m=0.04))
+    >>> windward = np.maximum(body.panels[:, 2], 0.0) * body.panels[:, 4]
+    >>> bool(abs(windward.sum() / 0.04 - 1.0) < 0.003)
+    True
+    """
+    radius, count = measures.side_m / 2.0, 4 * measures.strips
+    angle = (np.arange(count) + 0.5) * (2.0 * math.pi / count)
+    nx, ny = np.cos(angle), np.sin(angle)
+    width = np.full(count, 2.0 * math.pi * radius / count)
+    return RigidBody(
+        area_m2=math.pi * radius**2,
+        panels=np.stack([radius * nx, radius * ny, nx, ny, width], axis=1),
+        corners=np.zeros((0, 2)),
+        # The mean of x² over a disc is R² / 4.
+        moment_points=0.5 * radius * np.array([[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]]),
+        symmetry=0,
+        disc_radius_m=radius,
+    )

@@ -1,0 +1,80 @@
+"""What every shape of a rigid body declares: its drag panels, corners, area and moments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from driftwalk.core.arrays import Floats
+
+
+class Measures(NamedTuple):
+    """Size of a body, and how finely its sides are cut."""
+
+    side_m: float
+    """Side of a square or of a cell, diameter of a disc, length of a rectangle [m]."""
+    width_m: float | None = None
+    """Second side of a rectangle [m]."""
+    strips: int = 8
+    """Strips along a side."""
+    hidden_share: float = 0.0
+    """Share of the drag of a free face that a face between two cells feels, 0 to 1."""
+
+
+@dataclass(frozen=True, eq=False)
+class RigidBody:
+    """An outline about its centre of mass, seen from above, in the body's own frame.
+
+    Examples
+    --------
+    >>> from driftwalk.model.bodies import rigid_body
+    >>> body = rigid_body("rectangle", Measures(side_m=0.04, width_m=0.02))
+    >>> round(body.area_m2, 6), round(body.moment_m2, 8), body.symmetry
+    (0.0008, 0.00016667, 2)
+    """
+
+    area_m2: float
+    panels: Floats
+    """Strips of the drag, shape (n, 5): middle x, y [m], outward normal x, y, width [m]."""
+    corners: Floats
+    """Corners that may touch a wall, shape (n, 2) [m]; none of a disc."""
+    moment_points: Floats
+    """Four points with the second moments of the area, shape (4, 2) [m]."""
+    symmetry: int
+    """Turns by 2 pi / symmetry leave it as it is; 0 for a disc, which has no heading."""
+    disc_radius_m: float = 0.0
+    force_lever_m: float = 0.0
+    """Lever of the torque of forces that act on its cells independently, rms [m]; 0 of one cell."""
+    cells: Floats = field(default_factory=lambda: np.zeros((1, 2)))
+    """Centres of its cells, shape (n, 2) [m]."""
+    is_square: bool = False
+    """Whether it is the block for which the native core has a kernel of its own."""
+
+    @property
+    def moment_m2(self) -> float:
+        """Moment of inertia over mass, I / m, of a body of even density [m²]."""
+        return float((self.moment_points**2).sum(axis=1).mean())
+
+    @property
+    def reach_m(self) -> float:
+        """Distance of the farthest point from the centre of mass [m]."""
+        corners = np.hypot(*self.corners.T).max() if self.corners.size else 0.0
+        return float(max(corners, self.disc_radius_m))
+
+    def arrays(self) -> dict[str, Any]:
+        """Return what the native core takes of a body that is no single square."""
+        if self.is_square:
+            return {}
+        names = ("panels", "corners", "moment_points")
+        return {name: np.ascontiguousarray(getattr(self, name)) for name in names}
+
+
+def face(middle: tuple[float, float], normal: tuple[float, float], length: float, strips: int,
+         share: float = 1.0) -> Floats:  # fmt: skip
+    """Return the panels of a straight face, of which the water reaches a share."""
+    offsets = ((np.arange(strips) + 0.5) / strips - 0.5) * length
+    (x, y), (nx, ny) = middle, normal
+    columns = (x - ny * offsets, y + nx * offsets, nx, ny, share * length / strips)
+    return np.stack(np.broadcast_arrays(*columns), axis=1)
