@@ -148,6 +148,9 @@ variables (a measured flow was given, and its scale is not exact):
     measured_flow_scale_std [1]: standard deviation of its scale
     measured_flow_scale_p_value [1]: chance of a scale so far from 1
     measured_flow_scale_detectable [1]: relative change of the scale that is found nine times in ten
+variables (glued blocks, after a fit of one block):
+    stirring_misfit_std [1]: by how much force and torque of the body disagree on the correlation, \
+        in standard deviations
 variables (with orientations, in one flow):
     spin_correlation [1]: correlation of the block's spin with the vorticity of a first estimate \
         of the flow
@@ -271,6 +274,11 @@ LAW_NUMBERS: Final = (
     Number("pulse_frequency", "Hz", "frequency of pulses", shown="Hz", note=_CORRECTED),
     Number("mode_frequency", "Hz", "frequency of the modes", shown="Hz",
            note="of the flow, whose shape changes; corrected"),
+    Number("hidden_face_drag_share", label="drag of hidden faces",
+           note="over that of a free face"),
+    Number("stirring_correlation", label="shared stirring",
+           note="correlation of the forces on two blocks side by side"),
+    Number("stirring_length", "m", "length of the stirring", shown="mm"),
     Number("measured_flow_scale", label="scale of the measured flow",
            note="over that of the fitted one"),
 )  # fmt: skip
