@@ -203,16 +203,13 @@ def fit_motion(
         for rival in law.rivals:
             parameters = _with_rival(parameters, search, rival, ready)
         shape = laws.alternatives.shape_change(law.mode)
-    glued: dict[str, Any] = {}
-    if earlier is not None and before is not None:
-        glued = stirring_facts(ready, law.mode, restricted.point, before, earlier.fit)
     facts = {
         **parameters,
         **law_facts(law, assumptions),
         **shape_facts(shape, law.tests),
         **({"flow_modes_unsettled": modes.unsettled} if modes.unsettled else {}),
         **turning,
-        **glued,
+        **stirring_facts(ready, law.mode, restricted.point, before, earlier),
         **whiteness_of(counted)._asdict(),
         **ready.facts,
         **_search_facts(law, restricted),

@@ -9,7 +9,8 @@ normal law of flow and ln C_d, is the prior:
   at a distance r, the force on the body has the variance sigma² sum rho_ij, and its torque has
   sigma² sum rho_ij r_i·r_j. Noise intensity and lever of the body, against the intensity of one
   block, give rho of two blocks side by side: of a dimer q_2 / q_1 = (1 + rho) / 2 and
-  lever² = (a²/4) (1 - rho) / (1 + rho). rho has a uniform prior, and an interval of highest density.
+  lever² = (a²/4) (1 - rho) / (1 + rho). rho has a uniform prior, and an interval of highest
+  density.
 
 See docs/how-to/dimer.md.
 """
@@ -139,12 +140,21 @@ def first_glued_point(ready: PreparedRecordings, before: Estimate) -> Point:
 
 
 def stirring_facts(
-    ready: PreparedRecordings, mode: Mode, point: Point, before: Estimate, earlier: xr.Dataset
+    ready: PreparedRecordings,
+    mode: Mode,
+    point: Point,
+    before: Estimate | None,
+    earlier: EarlierFit | None,
 ) -> dict[str, Any]:
-    """Return the correlation of the forces side by side, and the length, with intervals."""
+    """Return the correlation of the forces side by side, and the length, with intervals.
+
+    Nothing without an earlier fit.
+    """
+    if before is None or earlier is None:
+        return {}
     body = ready.passes.body
     # Of ln C_d, ln q, ln r, ...
-    of_one = float(earlier["covariance"][1, 1])
+    of_one = float(earlier.fit["covariance"][1, 1])
     observed = [point.log_intensity - before.point.log_intensity]
     variances = [mode.value_of("log_intensity")[1] ** 2 + of_one]
     if point.log_lever is not None:

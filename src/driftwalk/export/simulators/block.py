@@ -62,6 +62,11 @@ class Block:
         """Return the numbers of the model, units in the keys."""
         study = self.study
         forces = study.forces
+        if study.block.shape != "square":
+            raise InputError(
+                f"a simulator is given the square block, and the body is '{study.block.shape}' "
+                "(`block.shape`): driftwalk simulate knows it"
+            )
         return {
             "side_m": study.block.side_m,
             "mass_kg": study.block.mass_kg,

@@ -48,9 +48,9 @@ CHANGES: Final = ("strength_trend", *STRENGTHS[1::2])
 DRAG_SHAPES: Final = ("linear_share", "drag_power")
 """How the drag may go with the speed otherwise: one of them at most is opened."""
 OF_PREDICTIONS: Final = ("hidden_share",)
-"""Numbers that the predictions alone determine, as they do C_d: what the covariances say of a drag is
-wrong to the order in which the filter is. On a dimer that was slow in the water they said 1 of a
-share of 0, by seven standard deviations."""
+"""Numbers that the predictions alone determine, as they do C_d: what the covariances say of a drag
+is wrong to the order in which the filter is. Of a dimer that was slow in the water they said 1
+where the share was 0, by seven standard deviations."""
 PULSES: Final = ("pulse_cosine", "pulse_sine")
 MODES: Final = ("mode_frequency", "mode_phase")
 """Numbers of the flow's modes in time: their frequency, and the phase of one mode alone."""
