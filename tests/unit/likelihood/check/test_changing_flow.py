@@ -12,7 +12,6 @@ import pytest
 import xarray as xr
 from euler_blocks import (
     DEPTH_M,
-    DRAG,
     FORCE_INTERVAL_S,
     MASS_KG,
     SIDE_M,
@@ -26,7 +25,6 @@ from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import Series
 from driftwalk.likelihood.spline import Spline
 from driftwalk.model import Study, apply_overrides
-from driftwalk.schema.answers.facts import facts_of
 
 SECONDS = 900.0
 
