@@ -68,3 +68,9 @@ def test_a_growing_flow_is_explained_and_handed_on(tmp_path: Path) -> None:
     # twice as far.
     floor = float(np.median([apart(other) for other in others]))
     assert distance() < 1.5 * floor < distance("--flow", steady)
+    # Another simulator gets the mean flow, and the user reads so.
+    out = tmp_path / "mujoco"
+    notes = answer("export", run, "--to", "mujoco", "-o", out)["notes"]
+    assert any("changes in time, and is taken with its mean" in note for note in notes)
+    assert "with its mean flow" in (out / "README.md").read_text(encoding="utf-8")
+    assert "time" not in dw.load_flow(out / "flow.nc").dims
