@@ -161,21 +161,20 @@ class StoredFrames(NamedTuple):
 
 def stored_frames(fit: xr.Dataset) -> StoredFrames | None:
     """Return when the flow of a fit is given, and how strong it is then; None of a steady one."""
-    none = np.zeros((0, 1))
-    amplitude = fit["mode_amplitude"].values if "flow_mode" in fit.dims else none
-    if "flow_strength" not in fit:
-        if "flow_mode" not in fit.dims:
-            return None
+    moves, changes = "flow_mode" in fit.dims, "flow_strength" in fit
+    if not (moves or changes):
+        return None
+    if not changes:
         time = fit["mode_time"].values
-        return StoredFrames(time, np.ones(time.size), amplitude, "loop")
+        return StoredFrames(time, np.ones(time.size), fit["mode_amplitude"].values, "loop")
     time, strength = fit["strength_time"].values, fit["flow_strength"].values
-    if not len(amplitude):
-        none = np.zeros((0, time.size))
-        return StoredFrames(time, strength, none, str(fit.attrs["flow_strength_repeat"]))
-    period = fit["mode_time"].values
-    during = [np.interp(time % period[-1], period, one) for one in amplitude]
-    # The last frame is that of the mean flow: see `strength_variables`.
-    return StoredFrames(time, strength, np.stack(during) * (time < time[-1]), "hold")
+    amplitude = np.zeros((0, time.size))
+    if moves:
+        period = fit["mode_time"].values
+        during = [np.interp(time % period[-1], period, one) for one in fit["mode_amplitude"].values]
+        # The last frame is that of the mean flow: see `strength_variables`.
+        amplitude = np.stack(during) * (time < time[-1])
+    return StoredFrames(time, strength, amplitude, str(fit.attrs["flow_strength_repeat"]))
 
 
 def moving_fields(

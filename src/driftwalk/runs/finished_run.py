@@ -229,16 +229,13 @@ class FoundRun:
             The study of the run.
         """
         flow = self.flow(study)
-        if "time" not in flow["u"].dims or "flow" in self.found.dims or not self._is_fit:
+        own = self.kind is not None and self.kind.name == "fit"
+        if "time" not in flow["u"].dims or "flow" in self.found.dims or not own:
             return flow, None
         from driftwalk.likelihood import fitted_flow
 
         lacks = f"the flow of {self.name} changes in time, and is taken with its mean"
         return fitted_flow(self.found, interval=0), lacks
-
-    @property
-    def _is_fit(self) -> bool:
-        return self.kind is not None and self.kind.name == "fit"
 
     def recording(self) -> xr.Dataset | None:
         """Return the first recording of the run, None where there is none."""
