@@ -37,6 +37,7 @@ dimensions:
     compared_law: force laws that were compared, by name
     flow_mode: modes of the flow in time
     mode_time: times in a period of the modes
+    strength_time: frames of the strength of the flow
     number: numbers of departures from the model, by name
     law: force laws that were fitted, by name
     departure: numbers of departures that were tested, by name
@@ -182,6 +183,10 @@ variables (modes of the flow in time were fitted):
     mode_share(flow_mode) [1]: speed of the mode over that of the mean flow, both as rms where the \
         block has been
     mode_weight [1]: factor of the two weights for the modes
+variables (the strength of the flow changes, or has pulses):
+    flow_strength(strength_time) [1]: strength of the flow over its mean; linear between frames
+    strength_time(strength_time) [s]: time of a frame; from the first sample of the first \
+        recording on
 variables (numbers of departures were tested):
     departure_estimate(departure): estimates of closed numbers by score tests at the end of the \
         search; in SI units; the model is 0
@@ -229,6 +234,10 @@ attributes (a measured flow was given):
     measured_flow_errors text: where its errors are from
 attributes (the shape of the flow changes):
     flow_shape_change text: how, in a sentence
+attributes (the strength of the flow changes, or has pulses):
+    flow_strength_repeat text: how it goes on after its last frame: "loop" or "hold"
+attributes (the strength changes too fast to be given in frames):
+    flow_strength_left_out text: why the flow is given without it
 attributes (modes of the flow in time were asked for, and not found):
     flow_modes_unsettled text: why
 attributes (the law is not settled):
