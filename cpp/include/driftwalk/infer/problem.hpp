@@ -118,7 +118,7 @@ struct PointShare {
   double slope_x[4], slope_y[4];   // its derivatives [1/m]
   std::int32_t node;               // as of a StripShare
 };
-inline constexpr int water_points = 4;
+inline constexpr int water_points = 9;
 
 // Memory of a filter, made once.
 template <int D>
