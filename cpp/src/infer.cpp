@@ -103,10 +103,14 @@ DragModel::DragModel(const FloatingBlock& block, const SplineView& flow, const d
   block_.strips = block.strips;
   block_.mass_by_inertia = 6 / (block.side * block.side);
   block_.reach = 1.5 * block_.half_side;
-  const double at = 0.57735026918962576 * block_.half_side;
+  // The 3 x 3 Gauss points of the square.
+  constexpr double place[3] = {-0.77459666924148338, 0, 0.77459666924148338};
+  constexpr double weight[3] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
+  block_.points = water_points;
   for (int k = 0; k < water_points; ++k) {
-    block_.points[k][0] = k & 1 ? at : -at;
-    block_.points[k][1] = k & 2 ? at : -at;
+    block_.point[k][0] = block_.half_side * place[k % 3];
+    block_.point[k][1] = block_.half_side * place[k / 3];
+    block_.point[k][2] = weight[k % 3] * weight[k / 3];
   }
   orientations_ = block.round ? 1 : orientations;
   if (block.panel_count > 0) {
@@ -154,11 +158,13 @@ void DragModel::make_panels(const FloatingBlock& block) {
   for (int k = 0; k < 8; ++k) {
     square += block.moment_points[k] * block.moment_points[k] / 8;
   }
-  for (int k = 0; k < water_points; ++k) {
+  block_.points = 4;
+  for (int k = 0; k < block_.points; ++k) {
     for (int axis = 0; axis < 2; ++axis) {
       const double even = (k >> axis & 1) != 0 ? std::sqrt(square) : -std::sqrt(square);
-      block_.points[k][axis] = angle_ == Angle::none ? even : block.moment_points[2 * k + axis];
+      block_.point[k][axis] = angle_ == Angle::none ? even : block.moment_points[2 * k + axis];
     }
+    block_.point[k][2] = 0.25;
   }
 }
 

@@ -293,8 +293,11 @@ double worst_water(const driftwalk::PreparedRun<T>& run, double along, double tu
   double worst = 0;
   for (int k = 0; k < 300; ++k) {
     const double x = 0.2 * draw(), y = 0.2 * draw();
+    const double angle = 3.2 * draw();
+    const Axes<Real> axes{Real(static_cast<T>(std::cos(angle))),
+                          Real(static_cast<T>(std::sin(angle)))};
     const Motion<Real> got = driftwalk::water_acceleration(
-        run.view().water, block, Real(static_cast<T>(x)), Real(static_cast<T>(y)));
+        run.view().water, block, Real(static_cast<T>(x)), Real(static_cast<T>(y)), axes);
     const double px = std::clamp(x, -0.15, 0.15), py = std::clamp(y, -0.15, 0.15);
     worst = std::max({worst, std::fabs(scalar(got.vx) - run.view().water.push * (a * px - b * py)),
                       std::fabs(scalar(got.vy) - run.view().water.push * (b * px + a * py)),

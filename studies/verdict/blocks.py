@@ -40,9 +40,6 @@ PER_INERTIA: Final = 6.0 / SIDE_M**2
 """Mass over moment of inertia."""
 BOUNCE_M_S: Final = 0.01
 """Slower contacts do not bounce."""
-SPACING: Final = float(AXIS[1] - AXIS[0])
-NODES: Final = AXIS.size
-
 _gauss = 1.0 / np.sqrt(3.0)
 _along = 0.5 * SIDE_M * (1.0 + 0.5j * np.array([-1 - _gauss, -1 + _gauss, 1 - _gauss, 1 + _gauss]))
 POINTS: Final[Complexes] = np.concatenate([_along * 1j**k for k in range(4)])
@@ -51,8 +48,12 @@ face of a turning block ends in its middle, so a pure spin has its exact drag.""
 NORMALS: Final[Complexes] = np.repeat(1j ** np.arange(4), 4)
 WIDTHS: Final[Floats] = np.full(16, 0.25 * SIDE_M)
 CORNERS: Final[Complexes] = 0.5 * SIDE_M * (1.0 + 1j) * 1j ** np.arange(4)
-INNER: Final[Complexes] = CORNERS / np.sqrt(3.0)
-"""Gauss points of the area, for means of the water's acceleration over the block."""
+_places, _weights = np.polynomial.legendre.leggauss(3)
+INNER: Final[Complexes] = 0.5 * SIDE_M * np.add.outer(_places, 1j * _places).ravel()
+"""3 x 3 Gauss points of the area, for means of the water's acceleration over the block. Of 2 x 2
+points the moment is 5 to 20 % off in eddies as small as the block."""
+SHARES: Final[Floats] = 0.25 * np.outer(_weights, _weights).ravel()
+"""What they count."""
 
 
 @dataclass
@@ -148,7 +149,11 @@ class State:
 
 
 class Water:
-    """The water of the tanks: modes, and the accelerations that pairs of them make."""
+    """The water of the tanks: modes, and the accelerations that pairs of them make.
+
+    Where it carries blocks, the lattice has twice as many nodes: the spin by the acceleration goes
+    with its second derivatives, and came out 2 % off between the nodes of the flow.
+    """
 
     def __init__(self, tanks: Tanks) -> None:
         self.tanks = tanks
@@ -156,18 +161,26 @@ class Water:
         self.modes = modes.shape[1]
         self.pairs = [(i, j) for i in range(self.modes) for j in range(i, self.modes)]
         self.carries = bool(tanks.floating.any())
+        if self.carries:
+            modes = halved(halved(modes, -1), -2)
+        self.nodes = modes.shape[-1]
+        self.spacing = float(AXIS[-1] - AXIS[0]) / (self.nodes - 1)
         layers = [modes[:, i] for i in range(self.modes)]
         if self.carries:
             layers += [
-                _carried(modes[:, i], modes[:, j])
-                + (_carried(modes[:, j], modes[:, i]) if i != j else 0.0)
+                self._carried(modes[:, i], modes[:, j])
+                + (self._carried(modes[:, j], modes[:, i]) if i != j else 0.0)
                 for i, j in self.pairs
             ]
         table = np.stack(layers, axis=-1)
         corners = [table, np.roll(table, -1, 2), np.roll(table, -1, 1)]
         corners.append(np.roll(corners[1], -1, 1))
         self.table = np.stack(corners, axis=3).reshape(-1, 4, table.shape[-1])
-        self.base = (np.arange(len(modes)) * NODES**2)[:, np.newaxis]
+        self.base = (np.arange(len(modes)) * self.nodes**2)[:, np.newaxis]
+
+    def _carried(self, by: Complexes, what: Complexes) -> Complexes:
+        """Return (u . grad) w at the nodes."""
+        return by.real * slope(what, -1, self.spacing) + by.imag * slope(what, -2, self.spacing)
 
     def weights(self, time: Floats) -> Floats:
         """Return weights and their rates, shape (times, 2, tanks, modes)."""
@@ -185,12 +198,12 @@ class Water:
 
     def layers(self, place: Complexes) -> Complexes:
         """Return all layers at places of each tank, shape (tanks, places, layers)."""
-        column = np.clip((place.real - AXIS[0]) / SPACING, 0.0, NODES - 1.001)
-        row = np.clip((place.imag - AXIS[0]) / SPACING, 0.0, NODES - 1.001)
+        column = np.clip((place.real - AXIS[0]) / self.spacing, 0.0, self.nodes - 1.001)
+        row = np.clip((place.imag - AXIS[0]) / self.spacing, 0.0, self.nodes - 1.001)
         i, j = column.astype(np.intp), row.astype(np.intp)
         fx, fy = column - i, row - j
         shares = ((1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy)
-        found = self.table.take(self.base + j * NODES + i, axis=0)
+        found = self.table.take(self.base + j * self.nodes + i, axis=0)
         return sum(share[..., np.newaxis] * found[:, :, k] for k, share in enumerate(shares))
 
     def velocity(self, layers: Complexes, weight: Floats) -> Complexes:
@@ -222,8 +235,8 @@ def by_water(
     if water.carries:
         arms = INNER * turned
         here = water.acceleration(water.layers(place + arms), *weights)
-        found = found + tanks.floating * here.mean(axis=1)
-        curl = (arms.conj() * here).imag.mean(axis=1) / (SIDE_M**2 / 6.0)
+        found = found + tanks.floating * (here @ SHARES)
+        curl = (arms.conj() * here).imag @ SHARES / (SIDE_M**2 / 6.0)
         turning = turning + tanks.floating * curl
     return found, turning
 
@@ -302,10 +315,25 @@ def bounce(state: State, k: int, arm: complex, friction: float, restitution: flo
     state.velocity[k], state.spin[k] = velocity, spin
 
 
-def _carried(by: Complexes, what: Complexes) -> Complexes:
-    """Return (u . grad) w at the nodes."""
-    along_y, along_x = np.gradient(what, SPACING, axis=(-2, -1))
-    return by.real * along_x + by.imag * along_y
+def halved(values: Complexes, axis: int) -> Complexes:
+    """Return values with one in the middle of any two along an axis, by cubics of the four nearest.
+
+    At the ends, outside of the tank, it is their mean.
+    """
+    values = np.moveaxis(values, axis, 0)
+    found = np.repeat(values, 2, axis=0)[:-1]
+    found[1::2] = 0.5 * (values[1:] + values[:-1])
+    found[3:-3:2] = (9.0 * (values[1:-2] + values[2:-1]) - values[:-3] - values[3:]) / 16.0
+    return np.moveaxis(found, 0, axis)
+
+
+def slope(values: Complexes, axis: int, spacing: float) -> Complexes:
+    """Return the derivative along an axis, by quartics of the five nearest; at the ends by two."""
+    found = np.moveaxis(np.gradient(values, spacing, axis=axis), axis, 0)
+    values = np.moveaxis(values, axis, 0)
+    inner = 8.0 * (values[3:-1] - values[1:-3]) - values[4:] + values[:-4]
+    found[2:-2] = inner / (12.0 * spacing)
+    return np.moveaxis(found, 0, axis)
 
 
 def _at_rest(tanks: Tanks) -> State:

@@ -52,12 +52,16 @@ def main() -> None:
 
 
 def groups(wanted: list[World]) -> list[list[World]]:
-    """Return worlds to simulate together: steady flows of one length, and those that change."""
+    """Return worlds to simulate together: steady flows of one length, and those that change.
+
+    The water that carries blocks has a finer lattice: floating bodies are simulated apart.
+    """
     alike: dict[tuple[Any, ...], list[World]] = defaultdict(list)
     for world in wanted:
         body = world.body
         if isinstance(body, Block):
-            alike[(world.minutes if len(body.flow.modes) == 1 else "changing",)].append(world)
+            length = world.minutes if len(body.flow.modes) == 1 else "changing"
+            alike[(length, body.floating)].append(world)
         else:
             alike[(world.name,)].append(world)
     found = [

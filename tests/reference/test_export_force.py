@@ -49,9 +49,7 @@ def twin_push(block: Block, states: Floats) -> Floats:
     twin = twin_of(block)
     pose, motion = states.T[:3], states.T[3:]
     coefficient = np.full(len(states), block.study.forces.drag_coefficient)
-    return np.stack(drag(twin, coefficient, pose, motion)[:3]) + push_of_water(
-        twin, pose[0], pose[1]
-    )
+    return np.stack(drag(twin, coefficient, pose, motion)[:3]) + push_of_water(twin, pose)
 
 
 @pytest.mark.fast_cases(1)

@@ -93,6 +93,48 @@ def test_water_that_gains_spin_turns_the_block(
     assert np.abs(y[0]).max() < exact * 2e-6
 
 
+@pytest.mark.parametrize("theta", [0.0, 0.6])
+@BOTH
+def test_an_eddy_as_small_as_the_block_turns_it_by_the_whole_moment(
+    theta: float, precision: str, exact: float
+) -> None:
+    # u = U + W(r) (-y, x): mean and moment of Du/Dt by 12 x 12 Gauss points, without drag, and the
+    # motion by another integrator. With 2 x 2 points that do not turn the place is 0.4 mm off.
+    from scipy.integrate import solve_ivp
+
+    stream, size, time = (0.03, 0.01), 0.02, np.arange(11) * 0.1
+    places, weights = np.polynomial.legendre.leggauss(12)
+    across, along = SIDE / 2 * np.stack(np.meshgrid(places, places))
+    weight = np.outer(weights, weights) / 4
+
+    def velocity(x: Floats, y: Floats) -> tuple[Any, Any]:
+        rate = 2.0 * np.exp(-0.5 * (x**2 + y**2) / size**2)
+        return stream[0] - rate * y, stream[1] + rate * x
+
+    def change(_: float, state: Floats) -> Floats:
+        cosine, sine = np.cos(state[2]), np.sin(state[2])
+        arm_x, arm_y = cosine * across - sine * along, sine * across + cosine * along
+        x, y = state[0] + arm_x, state[1] + arm_y
+        rate = 2.0 * np.exp(-0.5 * (x**2 + y**2) / size**2)
+        u, v = velocity(x, y)
+        by_x, by_y = -rate * x / size**2, -rate * y / size**2
+        water_x = -y * (u * by_x + v * by_y) - v * rate
+        water_y = x * (u * by_x + v * by_y) + u * rate
+        moment = 6 / SIDE**2 * (weight * (arm_x * water_y - arm_y * water_x)).sum()
+        push = [(weight * water_x).sum(), (weight * water_y).sum(), moment]
+        return np.array([*state[3:], *push])
+
+    begin = np.array([0.008, -0.013, theta, 0.0, 0.0, 0.0])
+    want = solve_ivp(change, (0.0, 1.0), begin, t_eval=time, rtol=1e-8, atol=1e-10).y
+    nodes = np.linspace(-0.16, 0.16, 257)
+    native = model(velocity, times=time, nodes=nodes, time_step=0.0025, displaced_mass=MASS)
+    x, y, angle, _ = run(native, one_world(*begin[:3], drag=0.0), precision=precision)
+    assert np.abs(want[2] - theta).max() > 0.1
+    assert np.abs(x[0] - want[0]).max() < 5e-5
+    assert np.abs(y[0] - want[1]).max() < 5e-5
+    assert np.abs(wrapped(angle[0] - want[2])).max() < 3e-3
+
+
 @BOTH
 def test_water_that_changes_pushes_with_its_whole_acceleration(
     precision: str, exact: float
@@ -115,7 +157,7 @@ def test_water_that_changes_pushes_with_its_whole_acceleration(
     x, y, theta, _ = run(native, world, precision=precision)
     assert np.abs(x[0] - 0.05 * np.cos(angle)).max() < exact * 2e-5
     assert np.abs(y[0] - 0.05 * np.sin(angle)).max() < exact * 2e-5
-    assert np.abs(wrapped(theta[0] - angle)).max() < exact * 5e-4
+    assert np.abs(wrapped(theta[0] - angle)).max() < exact * 1e-3
 
 
 def test_a_steady_flow_in_frames_pushes_as_a_steady_flow() -> None:

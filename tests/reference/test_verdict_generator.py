@@ -93,6 +93,45 @@ def test_the_water_carries_a_floating_block_round(
     assert motion.angle[0, -1] == pytest.approx(6.0, abs=1e-9)
 
 
+def test_the_water_turns_a_floating_block_in_an_eddy_of_its_size(
+    study: dict[str, ModuleType],
+) -> None:
+    """An eddy in a stream, u = U + i W(r) z: the moment of Du/Dt by 20 x 20 Gauss points."""
+    blocks, flows = study["blocks"], study["flows"]
+    stream, size = 0.03 + 0.01j, 0.02
+
+    def rate(place: Any) -> Any:
+        return 2.0 * np.exp(-0.5 * np.abs(place) ** 2 / size**2)
+
+    def velocity(place: Any) -> Any:
+        return stream + 1j * rate(place) * place
+
+    def acceleration(place: Any) -> Any:
+        by_x, by_y = (-part / size**2 * rate(place) * place for part in (place.real, place.imag))
+        u = velocity(place)
+        return u.real * 1j * (rate(place) + by_x) + u.imag * 1j * (1j * rate(place) + by_y)
+
+    rng = np.random.default_rng(4)
+    place, angle = 0.02 * (rng.normal(size=(2, 6)).T @ [1.0, 1j]), rng.uniform(0.0, 1.5, 6)
+    names = ("force_std", "drag_coefficient", "drag_power", "force_memory", "growth", "pulse",
+             "friction", "restitution")  # fmt: skip
+    tanks = blocks.Tanks(
+        flow=[flows.Flow(velocity(flows.X + 1j * flows.Y)[np.newaxis])] * 6,
+        seed=[0] * 6, start=place, floating=np.full(6, True), added_mass=np.full(6, 0.5),
+        pulse_period=np.ones(6), **{name: np.zeros(6) for name in names},
+    )  # fmt: skip
+    state = blocks.State(place, np.zeros(6, complex), angle, np.zeros(6))
+    water, weights = blocks.Water(tanks), np.array([np.ones((6, 1)), np.zeros((6, 1))])
+    found, turning = blocks.by_water(state, tanks, water, weights, np.zeros(6), np.zeros(6))
+    places, shares = np.polynomial.legendre.leggauss(20)
+    arms = SIDE / 2 * np.add.outer(places, 1j * places).ravel() * np.exp(1j * angle)[:, np.newaxis]
+    there = place[:, np.newaxis] + arms
+    share, push = np.outer(shares, shares).ravel() / 4, acceleration(there)
+    moment = (arms.conj() * push).imag @ share / (SIDE**2 / 6)
+    assert np.abs(found - push @ share).max() < 2e-3 * np.abs(push).max()
+    assert np.abs(turning - moment).max() < 0.01 * np.abs(moment).max()
+
+
 def test_the_drag_takes_the_power_that_the_force_gives(study: dict[str, ModuleType]) -> None:
     """In the steady state <-drag . v> = sigma_F^2 tau / M, whatever the angle and the law.
 

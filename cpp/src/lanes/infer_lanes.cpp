@@ -26,8 +26,9 @@ DragResponse<D> drag_alone(const FilterProblem& problem, double theta, double om
   DragResponse<D> drag =
       expected_drag<D>(drag_law(problem), problem.law.power, problem.flow, problem.block,
                        problem.orientations, theta, block, shares);
-  add_water_acceleration<D>(problem.flow, nullptr, problem.block, problem.law, block, theta, points,
-                            drag);
+  const double known = problem.orientations.count == 0 ? theta : 0;
+  add_water_acceleration<D>(problem.flow, nullptr, problem.block, problem.law, __builtin_cos(known),
+                            __builtin_sin(known), block, points, drag);
   const std::int64_t nodes = std::int64_t(problem.flow.rows) * problem.flow.columns;
   double* rows[D];
   for (int a = 0; a < D; ++a) {

@@ -206,7 +206,8 @@ class LiveTank:
         force_std: float | None = None,
         flow_scale: float | None = None,
         latching: Latching | None = None,
-        hidden_face_drag: HiddenFaceDrag | None = None,
+        hidden_face_drag: HiddenFaceDrag | str | None = None,
+        stirring_length: float | None = None,
         blocks: int | None = None,
         part: bool = False,
     ) -> None:
@@ -223,8 +224,10 @@ class LiveTank:
         latching : {"collision", "connector", "none"}
             How blocks latch from then on. Joined blocks stay joined, even with "none", unless they
             are parted.
-        hidden_face_drag : {"none", "full"}
-            Drag on faces that are joined.
+        hidden_face_drag : {"none", "full"} or float
+            Drag on faces that are joined; a number is its share of a free face's, 0 to 1.
+        stirring_length : float
+            Distance over which blocks share the stochastic force [m]; 0: each has its own.
         blocks : int
             Number of blocks. The last ones are removed; what is left of their assemblies goes on as
             it was moving, as several where it no longer hangs together. New ones come to rest at
@@ -244,6 +247,7 @@ class LiveTank:
             "forces.force_std_N": force_std,
             "assembly.latching": latching,
             "assembly.hidden_face_drag": hidden_face_drag,
+            "forces.stirring_length_m": stirring_length,
             "assembly.blocks": blocks,
         }
         overrides = {key: value for key, value in given.items() if value is not None}

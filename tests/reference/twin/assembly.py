@@ -345,7 +345,7 @@ def drag_sums(
         members[3:],
         hidden if rules.hidden_face_drag == "none" else None,
     )
-    pushed = push_of_water(model, members[0], members[1])
+    pushed = push_of_water(model, members[:3])
     force_x, force_y, torque = force_x + pushed[0], force_y + pushed[1], torque + pushed[2]
     sums, first = [], 0
     for body, arm in zip(world.assemblies, arms, strict=True):

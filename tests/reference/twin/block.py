@@ -118,10 +118,10 @@ def flow_at(model: TwinModel, x: Floats, y: Floats) -> tuple[Floats, Floats]:
     return _bilinear(model, (model.flow_u, model.flow_v), x, y)
 
 
-def water_acceleration(model: TwinModel, x: Floats, y: Floats) -> Floats:
-    """Return (u . grad) u averaged over a block, and half its curl, shape (3, worlds).
+def water_acceleration(model: TwinModel, pose: Floats) -> Floats:
+    """Return (u . grad) u averaged over a block, and its spin, shape (3, worlds).
 
-    The averages are those of four points at a / sqrt(12) from the middle of the block.
+    The averages are those of the 3 x 3 Gauss points of the block.
     """
     dx, dy = (axis[1] - axis[0] for axis in (model.flow_x, model.flow_y))
     nodes = [
@@ -129,20 +129,26 @@ def water_acceleration(model: TwinModel, x: Floats, y: Floats) -> Floats:
         + model.flow_v * np.gradient(values, dy, axis=0)
         for values in (model.flow_u, model.flow_v)
     ]
+    x, y, theta = pose
     total = np.zeros((3, x.size))
-    for arm_x, arm_y in model.side / np.sqrt(12) * np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]]):
-        there = _bilinear(model, (nodes[0], nodes[1]), x + arm_x, y + arm_y)
-        total += [*there, 6 / model.side**2 * (arm_x * there[1] - arm_y * there[0])]
-    return total / 4
+    places, weights = np.polynomial.legendre.leggauss(3)
+    for across, first in zip(model.side / 2 * places, weights / 2, strict=True):
+        for along, second in zip(model.side / 2 * places, weights / 2, strict=True):
+            arm_x = across * np.cos(theta) - along * np.sin(theta)
+            arm_y = across * np.sin(theta) + along * np.cos(theta)
+            u, v = _bilinear(model, (nodes[0], nodes[1]), x + arm_x, y + arm_y)
+            spin = 6 / model.side**2 * (arm_x * v - arm_y * u)
+            total += first * second * np.stack([u, v, spin])
+    return total
 
 
-def push_of_water(model: TwinModel, x: Floats, y: Floats) -> Floats:
+def push_of_water(model: TwinModel, pose: Floats) -> Floats:
     """Return the force [N] and torque [N m] of the water's own acceleration, shape (3, worlds)."""
     if model.displaced_mass == 0:
-        return np.zeros((3, x.size))
+        return np.zeros((3, pose.shape[1]))
     own = np.array([1, 1, model.side**2 / 6]) * model.displaced_mass
     added = model.added_mass_share * np.array([model.mass, model.mass, model.inertia])
-    return np.asarray((own + added)[:, None] * water_acceleration(model, x, y))
+    return np.asarray((own + added)[:, None] * water_acceleration(model, pose))
 
 
 def _bilinear(
@@ -233,7 +239,7 @@ def simulate_reference(
         ahead = motion + dt / 2 * (before + noise)
         middle = pose + dt / 4 * (motion + ahead)
         force_x, force_y, torque, conductance = drag(model, drag_coefficient, middle, ahead)
-        pushed = np.stack([force_x, force_y, torque]) + push_of_water(model, middle[0], middle[1])
+        pushed = np.stack([force_x, force_y, torque]) + push_of_water(model, middle)
         acceleration = pushed * per_mass
         damping = 1 + dt / 2 * spread * per_mass * conductance
         mean = ahead + dt / 2 * (acceleration - before) / damping

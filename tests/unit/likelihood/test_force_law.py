@@ -100,6 +100,45 @@ def test_curl_of_the_acceleration_spins() -> None:
     assert push[2] == pytest.approx(0.5 * (square[1, 0] - square[0, 1]), rel=1e-10)
 
 
+@pytest.mark.parametrize("theta", [0.0, 0.3, 1.1])
+def test_the_push_is_the_mean_over_the_block_where_the_flow_bends(theta: float) -> None:
+    """Of a quadratic flow Du/Dt is cubic: mean and moment by 20 x 20 Gauss points of the square."""
+    bends = np.random.default_rng(5).normal(size=(2, 6)) * np.array([0.03, 1, 1, 30, 30, 30])
+
+    def flow(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.asarray(np.tensordot(bends, np.stack([1 + 0 * x, x, y, x * x, x * y, y * y]), 1))
+
+    # Of a parabola the coefficients are its values less a sixth of the second difference.
+    x = GRID["origin_x"] + GRID["spacing"] * (np.arange(GRID["columns"]) - 1.0)
+    y = GRID["origin_y"] + GRID["spacing"] * (np.arange(GRID["rows"]) - 1.0)
+    shift = GRID["spacing"] ** 2 / 3 * (bends[:, 3] + bends[:, 5])
+    coefficients = np.ascontiguousarray(flow(*np.meshgrid(x, y)) - shift[:, None, None])
+    places, weights = np.polynomial.legendre.leggauss(20)
+    across, along = SIDE / 2 * np.stack(np.meshgrid(places, places))
+    arm_x = across * np.cos(theta) - along * np.sin(theta)
+    arm_y = across * np.sin(theta) + along * np.cos(theta)
+    x, y = MEAN[0] + arm_x, MEAN[1] + arm_y
+    u, v = flow(x, y)
+    by_x, by_y = (
+        np.tensordot(bends, np.stack(slopes), 1)
+        for slopes in (
+            [0 * x, 1 + 0 * x, 0 * x, 2 * x, y, 0 * x],
+            [0 * x, 0 * x, 1 + 0 * x, 0 * x, x, 2 * y],
+        )
+    )
+    water = u * by_x + v * by_y
+    weight = np.outer(weights, weights) / 4
+    want = [*(weight * water).sum(axis=(1, 2)), 0.0]
+    want[2] = 6 / SIDE**2 * float((weight * (arm_x * water[1] - arm_y * water[0])).sum())
+    mean = MEAN.copy()
+    mean[2] = theta
+    push = (
+        response(coefficients, mean, water_acceleration=1.0, water_spin=1.0)["acceleration"]
+        - response(coefficients, mean)["acceleration"]
+    )
+    np.testing.assert_allclose(push, want, rtol=1e-8)
+
+
 def test_linear_drag_is_that_of_all_strips() -> None:
     """Still water, known velocity: -K b 4 N v, whatever the angle."""
     still = np.zeros((2, GRID["rows"], GRID["columns"]))

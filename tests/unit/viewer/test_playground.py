@@ -51,6 +51,7 @@ def exact() -> Study:
         ("blocks", 12.0, 12),
         ("latching", "none", "none"),
         ("hidden_face_drag", "full", "full"),
+        ("stirring_length", 0.06, 0.06),
     ],
 )
 def test_values_that_a_knob_takes(name: str, value: Any, read: Any) -> None:

@@ -91,9 +91,9 @@ inline void sum_noise(const Physics<Real, T, Law>& physics, int half, Member<Rea
 // Turns a block's sums into accelerations of a block alone, and adds that by the water's own. Of
 // the water's, the mass that it pushes is at the block's centre, on the arm.
 template <class Real, class T, class Law>
-inline void add_water(const Physics<Real, T, Law>& physics, Real x, Real y, const Arm<Real>& arm,
-                      Sums<Real>& sums) {
-  const Motion<Real> water = water_acceleration(physics.water, physics.block, x, y);
+inline void add_water(const Physics<Real, T, Law>& physics, Real x, Real y, const Axes<Real>& axes,
+                      const Arm<Real>& arm, Sums<Real>& sums) {
+  const Motion<Real> water = water_acceleration(physics.water, physics.block, x, y, axes);
   const Real per_mass = physics.world.drag_per_mass, per_inertia = physics.world.drag_per_inertia;
   sums.part[0] = sums.part[0] * per_mass + water.vx;
   sums.part[1] = sums.part[1] * per_mass + water.vy;
@@ -145,7 +145,7 @@ inline void feel_drag(const Physics<Real, T, Law>& physics, Member<Real>& m, Sum
   sums.part[3] = drag.conductance;
   sums.part[4] = drag.conductance * (arm_x * arm_x + arm_y * arm_y);
   if (physics.water.count > 0) {
-    add_water(physics, ahead.pose.x + arm_x, ahead.pose.y + arm_y, {arm_x, arm_y}, sums);
+    add_water(physics, ahead.pose.x + arm_x, ahead.pose.y + arm_y, axes, {arm_x, arm_y}, sums);
   }
 }
 

@@ -261,8 +261,13 @@ private:
     DragResponse<D> response =
         expected_drag<D>(law_, problem_.law.power, flow, problem_.block, problem_.orientations,
                          theta, block, scratch_.shares);
-    add_water_acceleration<D>(flow, rate_nodes, problem_.block, problem_.law, block, theta,
-                              scratch_.points, response);
+    if (pushed_) {
+      // Where the angle is not known, that of the tank's axes stands for all.
+      const double known = problem_.orientations.count == 0 ? theta : 0;
+      add_water_acceleration<D>(flow, rate_nodes, problem_.block, problem_.law,
+                                __builtin_cos(known), __builtin_sin(known), block, scratch_.points,
+                                response);
+    }
     return response;
   }
 

@@ -34,8 +34,10 @@ struct StripBlock {
   int strips;         // a side
   double drag_scale; // acceleration by a strip's squared closing speed, 1/2 rho C_d (a/N) d/m [1/m]
   double mass_by_inertia; // m/I [1/m^2]
-  double points[4][2];    // with the second moments of its area, in its frame [m]
-  double reach;           // how far from its centre the flow matters [m]
+  // Points at which the water's acceleration pushes it, in its frame, and what each counts.
+  double point[9][3]; // [m, m, 1]
+  int points;
+  double reach; // how far from its centre the flow matters [m]
   PanelRows panels{};
 };
 
@@ -128,7 +130,7 @@ struct PointShare {
   double slope_x[4], slope_y[4];   // its derivatives [1/m]
   std::int32_t node;               // as of a StripShare
 };
-inline constexpr int water_points = 4;
+inline constexpr int water_points = 9;
 
 // Memory of a filter, made once.
 template <int D>

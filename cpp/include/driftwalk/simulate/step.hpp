@@ -68,8 +68,8 @@ inline void feel_water(BlockPack<Real, T, Law>& pack) {
   WaterPush<Real>& push = pack.push;
   push.acceleration = {sums.force_x * per_mass, sums.force_y * per_mass, sums.torque * per_inertia};
   if (physics.water.count > 0) {
-    push.acceleration =
-        push.acceleration + water_acceleration(physics.water, physics.block, pose.x, pose.y);
+    push.acceleration = push.acceleration +
+                        water_acceleration(physics.water, physics.block, pose.x, pose.y, pack.axes);
   }
   push.stiffness = sums.conductance * per_mass * half;
   push.spin_stiffness = sums.conductance * per_inertia * (turning_share(physics.block) * half);

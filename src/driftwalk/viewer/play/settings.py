@@ -17,6 +17,7 @@ FILLED: Final = 0.4
 MOST_DRAG: Final = 1.5
 MOST_FORCE_N: Final = 1.5e-3
 MOST_FLOW: Final = 3.0
+MOST_STIRRING_M: Final = 0.3
 LATCHING: Final = ("collision", "connector", "none")
 HIDDEN_FACES: Final = ("none", "full")
 
@@ -92,7 +93,9 @@ class Knob:
 
     def reaching(self, value: Any) -> Self:
         """Return the setting with a range that holds a value, which a study may have beyond it."""
-        if self.choices or self.least <= value <= self.most:
+        if self.choices:
+            return self if value in self.choices else replace(self, choices=(*self.choices, value))
+        if self.least <= value <= self.most:
             return self
         if value > self.most:
             return replace(self, most=float(value))
@@ -108,6 +111,7 @@ KNOBS: Final = (
     Knob("flow_scale", "strength of the flow", "×", 0.0, MOST_FLOW, 0.05),
     Knob("latching", "latching", choices=LATCHING),
     Knob("hidden_face_drag", "drag on joined faces", choices=HIDDEN_FACES),
+    Knob("stirring_length", "length of the stirring", "m", 0.0, MOST_STIRRING_M, 0.005),
     SPEED,
 )
 
@@ -136,7 +140,8 @@ def values_of(tank: LiveTank, *, speed: float) -> dict[str, Any]:
         "blocks": rules.blocks,
         "flow_scale": tank.flow_scale,
         "latching": rules.latching,
-        "hidden_face_drag": rules.hidden_face_drag,
+        "hidden_face_drag": str(rules.hidden_face_drag),
+        "stirring_length": forces.stirring_length_m,
         "speed": speed,
     }
 

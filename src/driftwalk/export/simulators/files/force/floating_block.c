@@ -84,27 +84,31 @@ fb_push fb_drag(const fb_model* model, const fb_state* state) {
   return sum;
 }
 
-/* The mean of Du/Dt at four points that have the second moments of the square, and half its curl.
- */
+/* The mean of Du/Dt over the block, and its moment, from the 3 x 3 Gauss points of the square. */
 static void add_acceleration(const fb_model* model, const fb_state* state, fb_push* push) {
-  const double reach = model->side / sqrt(12.0);
+  const double reach = model->side / 2 * sqrt(0.6);
   const double share = model->added_mass_share;
   const double mass = model->displaced_mass + share * model->mass;
   const double inertia =
       model->displaced_mass * model->side * model->side / 6 + share * model->inertia;
+  const double cosine = cos(state->theta), sine = sin(state->theta);
   double sum_x = 0, sum_y = 0, spin = 0;
-  for (int corner = 0; corner < 4; ++corner) {
-    const double arm_x = corner & 1 ? reach : -reach, arm_y = corner & 2 ? reach : -reach;
-    double x, y;
-    look_up(model, model->acceleration_x, model->acceleration_y, state->x + arm_x, state->y + arm_y,
-            &x, &y);
-    sum_x += x;
-    sum_y += y;
-    spin += arm_x * y - arm_y * x;
+  for (int row = -1; row <= 1; ++row) {
+    for (int column = -1; column <= 1; ++column) {
+      const double arm_x = reach * (column * cosine - row * sine);
+      const double arm_y = reach * (column * sine + row * cosine);
+      const double weight = (row == 0 ? 8 : 5) * (column == 0 ? 8 : 5) / 324.0;
+      double x, y;
+      look_up(model, model->acceleration_x, model->acceleration_y, state->x + arm_x,
+              state->y + arm_y, &x, &y);
+      sum_x += weight * x;
+      sum_y += weight * y;
+      spin += weight * (arm_x * y - arm_y * x);
+    }
   }
-  push->x += mass * sum_x / 4;
-  push->y += mass * sum_y / 4;
-  push->torque += inertia * 6 / (model->side * model->side) * spin / 4;
+  push->x += mass * sum_x;
+  push->y += mass * sum_y;
+  push->torque += inertia * 6 / (model->side * model->side) * spin;
 }
 
 fb_push fb_water(const fb_model* model, const fb_state* state) {

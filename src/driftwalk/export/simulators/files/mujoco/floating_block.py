@@ -87,8 +87,11 @@ class FloatingBlock:
         self._acceleration = None
         if "ax_m_s2" in flow:
             self._acceleration = (flow["ax_m_s2"] + 1j * flow["ay_m_s2"]).ravel()
-            corners = np.array([1 + 1j, 1 - 1j, -1 + 1j, -1 - 1j])
-            self._points = corners * self.numbers["side_m"] / math.sqrt(12)
+            # The 3 x 3 Gauss points of the block.
+            places, weights = np.polynomial.legendre.leggauss(3)
+            across, along = (axis.ravel() for axis in np.meshgrid(places, places))
+            self._points = (across + 1j * along) * self.numbers["side_m"] / 2
+            self._weights = np.outer(weights, weights).ravel() / 4
 
     def _look_up(self, nodes: Any, places: Any) -> Any:
         """Return the bilinear field at places x + iy, beyond the grid the value of its edge."""
@@ -119,19 +122,20 @@ class FloatingBlock:
         force = (conductance + self._linear) * relative
         total, torque = complex(force.sum()), float((arms.conj() * force).imag.sum())
         if self._acceleration is not None:
-            total, torque = self._add_acceleration(complex(x, y), total, torque)
+            total, torque = self._add_acceleration(complex(x, y), turn, total, torque)
         return total.real, total.imag, torque
 
     def _add_acceleration(
-        self, centre: complex, force: complex, torque: float
+        self, centre: complex, turn: complex, force: complex, torque: float
     ) -> tuple[complex, float]:
-        """Add the push of water that accelerates: its mean over the block, and half its curl."""
+        """Add the push of water that accelerates: its mean over the block, and its moment."""
         said = self.numbers
         share, own = said["added_mass_share"], said["displaced_mass_kg"]
-        there = self._look_up(self._acceleration, centre + self._points)
-        force += (own + share * said["mass_kg"]) * complex(there.mean())
+        arms = self._points * turn
+        there = self._weights * self._look_up(self._acceleration, centre + arms)
+        force += (own + share * said["mass_kg"]) * complex(there.sum())
         inertia = own * said["side_m"] ** 2 / 6 + share * said["inertia_kg_m2"]
-        spin = float((self._points.conj() * there).imag.mean())
+        spin = float((arms.conj() * there).imag.sum())
         return force, torque + inertia * 6 / said["side_m"] ** 2 * spin
 
     def stochastic_force(self, interval: int) -> tuple[float, float]:

@@ -1,0 +1,103 @@
+"""`driftwalk fit DIMER --body-shape xx --from FIT`: hidden drag, shared stirring, and their use."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from command_line import here
+from euler_blocks import stirred
+
+import driftwalk as dw
+from driftwalk.flow.analytic import flow_from_function
+
+MINUTES, SIDE, MASS, HIDDEN, RHO = 10.0, 0.03, 0.0116, 0.5, 0.6
+LENGTH = SIDE / math.sqrt(-2.0 * math.log(RHO))
+
+
+def recorded(folder: Path, name: str, study: dw.Study, flow: xr.Dataset) -> Path:
+    """Write a simulated recording as a tracker does."""
+    motion = dw.simulate(study, flow).isel(replicate=0, body=0)
+    path = folder / f"{name}.csv"
+    columns = [motion[key].values for key in ("time", "x", "y", "theta")]
+    np.savetxt(path, np.stack(columns, axis=1), delimiter=",", comments="",
+               header="t_s,x_m,y_m,theta_rad", fmt="%.6f")  # fmt: skip
+    return path
+
+
+def recordings(folder: Path) -> tuple[Path, Path]:
+    """Return simulated recordings of one block and of two that are glued, in the same water."""
+    flow = flow_from_function(lambda x, y: stirred(x, y, 1.0), diameter=0.32)
+    one = dw.Study(
+        tank={"diameter_m": 0.32},
+        simulation={"duration_s": 60.0 * MINUTES, "sample_rate_Hz": 10.0, "seed": 4},
+        observation={"position_noise_m": 2e-4, "orientation_noise_rad": 0.006},
+    )
+    glued = dw.apply_overrides(
+        one,
+        {
+            "block.shape": "xx",
+            "block.mass_kg": 2 * MASS,
+            "assembly.hidden_face_drag": HIDDEN,
+            "forces.stirring_length_m": LENGTH,
+            # Of the sum of two forces with the correlation rho.
+            "forces.force_std_N": one.forces.force_std_N * math.sqrt(2.0 * (1.0 + RHO)),
+            "simulation.seed": 5,
+        },
+    )
+    return recorded(folder, "one", one, flow), recorded(folder, "two", glued, flow)
+
+
+def answer(*arguments: Any) -> dict[str, Any]:
+    done = here(*arguments, "--json")
+    assert done.code == 0, done.err
+    found: dict[str, Any] = json.loads(done.out)
+    return found
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("no_figures")
+def test_a_dimer_tells_hidden_drag_and_shared_stirring(tmp_path: Path) -> None:
+    one, two = recordings(tmp_path)
+    fit, dimer = tmp_path / "fit", tmp_path / "dimer"
+    stated = ("--side", "3cm", "--mass", "11.6g", "--force-interval", "10ms")
+    answer("fit", one, "--tank", "32cm", *stated, "--no-check", "-o", fit)
+    found = answer("fit", two, "--body-shape", "xx", "--from", fit, "--no-check", "-o", dimer)
+    # Twice the interval: what is tested is that the numbers are those of the recording.
+    for name, truth in (("hidden_face_drag_share", HIDDEN), ("stirring_correlation", RHO)):
+        low, high = found[f"{name}_interval"]
+        assert abs(found[name] - truth) < high - low, name
+        assert high - low < 0.5
+    assert found["stirring_length_m"] == pytest.approx(LENGTH, rel=0.2)
+    assert found["stirring_misfit_std"] < 4.0
+    predicted = answer(
+        "assemble", fit, "--from", dimer, "--runs", "40", "--duration", "20s", "--film", "none",
+        "-o", tmp_path / "four",
+    )  # fmt: skip
+    assert float(predicted["hidden_face_drag"]) == found["hidden_face_drag_share"]
+    refused = here("assemble", dimer, "-o", tmp_path / "five")
+    assert refused.code == 2
+    assert "square blocks assemble, and the body is 'xx'" in refused.err
+
+
+def test_what_cannot_be_glued_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "one.csv"
+    path.write_text("t_s,x_m,y_m\n0,0,0\n1,0.01,0\n")
+    missing = here("fit", path, "--from", tmp_path, "-o", tmp_path / "out")
+    assert missing.code == 2
+    assert "fit" in missing.err
+    for shape, words in (
+        ("x.x", "hang together"),
+        ("rectangle", "a rectangle has two sides"),
+        ("disc:4x2cm", "expected"),
+        ("blob", "no body shape 'blob'"),
+    ):
+        done = here("fit", path, "--tank", "30cm", "--body-shape", shape, "-o", tmp_path / "out")
+        assert done.code == 2
+        assert words in done.err, (shape, done.err)
+        assert len(done.err.strip().splitlines()) == 1
