@@ -21,7 +21,7 @@ import numpy.typing as npt
 import shapes
 from blocks import SQUARE, Body, Motion, simulate
 from flows import AXIS, place, steady, uniform
-from information import of_block
+from information import of_block, visited
 from make import finite, tanks_of, write
 from ranges import (
     ADDED_MASS,
@@ -41,10 +41,14 @@ from worlds import Block, Camera, World
 SEEDS = {"discs": 81_000, "squares": 81_000, "ode": 82_000, "dimers": 83_000}
 COUNTS = {"discs": 20, "squares": 8, "ode": 8, "dimers": 24}
 MOST_WALL_SHARE = 0.3
+LEAST_VISITED_SHARE = 0.1
+"""Of the tank."""
 AT_ONCE = 36
 HIDDEN_SHARES = (0.0, 0.5, 1.0)
 CORRELATIONS = (0.0, 0.8)
 ODE_STEP_S = 0.5e-3
+OTHER_SEED = 0x5EED
+"""The dimer of a pair has the seed of the block with these bits turned."""
 
 
 def main() -> None:
@@ -67,7 +71,7 @@ def drawn(which: str, number: int) -> World:
     # Half of the floating bodies have the added mass that a fit takes by itself.
     share = 0.5 if number % 4 == 1 else round(uniform(rng, ADDED_MASS), 3)
     body = Block(
-        flow=steady(rng, sinks=0.1 if floats else 0.7, swirls=0.2),
+        flow=steady(rng, sinks=0.1 if floats else 0.7, swirls=0.7 if floats else 0.2),
         drag_coefficient=uniform(rng, DRAG_COEFFICIENT),
         force_std=uniform(rng, FORCE_STD_N),
         start=complex(*place(rng, 0.08)),
@@ -92,24 +96,24 @@ def known(body: Body) -> list[str]:
 
 def discs(out: Path, which: str, count: int) -> None:
     """Make recordings of discs without orientations, or of square blocks in the same tanks."""
-    body, found, number = shapes.disc(), 0, 1
-    while found < count:
-        group = [drawn(which, number + k) for k in range(AT_ONCE)]
-        number += AT_ONCE
-        tanks = tanks_of(group)
-        tanks.body = body
+    group, body = [drawn(which, 1 + k) for k in range(AT_ONCE)], shapes.disc()
+    tanks = tanks_of(group)
+    tanks.body = body
+    motions = simulate(tanks, 1200.0)
+    facts = [of_block(tanks, k, motions) for k in range(AT_ONCE)]
+    kept = []
+    for name in ("paper", "floating"):
+        able = [k for k, fact in enumerate(facts) if could_tell(fact)]
+        kept += [k for k in able if group[k].kind.name == name][: count // 2]
+    if which == "squares":
+        tanks = tanks.only(np.array(kept))
+        tanks.body = SQUARE
         motions = simulate(tanks, 1200.0)
-        facts = [of_block(tanks, k, motions) for k in range(AT_ONCE)]
-        kept = [k for k, fact in enumerate(facts) if could_tell(fact)][: count - found]
-        found += len(kept)
-        if which == "squares":
-            tanks = tanks.only(np.array(kept))
-            tanks.body = SQUARE
-            motions, facts = simulate(tanks, 1200.0), [{} for _ in kept]
-        for position, k in enumerate(kept):
-            row = position if which == "squares" else k
-            world = replace(group[k], options=known(tanks.body) + group[k].options)
-            write_world(out, world, motions, row, facts[row], heading=which == "squares")
+    for position, k in enumerate(kept):
+        square = which == "squares"
+        world = replace(group[k], options=known(tanks.body) + group[k].options)
+        told = {} if square else facts[k]
+        write_world(out, world, motions, position if square else k, told, heading=square)
 
 
 def write_world(
@@ -123,8 +127,13 @@ def write_world(
 
 
 def could_tell(facts: dict[str, Any]) -> bool:
-    """Return whether a recording could tell C_d, of a body that is seldom at the wall."""
-    return bool(facts["judgeable"]) and facts["wall_share"] < MOST_WALL_SHARE
+    """Return whether a recording could tell C_d, of a body that gets about off the wall."""
+    return bool(facts["judgeable"]) and gets_about(facts["wall_share"], facts["visited_share"])
+
+
+def gets_about(wall_share: float, visited_share: float) -> bool:
+    """Return whether a body is seldom at the wall and stays in no eddy."""
+    return wall_share < MOST_WALL_SHARE and visited_share > LEAST_VISITED_SHARE
 
 
 def ode(out: Path, which: str, count: int) -> None:
@@ -188,26 +197,25 @@ def by_ode(program: Path, world: World, case: Path) -> npt.NDArray[np.complex128
 
 def dimers(out: Path, which: str, count: int) -> None:
     """Make pairs of recordings: a block, and a glued dimer in the same flow."""
-    number, found = 1, 0
-    while found < count:
-        group = [drawn(which, number + k) for k in range(AT_ONCE)]
-        number += AT_ONCE
-        tanks = tanks_of(group)
-        singles = simulate(tanks, 1200.0)
-        able = [k for k in range(AT_ONCE) if could_tell(of_block(tanks, k, singles))]
-        for hidden in HIDDEN_SHARES:
-            # Hidden shares take turns, then correlations.
-            rows = [k for at, k in enumerate(able) if HIDDEN_SHARES[at % 3] == hidden]
-            rho = np.array([CORRELATIONS[(able.index(k) // 3) % 2] for k in rows])
-            glued = tanks.only(np.array(rows))
-            glued.seed = [seed ^ 0x5EED for seed in glued.seed]
-            glued.body, glued.correlation = shapes.dimer(hidden), rho
-            motions = simulate(glued, 1200.0)
-            for row, k in enumerate(rows):
-                facts = of_block(glued, row, motions)
-                if found < count and could_tell(facts):
-                    found += 1
-                    write_pair(out, group[k], (singles, k), (motions, row), hidden, rho[row])
+    group = [drawn(which, 1 + k) for k in range(count + count // 3)]
+    tanks = tanks_of(group)
+    singles = simulate(tanks, 1200.0)
+    able = [k for k in range(len(group)) if could_tell(of_block(tanks, k, singles))]
+    # Hidden shares take turns, then correlations.
+    hidden = np.array([HIDDEN_SHARES[at % 3] for at in range(len(able))])
+    correlation = np.array([CORRELATIONS[(at // 3) % 2] for at in range(len(able))])
+    glued = tanks.only(np.array(able))
+    glued.seed = [seed ^ OTHER_SEED for seed in glued.seed]
+    glued.body, glued.correlation = shapes.dimer(hidden), correlation
+    motions, found = simulate(glued, 1200.0), 0
+    for row, k in enumerate(able):
+        about = gets_about(float(motions.touched[row].mean()), visited(motions.place[row]))
+        if found < count and about:
+            found += 1
+            write_pair(
+                out, group[k], (singles, k), (motions, row), float(hidden[row]),
+                float(correlation[row]),
+            )  # fmt: skip
 
 
 def write_pair(
@@ -221,7 +229,7 @@ def write_pair(
         "--mass", "11.6g", *extra],
     )  # fmt: skip
     glued = replace(
-        single, name=f"{world.name}-dimer", seed=world.seed ^ 0x5EED,
+        single, name=f"{world.name}-dimer", seed=world.seed ^ OTHER_SEED,
         options=["--tank", "30cm", "--body-shape", "xx:3cm", "--mass", "23.2g", *extra],
     )  # fmt: skip
     for part, (motions, row) in ((single, one), (glued, two)):
@@ -231,7 +239,7 @@ def write_pair(
         "name": world.name,
         "kind": world.kind.name,
         "hidden_share": hidden,
-        "correlation": float(correlation),
+        "correlation": correlation,
         "body": body,
     }
     text = json.dumps(truth, indent=1)

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "verdict"))
 
@@ -28,13 +29,16 @@ def disc(diameter: float = SIDE_M, mass: float = MASS_KG) -> Body:
     return Body(radius * rim, rim, widths, none, inner, radius, radius**2, 2.0, mass, radius)
 
 
-def dimer(hidden_share: float) -> Body:
-    """Return two blocks glued side by side; hidden faces feel a share of the drag of free ones."""
+def dimer(hidden_share: npt.ArrayLike) -> Body:
+    """Return two blocks glued side by side; hidden faces feel a share of the drag of free ones.
+
+    Of several tanks the share may be one for each.
+    """
     centres = 0.5 * SIDE_M * np.array([-1.0, 1.0])
     points = np.concatenate([centre + POINTS for centre in centres])
     normals = np.tile(NORMALS, 2)
     hidden = (np.abs(points.real) < 1e-12) & (np.abs(normals.imag) < 1e-12)
-    widths = np.tile(WIDTHS, 2) * np.where(hidden, hidden_share, 1.0)
+    widths = np.tile(WIDTHS, 2) * np.where(hidden, np.asarray(hidden_share)[..., np.newaxis], 1.0)
     corners = np.array([z + z.real / abs(z.real) * 0.5 * SIDE_M for z in CORNERS])
     inner = INNER.real * 2.0 + 1j * INNER.imag
     return Body(

@@ -41,7 +41,9 @@ def main() -> None:
     print(f"\nprocessor time: {seconds(lines):.2f} s a minute of recording (median)")
     if options.against:
         other = joined(*options.against)
-        print(f"of the other set: {seconds(other):.2f} s; ratio {seconds(lines) / seconds(other):.2f}")
+        print(
+            f"of the other set: {seconds(other):.2f} s; ratio {seconds(lines) / seconds(other):.2f}"
+        )
 
 
 def row(name: str, found: list[tuple[dict[str, Any], float]]) -> str:
