@@ -13,7 +13,7 @@ from driftwalk.model.bodies.rigid_body import Measures, RigidBody, face
 from driftwalk.schema.shapes import Cells, cells_of_shape
 
 MOST_CELLS = 64
-"""Of a body: 32 panels each are read in every step."""
+"""A body may have this many: in every step 32 panels of each are read."""
 STEPS = ((1, 0), (0, 1), (-1, 0), (0, -1))
 """From a cell to its neighbours."""
 
