@@ -45,9 +45,7 @@ def tanks(study: dict[str, ModuleType], body: Any, count: int, **given: Any) -> 
     }  # fmt: skip
     arrays = {name: np.full(count, value) for name, value in (values | given).items()}
     flow = study["flows"].Flow((water + 0j)[np.newaxis])
-    return study["blocks"].Tanks(
-        flow=[flow] * count, seed=list(range(count)), body=body, **arrays
-    )
+    return study["blocks"].Tanks(flow=[flow] * count, seed=list(range(count)), body=body, **arrays)
 
 
 def test_a_disc_comes_to_rest(study: dict[str, ModuleType]) -> None:
@@ -106,9 +104,7 @@ def test_a_dimer_feels_all_its_faces(study: dict[str, ModuleType], hidden: float
 
 
 @pytest.mark.parametrize("correlation", [0.0, 0.8])
-def test_forces_of_the_members_of_a_dimer(
-    study: dict[str, ModuleType], correlation: float
-) -> None:
+def test_forces_of_the_members_of_a_dimer(study: dict[str, ModuleType], correlation: float) -> None:
     """var F = 2 sigma^2 (1 + rho), var torque = sigma^2 (1 - rho) a^2 / 2.
 
     600 tanks: four standard deviations of a variance are 23 %, a false alarm in 16,000 each.

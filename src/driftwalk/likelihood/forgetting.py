@@ -16,18 +16,21 @@ import math
 
 import numpy as np
 
-from driftwalk.core.arrays import Floats
+from driftwalk.core.arrays import Bools, Floats
 from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import FILTER, Series
 from driftwalk.likelihood.newton import Mode, ModeSearch
-from driftwalk.likelihood.spline import basis_matrix
+from driftwalk.likelihood.spline import Spline, basis_matrix
+
+BLOCK = 4096
+"""Samples whose bases are held at once."""
 
 
 def due_share(search: ModeSearch, mode: Mode) -> float:
-    """Return tr(M B) / tr(M A) at a mode; for a disc, whose drag is that of its slip.
+    """Return tr(M B) / tr(M A) at a mode, of a disc: its drag depends on the slip alone.
 
-    A flow in layers or in intervals counts with the mean of each.
+    Of a flow in layers the mean counts.
     """
     passes, point = search.passes, mode.point
     prior = search.prior.matrix(mode.weights)
@@ -36,45 +39,55 @@ def due_share(search: ModeSearch, mode: Mode) -> float:
         one, other = (np.zeros_like(prior) for _ in range(2))
         for series in passes.series:
             if series.flow == flow:
-                rows, kept, gains = _memory(passes, series, point.in_flow(flow))
-                one += rows.T @ (gains[:, None] * rows)
-                other += rows.T @ (gains[:, None] * kept)
+                _add_series(passes, series, point.in_flow(flow), one, other)
         weight = np.linalg.inv(one + prior)
         due += float(np.sum(weight * other.T))
         whole += float(np.sum(weight * one))
-
     return due / whole
 
 
-def _memory(passes: Passes, series: Series, point: Point) -> tuple[Floats, Floats, Floats]:
-    """Return phi and psi, shape (n, coefficients), and kappa^2 dt / q, (n,), at the samples."""
+def _add_series(passes: Passes, series: Series, point: Point, one: Floats, other: Floats) -> None:
+    """Add A and B of a series."""
     body, spline = passes.body, passes.spline
-    state = passes.states(series, point)
-    seen = np.isfinite(state).all(axis=1)
-    x, y, vx, vy = np.where(seen[:, None], state, 0.0).T
+    # Many samples within a tenth of a second tell the same.
+    states, time = passes.states(series, point)[:: series.pooled], series.time[:: series.pooled]
+    excluded = np.add.reduceat(series.excluded, np.arange(0, series.time.size, series.pooled))
+    mean = point.coefficients.reshape(-1, spline.size)[:2]
+    scale = 0.5 * body.water_density * body.side * body.depth / body.mass
+    step = np.diff(time, prepend=time[0])
+    seen = np.isfinite(states).all(axis=1)
+    states = np.where(seen[:, None], states, 0.0)
+    lost = (excluded != 0) | ~seen | (step > FILTER.longest_gap_s)
+    memory = np.zeros(spline.size)
+    for begin in range(0, time.size, BLOCK):
+        part = slice(begin, begin + BLOCK)
+        rows = _bases(spline, states[part, 0], states[part, 1])
+        slip = np.hypot(*(mean @ rows.T - states[part, 2:].T))
+        # Along the slip the drag k |w| w pulls with 2 k |w|, across it with k |w|: their mean.
+        rate = 1.5 * scale * math.exp(point.log_drag) * slip
+        kept, memory = remembered(rows, rate * step[part], lost[part], memory)
+        gains = np.where(lost[part], 0.0, rate**2 * step[part] / math.exp(point.log_intensity))
+        one += rows.T @ (gains[:, None] * rows)
+        other += rows.T @ (gains[:, None] * kept)
+
+
+def remembered(rows: Floats, turns: Floats, lost: Bools, memory: Floats) -> tuple[Floats, Floats]:
+    """Return the means of psi over steps of constant phi, shape (n, coefficients), and psi after.
+
+    `turns` are the lengths of the steps in memory times, (n,); nothing is remembered over a step
+    that is lost.
+    """
+    left = np.where(lost, 0.0, np.exp(-turns))
+    share = np.where(turns > 1e-9, -np.expm1(-turns) / np.maximum(turns, 1e-9), 1.0)
+    kept = np.empty_like(rows)
+    for k, row in enumerate(rows):
+        kept[k] = share[k] * memory + (1.0 - share[k]) * row
+        memory = np.zeros_like(memory) if lost[k] else left[k] * memory + (1.0 - left[k]) * row
+    return kept, memory
+
+
+def _bases(spline: Spline, x: Floats, y: Floats) -> Floats:
+    """Return all basis functions at places, shape (n, coefficients of one component)."""
     along_x = basis_matrix((x - spline.origin_x) / spline.spacing, spline.columns)
     along_y = basis_matrix((y - spline.origin_y) / spline.spacing, spline.rows)
-    rows = (along_y[:, :, None] * along_x[:, None, :]).reshape(x.size, -1)
-    mean = point.coefficients.reshape(-1, spline.size)[:2]
-    slip = np.hypot(*(mean @ rows.T - np.stack([vx, vy])))
-    scale = 0.5 * body.water_density * body.side * body.depth / body.mass
-    # Along the slip the drag k |w| w pulls with 2 k |w|, across it with k |w|: their mean.
-    rate = 1.5 * scale * math.exp(point.log_drag) * slip
-    step = np.diff(series.time, prepend=series.time[0])
-    lost = (series.excluded != 0) | ~seen | (step > FILTER.longest_gap_s)
-    gains = np.where(lost, 0.0, rate**2 * step / math.exp(point.log_intensity))
-    left = np.where(lost, 0.0, np.exp(-rate * step))
-    kept = np.zeros_like(rows)
-    memory = np.zeros(rows.shape[1])
-    for k in range(1, len(rows)):
-        # The mean of psi over the step, of a phi that is constant in it.
-        ahead = left[k] * memory + (1.0 - left[k]) * rows[k]
-        kept[k] = rows[k] if lost[k] else _mean(memory, rows[k], left[k], rate[k] * step[k])
-        memory = ahead if not lost[k] else np.zeros_like(memory)
-    return rows, kept, gains
-
-
-def _mean(memory: Floats, row: Floats, left: float, turns: float) -> Floats:
-    """Return the mean of psi over a step of so many memory times."""
-    share = (1.0 - left) / turns if turns > 1e-9 else 1.0
-    return share * memory + (1.0 - share) * row
+    return (along_y[:, :, None] * along_x[:, None, :]).reshape(x.size, -1)
