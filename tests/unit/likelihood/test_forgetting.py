@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import driftwalk as dw
+from driftwalk.likelihood.filter.parameters import DRAG_SHAPES
 from driftwalk.likelihood.forgetting import remembered
+from driftwalk.likelihood.law.force_law import assumptions_of
 
 
 @pytest.mark.parametrize("crossing", [0.2, 1.0, 2.0, 20.0])
@@ -62,3 +65,13 @@ def test_the_bias_of_a_rate_is_that_of_the_sum() -> None:
     error = score.std() / np.sqrt(visits)
     assert error < 0.012
     assert abs(score.mean() - kept.mean()) < 4 * error + 0.01
+
+
+@pytest.mark.parametrize(("shape", "tried"), [("disc", False), ("square", True), ("xx", True)])
+def test_the_power_of_the_drag_is_not_tried_without_a_heading(shape: str, tried: bool) -> None:
+    study = dw.Study(block={"shape": shape})
+    found = assumptions_of(study, "none" if shape == "disc" else "state", recordings=1, flows=1)
+    assert (set(DRAG_SHAPES) <= set(found.tried)) == tried
+    assert "force_memory" in found.tried
+    stated = dw.apply_overrides(study, {"fit.law": "power"})
+    assert "drag_power" in assumptions_of(stated, "none", recordings=1, flows=1).opened
