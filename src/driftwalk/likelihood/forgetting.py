@@ -57,7 +57,7 @@ def _add_series(passes: Passes, series: Series, point: Point, one: Floats, other
     step = np.diff(time, prepend=time[0])
     seen = np.isfinite(states).all(axis=1)
     states = np.where(seen[:, None], states, 0.0)
-    lost = (excluded != 0) | ~seen | (step > FILTER.longest_gap_s)
+    lost: Bools = np.asarray((excluded != 0) | ~seen | (step > FILTER.longest_gap_s))
     memory = np.zeros(spline.size)
     for begin in range(0, time.size, BLOCK):
         part = slice(begin, begin + BLOCK)
