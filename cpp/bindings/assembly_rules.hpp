@@ -49,6 +49,20 @@ inline bool is_first(const std::string& word, const char* first, const char* sec
   return word == first;
 }
 
+// What is shared: the drag of joined faces, and the stochastic force over a length [m].
+inline void set_shared(driftwalk::AssemblyRules& rules, double hidden_share, double stirring_length,
+                       bool incompressible) {
+  if (!(hidden_share >= 0 && hidden_share <= 1)) {
+    throw std::invalid_argument("hidden_share must be from 0 to 1");
+  }
+  if (!(stirring_length >= 0 && stirring_length < 1e6)) {
+    throw std::invalid_argument("stirring_length must be finite and not negative");
+  }
+  rules.hidden_share = hidden_share;
+  rules.stirring_length = stirring_length;
+  rules.incompressible = incompressible;
+}
+
 inline void require_blocks(std::size_t blocks) {
   if (blocks < 1 || blocks > driftwalk::most_blocks) {
     throw std::invalid_argument("a world has 1 to 256 blocks");

@@ -37,8 +37,8 @@ nb::tuple place_blocks(const Model& model, std::size_t blocks, In<std::uint64_t,
 nb::dict assemble(const Model& model, In<double, 3> start, In<std::uint64_t, 1> key,
                   In<double, 1> drag_coefficient, In<double, 1> force_std, std::int64_t steps,
                   const std::string& latching, double connector_distance, double connector_axis,
-                  const std::string& hidden_face_drag, double block_restitution,
-                  double block_friction, int sample_every, int threads,
+                  double hidden_share, double stirring_length, bool incompressible,
+                  double block_restitution, double block_friction, int sample_every, int threads,
                   const std::string& precision, std::optional<In<double, 1>> flow_start) {
   const std::size_t worlds = start.shape(0), blocks = start.shape(1);
   require_blocks(blocks);
@@ -54,7 +54,7 @@ nb::dict assemble(const Model& model, In<double, 3> start, In<std::uint64_t, 1> 
   rules.latching = latching_of(latching);
   rules.connector_distance = connector_distance;
   rules.connector_cosine = std::cos(connector_axis);
-  rules.hidden_faces_drag = is_first(hidden_face_drag, "full", "none");
+  set_shared(rules, hidden_share, stirring_length, incompressible);
   rules.restitution = block_restitution;
   rules.friction = block_friction;
   const driftwalk::AssemblyWorlds batch{static_cast<std::int64_t>(worlds),
@@ -126,6 +126,7 @@ void register_assemble(nb::module_& module) {
              "threads"_a);
   module.def("assemble", &assemble, "model"_a, nb::kw_only(), "start"_a, "key"_a,
              "drag_coefficient"_a, "force_std"_a, "steps"_a, "latching"_a, "connector_distance"_a,
-             "connector_axis"_a, "hidden_face_drag"_a, "block_restitution"_a, "block_friction"_a,
-             "sample_every"_a, "threads"_a, "precision"_a, "flow_start"_a = nb::none());
+             "connector_axis"_a, "hidden_share"_a, "stirring_length"_a, "incompressible"_a,
+             "block_restitution"_a, "block_friction"_a, "sample_every"_a, "threads"_a,
+             "precision"_a, "flow_start"_a = nb::none());
 }

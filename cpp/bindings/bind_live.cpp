@@ -20,8 +20,8 @@ using driftwalk::LiveWorld;
 
 void start_world(LiveWorld* self, const Model& model, In<double, 2> start, std::uint64_t key,
                  double drag_coefficient, double force_std, const std::string& latching,
-                 double connector_distance, double connector_axis,
-                 const std::string& hidden_face_drag, double block_restitution,
+                 double connector_distance, double connector_axis, double hidden_share,
+                 double stirring_length, bool incompressible, double block_restitution,
                  double block_friction, double flow_start) {
   require_blocks(start.shape(0));
   if (start.shape(1) != 3) {
@@ -31,7 +31,7 @@ void start_world(LiveWorld* self, const Model& model, In<double, 2> start, std::
   rules.latching = latching_of(latching);
   rules.connector_distance = connector_distance;
   rules.connector_cosine = std::cos(connector_axis);
-  rules.hidden_faces_drag = is_first(hidden_face_drag, "full", "none");
+  set_shared(rules, hidden_share, stirring_length, incompressible);
   rules.restitution = block_restitution;
   rules.friction = block_friction;
   new (self) LiveWorld(model.twice(), rules, {drag_coefficient, force_std, 1.0}, start.data(), key,
@@ -85,8 +85,8 @@ void register_live(nb::module_& module) {
   nb::class_<LiveWorld>(module, "LiveWorld")
       .def("__init__", &start_world, nb::keep_alive<1, 2>(), "model"_a, nb::kw_only(), "start"_a,
            "key"_a, "drag_coefficient"_a, "force_std"_a, "latching"_a, "connector_distance"_a,
-           "connector_axis"_a, "hidden_face_drag"_a, "block_restitution"_a, "block_friction"_a,
-           "flow_start"_a = 0.0)
+           "connector_axis"_a, "hidden_share"_a, "stirring_length"_a, "incompressible"_a,
+           "block_restitution"_a, "block_friction"_a, "flow_start"_a = 0.0)
       .def("advance", &advance, "steps"_a)
       .def("state", &state)
       .def(
@@ -97,10 +97,13 @@ void register_live(nb::module_& module) {
           nb::kw_only(), "drag_coefficient"_a, "force_std"_a, "flow_scale"_a)
       .def(
           "set_rules",
-          [](LiveWorld& world, const std::string& latching, const std::string& hidden_face_drag) {
-            world.set_rules(latching_of(latching), is_first(hidden_face_drag, "full", "none"));
+          [](LiveWorld& world, const std::string& latching, double hidden_share,
+             double stirring_length) {
+            driftwalk::AssemblyRules checked;
+            set_shared(checked, hidden_share, stirring_length, false);
+            world.set_rules(latching_of(latching), hidden_share, stirring_length);
           },
-          nb::kw_only(), "latching"_a, "hidden_face_drag"_a)
+          nb::kw_only(), "latching"_a, "hidden_share"_a, "stirring_length"_a)
       .def("set_blocks", &set_blocks, "blocks"_a)
       .def("part", &LiveWorld::part)
       .def_prop_ro("step", &LiveWorld::step)

@@ -130,10 +130,11 @@ void LiveWorld::set_forces(const LiveForces& forces) {
   inside_->pack.scale_flow(forces.flow_scale);
 }
 
-void LiveWorld::set_rules(Latching latching, bool hidden_faces_drag) {
+void LiveWorld::set_rules(Latching latching, double hidden_share, double stirring_length) {
   AssemblyRules& rules = inside_->rules;
   rules.latching = latching;
-  rules.hidden_faces_drag = hidden_faces_drag;
+  rules.hidden_share = hidden_share;
+  rules.stirring_length = stirring_length;
   for (int b = 0; b < rules.blocks; ++b) {
     cover_faces(rules, inside_->pack.memory(), b, 0);
   }

@@ -253,7 +253,7 @@ void check_jam(Tank tank, const char* name, int blocks, Latching latching, bool 
   const driftwalk::PreparedRun<double> prepared(tank.finished());
   AssemblyRules rules = synthetic::rules_in(prepared, blocks);
   rules.latching = latching;
-  rules.hidden_faces_drag = hidden_faces_drag;
+  rules.hidden_share = hidden_faces_drag ? 1 : 0;
   rules.friction = hidden_faces_drag ? 0.5 : 0;
   const Crowd crowd = crowd_in(rules, 20);
   const CrowdResults found = synthetic::assemble<float>(tank, rules, crowd, 300, 3);
@@ -598,7 +598,7 @@ void check_step_of_an_assembly() {
     const int n = sizes[trial % 3];
     const bool hidden = trial % 2 == 1;
     AssemblyRules rules = synthetic::rules_in(prepared, n);
-    rules.hidden_faces_drag = hidden;
+    rules.hidden_share = hidden ? 1 : 0;
     Crowd crowd(n);
     std::vector<double> start;
     const double heading = pi * draw(), at_x = 0.05 * draw(), at_y = 0.05 * draw();

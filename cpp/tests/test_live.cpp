@@ -249,7 +249,7 @@ void check_parting() {
     const Look before(world.live);
     const int assemblies = check_assemblies(before);
     CHECK(blocks == 1 || assemblies < blocks);
-    world.live.set_rules(Latching::none, false);
+    world.live.set_rules(Latching::none, 0, 0);
     world.live.part();
     const Look after(world.live);
     check_kept(before, after);
@@ -336,7 +336,7 @@ void check_late_forces() {
     const AssemblyRules rules = synthetic::rules_in(prepared, blocks);
     AssemblyRules hard = rules;
     hard.latching = Latching::none;
-    hard.hidden_faces_drag = true;
+    hard.hidden_share = 1;
     Crowd crowd(blocks);
     while (!crowd.add_random(rules, crowd.worlds() + 3, 0.45, 0)) {
     }
@@ -345,7 +345,7 @@ void check_late_forces() {
     late.advance(120);
     CHECK(Look(late).pose == Look(fresh).pose);
     late.set_forces({0.45, 0.0, 1.5});
-    late.set_rules(rules.latching, rules.hidden_faces_drag);
+    late.set_rules(rules.latching, rules.hidden_share, rules.stirring_length);
     int joined = 0;
     for (int k = 0; k < 40; ++k) {
       late.advance(50);
@@ -363,13 +363,13 @@ void check_late_forces() {
 void check_hidden_faces() {
   Joined world(9), other(9);
   CHECK(check_assemblies(Look(world.live)) < 9);
-  world.live.set_rules(world.rules.latching, true);
+  world.live.set_rules(world.rules.latching, 1, 0);
   world.live.advance(5);
   other.live.advance(5);
   CHECK(Look(world.live).pose != Look(other.live).pose);
   Joined back(9);
-  back.live.set_rules(world.rules.latching, true);
-  back.live.set_rules(world.rules.latching, false);
+  back.live.set_rules(world.rules.latching, 1, 0);
+  back.live.set_rules(world.rules.latching, 0, 0);
   back.live.advance(5);
   CHECK(Look(back.live).pose == Look(other.live).pose);
 }
@@ -401,7 +401,7 @@ void check_any_sequence() {
       live.part();
       break;
     case 2:
-      live.set_rules(Latching(below(3)), below(2) == 0);
+      live.set_rules(Latching(below(3)), 0.5 * below(3), below(2) * 0.05);
       break;
     case 3:
       live.set_forces({random() + 1, 4e-3 * (random() + 1), random() + 1});

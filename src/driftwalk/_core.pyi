@@ -153,7 +153,9 @@ def assemble(
     latching: str,
     connector_distance: float,
     connector_axis: float,
-    hidden_face_drag: str,
+    hidden_share: float,
+    stirring_length: float,
+    incompressible: bool,
     block_restitution: float,
     block_friction: float,
     sample_every: int,
@@ -176,7 +178,9 @@ class LiveWorld:
         latching: str,
         connector_distance: float,
         connector_axis: float,
-        hidden_face_drag: str,
+        hidden_share: float,
+        stirring_length: float,
+        incompressible: bool,
         block_restitution: float,
         block_friction: float,
         flow_start: float = 0.0,
@@ -189,7 +193,7 @@ class LiveWorld:
     def set_forces(
         self, *, drag_coefficient: float, force_std: float, flow_scale: float
     ) -> None: ...
-    def set_rules(self, *, latching: str, hidden_face_drag: str) -> None: ...
+    def set_rules(self, *, latching: str, hidden_share: float, stirring_length: float) -> None: ...
     def set_blocks(self, blocks: int) -> int: ...  # as many as there are then
     def part(self) -> None: ...
     @property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import xarray as xr
 from command_line import assert_same_bits
 from slow_orbits import TRUTH as SLOW, slow_flow, slow_recording
 
@@ -43,7 +44,7 @@ AROUND_THE_TRUTH = {
 }
 
 
-def synthetic_recording(duration: float, seed: int = 5):
+def synthetic_recording(duration: float, seed: int = 5, flow=None):
     study = apply_overrides(
         dw.Study(),
         {
@@ -55,7 +56,8 @@ def synthetic_recording(duration: float, seed: int = 5):
         },
     )
     start = dw.simulation.Start(0.05, 0.0, 0.0)
-    run = dw.simulate(study, dw.tank30_flow(), start=start, seed=seed).isel(replicate=0, body=0)
+    water = dw.tank30_flow() if flow is None else flow
+    run = dw.simulate(study, water, start=start, seed=seed).isel(replicate=0, body=0)
     return build_trajectory(run["time"], run["x"], run["y"], run["theta"])
 
 
@@ -179,6 +181,26 @@ def test_threads_do_not_change_a_single_bit(found):
     assert len(given) == 1
     assert given[0] is again
     assert again.identical(found)
+
+
+@pytest.mark.slow
+def test_the_second_half_of_a_changing_flow_has_its_own_water():
+    """The water flows half as fast from 200 s on: simulated with the first half's, D is above 0.3.
+
+    How it goes on is tested with `flow_since`.
+    """
+    steady = dw.tank30_flow()
+    fields = [steady, steady, *(2 * [steady.assign(u=0.5 * steady["u"], v=0.5 * steady["v"])])]
+    flow = xr.concat(fields, "time").assign_coords(time=[0.0, 199.9, 200.1, 400.0])
+    flow.attrs["repeat"] = "hold"
+    few = {"calibration.replicates": 1, "calibration.bootstrap": 8}
+    study = apply_overrides(dw.Study(), {**SMALL, **few, "calibration.force_std_step_N": 0.4e-3})
+    found = dw.calibrate(synthetic_recording(400.0, flow=flow), study, flow=flow, threads=2)
+    facts = facts_of(found)
+    assert facts["halves_ks_distance"] > 0.25
+    assert facts["second_half_ks_distance"] < 1.5 * facts["second_half_noise_floor"] < 0.25
+    # What changes is in the model.
+    assert not any("not steady" in str(reason) for reason in found["verdict_reason"].values)
 
 
 @pytest.mark.slow

@@ -364,7 +364,11 @@ class LiveTank:
         if changed:
             self._set_forces()
             rules = self._active.study.assembly
-            self._world.set_rules(latching=rules.latching, hidden_face_drag=rules.hidden_face_drag)
+            self._world.set_rules(
+                latching=rules.latching,
+                hidden_share=rules.hidden_share,
+                stirring_length=self._active.study.forces.stirring_length_m,
+            )
         if wished.part:
             self._world.part()
             self._look()

@@ -20,6 +20,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.core.run_stages import Progress
 from driftwalk.schema import Track
 from driftwalk.schema.answers.facts import FAR_ABOVE_FLOOR, is_explained
+from driftwalk.simulation.series import flow_since
 
 
 def noise_floor_at(problem: Problem, point: Sequence[float]) -> float:
@@ -116,7 +117,8 @@ def validate_on_halves(
             prepare_problem(
                 half,
                 whole.study,
-                flow,
+                # A flow that changes has the clock of the whole recording.
+                flow_since(flow, float(half.time[0] - track.time[0])),
                 camera=whole.like.camera,
                 model=whole.model,
                 statistic=whole.statistic,

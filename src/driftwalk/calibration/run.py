@@ -33,7 +33,7 @@ from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.run_stages import share_of_windows, tell_nobody
 from driftwalk.motion import BlockModel, MotionModel, ParticleModel
 from driftwalk.motion.protocol import ScoresItself
-from driftwalk.simulation.series import series_warnings
+from driftwalk.simulation.series import is_series, series_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -161,7 +161,8 @@ def calibrate(
         for text in (
             OWN_FLOW if is_block and flow is None else None,
             wall_warning(track, chosen) if is_block else None,
-            None if stationarity is None else stationarity.warning,
+            # In a flow that changes the model is not steady either.
+            None if stationarity is None or is_series(problem.like.flow) else stationarity.warning,
         )
         if text is not None
     ]

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from driftwalk.cli.inputs.model_source import RUN_NAMES, assembly_source
+from driftwalk.cli.inputs.model_source import RUN_NAMES, assembly_source, with_glued
 from driftwalk.cli.inputs.recordings import opening_note
 from driftwalk.cli.options.run import RunOptions, with_run_options
 from driftwalk.cli.options.shared_types import FlowFile, Run, option
@@ -26,6 +27,14 @@ def assemble(
     given: StudyOptions,
     run: Run = None,
     flow: FlowFile = None,
+    glued: Annotated[
+        Path | None,
+        option(
+            "--from RUN",
+            "Fit of glued blocks: the drag of hidden faces and the length of the stirring.",
+            show_default=False,
+        ),
+    ] = None,
     film: Annotated[str, option("--film gif|mp4|none", "Film of the first run.")] = "gif",
     *,
     options: RunOptions,
@@ -40,6 +49,7 @@ def assemble(
     from driftwalk.runs import AssemblyWork
 
     _check_film(film)
+    given = with_glued(given, glued)
     refused = [] if given.file is None else ["--study"]
     source = assembly_source(run, flow, given, refused=refused)
     work = AssemblyWork(

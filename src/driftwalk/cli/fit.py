@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated, Any
 
-from driftwalk.cli.inputs.model_source import load_flow_for
+from driftwalk.cli.inputs.model_source import load_flow_for, read_earlier_fit
 from driftwalk.cli.inputs.recordings import opening_note, read_for_run
-from driftwalk.cli.options.recording import RecordingOptions, with_recording_options
-from driftwalk.cli.options.shared_types import Json, Overwrite, argument, flow_of_run, option
+from driftwalk.cli.options.flatten_options import with_options
+from driftwalk.cli.options.recording import RecordingOptions
+from driftwalk.cli.options.shared_types import (
+    Json,
+    Overwrite,
+    argument,
+    flow_of_run,
+    option,
+    quantity_parser,
+)
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import print_note, print_parts, print_places, print_result
@@ -21,7 +30,9 @@ RecordingFiles = Annotated[
 ]
 
 
-@with_recording_options
+@with_options(
+    RecordingOptions, *(one.name for one in fields(RecordingOptions) if one.name != "start")
+)
 @with_study_options(
     FIT_KEYS,
     *("body_shape", "side", "mass", "depth", "force_interval"),
@@ -41,6 +52,15 @@ def fit(
             "--flow FILE",
             "Steady flow that was measured, as by PIV: the prior of the fitted flow.",
             callback=flow_of_run,
+            show_default=False,
+        ),
+    ] = None,
+    start: Annotated[
+        str | None,
+        option(
+            "--from s|RUN",
+            "First time to keep; or, for glued blocks (--body-shape xx), the finished fit of one "
+            "block in the same water.",
             show_default=False,
         ),
     ] = None,
@@ -72,9 +92,14 @@ def fit(
     from driftwalk.schema.answers.facts import sentences
     from driftwalk.schema.answers.fit import checked_parts, fitted_parts
 
-    read = read_for_run(recordings, given, how)
+    earlier = None if start is None or not Path(start).is_dir() else Path(start)
+    before = None if earlier is None else read_earlier_fit(earlier)
+    if start is not None and earlier is None:
+        how = replace(how, start=quantity_parser("s")(start))
+    read = read_for_run(recordings, given, how, before=before)
     inputs = {"recording" if n == 0 else f"recording-{n + 1}": p for n, p in enumerate(recordings)}
-    inputs |= {role: path for role, path in (("study", given.file), ("flow", flow)) if path}
+    files = {"study": given.file, "flow": flow, "earlier": earlier and earlier / "fit.nc"}
+    inputs |= {role: path for role, path in files.items() if path}
     field = None if flow is None else load_flow_for(flow, read.study)
     effort = fit_work(sum(one.sizes["time"] for one in read.trajectories))
     opening = opening_note(read.study, given, how=how, about="block")
@@ -101,6 +126,7 @@ def fit(
         compare_laws=compare_laws,
         wall=wall,
         flow=field,
+        earlier=before,
         **({} if json else said),
     )
     with reported("fit") as told:

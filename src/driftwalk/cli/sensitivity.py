@@ -44,6 +44,7 @@ AXES: Final = {
     "flow": "sensitivity.flow",
     "latching": "sensitivity.latching",
     "hidden-face-drag": "sensitivity.hidden_face_drag",
+    "stirring-length": "sensitivity.stirring_length_m",
     "drag-coefficient": "sensitivity.drag_coefficient",
     "force-std": "sensitivity.force_std_N",
 }
@@ -192,8 +193,8 @@ def vary_overrides(given: Sequence[str]) -> dict[str, Any]:
 
 def _values(word: str, key: str) -> Iterator[Any]:
     """Return the values of one word: itself, a number, or the numbers of a range."""
-    quantity = declared(key).quantity
-    if quantity is None:
+    quantity, known = declared(key).quantity, declared(key).words
+    if quantity is None or word in known:
         yield word
         return
     parts = word.split(":")

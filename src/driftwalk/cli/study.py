@@ -274,7 +274,9 @@ def _of_run(
         own = study_as_seen(own, recording, body_track(recording, found.body))
     study = given.over(own, base=f"the study of {source.folder}")
     if RECOVER_KEYS["flow"] not in given.overrides:
-        return study, found.flow(own), found.inputs
+        mean, lacks = found.mean_flow(own)
+        print_warnings([lacks])
+        return study, mean, found.inputs
     field, flow_file = _named_flow(study, given)
     return study, field, {**found.inputs, **_files({"flow": flow_file})}
 

@@ -345,6 +345,8 @@ def fitted_law(found: xr.Dataset) -> dict[str, Any]:
     # Forces on the cells of a glued body turn it; of one block the lever is a test of the model.
     if "force_lever" in known and "study" in found.attrs and _is_glued(found):
         law["forces.force_lever_m"] = fitted_value(found, "force_lever")
+    if "hidden_face_drag_share" in known:
+        law["assembly.hidden_face_drag"] = fitted_value(found, "hidden_face_drag_share")
     return law
 
 

@@ -33,6 +33,8 @@ class ModelSettings(TypedDict, total=False):
     step_interval: Annotated[Number, "steps.step_interval_s"]
     position_noise: Annotated[Number, "observation.position_noise_m"]
     orientation_noise: Annotated[Number, "observation.orientation_noise_rad"]
+    stirring_length: Annotated[Number, "forces.stirring_length_m"]
+    stirring: Annotated[str, "forces.stirring"]
     flow_repeat: Annotated[str, "flow.repeat"]
     flow_start: Annotated[str, "flow.start"]
 
@@ -66,7 +68,7 @@ class AssemblySettings(ModelSettings, total=False):
     latching: Annotated[str, "assembly.latching"]
     connector_distance: Annotated[Number, "assembly.connector_distance_m"]
     connector_axis: Annotated[Number, "assembly.connector_axis_rad"]
-    hidden_face_drag: Annotated[str, "assembly.hidden_face_drag"]
+    hidden_face_drag: Annotated[Number, "assembly.hidden_face_drag"]
     chirality: Annotated[str, "assembly.chirality"]
     block_restitution: Annotated[Number, "assembly.block_restitution"]
     block_friction: Annotated[Number, "assembly.block_friction"]

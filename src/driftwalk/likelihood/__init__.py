@@ -4,6 +4,7 @@ from driftwalk.likelihood.check.run import Judged, check_model, judge_fit
 from driftwalk.likelihood.contacts.estimate import estimate_wall
 from driftwalk.likelihood.fit import check_fit, fit_motion
 from driftwalk.likelihood.flow_intervals import fitted_flow
+from driftwalk.likelihood.glued import EarlierFit, glued_study
 from driftwalk.likelihood.law.held_out import compare_laws
 from driftwalk.likelihood.preparation import describe_measured
 from driftwalk.likelihood.recovery import FitRecovery, recovery_study
@@ -11,6 +12,7 @@ from driftwalk.likelihood.refuse import fit_work
 from driftwalk.likelihood.score import score_fit
 
 __all__ = [
+    "EarlierFit",
     "FitRecovery",
     "Judged",
     "check_fit",
@@ -21,6 +23,7 @@ __all__ = [
     "fit_motion",
     "fit_work",
     "fitted_flow",
+    "glued_study",
     "judge_fit",
     "recovery_study",
     "score_fit",

@@ -16,6 +16,15 @@ from driftwalk.likelihood.angle_consistency import angle_given_facts, spin_corre
 from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import Series
+from driftwalk.likelihood.glued import (
+    GLUED,
+    EarlierFit,
+    earlier_prior,
+    estimate_before,
+    first_glued_point,
+    glued_study,
+    stirring_facts,
+)
 from driftwalk.likelihood.interval_inflation import (
     open_where_undetermined,
     parameter_covariance,
@@ -83,6 +92,7 @@ def fit_motion(
     angle: AngleUse | None = None,
     body: str | None = None,
     flow: xr.Dataset | None = None,
+    earlier: EarlierFit | None = None,
     tell: Tell | None = None,
 ) -> xr.Dataset:
     """Fit flow, drag coefficient, stochastic force and tracking noise to a recording, together.
@@ -106,6 +116,10 @@ def fit_motion(
     flow : xarray.Dataset, optional
         A steady flow that was measured, a `flow_field` as `load_flow` returns it: its *measured*
         nodes, with their errors, become the prior of the fitted flow.
+    earlier : EarlierFit, optional
+        Of glued blocks, ``shape = "xx"``: a fit of one block in the same water, with its
+        recordings. The fit then says how much drag the hidden faces feel, and over which length
+        the stirring is shared.
     tell : callable, optional
         Called with the thousandths of the work that are done, 1000, and the present task.
 
@@ -135,13 +149,22 @@ def fit_motion(
     from driftwalk.model import Study
 
     chosen = study if study is not None else Study()
+    if earlier is not None:
+        chosen = glued_study(chosen, earlier.fit)
     ready = prepare(as_list(recordings), chosen, angle, body, flow)
     require_one_flow(ready)
+    before = None if earlier is None else estimate_before(earlier)
+    if before is not None:
+        ready = replace(ready, earlier=earlier_prior(ready, before))
     passes = ready.passes
-    start = first_point(ready, passes.spline)
+    spline = passes.spline
+    start = first_point(ready, spline) if before is None else first_glued_point(ready, before)
     assumptions = assumptions_of(
         chosen, ready.angle, recordings=len(ready.tracks), flows=passes.flows
     )
+    if before is not None:
+        opened = {**assumptions.opened, "hidden_share": GLUED.first_share}
+        assumptions = replace(assumptions, opened=opened)
     course = Course(tell or tell_nobody, _usual_parts(passes))
     reason = reason_of_no_solution(ready.wall_share, ready.tracks, chosen)
     # The stages stay in one function: they share most of their variables.
@@ -186,6 +209,7 @@ def fit_motion(
         **shape_facts(shape, law.tests),
         **({"flow_modes_unsettled": modes.unsettled} if modes.unsettled else {}),
         **turning,
+        **stirring_facts(ready, law.mode, restricted.point, before, earlier),
         **whiteness_of(counted)._asdict(),
         **ready.facts,
         **_search_facts(law, restricted),
@@ -198,7 +222,7 @@ def fit_motion(
     warnings = [] if unstated is None else [unstated]
     for recording, track in zip(ready.recordings, ready.tracks, strict=True):
         warnings += jump_warnings(recording, body, track=track)
-    warnings += warnings_of(facts, shares, ready.intervals, side_m=chosen.block.side_m)
+    warnings += warnings_of(facts, shares, ready.intervals, block=chosen.block)
     warnings += [*law.unsettled, *contradictions(facts)]
     warnings += [modes.unsettled] if modes.unsettled else []
     if shape is not None and shape.significant:
@@ -218,7 +242,8 @@ def _laws_with_modes(
 ) -> tuple[ModeSearch, LawSearch, LawResult, FlowModes]:
     """Return the search, that of the law, its result, and the modes of the flow with which."""
     wanted, modes = ready.study.fit.flow_modes, FlowModes()
-    weights = first_weights(ready.tracks, search.passes.spline)
+    known = ready.earlier
+    weights = first_weights(ready.tracks, search.passes.spline) if known is None else known.weights
     if wanted != "none":
         modes = find_flow_modes(search, start, weights, wanted)
     if modes.start is None:

@@ -1,16 +1,19 @@
-"""Modes of the flow in time in the dataset of a fit: coefficients, fields and amplitudes."""
+"""Strength and modes of the flow in time: the frames of a flow, and their part of a fit."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Final
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
 from driftwalk.core.arrays import Floats
+from driftwalk.core.errors import InputError
 from driftwalk.flow.grid import Grid
-from driftwalk.likelihood.filter.parameters import Point
-from driftwalk.likelihood.filter.series import Series, mode_amplitudes
+from driftwalk.likelihood.filter.parameters import PULSES, STRENGTHS, Point
+from driftwalk.likelihood.filter.series import Series, layer_strengths, mode_amplitudes
 from driftwalk.likelihood.spline import Spline
 
 if TYPE_CHECKING:
@@ -18,6 +21,99 @@ if TYPE_CHECKING:
 
 FRAMES_PER_PERIOD: Final = 32
 """Frames of a flow with modes; linear between them, an amplitude comes out 0.2 % too small."""
+
+
+class FramePolicy(NamedTuple):
+    """Frames of a flow whose strength changes; between them it is linear in time."""
+
+    per_half_wave: int = 10
+    """Frames in half a wave of the fastest cosine: its amplitude comes out 1 % too small."""
+    per_period: int = 16
+    """Frames in a period of a pulse: its amplitude comes out 1 % too small."""
+    most: int = 2000
+    """Most frames: with the 50 by 50 nodes of a flow they take some 100 MB. Chosen by hand."""
+
+
+FRAMES: Final = FramePolicy()
+
+
+class Frames(NamedTuple):
+    """When a flow is given, and how strong its layers are then."""
+
+    time: Floats
+    """From the first sample of the series on [s]."""
+    strength: Floats
+    """Of the mean flow and of its modes, shape (layers, frames)."""
+    repeat: str
+    """"loop" of a whole period, "hold" of a change over the recording."""
+
+
+def flow_frames(series: Series, point: Point) -> Frames | None:
+    """Return the frames of a flow with the strength and the modes of a fit; None of a steady one.
+
+    Raises
+    ------
+    InputError
+        When it changes so fast that there would be too many.
+    """
+    first, end = float(series.time[0]), float(series.time[-1] - series.time[0])
+    if layer_strengths(series, point) is None:
+        return None
+    steps = [series.span / (FRAMES.per_half_wave * len(STRENGTHS))]
+    repeat = "hold"
+    frequencies = _frequencies(point)
+    if frequencies:
+        period = 1.0 / max(*frequencies, 1e-300)
+        steps.append(period / FRAMES.per_period)
+        if len(frequencies) == 1 and not any(point.number(name) for name in STRENGTHS):
+            repeat, end = "loop", period
+    count = math.ceil(end / min(steps)) + 1
+    if count > FRAMES.most:
+        raise InputError(
+            f"the strength of the flow changes too fast to be simulated: {count} frames would be "
+            f"needed, and {FRAMES.most} are possible"
+        )
+    time = np.linspace(0.0, end, count)
+    strength = layer_strengths(replace(series, time=first + time), point)
+    assert strength is not None
+    return Frames(time, strength, repeat)
+
+
+def _frequencies(point: Point) -> list[float]:
+    """Return the frequencies of the pulses and of the modes of a flow [Hz]."""
+    pulses = [point.number("pulse_frequency")] if any(point.number(one) for one in PULSES) else []
+    return [*pulses, *([point.number("mode_frequency")] if point.layers > 1 else [])]
+
+
+def strength_variables(
+    point: Point, series: Series
+) -> tuple[dict[str, Any], dict[str, Any], dict[str, str]]:
+    """Return variables, coordinates and attributes of the strength of a fitted flow in time."""
+    if not any(point.number(name) for name in (*STRENGTHS, *PULSES)):
+        return {}, {}, {}
+    whole = replace(series, time=np.array([0.0, series.span]))
+    slow = replace(point, opened={**point.opened, **dict.fromkeys(PULSES, 0.0)})
+    words: dict[str, str] = {}
+    try:
+        frames = flow_frames(whole, point)
+    except InputError as error:
+        words["flow_strength_left_out"] = str(error)
+        if point.layers > 1 or not any(point.number(name) for name in STRENGTHS):
+            return {}, {}, words
+        point, frames = slow, flow_frames(whole, slow)
+    assert frames is not None
+    time, strength = frames.time, frames.strength[0]
+    if frames.repeat == "hold" and _frequencies(point):
+        # Pulses and modes do not stop where the recording happens to end: what stands still
+        # afterwards is the flow without them.
+        rest = layer_strengths(replace(series, time=whole.time[-1:]), slow)
+        time = np.append(time, time[-1] + time[1])
+        strength = np.append(strength, 1.0 if rest is None else rest[0])
+    return (
+        {"flow_strength": ("strength_time", strength)},
+        {"strength_time": ("strength_time", time)},
+        {"flow_strength_repeat": frames.repeat, **words},
+    )
 
 
 def mode_variables(
@@ -53,16 +149,44 @@ def stored_coefficients(fit: xr.Dataset) -> Floats:
     return np.concatenate([mean[np.newaxis], fit["mode_coefficient"].values])
 
 
-def mode_frames(
-    fit: xr.Dataset, mean: Mapping[str, np.ndarray]
-) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Return times and frames over a period of a fit with modes, from the fields of its mean."""
-    amplitudes = fit["mode_amplitude"].values
-    frames = {
-        name: np.broadcast_to(one, (amplitudes.shape[1], *one.shape)) for name, one in mean.items()
+class StoredFrames(NamedTuple):
+    """Frames of a stored fit in one flow: its strength and the amplitudes of its modes."""
+
+    time: Floats
+    strength: Floats
+    amplitude: Floats
+    """Shape (modes, frames)."""
+    repeat: str
+
+
+def stored_frames(fit: xr.Dataset) -> StoredFrames | None:
+    """Return when the flow of a fit is given, and how strong it is then; None of a steady one."""
+    moves, changes = "flow_mode" in fit.dims, "flow_strength" in fit
+    if not (moves or changes):
+        return None
+    if not changes:
+        time = fit["mode_time"].values
+        return StoredFrames(time, np.ones(time.size), fit["mode_amplitude"].values, "loop")
+    time, strength = fit["strength_time"].values, fit["flow_strength"].values
+    amplitude = np.zeros((0, time.size))
+    if moves:
+        period = fit["mode_time"].values
+        during = [np.interp(time % period[-1], period, one) for one in fit["mode_amplitude"].values]
+        # The last frame is that of the mean flow: see `strength_variables`.
+        amplitude = np.stack(during) * (time < time[-1])
+    return StoredFrames(time, strength, amplitude, str(fit.attrs["flow_strength_repeat"]))
+
+
+def moving_fields(
+    fit: xr.Dataset, frames: StoredFrames, mean: Mapping[str, Floats]
+) -> dict[str, Floats]:
+    """Return the variables of a flow field in frames, from those of its mean."""
+    found = {
+        name: np.broadcast_to(one, (frames.time.size, *one.shape)) for name, one in mean.items()
     }
-    moving = {
-        name: fit[name].values + np.tensordot(amplitudes.T, fit[f"{name}_mode"].values, 1)
-        for name in ("u", "v")
-    }
-    return fit["mode_time"].values, frames | moving
+    for name in ("u", "v"):
+        field = mean[name]
+        if len(frames.amplitude):
+            field = field + np.tensordot(frames.amplitude.T, fit[f"{name}_mode"].values, 1)
+        found[name] = frames.strength[:, None, None] * field
+    return found

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
-from driftwalk.likelihood.fitted_modes import mode_frames
+from driftwalk.likelihood.fitted_modes import moving_fields, stored_frames
 from driftwalk.schema import FLAGS, Track, build_flow_field
 from driftwalk.schema.check import refuse_other_version, require_kind
 from driftwalk.schema.kinds.flow import FIT_PREFIX
@@ -121,9 +122,15 @@ def cut_track(track: Track, intervals: Intervals, *, fewest: int, where: str) ->
 
 
 def switched_frames(
-    intervals: Intervals, fields: Mapping[str, Sequence[np.ndarray]], *, first: float
+    intervals: Intervals,
+    fields: Mapping[str, Sequence[np.ndarray]],
+    *,
+    first: float,
+    more: npt.ArrayLike = (),
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Return frames of a flow that jumps at the switches, where frames are joined by lines.
+
+    Frames at `more` times [s] stand between them.
 
     Examples
     --------
@@ -132,14 +139,11 @@ def switched_frames(
     >>> time.tolist(), frames["u"].tolist()
     ([2.999999, 3.000001], [[0.0], [1.0]])
     """
-    time, flow = [], []
     half = 1e-6  # [s], for a field is linear between its frames
-    for index, switch in enumerate(intervals.times):
-        time += [switch - first - half, switch - first + half]
-        flow += [intervals.flows[index], intervals.flows[index + 1]]
-    return np.array(time), {
-        name: np.stack([values[one] for one in flow]) for name, values in fields.items()
-    }
+    switches = np.array(intervals.times) - first
+    time = np.unique(np.concatenate([switches - half, switches + half, np.asarray(more)]))
+    flow = np.array(intervals.flows)[np.searchsorted(switches, time, side="right")]
+    return time, {name: np.stack([values[one] for one in flow]) for name, values in fields.items()}
 
 
 def require_fit(dataset: xr.Dataset) -> xr.Dataset:
@@ -160,8 +164,8 @@ def fitted_flow(fit: xr.Dataset, *, interval: int | None = None) -> xr.Dataset:
         switch, as fields are linear in time between frames; times count from the first sample of
         the first recording, as those of a simulation do.
 
-        With modes in time it is the period of the flow that returns, and with `interval` 0 the
-        mean flow.
+        A flow whose strength or shape the fit found to change has frames, too: of a whole period
+        where that is all, else over the first recording. With `interval` it is the mean flow.
 
     Returns
     -------
@@ -197,10 +201,11 @@ def fitted_flow(fit: xr.Dataset, *, interval: int | None = None) -> xr.Dataset:
             ends = fit["interval"].sel(parameter=name).values
             attrs[f"{FIT_PREFIX}{name}"] = [float(end) for end in ends]
     x, y = fit["x"].values, fit["y"].values
-    if "flow_mode" in fit.dims and interval is None:
-        time, frames = mode_frames(fit, _field_variables(fit))
-        attrs["repeat"] = "loop"  # a whole period
-        return build_flow_field(x, y, time=time, attrs=attrs, **frames)
+    moving = stored_frames(fit) if interval is None else None
+    if intervals.steady and moving is not None:
+        attrs["repeat"] = moving.repeat
+        fields_in_time = moving_fields(fit, moving, _field_variables(fit))
+        return build_flow_field(x, y, time=moving.time, attrs=attrs, **fields_in_time)
     if intervals.steady:
         return build_flow_field(x, y, attrs=attrs, **_field_variables(fit))
     fields = [_field_variables(fit.isel(flow=index)) for index in range(fit.sizes["flow"])]
@@ -211,7 +216,13 @@ def fitted_flow(fit: xr.Dataset, *, interval: int | None = None) -> xr.Dataset:
         return build_flow_field(x, y, attrs=attrs, **fields[flow])
     attrs["repeat"] = "hold"  # before the first switch and after the last the flow is steady
     by_name = {name: [one[name] for one in fields] for name in fields[0]}
-    time, frames = switched_frames(intervals, by_name, first=float(fit["recording_start"]))
+    more = () if moving is None else moving.time
+    time, frames = switched_frames(
+        intervals, by_name, first=float(fit["recording_start"]), more=more
+    )
+    if moving is not None:
+        strength = np.interp(time, moving.time, moving.strength)[:, None, None]
+        frames |= {name: strength * frames[name] for name in ("u", "v")}
     return build_flow_field(x, y, time=time, attrs=attrs, **frames)
 
 

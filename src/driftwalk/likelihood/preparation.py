@@ -30,7 +30,7 @@ from driftwalk.likelihood.fitted_modes import stored_coefficients
 from driftwalk.likelihood.flow_intervals import Intervals, cut_track, intervals_of, require_fit
 from driftwalk.likelihood.law.force_law import effective_logs, stored_numbers
 from driftwalk.likelihood.measured_flow import MeasuredFlow, measured_flow, stored_flow
-from driftwalk.likelihood.prior import Prior, Weights
+from driftwalk.likelihood.prior import Earlier, Prior, Weights
 from driftwalk.likelihood.refuse import (
     LIMIT,
     require_length,
@@ -93,11 +93,13 @@ class PreparedRecordings:
     mistakes: int
     """Samples that are left out as mistakes of the tracker."""
     measured: MeasuredFlow | None = None
+    earlier: Earlier | None = None
+    """What a fit of one block says, where glued blocks are fitted."""
 
     @property
     def prior(self) -> Prior:
         """The prior of the fit."""
-        return Prior(self.passes, self.measured)
+        return Prior(self.passes, self.measured, earlier=self.earlier)
 
     @property
     def duration(self) -> float:

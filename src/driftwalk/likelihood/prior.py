@@ -66,14 +66,33 @@ class Weights:
 
 def usual_lever(side: float, outline: RigidBody) -> float:
     """Return the centre of the prior of the force's lever [m], and its first value."""
-    return outline.force_lever_m or PRIOR.lever * side
+    return outline.force_lever_m() or PRIOR.lever * side
+
+
+class Earlier(NamedTuple):
+    """What an earlier fit in the same water knows, a normal law of the coefficients and ln C_d."""
+
+    centre: Floats
+    precision: Floats
+    weights: Weights
+    """Those of its smoothness, which the precision holds."""
 
 
 class Prior:
-    """The prior of all parameters as a quadratic form."""
+    """The prior of all parameters as a quadratic form.
 
-    def __init__(self, passes: Passes, measured: MeasuredFlow | None = None) -> None:
-        self.measured = measured
+    That of an earlier fit holds the smoothness of the flow and the prior of C_d already: weights
+    have no effect then.
+    """
+
+    def __init__(
+        self,
+        passes: Passes,
+        measured: MeasuredFlow | None = None,
+        *,
+        earlier: Earlier | None = None,
+    ) -> None:
+        self.measured, self.earlier = measured, earlier
         self.roughness, self.size = penalties(passes.spline)
         self.layers = passes.layers
         self.log_lever = math.log(usual_lever(passes.body.side, passes.body.outline))
@@ -102,6 +121,8 @@ class Prior:
         coefficients = point.coefficients.reshape(-1, count)
         score, information = sums.score.copy(), sums.information.copy()
         factors = self.factors(weights, len(coefficients))
+        if self.earlier is not None:
+            factors = np.zeros_like(factors)
         pull = (factors[:, None] * coefficients) @ precision
         for component, factor in enumerate(factors):
             part = slice(component * count, (component + 1) * count)
@@ -115,6 +136,13 @@ class Prior:
             score[:drag] += force
             information[:drag, :drag] += curvature
         single = [(drag, point.log_drag - math.log(PRIOR.drag), PRIOR.log_drag_std)]
+        if self.earlier is not None:
+            away = np.append(point.coefficients.ravel(), point.log_drag) - self.earlier.centre
+            pulled = self.earlier.precision @ away
+            deviance += 0.5 * float(away @ pulled)
+            score[: drag + 1] -= pulled
+            information[: drag + 1, : drag + 1] += self.earlier.precision
+            single = []
         if point.log_lever is not None:
             single.append((drag + LEVER, point.log_lever - self.log_lever, PRIOR.log_lever_std))
         if point.log_angle_noise is not None:
@@ -133,6 +161,8 @@ class Prior:
 
     def updated(self, weights: Weights, point: Point, covariance: Floats) -> Weights:
         """Return the weights after one step of the evidence's fixed point."""
+        if self.earlier is not None:
+            return weights
         inverse = np.linalg.inv(self.matrix(weights))
         count = len(inverse)
         coefficients = point.coefficients.reshape(-1, count)

@@ -23,7 +23,7 @@ from driftwalk.flow.arena import Outline, outline_of
 from driftwalk.flow.grid import Grid, make_grid
 from driftwalk.likelihood.filter.parameters import DRAG_SHAPES, Point
 from driftwalk.likelihood.filter.series import Series
-from driftwalk.likelihood.fitted_modes import mode_variables
+from driftwalk.likelihood.fitted_modes import mode_variables, strength_variables
 from driftwalk.likelihood.interval_inflation import open_where_undetermined, parameter_covariance
 from driftwalk.likelihood.law.force_law import Assumptions
 from driftwalk.likelihood.law.forward_selection import LawResult
@@ -167,6 +167,8 @@ def build_fit(
         count = flows[0]["count"][1]
         modes, of_modes = mode_variables(restricted.point, ready.series[0], spline, grid, count)
         data, coords = data | modes, coords | of_modes
+    strength, strength_at, strength_words = strength_variables(restricted.point, ready.series[0])
+    data, coords = data | strength, coords | strength_at
     numbers, names_of, _ = fit_parts(facts)
     found, names_found = number_variables(restricted.point, law)
     words: dict[str, Any] = {}
@@ -180,6 +182,7 @@ def build_fit(
         **{name: facts[name] for name in WORDS},
         **{name: facts[name] for name in REASONS if name in facts},
         "study": study.to_toml(),
+        **strength_words,
         **words,
     }
     return xr.Dataset(data | found | numbers, coords | names_found | names_of, attrs)

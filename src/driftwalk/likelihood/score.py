@@ -99,8 +99,8 @@ def score_fit(
             f"the fit has {fit.sizes['flow']} flows: name the interval that the true flow belongs "
             f"to, 0 to {fit.sizes['flow_interval'] - 1}"
         )
-    # Of a flow with modes in time, the mean is compared.
-    estimated = fitted_flow(fit, interval=0 if "flow_mode" in fit.dims else interval)
+    # Of a flow that changes its strength or its shape, the mean is compared.
+    estimated = fitted_flow(fit, interval=interval or 0)
     if "time" in flow.dims:
         raise InputError("the true flow has frames: a steady one is needed to score a fit")
     truth = dict(zip(SCORED, (drag_coefficient, force_std, tracking_noise), strict=True))

@@ -13,6 +13,7 @@ from driftwalk.schema.answers.facts import is_open
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
+    from driftwalk.model.block import Block
 
 
 class WarningPolicy(NamedTuple):
@@ -51,11 +52,11 @@ def precision_facts(std: float, duration: float, study: Study) -> dict[str, floa
 
 
 def warnings_of(
-    facts: Mapping[str, Any], visited: Sequence[float], intervals: Intervals, *, side_m: float
+    facts: Mapping[str, Any], visited: Sequence[float], intervals: Intervals, *, block: Block
 ) -> list[str]:
     """Return the warnings; `visited` is the share of the tank that was visited in each flow."""
     return [
-        *meaningless_of(facts, side_m=side_m),
+        *meaningless_of(facts, block=block),
         *_on_the_data(facts, visited, intervals),
         *_on_the_search(facts),
         *_on_the_model(facts),
@@ -66,19 +67,20 @@ def warnings_of(
 def meaningless_of(
     facts: Mapping[str, Any],
     *,
-    side_m: float,
+    block: Block,
     wall_share: float = LIMIT.most_wall_share,
     lever: float = LAW.notable_lever,
 ) -> list[str]:
     """Return the warnings that a number of the fit may mean nothing.
 
-    `wall_share` and `lever`, in sides of the block, are the largest ones without a warning.
+    `wall_share` and `lever`, in sides of the block, are the largest ones without a warning; forces
+    on each of glued blocks make a lever of their own.
     """
     return [
         *_on_the_wall(facts, wall_share),
         *_on_the_likelihood(facts),
         *_on_two_uses_of_the_angle(facts),
-        *_on_the_lever(facts, lever * side_m),
+        *_on_the_lever(facts, lever * block.side_m + block.body().force_lever_m()),
     ]
 
 

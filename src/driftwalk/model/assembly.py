@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar, Final, Literal
 
-from driftwalk.model.section import OrNumber, Quantity, Section, Seed
+from driftwalk.model.section import Quantity, Section, Seed
 
 MOST_BLOCKS: Final = 256
 """The most that the native core takes."""
 
 Latching = Literal["collision", "connector", "none"]
-HiddenFaceDrag = Literal["none", "full"]
+HiddenFaceDrag = Annotated[
+    float | Literal["none", "full"], Quantity("1", ge=0, le=1, words=("none", "full"))
+]
 Chirality = Literal["merged", "distinct"]
 
 
@@ -47,14 +49,12 @@ class Assembly(Section):
     """Largest rotation of two connectors against each other about their axis. Blocks float upright,
     so this rotation is always 0 and the condition is always met; the key only completes the
     description of a connector."""
-    hidden_face_drag: Annotated[HiddenFaceDrag, OrNumber("hidden_face_drag_share")] = "none"
+    hidden_face_drag: HiddenFaceDrag = "none"
     """Drag on faces that are joined.
 
     Drag on faces that are joined to another block: "none", "full" as on a free face, or a share
-    of it (`hidden_face_drag_share`).
+    of that, 0 to 1.
     """
-    hidden_face_drag_share: Annotated[float | None, Quantity("1", ge=0, le=1)] = None
-    """Share of the drag of a free face that a joined face feels, instead of `hidden_face_drag`."""
     chirality: Chirality = "merged"
     """Mirror images as one class or two.
 
@@ -70,15 +70,9 @@ class Assembly(Section):
     confidence: Annotated[float, Quantity("1", gt=0, lt=1)] = 0.9
     """Simultaneous confidence of the intervals of the proportions."""
 
-    @classmethod
-    def replaced_by(cls, keys: set[str]) -> set[str]:
-        """Return the other way of giving the drag of joined faces, when one is set."""
-        both = {"hidden_face_drag", "hidden_face_drag_share"}
-        return both - keys if keys & both else set()
-
     @property
     def hidden_share(self) -> float:
         """Share of the drag of a free face that a joined face feels, 0 to 1."""
-        if self.hidden_face_drag_share is not None:
-            return self.hidden_face_drag_share
-        return 1.0 if self.hidden_face_drag == "full" else 0.0
+        words = {"none": 0.0, "full": 1.0}
+        share = self.hidden_face_drag
+        return words[share] if isinstance(share, str) else share

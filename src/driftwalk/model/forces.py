@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field
 
 from driftwalk.model.section import Quantity, Section
 
@@ -43,11 +45,23 @@ class Forces(Section):
     exp(-force_interval / T) of the one before it, and 1 - k is new, with standard deviation
     sigma_F: the noise intensity is still sigma_F^2 * force_interval.
     """
-    force_lever_m: Annotated[float, Quantity("m", ge=0, le=10)] = 0.0
+    stirring_length_m: Annotated[float, Quantity("m", ge=0, le=1e3)] = 0.0
+    """Distance over which blocks share the stochastic force.
+
+    Length L of the stochastic force in space: two blocks at a distance r feel forces with the
+    correlation exp(-r^2 / 2 L^2). 0: each block has a force of its own. One block alone feels the
+    same with every L.
+    """
+    stirring: Literal["free", "incompressible"] = "free"
+    """Force field of the stirring: "free", or "incompressible" (without divergence)."""
+    force_lever_m: Annotated[float | None, Quantity("m", ge=0, le=10)] = Field(
+        default=None, examples=[0.01]
+    )
     """Lever with which the stochastic force turns the body.
 
     Lever of the stochastic force, rms: every interval the body feels a torque too, with the
-    standard deviation sigma_F times the lever. 0: the force acts on the centre of mass.
+    standard deviation sigma_F times the lever. Not stated, it is 0 for one block, and for glued
+    blocks what forces on each of them make.
     """
     linear_drag_kg_s: Annotated[float, Quantity("kg/s", ge=0, le=1e4)] = 0.0
     """Drag of the block linear in the slip.

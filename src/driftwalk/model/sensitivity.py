@@ -20,6 +20,7 @@ AXES: Final[dict[str, str]] = {
     "flow": "flow",
     "latching": "latching",
     "hidden_face_drag": "hidden_face_drag",
+    "stirring_length": "stirring_length_m",
     "drag_coefficient": "drag_coefficient",
     "force_std": "force_std_N",
 }
@@ -71,6 +72,10 @@ class Sensitivity(ForceGrid):
         default=None, examples=['["none", "full"]']
     )
     """Rules for the drag on joined faces to compare, an axis of the map."""
+    stirring_length_m: tuple[Annotated[float, Quantity("m", ge=0, le=1e3)], ...] | None = Field(
+        default=None, examples=["[0.0, 0.03, 0.1]"]
+    )
+    """Lengths over which blocks share the stochastic force to compare, an axis of the map."""
     drag_coefficient: tuple[DragCoefficient, ...] | None = Field(
         default=None, examples=["[0.2, 0.45, 1.0]"]
     )

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from pydantic import Field, model_validator
 
@@ -37,6 +37,9 @@ from driftwalk.model.section import (
 from driftwalk.model.sensitivity import Sensitivity
 from driftwalk.model.simulation import Pose, Simulation, resolve_time_step
 from driftwalk.model.tank import Tank, Water
+
+if TYPE_CHECKING:
+    from driftwalk.model.bodies import RigidBody
 
 
 class Study(Section):
@@ -126,6 +129,18 @@ class Study(Section):
     def wetted_depth_m(self) -> float:
         """Wetted depth d of a side face [m]."""
         return self.block.wetted_depth_m(self.water.density_kg_m3)
+
+    def body(self) -> RigidBody:
+        """Return the outline of the body, with this study's drag on hidden faces."""
+        return self.block.body(self.assembly.hidden_share)
+
+    @property
+    def force_lever_m(self) -> float:
+        """Lever with which the stochastic force turns the body [m]."""
+        stated = self.forces.force_lever_m
+        if stated is not None or self.block.shape == "square":
+            return stated or 0.0
+        return self.body().force_lever_m(self.forces.stirring_length_m)
 
     @property
     def displaced_mass_kg(self) -> float:

@@ -175,6 +175,9 @@ def plot_residual_time(
     ax.errorbar(middle, value, xerr=half, yerr=reach, fmt="o", ms=3.0, lw=0.9, color=BLUE)
     if show == "flow" and np.isnan(value).any():
         words = "no point: absorbed by the fit"
+        # A strip below the error bars, for the words.
+        low, high = ax.get_ylim()
+        ax.set_ylim(low - 0.12 * (high - low), high)
         ax.text(0.98, 0.03, words, ha="right", color=MUTED, fontsize=6.0, transform=ax.transAxes)
     for edge in start[1:][np.diff(check["part_recording"].values) > 0] / 60.0:
         ax.axvline(edge, color=MUTED, lw=0.6, ls=":")

@@ -33,8 +33,6 @@ GIVE: Final = (
     "give the directory of a finished fit, calibration or comparison of models, or a flow field "
     "(`flow`)"
 )
-OF_THE_FLOW: Final = ("strength_", "pulse_")
-"""Beginnings of the numbers of a fit that say how the flow changes: a simulation has none."""
 
 
 @dataclass(frozen=True)
@@ -104,13 +102,8 @@ class FoundRun:
         verdict = stored_verdict(self.found)
         if verdict is not None and not verdict.explains:
             said += [f"of the {self.words}: {verdict.word}: {text}" for text in verdict.reasons]
-        if "number" in self.found.coords:
-            names = [str(name) for name in self.found["number"].values]
-            if any(name.startswith(OF_THE_FLOW) for name in names):
-                said.append(
-                    "the fit found a flow whose strength changes during the recording; it is "
-                    "simulated with its mean strength"
-                )
+        left_out = self.found.attrs.get("flow_strength_left_out")
+        said += [] if left_out is None else [f"of the {self.words}: {left_out}"]
         return said
 
     @property
@@ -224,6 +217,25 @@ class FoundRun:
             f"{self.folder} holds a finished run, but not its flow field ({FLOW_FILE}): give one "
             "(`flow`)"
         )
+
+    def mean_flow(self, study: Study) -> tuple[xr.Dataset, str | None]:
+        """Return the flow field of a run for what takes a steady one alone, and what it lacks.
+
+        Of a fit whose flow changes its strength or its shape it is the mean flow.
+
+        Parameters
+        ----------
+        study : Study
+            The study of the run.
+        """
+        flow = self.flow(study)
+        own = self.kind is not None and self.kind.name == "fit"
+        if "time" not in flow["u"].dims or "flow" in self.found.dims or not own:
+            return flow, None
+        from driftwalk.likelihood import fitted_flow
+
+        lacks = f"the flow of {self.name} changes in time, and is taken with its mean"
+        return fitted_flow(self.found, interval=0), lacks
 
     def recording(self) -> xr.Dataset | None:
         """Return the first recording of the run, None where there is none."""

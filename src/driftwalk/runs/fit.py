@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.figures.write import Figures
+    from driftwalk.likelihood import EarlierFit
     from driftwalk.model import Study
     from driftwalk.runs.resumable_run import Run
 
@@ -48,6 +49,8 @@ class FitWork:
         Whether restitution and friction of the wall are estimated, which takes as long as a fit.
     flow : xarray.Dataset or None
         A measured `flow_field`.
+    earlier : EarlierFit or None
+        Of glued blocks, a fit of one block in the same water.
     fitted : callable
         Called with the fit as soon as it is stored, before all that follows.
     checked_model : callable
@@ -62,6 +65,7 @@ class FitWork:
     compare_laws: bool = False
     wall: bool = False
     flow: xr.Dataset | None = None
+    earlier: EarlierFit | None = None
     fitted: Callable[[xr.Dataset], None] = tell_nobody
     checked_model: Callable[[xr.Dataset, xr.Dataset | None], None] = tell_nobody
 
@@ -87,6 +91,7 @@ class FitWork:
                 dataset_hash(one, ("x", "y", "theta")) for one in self.recordings
             ],
             **({} if self.flow is None else {"flow_sha256": _hash_of(self.flow)}),
+            **({} if self.earlier is None else {"earlier_sha256": _hash_of(self.earlier.fit)}),
         }
 
     def compute(self, run: Run) -> Fitted:
@@ -102,7 +107,14 @@ class FitWork:
         course = run.course(self._usual_parts())
         course.begin("fit")
         tell = course.stage("fit")
-        found = fit_motion(self.recordings, self.study, body=self.body, flow=self.flow, tell=tell)
+        found = fit_motion(
+            self.recordings,
+            self.study,
+            body=self.body,
+            flow=self.flow,
+            earlier=self.earlier,
+            tell=tell,
+        )
         run.keep("fit.nc", found)
         run.keep("flow.nc", fitted_flow(found))
         for number, recording in enumerate(self.recordings, start=1):

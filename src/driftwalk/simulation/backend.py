@@ -109,7 +109,7 @@ def native_model(
     forces, step = study.forces, study.time_step_s
     check_sample_time(sample_time)
     require_steps(max(float(sample_time[-1]), forces.force_interval_s), step)
-    body = study.block.body(study.assembly.hidden_share)
+    body = study.body()
     return _core.Model(
         side=study.block.side_m,
         mass=study.block.mass_kg,
@@ -124,7 +124,7 @@ def native_model(
         displaced_mass=study.displaced_mass_kg if forces.pressure_gradient else 0.0,
         time_step=step,
         steps_per_interval=round(forces.force_interval_s / step),
-        force_lever=forces.force_lever_m,
+        force_lever=study.force_lever_m,
         force_memory=forces.force_memory_s,
         disc_radius=body.disc_radius_m,
         **body.arrays(),

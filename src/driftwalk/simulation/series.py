@@ -63,6 +63,13 @@ def is_series(flow: xr.Dataset | None) -> bool:
     return flow is not None and "time" in flow["u"].dims and flow.sizes["time"] > 1
 
 
+def flow_since(flow: xr.Dataset | None, begin: float) -> xr.Dataset | None:
+    """Return a flow whose clock begins at a time [s]; a steady one, and None, as they are."""
+    if flow is None or not is_series(flow):
+        return flow
+    return flow.assign_coords(time=flow["time"].copy(data=flow["time"].values - begin))
+
+
 def series_of(flow: xr.Dataset) -> Series:
     """Return the clock of a flow in frames that `continued_flow` has returned."""
     attrs = flow.attrs

@@ -58,7 +58,7 @@ def test_lists_are_read_with_units_and_survive_the_file() -> None:
             "'colision'; did you mean 'collision'?",
         ),
         (Assembly, {"chirality": "both"}, '[assembly] chirality must be "merged" or "distinct"'),
-        (Assembly, {"hidden_face_drag": "half"}, 'hidden_face_drag must be "none" or "full"'),
+        (Assembly, {"hidden_face_drag": "half"}, 'expected a number or "none" or "full"'),
         (Assembly, {"block_restitution": 1.1}, "block_restitution: must be at most 1, got 1.1"),
         (Assembly, {"confidence": 1.0}, "confidence: must be less than 1, got 1.0"),
         (Sensitivity, {"runs": 0}, "[sensitivity] runs: must be at least 1, got 0"),

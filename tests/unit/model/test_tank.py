@@ -8,7 +8,8 @@ import math
 import pytest
 
 from driftwalk.core.errors import ConfigurationError
-from driftwalk.model import Block, Calibration, FieldOfView, Pose, Tank
+from driftwalk.model import Calibration, FieldOfView, Pose, Tank
+from driftwalk.model.block import Block
 from driftwalk.model.study import block_corners
 
 HEXAGON = tuple((math.cos(k * math.pi / 3), math.sin(k * math.pi / 3)) for k in range(6))

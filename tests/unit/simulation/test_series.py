@@ -15,6 +15,7 @@ from driftwalk.schema.kinds.flow import flow_series_words
 from driftwalk.simulation import simulate
 from driftwalk.simulation.series import (
     continued_flow,
+    flow_since,
     flow_starts,
     series_facts,
     series_of,
@@ -60,6 +61,19 @@ def test_a_recording_has_its_own_clock() -> None:
     found = dw.simulate_like(chosen, series(*SPEEDS, interval=10.0), recording, replicates=3)
     assert found.attrs["flow_begins"] == "together"
     assert found["flow_start"].values.tolist() == [0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize("repeat", ["none", "loop", "mirror", "hold"])
+def test_a_part_of_a_recording_has_the_clock_of_the_whole(repeat: str) -> None:
+    whole = continued_flow(series(*SPEEDS), study(repeat=repeat), duration=6.0, begin=0.0)
+    part = flow_since(series(*SPEEDS), 2.0)
+    assert part is not None
+    part = continued_flow(part, study(repeat=repeat), duration=4.0, begin=0.0)
+    time = np.linspace(0.0, 4.0 if repeat == "none" else 20.0, 41)
+    here, later = (velocity_at(*one)[0] for one in ((part, 0, 0, time), (whole, 0, 0, time + 2.0)))
+    assert here == pytest.approx(later, abs=1e-12)
+    steady = dw.uniform_flow(0.01, 0.0)
+    assert flow_since(steady, 2.0) is steady
 
 
 def test_a_series_as_long_as_its_frames_last_is_long_enough() -> None:

@@ -101,6 +101,27 @@ inline void add_water(const Physics<Real, T, Law>& physics, Real x, Real y, cons
                  (arm.x * water.vy - arm.y * water.vx) * Real(physics.step.per_inertia);
 }
 
+// Where joined faces feel a share of the drag, it is so far from that without them to that with
+// them.
+template <class Real, class T, class Law>
+inline void blend_hidden(const Physics<Real, T, Law>& physics, Real x, Real y,
+                         const Axes<Real>& axes, const Motion<Real>& own, const Member<Real>& m,
+                         DragSums<Real>& drag) {
+  bool joined = false;
+  for (const auto& covered : m.covered) {
+    joined = joined || any(covered);
+  }
+  if (!joined) {
+    return;
+  }
+  const DragSums<Real> full = drag_sums(physics.law, physics.block, physics.flow, x, y, axes, own);
+  const T share = physics.hidden_share;
+  drag.force_x = drag.force_x + (full.force_x - drag.force_x) * share;
+  drag.force_y = drag.force_y + (full.force_y - drag.force_y) * share;
+  drag.torque = drag.torque + (full.torque - drag.torque) * share;
+  drag.conductance = drag.conductance + (full.conductance - drag.conductance) * share;
+}
+
 // Drag of a block half a step ahead, about its assembly's centre of mass.
 template <class Real, class T, class Law>
 inline void feel_drag(const Physics<Real, T, Law>& physics, Member<Real>& m, Sums<Real>& sums) {
@@ -112,9 +133,12 @@ inline void feel_drag(const Physics<Real, T, Law>& physics, Member<Real>& m, Sum
   const Motion<Real> own{m.ahead.vx - m.ahead.omega * arm_y, m.ahead.vy + m.ahead.omega * arm_x,
                          m.ahead.omega};
   const Real covered{static_cast<T>(closing_where_covered)};
-  const DragSums<Real> drag = drag_sums(
+  DragSums<Real> drag = drag_sums(
       physics.law, physics.block, physics.flow, ahead.pose.x + arm_x, ahead.pose.y + arm_y, axes,
       own, [&](int face, Real closing) { return select(m.covered[face], covered, closing); });
+  if (physics.hidden_share > T(0)) {
+    blend_hidden(physics, ahead.pose.x + arm_x, ahead.pose.y + arm_y, axes, own, m, drag);
+  }
   sums.part[0] = drag.force_x;
   sums.part[1] = drag.force_y;
   sums.part[2] = drag.torque + (arm_x * drag.force_y - arm_y * drag.force_x);

@@ -155,7 +155,7 @@ inline void cover_faces(const AssemblyRules& rules, const PackMemory<Real>& pack
   const unsigned joined = pack.book(block, lane).joined;
   for (int face = 0; face < 4; ++face) {
     put(pack.members[block].covered[face], lane,
-        !rules.hidden_faces_drag && (joined >> face & 1u) != 0);
+        rules.hidden_share < 1 && (joined >> face & 1u) != 0);
   }
 }
 

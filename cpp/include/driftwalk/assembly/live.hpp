@@ -47,7 +47,7 @@ public:
   void advance(std::int64_t steps);
   void set_forces(const LiveForces& forces);
   // What is joined stays so.
-  void set_rules(Latching latching, bool hidden_faces_drag);
+  void set_rules(Latching latching, double hidden_share, double stirring_length);
   // Removes the last blocks, or adds blocks at random free places, at rest, as long as there are
   // any. Returns the number of blocks, 1 to most_blocks.
   int set_blocks(int blocks);

@@ -2,10 +2,11 @@
 // or its neighbours.
 #pragma once
 
+#include "driftwalk/assembly/correlate.hpp"
 #include "driftwalk/assembly/lane.hpp"
 #include "driftwalk/assembly/near.hpp"
 #include "driftwalk/assembly/walls.hpp"
-#include "driftwalk/random/normal.hpp"
+#include "driftwalk/random/stirring.hpp"
 #include "driftwalk/simulate/run.hpp"
 
 DRIFTWALK_LANES_BEGIN
@@ -30,7 +31,8 @@ public:
                  run.water,
                  run.wall,
                  run.step,
-                 {Real(T(0)), Real(T(0)), Real(T(0))}} {
+                 {Real(T(0)), Real(T(0)), Real(T(0))},
+                 static_cast<T>(rules.hidden_share)} {
     const bool has_lists = capacity > most_blocks_all_pairs;
     for (int lane = 0; lane < lanes; ++lane) {
       load_lane<Real, T>(rules_, start, memory_, lane);
@@ -95,6 +97,7 @@ public:
   // To be called when the rules, or the blocks of a lane, have been changed from outside.
   void renew() {
     near_ = NearRules<T>(rules_);
+    physics_.hidden_share = static_cast<T>(rules_.hidden_share);
     blocks_ = rules_.blocks;
     listed_ = blocks_ > most_blocks_all_pairs;
     for (int lane = 0; lane < lanes && listed_; ++lane) {
@@ -114,9 +117,7 @@ public:
   bool step(std::int64_t step) {
     const std::int64_t phase = step % period();
     if (phase == 0) {
-      for (int b = 0; b < blocks_; ++b) {
-        draw_forces(b, draw_, kept_, fresh_);
-      }
+      draw_all_forces();
       kept_ = Real(run_.force_kept);
       fresh_ = Real(T(1) - run_.force_kept);
       draw_ = draw_ + UInt(static_cast<UInt32>(1));
@@ -137,18 +138,55 @@ private:
     put(fresh_, lane, run_.force_first);
   }
 
+  void draw_all_forces() {
+    const bool few = rules_.stirring_length > 0 && blocks_ <= most_blocks_correlated;
+    Real last[most_blocks_correlated][2];
+    for (int b = 0; b < blocks_; ++b) {
+      if (few) {
+        last[b][0] = memory_.members[b].normals[2];
+        last[b][1] = memory_.members[b].normals[3];
+        draw_fresh(b, draw_);
+      } else {
+        draw_forces(b, draw_, kept_, fresh_);
+      }
+    }
+    if (few) {
+      correlate(static_cast<T>(rules_.stirring_length), rules_.incompressible, blocks_,
+                memory_.members);
+    }
+    for (int b = 0; b < blocks_ && few; ++b) {
+      remember_forces(last[b], kept_, fresh_, memory_.members[b].normals);
+    }
+  }
+
   // `kept` and `fresh` are of the first interval of the period.
   void draw_forces(int block, UInt draw, Real kept, Real fresh) {
-    UInt words[4];
-    stream_(draw, UInt(static_cast<UInt32>(block)), UInt(static_cast<UInt32>(0)),
-            UInt(static_cast<UInt32>(Purpose::force)), words);
     Real* const normals = memory_.members[block].normals;
     const Real last[2] = {normals[2], normals[3]};
-    normal_pair(words[0], words[1], normals[0], normals[1]);
-    normal_pair(words[2], words[3], normals[2], normals[3]);
+    draw_fresh(block, draw);
+    remember_forces(last, kept, fresh, normals);
+  }
+
+  void remember_forces(const Real* last, Real kept, Real fresh, Real* normals) const {
     if (run_.force_kept > T(0)) {
       remember(kept, fresh, last, normals);
       remember(Real(run_.force_kept), Real(T(1) - run_.force_kept), normals, normals + 2);
+    }
+  }
+
+  // The normal numbers of a block in two intervals, without memory.
+  void draw_fresh(int block, UInt draw) {
+    Member<Real>& m = memory_.members[block];
+    Real* const normals = m.normals;
+    if (rules_.stirring_length > 0 && blocks_ > most_blocks_correlated) {
+      draw_stirring(stream_, draw, static_cast<T>(rules_.stirring_length), rules_.incompressible,
+                    m.x, m.y, normals);
+    } else {
+      UInt words[4];
+      stream_(draw, UInt(static_cast<UInt32>(block)), UInt(static_cast<UInt32>(0)),
+              UInt(static_cast<UInt32>(Purpose::force)), words);
+      normal_pair(words[0], words[1], normals[0], normals[1]);
+      normal_pair(words[2], words[3], normals[2], normals[3]);
     }
   }
 

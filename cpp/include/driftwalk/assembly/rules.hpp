@@ -27,7 +27,11 @@ struct AssemblyRules {
   double connector_distance = 0; // largest distance between the centres of two faces that latch
   // Cosine of the largest angle between a face's normal and the other's opposite.
   double connector_cosine = 1;
-  bool hidden_faces_drag = false;
+  double hidden_share = 0; // of the drag of a free face that a joined face feels, 0 to 1
+  // The stochastic force: over which length blocks share it [m], 0: each has its own; and whether
+  // it is divergence-free.
+  double stirring_length = 0;
+  bool incompressible = false;
 };
 
 struct AssemblyWorlds {

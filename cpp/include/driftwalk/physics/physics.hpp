@@ -33,6 +33,7 @@ struct Physics {
   WallView<T> wall;
   StepConstants<T> step;
   WorldConstants<Real> world;
+  T hidden_share = T(0); // of the drag of a free face that a joined face feels
 };
 
 DRIFTWALK_LANES_END

@@ -14,6 +14,7 @@ enum class Purpose : std::uint32_t {
   bout = 5,        // its bouts, at the step in which one begins
   flow = 6,        // moment of a flow in frames at which a world begins
   torque = 7,      // of the stochastic force, one draw per force interval
+  stirring = 8,    // force field at a node of its lattice, one draw per two force intervals
 };
 
 } // namespace driftwalk

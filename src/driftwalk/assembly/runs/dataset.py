@@ -152,7 +152,7 @@ def assembly_attrs(plan: Plan) -> dict[str, Any]:
         "chirality": settings.chirality,
         "latching": settings.latching,
         **(connector if settings.latching == "connector" else {}),
-        "hidden_face_drag": settings.hidden_face_drag,
+        "hidden_face_drag": str(settings.hidden_face_drag),
         "block_restitution": settings.block_restitution,
         "block_friction": settings.block_friction,
         "block_side_m": study.block.side_m,

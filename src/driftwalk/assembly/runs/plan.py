@@ -66,7 +66,9 @@ class Plan:
             "latching": rules.latching,
             "connector_distance": rules.connector_distance_m,
             "connector_axis": rules.connector_axis_rad,
-            "hidden_face_drag": rules.hidden_face_drag,
+            "hidden_share": rules.hidden_share,
+            "stirring_length": self.study.forces.stirring_length_m,
+            "incompressible": self.study.forces.stirring == "incompressible",
             "block_restitution": rules.block_restitution,
             "block_friction": rules.block_friction,
         }

@@ -25,13 +25,18 @@ TOUCHING_M = 1e-9
 
 
 def require_room(study: Study) -> None:
-    """Refuse more blocks than the tank has room for by area alone.
+    """Refuse blocks that are not square, and more than the tank has room for by area alone.
 
     Raises
     ------
     InputError
-        Names both areas.
+        Names both areas, or the shape.
     """
+    if study.block.shape != "square":
+        raise InputError(
+            f"square blocks assemble, and the body is '{study.block.shape}' (`block.shape`): start "
+            "from the fit of one square block"
+        )
     count, side, tank = study.assembly.blocks, study.block.side_m, study.tank
     room = tank_area(tank)
     if count * side**2 > room:

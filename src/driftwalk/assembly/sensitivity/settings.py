@@ -353,6 +353,7 @@ KEYS: Final[dict[str, str]] = {
     "flow": "",
     "latching": "assembly.latching",
     "hidden_face_drag": "assembly.hidden_face_drag",
+    "stirring_length": "forces.stirring_length_m",
     "drag_coefficient": "forces.drag_coefficient",
     "force_std": "forces.force_std_N",
 }
@@ -484,4 +485,7 @@ def _plain(values: Any) -> list[Any]:
 
 
 def _array(values: tuple[Any, ...]) -> npt.NDArray[Any]:
-    return np.array(values, dtype=object if isinstance(values[0], str) else None)
+    # Words and shares of the drag on joined faces may stand together.
+    if any(isinstance(value, str) for value in values):
+        return np.array([str(value) for value in values], dtype=object)
+    return np.array(values)

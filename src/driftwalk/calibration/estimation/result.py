@@ -25,7 +25,7 @@ from driftwalk.schema import Parameter
 from driftwalk.schema.answers.facts import BOUNDS, AnswerParts, texts
 from driftwalk.schema.answers.verdict import verdict_of, verdict_variables
 from driftwalk.schema.check import build_dataset
-from driftwalk.simulation.series import series_warnings
+from driftwalk.simulation.series import is_series, series_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -68,7 +68,8 @@ def build_model_calibration(
     """Return the dataset of a calibration of many parameters."""
     ranges, held_out = entry.ranges, found.held_out
     against, unable = _findings(found, entry)
-    unable += unsteady_motion(motion)
+    # In a flow that changes the model is not steady either.
+    unable += [] if is_series(motion.like.flow) else unsteady_motion(motion)
     verdict = verdict_of([*held_out_differences(held_out, motion), *against], unable)
     count = len(ranges)
     # None where the summaries' answer does not count: nothing is known of the intervals then.

@@ -15,6 +15,7 @@ from driftwalk.core.errors import InputError
 if TYPE_CHECKING:
     import xarray as xr
 
+    from driftwalk.likelihood import EarlierFit
     from driftwalk.model import Study
     from driftwalk.motion import MotionModel
     from driftwalk.runs import FoundRun
@@ -30,6 +31,7 @@ RUN_NAMES: Final = (
     *("drag_coefficient", "force_std", "force_interval"),
     *("wall_friction", "wall_restitution", "time_step"),
     *("latching", "connector_distance", "connector_axis", "hidden_face_drag", "chirality"),
+    *("stirring_length", "stirring"),
     *("block_restitution", "block_friction", "confidence", "seed", "flow_repeat", "flow_start"),
 )
 """Options for keys of a study that every command on self-assembly takes."""
@@ -148,6 +150,69 @@ def _source_from_run(folder: Path, flow_file: Path | None, given: StudyOptions) 
         field, inputs["flow"] = load_flow_for(flow_file, chosen), flow_file
     warnings = [*found.warnings, *_without_effect(given, chosen)]
     return Source(chosen, field, found.uncertainty, inputs, warnings, found.not_drawn)
+
+
+def read_earlier_fit(folder: Path) -> EarlierFit:
+    """Return a finished fit with its recordings.
+
+    Raises
+    ------
+    InputError
+        When the folder holds none.
+    """
+    from driftwalk.likelihood import EarlierFit
+    from driftwalk.schema.runs import open_run_folder
+
+    run = open_run_folder(folder)
+    found, recordings = run.dataset("fit.nc"), run.recordings()
+    if found is None or not recordings:
+        raise InputError(
+            f"{folder} is no finished fit with its recording (fit.nc, recording.nc): make one with "
+            f"driftwalk fit RECORDING -o {folder}"
+        )
+    return EarlierFit(found, recordings)
+
+
+GLUED: Final = {
+    "hidden_face_drag_share": "assembly.hidden_face_drag",
+    "stirring_length": "forces.stirring_length_m",
+}
+"""Parameters of a fit of glued blocks, and the keys of a study that they are."""
+
+
+def with_glued(given: StudyOptions, folder: Path | None) -> StudyOptions:
+    """Return the options with what a fit of glued blocks says, where they do not say it.
+
+    Raises
+    ------
+    InputError
+        When the run is not one of glued blocks after a fit of one block.
+    """
+    if folder is None:
+        return given
+    from driftwalk.schema.answers.facts import fitted_value
+    from driftwalk.schema.kinds.fit import PARAMETERS
+
+    found = read_earlier_fit(folder).fit
+    known = {str(name) for name in found["parameter"].values}
+    if not set(GLUED) <= known:
+        raise InputError(
+            f"{folder} does not say what hidden faces and neighbours feel: it has to be a fit of "
+            "glued blocks after one of a single block (driftwalk fit DIMER --body-shape xx --from "
+            "FIT)"
+        )
+    values = {key: fitted_value(found, name) for name, key in GLUED.items()}
+    said = [
+        f"{PARAMETERS[name].words} {value:.2g} ({low:.2g} to {high:.2g})"
+        + (" m" if name == "stirring_length" else "")
+        for name in GLUED
+        for value, (low, high) in [
+            (fitted_value(found, name), found["interval"].sel(parameter=name).values)
+        ]
+    ]
+    print_note(f"{'; '.join(said)}: from {folder}")
+    kept = {key: value for key, value in values.items() if key not in given.overrides}
+    return given.and_also(kept, keys=given.keys)
 
 
 def load_flow_for(path: Path, study: Study) -> xr.Dataset:

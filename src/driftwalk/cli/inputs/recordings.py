@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from driftwalk.conditions import About, ReadRecordings
     from driftwalk.conditions.reading import Bodies
+    from driftwalk.likelihood import EarlierFit
     from driftwalk.model import Study
     from driftwalk.motion import MotionModel
 
@@ -29,7 +30,12 @@ FIT_TANK: Final = 0.5
 
 
 def read_for_run(
-    paths: Sequence[Path], given: StudyOptions, how: RecordingOptions, *, bodies: Bodies = "named"
+    paths: Sequence[Path],
+    given: StudyOptions,
+    how: RecordingOptions,
+    *,
+    bodies: Bodies = "named",
+    before: EarlierFit | None = None,
 ) -> ReadRecordings:
     """Read the recordings of a fit or a calibration, and make its study.
 
@@ -43,6 +49,8 @@ def read_for_run(
         How to read them.
     bodies : {"named", "all"}
         Which bodies they keep where one is named.
+    before : EarlierFit, optional
+        Of glued blocks, the fit of one block, whose tank and law are those of the study.
 
     Raises
     ------
@@ -51,11 +59,16 @@ def read_for_run(
     """
     from driftwalk.conditions import read_recordings
 
-    said = given.states_tank or how.tank is not None
+    study = given.study()
+    if before is not None:
+        from driftwalk.likelihood import glued_study
+
+        study = glued_study(study, before.fit)
+    said = given.states_tank or how.tank is not None or before is not None
     with explained():
         return read_recordings(
             paths,
-            given.study(),
+            study,
             how.arguments(),
             tank="stated" if said else "unsaid",
             body=how.body,

@@ -62,6 +62,11 @@ class Block:
         """Return the numbers of the model, units in the keys."""
         study = self.study
         forces = study.forces
+        if study.block.shape != "square":
+            raise InputError(
+                f"a simulator is given the square block, and the body is '{study.block.shape}' "
+                "(`block.shape`): driftwalk simulate knows it"
+            )
         return {
             "side_m": study.block.side_m,
             "mass_kg": study.block.mass_kg,
@@ -163,8 +168,14 @@ def _of_run(source: Source) -> tuple[Study, xr.Dataset, str]:
 
     found = read_found(source.path, give=TAKEN)
     study = found.block_study(why=f"another simulator gets the block in stirred water: {TAKEN}")
-    flow = found.flow(study) if source.flow is None else _flow(source.flow, study)
-    return study, flow, f"the {found.words} in {source.path.resolve().name}"
+    origin = f"the {found.words} in {source.path.resolve().name}"
+    if source.flow is not None:
+        return study, _flow(source.flow, study), origin
+    flow, lacks = found.mean_flow(study)
+    if lacks is not None:
+        source.tell(lacks)
+        origin += ", with its mean flow"
+    return study, flow, origin
 
 
 def _flow(path: Path, study: Study) -> xr.Dataset:

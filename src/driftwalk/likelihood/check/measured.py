@@ -42,7 +42,7 @@ class Placement(NamedTuple):
 
 def best_placement(measured: MeasuredFlow, free: xr.Dataset) -> Placement:
     """Return where the measured flow fits a flow that was fitted without it best."""
-    flow = fitted_flow(free)
+    flow = fitted_flow(free, interval=0)
     known = flow["flag"].values == FLAGS["measured"]
     x, y = flow["x"].values, flow["y"].values
     want = np.stack([flow[name].values for name in ("u", "v")])

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -33,7 +33,8 @@ from driftwalk.likelihood.check.restarts import (
     within_sections,
 )
 from driftwalk.likelihood.filter.parameters import PULSES, STRENGTHS, Point
-from driftwalk.likelihood.filter.series import Series, layer_strengths, wall_intervals
+from driftwalk.likelihood.filter.series import Series, wall_intervals
+from driftwalk.likelihood.fitted_modes import flow_frames
 from driftwalk.likelihood.flow_intervals import fitted_flow, fitted_intervals
 from driftwalk.likelihood.preparation import Estimate
 from driftwalk.likelihood.spline import Spline
@@ -48,20 +49,6 @@ Keys = npt.NDArray[np.uint64]
 
 Path = tuple[Floats, npt.NDArray[np.floating], npt.NDArray[np.floating]]
 """Times [s], x and y [m]."""
-
-
-class FramePolicy(NamedTuple):
-    """Frames of a flow whose strength changes; between them it is linear in time."""
-
-    per_half_wave: int = 10
-    """Frames in half a wave of the fastest cosine: its amplitude comes out 1 % too small."""
-    per_period: int = 16
-    """Frames in a period of a pulse: its amplitude comes out 1 % too small."""
-    most: int = 2000
-    """Most frames: with the 50 by 50 nodes of a flow they take some 100 MB. Chosen by hand."""
-
-
-FRAMES: Final = FramePolicy()
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,37 +160,18 @@ def recorded_steps(series: Sequence[Replicated], estimate: Estimate) -> Floats:
 
 def _in_frames(flow: xr.Dataset, series: Series, point: Point, spline: Spline) -> xr.Dataset:
     """Return a flow with the strength and the modes that a fit has found; a steady one as it is."""
-    first, span = float(series.time[0]), float(series.time[-1] - series.time[0])
-    if layer_strengths(series, point) is None:
+    found = flow_frames(series, point)
+    if found is None:
         return flow
-    steps = [series.span / (FRAMES.per_half_wave * len(STRENGTHS))]
-    repeat, end = "hold", span
-    pulses = [point.number("pulse_frequency")] if any(point.number(one) for one in PULSES) else []
-    frequencies = [*pulses, *([point.number("mode_frequency")] if point.layers > 1 else [])]
-    if frequencies:
-        period = 1.0 / max(*frequencies, 1e-300)
-        steps.append(period / FRAMES.per_period)
-        if len(frequencies) == 1 and not any(point.number(name) for name in STRENGTHS):
-            repeat, end = "loop", min(period, span)
-    count = math.ceil(end / min(steps)) + 1
-    if count > FRAMES.most:
-        raise InputError(
-            f"the strength of the flow changes too fast to be simulated: {count} frames would be "
-            f"needed, and {FRAMES.most} are possible"
-        )
-    time = np.linspace(0.0, end, count)
-    strengths = layer_strengths(replace(series, time=first + time), point)
-    assert strengths is not None
     water = np.stack([flow["u"].values, flow["v"].values])
-    total = strengths[0][:, None, None, None] * water
+    total = found.strength[0][:, None, None, None] * water
     if point.layers > 1:
         x, y = flow["x"].values, flow["y"].values
-        for strength, layer in zip(strengths[1:], point.coefficients[1:], strict=True):
+        for strength, layer in zip(found.strength[1:], point.coefficients[1:], strict=True):
             total += strength[:, None, None, None] * spline.values(layer, x, y)
     frames = {name: (("time", "y", "x"), total[:, k]) for k, name in enumerate(("u", "v"))}
-    return (
-        flow[["u", "v", "flag"]].assign(frames).assign_coords(time=time).assign_attrs(repeat=repeat)
-    )
+    moving = flow[["u", "v", "flag"]].assign(frames).assign_coords(time=found.time)
+    return moving.assign_attrs(repeat=found.repeat)
 
 
 def replicates_at_estimate(

@@ -56,7 +56,10 @@ def verdict_on(fit: xr.Dataset, criteria: Sequence[Criterion], *, study: Study) 
         *_too_little_seen(fit, side_m=side),
         *_not_determined(fit),
         *meaningless_of(
-            facts, side_m=side, wall_share=INFORMATION.most_wall_share, lever=INFORMATION.most_lever
+            facts,
+            block=study.block,
+            wall_share=INFORMATION.most_wall_share,
+            lever=INFORMATION.most_lever,
         ),
         *_told(fit, "law_unsettled"),
         *_told(fit, "flow_modes_unsettled"),

@@ -101,6 +101,8 @@ class Pair(NamedTuple):
     """Of a variance; where it is more, the two cannot be compared."""
     wave: Floats | None = None
     """How much of the difference counts at each sample, shape (n,); all of it by default."""
+    spreads: bool = True
+    """Whether the likelihood learns from the covariances of the innovations too."""
 
     @property
     def comparable(self) -> Bools:
@@ -143,11 +145,11 @@ def noise_derivatives(
     white = forward(root, base["innovation"][used].T).T
     changes, spreads = [], []
     while pairs:
-        one, other, step, _, wave = pairs.pop(0)
+        one, other, step, _, wave, of_spreads = pairs.pop(0)
         per = 1.0 / step if wave is None else wave[used, None] / step
         change = (one["innovation"][used] - other["innovation"][used]) * per
         changes.append(forward(root, change.T).T)
         widening = unpacked((other["covariance"][used] - one["covariance"][used]) * per)
-        half = forward(root, widening)
+        half = forward(root, widening if of_spreads else np.zeros_like(widening))
         spreads.append(forward(root, half.transpose(1, 0, 2)))
     return white, changes, spreads

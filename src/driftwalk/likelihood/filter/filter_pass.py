@@ -30,7 +30,7 @@ from driftwalk.likelihood.filter.difference_pairs import (
     noise_derivatives,
     used_of,
 )
-from driftwalk.likelihood.filter.parameters import STRENGTHS, Point
+from driftwalk.likelihood.filter.parameters import OF_PREDICTIONS, STRENGTHS, Point
 from driftwalk.likelihood.filter.series import (
     FILTER,
     Body,
@@ -131,14 +131,14 @@ class Passes:
                 one = dict(closed.run(count, states=False))
             moved = self.kernel(series, point.with_extra(name, high))
             other = dict(moved.run(count, states=False))
-            pair = Pair(one, other, step, most)
+            pair = Pair(one, other, step, most, spreads=name not in OF_PREDICTIONS)
             if difference.shortens and (excess := pair.excess) > 1.0:
                 # Where positions are known to some micrometres, a tenth of a millisecond is a long
                 # step in time: the second pass is made again with a shorter one.
                 _, high, step, *_ = difference_of(point, name, shorter=excess)
                 moved = self.kernel(series, point.with_extra(name, high))
                 other = dict(moved.run(count, states=False))
-                pair = Pair(one, other, step, most)
+                pair = pair._replace(other=other, step=step)
             found[name] = pair
         for name in waves:
             found[name] = found["strength_0"]._replace(wave=slow_change(series, name))
@@ -246,7 +246,7 @@ class Passes:
             theta,
             series.omega,
             series.excluded,
-            **body.native(),
+            **body.native(point),
             **vars(spline),
             coefficients=np.ascontiguousarray(
                 point.coefficients.reshape(-1, spline.rows, spline.columns)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
@@ -125,20 +126,31 @@ class Body:
     orientation: str
     """"state", "given" or "none": the track's angle is measured like the position, is an input, or
     is not used."""
-    outline: RigidBody
+    block: Block
+    hidden_share: float
+    """Share of the drag of a free face that a face between two glued blocks feels."""
 
-    def native(self) -> dict[str, Any]:
+    @cached_property
+    def outline(self) -> RigidBody:
+        """The outline of the body."""
+        return self.block.body(self.hidden_share)
+
+    def native(self, point: Point) -> dict[str, Any]:
         """Return the arguments of the native filter."""
-        numbers = {name: value for name, value in vars(self).items() if name != "outline"}
+        names = ("side", "mass", "depth", "strips", "water_density", "drag_speed", "orientation")
+        numbers = {name: getattr(self, name) for name in names}
         if self.outline.is_square:
             return numbers
+        outline = self.outline
+        if "hidden_share" in point.opened or "hidden_share" in point.fixed:
+            outline = self.block.body(point.number("hidden_share"))
         return {
             **numbers,
-            "panels": self.outline.panels,
-            "moment_points": self.outline.moment_points,
-            "mass_by_inertia": 1.0 / self.outline.moment_m2,
-            "symmetry": max(self.outline.symmetry, 1),
-            "round": self.outline.disc_radius_m > 0.0,
+            "panels": outline.panels,
+            "moment_points": outline.moment_points,
+            "mass_by_inertia": 1.0 / outline.moment_m2,
+            "symmetry": max(outline.symmetry, 1),
+            "round": outline.disc_radius_m > 0.0,
         }
 
 
@@ -393,5 +405,6 @@ def body_of(study: Study, used_angle: str) -> Body:
         water_density=study.water.density_kg_m3,
         drag_speed=study.forces.drag_speed_m_s,
         orientation=used_angle,
-        outline=study.block.body(study.assembly.hidden_share),
+        block=study.block,
+        hidden_share=study.assembly.hidden_share,
     )

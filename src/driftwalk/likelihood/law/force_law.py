@@ -100,6 +100,7 @@ def _states_other(study: Study, key: str) -> bool:
 
 
 PLAIN: Final = {
+    "hidden_share": "hidden_face_drag_share",
     "drag_power": "drag_power",
     "force_memory": "force_memory_s",
     "angle_offset": "orientation_offset_rad",
@@ -187,6 +188,11 @@ def number_facts(point: Point, covariance: Floats, study: Study) -> dict[str, An
     for name, key in PLAIN.items():
         if name in widths or name in point.fixed:
             state(key, point.number(name), widths.get(name, 0.0))
+    if "hidden_share" in widths:
+        # The water may seem to pull at a hidden face, or to push more than at a free one.
+        for key in ("hidden_face_drag_share", "hidden_face_drag_share_interval"):
+            clipped = np.clip(facts[key], 0.0, 1.0)
+            facts[key] = clipped.tolist() if clipped.ndim else float(clipped)
     if "time_variance" in widths:
         value, width = point.opened["time_variance"], widths["time_variance"]
         ends = [math.sqrt(max(one, 0.0)) for one in (value - width, value + width)]
@@ -200,7 +206,7 @@ def number_facts(point: Point, covariance: Floats, study: Study) -> dict[str, An
         # speed at which linear and quadratic drag are compared, a side a second.
         side, width = study.block.side_m, study.block.side_m
         if study.block.shape != "square":
-            width = 0.25 * float(study.block.body(study.assembly.hidden_share).panels[:, 4].sum())
+            width = 0.25 * float(study.body().panels[:, 4].sum())
         area = width * study.wetted_depth_m
         drag = 0.5 * study.water.density_kg_m3 * math.exp(point.log_drag) * area * side
         state("linear_drag_kg_s", share, width, drag * inertia_of(study, point).share)

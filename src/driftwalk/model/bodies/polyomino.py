@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 import numpy as np
@@ -45,7 +44,7 @@ def _glued(cells: Cells, measures: Measures) -> RigidBody:
             hidden = (cell[0] + nx, cell[1] + ny) in cells
             share = measures.hidden_share if hidden else 1.0
             middle = (x + nx * side / 2, y + ny * side / 2)
-            if share > 0:
+            if share:
                 faces.append(face(middle, (float(nx), float(ny)), side, measures.strips, share))
     spread = centres.T @ centres / len(cells) + np.eye(2) * side**2 / 12.0
     variances, axes = np.linalg.eigh(spread)
@@ -56,8 +55,6 @@ def _glued(cells: Cells, measures: Measures) -> RigidBody:
         corners=_hull(centres, side),
         moment_points=(signs * np.sqrt(variances)) @ axes.T,
         symmetry=_symmetry(centres),
-        # Independent forces: of their sum's variance n sigma², the torque has sigma² sum |r|².
-        force_lever_m=math.sqrt(float((centres**2).sum()) / len(cells)),
         cells=centres,
     )
 

@@ -45,8 +45,6 @@ class RigidBody:
     symmetry: int
     """Turns by 2 pi / symmetry leave it as it is; 0 for a disc, which has no heading."""
     disc_radius_m: float = 0.0
-    force_lever_m: float = 0.0
-    """Lever of the torque of forces that act on its cells independently, rms [m]; 0 of one cell."""
     cells: Floats = field(default_factory=lambda: np.zeros((1, 2)))
     """Centres of its cells, shape (n, 2) [m]."""
     is_square: bool = False
@@ -62,6 +60,26 @@ class RigidBody:
         """Distance of the farthest point from the centre of mass [m]."""
         corners = np.hypot(*self.corners.T).max() if self.corners.size else 0.0
         return float(max(corners, self.disc_radius_m))
+
+    def correlation(self, stirring_length: float) -> Floats:
+        """Return the correlation of the forces on its cells, exp(-r²/2L²), shape (n, n)."""
+        if stirring_length == 0.0:
+            return np.eye(len(self.cells))
+        apart = self.cells[:, None] - self.cells[None]
+        return np.asarray(np.exp(-(apart**2).sum(axis=2) / (2.0 * stirring_length**2)))
+
+    def force_share(self, stirring_length: float = 0.0) -> float:
+        """Return the force on the body over that on one cell: √n where they are independent."""
+        return float(np.sqrt(self.correlation(stirring_length).sum()))
+
+    def force_lever_m(self, stirring_length: float = 0.0) -> float:
+        """Return the torque over the force of the forces on its cells, rms [m]; 0 of one cell.
+
+        With rho_ij their correlation and r_i their places, lever² is sum rho_ij r_i·r_j over
+        sum rho_ij.
+        """
+        torque = (self.correlation(stirring_length) * (self.cells @ self.cells.T)).sum()
+        return float(np.sqrt(max(torque, 0.0))) / self.force_share(stirring_length)
 
     def arrays(self) -> dict[str, Any]:
         """Return what the native core takes of a body that is no single square."""

@@ -46,6 +46,7 @@ _NUMBERS: Final[dict[str, tuple[str, str, str]]] = {
     "force_std": (r"stochastic force $\sigma_F$ (mN)", "mN", "N"),
     "tank_diameter": ("tank diameter (cm)", "cm", "m"),
     "blocks": ("number of blocks", "", ""),
+    "stirring_length": ("stirring length (cm)", "cm", "m"),
 }
 _WORDS: Final[dict[str, str]] = {
     "flow": "flow",

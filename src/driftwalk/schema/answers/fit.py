@@ -21,6 +21,7 @@ from driftwalk.schema.answers.facts import (
 from driftwalk.schema.answers.force_law import (
     LINEAR_DRAG_ALONE,
     compared_laws,
+    flow_in_time,
     law_estimates,
     law_words,
     wall_estimates,
@@ -118,7 +119,8 @@ def fitted_parts(fit: xr.Dataset, *, hint: str = "") -> list[Part]:
         names = ", ".join(map(str, fit["flow"].values[fit["interval_flow"].values]))
         times = ", ".join(f"{time:g} s" for time in facts["switching_times_s"])
         parts.append(Row("flows", f"{names}, switched at {times}"))
-    return parts
+    in_time = flow_in_time(fit)
+    return parts if in_time is None else [*parts, Row("flow over time", in_time)]
 
 
 def model_estimates(fit: xr.Dataset) -> list[Estimate]:

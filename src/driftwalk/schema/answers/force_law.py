@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
+from driftwalk.core.arrays import Floats
 from driftwalk.schema.answers.parts import Estimate, estimates
 from driftwalk.schema.kinds.fit import LAW_NUMBERS, WALL_NUMBERS
 
@@ -93,6 +94,29 @@ def law_words(facts: Mapping[str, Any]) -> dict[str, str]:
     if facts.get("drag_law_stated") == "yes" and not whole:
         rows["drag law"] = f"{DRAG_LAWS.get(drag, drag)}, {NOT_SEARCHED}"
     return rows
+
+
+def flow_in_time(fit: xr.Dataset) -> str | None:
+    """Return in which frames the flow of a fit that changes is given on; None of a steady one."""
+    if "flow_strength" not in fit:
+        left_out = fit.attrs.get("flow_strength_left_out")
+        modes = [] if "mode_time" not in fit.coords else [_period(fit["mode_time"].values)]
+        return "; ".join([*modes, *([str(left_out)] if left_out else [])]) or None
+    time, strength = fit["strength_time"].values, fit["flow_strength"].values
+    low, high = float(strength.min()), float(strength.max())
+    between = f"strength {low:.3g} to {high:.3g} of the mean"
+    if fit.attrs["flow_strength_repeat"] == "loop":
+        return f"{_period(time)}; {between}"
+    words = (
+        f"{time.size} frames from 0 to {time[-1]:.4g} s; {between}; before and after, it stays as "
+        "in the first and the last frame"
+    )
+    left_out = fit.attrs.get("flow_strength_left_out")
+    return words if left_out is None else f"{words}; without pulses: {left_out}"
+
+
+def _period(time: Floats) -> str:
+    return f"{time.size} frames of one period, {time[-1]:.4g} s, which begins again"
 
 
 def _support(facts: Mapping[str, Any], other: str, *, paper: bool) -> str:

@@ -37,6 +37,7 @@ dimensions:
     compared_law: force laws that were compared, by name
     flow_mode: modes of the flow in time
     mode_time: times in a period of the modes
+    strength_time: frames of the strength of the flow
     number: numbers of departures from the model, by name
     law: force laws that were fitted, by name
     departure: numbers of departures that were tested, by name
@@ -148,6 +149,9 @@ variables (a measured flow was given, and its scale is not exact):
     measured_flow_scale_std [1]: standard deviation of its scale
     measured_flow_scale_p_value [1]: chance of a scale so far from 1
     measured_flow_scale_detectable [1]: relative change of the scale that is found nine times in ten
+variables (glued blocks, after a fit of one block):
+    stirring_misfit_std [1]: by how much force and torque of the body disagree on the correlation, \
+        in standard deviations
 variables (with orientations, in one flow):
     spin_correlation [1]: correlation of the block's spin with the vorticity of a first estimate \
         of the flow
@@ -179,6 +183,10 @@ variables (modes of the flow in time were fitted):
     mode_share(flow_mode) [1]: speed of the mode over that of the mean flow, both as rms where the \
         block has been
     mode_weight [1]: factor of the two weights for the modes
+variables (the strength of the flow changes, or has pulses):
+    flow_strength(strength_time) [1]: strength of the flow over its mean; linear between frames
+    strength_time(strength_time) [s]: time of a frame; from the first sample of the first \
+        recording on
 variables (numbers of departures were tested):
     departure_estimate(departure): estimates of closed numbers by score tests at the end of the \
         search; in SI units; the model is 0
@@ -226,6 +234,10 @@ attributes (a measured flow was given):
     measured_flow_errors text: where its errors are from
 attributes (the shape of the flow changes):
     flow_shape_change text: how, in a sentence
+attributes (the strength of the flow changes, or has pulses):
+    flow_strength_repeat text: how it goes on after its last frame: "loop" or "hold"
+attributes (the strength changes too fast to be given in frames):
+    flow_strength_left_out text: why the flow is given without it
 attributes (modes of the flow in time were asked for, and not found):
     flow_modes_unsettled text: why
 attributes (the law is not settled):
@@ -271,6 +283,11 @@ LAW_NUMBERS: Final = (
     Number("pulse_frequency", "Hz", "frequency of pulses", shown="Hz", note=_CORRECTED),
     Number("mode_frequency", "Hz", "frequency of the modes", shown="Hz",
            note="of the flow, whose shape changes; corrected"),
+    Number("hidden_face_drag_share", label="drag of hidden faces",
+           note="over that of a free face"),
+    Number("stirring_correlation", label="shared stirring",
+           note="correlation of the forces on two blocks side by side"),
+    Number("stirring_length", "m", "length of the stirring", shown="mm"),
     Number("measured_flow_scale", label="scale of the measured flow",
            note="over that of the fitted one"),
 )  # fmt: skip

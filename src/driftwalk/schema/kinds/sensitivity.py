@@ -16,7 +16,9 @@ variables (an axis):
     blocks(blocks) [1] int: number of blocks
     flow(flow) text: flow field
     latching(latching) text: when two blocks latch
-    hidden_face_drag(hidden_face_drag) text: drag on joined faces
+    hidden_face_drag(hidden_face_drag) text: drag on joined faces; a word, or its share of a free \
+        face's
+    stirring_length(stirring_length) [m]: distance over which blocks share the stochastic force
 """)
 """Quantities that may vary over a map."""
 _DIMENSIONS: Final = "\n".join(f"{one.name}: settings, where it varies" for one in AXES)

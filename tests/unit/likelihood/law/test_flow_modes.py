@@ -28,7 +28,7 @@ from driftwalk.likelihood.check import replicates
 from driftwalk.likelihood.filter.filter_pass import Passes, Sums
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import body_of, layer_strengths, mode_amplitudes, series_of
-from driftwalk.likelihood.fitted_modes import mode_frames, mode_variables
+from driftwalk.likelihood.fitted_modes import mode_variables, moving_fields, stored_frames
 from driftwalk.likelihood.law import flow_modes
 from driftwalk.likelihood.law.flow_modes import modes_at
 from driftwalk.likelihood.law.shape_changes import ShapeChange
@@ -222,6 +222,8 @@ def test_eddies_that_alternate_are_found() -> None:
     assert float(data["mode_share"][1][0]) == pytest.approx(SHARE / math.sqrt(2.0), rel=0.3)
     u, v = spline.values(found.start.mean_coefficients, grid.x, grid.y)
     fit = xr.Dataset({**data, "u": (("y", "x"), u), "v": (("y", "x"), v)}, coords)
-    time, frames = mode_frames(fit, {"u": u, "v": v})
-    assert time[-1] == pytest.approx(PERIOD, rel=1e-3)
+    found_frames = stored_frames(fit)
+    assert found_frames is not None
+    assert found_frames.time[-1] == pytest.approx(PERIOD, rel=1e-3)
+    frames = moving_fields(fit, found_frames, {"u": u, "v": v})
     np.testing.assert_allclose(frames["u"][:-1].mean(axis=0), u, atol=1e-9)

@@ -1,0 +1,194 @@
+"""What a recording of glued blocks tells that none of one block does.
+
+A dimer, or any rigid polyomino, in the water of an earlier fit of one block, whose posterior, a
+normal law of flow and ln C_d, is the prior:
+
+- *Drag of hidden faces*: the share h of a free face's drag that a face between two blocks feels is
+  a number of the fit like any other, because the water pushes along and across the body's length.
+- *Stirring that is shared*: with the correlation rho(r) = exp(-r²/2L²) of the forces on two blocks
+  at a distance r, the force on the body has the variance sigma² sum rho_ij, and its torque has
+  sigma² sum rho_ij r_i·r_j. Noise intensity and lever of the body, against the intensity of one
+  block, give rho of two blocks side by side: of a dimer q_2 / q_1 = (1 + rho) / 2 and
+  lever² = (a²/4) (1 - rho) / (1 + rho). rho has a uniform prior, and an interval of highest
+  density.
+
+See docs/how-to/dimer.md.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
+
+import numpy as np
+
+from driftwalk.core.arrays import Floats
+from driftwalk.core.errors import InputError, argument_text
+from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.filter.series import Body
+from driftwalk.likelihood.newton import Mode
+from driftwalk.likelihood.preparation import Estimate, PreparedRecordings, estimate_of
+from driftwalk.likelihood.prior import Earlier, usual_lever
+from driftwalk.likelihood.start import first_point
+from driftwalk.schema.answers.facts import fitted_value
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.model import Study
+
+
+class GluedPolicy(NamedTuple):
+    """How the correlation is searched."""
+
+    first_share: float = 0.5
+    """Share of hidden drag at which the search begins."""
+    most_correlation: float = 0.995
+    """Largest correlation of the forces on two blocks side by side: a length of ten sides."""
+    nodes: int = 2001
+    """Of the posterior of the correlation."""
+
+
+GLUED: Final = GluedPolicy()
+
+
+class EarlierFit(NamedTuple):
+    """A finished fit of one block in the same water, and its recordings."""
+
+    fit: xr.Dataset
+    recordings: Sequence[xr.Dataset]
+
+
+def glued_study(study: Study, earlier: xr.Dataset) -> Study:
+    """Return the study of a glued body with what an earlier fit of one block says.
+
+    Tank, water, law and the block come from the earlier fit, and the mass once for each cell where
+    it is not stated; shape, reading and [fit] from the study.
+
+    Raises
+    ------
+    InputError
+        When the body is not glued, or the earlier fit is not one of a single block.
+    """
+    from driftwalk.conditions.study import fitted_law, is_stated
+    from driftwalk.model import apply_overrides, parse_study
+
+    cells = len(study.block.body().cells)
+    one = parse_study(earlier.attrs["study"])
+    if cells < 2 or len(one.block.body().cells) > 1:
+        raise InputError(
+            "an earlier fit of one block is the start of a fit of glued blocks "
+            f"({argument_text('body_shape', 'xx')}); to fit several recordings of one block "
+            "together: driftwalk fit FIRST SECOND"
+        )
+    side = study.block.side_m
+    if is_stated(study, "block.side_m") and abs(side / one.block.side_m - 1.0) > 1e-6:
+        raise InputError(
+            f"the glued blocks have sides of {1e3 * side:.4g} mm, and the block of the earlier fit "
+            f"one of {1e3 * one.block.side_m:.4g} mm: state the side once, in the earlier fit"
+        )
+    block = {"block.side_m": one.block.side_m, "block.depth_m": one.wetted_depth_m}
+    if not is_stated(study, "block.mass_kg"):
+        block["block.mass_kg"] = cells * one.block.mass_kg
+    law: dict[str, Any] = {
+        # A power is that of the earlier fit, not to be estimated again.
+        "fit.law": "auto" if earlier.attrs["drag_law"] == "power" else earlier.attrs["drag_law"],
+        "fit.pressure_gradient": "on" if earlier.attrs["force_law"] == "floating body" else "off",
+        "fit.force_memory_s": "white",
+        "fit.flow_strength": "constant",
+    }
+    known = {str(name) for name in earlier["parameter"].values}
+    for key, name in (("added_mass_share", "added_mass_share"), ("force_memory_s", "force_memory")):
+        if name in known:
+            law[f"fit.{key}"] = fitted_value(earlier, name)
+    law = {key: value for key, value in law.items() if not is_stated(study, key)}
+    sections = {"tank": one.tank, "water": one.water, "forces": one.forces}
+    return apply_overrides(study.model_copy(update=sections), block | law | fitted_law(earlier))
+
+
+def earlier_prior(ready: PreparedRecordings, before: Estimate) -> Earlier:
+    """Return the posterior of the earlier fit as the prior of flow and ln C_d."""
+    if ready.passes.spline != before.passes.spline:
+        raise InputError(
+            "the earlier fit has other knots for the flow: tank and `fit.spline_spacing` must be "
+            "the same"
+        )
+    sums = before.passes.sums(before.point, noise="without")
+    precision = before.prior.add(sums, before.point, before.weights).information
+    centre = np.append(before.point.coefficients.ravel(), before.point.log_drag)
+    return Earlier(centre, precision, before.weights)
+
+
+def estimate_before(earlier: EarlierFit) -> Estimate:
+    """Return the earlier fit, ready to run its filter."""
+    return estimate_of(earlier.fit, earlier.recordings, body=None)
+
+
+def first_glued_point(ready: PreparedRecordings, before: Estimate) -> Point:
+    """Return where the search begins: flow and drag of one block, noises of the recording."""
+    own, body = first_point(ready, ready.passes.spline), ready.passes.body
+    lever = None if own.log_lever is None else math.log(usual_lever(body.side, body.outline))
+    return replace(
+        own,
+        coefficients=before.point.coefficients,
+        log_drag=before.point.log_drag,
+        log_intensity=before.point.log_intensity - math.log(len(body.outline.cells)),
+        log_lever=lever,
+    )
+
+
+def stirring_facts(
+    ready: PreparedRecordings,
+    mode: Mode,
+    point: Point,
+    before: Estimate | None,
+    earlier: EarlierFit | None,
+) -> dict[str, Any]:
+    """Return the correlation of the forces side by side, and the length, with intervals.
+
+    Nothing without an earlier fit.
+    """
+    if before is None or earlier is None:
+        return {}
+    body = ready.passes.body
+    # Of ln C_d, ln q, ln r, ...
+    of_one = float(earlier.fit["covariance"][1, 1])
+    observed = [point.log_intensity - before.point.log_intensity]
+    variances = [mode.value_of("log_intensity")[1] ** 2 + of_one]
+    if point.log_lever is not None:
+        observed.append(point.log_lever)
+        variances.append(mode.value_of("log_lever")[1] ** 2)
+    nodes = np.linspace(0.0, GLUED.most_correlation, GLUED.nodes)
+    expected = np.array([_expected(float(rho), body) for rho in nodes])[:, : len(observed)]
+    squares = ((expected - observed) ** 2 / variances).sum(axis=1)
+    rho = _most_likely(nodes, -0.5 * squares, ready.study.fit.confidence)
+    facts: dict[str, Any] = {}
+    for name, of in (("stirring_correlation", float), ("stirring_length_m", _length_of(body))):
+        value, *ends = (of(one) for one in rho)
+        facts |= {name: value, f"{name}_interval": ends}
+    if len(observed) > 1:
+        facts["stirring_misfit_std"] = math.sqrt(float(squares.min()))
+    return facts
+
+
+def _expected(rho: float, body: Body) -> tuple[float, float]:
+    """Return the logarithms of the intensity over that of one block, and of the lever [m]."""
+    length, outline = _length_of(body)(rho), body.outline
+    ratio = 2.0 * math.log(outline.force_share(length) / len(outline.cells))
+    return ratio, math.log(max(outline.force_lever_m(length), 1e-12))
+
+
+def _length_of(body: Body) -> Callable[[float], float]:
+    """Return the function from the correlation at one side to the length [m]; 0 for none."""
+    return lambda rho: 0.0 if rho <= 0.0 else body.side / math.sqrt(-2.0 * math.log(rho))
+
+
+def _most_likely(nodes: Floats, log_density: Floats, confidence: float) -> tuple[float, ...]:
+    """Return the most likely node, and the ends of the interval of highest density."""
+    density = np.exp(log_density - log_density.max())
+    order = np.argsort(-density)
+    inside = np.searchsorted(np.cumsum(density[order]), confidence * density.sum())
+    within = order[: int(inside) + 1]
+    return tuple(float(nodes[k]) for k in (order[0], within.min(), within.max()))
