@@ -40,7 +40,7 @@ def study(shape: str, hidden: float = 0.0, **sections: Any) -> dw.Study:
     forces = {"drag_coefficient": DRAG, "force_std_N": 0.0} | sections.pop("forces", {})
     return dw.Study(
         block={"shape": shape, "mass_kg": MASS}, forces=forces, observation=EXACT,
-        assembly={"hidden_face_drag_share": hidden}, **sections,
+        assembly={"hidden_face_drag": hidden}, **sections,
     )  # fmt: skip
 
 

@@ -95,7 +95,20 @@ def test_only_corners_of_the_hull_touch_a_wall() -> None:
     [("xx", A / 2), ("xxx", A * math.sqrt(2 / 3)), ("x./xx", A * 2 / 3), ("disc", 0.0)],
 )
 def test_independent_forces_on_the_cells_have_a_lever(shape: str, lever: float) -> None:
-    assert made(shape).force_lever_m == pytest.approx(lever, rel=1e-12)
+    assert made(shape).force_lever_m() == pytest.approx(lever, rel=1e-12)
+
+
+@pytest.mark.parametrize("length", [0.01, 0.03, 0.5])
+def test_shared_forces_on_a_dimer(length: float) -> None:
+    """With the correlation rho at a distance a the force is sqrt(2 (1 + rho)) of one cell's.
+
+    The torque, sigma a sqrt((1 - rho) / 2), over that force is a / 2 sqrt((1 - rho) / (1 + rho)).
+    """
+    rho = math.exp(-(A**2) / (2 * length**2))
+    body = made("xx")
+    assert body.force_share(length) == pytest.approx(math.sqrt(2 * (1 + rho)), rel=1e-12)
+    lever = A / 2 * math.sqrt((1 - rho) / (1 + rho))
+    assert body.force_lever_m(length) == pytest.approx(lever, rel=1e-9)
 
 
 def test_the_size_may_stand_in_the_shape() -> None:
