@@ -18,6 +18,8 @@ SETTINGS: dict[str, Any] = {
     "hidden_face_drag": "none",
     "block_restitution": 0.5,
     "block_friction": 0.0,
+    "stirring_length": 0.0,
+    "incompressible": False,
     "sample_every": 0,
     "threads": 1,
     "precision": "single",
@@ -46,6 +48,9 @@ def assemble(
 ) -> dict[str, Any]:
     """Run worlds; drag and force are one number for all or one for each."""
     poses = np.ascontiguousarray(start, dtype=np.float64)
+    settings = {**SETTINGS, **changes}
+    share = settings.pop("hidden_face_drag")
+    settings["hidden_share"] = {"none": 0.0, "full": 1.0}.get(share, share)
     return _core.assemble(
         native,
         start=poses,
@@ -53,7 +58,7 @@ def assemble(
         drag_coefficient=np.array(np.broadcast_to(np.asarray(drag, float), len(poses))),
         force_std=np.array(np.broadcast_to(np.asarray(force, float), len(poses))),
         steps=steps,
-        **{**SETTINGS, **changes},
+        **settings,
     )
 
 

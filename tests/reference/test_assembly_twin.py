@@ -45,12 +45,16 @@ def native_row(
 ) -> dict[str, Any]:
     """Run one world in the kernel; arguments as of the twin."""
     alone = {name: np.array([arguments.pop(name)]) for name in ("drag_coefficient", "force_std")}
+    hidden = {"none": 0.0, "full": 1.0}[arguments.pop("hidden_face_drag")]
     rows = _core.assemble(
         native_model(model, flow, np.zeros(1), Camera()),
         start=np.ascontiguousarray(start[None]),
         key=np.array([key], dtype=np.uint64),
         threads=1,
         precision="double",
+        hidden_share=hidden,
+        stirring_length=0.0,
+        incompressible=False,
         **alone,
         **arguments,
     )

@@ -66,7 +66,8 @@ def test_every_world_sees_a_changing_flow_from_its_beginning() -> None:
     ("change", "words"),
     [
         ({"latching": "glue"}, "latching"),
-        ({"hidden_face_drag": "half"}, "half must be full or none"),
+        ({"hidden_face_drag": 1.5}, "hidden_share must be from 0 to 1"),
+        ({"stirring_length": -0.1}, "stirring_length must be finite"),
         ({"precision": "quad"}, "quad must be double or single"),
         ({"steps": 0}, "steps"),
         ({"sample_every": -1}, "sample_every"),

@@ -179,8 +179,12 @@ private:
     Member<Real>& m = memory_.members[block];
     Real* const normals = m.normals;
     if (rules_.stirring_length > 0 && blocks_ > most_blocks_correlated) {
-      draw_stirring(stream_, draw, static_cast<T>(rules_.stirring_length), rules_.incompressible,
-                    m.x, m.y, normals);
+      const T length = static_cast<T>(rules_.stirring_length);
+      if (rules_.incompressible) {
+        draw_stirring<IncompressibleStirring>(stream_, draw, length, m.x, m.y, normals);
+      } else {
+        draw_stirring<FreeStirring>(stream_, draw, length, m.x, m.y, normals);
+      }
     } else {
       UInt words[4];
       stream_(draw, UInt(static_cast<UInt32>(block)), UInt(static_cast<UInt32>(0)),
