@@ -19,8 +19,8 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from driftwalk.core.arrays import Floats
+from driftwalk.likelihood.filter.forgetting import due_share
 from driftwalk.likelihood.filter.parameters import Point
-from driftwalk.likelihood.forgetting import due_share
 from driftwalk.likelihood.newton import Mode, ModeSearch, known_numbers_variance
 from driftwalk.likelihood.refuse import cholesky
 
@@ -103,7 +103,9 @@ def restricted_drag(search: ModeSearch, mode: Mode, *, intensity: bool = True) -
     sd = math.sqrt(known_numbers_variance(mode))
     slopes = mode.covariance[:, drag] / mode.covariance[drag, drag]
     found = [profile_at(search, mode, start.log_drag, start.coefficients.ravel())]
-    share = due_share(search, mode) if search.passes.body.outline.disc_radius_m else 1.0
+    share = 1.0
+    if search.passes.body.outline.disc_radius_m:
+        share = due_share(search.passes, search.prior.matrix(mode.weights), start)
 
     def add_profile(log_drag: float) -> None:
         near = min(found, key=lambda one: abs(one.log_drag - log_drag))
@@ -164,7 +166,7 @@ def _with_restricted_intensity(
 def _minimum(found: list[Profile], share: float = 1.0) -> tuple[float, float]:
     """Return the minimum of the criterion through some points, and its standard deviation.
 
-    A share of the determinant's slope counts (`driftwalk.likelihood.forgetting`).
+    A share of the determinant's slope counts (`driftwalk.likelihood.filter.forgetting`).
 
     The standard deviation is infinite where there is no minimum near the points.
 

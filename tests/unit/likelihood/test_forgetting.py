@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import driftwalk as dw
+from driftwalk.likelihood.filter.forgetting import remembered
 from driftwalk.likelihood.filter.parameters import DRAG_SHAPES
-from driftwalk.likelihood.forgetting import remembered
 from driftwalk.likelihood.law.force_law import assumptions_of
 
 

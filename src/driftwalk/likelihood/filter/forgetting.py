@@ -20,20 +20,17 @@ from driftwalk.core.arrays import Bools, Floats
 from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import FILTER, Series
-from driftwalk.likelihood.newton import Mode, ModeSearch
 from driftwalk.likelihood.spline import Spline, basis_matrix
 
 BLOCK = 4096
 """Samples whose bases are held at once."""
 
 
-def due_share(search: ModeSearch, mode: Mode) -> float:
-    """Return tr(M B) / tr(M A) at a mode, of a disc: its drag depends on the slip alone.
+def due_share(passes: Passes, prior: Floats, point: Point) -> float:
+    """Return tr(M B) / tr(M A) at a point, of a disc: its drag depends on the slip alone.
 
-    Of a flow in layers the mean counts.
+    `prior` is Lambda of one component. Of a flow in layers the mean counts.
     """
-    passes, point = search.passes, mode.point
-    prior = search.prior.matrix(mode.weights)
     due = whole = 0.0
     for flow in range(passes.flows):
         one, other = (np.zeros_like(prior) for _ in range(2))
