@@ -48,7 +48,7 @@ double read_law(int count, char** words, Law& law) {
       {"water_spin", &law.water_spin}, {"linear_drag", &law.linear_drag},
       {"drag_power", &law.drag_power}, {"flow_growth", &law.flow_growth},
       {"pulse", &law.pulse},           {"pulse_period", &law.pulse_period},
-      {"force_memory", &memory},
+      {"force_memory", &memory},       {"disc", &law.disc},
   };
   for (int k = 0; k < count; ++k) {
     const std::string word = words[k];

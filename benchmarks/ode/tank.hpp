@@ -41,6 +41,7 @@ struct Law {
   double flow_growth = 0;       // of the flow's strength a second, as a share of that at the start
   double pulse = 0;             // amplitude of its pulses, as a share
   double pulse_period = 10;     // [s]
+  double disc = 0;              // 1: a disc of diameter `side`, no block
 };
 inline constexpr double reference_speed = 0.03; // [m/s]
 
@@ -187,6 +188,48 @@ inline Wrench drag(const Case& c, double drag_coefficient, const State& s, doubl
   return sum;
 }
 
+// The same of a disc, whose rim is many strips. Its spin is not in the force: it only brakes.
+inline Wrench disc_drag(const Case& c, double drag_coefficient, const State& s, double strength) {
+  constexpr int rim = 101;
+  const double radius = c.side / 2;
+  const double scale = 0.5 * c.density * drag_coefficient * c.depth * 2 * pi * radius / rim;
+  Wrench sum{0, 0, 0};
+  for (int k = 0; k < rim; ++k) {
+    const double nx = std::cos(2 * pi * k / rim), ny = std::sin(2 * pi * k / rim);
+    const Planar water = flow_at(c, s.x + radius * nx, s.y + radius * ny);
+    const double wx = strength * water.x - s.vx, wy = strength * water.y - s.vy;
+    const double size = scale * std::max(-(nx * wx + ny * wy), 0.0);
+    sum.x += size * wx;
+    sum.y += size * wy;
+    sum.torque += size * radius * (nx * wy - ny * wx - s.omega * radius);
+  }
+  return sum;
+}
+
+// Impulse where the rim of a disc is beyond the circle, and the disc moved back inside.
+inline void meet_circle_with_rim(const Case& c, dBodyID body) {
+  State s = state_of(body);
+  const double radius = c.side / 2, distance = std::hypot(s.x, s.y);
+  if (distance + radius <= c.radius) {
+    return;
+  }
+  const double nx = s.x / distance, ny = s.y / distance;
+  const double closing = s.vx * nx + s.vy * ny;
+  if (closing > 0) {
+    const double push = closing * (1 + (closing > c.bounce_speed ? c.restitution : 0));
+    const double sliding = s.vy * nx - s.vx * ny + s.omega * radius;
+    // At the rim the disc weighs a third: R² m / I = 2.
+    const double rub = std::clamp(-sliding / 3, -c.friction * push, c.friction * push);
+    s.vx -= push * nx + rub * ny;
+    s.vy -= push * ny - rub * nx;
+    s.omega += 2 * rub / radius;
+  }
+  const double back = distance + radius - c.radius;
+  dBodySetPosition(body, s.x - back * nx, s.y - back * ny, 0);
+  dBodySetLinearVel(body, s.vx, s.vy, 0);
+  dBodySetAngularVel(body, 0, 0, s.omega);
+}
+
 // Impulses at the corners beyond the circle, and the block moved back inside.
 inline void meet_circle(const Case& c, dBodyID body) {
   State s = state_of(body);
@@ -238,7 +281,12 @@ public:
         contacts_(dJointGroupCreate(0)), blocks_(dSimpleSpaceCreate(nullptr)) {
     dWorldSetGravity(world_, 0, 0, 0);
     dMass mass;
-    dMassSetBoxTotal(&mass, c.mass * (1 + c.law.added_mass), c.side, c.side, c.side);
+    const double moved = c.mass * (1 + c.law.added_mass);
+    if (c.law.disc != 0) {
+      dMassSetCylinderTotal(&mass, moved, 3, c.side / 2, c.side);
+    } else {
+      dMassSetBoxTotal(&mass, moved, c.side, c.side, c.side);
+    }
     for (std::size_t b = 0; b < c.blocks; ++b) {
       const dBodyID body = dBodyCreate(world_);
       dBodySetMass(body, &mass);
@@ -281,7 +329,8 @@ public:
     time_ += c_.dt;
     for (const dBodyID body : bodies_) {
       const State s = state_of(body);
-      const Wrench w = drag(c_, start->drag_coefficient, s, strength);
+      const Wrench w = c_.law.disc != 0 ? disc_drag(c_, start->drag_coefficient, s, strength)
+                                        : drag(c_, start->drag_coefficient, s, strength);
       if (c_.law.pressure_gradient != 0 || c_.law.water_spin != 0) {
         const Carried push = carried_at(c_, s.x, s.y, s.cosine, s.sine);
         const double mass = c_.mass * (1 + c_.law.added_mass) * strength * strength;
@@ -306,7 +355,11 @@ public:
     dJointGroupEmpty(contacts_);
     if (!boxes_) {
       for (const dBodyID body : bodies_) {
-        meet_circle(c_, body);
+        if (c_.law.disc != 0) {
+          meet_circle_with_rim(c_, body);
+        } else {
+          meet_circle(c_, body);
+        }
       }
     }
   }

@@ -241,7 +241,7 @@ Out<double> ks_matrix(In<double, 2> a_length, In<double, 2> a_angle, In<std::int
                   {static_cast<std::size_t>(a.rows), static_cast<std::size_t>(b.rows)});
 }
 
-// Drag force [N] and torque [N m] on a block of the model, in double precision.
+// Drag force [N] and torque [N m] on a body of the model, in double precision.
 std::tuple<double, double, double> drag(const Model& model, double drag_coefficient, double x,
                                         double y, double theta, double vx, double vy,
                                         double omega) {
@@ -250,7 +250,9 @@ std::tuple<double, double, double> drag(const Model& model, double drag_coeffici
   driftwalk::sincos(theta, axes.sine, axes.cosine);
   const driftwalk::Motion<double> motion{vx, vy, omega};
   const auto sums_of = [&](const auto& law) {
-    return driftwalk::drag_sums(law, run.block, run.flow, x, y, axes, motion);
+    return run.shape.panel_count > 0
+               ? driftwalk::panel_sums(law, run.shape, run.flow, x, y, axes, motion)
+               : driftwalk::drag_sums(law, run.block, run.flow, x, y, axes, motion);
   };
   const auto mixed = driftwalk::MixedDrag<double>::of(drag_coefficient, run.drag);
   const bool quadratic = run.drag.is_quadratic;

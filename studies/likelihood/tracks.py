@@ -61,7 +61,7 @@ def wall_share(poses: Poses) -> float:
         np.arange(poses.x.size) * INTERVAL_S,
         *poses,
         outline=outline_of(dw.Study().tank.to_arena()),
-        side=dw.Study().block.side_m,
+        block=dw.Study().block,
     )
     return float(near[1:].mean())
 

@@ -1,9 +1,10 @@
-"""Square blocks in stirred tanks: rigid bodies in plain NumPy, many tanks at once.
+"""Floating bodies in stirred tanks: rigid bodies in plain NumPy, many tanks at once.
 
 Places, velocities and forces are complex numbers. The drag is integrated along each half of a face
 by two Gauss points, where driftwalk has four strips. Steps of a millisecond take velocities first,
 then places, then contacts with the wall; the force of the water is that in the middle of five.
-Nothing here comes from driftwalk.
+Nothing here comes from driftwalk. The body is the square block, a disc, or two blocks glued
+together (`bodies.py` of the study of bodies).
 """
 
 from __future__ import annotations
@@ -36,8 +37,6 @@ HOLD: Final = round(FORCE_INTERVAL_S / STEP_S)
 PERIOD: Final = round(SAMPLE_S / STEP_S)
 CHUNK: Final = 5000
 """Steps for which forces and weights are drawn at once: whole intervals and samples."""
-PER_INERTIA: Final = 6.0 / SIDE_M**2
-"""Mass over moment of inertia."""
 BOUNCE_M_S: Final = 0.01
 """Slower contacts do not bounce."""
 _gauss = 1.0 / np.sqrt(3.0)
@@ -56,16 +55,50 @@ SHARES: Final[Floats] = 0.25 * np.outer(_weights, _weights).ravel()
 """What they count."""
 
 
+class Body(NamedTuple):
+    """A rigid body, in its own frame about its centre of mass; all tanks of a call have it."""
+
+    points: Complexes
+    """Of the drag along its sides."""
+    normals: Complexes
+    widths: Floats
+    corners: Complexes
+    inner: Complexes
+    """Points with the second moments of its area."""
+    reach_m: float
+    """Of its farthest point."""
+    square_m2: float
+    """Its moment of inertia is mass x this square / divisor."""
+    divisor: float
+    mass_kg: float = MASS_KG
+    radius_m: float = 0.0
+    """Of a disc: no corners, and its spin is not in the force of the water."""
+    members: Complexes = np.zeros(1, dtype=np.complex128)
+    """Where stochastic forces act."""
+    shares: Floats = np.full(4, 0.25)
+    """What the inner points count."""
+
+    @property
+    def per_inertia(self) -> float:
+        """Mass over moment of inertia."""
+        return self.divisor / self.square_m2
+
+
+SQUARE: Final = Body(
+    POINTS, NORMALS, WIDTHS, CORNERS, INNER, SIDE_M / np.sqrt(2.0), SIDE_M**2, 6.0, shares=SHARES
+)
+
+
 @dataclass
 class Tanks:
-    """Parameters of the blocks, one for each tank, and their flows."""
+    """Parameters of the bodies, one for each tank, and their flows."""
 
     flow: list[Flow]
     seed: list[int]
     start: Complexes
     drag_coefficient: Floats
     force_std: Floats
-    """In the force interval [N]."""
+    """On each member, in the force interval [N]."""
     added_mass: Floats
     """As a share of the mass, of the moment of inertia too."""
     floating: npt.NDArray[np.bool_]
@@ -83,6 +116,9 @@ class Tanks:
     """At the start, 0 where it is not given."""
     angle: Floats | None = None
     spin: Floats | None = None
+    body: Body = SQUARE
+    correlation: Floats | None = None
+    """Of the forces on any two members of the body, 0 where it is not given."""
 
     def only(self, kept: npt.NDArray[np.intp]) -> Tanks:
         """Return some of the tanks."""
@@ -93,6 +129,8 @@ class Tanks:
                 values[one.name] = value[kept]
             elif one.name in ("flow", "seed"):
                 values[one.name] = [value[k] for k in kept]
+            else:
+                values[one.name] = value
         return Tanks(**values)
 
 
@@ -114,13 +152,11 @@ def simulate(tanks: Tanks, seconds: float, *, settling: float = SETTLING_S) -> M
     rngs = [np.random.default_rng(seed) for seed in tanks.seed]
     n, first = len(rngs), round(settling / STEP_S)
     steps = first + round(seconds / STEP_S)
-    memory = np.exp(-FORCE_INTERVAL_S / np.maximum(tanks.force_memory, 1e-12))
-    force = np.sqrt((1 - memory) / (1 + memory)) * tanks.force_std * _normal(rngs, 1)[:, 0]
+    forces = Forces(tanks, rngs)
     touched, kept = np.zeros(n, dtype=bool), []
     gain, spin_gain = np.zeros(n, dtype=complex), np.zeros(n)
-    mass = MASS_KG * (1.0 + tanks.added_mass)
     for begin in range(0, steps + 1, CHUNK):
-        draws = tanks.force_std[:, np.newaxis] * _normal(rngs, CHUNK // HOLD)
+        forces.draw()
         times = (begin + EVERY / 2 + np.arange(0, CHUNK, EVERY)) * STEP_S - settling
         weights = water.weights(times)
         for k in range(0, min(CHUNK, steps + 1 - begin), EVERY):
@@ -130,17 +166,61 @@ def simulate(tanks: Tanks, seconds: float, *, settling: float = SETTLING_S) -> M
                              state.spin.copy(), touched))  # fmt: skip
                 touched = np.zeros(n, dtype=bool)
             if step % HOLD == 0:
-                force = memory * force + (1 - memory) * draws[:, k // HOLD]
+                forces.change(k // HOLD)
+            push, turn = forces.gains(state.angle)
             gain, spin_gain = by_water(
-                state, tanks, water, weights[k // EVERY], gain + force / mass, spin_gain
+                state, tanks, water, weights[k // EVERY], gain + push, spin_gain + turn
             )
-            touched |= move(state, tanks, gain + force / mass, spin_gain)
+            touched |= move(state, tanks, gain + push, spin_gain + turn)
     return Motion(*(np.stack(part, axis=1) for part in zip(*kept, strict=True)))
+
+
+class Forces:
+    """The stochastic forces on the members of each body, redrawn every interval."""
+
+    def __init__(self, tanks: Tanks, rngs: list[np.random.Generator]) -> None:
+        self.tanks, self.rngs = tanks, rngs
+        count, n = tanks.body.members.size, len(rngs)
+        share = np.zeros(n) if tanks.correlation is None else tanks.correlation
+        # Of unit variance, any two with the correlation.
+        both = share[:, np.newaxis, np.newaxis] * np.ones((count, count))
+        both[:, np.arange(count), np.arange(count)] = 1.0
+        low, vectors = np.linalg.eigh(both)
+        self.mixed = vectors * np.sqrt(np.maximum(low, 0.0))[:, np.newaxis]
+        self.memory = np.exp(-FORCE_INTERVAL_S / np.maximum(tanks.force_memory, 1e-12))
+        self.memory = self.memory[:, np.newaxis]
+        at_start = np.sqrt((1 - self.memory) / (1 + self.memory)) * tanks.force_std[:, np.newaxis]
+        self.force = at_start * self._members(1)[:, 0]
+        self.mass = tanks.body.mass_kg * (1.0 + tanks.added_mass)
+        self.draws = self.force[:, np.newaxis]
+
+    def draw(self) -> None:
+        """Draw the forces of a chunk of steps."""
+        self.draws = self.tanks.force_std[:, np.newaxis, np.newaxis] * self._members(CHUNK // HOLD)
+
+    def change(self, interval: int) -> None:
+        """Take the forces of an interval of the chunk."""
+        self.force = self.memory * self.force + (1 - self.memory) * self.draws[:, interval]
+
+    def gains(self, angle: Floats) -> tuple[Complexes, Floats]:
+        """Return the accelerations that they give."""
+        body = self.tanks.body
+        push = self.force.sum(axis=1) / self.mass
+        if body.members.size == 1:
+            return push, np.zeros(angle.size)
+        arms = body.members * np.exp(1j * angle)[:, np.newaxis]
+        torque = (arms.conj() * self.force).imag.sum(axis=1)
+        return push, torque * body.per_inertia / self.mass
+
+    def _members(self, count: int) -> Complexes:
+        members = self.tanks.body.members.size
+        found = _normal(self.rngs, count * members).reshape(len(self.rngs), count, members)
+        return found if members == 1 else np.einsum("nab,ncb->nca", self.mixed, found)
 
 
 @dataclass
 class State:
-    """Of all blocks, at one time."""
+    """Of all bodies, at one time."""
 
     place: Complexes
     velocity: Complexes
@@ -226,17 +306,19 @@ def by_water(
     half = 0.5 * EVERY * STEP_S
     velocity, spin = state.velocity + half * gain, state.spin + half * spin_gain
     place = (state.place + half * velocity)[:, np.newaxis]
-    turned = np.exp(1j * (state.angle + half * spin))[:, np.newaxis]
-    mass = MASS_KG * (1.0 + tanks.added_mass)
-    arms = POINTS * turned
+    body, turned = tanks.body, np.exp(1j * (state.angle + half * spin))[:, np.newaxis]
+    if body.radius_m:
+        turned = np.ones_like(turned)
+    mass = body.mass_kg * (1.0 + tanks.added_mass)
+    arms = body.points * turned
     flow = water.velocity(water.layers(place + arms), weights[0])
     push, torque = drag(tanks, flow, turned, arms, velocity, spin)
-    found, turning = push / mass, torque / (mass * SIDE_M**2 / 6.0)
+    found, turning = push / mass, torque / (mass * body.square_m2 / body.divisor)
     if water.carries:
-        arms = INNER * turned
+        arms = body.inner * turned
         here = water.acceleration(water.layers(place + arms), *weights)
-        found = found + tanks.floating * (here @ SHARES)
-        curl = (arms.conj() * here).imag @ SHARES / (SIDE_M**2 / 6.0)
+        found = found + tanks.floating * (here @ body.shares)
+        curl = (arms.conj() * here).imag @ body.shares / (body.square_m2 / body.divisor)
         turning = turning + tanks.floating * curl
     return found, turning
 
@@ -245,20 +327,27 @@ def drag(
     tanks: Tanks, flow: Complexes, turned: Complexes, arms: Complexes, velocity: Complexes,
     spin: Floats,
 ) -> tuple[Complexes, Floats]:  # fmt: skip
-    """Return force and torque of the water on the windward faces."""
-    slip = flow - velocity[:, np.newaxis] - 1j * spin[:, np.newaxis] * arms
-    facing = np.maximum(-((NORMALS * turned).conj() * slip).real, 0.0)
-    size = (0.5 * DENSITY_KG_M3 * DEPTH_M) * tanks.drag_coefficient[:, np.newaxis] * WIDTHS * facing
+    """Return force and torque of the water on the windward sides."""
+    body, turning = tanks.body, spin[:, np.newaxis]
+    slip = flow - velocity[:, np.newaxis]
+    if not body.radius_m:
+        slip = slip - 1j * turning * arms
+    facing = np.maximum(-((body.normals * turned).conj() * slip).real, 0.0)
+    scale = (0.5 * DENSITY_KG_M3 * DEPTH_M) * tanks.drag_coefficient[:, np.newaxis]
+    size = scale * body.widths * facing
     if np.any(tanks.drag_power != 2.0):
         size *= (np.abs(slip) / REFERENCE_M_S + 1e-9) ** (tanks.drag_power[:, np.newaxis] - 2.0)
     along = size * slip
+    if body.radius_m:
+        rubbing = (arms.conj() * slip).imag - turning * body.radius_m**2
+        return along.sum(axis=1), (size * rubbing).sum(axis=1)
     return along.sum(axis=1), (arms.conj() * along).imag.sum(axis=1)
 
 
 def move(state: State, tanks: Tanks, gain: Complexes, spin_gain: Floats) -> npt.NDArray[np.bool_]:
     """Make `EVERY` steps in place, all at once off the wall; return which blocks touched it."""
     time, twice = EVERY * STEP_S, 0.5 * EVERY * (EVERY + 1) * STEP_S**2
-    margin = SIDE_M / np.sqrt(2.0) + time * np.abs(state.velocity) + 1e-4
+    margin = tanks.body.reach_m + time * np.abs(state.velocity) + 1e-4
     near = np.flatnonzero(np.abs(state.place) > RADIUS_M - margin)
     parts = [part[near] for part in (state.place, state.velocity, state.angle, state.spin)]
     state.place += time * state.velocity + twice * gain
@@ -274,25 +363,35 @@ def move(state: State, tanks: Tanks, gain: Complexes, spin_gain: Floats) -> npt.
         some.spin += STEP_S * spin_gain[near]
         some.place += STEP_S * some.velocity
         some.angle += STEP_S * some.spin
-        touched[near] |= meet_wall(some, tanks.friction[near], tanks.restitution[near])
+        touched[near] |= meet_wall(some, tanks.friction[near], tanks.restitution[near], tanks.body)
     state.place[near], state.velocity[near] = some.place, some.velocity
     state.angle[near], state.spin[near] = some.angle, some.spin
     return touched
 
 
-def meet_wall(state: State, friction: Floats, restitution: Floats) -> npt.NDArray[np.bool_]:
+def meet_wall(
+    state: State, friction: Floats, restitution: Floats, body: Body
+) -> npt.NDArray[np.bool_]:
     """Let corners beyond the circle bounce and rub, and put them back; return which did."""
-    arms = CORNERS * np.exp(1j * state.angle)[:, np.newaxis]
+    if body.radius_m:
+        arms = (body.radius_m * state.place / np.abs(state.place))[:, np.newaxis]
+    else:
+        arms = body.corners * np.exp(1j * state.angle)[:, np.newaxis]
     beyond = np.abs(state.place[:, np.newaxis] + arms) > RADIUS_M
     touched = beyond.any(axis=1)
     if touched.any():
         for k, corner in zip(*np.nonzero(beyond), strict=True):
-            bounce(state, int(k), complex(arms[k, corner]), friction[k], restitution[k])
+            bounce(
+                state, int(k), complex(arms[k, corner]), friction[k], restitution[k],
+                body.per_inertia,
+            )  # fmt: skip
     return touched
 
 
-def bounce(state: State, k: int, arm: complex, friction: float, restitution: float) -> None:
-    """Let one corner of one block meet the wall, by impulses along it and across."""
+def bounce(
+    state: State, k: int, arm: complex, friction: float, restitution: float, per_inertia: float
+) -> None:
+    """Let one corner of one body meet the wall, by impulses along it and across."""
     place, velocity, spin = complex(state.place[k]), complex(state.velocity[k]), state.spin[k]
     away = abs(place + arm)
     if away <= RADIUS_M:
@@ -303,14 +402,14 @@ def bounce(state: State, k: int, arm: complex, friction: float, restitution: flo
     closing = ((velocity + 1j * spin * arm) * normal.conjugate()).real
     if closing > 0.0:
         share = 1.0 + (restitution if closing > BOUNCE_M_S else 0.0)
-        push = closing * share / (1.0 + PER_INERTIA * lever**2)
+        push = closing * share / (1.0 + per_inertia * lever**2)
         velocity -= push * normal
-        spin -= push * lever * PER_INERTIA
+        spin -= push * lever * per_inertia
         sliding = ((velocity + 1j * spin * arm) * normal.conjugate()).imag
-        stop = -sliding / (1.0 + PER_INERTIA * reach**2)
+        stop = -sliding / (1.0 + per_inertia * reach**2)
         rub = min(max(stop, -friction * push), friction * push)
         velocity += rub * 1j * normal
-        spin += rub * reach * PER_INERTIA
+        spin += rub * reach * per_inertia
     state.place[k] = place - normal * (away - RADIUS_M)
     state.velocity[k], state.spin[k] = velocity, spin
 

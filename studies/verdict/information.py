@@ -22,7 +22,7 @@ import blocks
 import numpy as np
 import numpy.typing as npt
 from blocks import Motion, Tanks, Water
-from ranges import FORCE_INTERVAL_S, MASS_KG, RADIUS_M, SAMPLE_S
+from ranges import FORCE_INTERVAL_S, RADIUS_M, SAMPLE_S
 from scipy import sparse
 from walkers import Walker
 
@@ -45,7 +45,7 @@ def of_block(tanks: Tanks, k: int, motion: Motion) -> dict[str, float | bool]:
     one = tanks.only(np.full(motion.place.shape[1], k))
     free = ~motion.touched[k]
     force, slopes, carried = _forces(one, Motion(*(part[k] for part in motion)))
-    mass = MASS_KG * (1.0 + tanks.added_mass[k])
+    mass = tanks.body.mass_kg * (1.0 + tanks.added_mass[k])
     rate = tanks.force_std[k] ** 2 * FORCE_INTERVAL_S / mass**2
     unit = np.sqrt(SAMPLE_S / rate)
     scores = np.stack([_parts(force / mass), _parts(carried)], axis=1) * unit
@@ -108,8 +108,8 @@ def _forces(
     water.base = np.zeros((1, 1), dtype=np.intp)
     time = SAMPLE_S * np.arange(motion.place.size)
     weights = water.weights(time)[:, :, 0]
-    turned = np.exp(1j * motion.angle)[:, np.newaxis]
-    arms = blocks.POINTS * turned
+    turned = np.exp(1j * motion.angle * (not one.body.radius_m))[:, np.newaxis]
+    arms = one.body.points * turned
     here = water.layers(motion.place[:, np.newaxis] + arms)
     flow = water.velocity(here, weights[:, 0])
     forces = [
@@ -125,7 +125,7 @@ def _acceleration(one: Tanks, motion: Motion, weights: Floats) -> npt.NDArray[np
     first.floating = np.array([True])
     water = Water(first)
     water.base = np.zeros((1, 1), dtype=np.intp)
-    arms = blocks.INNER * np.exp(1j * motion.angle)[:, np.newaxis]
+    arms = first.body.inner * np.exp(1j * motion.angle)[:, np.newaxis]
     layers = water.layers(motion.place[:, np.newaxis] + arms)
     return water.acceleration(layers, weights[:, 0], weights[:, 1]) @ blocks.SHARES
 

@@ -299,3 +299,62 @@ def test_a_floating_body_moves_here_as_in_driftwalk(simulate: Simulate) -> None:
 def test_a_law_with_another_name_is_refused(simulate: Simulate) -> None:
     with pytest.raises(subprocess.CalledProcessError):
         simulate(start=[0.0] * 8, step=1e-3, seconds=0.1, law=("gravity=9.81",))
+
+
+def test_drag_of_the_rim_brings_a_disc_to_rest(simulate: Simulate) -> None:
+    """m dv/dt = -k v^2 in any direction, and I domega/dt = -k v R^2 omega: omega ~ v^(m R^2/I)."""
+    drag, speed, seconds = 0.6, 0.1, 3.0
+    rate = 0.5 * DENSITY * drag * SIDE * DEPTH / MASS
+    start = [-0.04, -0.03, 0.0, 0.8 * speed, 0.6 * speed, 2.0, drag, 0.0]
+    poses = simulate(start=start, step=0.5e-3, seconds=seconds, law=("disc=1",))
+    way = np.log1p(rate * speed * seconds) / rate
+    assert poses[-1, :2] == pytest.approx([0.8 * way - 0.04, 0.6 * way - 0.03], abs=1e-3 * way)
+    # v = v0 / (1 + k v0 t / m), so omega = omega0 / (1 + ...)^2: its integral.
+    turned = 2.0 * seconds / (1.0 + rate * speed * seconds)
+    assert np.unwrap(poses[:, 2])[-1] == pytest.approx(turned, rel=2e-3)
+
+
+def test_a_disc_bounces_off_the_wall_and_rolls(simulate: Simulate) -> None:
+    """Restitution 0.5; the study's wall is smooth, so what is along it stays."""
+    step = 0.5e-3
+    start = [0.05, 0.05, 0.0, 0.2, 0.05, 1.0, 0.0, 0.0]
+    poses = simulate(start=start, step=step, seconds=1.0, law=("disc=1",))
+    at = poses[np.argmax(np.hypot(poses[:, 0], poses[:, 1])), :2]
+    normal = at / np.hypot(*at)
+    velocity = np.array([0.2, 0.05])
+    want = velocity - 1.5 * (velocity @ normal) * normal
+    assert np.hypot(*poses[:, :2].T).max() == pytest.approx(0.15 - SIDE / 2, abs=0.2 * step)
+    assert np.diff(poses[-50:, :2], axis=0)[0] / step == pytest.approx(want, abs=0.005)
+    assert np.unwrap(poses[:, 2])[-1] == pytest.approx(1.0, rel=1e-3)
+
+
+def test_a_disc_goes_the_way_of_driftwalk_for_20_s(simulate: Simulate) -> None:
+    """Two engines in one flow, without noise: the paths are 0.15 mm apart at most."""
+    axis = np.linspace(-0.165, 0.165, 67)
+
+    def water(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        near = np.exp(-(((x**2 + y**2) / 0.1**2) ** 2))
+        return -0.6 * y * near - 0.2 * x, 0.6 * x * near - 0.2 * y + 0.01 * np.sin(30 * x)
+
+    step, seconds = 0.25e-3, 20.0
+    start = [0.06, 0.02, 0.0, 0.0, 0.0, 0.0, 0.6, 0.0]
+    poses = simulate(
+        start=start, step=step, seconds=seconds, period=round(0.5 / step), water=water, axis=axis,
+        law=("disc=1",),
+    )  # fmt: skip
+    x, y = np.meshgrid(axis, axis)
+    u, v = water(x, y)
+    found = dw.simulate(
+        dw.Study(
+            block={"shape": "disc", "side_m": SIDE, "mass_kg": MASS},
+            forces={"drag_coefficient": 0.6, "force_std_N": 0.0},
+            observation={"position_noise_m": 0.0, "position_quantum_m": 0.0},
+            simulation={"time_step_s": 2e-3},
+        ),
+        build_flow_field(axis, axis, u=u, v=v, flag=np.ones(u.shape, dtype=np.int8)),
+        sample_time=0.5 * np.arange(41), replicates=1,
+        start=dw.simulation.Start(0.06, 0.02, 0.0),
+    )  # fmt: skip
+    path = np.stack([found["x"].values[0, :, 0], found["y"].values[0, :, 0]], axis=1)
+    assert np.hypot(*(path - poses[:, :2]).T).max() < 1.5e-4
+    assert np.hypot(*np.diff(path, axis=0).T).sum() > 0.3

@@ -19,6 +19,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from driftwalk.core.arrays import Floats
+from driftwalk.likelihood.filter.forgetting import due_share
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.newton import Mode, ModeSearch, known_numbers_variance
 from driftwalk.likelihood.refuse import cholesky
@@ -102,6 +103,9 @@ def restricted_drag(search: ModeSearch, mode: Mode, *, intensity: bool = True) -
     sd = math.sqrt(known_numbers_variance(mode))
     slopes = mode.covariance[:, drag] / mode.covariance[drag, drag]
     found = [profile_at(search, mode, start.log_drag, start.coefficients.ravel())]
+    share = 1.0
+    if search.passes.body.outline.disc_radius_m:
+        share = due_share(search.passes, search.prior.matrix(mode.weights), start)
 
     def add_profile(log_drag: float) -> None:
         near = min(found, key=lambda one: abs(one.log_drag - log_drag))
@@ -110,14 +114,14 @@ def restricted_drag(search: ModeSearch, mode: Mode, *, intensity: bool = True) -
 
     add_profile(start.log_drag - REML.span * sd)
     # Two points give the slope of the determinant and with it a first guess of the minimum.
-    guess, _ = _minimum(found)
+    guess, _ = _minimum(found, share)
     ends = start.log_drag - 2 * REML.span * sd, start.log_drag + REML.span * sd
     guess = float(np.clip(guess, *ends))
     if abs(guess - start.log_drag) > REML.near * sd:
         add_profile(guess)
         add_profile(guess - REML.span * sd)
     found.sort(key=lambda one: one.log_drag)
-    log_drag, std = _minimum(found)
+    log_drag, std = _minimum(found, share)
     if not sd / REML.most_std_ratio <= std <= sd * REML.most_std_ratio:
         return Restricted(start, sd, found, has_minimum=False)
     nearest = min(found, key=lambda one: abs(one.log_drag - log_drag))
@@ -159,8 +163,10 @@ def _with_restricted_intensity(
     return point.moved(step)
 
 
-def _minimum(found: list[Profile]) -> tuple[float, float]:
+def _minimum(found: list[Profile], share: float = 1.0) -> tuple[float, float]:
     """Return the minimum of the criterion through some points, and its standard deviation.
+
+    A share of the determinant's slope counts (`driftwalk.likelihood.filter.forgetting`).
 
     The standard deviation is infinite where there is no minimum near the points.
 
@@ -174,7 +180,9 @@ def _minimum(found: list[Profile]) -> tuple[float, float]:
     degree = min(2, len(found) - 1)
     polynomial = np.polynomial.Polynomial
     slopes = [one.slope * scale for one in found]
-    determinants = [one.half_log_determinant - found[0].half_log_determinant for one in found]
+    determinants = [
+        share * (one.half_log_determinant - found[0].half_log_determinant) for one in found
+    ]
     slope = polynomial.fit(at, slopes, degree).convert()
     slope = slope + polynomial.fit(at, determinants, degree).convert().deriv()
     lattice = np.linspace(at.min() - 0.5, at.max() + 0.5, 2001)

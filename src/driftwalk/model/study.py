@@ -178,7 +178,7 @@ class Study(Section):
 
 
 def block_corners(pose: Pose, block: Block) -> list[tuple[float, float]]:
-    """Return the corners of a body [m] at a pose; of a disc, 32 points of its rim."""
+    """Return the corners of a body [m] at a pose; of a disc, points of its rim."""
     if block.shape == "square":
         reach = block.side_m / math.sqrt(2.0)
         angles = (pose.theta_rad + math.pi * (0.25 + 0.5 * quarter) for quarter in range(4))

@@ -7,14 +7,15 @@ import pytest
 
 from driftwalk.flow.arena import Circle, outline_of
 from driftwalk.likelihood.filter.series import _continued, wall_intervals
+from driftwalk.model import Block
 
 TANK = Circle(0.15)
-SIDE = 0.03
+BLOCK = Block(side_m=0.03)
 
 
 def intervals(x: np.ndarray, theta: np.ndarray | None, time: np.ndarray | None = None) -> list[int]:
     time = 0.1 * np.arange(x.size) if time is None else time
-    found = wall_intervals(time, x, np.zeros(x.size), theta, outline=TANK, side=SIDE)
+    found = wall_intervals(time, x, np.zeros(x.size), theta, outline=TANK, block=BLOCK)
     return np.flatnonzero(found).tolist()
 
 
@@ -97,7 +98,7 @@ def test_the_future_does_not_matter() -> None:
     x, y = 0.1 * np.cos(time) + 0.04, 0.1 * np.sin(1.3 * time)
     theta = 0.7 * time
     arena = outline_of({"shape": "rectangle", "width_m": 0.3, "height_m": 0.24})
-    options = {"outline": arena, "side": SIDE}
+    options = {"outline": arena, "block": BLOCK}
     whole = wall_intervals(time, x, y, theta, **options)
     assert 0.05 < whole.mean() < 0.95
     for last in (50, 177, 300):

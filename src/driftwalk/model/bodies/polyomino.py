@@ -11,6 +11,8 @@ from driftwalk.core.errors import ConfigurationError
 from driftwalk.model.bodies.rigid_body import Measures, RigidBody, face
 from driftwalk.schema.shapes import Cells, cells_of_shape
 
+MOST_CELLS = 64
+"""A body may have this many: in every step 32 panels of each are read."""
 STEPS = ((1, 0), (0, 1), (-1, 0), (0, -1))
 """From a cell to its neighbours."""
 
@@ -30,6 +32,8 @@ def polyomino(shape: str) -> Callable[[Measures], RigidBody] | None:
 
 def _glued(cells: Cells, measures: Measures) -> RigidBody:
     side = measures.side_m
+    if len(cells) > MOST_CELLS:
+        raise ConfigurationError(f"a body has {MOST_CELLS} cells at most, got {len(cells)}")
     if not _connected(cells):
         raise ConfigurationError("the cells of a body hang together face to face: 'xx', 'x./xx'")
     places = np.asarray(cells, dtype=np.float64) * side
