@@ -48,13 +48,13 @@ def _add_series(passes: Passes, series: Series, point: Point, one: Floats, other
     body, spline = passes.body, passes.spline
     # Many samples within a tenth of a second tell the same.
     states, time = passes.states(series, point)[:: series.pooled], series.time[:: series.pooled]
-    excluded = np.add.reduceat(series.excluded, np.arange(0, series.time.size, series.pooled))
+    excluded = np.maximum.reduceat(series.excluded, np.arange(0, series.time.size, series.pooled))
     mean = point.coefficients.reshape(-1, spline.size)[:2]
     scale = 0.5 * body.water_density * body.side * body.depth / body.mass
     step = np.diff(time, prepend=time[0])
-    seen = np.isfinite(states).all(axis=1)
+    seen = np.asarray(np.isfinite(states).all(axis=1))
     states = np.where(seen[:, None], states, 0.0)
-    lost: Bools = np.asarray((excluded != 0) | ~seen | (step > FILTER.longest_gap_s))
+    lost = np.any([excluded != 0, ~seen, step > FILTER.longest_gap_s], axis=0)
     memory = np.zeros(spline.size)
     for begin in range(0, time.size, BLOCK):
         part = slice(begin, begin + BLOCK)
