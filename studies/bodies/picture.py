@@ -1,4 +1,4 @@
-"""Draw the picture of docs/how-to/dimer.md: python studies/bodies/picture.py docs/images/dimer.png."""
+"""Draw the picture of docs/how-to/dimer.md: python studies/bodies/picture.py OUT.png."""
 
 from __future__ import annotations
 

@@ -120,6 +120,17 @@ class Block(Section):
         )
 
     @property
+    def described(self) -> str:
+        """The body in words, such as "block of side 3 cm"."""
+        side = f"{100 * self.side_m:.4g}"
+        if self.shape == "disc":
+            return f"disc of diameter {side} cm"
+        if self.width_m is not None:
+            return f"rectangle of {side} x {100 * self.width_m:.4g} cm"
+        glued = "" if self.shape == "square" else f"{self.shape} of glued blocks, each a "
+        return f"{glued}block of side {side} cm"
+
+    @property
     def area_m2(self) -> float:
         """Area of the body, seen from above [m²]."""
         return self.side_m**2 if self.shape == "square" else self.body().area_m2

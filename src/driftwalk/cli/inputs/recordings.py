@@ -198,7 +198,7 @@ def opening_note(
     texts = {"tank.diameter_m": f"tank: {study.tank.describe()}"}
     if about != "tank":
         texts |= {
-            "block.side_m": f"block of side {100 * block.side_m:.4g} cm",
+            "block.side_m": block.described,
             "block.mass_kg": f"mass {1e3 * block.mass_kg:.4g} g",
             "block.depth_m": f"wetted depth {depth_cm:.4g} cm",
         }
