@@ -250,9 +250,12 @@ def member(name: str) -> str:
 
 
 def gives_false_advice(line: Line) -> bool:
-    """Return whether an answer advises to change what is right."""
-    texts = " ".join(map(str, [*line.get("warnings", []), *line.get("reasons", [])]))
-    return any(word in texts for word in ADVICE)
+    """Return whether an answer advises to change what is right.
+
+    What says that the change was tried and is no better is no advice.
+    """
+    texts = map(str, [*line.get("warnings", []), *line.get("reasons", [])])
+    return any(word in text for text in texts for word in ADVICE if "no better" not in text)
 
 
 def by_kind(lines: list[Line]) -> str:
