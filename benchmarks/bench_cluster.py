@@ -298,11 +298,11 @@ def main() -> None:
     quick = options.quick
     with connect(parse_address("local:2")) as cluster:
         rate = handing_out(cluster, 200 if quick else 2000)
-        real_units(cluster, 400 if quick else 2000)
-        for runs in (400,) if quick else (1000, 8000):
+        real_units(cluster, 100 if quick else 2000)
+        for runs in (100,) if quick else (1000, 8000):
             beside_threads(cluster, runs, 1 if quick else options.rounds)
-    paper = sensitivity_study(2 if quick else 20)
-    six = six_parameters(60.0 if quick else options.length)
+    paper = sensitivity_study(1 if quick else 20)
+    six = six_parameters(options.length)
     on_paper([paper, halved(paper, 3), six], rate)
 
 
