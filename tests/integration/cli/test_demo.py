@@ -31,7 +31,8 @@ class Killed:
     files: dict[str, bytes | None]
 
 
-# A quarter of an hour of the recording. All of it: tests/integration/test_fit_bars.py, .ci/wheel_run.py.
+# A quarter of an hour of the recording. All of it is fitted by tests/integration/test_fit_bars.py
+# and by .ci/wheel_run.py.
 SHORT = """
 from driftwalk import datasets
 whole = datasets.tank30_recording
