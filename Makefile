@@ -23,7 +23,7 @@ CPP := $(shell find cpp -name '*.cpp' -o -name '*.hpp')
 # Every worker imports every test file: with the bytecode of the last run that takes half the time.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-slow test-fresh test-browser fuzz fuzz-loaders fuzz-dialects doctest lint format cpp-test cpp-test-portable bench studies studies-tracking docs site web wheel cross release-check clean
+.PHONY: demo test test-slow test-studies test-fresh test-browser fuzz fuzz-loaders fuzz-dialects doctest lint format cpp-test cpp-test-portable bench studies studies-tracking docs site web wheel cross release-check clean
 
 demo: $(PACKAGE)
 	$(BIN)/driftwalk demo
@@ -37,6 +37,10 @@ test: $(TEST_TOOLS)
 
 test-slow: $(TEST_TOOLS)
 	$(BIN)/python -m pytest $(SIDE_BY_SIDE) -m slow
+
+# Once a week in CI: tests that are more of a study, each with a faster one among the slow tests.
+test-studies: $(TEST_TOOLS)
+	$(BIN)/python -m pytest $(SIDE_BY_SIDE) -m study
 
 # The property and statistical tests, slow ones too, with new examples and new seeds: some minutes.
 # The seed is printed first; the same run again: make test-fresh SEED=123
@@ -71,7 +75,7 @@ fuzz-loaders: $(TEST_TOOLS)
 	$(BIN)/python tests/fuzz/loader_run.py $(LOADER_FUZZ) --seed $(FUZZ_SEED) --from $(LOADER_FROM) \
 	  --cases $(LOADER_CASES) --workers $(LOADER_WORKERS)
 
-# All 10,000 dialects of recordings and 3,000 of flow fields, of which `make test-slow` tries a tenth a day.
+# All 10,000 dialects of recordings and 3,000 of flow fields, of which `make test-slow` tries a fiftieth a day.
 fuzz-dialects: $(TEST_TOOLS)
 	DRIFTWALK_ALL_DIALECTS=1 $(BIN)/python -m pytest $(SIDE_BY_SIDE) -m slow \
 	  tests/property/test_dialects.py tests/property/test_flow_dialects.py

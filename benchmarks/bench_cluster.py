@@ -227,7 +227,7 @@ class Traced(Executor):
         return future
 
 
-def six_parameters(length: float) -> Work:
+def six_parameters(length: float, *, quick: bool) -> Work:
     """The calibration of a self-propelled body with six parameters."""
     from self_propelled import moving
 
@@ -237,7 +237,8 @@ def six_parameters(length: float) -> Work:
     }  # fmt: skip
     model = dw.motion_model("run_tumble", clearance=0.015)
     recording = moving(model, truth, length, seed=2, noise=3e-4)
-    study = dw.Study(observation={"position_noise_m": 3e-4})
+    few = {"bootstrap": 4} if quick else {}
+    study = dw.Study(observation={"position_noise_m": 3e-4}, calibration=few)
     traced, before = Traced(), time.process_time()
     dw.calibration.calibrate(recording, model, study=study, executor=traced)
     units = sum(map(sum, traced.stages))
@@ -298,11 +299,11 @@ def main() -> None:
     quick = options.quick
     with connect(parse_address("local:2")) as cluster:
         rate = handing_out(cluster, 200 if quick else 2000)
-        real_units(cluster, 400 if quick else 2000)
-        for runs in (400,) if quick else (1000, 8000):
+        real_units(cluster, 100 if quick else 2000)
+        for runs in (100,) if quick else (1000, 8000):
             beside_threads(cluster, runs, 1 if quick else options.rounds)
-    paper = sensitivity_study(2 if quick else 20)
-    six = six_parameters(60.0 if quick else options.length)
+    paper = sensitivity_study(1 if quick else 20)
+    six = six_parameters(options.length, quick=quick)
     on_paper([paper, halved(paper, 3), six], rate)
 
 

@@ -59,6 +59,8 @@ class Page:
     """From how a line begins to how far its numbers scatter: other last bits are other worlds."""
     draws: bool = True
     """Whether the commands draw their figures, which take most of a small run."""
+    little: bool = False
+    """Whether searches for models simulate little, with every stage of theirs."""
     needs: tuple[str, ...] = ()
     """Packages without which the examples are skipped."""
     slow: bool = False
@@ -489,6 +491,7 @@ PAGES: dict[str, Page] = {
         instead={"-o compare": "--models inertial,active+wall --bootstrap 0 -o compare"},
         makes=("compare/comparison.nc",),
         draws=False,
+        little=True,
         slow=True,
     ),
     "docs/how-to/design-an-experiment.md": Page(

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 from command_line import leave_out_figures
+from few_simulations import compare_after_little, simulate_little
 from ports import held_port
 
 from driftwalk.cli.demo import demo_truth
@@ -34,6 +35,9 @@ def test_examples_of_a_page_run(name: str, tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.setenv("MPLBACKEND", "Agg")
     if not PAGES[name].draws:
         leave_out_figures(monkeypatch)
+    if PAGES[name].little:
+        simulate_little(monkeypatch)
+        compare_after_little(monkeypatch)
     with held_port() as port, streaming(port) if PAGES[name].streams else nullcontext():
         reader = Reader(PAGES[name], port)
         for block in blocks_of(name):

@@ -56,12 +56,12 @@ HEADS = [
 ]
 
 
-ALL, PARTS = "DRIFTWALK_ALL_DIALECTS", 10
+ALL, PARTS = "DRIFTWALK_ALL_DIALECTS", 50
 DAY_S = 86_400
 
 
 def part_of_today(number: int) -> range:
-    """Return the seeds below a number that are tried today: a tenth, and all within ten days.
+    """Return the seeds below a number that are tried today: a fiftieth, and all within fifty days.
 
     All of them where the environment asks for it, as `make fuzz-dialects` does.
     """

@@ -325,7 +325,7 @@ def test_the_truth_of_a_slow_orbit_is_in_the_intervals():
             "calibration.bootstrap": 60,
         },
     )
-    recording = slow_recording(seed=11)
+    recording = slow_recording(seed=11, duration=450.0)
     found = dw.calibrate(recording, study, flow=slow_flow(), threads=2)
     for name, truth in SLOW.items():
         low, high = facts_of(found)[f"{name}_interval"]

@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
-
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import here
 from fit_worlds import DRAG, FORCE_N, NOISE_M, TRUTH
 
 import driftwalk as dw
 from driftwalk.flow import bilinear
 from driftwalk.schema.answers.facts import facts_of
-
-STUDIES = Path(__file__).resolve().parents[2] / "studies" / "real"
 
 
 def block_mean(flow: xr.Dataset, x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -68,17 +62,3 @@ def test_half_an_hour_of_the_bundled_recording(
     flow, truth = (block_mean(one, x, y) for one in (dw.fitted_flow(fit), dw.tank30_flow()))
     error = np.sqrt(((flow - truth) ** 2).sum() / (truth**2).sum())
     assert error <= most_flow
-
-
-@pytest.mark.slow
-def test_a_real_recording_comes_to_an_end(
-    shared_data: Callable[[str], Path], tmp_path: Path
-) -> None:
-    """A body that drives itself: no truth, but an answer and its flow."""
-    name = "destab_driveA_100pc_0_noisevar_10_randdur_600.csv"
-    recording = shared_data("smarticles-rattling") / name
-    study = STUDIES / "smarticles.toml"
-    done = here("fit", recording, "--study", study, "-o", tmp_path / "run", "--to", "100")
-    assert done.code == 0, done.err
-    assert "drag coefficient C_d" in done.out
-    assert np.isfinite(dw.load_flow(tmp_path / "run" / "flow.nc")["u"].values).all()

@@ -19,7 +19,7 @@ AXIS = np.linspace(-0.165, 0.165, 133)
 NOISE_M = 0.3e-3
 
 
-@pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.parametrize(
     ("name", "angle", "most_drag", "most_flow"),
     [
@@ -32,7 +32,8 @@ def test_half_an_hour_of_another_engine(
 ) -> None:
     """Measured with the angle in the state: C_d +0.7 and -0.2 %, sigma_F 1.4 %, flow 0.7 and 2 %.
 
-    With the angle as an input: C_d -9 and -2 %, flow 3 and 6 %.
+    With the angle as an input: C_d -9 and -2 %, flow 3 and 6 %. The slow set has such bars for
+    the bundled recordings: test_fit_bars.py.
     """
     with np.load(FOLDER / f"{name}.npz") as stored:
         x, y, u, v = (1e-5 * stored[key] for key in ("x", "y", "u", "v"))

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from command_line import GRID, assert_same_bits
+from few_simulations import simulate_little
 from recovery_worlds import small_study
 from self_propelled import moving
 
@@ -33,8 +34,8 @@ def workers() -> Iterator[Cluster]:
 
 @pytest.fixture(scope="module")
 def short() -> xr.Dataset:
-    """Return five minutes of the bundled recording."""
-    return dw.tank30_recording().sel(time=slice(0.0, 300.0))
+    """Return two minutes of the bundled recording."""
+    return dw.tank30_recording().sel(time=slice(0.0, 120.0))
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +59,10 @@ def test_a_calibration_with_its_bootstrap_and_halves(workers: Cluster, short: xr
     assert_same_bits(there, calibrate(short, **options))
 
 
-def test_a_calibration_of_three_parameters(workers: Cluster, active: xr.Dataset) -> None:
+def test_a_calibration_of_three_parameters(
+    workers: Cluster, active: xr.Dataset, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    simulate_little(monkeypatch)
     model, study = dw.motion_model("active", clearance=0.015), noisy(bootstrap=10)
     there = dw.calibrate(active, model, study=study, executor=workers.executor)
     assert_same_bits(there, dw.calibrate(active, model, study=study))

@@ -113,7 +113,7 @@ def test_calibrate_a_termite(
     shared_data: SharedData, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder, file = RECORDINGS["termite"]
-    study = reduced(load_study(STUDIES / "termite.toml"), cells=8)
+    study = reduced(load_study(STUDIES / "termite.toml"), cells=5)
     found = calibrate(shared_data(folder) / file, study, tmp_path, capsys)
     assert_consistent(found, study, tmp_path)
     # Every 0.1 s of 46.6 s, two ends without a pair.
@@ -128,7 +128,7 @@ def test_calibrate_a_smarticle(
     shared_data: SharedData, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder, file = RECORDINGS["smarticles"]
-    study = reduced(load_study(STUDIES / "smarticles.toml"), cells=8)
+    study = reduced(load_study(STUDIES / "smarticles.toml"), cells=5)
     recording = shared_data(folder) / file
     found = calibrate(recording, study, tmp_path, capsys, "--body", "2", "--to", "100")
     assert_consistent(found, study, tmp_path)

@@ -27,7 +27,7 @@ pytest.importorskip("cv2")
 STUDY = Path(__file__).resolve().parents[2] / "studies" / "tracking"
 TANK = ("--tank", "30cm")
 NAN = float("nan")
-FRAMES = 4000
+FRAMES = 1000
 FIRST_FRAMES = f"""\
 import itertools
 from driftwalk.track.source.frames import VideoFile
@@ -144,7 +144,7 @@ def test_four_blocks_with_moderate_noise(
     scenes: ModuleType, scores: ModuleType, tmp_path: Path, seed: int
 ) -> None:
     """Measured: 0.018 mm, 0.10 degrees, all samples."""
-    out, _, truth = filmed(scenes, tmp_path, "moderate", seed, 60)
+    out, _, truth = filmed(scenes, tmp_path, "moderate", seed, 40)
     found = scores.score(xr.load_dataset(out), truth)
     assert found["position_rms_mm"] <= 0.15
     assert found["angle_rms_deg"] <= 0.5
@@ -158,7 +158,7 @@ def test_four_blocks_with_moderate_noise(
 def test_four_blocks_with_heavy_noise(
     scenes: ModuleType, scores: ModuleType, tmp_path: Path, seed: int
 ) -> None:
-    out, _, truth = filmed(scenes, tmp_path, "heavy", seed, 60)
+    out, _, truth = filmed(scenes, tmp_path, "heavy", seed, 40)
     found = scores.score(xr.load_dataset(out), truth)
     assert found["recall_visible"] >= 0.95
     assert found["unmarked"] == 0
@@ -168,14 +168,15 @@ def test_four_blocks_with_heavy_noise(
 def test_a_fit_of_tracked_poses_is_that_of_the_true_ones(
     scenes: ModuleType, scores: ModuleType, tmp_path: Path
 ) -> None:
-    out, motion, truth = filmed(scenes, tmp_path, "closed-loop", 301, 400)
+    out, motion, truth = filmed(scenes, tmp_path, "closed-loop", 301, 200)
     errors = scores.score(xr.load_dataset(out), truth)
     sizes = 1e-3 * errors["position_sd_per_axis_mm"], np.radians(errors["angle_sd_deg"])
     loop = import_module("closed_loop")
     true = save_trajectory(loop.with_noise(motion, *sizes, seed=1), tmp_path / "true.nc")
     tracked_fit, true_fit = (
         run_driftwalk(
-            "fit", file, *TANK, "--law", "paper", "--no-check", "-o", tmp_path / file.stem
+            *("fit", file, *TANK, "--law", "paper", "--no-check", "--spline-spacing", "4cm"),
+            *("-o", tmp_path / file.stem),
         )
         for file in (out, true)
     )
@@ -188,7 +189,7 @@ def test_a_fit_of_tracked_poses_is_that_of_the_true_ones(
 def test_the_mouse_beside_its_published_track(
     shared_data: Callable[[str], Path], tmp_path: Path
 ) -> None:
-    """Two minutes of the video; its background, though, is that of all of it.
+    """Half a minute of the video; its background, though, is that of all of it.
 
     The study tracks all of it: of the last 6,000 frames four are stale, the picture before again.
     """

@@ -234,17 +234,18 @@ def random_case(seed: int) -> tuple[dw.Study, xr.Dataset, dict[str, Any]]:
 @pytest.mark.slow
 def test_random_worlds_agree_for_a_second_and_a_half() -> None:
     met = latched = 0
-    for seed in range(25):
+    for seed in range(15):
         model, flow, arguments = random_case(seed)
         run = compare(model, flow, steps=150, **arguments)
         met += run["first_contact_step"] > 0
         latched += int(run["event_count"])
-    assert met > 12
-    assert latched > 12
+    assert met > 7
+    assert latched > 7
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_most_worlds_agree_for_six_seconds() -> None:
+    """Worlds of a second and a half are among the slow tests: the test above."""
     # Crowded worlds part by chaos, from 1e-16 m on: the events of most are still the same.
     same, distance = 0, []
     for seed in range(1000, 1005):

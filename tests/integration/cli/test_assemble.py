@@ -17,7 +17,7 @@ import pytest
 import xarray as xr
 from command_line import (
     FLOW,
-    GRID,
+    NO_FIGURES,
     RECORDING,
     Done,
     apart,
@@ -26,7 +26,7 @@ from command_line import (
     here,
     refusal,
 )
-from redrawn import assert_drawn_alike
+from redrawn import assert_drawn_alike, drawn
 from signals_at_units import after_units
 
 from driftwalk.page import report_page
@@ -38,32 +38,19 @@ SIZE = ["--blocks", "4", "--runs", "60", "--duration", "30s", "--threads", "1"]
 RESULTS = ("assembly.nc", "distribution.nc", "class_times.nc", "path.nc")
 DRAWN = ("assembly_drawn.nc", "distribution_drawn.nc")
 
-# A film of 20 frames in place of 250.
-SHORT_FILM = "from driftwalk.plot import tank\ntank.FRAMES_PER_S = 1.0\n"
-
 pytestmark = pytest.mark.usefixtures("undrawn")
 
 
 @pytest.fixture(scope="module")
-def calibrated(undrawn: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the run directory of a short calibration, with a flow field of its own."""
-    place = tmp_path_factory.mktemp("calibrated")
-    study = place / "study.toml"
-    study.write_text(GRID, encoding="utf-8")
-    done = here(
-        *("calibrate", RECORDING, "--to", "60s", "--study", study, "--out", place / "run"),
-        *("--tank", "30cm", "--threads", "1"),
-    )
-    assert done.code == 0, done.err
-    return place / "run"
+def calibrated(calibrated_minute: tuple[Path, Done]) -> Path:
+    return calibrated_minute[0]
 
 
 @pytest.fixture(scope="module")
 def whole(calibrated: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Done]:
     """Return a run from the calibration, figures and all."""
     folder = tmp_path_factory.mktemp("whole") / "assembly"
-    done = apart("assemble", calibrated, *SIZE, "--json", "-o", folder, before=SHORT_FILM)
-    return folder, done
+    return folder, drawn("assemble", calibrated, *SIZE, "--json", "-o", folder)
 
 
 def dataset(path: Path) -> xr.Dataset:
@@ -223,7 +210,7 @@ def test_of_many_blocks_sizes_are_printed_and_stored(calibrated: Path, tmp_path:
 def test_the_figures_of_many_blocks_are_of_sizes(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     many = ["--blocks", "10", "--runs", "4", "--duration", "5s", "--threads", "1"]
-    done = apart("assemble", "--flow", FLOW, *many, "--film", "none", "-o", folder)
+    done = drawn("assemble", "--flow", FLOW, *many, "--film", "none", "-o", folder)
     assert done.code == 0, done.err
     figures = {path.stem for path in (folder / "figures").iterdir()}
     assert figures == {"assembly_sizes", "film_strip"}
@@ -348,11 +335,9 @@ def test_a_finished_run_is_kept_until_overwrite(calibrated: Path, tmp_path: Path
     assert [len(list(folder.glob("*.nc"))) for folder in moved] == [6]
 
 
-# Small units, without figures.
-SMALL = """
-import driftwalk.figures
+# Small units, without figures and film.
+SMALL = f"""{NO_FIGURES}
 import driftwalk.assembly.runs.run
-driftwalk.figures.write_figures = lambda *folders, **datasets: []
 driftwalk.assembly.runs.run.runs_per_unit = lambda _: 25
 """
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
+import shutil
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
@@ -27,6 +28,7 @@ from command_line import (
     contents,
     end,
     here,
+    leave_out_figures,
     refusal,
     start,
 )
@@ -153,11 +155,24 @@ def test_a_finished_run_is_kept_as_it_is(finished: tuple[Path, Done], study: Pat
     assert contents(folder) == before
 
 
+@pytest.fixture(scope="module")
+def undrawn_run(study: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Done]:
+    """Return a run of a minute without figures, and what it printed."""
+    folder = tmp_path_factory.mktemp("undrawn") / "run"
+    with pytest.MonkeyPatch.context() as patch:
+        leave_out_figures(patch)
+        done = here(*words(study, folder), "--flow", FLOW)
+    assert done.code == 0, done.err
+    return folder, done
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("no_figures")
-def test_overwrite_moves_the_finished_run_aside(study: Path, tmp_path: Path) -> None:
+def test_overwrite_moves_the_finished_run_aside(
+    undrawn_run: tuple[Path, Done], study: Path, tmp_path: Path
+) -> None:
     folder = tmp_path / "run"
-    assert here(*words(study, folder), "--flow", FLOW).code == 0
+    shutil.copytree(undrawn_run[0], folder)
     first = contents(folder)
     assert here(*words(study, folder), "--flow", FLOW, "--overwrite", "--seed", "2").code == 0
     kept = list((folder / "previous").iterdir())
@@ -175,10 +190,8 @@ def test_overwrite_moves_the_finished_run_aside(study: Path, tmp_path: Path) -> 
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("no_figures")
-def test_no_force_is_printed_without_its_interval(study: Path, tmp_path: Path) -> None:
-    done = here(*words(study, tmp_path / "run"), "--flow", FLOW)
-    assert done.code == 0
+def test_no_force_is_printed_without_its_interval(undrawn_run: tuple[Path, Done]) -> None:
+    done = undrawn_run[1]
     lines = [line for line in done.out.splitlines() if "σ_F" in line and "mN" in line]
     assert len(lines) == 1
     assert re.search(r"\d mN, redrawn every 10 ms   90% interval [\d.]+ to [\d.]+$", lines[0])
@@ -200,9 +213,7 @@ def test_a_force_without_bootstrap_says_that_it_has_no_interval(
     assert done.code == 0
     line = next(line for line in done.out.splitlines() if "stochastic force" in line)
     assert line.endswith("no interval without a bootstrap")
-    found = json.loads(
-        here(*words(study, tmp_path / "again"), "--flow", FLOW, *options, "--json").out
-    )
+    found = json.loads(here("info", tmp_path / "run", "--json").out)
     assert found["force_std_N_interval"] is None
 
 
@@ -253,7 +264,7 @@ def test_an_optimum_at_the_edge_and_a_bad_fit_are_warned_of(study: Path, tmp_pat
         text.replace("drag_coefficient_max = 0.6", "drag_coefficient_max = 1.1"), encoding="utf-8"
     )
     run = tmp_path / "run"
-    done = here(*words(narrow, run, "300s"), "--flow", FLOW)
+    done = here(*words(narrow, run, "120s"), "--flow", FLOW)
     assert done.code == 0
     assert "  the optimum lies at the edge of the grid: drag" in done.out
     assert "verdict                cannot tell:" in done.out
@@ -329,7 +340,7 @@ def test_threads_and_instruction_sets_do_not_change_a_bit(
 
 @pytest.mark.slow
 def test_progress_through_a_pipe_is_plain_lines(study: Path, tmp_path: Path) -> None:
-    started = words(study, tmp_path / "run", "120s")
+    started = words(study, tmp_path / "run")
     done = apart(*started, "--flow", FLOW, before=NO_FIGURES + CHATTY)
     assert done.code == 0
     lines = [line for line in done.err.splitlines() if line.startswith("calibrate: ")]
@@ -349,7 +360,7 @@ def test_progress_on_a_terminal_is_a_bar_with_the_time_left(study: Path, tmp_pat
 
     master, slave = pty.openpty()
     process = start(
-        *words(study, tmp_path / "run", "300s"),
+        *words(study, tmp_path / "run", "120s"),
         *("--flow", FLOW),
         before=NO_FIGURES,
         stderr=slave,

@@ -47,6 +47,17 @@ def test_the_truth_is_found(run: tuple[Path, dict]) -> None:
         room = 0.25 * (high - low)
         assert low - room <= value <= high + room, name
     assert said["parameters"]["speed_m_s"]["determined"]
+    # The speed is known from 600 steps, within a percent or two.
+    assert said["parameters"]["speed_m_s"]["value"] == pytest.approx(TRUTH["speed"], rel=0.03)
+
+
+@pytest.mark.slow
+def test_the_right_model_is_believed_without_a_search(run: tuple[Path, dict]) -> None:
+    found = open_netcdf(run[0] / "run" / "model_calibration.nc")
+    assert "searched_estimate" not in found
+    assert float(found["misfit"]) <= float(found["most_misfit"])
+    assert float(found["interval_stretch"]) == 1.0
+    assert found["verdict"] == "explains"
 
 
 @pytest.mark.slow

@@ -19,7 +19,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 import slurm
-from command_line import FLOW, GRID, NO_FIGURES, Done, apart, end, refusal, start
+from command_line import (
+    FLOW,
+    GRID,
+    NO_FIGURES,
+    Done,
+    apart,
+    end,
+    here,
+    leave_out_figures,
+    refusal,
+    start,
+)
 
 import driftwalk as dw
 from driftwalk.sweep import ShardStore, WorkUnit, grid, run_sweep
@@ -49,7 +60,9 @@ def done(finished: Done) -> str:
 @pytest.fixture(scope="module")
 def at_home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("home") / "run"
-    done(driftwalk(*ASSEMBLE, "-o", folder))
+    with pytest.MonkeyPatch.context() as patch:
+        leave_out_figures(patch)
+        done(here(*ASSEMBLE, "-o", folder))
     return folder
 
 
@@ -63,12 +76,6 @@ def same_results(one: Path, other: Path) -> None:
     for name in names:
         assert (one / name).read_bytes() == (other / name).read_bytes(), name
     assert shards_of(one) == shards_of(other)
-
-
-def test_assembly_has_the_same_bytes(at_home: Path, tmp_path: Path) -> None:
-    said = done(driftwalk(*ASSEMBLE, "--cluster", "local:2", "-o", tmp_path / "run"))
-    assert "2 workers at local:2, dashboard http://" in said
-    same_results(at_home, tmp_path / "run")
 
 
 # Sweeps of plain Python, in a process of its own: workers are told apart by their numbers.
@@ -167,18 +174,21 @@ def test_without_a_scheduler_the_run_ends_and_goes_on_later(tmp_path: Path) -> N
     assert sum_at_home(tmp_path / "gone") == 1240.0
 
 
+@pytest.mark.usefixtures("no_figures")
 def test_a_client_that_is_killed_goes_on_at_home(at_home: Path, tmp_path: Path) -> None:
-    """The live page follows it until then."""
-    folder = tmp_path / "run"
-    with start(
+    """The live page follows it until then; what two workers made of it has the same bytes."""
+    folder, said = tmp_path / "run", tmp_path / "said"
+    # To a file: workers hold a pipe open for as long as they live.
+    with said.open("w") as stderr, start(
         *(*ASSEMBLE, "--cluster", "local:2", "-o", folder),
-        before=NO_FIGURES, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        before=NO_FIGURES, stdout=subprocess.DEVNULL, stderr=stderr,
     ) as client:  # fmt: skip
         wait_for_shards(folder, client)
         page = RunSource(folder).greeting()[0]["page"]
         while not page["state"]["progress"] and client.poll() is None:
             page = RunSource(folder).greeting()[0]["page"]
         client.send_signal(signal.SIGKILL)
+    assert "2 workers at local:2, dashboard http://" in said.read_text(encoding="utf-8")
     kept = len(shards_of(folder))
     assert 0 < kept < 16
     assert page["title"] == "Self-assembly under way"
@@ -186,7 +196,7 @@ def test_a_client_that_is_killed_goes_on_at_home(at_home: Path, tmp_path: Path) 
     (bars,) = page["sections"]
     assert 0 < bars["runs"] < RUNS
     assert bars["series"][0]["items"]
-    done(driftwalk(*ASSEMBLE, "-o", folder))
+    done(here(*ASSEMBLE, "-o", folder))
     same_results(at_home, folder)
 
 

@@ -19,9 +19,13 @@ RESTING = {
 }  # fmt: skip
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_summaries_name_the_true_model(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Run and rest tie with bursts by distance; by their summaries they do not."""
+    """Run and rest tie with bursts by distance; by their summaries they do not.
+
+    Slow tests of the same code: `test_summaries_are_matched_and_kept` in
+    tests/unit/calibration/ranking/test_compare.py, and test_evidence_ranking.py for the findings.
+    """
     recording = moving(
         dw.motion_model("run_rest", clearance=0.01), RESTING, 300.0, seed=4, noise=2e-4
     )

@@ -31,6 +31,13 @@ class Killed:
     files: dict[str, bytes | None]
 
 
+# A quarter of an hour of the recording. All of it is fitted by tests/integration/test_fit_bars.py
+# and by .ci/wheel_run.py.
+SHORT = """
+from driftwalk import datasets
+whole = datasets.tank30_recording
+datasets.tank30_recording = lambda: whole().sel(time=slice(0.0, 900.0))
+"""
 # No warning of a library reaches a user.
 STRICT = os.environ | {"PYTHONWARNINGS": "error"}
 
@@ -43,7 +50,7 @@ def killed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Killed]:
     """
     folder = tmp_path_factory.mktemp("demo") / "demo"
     told: list[str] = []
-    with start("demo", "--quick", "--out", folder, env=STRICT) as process:
+    with start("demo", "--quick", "--out", folder, before=SHORT, env=STRICT) as process:
         assert process.stdout is not None
         for line in process.stdout:
             told.append(line)
@@ -57,7 +64,7 @@ def killed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Killed]:
 @pytest.fixture(scope="module")
 def finished(killed: tuple[Path, Killed]) -> tuple[Path, Done]:
     """Return the demo that was killed, and continued to its end."""
-    return killed[0], apart("demo", "--quick", "--out", killed[0], env=STRICT)
+    return killed[0], apart("demo", "--quick", "--out", killed[0], before=SHORT, env=STRICT)
 
 
 @pytest.mark.slow
@@ -96,13 +103,13 @@ def test_the_fit_is_told_before_the_map_is_begun(killed: tuple[Path, Killed]) ->
 def test_a_finished_demo_is_read(finished: tuple[Path, Done]) -> None:
     folder = finished[0]
     before = contents(folder)
-    again = apart("demo", "--quick", "--out", folder, "--json")
+    again = apart("demo", "--quick", "--out", folder, "--json", before=SHORT)
     assert again.code == 0
     assert again.err.count("holds a finished run") == 2
     assert contents(folder) == before
     found = json.loads(again.out)
     assert found["truth"] == TRUTH
-    # Half an hour with the orientation as a state: C_d within 5 %, sigma_F 3 %, flow 2 %.
+    # With the orientation as a state: C_d within 5 %, sigma_F 3 %, flow 2 %.
     assert found["fit"]["drag_coefficient"] == pytest.approx(TRUTH["drag_coefficient"], rel=0.05)
     low, high = found["fit"]["drag_coefficient_interval"]
     assert low < TRUTH["drag_coefficient"] < high

@@ -203,15 +203,6 @@ def test_figures_come_with_the_numbers_that_they_draw(run: Path, tmp_path: Path)
     assert {round(1.0 - value, 12) for value in expected} <= shown
 
 
-@pytest.mark.slow
-def test_fonts_of_a_pdf_are_truetype(run: Path, tmp_path: Path) -> None:
-    assert here("export", run, "--to", "pdf", "-o", tmp_path / "out").code == 0
-    for drawing in (tmp_path / "out").glob("*.pdf"):
-        content = drawing.read_bytes()
-        assert b"/Type3" not in content
-        assert b"/FontFile2" in content
-
-
 @pytest.mark.parametrize(
     ("words", "message"),
     [

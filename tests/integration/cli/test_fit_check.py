@@ -12,6 +12,7 @@ import xarray as xr
 from command_line import RECORDING, Done, here
 from redrawn import assert_drawn_alike
 
+import driftwalk as dw
 from driftwalk.schema.answers.facts import facts_of
 
 SHORT = ("--to", "150", "--spline-spacing", "3cm", "--force-interval", "16ms")
@@ -112,6 +113,7 @@ def test_a_check_that_cannot_be_made_says_so_and_the_fit_is_kept(tmp_path: Path)
 def test_a_robot_that_drives_itself_is_not_explained(
     shared_data: Callable[[str], Path], tmp_path: Path
 ) -> None:
+    """A real recording: no truth, but an answer, its flow and a verdict."""
     name = "destab_driveA_100pc_0_noisevar_10_randdur_600.csv"
     recording = shared_data("smarticles-rattling") / name
     study = STUDIES / "smarticles.toml"
@@ -122,6 +124,8 @@ def test_a_robot_that_drives_itself_is_not_explained(
     assert found["verdict"] == "does not explain"
     assert any("excess kurtosis" in text for text in found["verdict_reasons"])
     assert found["ks_distance"] > 3.0 * found["ks_noise_floor"]
+    assert 0.0 < found["force_std_N"] < np.inf
+    assert np.isfinite(dw.load_flow(tmp_path / "run" / "flow.nc")["u"].values).all()
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import FLOW, GRID, RECORDING, calibration, contents, here, refusal
+from command_line import FLOW, RECORDING, Done, calibration, contents, here, refusal
 from page_reading import page_in, part_of, values
 
 from driftwalk.page import decode_array, report_html
@@ -46,18 +46,11 @@ pytestmark = pytest.mark.usefixtures("undrawn")
 
 
 @pytest.fixture(scope="module")
-def run(undrawn: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a calibration of a minute of the recording."""
-    place = tmp_path_factory.mktemp("run")
-    (place / "study.toml").write_text(GRID, encoding="utf-8")
-    made = here(
-        *("calibrate", RECORDING, "--to", "60s", "--study", place / "study.toml", *TANK),
-        *("--threads", "1", "--out", place / "calibrate"),
-    )
-    assert made.code == 0, made.err
+def run(calibrated_minute: tuple[Path, Done]) -> Path:
+    folder, done = calibrated_minute
     # The run says what to do next.
-    assert f"driftwalk report {place / 'calibrate'} -o report.html" in made.out
-    return place / "calibrate"
+    assert f"driftwalk report {folder} -o report.html" in done.out
+    return folder
 
 
 def report_of(source: Path, out: Path, *more: object) -> dict[str, Any]:

@@ -18,9 +18,7 @@ import pytest
 import xarray as xr
 from command_line import (
     FLOW,
-    GRID,
     NO_FIGURES,
-    RECORDING,
     Done,
     apart,
     assert_same_bits,
@@ -28,7 +26,7 @@ from command_line import (
     here,
     refusal,
 )
-from redrawn import assert_drawn_alike
+from redrawn import assert_drawn_alike, drawn
 from signals_at_units import after_units
 
 from driftwalk.schema.answers.facts import facts_of
@@ -42,24 +40,15 @@ pytestmark = pytest.mark.usefixtures("undrawn")
 
 
 @pytest.fixture(scope="module")
-def calibrated(undrawn: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the run directory of a short calibration without bootstrap."""
-    place = tmp_path_factory.mktemp("calibrated")
-    study = place / "study.toml"
-    study.write_text(GRID.replace("bootstrap = 10", "bootstrap = 0"), encoding="utf-8")
-    done = here(
-        *("calibrate", RECORDING, "--to", "60s", "--study", study, "--out", place / "run"),
-        *("--tank", "30cm", "--threads", "1"),
-    )
-    assert done.code == 0, done.err
-    return place / "run"
+def calibrated(calibrated_minute: tuple[Path, Done]) -> Path:
+    return calibrated_minute[0]
 
 
 @pytest.fixture(scope="module")
 def whole(calibrated: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Done]:
     """Return a run from the calibration, figures and all."""
     folder = tmp_path_factory.mktemp("whole") / "sensitivity"
-    return folder, apart("sensitivity", calibrated, *SIZE, *MAP, "--json", "-o", folder)
+    return folder, drawn("sensitivity", calibrated, *SIZE, *MAP, "--json", "-o", folder)
 
 
 def dataset(path: Path) -> xr.Dataset:

@@ -282,14 +282,16 @@ def test_a_model_of_the_users_is_named_again(tmp_path: Path) -> None:
         manifest = {"kind": MANIFEST_KIND, "manifest_version": 1, "study": study,
                     "specification": {"models": [model]}}  # fmt: skip
         (folder / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
-        for words in (
+        commands = (
             ("assemble", folder, "-o", tmp_path / "out"),
             ("sensitivity", folder, "-o", tmp_path / "out"),
+            ("study", "recover", folder, "-o", tmp_path / "out"),
             ("simulate", folder, "-o", tmp_path / "out.nc"),
             ("play", folder, "--no-open"),
-            ("study", "recover", folder, "-o", tmp_path / "out"),
             ("export", folder, "--to", "mujoco", "-o", tmp_path / "out"),
-        ):
+        )
+        # Two of the commands for each way of naming a model.
+        for words in commands[number::3]:
             line = refusal(here(*words))
             assert name in line
             if words[0] in ("simulate", "play"):

@@ -19,6 +19,7 @@ from command_line import FLOW, GRID, RECORDING, Done, here, refusal
 from finished_run import write_finished_run
 
 from driftwalk.cli.main import COMMANDS, load_command
+from driftwalk.plot.film import FRAMES_PER_S
 
 cv2 = pytest.importorskip("cv2")
 
@@ -296,14 +297,14 @@ LONG: dict[str, Callable[[Path, Path, Path], Words]] = {
     ],
     "compare-models": lambda place, run, out: [
         *("compare-models", RECORDING, *SHORT, *TANK, "--models", "inertial", *ONE),
-        *("-o", out / "run"),
+        *("--bootstrap", "0", "-o", out / "run"),
     ],
     "calibrate": lambda place, run, out: [
         *("calibrate", RECORDING, *SHORT, *TANK, "--study", place / "grid.toml", *ONE),
         *("-o", out / "run"),
     ],
     "fit": lambda place, run, out: [
-        *("fit", RECORDING, "--to", "120s", *TANK, "--angle", "given", "-o", out / "run")
+        *("fit", RECORDING, *SHORT, *TANK, "--angle", "given", "-o", out / "run")
     ],
     "assemble": lambda place, run, out: [
         *("assemble", "--flow", FLOW, "--blocks", "3", "--runs", "20", "--duration", "20s", *ONE),
@@ -336,8 +337,14 @@ def test_good_input(
 @pytest.mark.slow
 @pytest.mark.parametrize("command", LONG)
 def test_good_input_of_long_commands(
-    command: str, place: Path, finished: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    command: str,
+    place: Path,
+    finished: Path,
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setitem(FRAMES_PER_S, ".gif", 1.0)
     done = strict(capfd, *LONG[command](place, finished, tmp_path))
     assert done.code == 0, done
     own_words(done.err)

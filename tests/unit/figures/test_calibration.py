@@ -62,10 +62,21 @@ def test_svg_is_well_formed_and_as_wide_as_a_column(written) -> None:
 @pytest.mark.slow
 def test_the_same_datasets_give_the_same_bytes(written, datasets, tmp_path) -> None:
     calibration, flow, trajectory = datasets
-    again = write_figures(calibration_figures(calibration, trajectory, flow), tmp_path, ["svg"])
+    table = calibration_figures(calibration, trajectory, flow)
+    some = {name: table[name] for name in ("flow", "ks_map", "validation")}
     first = {path.name: path.read_bytes() for path in written}
-    for path in again:
+    for path in write_figures(some, tmp_path, ["svg"]):
         assert path.read_bytes() == first[path.name], path.name
+
+
+@pytest.mark.slow
+def test_fonts_of_a_pdf_are_truetype(datasets, tmp_path) -> None:
+    calibration, flow, trajectory = datasets
+    table = calibration_figures(calibration, trajectory, flow)
+    for path in write_figures({"ks_map": table["ks_map"]}, tmp_path, ["pdf"]):
+        content = path.read_bytes()
+        assert b"/Type3" not in content
+        assert b"/FontFile2" in content
 
 
 def test_style_is_restored_even_after_an_error() -> None:

@@ -332,7 +332,8 @@ def test_the_report_of_a_default_search_is_quick_and_small(tmp_path: Path) -> No
     folder = make_run(tmp_path / "run", parts)
     # Processor time: what else the machine does is not counted.
     begin = time.process_time()
-    path = write_report(report_page(folder), tmp_path / "report.html")
+    page = report_page(folder)
+    path = write_report(page, tmp_path / "report.html")
     assert time.process_time() - begin < 30.0
     assert 1e6 < path.stat().st_size < 5e6
-    assert part_of(report_page(folder), "map")["cells"]["excerpt_x"]["shape"] == [*shape, 301]
+    assert part_of(page, "map")["cells"]["excerpt_x"]["shape"] == [*shape, 301]

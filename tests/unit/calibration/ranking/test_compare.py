@@ -234,7 +234,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def with_summaries(recorded: xr.Dataset, **options: Any) -> xr.Dataset:
-    study = dw.apply_overrides(dw.Study(), {"calibration.bootstrap": 20})
+    study = dw.apply_overrides(dw.Study(), {"calibration.bootstrap": 8})
     models = ["inertial", "run_tumble"]
     return compare_models(recorded, models, study=study, budget=SMALL, **options)
 
