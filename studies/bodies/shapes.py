@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "verdict"))
 
-from blocks import CORNERS, INNER, NORMALS, POINTS, WIDTHS, Body
+from blocks import CORNERS, INNER, NORMALS, POINTS, SHARES, WIDTHS, Body
 from ranges import MASS_KG, SIDE_M
 
 RIM_POINTS = 41
@@ -43,5 +43,5 @@ def dimer(hidden_share: npt.ArrayLike) -> Body:
     inner = INNER.real * 2.0 + 1j * INNER.imag
     return Body(
         points, normals, widths, corners, inner, float(np.abs(corners).max()), 5.0 * SIDE_M**2,
-        12.0, 2.0 * MASS_KG, members=centres + 0j,
+        12.0, 2.0 * MASS_KG, members=centres + 0j, shares=SHARES,
     )  # fmt: skip

@@ -30,6 +30,7 @@ from driftwalk.likelihood.preparation import body_of, prepare, spline_of
 from driftwalk.likelihood.prior import Prior, Weights
 from driftwalk.likelihood.refuse import in_words, length_advice, needed_duration
 from driftwalk.likelihood.warnings import precision_facts, warnings_of
+from driftwalk.model.block import Block
 from driftwalk.schema import Track, body_track, build_trajectory
 from driftwalk.schema.answers.facts import facts_of
 
@@ -387,7 +388,7 @@ def test_a_vague_answer_says_how_long_to_record(
         facts(std, 600.0, wanted),
         [0.5],
         Intervals((), (0,), ("A",)),
-        side_m=0.03,
+        block=Block(),
     )
     assert bool(found) == (words is not None)
     assert words is None or re.search(words, found[0])

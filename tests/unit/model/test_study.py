@@ -63,7 +63,7 @@ def test_examples_of_the_template_can_be_uncommented() -> None:
         key, equals, _ = line.removeprefix("# ").partition(" = ")
         if line.startswith("# ") and equals and section and key in _fields(section):
             values = tomllib.loads(line.removeprefix("# "))
-            study = Study(**{section: {**_companions(key), **values}})
+            study = Study(**{section: {**_companions(section, key), **values}})
             assert getattr(getattr(study, section), key) is not None
             found += 1
     assert found >= 15
@@ -73,8 +73,10 @@ def _fields(section: str) -> dict[str, object]:
     return dict(type(getattr(Study(), section)).model_fields)
 
 
-def _companions(key: str) -> dict[str, object]:
+def _companions(section: str, key: str) -> dict[str, object]:
     """The keys that a key of a rectangle, a polygon or a list of intervals needs beside it."""
+    if section == "block":
+        return {"shape": "rectangle"} if key == "width_m" else {}
     return {
         "flow_labels": {"switching_times_s": [600.0, 1200.0]},
         "width_m": {"shape": "rectangle", "height_m": 0.3},
