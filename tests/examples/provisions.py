@@ -699,6 +699,7 @@ NOT_COMPARED: dict[str, str] = {
     "driftwalk report run/ *": "the size of a page with all figures, which a test leaves out",
     "driftwalk calibrate recording.csv --study *": "takes minutes: a test has a smaller search",
     "driftwalk compare recording.csv sim.nc": "of half an hour in one world",
+    "driftwalk fit growing.csv *": "a test compares the numbers of another recording that grows",
     "driftwalk fit recording.csv --flow piv.csv *": "of half an hour: a test takes a part of it",
 }
 """Commands whose shown numbers no test compares with fresh ones, and why."""

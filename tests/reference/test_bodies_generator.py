@@ -85,7 +85,9 @@ def test_a_dimer_feels_all_its_faces(study: dict[str, ModuleType], hidden: float
     body, own = study["shapes"].dimer(hidden), plain.glued("xx", SIDE, hidden, 200)
     assert 1.0 / body.per_inertia == pytest.approx(own.square_radius, rel=1e-9)
     inner = np.stack([body.inner.real, body.inner.imag])
-    assert (inner * body.shares) @ inner.T == pytest.approx(np.diag([4, 1]) * SIDE**2 / 12, abs=1e-12)
+    assert (inner * body.shares) @ inner.T == pytest.approx(
+        np.diag([4, 1]) * SIDE**2 / 12, abs=1e-12
+    )
     rng = np.random.default_rng(3)
     for _ in range(5):
         angle, spin = rng.uniform(-3, 3), rng.uniform(-1, 1)

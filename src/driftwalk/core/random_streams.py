@@ -28,6 +28,8 @@ class Purpose(IntEnum):
     MOTION = 4
     BOUT = 5
     FLOW = 6
+    TORQUE = 7
+    STIRRING = 8
 
 
 WORK: Final[dict[str, int]] = {

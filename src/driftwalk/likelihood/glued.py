@@ -1,4 +1,4 @@
-"""What a recording of glued blocks tells that none of one block does.
+"""Fits of glued blocks: the drag of hidden faces, and the length over which stirring is shared.
 
 A dimer, or any rigid polyomino, in the water of an earlier fit of one block, whose posterior, a
 normal law of flow and ln C_d, is the prior:
@@ -62,15 +62,27 @@ class EarlierFit(NamedTuple):
 
 
 def glued_study(study: Study, earlier: xr.Dataset) -> Study:
-    """Return the study of a glued body with what an earlier fit of one block says.
+    """Return the study of a glued body with the numbers of an earlier fit of one block.
 
     Tank, water, law and the block come from the earlier fit, and the mass once for each cell where
     it is not stated; shape, reading and [fit] from the study.
+
+    Parameters
+    ----------
+    study : Study
+        Of the glued body.
+    earlier : xarray.Dataset
+        A `fit` of one square block.
 
     Raises
     ------
     InputError
         When the body is not glued, or the earlier fit is not one of a single block.
+
+    Examples
+    --------
+    >>> glued_study(study, fit).block.mass_kg  # doctest: +SKIP
+    0.0232
     """
     from driftwalk.conditions.study import fitted_law, is_stated
     from driftwalk.model import apply_overrides, parse_study
@@ -112,8 +124,8 @@ def earlier_prior(ready: PreparedRecordings, before: Estimate) -> Earlier:
     """Return the posterior of the earlier fit as the prior of flow and ln C_d."""
     if ready.passes.spline != before.passes.spline:
         raise InputError(
-            "the earlier fit has other knots for the flow: tank and `fit.spline_spacing` must be "
-            "the same"
+            "the earlier fit has other knots for the flow: tank and the distance of the "
+            "knots must be the same"
         )
     sums = before.passes.sums(before.point, noise="without")
     precision = before.prior.add(sums, before.point, before.weights).information

@@ -94,7 +94,7 @@ class PreparedRecordings:
     """Samples that are left out as mistakes of the tracker."""
     measured: MeasuredFlow | None = None
     earlier: Earlier | None = None
-    """What a fit of one block says, where glued blocks are fitted."""
+    """Posterior of a fit of one block in the same water, for glued blocks."""
 
     @property
     def prior(self) -> Prior:

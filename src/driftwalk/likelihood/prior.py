@@ -70,7 +70,7 @@ def usual_lever(side: float, outline: RigidBody) -> float:
 
 
 class Earlier(NamedTuple):
-    """What an earlier fit in the same water knows, a normal law of the coefficients and ln C_d."""
+    """Posterior of an earlier fit in the same water: a normal law of coefficients and ln C_d."""
 
     centre: Floats
     precision: Floats

@@ -174,7 +174,7 @@ class Section(_WithSignature, BaseModel):
 
     @classmethod
     def expanded(cls, values: dict[str, Any]) -> dict[str, Any]:
-        """Return values of keys, those that stand for several as several."""
+        """Return values of keys, with a value that holds several split into its keys."""
         return values
 
 

@@ -1,4 +1,4 @@
-"""What every shape of a rigid body declares: its drag panels, corners, area and moments."""
+"""The outline of a rigid body: its drag panels, corners, area and moments."""
 
 from __future__ import annotations
 
