@@ -102,7 +102,8 @@ def fit(
     inputs |= {role: path for role, path in files.items() if path}
     field = None if flow is None else load_flow_for(flow, read.study)
     effort = fit_work(sum(one.sizes["time"] for one in read.trajectories))
-    opening = opening_note(read.study, given, how=how, about="block")
+    source = "recording" if earlier is None else str(earlier)
+    opening = opening_note(read.study, given, how=how, about="block", otherwise=source)
 
     def begun() -> None:
         opening()

@@ -17,6 +17,7 @@ import driftwalk as dw
 from driftwalk.flow.analytic import flow_from_function
 
 MINUTES, SIDE, MASS, HIDDEN, RHO = 10.0, 0.03, 0.0116, 0.5, 0.6
+ARENA = dw.Study(tank={"diameter_m": 0.32}).tank.to_arena()
 LENGTH = SIDE / math.sqrt(-2.0 * math.log(RHO))
 
 
@@ -32,7 +33,7 @@ def recorded(folder: Path, name: str, study: dw.Study, flow: xr.Dataset) -> Path
 
 def recordings(folder: Path) -> tuple[Path, Path]:
     """Return simulated recordings of one block and of two that are glued, in the same water."""
-    flow = flow_from_function(lambda x, y: stirred(x, y, 1.0), diameter=0.32)
+    flow = flow_from_function(lambda x, y: stirred(x, y, 1.0), arena=ARENA)
     one = dw.Study(
         tank={"diameter_m": 0.32},
         simulation={"duration_s": 60.0 * MINUTES, "sample_rate_Hz": 10.0, "seed": 4},
