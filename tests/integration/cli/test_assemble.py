@@ -261,7 +261,7 @@ def test_a_calibration_without_bootstrap_gives_one_distribution(
         (["--tank", "50cm"], "the flow field does not cover the tank"),
         (["--latching", "conector"], "did you mean 'connector'?"),
         (["--chirality", "left"], "--chirality over"),
-        (["--hidden-face-drag", "half"], "--hidden-face-drag over"),
+        (["--hidden-face-drag", "2"], "--hidden-face-drag over"),
         (["--confidence", "1"], "--confidence over"),
         (["--side", "40cm"], "the block does not fit"),
         (["--seed=-1"], "--seed"),
