@@ -453,6 +453,7 @@ public:
     physics_ = {
         {},
         run.block,
+        run.shape,
         run.flow,
         run.water,
         run.wall,

@@ -123,7 +123,9 @@ def test_a_robot_that_drives_itself_is_not_explained(
     found = json.loads(done.out)
     assert found["verdict"] == "does not explain"
     assert any("excess kurtosis" in text for text in found["verdict_reasons"])
-    assert found["ks_distance"] > 3.0 * found["ks_noise_floor"]
+    # Where the noise of the track is not determined, no steps are simulated.
+    floor = found["ks_noise_floor"]
+    assert floor is None or found["ks_distance"] > 3.0 * floor
     assert 0.0 < found["force_std_N"] < np.inf
     assert np.isfinite(dw.load_flow(tmp_path / "run" / "flow.nc")["u"].values).all()
 
