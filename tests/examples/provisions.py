@@ -525,6 +525,8 @@ PAGES: dict[str, Page] = {
             "assemble ": f"assemble {FEW_RUNS} ",
             "sensitivity fit/": f"sensitivity fit/ {FEW_SETTINGS}",
             "fit first.csv": "fit --no-check first.csv",
+            "fit disc.csv": "fit --no-check first.csv",
+            "fit raft.csv": "fit --no-check first.csv",
             "fit recording.csv --mass": "fit --no-check first.csv --mass",
             "fit recording.csv --flow": "fit --no-check first.csv --flow",
             "fit recording.csv --law": "fit --no-check first.csv --law",
@@ -699,7 +701,6 @@ NOT_COMPARED: dict[str, str] = {
     "driftwalk report run/ *": "the size of a page with all figures, which a test leaves out",
     "driftwalk calibrate recording.csv --study *": "takes minutes: a test has a smaller search",
     "driftwalk compare recording.csv sim.nc": "of half an hour in one world",
-    "driftwalk fit growing.csv *": "a test compares the numbers of another recording that grows",
     "driftwalk fit recording.csv --flow piv.csv *": "of half an hour: a test takes a part of it",
 }
 """Commands whose shown numbers no test compares with fresh ones, and why."""
