@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import io
+import json
 import re
 import subprocess
 import sys
 from importlib.resources import files
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -69,6 +70,13 @@ class Done(NamedTuple):
     code: int
     out: str
     err: str
+
+
+def answer(done: Done) -> dict[str, Any]:
+    """Return what a command printed with --json."""
+    assert done.code == 0, done.err
+    found: dict[str, Any] = json.loads(done.out)
+    return found
 
 
 def here(*words: object) -> Done:

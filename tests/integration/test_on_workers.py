@@ -28,8 +28,11 @@ ACTIVE = {"speed": 0.03, "rotational_diffusion": 0.5, "turn_rate": 0.3}
 
 @pytest.fixture(scope="module")
 def workers() -> Iterator[Cluster]:
+    """Two worker processes, to which nothing happens while the tests use them."""
     with connect(parse_address("local:2")) as cluster:
         yield cluster
+        assert cluster.report() == ""
+        assert cluster.words.endswith("units, 2 workers")
 
 
 @pytest.fixture(scope="module")
@@ -113,8 +116,3 @@ def test_self_assembly_and_its_sensitivity(workers: Cluster) -> None:
         lambda executor: dw.sensitivity_map(study, flow, axes=axes, executor=executor),
     ):
         xr.testing.assert_identical(made(workers.executor), made(None))
-
-
-def test_nothing_befell_them(workers: Cluster) -> None:
-    assert workers.report() == ""
-    assert workers.words.endswith("units, 2 workers")

@@ -16,13 +16,14 @@ from driftwalk.cli.options.shared_types import (
     argument,
     flow_of_run,
     option,
-    quantity_parser,
 )
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import print_note, print_parts, print_places, print_result
 from driftwalk.cli.terminal.progress import reported
+from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.study_keys import FIT_KEYS
+from driftwalk.core.units import parse_quantity
 
 RecordingFiles = Annotated[
     list[Path],
@@ -95,7 +96,7 @@ def fit(
     earlier = None if start is None or not Path(start).is_dir() else Path(start)
     before = None if earlier is None else read_earlier_fit(earlier)
     if start is not None and earlier is None:
-        how = replace(how, start=quantity_parser("s")(start))
+        how = replace(how, start=_first_time(start))
     read = read_for_run(recordings, given, how, before=before)
     inputs = {"recording" if n == 0 else f"recording-{n + 1}": p for n, p in enumerate(recordings)}
     files = {"study": given.file, "flow": flow, "earlier": earlier and earlier / "fit.nc"}
@@ -136,3 +137,11 @@ def fit(
         print_result(found.fit, out, json=True, check=found.check)
     else:
         print_places(found.fit, out, sentences(found.fit, "warning"))
+
+
+def _first_time(text: str) -> float:
+    """Return the first time to keep [s], where no folder of a run has that name."""
+    try:
+        return float(parse_quantity(text, "s"))
+    except ConfigurationError as error:
+        raise InputError(f"--from {text}: no time in s, and no folder of a finished fit") from error

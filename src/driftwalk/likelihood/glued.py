@@ -92,7 +92,7 @@ def glued_study(study: Study, earlier: xr.Dataset) -> Study:
     if cells < 2 or len(one.block.body().cells) > 1:
         raise InputError(
             "an earlier fit of one block is the start of a fit of glued blocks "
-            f"({argument_text('body_shape', 'xx')}); to fit several recordings of one block "
+            f"({argument_text('block.shape', 'xx')}); to fit several recordings of one block "
             "together: driftwalk fit FIRST SECOND"
         )
     side = study.block.side_m

@@ -108,5 +108,10 @@ class Sensitivity(ForceGrid):
         """Values of each axis of the map, SI, in the order of the dimensions."""
         lists = {name: getattr(self, key) for name, key in AXES.items()}
         given = {name: values for name, values in lists.items() if values is not None}
+        if hidden := given.get("hidden_face_drag"):
+            # Words and shares are one axis: as text, which a study reads like a typed value.
+            given["hidden_face_drag"] = tuple(
+                one if isinstance(one, str) else f"{one:g}" for one in hidden
+            )
         ranges = {"drag_coefficient": self.drag_coefficients, "force_std": self.force_stds_N}
         return given or ranges

@@ -285,7 +285,9 @@ def _draw_noise(ax: Axes, check: xr.Dataset) -> None:
     from matplotlib.colors import CenteredNorm
 
     x, y = (in_unit(check[axis], "cm", stored="m") for axis in ("x", "y"))
-    off = (check["noise_ratio"].values - 1.0) / check["noise_ratio_std"].values
+    std = check["noise_ratio_std"].values
+    # A cell with one error has no spread.
+    off = (check["noise_ratio"].values - 1.0) / np.where(std > 0.0, std, np.nan)
     top = max(LEAST_TOP, float(np.nanmax(np.abs(off), initial=0.0)))
     # Purple and orange: apart for colour-blind readers, white where all is well.
     mesh = ax.pcolormesh(

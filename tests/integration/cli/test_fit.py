@@ -5,14 +5,12 @@ The recording is the bundled one, which another engine simulated.
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import DATA, FIT, RECORDING, Done, here, refusal
+from command_line import DATA, FIT, RECORDING, Done, answer, here, refusal
 
 import driftwalk as dw
 from driftwalk.schema.answers.facts import facts_of
@@ -23,12 +21,6 @@ REQUIRED = (
     *("force_interval_s", "force_noise_intensity_N2_s", "tracking_noise_m", "wall_share"),
     *("tracking_noise_m_interval", "warnings"),
 )
-
-
-def answer(done: Done) -> dict[str, Any]:
-    assert done.code == 0, done.err
-    found: dict[str, Any] = json.loads(done.out)
-    return found
 
 
 @pytest.mark.slow

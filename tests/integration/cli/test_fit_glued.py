@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import here
+from command_line import FLOW, answer, here
 from euler_blocks import stirred
 
 import driftwalk as dw
@@ -54,21 +52,15 @@ def recordings(folder: Path) -> tuple[Path, Path]:
     return recorded(folder, "one", one, flow), recorded(folder, "two", glued, flow)
 
 
-def answer(*arguments: Any) -> dict[str, Any]:
-    done = here(*arguments, "--json")
-    assert done.code == 0, done.err
-    found: dict[str, Any] = json.loads(done.out)
-    return found
-
-
 @pytest.mark.slow
 @pytest.mark.usefixtures("no_figures")
 def test_a_dimer_tells_hidden_drag_and_shared_stirring(tmp_path: Path) -> None:
     one, two = recordings(tmp_path)
     fit, dimer = tmp_path / "fit", tmp_path / "dimer"
     stated = ("--side", "3cm", "--mass", "11.6g", "--force-interval", "10ms")
-    answer("fit", one, "--tank", "32cm", *stated, "--no-check", "-o", fit)
-    found = answer("fit", two, "--body-shape", "xx", "--from", fit, "--no-check", "-o", dimer)
+    answer(here("fit", one, "--tank", "32cm", *stated, "--no-check", "-o", fit, "--json"))
+    glued = ("--body-shape", "xx", "--from", fit, "--no-check", "--json")
+    found = answer(here("fit", two, *glued, "-o", dimer))
     # Twice the interval: what is tested is that the numbers are those of the recording.
     for name, truth in (("hidden_face_drag_share", HIDDEN), ("stirring_correlation", RHO)):
         low, high = found[f"{name}_interval"]
@@ -76,14 +68,24 @@ def test_a_dimer_tells_hidden_drag_and_shared_stirring(tmp_path: Path) -> None:
         assert high - low < 0.5
     assert found["stirring_length_m"] == pytest.approx(LENGTH, rel=0.2)
     assert found["stirring_misfit_std"] < 4.0
-    predicted = answer(
-        "assemble", fit, "--from", dimer, "--runs", "40", "--duration", "20s", "--film", "none",
-        "-o", tmp_path / "four",
-    )  # fmt: skip
+    few = ("--runs", "40", "--duration", "20s", "--film", "none", "--json")
+    predicted = answer(here("assemble", fit, "--from", dimer, *few, "-o", tmp_path / "four"))
     assert float(predicted["hidden_face_drag"]) == found["hidden_face_drag_share"]
     refused = here("assemble", dimer, "-o", tmp_path / "five")
     assert refused.code == 2
     assert "square blocks assemble, and the body is 'xx'" in refused.err
+
+
+def test_shares_of_hidden_drag_and_lengths_are_axes(tmp_path: Path) -> None:
+    """Words and numbers of the drag on joined faces, in one map with the stirring length (m)."""
+    vary = ("--vary", "hidden-face-drag=none,0.5,1", "--vary", "stirring-length=0,6cm")
+    study = tmp_path / "study.toml"
+    study.write_text("[sensitivity]\nruns = 4\nreference_realisations = 2\n")
+    few = ("--study", study, "--blocks", "2", "--duration", "2s", "-o", tmp_path / "map")
+    assert here("sensitivity", "--flow", FLOW, *vary, *few).code == 0
+    found = xr.open_dataset(tmp_path / "map" / "sensitivity.nc")
+    assert list(found["hidden_face_drag"].values) == ["none", "0.5", "1"]
+    assert found["stirring_length"].values == pytest.approx([0.0, 0.06])
 
 
 def test_what_cannot_be_glued_is_refused(tmp_path: Path) -> None:

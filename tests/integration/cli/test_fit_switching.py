@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import Done, here, refusal
+from command_line import Done, answer, here, refusal
 from switching_worlds import DRAG, START_S, SWITCH_S, true_flows, two_flows
 
 import driftwalk as dw
@@ -31,12 +29,6 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def finished(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Done]:
     folder = tmp_path_factory.mktemp("fit") / "run"
     return folder, here("fit", recording, *COARSE, *SWITCH, "-o", folder, "--json")
-
-
-def answer(done: Done) -> dict[str, Any]:
-    assert done.code == 0, done.err
-    found: dict[str, Any] = json.loads(done.out)
-    return found
 
 
 @pytest.mark.slow

@@ -85,6 +85,7 @@ def values_of(key: str) -> st.SearchStrategy[tuple[str, Any]]:
     """Return texts that a user may type for a key, each with the value that it means."""
     by_hand: dict[str, list[tuple[str, Any]]] = {
         "fit.switching_times_s": [("1, 2.5", (1.0, 2.5)), ("16ms", (0.016,))],
+        "block.shape": [("disc", "disc"), ("xx", "xx"), ("x./xx", "x./xx")],
         "fit.flow_labels": [("A,B,A", ("A", "B", "A"))],
         "recover.durations_s": [("10min,1h", (600.0, 3600.0)), ("20", (20.0,))],
         "recover.flow": [("a/flow.nc", "a/flow.nc")],

@@ -485,7 +485,4 @@ def _plain(values: Any) -> list[Any]:
 
 
 def _array(values: tuple[Any, ...]) -> npt.NDArray[Any]:
-    # Words and shares of the drag on joined faces may stand together.
-    if any(isinstance(value, str) for value in values):
-        return np.array([str(value) for value in values], dtype=object)
-    return np.array(values)
+    return np.array(values, dtype=object if isinstance(values[0], str) else None)
