@@ -22,6 +22,7 @@ def pages() -> dict[str, str]:
     return {path.name: text for path, text in all_pages().items()}
 
 
+@pytest.mark.slow
 def test_pages_are_written_and_those_of_rooms_that_are_gone_are_removed(
     pages: dict[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

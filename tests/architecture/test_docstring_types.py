@@ -76,6 +76,7 @@ def documented(room: str) -> Iterator[tuple[str, str]]:
                         yield f"{name}.{member}", inspect.getdoc(inner) or ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("room", [*ROOMS, ERRORS])
 def test_types_in_docstrings_exist(room: str) -> None:
     wrong = {

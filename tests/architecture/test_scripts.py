@@ -120,6 +120,7 @@ SOURCES_OF_STUDIES = (
 )
 
 
+@pytest.mark.slow
 def test_results_are_named_after_sources_that_exist() -> None:
     """Results carry a number of the sources that made them; made of no file it says nothing."""
     patterns = {

@@ -93,7 +93,7 @@ def timed(sample: Sample) -> tuple[Done, float]:
     return done, time.process_time() - begin
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("damage", DAMAGES, ids=lambda damage: damage.__name__)
 def test_damage_is_one_line(
     samples: list[Sample], damage: Callable[[Sample], bytes | None]

@@ -91,7 +91,7 @@ def test_the_block_is_a_cube_of_water_and_its_ranges_hold_the_estimates(name: st
     assert len(study.calibration.force_stds_N) == 41
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RECORDINGS)
 def test_a_flow_field_is_extracted_with_every_study(
     name: str, shared_data: SharedData, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -78,6 +78,7 @@ def found(pages: tuple[dict, dict], killed: Path) -> xr.Dataset:
     return result
 
 
+@pytest.mark.slow
 def test_a_killed_run_is_continued_to_its_manifest(found: xr.Dataset, killed: Path) -> None:
     from toy_kind import ToyWork
 
@@ -94,6 +95,7 @@ def test_a_killed_run_is_continued_to_its_manifest(found: xr.Dataset, killed: Pa
         run_work(ToyWork(0), killed)
 
 
+@pytest.mark.slow
 def test_its_figures_are_written_and_drawn_again(
     found: xr.Dataset, killed: Path, tmp_path: Path
 ) -> None:
@@ -103,6 +105,7 @@ def test_its_figures_are_written_and_drawn_again(
     assert again[0].read_bytes() == (killed / "figures" / "shares.svg").read_bytes()
 
 
+@pytest.mark.slow
 def test_its_pages(pages: tuple[dict, dict], found: xr.Dataset, killed: Path) -> None:
     live, early = pages
     assert live["title"] == "A toy under way"
@@ -115,6 +118,7 @@ def test_its_pages(pages: tuple[dict, dict], found: xr.Dataset, killed: Path) ->
         assert page["sections"][0]["paragraphs"][0].startswith("π                      3.")
 
 
+@pytest.mark.slow
 def test_its_answer_on_the_terminal_and_in_a_notebook(found: xr.Dataset, killed: Path) -> None:
     done = here("info", killed)
     assert done.code == 0, done.err
@@ -125,6 +129,7 @@ def test_its_answer_on_the_terminal_and_in_a_notebook(found: xr.Dataset, killed:
     assert "<pre>π                      3." in as_result(found)._repr_html_()
 
 
+@pytest.mark.slow
 def test_a_report_of_the_command_line(found: xr.Dataset, killed: Path, tmp_path: Path) -> None:
     done = here("report", killed, "-o", tmp_path / "toy.html")
     assert done.code == 0, done.err

@@ -23,6 +23,7 @@ def check(seeds: range, folder: Path) -> None:
     assert found["right"] > 0.75 * len(seeds)
 
 
+@pytest.mark.slow
 def test_two_hundred_dialects(tmp_path: Path) -> None:
     check(range(200), tmp_path)
 

@@ -206,6 +206,7 @@ def test_describe_is_valid_json_for_any_recording(points: list[tuple[float, ...]
     json.dumps(describe(dataset), allow_nan=False)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @given(st.one_of(st.text(max_size=20), st.from_regex(r"(circle|rect|polygon|fit):[-0-9x.@,cm]*")))
 def test_an_arena_is_read_or_refused(text: str) -> None:

@@ -105,6 +105,7 @@ def test_a_dimer_feels_all_its_faces(study: dict[str, ModuleType], hidden: float
         assert found[1][0] == pytest.approx(torque, abs=0.01 * abs(force) * SIDE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("correlation", [0.0, 0.8])
 def test_forces_of_the_members_of_a_dimer(study: dict[str, ModuleType], correlation: float) -> None:
     """var F = 2 sigma^2 (1 + rho), var torque = sigma^2 (1 - rho) a^2 / 2.

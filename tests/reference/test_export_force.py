@@ -52,7 +52,7 @@ def twin_push(block: Block, states: Floats) -> Floats:
     return np.stack(drag(twin, coefficient, pose, motion)[:3]) + push_of_water(twin, pose)
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("language", ["C", "Python"])
 @pytest.mark.parametrize("law", LAWS)
 def test_the_water_pushes_as_in_the_twin(law: str, language: str, code: Any) -> None:

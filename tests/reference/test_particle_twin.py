@@ -283,7 +283,7 @@ def test_an_inertial_particle_moves_as_its_twin(tank: Tank, reflects: bool, carr
     agree(Case((), shared, tank, reflects, carried))
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["active", "run and rest", "diffusion"])
 def test_the_water_carries_a_particle_as_its_twin(name: str) -> None:
     case = SWITCHING[name]

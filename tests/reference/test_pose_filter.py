@@ -283,6 +283,7 @@ def test_without_drag_it_is_the_normal_law_of_all_samples_at_once():
     assert logarithm == pytest.approx(want, abs=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.false_alarm(2e-3)
 def test_whitened_innovations_of_a_linear_world_are_standard_normal(fresh_seed):
     """False alarm in 500; a lever too large by a fifth, or 10 % more noise of the angle, is caught.

@@ -169,6 +169,7 @@ def swirl(z: plain.Complexes) -> plain.Complexes:
     return (0.45j - 0.2) * z * np.exp(-((np.abs(z) / 0.14) ** 4)) + jets
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("shape", "own"),
     [
@@ -263,6 +264,7 @@ def test_slopes_of_the_mean_drag_are_its_differences(shape: str, size: int, powe
     np.testing.assert_allclose(moved, (ahead - back) / 2e-6, rtol=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.false_alarm(2e-4)
 @pytest.mark.parametrize("shape", ["disc", "xx"])
 def test_the_mean_drag_is_the_mean_of_draws(shape: str, fresh_seed: Any) -> None:

@@ -156,6 +156,7 @@ def test_a_rectangle_of_equal_sides_moves_as_the_square_block(tank: dict[str, An
     assert np.abs(single[0] - single[1]).max() < 5e-5
 
 
+@pytest.mark.slow
 @pytest.mark.false_alarm(3e-4)
 def test_a_force_with_a_lever_turns_a_free_body(fresh_seed: Any) -> None:
     """var(omega) = (sigma_F l / I)² tau t, and nothing of it is in the velocity.

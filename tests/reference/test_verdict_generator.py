@@ -132,6 +132,7 @@ def test_the_water_turns_a_floating_block_in_an_eddy_of_its_size(
     assert np.abs(turning - moment).max() < 0.01 * np.abs(moment).max()
 
 
+@pytest.mark.slow
 def test_the_drag_takes_the_power_that_the_force_gives(study: dict[str, ModuleType]) -> None:
     """In the steady state <-drag . v> = sigma_F^2 tau / M, whatever the angle and the law.
 
@@ -194,6 +195,7 @@ def squared(path: np.ndarray, lag: int) -> float:
     return float(np.mean(np.abs(path[lag:] - path[:-lag]) ** 2))
 
 
+@pytest.mark.slow
 def test_squared_displacements_are_those_of_each_law(study: dict[str, ModuleType]) -> None:
     """With a memory exp(-a t) of the velocity, complex a where it turns, and <|v|^2> = V,
     msd = 2 V Re(t/a - (1 - exp(-a t))/a^2). 9,000 s hold some 4,500 memories: 3 % sd or less."""
@@ -222,6 +224,7 @@ def test_squared_displacements_are_those_of_each_law(study: dict[str, ModuleType
             assert squared(path, lag) == pytest.approx(sum(parts), rel=0.12), given["law"]
 
 
+@pytest.mark.slow
 def test_times_and_speeds_of_bouts(study: dict[str, ModuleType]) -> None:
     """Runs and rests of exponential law: the share of rests, and the mean speed of runs."""
     given = {"law": "run and rest", "speed": 0.03, "bout_s": 2.0, "rest_s": 1.0, "turn_std": 1.0}
@@ -271,6 +274,7 @@ def test_flows_are_of_the_stated_strength_and_keep_the_water(study: dict[str, Mo
         assert np.abs(spread[2:-2, 2:-2]).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_sets_have_the_numbers_of_the_table_and_no_world_twice(
     study: dict[str, ModuleType],
 ) -> None:
@@ -282,6 +286,7 @@ def test_sets_have_the_numbers_of_the_table_and_no_world_twice(
     assert len(outside) >= 20
 
 
+@pytest.mark.slow
 def test_a_longer_recording_tells_more_and_one_in_place_nothing(
     study: dict[str, ModuleType],
 ) -> None:

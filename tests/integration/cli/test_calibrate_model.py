@@ -58,6 +58,7 @@ def test_the_speed_of_an_active_body_is_found(
     assert "force_interval_s" not in said
 
 
+@pytest.mark.slow
 def test_a_model_in_a_file_of_the_users(
     place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

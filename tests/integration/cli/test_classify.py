@@ -94,6 +94,7 @@ def test_nothing_joined(recording: Path) -> None:
     assert "no blocks joined" in done.out
 
 
+@pytest.mark.slow
 def test_file(recording: Path, tmp_path: Path) -> None:
     out = tmp_path / "classes.nc"
     assert f"driftwalk: wrote {out}\n" in here("classify", recording, "-o", out).err

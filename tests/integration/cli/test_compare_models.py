@@ -74,6 +74,7 @@ def test_people_read_the_answer(run: tuple[Path, dict], capsys: pytest.CaptureFi
     assert str(folder / "figures") in out
 
 
+@pytest.mark.slow
 def test_models_are_ranked_as_they_finish(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     compare_after_little(monkeypatch)
     done = here("compare-models", *SHORT, "-o", tmp_path / "run")

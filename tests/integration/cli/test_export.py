@@ -81,6 +81,7 @@ def test_the_proof_can_fail(study: Path, tmp_path: Path, monkeypatch: pytest.Mon
     assert "NOT the same" in done.stdout
 
 
+@pytest.mark.slow
 def test_a_keyframe_is_the_replicate_of_driftwalk_simulate(study: Path, tmp_path: Path) -> None:
     mujoco = pytest.importorskip("mujoco", reason="mujoco-core is not installed")
     out = tmp_path / "tank"

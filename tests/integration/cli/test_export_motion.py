@@ -203,6 +203,7 @@ def test_figures_come_with_the_numbers_that_they_draw(run: Path, tmp_path: Path)
     assert {round(1.0 - value, 12) for value in expected} <= shown
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -226,6 +227,7 @@ def test_what_cannot_be_exported_is_refused(
     assert contents(tmp_path) == {}
 
 
+@pytest.mark.slow
 def test_a_run_says_what_to_cite(run: Path) -> None:
     done = here("cite", run)
     assert done.code == 0, done.err
@@ -241,6 +243,7 @@ def test_a_run_says_what_to_cite(run: Path) -> None:
     assert json.loads(here("cite", run, "--json").out)["version"] == dw.__version__
 
 
+@pytest.mark.slow
 def test_what_has_nothing_to_cite_is_refused(tmp_path: Path, blocks: Path) -> None:
     assert "finished run" in refusal(here("cite", tmp_path))
     assert "assembly_path" in refusal(here("cite", blocks))

@@ -53,6 +53,7 @@ def test_from_a_table_of_tracks_to_a_flow_that_is_simulated_in(tmp_path: Path) -
     assert code == 0, err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "tracks", "steps"),
     [

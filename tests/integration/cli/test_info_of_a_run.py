@@ -46,6 +46,7 @@ def test_the_answer_of_each_kind(
     assert key in facts
 
 
+@pytest.mark.slow
 def test_what_an_answer_needs_is_missed_in_one_line(tmp_path: Path) -> None:
     run = stored(tmp_path / "run", "sensitivity", {"sensitivity.nc": "sensitivity"})
     line = refusal(here("info", run))

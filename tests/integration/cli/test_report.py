@@ -65,6 +65,7 @@ def kinds_of(page: dict[str, Any]) -> dict[str, str]:
     return {part["id"]: part["kind"] for part in page["sections"]}
 
 
+@pytest.mark.slow
 def test_a_calibration(run: Path, tmp_path: Path) -> None:
     before = contents(run)
     page = report_of(run, tmp_path / "report.html")

@@ -137,6 +137,7 @@ def test_a_study_file_says_what_is_simulated(calibrated: Path, tmp_path: Path) -
     assert f"[tank] diameter_m is 0.25, and {calibrated} was made with 0.3" in line
 
 
+@pytest.mark.slow
 def test_flows_of_a_study_lie_beside_it(tmp_path: Path) -> None:
     shutil.copy(FLOW, tmp_path / "one.csv")
     shutil.copy(FLOW, tmp_path / "two.csv")

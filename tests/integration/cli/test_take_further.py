@@ -119,6 +119,7 @@ def compared(tmp_path: Path) -> Callable[[str], Path]:
     return make
 
 
+@pytest.mark.slow
 def test_a_fit_is_assembled_with_all_that_it_knows(
     fitted: Path, assembled: tuple[Path, Done]
 ) -> None:
@@ -168,6 +169,7 @@ def test_the_fit_is_the_reference_of_a_sensitivity_analysis(fitted: Path, tmp_pa
     assert reference["force_std_N"] == fitted_value(known, "force_std")
 
 
+@pytest.mark.slow
 def test_a_fit_is_simulated(fitted: Path, tmp_path: Path) -> None:
     done = here("simulate", fitted, "--duration", "2s", "--seed", "3", "-o", tmp_path / "sim.nc")
     assert done.code == 0, done.err

@@ -220,6 +220,7 @@ def test_a_message_without_measure_ends_only_its_sender(server: PageServer) -> N
         received(other, "cell")
 
 
+@pytest.mark.slow
 def test_so_many_browsers_and_no_more(server: PageServer) -> None:
     """Fifty that never read: the first 32 are let in, and whoever leaves makes room."""
     with contextlib.ExitStack() as stalled:

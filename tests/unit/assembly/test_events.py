@@ -56,6 +56,7 @@ def test_small_worlds(blocks: int, chirality: Chirality) -> None:
             assert (padded[number, count:] == -1).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("blocks", [7, 12, 64])
 def test_larger_worlds(blocks: int) -> None:
     """Two worlds have one class exactly when they have the same multiset of forms."""

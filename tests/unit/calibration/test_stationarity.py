@@ -65,6 +65,7 @@ def test_a_short_recording_says_nothing() -> None:
     assert stationarity_of(short) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "file", "steady"),
     [

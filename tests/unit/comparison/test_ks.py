@@ -137,6 +137,7 @@ for n, m in ((3, 5), (700, 700), (1000, 777), (40_000, 30_000), (70_000, 65_000)
 """
 
 
+@pytest.mark.slow
 def test_every_instruction_set_gives_the_same_numbers() -> None:
     printed = {}
     for name in _core.available_instruction_sets():

@@ -109,6 +109,7 @@ def plain_distance(a: np.ndarray, b: np.ndarray) -> float:
     return 0.5 * sum(largest)
 
 
+@pytest.mark.slow
 @pytest.mark.false_alarm(1e-4)
 @pytest.mark.parametrize("shift", [0.0, 0.5, 1.2])
 def test_the_p_value_is_that_of_a_plain_oracle(

@@ -258,6 +258,7 @@ def fast(passes: Passes) -> Passes:
     return replace(passes, series=[one])
 
 
+@pytest.mark.slow
 def test_of_a_fast_camera_the_information_is_nearly_that_of_all_derivatives(
     fast: Passes, point: Point
 ) -> None:

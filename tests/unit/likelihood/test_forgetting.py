@@ -41,6 +41,7 @@ def test_a_contact_ends_the_memory() -> None:
     assert kept[100:, 0] == pytest.approx(kept[:100, 0], rel=1e-12)
 
 
+@pytest.mark.slow
 def test_the_bias_of_a_rate_is_that_of_the_sum() -> None:
     """Velocities pulled to a mean that is new in every visit: the score at the fitted means.
 

@@ -101,6 +101,7 @@ def test_the_sum_of_squares_is_that_of_every_vector(scale_std: float) -> None:
     assert -expected == pytest.approx(step.ravel() @ curvature @ step.ravel(), rel=0.05)
 
 
+@pytest.mark.slow
 def test_errors_are_estimated_from_the_scatter_around_a_smooth_flow() -> None:
     one = read(of_fit(2e-3))
     assert np.nanmean(one.error) == pytest.approx(2e-3, rel=0.1)  # 3 sd

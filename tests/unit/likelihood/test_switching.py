@@ -186,6 +186,7 @@ def test_the_prior_of_several_flows_is_that_of_each() -> None:
         assert new == pytest.approx(np.clip(wanted, old / 10.0, old * 10.0))
 
 
+@pytest.mark.slow
 def test_a_flow_that_comes_back_is_one_flow() -> None:
     """Three intervals in two flows: the first flow's block has both its intervals."""
     middle = START_S + SWITCH_S

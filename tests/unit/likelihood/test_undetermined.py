@@ -110,6 +110,7 @@ def _at(mode: Mode) -> Any:
     return Restricted(mode.point, 0.1, [], has_minimum=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("error", [OverflowError("math range error"), np.linalg.LinAlgError("no")])
 def test_a_check_or_a_wall_that_breaks_down_leaves_the_fit(error: Any, monkeypatch: Any) -> None:
     def breaks(*given: Any, **options: Any) -> None:
@@ -190,6 +191,7 @@ def test_every_search_beside_the_law_may_break_down_alone(error: Any) -> None:
     assert (found.floating, found.left_out) == (True, law.left_out)
 
 
+@pytest.mark.slow
 def test_a_fit_without_its_departures_says_so(monkeypatch: Any) -> None:
     def breaks(*given: Any) -> None:
         raise OverflowError("math range error")

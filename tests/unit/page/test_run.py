@@ -65,6 +65,7 @@ def datasets() -> dict[str, xr.Dataset]:
     }
 
 
+@pytest.mark.slow
 def test_a_finished_run(tmp_path: Path, datasets: dict[str, xr.Dataset]) -> None:
     page = report_page(make_run(tmp_path / "run", datasets))
     assert (page["format"], page["version"], page["view"]) == ("driftwalk page", 1, "report")

@@ -91,6 +91,7 @@ def test_speed_shortens_the_film(tmp_path) -> None:
     assert len(frames_of(write_animation(two_bodies(), tmp_path / "a.gif", speed=4.0))) == 13
 
 
+@pytest.mark.slow
 def test_a_block_lies_in_the_picture_as_it_does_in_the_tank(tmp_path) -> None:
     """Turned by 45 degrees, a square is as wide as its diagonal."""
     recording = two_bodies()
@@ -102,7 +103,7 @@ def test_a_block_lies_in_the_picture_as_it_does_in_the_tank(tmp_path) -> None:
         assert np.ptp(rows) == pytest.approx(per_cm * width, abs=6.0)
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("unknown", ["theta", "side"])
 def test_without_a_side_or_an_orientation_a_body_is_a_disc(unknown, tmp_path) -> None:
     recording = two_bodies(block_side_m=None if unknown == "side" else 0.03)

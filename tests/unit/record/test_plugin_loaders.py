@@ -123,6 +123,7 @@ def test_a_file_of_the_package_is_read(answers: dict[str, tuple[str, str, Path]]
     assert answers["good"][0] == "0"
 
 
+@pytest.mark.slow
 def test_other_files_are_read_though_two_entry_points_are_broken(
     answers: dict[str, tuple[str, str, Path]],
 ) -> None:
@@ -132,6 +133,7 @@ def test_other_files_are_read_though_two_entry_points_are_broken(
     assert said.count("\n") == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "message"),
     [

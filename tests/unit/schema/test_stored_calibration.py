@@ -85,6 +85,7 @@ def test_a_model_of_the_user_answers_under_its_own_names(form: str) -> None:
         assert facts[f"coarse_{one.key}"] in found[one.name].values
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", FORMS)
 def test_flat_facts_and_variables_are_each_other_s_inverse(form: str) -> None:
     found = every_kind(form)

@@ -27,11 +27,13 @@ def stored(dataset: xr.Dataset, folder: Path) -> xr.Dataset:
     return open_netcdf(path)
 
 
+@pytest.mark.slow
 def test_what_is_stored_is_what_is_in_memory(fit: xr.Dataset, tmp_path: Path) -> None:
     xr.testing.assert_identical(stored(fit, tmp_path), fit)
     assert facts_of(stored(fit, tmp_path)) == facts_of(fit)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [0, 1, 2])
 def test_warnings_are_kept_however_many_there_are(
     fit: xr.Dataset, count: int, tmp_path: Path

@@ -58,6 +58,7 @@ def test_they_end_when_an_error_leaves_the_block() -> None:
     wait_for_end(seen[0])
 
 
+@pytest.mark.slow
 def test_they_end_when_their_parent_is_killed() -> None:
     code = (
         "import os, time\n"

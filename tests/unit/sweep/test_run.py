@@ -70,6 +70,7 @@ def test_size_of_units_does_not_matter(size: int) -> None:
     assert same(run_sweep(noisy, DESIGN.units(size)), EXPECTED)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["threads", "processes"])
 def test_executors_give_the_same_arrays(kind: str, tmp_path: Path) -> None:
     store = ShardStore(tmp_path, fingerprint={})

@@ -93,6 +93,7 @@ def test_slow_client_loses_frames_and_the_tracker_does_not_wait(connect) -> None
         assert 0 < lost <= 400 - len(frames)
 
 
+@pytest.mark.slow
 def test_the_last_lines_wait_for_a_client_that_is_busy(connect) -> None:
     with LiveServer(0) as server:
         _, reader = connect(server, small=True)

@@ -211,7 +211,7 @@ def test_marking_is_not_everything() -> None:
     assert unmarked_swaps(recording, world)[1] == 0
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 def test_blocks_that_are_joined_are_not_marked_all_the_time(seed: int) -> None:
     """Four blocks side by side move as one, each missed in 5 % of the frames."""

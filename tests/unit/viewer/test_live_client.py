@@ -72,6 +72,7 @@ def test_hello_and_frames_are_handed_on() -> None:
     asyncio.run(run())
 
 
+@pytest.mark.slow
 def test_no_event_is_missed_with_a_frame() -> None:
     async def run() -> None:
         with LiveServer(0, hello=HELLO) as server:
@@ -111,6 +112,7 @@ def test_a_lost_tracker_is_found_again(port: int) -> None:
     asyncio.run(run())
 
 
+@pytest.mark.slow
 def test_the_end_is_no_loss() -> None:
     async def run() -> None:
         with LiveServer(0, hello=HELLO) as server:
@@ -319,6 +321,7 @@ def test_the_same_wish_for_images_is_passed_on_once() -> None:
     asyncio.run(run())
 
 
+@pytest.mark.slow
 def test_nobody_there_is_said_once(port: int) -> None:
     async def run() -> None:
         async with listening(port) as (source, heard):

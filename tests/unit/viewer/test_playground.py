@@ -207,6 +207,7 @@ def test_positions_are_taken_at_the_recording_s_interval(interval: float) -> Non
             np.testing.assert_allclose(taken[known, block, part], wanted[known], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_messages_and_actions() -> None:
     async def run() -> list[Any]:
         source = PlaySource(Study(), dw.flow.random_tank_flow(1), blocks=3)

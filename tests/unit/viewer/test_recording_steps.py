@@ -37,7 +37,7 @@ def straight() -> xr.Dataset:
     return build_trajectory(time, 0.05 * np.sin(time / 10), 0 * time, 0 * time)
 
 
-@pytest.mark.fast_cases(1)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("recording", "change"),
     [

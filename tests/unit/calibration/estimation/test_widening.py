@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from driftwalk.calibration.estimation.synthetic_likelihood import LocalEmulator
 
@@ -16,6 +17,7 @@ def emulator_with(freedom: int) -> LocalEmulator:
     return LocalEmulator(middle, width, "squares", flat, np.eye(SUMMARIES), used, freedom)
 
 
+@pytest.mark.slow
 def test_it_is_the_scatter_over_the_stated_error() -> None:
     """Linear least squares, the covariance from simulations drawn anew each time.
 

@@ -55,6 +55,7 @@ def compared(recorded: Draw, seed: int) -> tuple[Any, list[list[int]]]:
     return bout_distances(motion, seen), [rests, *(one for _, one in worlds)]
 
 
+@pytest.mark.slow
 def test_rests_of_the_law_itself_are_like_its_own_and_a_power_law_is_not() -> None:
     for seed in range(6):
         found, _ = compared(exponential, seed)

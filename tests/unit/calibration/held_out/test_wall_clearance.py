@@ -9,6 +9,7 @@ from sliding_walkers import CLEARANCE, NOISE, TANK, sliding_recording
 from driftwalk.calibration.held_out.wall_clearance import estimate_clearance
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["run_and_tumble", "active_chiral", "two_state"])
 def test_the_noise_of_the_camera_brings_no_wall_nearer(name: str) -> None:
     """The 1 % quantile of the recorded distances is 0.4 mm too short."""
@@ -29,6 +30,7 @@ def drawn(random: np.random.Generator, *, at_wall: float, noise: float = NOISE) 
     return true + noise * random.normal(size=true.size)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("at_wall", [0.0, 0.05, 0.5])
 def test_errors_are_as_large_as_stated(at_wall: float) -> None:
     """Ten recordings: the mean square of errors over their standard errors is 1 ± 0.45."""

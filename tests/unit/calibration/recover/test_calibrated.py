@@ -39,6 +39,7 @@ def test_at_the_end_of_the_range_nothing_is_determined(parameter: Parameter) -> 
     assert np.isnan(interval_half_width(missing, 0.1, parameter, confidence=0.9))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("form", "model"),
     [

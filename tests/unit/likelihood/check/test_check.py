@@ -71,6 +71,7 @@ def simulated(flow: xr.Dataset, *, seconds: float = 600.0, seed: int = 1) -> xr.
     return build_trajectory(time, *pose)
 
 
+@pytest.mark.slow
 def test_the_bundled_recording_is_explained(check: xr.Dataset, fit: xr.Dataset) -> None:
     """Another engine, the same model. False alarm: one in 50."""
     said, reasons, failed = verdict(check)
@@ -85,6 +86,7 @@ def test_the_bundled_recording_is_explained(check: xr.Dataset, fit: xr.Dataset) 
     assert low <= facts["ks_distance"] <= high
 
 
+@pytest.mark.slow
 def test_what_the_fit_says_of_its_innovations_is_said_again(
     check: xr.Dataset, fit: xr.Dataset
 ) -> None:
@@ -96,6 +98,7 @@ def test_what_the_fit_says_of_its_innovations_is_said_again(
     assert first == pytest.approx(facts_of(fit)["autocorrelation"], abs=1e-9)
 
 
+@pytest.mark.slow
 def test_sums_by_place_and_by_time_agree(check: xr.Dataset) -> None:
     count = check["residual_count"].values
     assert count.sum() == check.attrs["samples_used"] == check["part_count"].sum()

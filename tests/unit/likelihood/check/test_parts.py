@@ -183,6 +183,7 @@ def test_lags_without_a_pair_take_no_degree_of_freedom() -> None:
     assert found.p_value == pytest.approx(chi2.sf(found.portmanteau, 20))
 
 
+@pytest.mark.slow
 @pytest.mark.false_alarm(1e-3)
 def test_what_fitting_puts_in_is_taken_out_again(fresh_seed: Callable[[int], int]) -> None:
     """Residuals of a local mean are anticorrelated; with the leverage known they count as white."""

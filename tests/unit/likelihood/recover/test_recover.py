@@ -120,6 +120,7 @@ def test_a_setting_is_the_fit_of_its_recording(found: xr.Dataset, flow: xr.Datas
     assert 0.0 < float(part["flow_error"]) < 1.0
 
 
+@pytest.mark.slow
 def test_the_dataset_is_whole(found: xr.Dataset) -> None:
     assert dict(found.sizes) == {"duration": 2, "angle": 1, "recording": 2, "parameter": 3}
     assert (found["status"].values == 0).all()

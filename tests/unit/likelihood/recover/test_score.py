@@ -53,7 +53,7 @@ def test_the_parameters_are_held_beside_the_truth(fit: xr.Dataset) -> None:
         assert [score[f"{name}_low"], score[f"{name}_high"]] == facts_of(fit)[f"{name}_interval"]
 
 
-@pytest.mark.fast_cases(6)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["drag_coefficient", "force_std", "tracking_noise"])
 @pytest.mark.parametrize(
     ("sds", "covered"), [(1.6, True), (1.7, False), (-1.6, True), (-1.7, False)]
@@ -108,6 +108,7 @@ def test_the_flow_error_by_brute_force(fit: xr.Dataset, track: xr.Dataset) -> No
     assert score["flow_error"] == pytest.approx(math.sqrt(total / size), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_without_the_recording_about_the_same_cells_count(
     fit: xr.Dataset, track: xr.Dataset
 ) -> None:
@@ -116,6 +117,7 @@ def test_without_the_recording_about_the_same_cells_count(
     assert about["flow_error"] == pytest.approx(exact["flow_error"], rel=0.4)
 
 
+@pytest.mark.slow
 def test_a_flow_that_is_a_tenth_too_strong_is_off_by_a_tenth(
     fit: xr.Dataset, track: xr.Dataset
 ) -> None:
@@ -139,12 +141,14 @@ def test_a_block_averages_a_parabola_by_its_second_moment() -> None:
     assert found[:, 1] == pytest.approx([0.0, 0.0], abs=1e-15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wrong", [0.0, -1.0, math.nan, math.inf])
 def test_a_truth_has_to_be_positive(fit: xr.Dataset, wrong: float) -> None:
     with pytest.raises(InputError, match="the true force_std_N is"):
         scored(fit, force_std=wrong)
 
 
+@pytest.mark.slow
 def test_what_is_no_fit_is_refused(track: xr.Dataset) -> None:
     with pytest.raises(InputError, match="expected a dataset 'fit'"):
         scored(track)

@@ -53,6 +53,7 @@ write(f"{{len(line)}}\\n")
     one.close()
 
 
+@pytest.mark.slow
 def test_one_that_answers_before_it_has_read_and_ends_its_output(tmp_path: Path) -> None:
     """Its answer may count; asked again, it has ended, and another copy can be started."""
     source = """
@@ -82,6 +83,7 @@ def test_its_last_words_are_told(tmp_path: Path) -> None:
     one.close()
 
 
+@pytest.mark.slow
 def test_one_that_reads_nothing(tmp_path: Path) -> None:
     one = program("import time\ntime.sleep(60)", tmp_path)
     began = time.monotonic()

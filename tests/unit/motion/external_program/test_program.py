@@ -218,6 +218,7 @@ def test_the_request_is_as_the_page_says(tmp_path):
     assert len({one["id"] for one in (both, alone, *asked)}) == 5
 
 
+@pytest.mark.slow
 def test_threads_and_restarts_do_not_change_a_world(tmp_path):
     expected = simulate()
     assert_same(simulate(like=replace(LIKE, threads=4)), expected, "threads matter")
@@ -324,6 +325,7 @@ def test_a_copy_that_makes_other_worlds_is_found():
         model.simulate(VALUES, LIKE, KEYS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("fault", "hint"),
     [
@@ -344,6 +346,7 @@ def test_a_program_that_hangs_is_ended_with_all_that_it_started(fault, hint, tmp
     assert (counted > 0) == (fault == "hang")
 
 
+@pytest.mark.slow
 def test_a_program_that_reads_nothing_hangs_too(tmp_path):
     """The request does not fit into the pipe, and nobody reads it."""
     script = written(tmp_path, "import time\ntime.sleep(600)\n")
@@ -363,6 +366,7 @@ def test_an_error_ends_the_requests_of_the_other_threads():
     assert pids(model) == []
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_the_requests():
     # A process that was started in the background ignores the signal.
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
