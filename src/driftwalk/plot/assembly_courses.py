@@ -8,6 +8,7 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
+from driftwalk.plot.parts import style
 from driftwalk.plot.parts.assembly_labels import (
     OTHER,
     check_kind,
@@ -21,13 +22,11 @@ from driftwalk.plot.parts.assembly_labels import (
 from driftwalk.plot.parts.labels import number_fact
 from driftwalk.plot.parts.polyomino_sketch import (
     NAME_SIZE_PT,
-    axes_points,
     class_cells,
     name_text,
     place_sketch,
     sketch_size,
 )
-from driftwalk.plot.parts.style import BLUE, INK, MUTED, ORANGE, axes_or_new
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -38,8 +37,8 @@ LABEL_GAP: Final = 0.012
 SKETCH_PT: Final = 9.0
 TIME_LABEL: Final = "time (s)"
 SURVIVAL: Final = {
-    "first_contact": ("no two blocks have met", BLUE, "-"),
-    "completion": ("more than one assembly", ORANGE, (0, (5, 2))),
+    "first_contact": ("no two blocks have met", style.BLUE, "-"),
+    "completion": ("more than one assembly", style.ORANGE, (0, (5, 2))),
 }
 
 BAR_WIDTH: Final = 0.76
@@ -84,7 +83,7 @@ def plot_class_times(
     if form not in ("lines", "stacked"):
         raise InputError(f"form='{form}': choose lines or stacked")
     check_kind(times, "class_times", "proportion", "time", "class")
-    ax = axes_or_new(ax, height_mm=75.0)
+    ax = style.axes_or_new(ax, height_mm=75.0)
     time = np.asarray(times["time"].values, dtype=np.float64)
     names, proportion = _shown(times)
     colors = class_colors(names)
@@ -143,7 +142,7 @@ def plot_survival(times: xr.Dataset, ax: Axes | None = None) -> Axes:
     curves = [name for name in SURVIVAL if name in times]
     if not curves:
         raise InputError(f"the dataset 'class_times' lacks {' and '.join(SURVIVAL)}")
-    ax = axes_or_new(ax, height_mm=65.0)
+    ax = style.axes_or_new(ax, height_mm=65.0)
     time = np.asarray(times["time"].values, dtype=np.float64)
     for name in curves:
         text, color, dashes = SURVIVAL[name]
@@ -179,7 +178,7 @@ def _shown(times: xr.Dataset) -> tuple[list[str], Floats]:
 
 def _label_right(ax: Axes, names: list[str], height: Floats, colors: dict[str, str]) -> None:
     """Put sketch and name of every class at its end, moved apart where they would meet."""
-    total_pt = float(axes_points(ax)[1])
+    total_pt = float(style.axes_points(ax)[1])
     low, high = ax.get_ylim()
     share = (height - low) / (high - low)
     known = [name != OTHER for name in names]
@@ -197,18 +196,18 @@ def _label_right(ax: Axes, names: list[str], height: Floats, colors: dict[str, s
         (sketch_size(class_cells(n))[0] for n, there in zip(names, known, strict=True) if there),
         default=1.0,
     )
+    leader = {"arrowstyle": "-", "lw": 0.4, "color": style.MUTED, "shrinkA": 0, "shrinkB": 0}
     for name, there, at, end in zip(names, known, place, share, strict=True):
         ax.annotate(
             "", (1.0, end), xytext=(8.0, (at - end) * total_pt), xycoords="axes fraction",
-            textcoords="offset points", annotation_clip=False,
-            arrowprops={"arrowstyle": "-", "lw": 0.4, "color": MUTED, "shrinkA": 0, "shrinkB": 0},
+            textcoords="offset points", annotation_clip=False, arrowprops=leader,
         )  # fmt: skip
         if there:
             _sketch_at(ax, name, at, cell_pt, colors[name])
         ax.annotate(
             name_text(name), (1.0, at), xytext=(13.0 + wide * cell_pt, 0.0),
             xycoords="axes fraction", textcoords="offset points", va="center",
-            size=NAME_SIZE_PT, color=INK, annotation_clip=False,
+            size=NAME_SIZE_PT, color=style.INK, annotation_clip=False,
         )  # fmt: skip
 
 
@@ -301,10 +300,10 @@ def plot_assembly_sizes(
     both = [sizes] if beside is None else [sizes, beside]
     for one in both:
         check_kind(one, "assembly_sizes", "size", "size_to", "block_share")
-    ax = axes_or_new(ax, height_mm=65.0)
+    ax = style.axes_or_new(ax, height_mm=65.0)
     place = np.arange(sizes.sizes["size"])
     width = BAR_WIDTH / len(both)
-    for index, (one, color) in enumerate(zip(both, (BLUE, ORANGE), strict=False)):
+    for index, (one, color) in enumerate(zip(both, (style.BLUE, style.ORANGE), strict=False)):
         share, low, high = (one[f"block_share{end}"].values for end in ("", "_low", "_high"))
         ax.bar(
             place + (index - (len(both) - 1) / 2) * width, share, width, color=color,
@@ -364,9 +363,9 @@ def plot_growth(
     curves = GROWTH[what]
     for one in both:
         check_kind(one, "assembly_sizes", "time", *curves)
-    ax = axes_or_new(ax, height_mm=65.0)
+    ax = style.axes_or_new(ax, height_mm=65.0)
     time = sizes["time"].values
-    for one, color, label in zip(both, (BLUE, ORANGE), labels, strict=False):
+    for one, color, label in zip(both, (style.BLUE, style.ORANGE), labels, strict=False):
         for (name, words), dashes in zip(curves.items(), DASHES, strict=False):
             text = ", ".join(part for part in (words if len(curves) > 1 else "", label) if part)
             ax.plot(one["time"], one[name], color=color, ls=dashes, lw=1.3, label=text or None)

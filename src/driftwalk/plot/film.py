@@ -12,10 +12,10 @@ import numpy as np
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.atomic import atomic_path, require_target
+from driftwalk.plot.parts import style
 from driftwalk.plot.parts.arena import CM_PER_M, arena_of, draw_arena, draw_scale_bar
 from driftwalk.plot.parts.assembly_labels import PALETTE
 from driftwalk.plot.parts.film_file import FRAMES_PER_S, Frame, require_film_writer, write_frames
-from driftwalk.plot.parts.style import INK, MUTED, new_figure, print_style
 from driftwalk.schema.check import kind_name
 
 if TYPE_CHECKING:
@@ -110,7 +110,7 @@ def write_animation(
     ending = target.suffix.lower()
     moments, rate = _moments(scene.time, FRAMES_PER_S[ending], seconds, speed)
     require_film_writer(ending)
-    with print_style(), atomic_path(target) as temporary:
+    with style.print_style(), atomic_path(target) as temporary:
         frames = _frames(scene, moments, rate, DOTS_PER_INCH[ending])
         if progress is not None:
             frames = _counted(frames, moments.size, progress)
@@ -195,9 +195,9 @@ def _frames(scene: _Scene, moments: Floats, rate: float, dots: int) -> Iterator[
     canvas: Any = figure.canvas
     canvas.draw()
     empty = canvas.copy_from_bbox(figure.bbox)
-    trails = LineCollection([], colors=MUTED, linewidths=0.8, alpha=0.7, zorder=2)
-    bodies = PolyCollection([], edgecolors=INK, linewidths=0.6, zorder=3)
-    pointers = LineCollection([], colors=INK, linewidths=0.9, zorder=4)
+    trails = LineCollection([], colors=style.MUTED, linewidths=0.8, alpha=0.7, zorder=2)
+    bodies = PolyCollection([], edgecolors=style.INK, linewidths=0.6, zorder=3)
+    pointers = LineCollection([], colors=style.INK, linewidths=0.9, zorder=4)
     clock = figure.text(0.04, 0.955, "", size=9.0, va="center")
     for artist in (trails, bodies, pointers):
         ax.add_collection(artist, autolim=False)
@@ -226,7 +226,7 @@ def _stage(scene: _Scene, rate: float, dots: int) -> tuple[Figure, Axes]:
 
     Axes without ticks and a fixed layout: a frame is drawn in some milliseconds.
     """
-    figure = new_figure(width_mm=FILM_MM, height_mm=FILM_MM)
+    figure = style.new_figure(width_mm=FILM_MM, height_mm=FILM_MM)
     figure.set_layout_engine("none")
     figure.set_dpi(dots)
     ax = figure.add_axes((0.03, 0.03, 0.94, 0.9))

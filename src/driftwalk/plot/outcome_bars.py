@@ -8,6 +8,7 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
+from driftwalk.plot.parts import style
 from driftwalk.plot.parts.assembly_labels import (
     OTHER,
     check_kind,
@@ -17,17 +18,7 @@ from driftwalk.plot.parts.assembly_labels import (
     percent,
     runs_text,
 )
-from driftwalk.plot.parts.polyomino_sketch import axes_points, draw_sketches_below, settle_layout
-from driftwalk.plot.parts.style import (
-    BLUE,
-    DOUBLE_COLUMN_MM,
-    INK,
-    MUTED,
-    ORANGE,
-    SINGLE_COLUMN_MM,
-    STYLE,
-    new_figure,
-)
+from driftwalk.plot.parts.polyomino_sketch import draw_sketches_below
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -108,10 +99,10 @@ def plot_outcomes(
     ax = _new_axes(wide=len(both) > 1 or len(drawn) > NARROW_CLASSES) if ax is None else ax
     place = np.arange(len(drawn), dtype=np.float64)
     width = BAR_WIDTH / len(both)
-    for index, dataset in enumerate(both):
+    for index, (dataset, color) in enumerate(zip(both, (style.BLUE, style.ORANGE), strict=False)):
         at = place + (index - (len(both) - 1) / 2.0) * width
         _draw_bars(
-            ax, at, _bars(dataset, names, shown), width=width, color=(BLUE, ORANGE)[index],
+            ax, at, _bars(dataset, names, shown), width=width, color=color,
             label=_legend_text(dataset, labels[index]),
         )  # fmt: skip
     if realisations is not None:
@@ -124,13 +115,15 @@ def plot_outcomes(
     ax.spines[["top", "right"]].set_visible(False)
     _divide(ax, drawn)
     _legend(ax, both)
-    settle_layout(ax)
+    style.settle_layout(ax)
     ax.set_xlabel(f"outcome class{rest}", labelpad=draw_sketches_below(ax, list(place), drawn))
     return ax
 
 
 def _new_axes(*, wide: bool) -> Axes:
-    figure = new_figure(width_mm=DOUBLE_COLUMN_MM if wide else SINGLE_COLUMN_MM, height_mm=76.0)
+    figure = style.new_figure(
+        width_mm=style.DOUBLE_COLUMN_MM if wide else style.SINGLE_COLUMN_MM, height_mm=76.0
+    )
     return figure.add_subplot()
 
 
@@ -166,7 +159,7 @@ def _draw_bars(ax: Axes, at: Floats, bars: Bars, *, width: float, color: str, la
     below = np.maximum(bars.proportion - bars.low, 0.0)[known]
     above = np.maximum(bars.high - bars.proportion, 0.0)[known]
     ax.errorbar(
-        at[known], bars.proportion[known], yerr=[below, above], fmt="none", ecolor=INK,
+        at[known], bars.proportion[known], yerr=[below, above], fmt="none", ecolor=style.INK,
         elinewidth=0.8, capsize=1.6, capthick=0.8,
     )  # fmt: skip
 
@@ -189,7 +182,7 @@ def _draw_realisations(
         kept = np.column_stack([kept, np.delete(every, shown, axis=1).sum(axis=1)])
     ax.errorbar(
         at, kept.mean(axis=0), yerr=kept.std(axis=0, ddof=1), fmt="D", ms=2.6, mfc="white",
-        mec=INK, mew=0.7, ecolor=INK, elinewidth=1.6, capsize=0.0,
+        mec=style.INK, mew=0.7, ecolor=style.INK, elinewidth=1.6, capsize=0.0,
         label=f"mean ± s.d. of {len(every)} realisations",
     )  # fmt: skip
 
@@ -198,7 +191,7 @@ def _divide(ax: Axes, drawn: list[str]) -> None:
     """Draw a line between the classes of one assembly and those of several."""
     complete = [is_complete(name) for name in drawn]
     if any(complete) and not all(complete[: drawn.index(OTHER) if OTHER in drawn else None]):
-        ax.axvline(complete.index(False) - 0.5, color=MUTED, lw=0.6, dashes=(3, 3), zorder=0)
+        ax.axvline(complete.index(False) - 0.5, color=style.MUTED, lw=0.6, dashes=(3, 3), zorder=0)
 
 
 def _legend_text(dataset: xr.Dataset, label: str) -> str:
@@ -220,10 +213,10 @@ def _legend(ax: Axes, both: list[xr.Dataset]) -> None:
     # The first words of the method are its name, the rest explains.
     method = str(both[0].attrs.get("method", "")).partition(",")[0].partition(";")[0]
     name = "simultaneous intervals" + (f", {method}" if method else "")
-    handles.append(Line2D([], [], color=INK, lw=0.8, marker="_", ms=4.0))
+    handles.append(Line2D([], [], color=style.INK, lw=0.8, marker="_", ms=4.0))
     texts.append(f"{percent(confidence)} {name}" if confidence is not None else name)
     ax.legend(
         handles, texts, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2,
-        fontsize=STYLE["legend.fontsize"], frameon=False,
-        ncols=2 if len(handles) > 2 and axes_points(ax)[0] > WIDE_LEGEND_PT else 1,
+        fontsize=style.STYLE["legend.fontsize"], frameon=False,
+        ncols=2 if len(handles) > 2 and style.axes_points(ax)[0] > WIDE_LEGEND_PT else 1,
     )  # fmt: skip

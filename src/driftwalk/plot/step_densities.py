@@ -10,6 +10,7 @@ import numpy.typing as npt
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.plot.distances import CAUSES
+from driftwalk.plot.parts import style
 from driftwalk.plot.parts.labels import (
     ANGLE_LABEL,
     FACTORS,
@@ -21,15 +22,6 @@ from driftwalk.plot.parts.labels import (
     plot_parameters,
     require_variables,
     required_fact,
-)
-from driftwalk.plot.parts.style import (
-    DENSITY_COLORMAP,
-    MUTED,
-    PALE,
-    add_colorbar,
-    axes_grid_or_new,
-    axes_or_new,
-    letter_panels,
 )
 
 if TYPE_CHECKING:
@@ -155,7 +147,7 @@ def plot_step_density(
     'turning (step) angle (°)'
     """
     share, length_mm, angle_deg = _checked(density, step_length_edge, turning_angle_edge)
-    ax = axes_or_new(ax)
+    ax = style.axes_or_new(ax)
     mesh = density_mesh(ax, share, length_mm, angle_deg)
     if limits == "filled":
         ax.set_xlim(*filled_range(share.sum(axis=1), length_mm))
@@ -165,7 +157,7 @@ def plot_step_density(
     if marginals == "shown":
         _draw_marginals(ax, share, length_mm, angle_deg)
     if colorbar == "beside":
-        add_colorbar(mesh, ax, DENSITY_LABEL)
+        style.add_colorbar(mesh, ax, DENSITY_LABEL)
     return ax
 
 
@@ -184,11 +176,11 @@ def density_mesh(
         length_mm,
         angle_deg,
         np.ma.masked_equal(density.T, 0.0),
-        cmap=DENSITY_COLORMAP,
+        cmap=style.DENSITY_COLORMAP,
         norm=PowerNorm(COLOR_POWER, vmin=0.0, vmax=highest),
     )
     mesh.set_rasterized(True)
-    ax.axhline(0.0, color=MUTED, lw=0.5, dashes=(4, 3))
+    ax.axhline(0.0, color=style.MUTED, lw=0.5, dashes=(4, 3))
     return mesh
 
 
@@ -216,11 +208,10 @@ def _draw_marginals(ax: Axes, share: Floats, length_mm: Floats, angle_deg: Float
 
     top = ax.inset_axes((0.0, 1.02, 1.0, 0.16), sharex=ax)
     right = ax.inset_axes((1.02, 0.0, 0.16, 1.0), sharey=ax)
-    style: dict[str, Any] = {"fill": True, "facecolor": PALE, "edgecolor": MUTED, "linewidth": 0.7}
-    top.stairs(share.sum(axis=1) / np.diff(length_mm), length_mm, **style)
-    right.stairs(
-        share.sum(axis=0) / np.diff(angle_deg), angle_deg, orientation="horizontal", **style
-    )
+    look: dict[str, Any] = {"fill": True, "facecolor": style.PALE, "edgecolor": style.MUTED}
+    length, angle = share.sum(axis=1) / np.diff(length_mm), share.sum(axis=0) / np.diff(angle_deg)
+    top.stairs(length, length_mm, linewidth=0.7, **look)
+    right.stairs(angle, angle_deg, orientation="horizontal", linewidth=0.7, **look)
     top.set_ylim(bottom=0.0)
     right.set_xlim(left=0.0)
     for side, name in ((top, "step length"), (right, "turning angle")):
@@ -316,7 +307,7 @@ def plot_density_panels(
     top = max(
         float(density_of(density, length_mm, angle_deg).max(initial=0.0)) for density in densities
     )
-    row = axes_grid_or_new(axes, count=4, sharex=True, sharey=True)
+    row = style.axes_grid_or_new(axes, count=4, sharex=True, sharey=True)
     limits = _common_limits(densities, length_mm, angle_deg)
     for ax, density in zip(row, densities, strict=True):
         mesh = density_mesh(ax, density, length_mm, angle_deg, top=top)
@@ -328,11 +319,11 @@ def plot_density_panels(
         ax.label_outer()
     for ax, setting in zip(row[1:], settings, strict=True):
         _mark_cause(ax, setting)
-    letter_panels(
+    style.letter_panels(
         row, ["recording", *(along.title(setting.values[along.name]) for setting in settings)]
     )
     if colorbar == "beside":
-        add_colorbar(mesh, row, DENSITY_LABEL)
+        style.add_colorbar(mesh, row, DENSITY_LABEL)
     return row
 
 
@@ -410,7 +401,12 @@ def _mark_cause(ax: Axes, setting: Setting) -> None:
     name, hatch = causes[0]
     ax.set_facecolor("white")
     ax.axhspan(
-        *ax.get_ylim(), facecolor="none", edgecolor=MUTED, linewidth=0.0, hatch=hatch, gid=name
+        *ax.get_ylim(),
+        facecolor="none",
+        edgecolor=style.MUTED,
+        linewidth=0.0,
+        hatch=hatch,
+        gid=name,
     )
     ax.text(
         0.5, 0.5, name, transform=ax.transAxes, ha="center", va="center",

@@ -62,12 +62,13 @@ def classes_section(
     shown = [names[index] for index in classes_to_show(names, np.nan_to_num(largest))]
     first = next(iter(found.values()))
     confidence = value_of(first, "confidence")
+    items = {name: class_items(one, names, shown) for name, one in found.items()}
     return section(
         id, "classes", title,
         None if confidence is None else f"{percent(confidence)} simultaneous intervals.",
         confidence=confidence,
         runs=int(first.attrs.get("runs", 0)),
-        series=[{"name": name, "items": _items(one, names, shown)} for name, one in found.items()],
+        series=[{"name": name, "items": each} for name, each in items.items()],
     )  # fmt: skip
 
 
@@ -122,7 +123,8 @@ def _by_name(found: xr.Dataset, variable: str, names: list[str]) -> Floats:
     return np.array([values[place[name]] if name in place else np.nan for name in names])
 
 
-def _items(found: xr.Dataset, names: list[str], shown: list[str]) -> list[dict[str, Any]]:
+def class_items(found: xr.Dataset, names: list[str], shown: list[str]) -> list[dict[str, Any]]:
+    """Return the classes to show of an `outcome_distribution`, and the rest of `names` summed."""
     keys = ("count", "proportion", "interval_low", "interval_high")
     columns = {
         key: dict(zip(names, _by_name(found, key, names), strict=True)) for key in keys

@@ -9,12 +9,11 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
-from driftwalk.plot.parts.style import BLUE, INK
+from driftwalk.plot.parts.style import BLUE, INK, axes_points
 from driftwalk.schema.shapes import NAMED_SHAPES, cells_of_shape
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
     from matplotlib.offsetbox import AnnotationBbox, DrawingArea
 
 Orientation = Literal["wide", "tall"]
@@ -345,28 +344,6 @@ def _shelves(sizes: Floats, limit: float) -> Floats:
         left += width + GAP
         deepest = max(deepest, height)
     return offsets
-
-
-def figure_of(ax: Axes) -> Figure:
-    """Return the whole figure that axes lie in."""
-    figure = ax.get_figure(root=True)
-    if figure is None:
-        raise InputError("the axes were removed from their figure")
-    return figure
-
-
-def axes_points(ax: Axes) -> Floats:
-    """Return width and height of axes as they lie now [pt]."""
-    size: Floats = np.array([ax.bbox.width, ax.bbox.height]) / figure_of(ax).dpi * 72.0
-    return size
-
-
-def settle_layout(ax: Axes) -> None:
-    """Give axes the size that they will have, so that sizes and places in points stay true."""
-    figure = figure_of(ax)
-    engine = figure.get_layout_engine()
-    if engine is not None:
-        engine.execute(figure)
 
 
 def _slot_points(ax: Axes, positions: Sequence[float]) -> float:

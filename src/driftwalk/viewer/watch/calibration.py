@@ -17,8 +17,8 @@ from driftwalk.core.run_stages import CALIBRATION_STAGES, MORE, share_of_map, sh
 from driftwalk.page import bootstrap_section, encode_array, map_section, profile_sections
 from driftwalk.schema import Parameter
 from driftwalk.schema.parameters import BLOCK
-from driftwalk.viewer.watch.run_page import NO_CELL, Section
-from driftwalk.viewer.watch.shards import FinishedUnit, RunReader
+from driftwalk.viewer.watch.run_page import NO_CELL, Running, Section
+from driftwalk.viewer.watch.shards import FinishedUnit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -69,7 +69,7 @@ class SettingsMap:
             self.details[unit.start + row] = {name: kept[name][row] for name in kept}
 
 
-class RunningCalibration:
+class RunningCalibration(Running):
     """A calibration under way.
 
     Parameters
@@ -80,16 +80,14 @@ class RunningCalibration:
         Everything that determines its numbers.
     """
 
-    title = "A calibration under way"
-
     def __init__(self, folder: Path, specification: Mapping[str, Any]) -> None:
         from driftwalk.model import Study
 
+        super().__init__(folder, specification)
         self._folder = folder
         self._study: Study = Study(**specification["study"])
         self._body: str | None = specification.get("body")
         self._parameters = _parameters(specification, self._study)
-        self._reader = RunReader(folder)
         self._maps: dict[str, SettingsMap] = {}
         self._more: dict[str, int] = {}
         """How many settings of a map are simulated more often, by the stage of the map."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from driftwalk.core.errors import DriftwalkError, InputError, RunDirectoryError
 from driftwalk.core.files.file_names import path_inside, text_of_name
@@ -30,24 +30,6 @@ SPANS: Final = ((86400.0, "days"), (3600.0, "h"), (60.0, "min"))
 Section = dict[str, Any]
 
 
-class Running(Protocol):
-    """A run that is under way."""
-
-    title: str
-
-    def look(self) -> list[Section]:
-        """Read what is new, and return the sections that it changed."""
-
-    def sections(self) -> list[Section]:
-        """Return all sections as they are now."""
-
-    def state(self) -> tuple[float | None, str]:
-        """Return how far the run is, 0 to 1, and what is under way in words."""
-
-    def cell(self, row: int, column: int) -> dict[str, Any]:
-        """Return what is kept of a setting of the map."""
-
-
 NO_CELL: Final[dict[str, Any]] = dict.fromkeys(
     (
         *("excerpt_time", "excerpt_x", "excerpt_y", "density"),
@@ -57,8 +39,8 @@ NO_CELL: Final[dict[str, Any]] = dict.fromkeys(
 """Answer for a setting that has not been simulated."""
 
 
-class RunningOther:
-    """A run of a kind that shows nothing before it is finished.
+class Running:
+    """A run that is under way; of a kind without a view of its own the finished work is counted.
 
     Parameters
     ----------
@@ -68,32 +50,29 @@ class RunningOther:
         Everything that determines its numbers.
     """
 
-    title = "A run under way"
-
     def __init__(self, folder: Path, specification: Mapping[str, Any]) -> None:
         self._reader = RunReader(folder)
         self._done = 0
         kind = RUN_KINDS.get(str(specification.get("kind")))
-        if kind is not None:
-            self.title = kind.under_way
+        self.title = "A run under way" if kind is None else kind.under_way
 
     def look(self) -> list[Section]:
-        """Count what is finished."""
+        """Read what is new, and return the sections that it changed."""
         self._done += sum(1 for _ in self._reader.new_units())
         return []
 
     def sections(self) -> list[Section]:
-        """Return one section that says that there is nothing to see yet."""
+        """Return all sections as they are now."""
         reason = "This kind of run shows its results when it is finished. The page waits for it."
         return [empty_section("waiting", self.title, reason)]
 
     def state(self) -> tuple[float | None, str]:
-        """Return that nobody knows how far it is."""
+        """Return how far the run is, 0 to 1 or None, and what is under way in words."""
         units = f": {self._done} work units are finished" if self._done else ""
         return None, f"under way{units}"
 
     def cell(self, row: int, column: int) -> dict[str, Any]:  # noqa: ARG002
-        """Return nothing: there is no map."""
+        """Return what is kept of a setting of the map."""
         return dict(NO_CELL)
 
 
@@ -256,7 +235,7 @@ def running_view(folder: Path) -> Running:
     """
     specification = unfinished_specification(folder)
     kind = RUN_KINDS.get(str(specification.get("kind")))
-    view = RunningOther if kind is None or kind.live is None else load_maker(kind.live)
+    view = Running if kind is None or kind.live is None else load_maker(kind.live)
     try:
         running: Running = view(folder, specification)
         return running
