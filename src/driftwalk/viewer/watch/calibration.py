@@ -14,7 +14,9 @@ import numpy.typing as npt
 from driftwalk.core.errors import DriftwalkError
 from driftwalk.core.files.run_layout import run_file
 from driftwalk.core.run_stages import CALIBRATION_STAGES, MORE, share_of_map, share_of_windows
-from driftwalk.page import bootstrap_section, encode_array, map_section, profile_sections
+from driftwalk.page import encode_array
+from driftwalk.page.sections.calibration import bootstrap_section, profile_sections
+from driftwalk.page.sections.map import map_section
 from driftwalk.schema import Parameter
 from driftwalk.schema.parameters import BLOCK
 from driftwalk.viewer.watch.run_page import NO_CELL, Running, Section
@@ -208,7 +210,8 @@ class RunningCalibration(Running):
     def _made_from(self) -> list[Section]:
         """The sections on the recording and on the flow, once they are there."""
         from driftwalk.flow import load_flow
-        from driftwalk.page import flow_section, trajectory_section
+        from driftwalk.page.sections.flow import flow_section
+        from driftwalk.page.sections.recording import trajectory_section
 
         if "recording" not in self._still and self._recording is not None:
             self._still["recording"] = trajectory_section(self._recording, body=self._body)
