@@ -107,8 +107,7 @@ def plot_flow_recovery(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax = style.axes_or_new(ax)
     for at, look, part in _groups(recovery):
         ax.plot(at, 100.0 * part["flow_error"].values, "o", **look)
-    ax.set_ylim(bottom=0.0)
-    ax.set_ylabel("flow error (% of rms speed)")
+    ax.set(ylim=(0.0, None), ylabel="flow error (% of rms speed)")
     _label_groups(ax, recovery)
     return ax
 
@@ -168,8 +167,7 @@ def plot_recovery_error(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:
     if np.isfinite(recovery["drag_coefficient_error_scale"].values).any():
         # Without a point a logarithmic axis has no range.
         _logarithmic(ax)
-    ax.set_xlabel("length of a recording (min)")
-    ax.set_ylabel("error of $C_d$, rms (%)")
+    ax.set(xlabel="length of a recording (min)", ylabel="error of $C_d$, rms (%)")
     ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize=6.0)
     return ax
 
@@ -256,8 +254,7 @@ def _logarithmic(ax: Axes) -> None:
     """Set both axes to logarithms with plain numbers."""
     from matplotlib.ticker import LogLocator, NullFormatter
 
-    ax.set_xscale("log")
-    ax.set_yscale("log")
+    ax.set(xscale="log", yscale="log")
     for axis in (ax.xaxis, ax.yaxis):
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axis.set_major_formatter("{x:g}")

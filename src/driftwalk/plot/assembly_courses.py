@@ -18,6 +18,7 @@ from driftwalk.plot.parts.assembly_labels import (
     is_complete,
     percent,
     runs_text,
+    with_rest,
 )
 from driftwalk.plot.parts.labels import number_fact
 from driftwalk.plot.parts.polyomino_sketch import (
@@ -107,8 +108,7 @@ def plot_class_times(
         labelled = proportion.max(axis=1) > 0.0
     kept = np.flatnonzero(labelled)
     _label_right(ax, [names[index] for index in kept], height[kept], colors)
-    ax.set_xlabel(TIME_LABEL)
-    ax.set_ylabel("proportion of runs")
+    ax.set(xlabel=TIME_LABEL, ylabel="proportion of runs")
     ax.spines[["top", "right"]].set_visible(False)
     ax.set_title(runs_text(times), loc="left")
     return ax
@@ -152,10 +152,9 @@ def plot_survival(times: xr.Dataset, ax: Axes | None = None) -> Axes:
                 time, times[f"{name}_low"].values, times[f"{name}_high"].values, color=color,
                 alpha=0.2, lw=0,
             )  # fmt: skip
-    ax.set_xlim(time[0], time[-1])
-    ax.set_ylim(0.0, 1.02)
-    ax.set_xlabel(TIME_LABEL)
-    ax.set_ylabel("proportion of runs")
+    ax.set(
+        xlim=(time[0], time[-1]), ylim=(0.0, 1.02), xlabel=TIME_LABEL, ylabel="proportion of runs"
+    )
     ax.spines[["top", "right"]].set_visible(False)
     confidence = number_fact(times, "confidence")
     bands = f"bands: {percent(confidence)}" if np.isfinite(confidence) else ""
@@ -168,12 +167,9 @@ def _shown(times: xr.Dataset) -> tuple[list[str], Floats]:
     """Return the names drawn and their proportions (class, time)."""
     names = class_names(times)
     proportion = np.asarray(times["proportion"].transpose("class", "time").values, dtype=np.float64)
-    shown = classes_to_show(names, proportion.max(axis=1))
-    drawn, kept = [names[index] for index in shown], proportion[shown]
-    if len(shown) < len(names):
-        drawn.append(OTHER)
-        kept = np.vstack([kept, np.delete(proportion, shown, axis=0).sum(axis=0)])
-    return drawn, kept
+    shown = classes_to_show(names, proportion.T)
+    others = [OTHER] if len(shown) < len(names) else []
+    return [*(names[index] for index in shown), *others], with_rest(proportion, shown)
 
 
 def _label_right(ax: Axes, names: list[str], height: Floats, colors: dict[str, str]) -> None:
@@ -239,28 +235,19 @@ def spread_apart(wanted: Floats, size: Floats) -> Floats:
     >>> spread_apart(np.array([0.5, 0.5]), np.array([0.2, 0.2])).round(6).tolist()
     [0.4, 0.6]
     """
+    from scipy.optimize import isotonic_regression
+
     size = size / max(1.0, float(size.sum()))
     order = np.argsort(wanted, kind="stable")
     half = size[order] / 2.0
     # What lies before a thing, packed tightly: the middles minus this need only not decrease.
     packed = np.cumsum(size[order]) - half
-    level = _isotonic(wanted[order] - packed)
+    # It refuses an empty sequence.
+    level = isotonic_regression(wanted[order] - packed).x if wanted.size else packed
     level = np.clip(level, 0.0, 1.0 - float(size.sum()))
     place = np.empty_like(wanted, dtype=np.float64)
     place[order] = level + packed
     return place
-
-
-def _isotonic(values: Floats) -> Floats:
-    """Return the nearest sequence that does not decrease: neighbours that do are pooled."""
-    blocks: list[tuple[float, int]] = []
-    for value in values:
-        mean, count = float(value), 1
-        while blocks and blocks[-1][0] > mean:
-            before, many = blocks.pop()
-            mean, count = (mean * count + before * many) / (count + many), count + many
-        blocks.append((mean, count))
-    return np.concatenate([np.full(count, mean) for mean, count in blocks] or [np.empty(0)])
 
 
 def plot_assembly_sizes(
@@ -312,9 +299,7 @@ def plot_assembly_sizes(
         )  # fmt: skip
     ends = zip(sizes["size"].values, sizes["size_to"].values, strict=True)
     ax.set_xticks(place, [str(a) if a == b else f"{a}–{b}" for a, b in ends], rotation=45)
-    ax.set_ylim(bottom=0.0)
-    ax.set_xlabel("blocks in the assembly")
-    ax.set_ylabel("share of the blocks")
+    ax.set(ylim=(0.0, None), xlabel="blocks in the assembly", ylabel="share of the blocks")
     _finish(ax, both)
     return ax
 
@@ -371,8 +356,7 @@ def plot_growth(
             ax.plot(one["time"], one[name], color=color, ls=dashes, lw=1.3, label=text or None)
             ends = (one[f"{name}_low"].values, one[f"{name}_high"].values)
             ax.fill_between(one["time"].values, *ends, color=color, alpha=0.2, lw=0)
-    ax.set_xlim(time[0], time[-1])
-    ax.set_ylim(bottom=0.0)
+    ax.set(xlim=(time[0], time[-1]), ylim=(0.0, None))
     if what == "shares":
         ax.set_ylim(0.0, 1.02)
     ax.set_xlabel(TIME_LABEL)

@@ -149,8 +149,7 @@ def plot_refined_map(
         lines = ax.contour(*places, surface, levels=6, colors="white", linewidths=0.6)
     _draw_region(ax, calibration)
     draw_optimum(ax, calibration)
-    ax.set_xlim(*edges[0][[0, -1]])
-    ax.set_ylim(*edges[1][[0, -1]])
+    ax.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
     bar = _finish(ax, calibration, mesh, colorbar)
     if bar is not None and lines is not None:
         bar.add_lines(lines)
@@ -274,8 +273,7 @@ def hatch_cell(
 def _finish(ax: Axes, calibration: xr.Dataset, mesh: QuadMesh, colorbar: str) -> Colorbar | None:
     """Label the axes and add the colour bar with the line of the noise floor."""
     across, up = plane_of(calibration)
-    ax.set_xlabel(across.label(calibration))
-    ax.set_ylabel(up.label(calibration))
+    ax.set(xlabel=across.label(calibration), ylabel=up.label(calibration))
     across.scale(ax, "x")
     up.scale(ax, "y")
     if colorbar == "none":

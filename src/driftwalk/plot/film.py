@@ -244,8 +244,7 @@ def _frame_motion(scene: _Scene, ax: Axes) -> None:
     middle = [(np.nanmin(values) + np.nanmax(values)) / 2.0 for values in (scene.x, scene.y)]
     width = max(float(np.nanmax(values) - np.nanmin(values)) for values in (scene.x, scene.y))
     half = 0.54 * width + (scene.side or 0.0) or 1.0
-    ax.set_xlim(middle[0] - half, middle[0] + half)
-    ax.set_ylim(middle[1] - half, middle[1] + half)
+    ax.set(xlim=(middle[0] - half, middle[0] + half), ylim=(middle[1] - half, middle[1] + half))
 
 
 def _size(scene: _Scene, ax: Axes) -> float:

@@ -81,8 +81,7 @@ def plot_innovations(check: xr.Dataset, ax: Axes | None = None) -> Axes:
             label=f"error in {shown}",
         )
     ax.xaxis.set_major_locator(MaxNLocator(integer=True))
-    ax.set_xlabel("lag (samples)")
-    ax.set_ylabel("autocorrelation")
+    ax.set(xlabel="lag (samples)", ylabel="autocorrelation")
     ax.margins(x=0.03)
     return ax
 
@@ -233,10 +232,9 @@ def plot_predicted_steps(
     ax.stairs(high, edge, baseline=low, fill=True, color=style.BLUE, alpha=0.3, lw=0, label=band)
     ax.stairs(median, edge, color=style.BLUE, lw=0.9, label="their median", baseline=None)
     ax.stairs(real, edge, color=style.ORANGE, lw=1.1, label="recording", baseline=None)
-    ax.set_xlim(*_shown(real + median, edge))
-    ax.set_ylim(bottom=0.0)
-    ax.set_xlabel(label)
-    ax.set_ylabel(f"density ({each})")
+    ax.set(
+        xlim=_shown(real + median, edge), ylim=(0.0, None), xlabel=label, ylabel=f"density ({each})"
+    )
     return ax
 
 
@@ -316,8 +314,7 @@ def plot_own_aspects(found: xr.Dataset, ax: Axes, *, label: str) -> None:
     ax.plot(found["own_distance"].values, place, "|", ms=9.0, mew=1.4, color=style.INK, label=label)
     ax.set_yticks(place, [ASPECT_WORDS.get(name, name) for name in aspects])
     ax.invert_yaxis()
-    ax.set_xlim(left=0.0)
-    ax.set_xlabel("KS distance D")
+    ax.set(xlim=(0.0, None), xlabel="KS distance D")
 
 
 def plot_check_ratios(

@@ -17,6 +17,7 @@ from driftwalk.plot.parts.assembly_labels import (
     is_complete,
     percent,
     runs_text,
+    with_rest,
 )
 from driftwalk.plot.parts.polyomino_sketch import draw_sketches_below
 
@@ -92,7 +93,7 @@ def plot_outcomes(
         )
     names = list(dict.fromkeys(name for dataset in both for name in class_names(dataset)))
     full = np.array([_on_classes(dataset["proportion"], names) for dataset in both])
-    shown = classes_to_show(names, full.max(axis=0))
+    shown = classes_to_show(names, full)
     drawn = [names[index] for index in shown]
     if len(shown) < len(names):
         drawn.append(OTHER)
@@ -108,8 +109,7 @@ def plot_outcomes(
     if realisations is not None:
         at = place - (len(both) - 1) / 2.0 * width
         _draw_realisations(ax, at + 0.22 * width, realisations, names, shown)
-    ax.set_xlim(-0.6, len(drawn) - 0.4)
-    ax.set_ylim(bottom=0.0)
+    ax.set(xlim=(-0.6, len(drawn) - 0.4), ylim=(0.0, None))
     rest = f" (other: {len(names) - len(shown)} rarer classes)" if OTHER in drawn else ""
     ax.set_ylabel("proportion of runs")
     ax.spines[["top", "right"]].set_visible(False)
@@ -135,18 +135,14 @@ def _on_classes(proportion: xr.DataArray, names: list[str]) -> Floats:
 
 def _bars(dataset: xr.Dataset, names: list[str], shown: list[int]) -> Bars:
     proportion = _on_classes(dataset["proportion"], names)
-    values = [proportion, *(_on_classes(dataset[f"interval_{end}"], names) for end in _ENDS)]
     # A class that the dataset does not list has a proportion of 0, and no interval.
     listed = np.isin(names, class_names(dataset))
-    values[1:] = [np.where(listed, end, np.nan) for end in values[1:]]
-    kept = [array[shown] for array in values]
-    if len(shown) < len(names):
-        rest = float(np.delete(proportion, shown).sum())
-        kept = [
-            np.append(array, value)
-            for array, value in zip(kept, (rest, np.nan, np.nan), strict=True)
-        ]
-    return Bars(*kept)
+    ends = (
+        np.where(listed, _on_classes(dataset[f"interval_{end}"], names), np.nan) for end in _ENDS
+    )
+    # The rest has no interval of its own.
+    none = [np.nan] * (len(shown) < len(names))
+    return Bars(with_rest(proportion, shown), *(np.append(end[shown], none) for end in ends))
 
 
 _ENDS = ("low", "high")
@@ -177,9 +173,7 @@ def _draw_realisations(
     if table.sizes["realisation"] < 2:
         raise InputError("one realisation has no spread: give at least 2")
     every = np.array([_on_classes(row, names) for row in table])
-    kept = every[:, shown]
-    if len(shown) < len(names):
-        kept = np.column_stack([kept, np.delete(every, shown, axis=1).sum(axis=1)])
+    kept = with_rest(every, shown, axis=1)
     ax.errorbar(
         at, kept.mean(axis=0), yerr=kept.std(axis=0, ddof=1), fmt="D", ms=2.6, mfc="white",
         mec=style.INK, mew=0.7, ecolor=style.INK, elinewidth=1.6, capsize=0.0,

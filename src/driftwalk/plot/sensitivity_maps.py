@@ -95,8 +95,7 @@ def plot_l1_map(
         _draw_floor_band(ax, sensitivity)
         _draw_lines(ax, sweep, distance, color=style.INK)
         _mark_on_line(ax, sensitivity, sweep)
-        ax.set_ylabel(DISTANCE_LABEL)
-        ax.set_ylim(bottom=0.0)
+        ax.set(ylabel=DISTANCE_LABEL, ylim=(0.0, None))
         _legend_above(ax)
         return ax
     ax = style.axes_or_new(ax)
@@ -176,8 +175,7 @@ def plot_class_panels(
         else:
             _draw_lines(ax, sweep, proportion, color=style.BLUE)
             _mark_on_line(ax, sensitivity, sweep)
-            ax.set_ylim(0.0, 1.05 * top)
-            ax.set_ylabel("proportion")
+            ax.set(ylim=(0.0, 1.05 * top), ylabel="proportion")
             _turn_words(ax, sweep)
         _title_panel(ax, name)
     if axes is None:
@@ -221,8 +219,7 @@ def plot_class_key(
         rows = key_rows(names, width_mm)
     ax = style.axes_or_new(ax, height_mm=KEY_ROW_MM * rows)
     ax.set_axis_off()
-    ax.set_xlim(0.0, 1.0)
-    ax.set_ylim(0.0, 1.0)
+    ax.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
     columns = -(-len(names) // rows)
     sizes = np.array([sketch_size(class_cells(name)) for name in names])
     written = any(name_text(name) for name in names)
@@ -254,9 +251,8 @@ def key_rows(names: Sequence[str], width_mm: float) -> int:
 def shown_classes(sensitivity: xr.Dataset) -> list[str]:
     """Return the classes of a study that figures show."""
     names = class_names(sensitivity)
-    proportion = sensitivity["proportion"].transpose(..., "class").values.reshape(-1, len(names))
-    largest = np.nan_to_num(np.where(np.isfinite(proportion), proportion, 0.0)).max(axis=0)
-    return [names[index] for index in classes_to_show(names, largest)]
+    share = sensitivity["proportion"].transpose(..., "class").values
+    return [names[index] for index in classes_to_show(names, share)]
 
 
 def _one_or_two(sensitivity: xr.Dataset, variable: xr.DataArray) -> list[SweepAxis]:
@@ -282,10 +278,7 @@ def _draw_map(ax: Axes, sweep: list[SweepAxis], values: Floats, *, colormap: str
     named: set[str] = set()
     for cell in zip(*np.nonzero(~np.isfinite(values)), strict=True):
         hatch_cell(ax, (x_edge, y_edge), cell, cause=("not computed", "//////"), named=named)
-    ax.set_xlim(*x_edge[[0, -1]])
-    ax.set_ylim(*y_edge[[0, -1]])
-    ax.set_xlabel(sweep[0].label)
-    ax.set_ylabel(sweep[1].label)
+    ax.set(xlim=x_edge[[0, -1]], ylim=y_edge[[0, -1]], xlabel=sweep[0].label, ylabel=sweep[1].label)
     return mesh
 
 

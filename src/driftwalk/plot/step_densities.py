@@ -152,8 +152,7 @@ def plot_step_density(
     if limits == "filled":
         ax.set_xlim(*filled_range(share.sum(axis=1), length_mm))
         ax.set_ylim(*filled_range(share.sum(axis=0), angle_deg))
-    ax.set_xlabel(LENGTH_LABEL)
-    ax.set_ylabel(ANGLE_LABEL)
+    ax.set(xlabel=LENGTH_LABEL, ylabel=ANGLE_LABEL)
     if marginals == "shown":
         _draw_marginals(ax, share, length_mm, angle_deg)
     if colorbar == "beside":
@@ -311,11 +310,9 @@ def plot_density_panels(
     limits = _common_limits(densities, length_mm, angle_deg)
     for ax, density in zip(row, densities, strict=True):
         mesh = density_mesh(ax, density, length_mm, angle_deg, top=top)
-        ax.set_xlim(*limits[0])
-        ax.set_ylim(*limits[1])
+        ax.set(xlim=limits[0], ylim=limits[1])
         ax.xaxis.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 5, 10]))
-        ax.set_xlabel(LENGTH_LABEL)
-        ax.set_ylabel(ANGLE_LABEL)
+        ax.set(xlabel=LENGTH_LABEL, ylabel=ANGLE_LABEL)
         ax.label_outer()
     for ax, setting in zip(row[1:], settings, strict=True):
         _mark_cause(ax, setting)

@@ -135,14 +135,12 @@ def plot_distance_profile(
     )
     # On a logarithmic scale the optimum and the noise floor, both far below 1, can be
     # distinguished.
-    ax.set_yscale("log")
-    ax.set_ylim(top=1.15)
+    ax.set(yscale="log", ylim=(None, 1.15))
     ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     ax.yaxis.set_major_formatter("{x:g}")
     ax.yaxis.set_minor_locator(NullLocator())
     along.scale(ax, "x")
-    ax.set_xlabel(along.label(calibration))
-    ax.set_ylabel("KS distance D")
+    ax.set(xlabel=along.label(calibration), ylabel="KS distance D")
     ax.spines[["top", "right"]].set_visible(False)
     return ax
 
@@ -209,8 +207,7 @@ def _cloud(calibration: xr.Dataset, ax: Axes) -> None:
     ax.autoscale_view()
     across.scale(ax, "x")
     up.scale(ax, "y")
-    ax.set_xlabel(across.label(calibration))
-    ax.set_ylabel(up.label(calibration))
+    ax.set(xlabel=across.label(calibration), ylabel=up.label(calibration))
 
 
 def _histogram(calibration: xr.Dataset, ax: Axes, parameter: PlotParameter) -> None:
@@ -226,8 +223,7 @@ def _histogram(calibration: xr.Dataset, ax: Axes, parameter: PlotParameter) -> N
     ax.stairs(counts, edges, fill=True, color=style.BLUE, alpha=0.6, label=ESTIMATES_LABEL)
     ax.axvline(parameter.best(calibration), color=style.ORANGE, lw=1.4, label="optimum")
     parameter.scale(ax, "x")
-    ax.set_xlabel(parameter.label(calibration))
-    ax.set_ylabel("recordings")
+    ax.set(xlabel=parameter.label(calibration), ylabel="recordings")
 
 
 def _through_optimum(calibration: xr.Dataset, along: PlotParameter) -> xr.Dataset:

@@ -12,7 +12,7 @@ from driftwalk.page.arrays import number, numbers
 from driftwalk.page.chart import chart, label, series
 from driftwalk.page.number_words import count, percent
 from driftwalk.page.parts import Section, attempt, figure, require, section, value_of
-from driftwalk.plot.parts.assembly_labels import OTHER, class_names, classes_to_show
+from driftwalk.plot.parts.assembly_labels import OTHER, class_names, classes_to_show, with_rest
 from driftwalk.plot.parts.polyomino_sketch import class_cells, is_class
 
 if TYPE_CHECKING:
@@ -58,8 +58,8 @@ def classes_section(
     for one in found.values():
         require(one, "class", "count", "proportion")
     names = list(dict.fromkeys(name for one in found.values() for name in class_names(one)))
-    largest = np.max([_by_name(one, "proportion", names) for one in found.values()], axis=0)
-    shown = [names[index] for index in classes_to_show(names, np.nan_to_num(largest))]
+    share = [one["proportion"].reindex({"class": names}).values for one in found.values()]
+    shown = [names[index] for index in classes_to_show(names, np.array(share))]
     first = next(iter(found.values()))
     confidence = value_of(first, "confidence")
     items = {name: class_items(one, names, shown) for name, one in found.items()}
@@ -90,16 +90,15 @@ def class_times_section(times: xr.Dataset) -> Section:
     thin = times.isel(time=slice(None, None, every))
     names = class_names(thin)
     share = thin["proportion"].transpose("class", "time").values
-    shown = classes_to_show(names, np.nan_to_num(share).max(axis=1, initial=0.0))
+    shown = classes_to_show(names, share.T)
     ends = [f"proportion_{end}" for end in ("low", "high")]
     bands = [thin[end].transpose("class", "time").values if end in thin else None for end in ends]
     classes = [
         _over_time(names[i], share[i], *(None if band is None else band[i] for band in bands))
         for i in shown
     ]
-    rest = sorted(set(range(len(names))) - set(shown))
-    if rest:
-        classes.append(_over_time(OTHER, share[rest].sum(axis=0), None, None))
+    if len(shown) < len(names):
+        classes.append(_over_time(OTHER, with_rest(share, shown)[-1], None, None))
     return section(
         "class-times", "class_times", "Outcome classes over time",
         time=numbers(thin["time"].values), classes=classes,
@@ -116,23 +115,17 @@ def _over_time(name: str, share: Floats, low: Floats | None, high: Floats | None
     }
 
 
-def _by_name(found: xr.Dataset, variable: str, names: list[str]) -> Floats:
-    """Return a variable of the classes in another order, NaN where a class does not occur."""
-    place = {name: index for index, name in enumerate(class_names(found))}
-    values = np.asarray(found[variable].values, dtype=np.float64)
-    return np.array([values[place[name]] if name in place else np.nan for name in names])
-
-
 def class_items(found: xr.Dataset, names: list[str], shown: list[str]) -> list[dict[str, Any]]:
     """Return the classes to show of an `outcome_distribution`, and the rest of `names` summed."""
     keys = ("count", "proportion", "interval_low", "interval_high")
     columns = {
-        key: dict(zip(names, _by_name(found, key, names), strict=True)) for key in keys
+        key: dict(zip(class_names(found), found[key].values.tolist(), strict=True))
+        for key in keys
         if key in found
-    }  # fmt: skip
+    }
 
     def column(key: str, name: str) -> float | None:
-        return number(columns[key][name]) if key in columns else None
+        return number(columns.get(key, {}).get(name))
 
     items = [
         {

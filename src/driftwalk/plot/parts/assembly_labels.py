@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
@@ -81,7 +82,7 @@ def is_complete(name: str) -> bool:
     return "+" not in name and name not in ("", OTHER)
 
 
-def classes_to_show(names: list[str], largest: Floats) -> list[int]:
+def classes_to_show(names: list[str], share: Floats) -> list[int]:
     """Choose the classes that a figure shows one by one; the rest is summed as "other".
 
     Up to 16 classes are all shown. Of more, those that reach 1 % somewhere, and of these at most
@@ -91,8 +92,8 @@ def classes_to_show(names: list[str], largest: Floats) -> list[int]:
     ----------
     names : list of str
         Names of the classes.
-    largest : array, shape (classes,)
-        Largest proportion of each class in what is drawn.
+    share : array, shape (..., classes)
+        Proportions of the classes in all that is drawn; NaN where they are unknown.
 
     Returns
     -------
@@ -106,8 +107,18 @@ def classes_to_show(names: list[str], largest: Floats) -> list[int]:
     """
     if len(names) <= SHOW_ALL:
         return list(range(len(names)))
+    largest = np.nan_to_num(share).reshape(-1, len(names)).max(axis=0, initial=0.0)
     ranked = np.argsort(-largest, kind="stable")[:SHOW_MOST]
     return sorted(int(index) for index in ranked if largest[index] >= SHOW_FROM)
+
+
+def with_rest(values: npt.NDArray[Any], shown: list[int], *, axis: int = 0) -> npt.NDArray[Any]:
+    """Return the shown classes along an axis, and behind them the sum of the others."""
+    kept = values.take(shown, axis=axis)
+    rest = np.delete(values, shown, axis=axis)
+    if not rest.shape[axis]:
+        return kept
+    return np.concatenate([kept, rest.sum(axis=axis, keepdims=True)], axis)
 
 
 def class_colors(names: list[str]) -> dict[str, str]:

@@ -143,8 +143,7 @@ class RunningSensitivity(Running):
         for setting, count in found.items():
             if count:
                 share[setting] = [count[name] / count.total() for name in names]
-        largest = np.nan_to_num(share).max(axis=0, initial=0.0)
-        shown = classes_to_show(list(names), largest)
+        shown = classes_to_show(list(names), share)
         return {
             "classes": [names[index] for index in shown],
             "cells": [cells_of(names[index]) for index in shown],
