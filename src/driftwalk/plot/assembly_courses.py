@@ -33,9 +33,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-# Share of the height between two labels at the right edge, and their largest sketch [pt].
+# Share of the height between two labels at the right edge.
 LABEL_GAP: Final = 0.012
-SKETCH_PT: Final = 9.0
 TIME_LABEL: Final = "time (s)"
 SURVIVAL: Final = {
     "first_contact": ("no two blocks have met", style.BLUE, "-"),
@@ -47,7 +46,6 @@ GROWTH: Final = {
     "mean size": {"mean_size": "mean size"},
     "shares": {"largest_share": "in the largest assembly", "free_share": "alone"},
 }
-DASHES: Final = ("-", (0, (5, 2)))
 
 
 def plot_class_times(
@@ -185,7 +183,8 @@ def _label_right(ax: Axes, names: list[str], height: Floats, colors: dict[str, s
         ]
     )
     free_pt = (1.0 - LABEL_GAP * len(names)) * total_pt
-    cell_pt = min(SKETCH_PT / 2.0, free_pt / max(float(tall.sum()), 1.0))
+    # A shape of two rows is 9 pt high at most.
+    cell_pt = min(4.5, free_pt / max(float(tall.sum()), 1.0))
     needed = np.maximum(tall * cell_pt, NAME_SIZE_PT) / total_pt
     place = spread_apart(share, needed + LABEL_GAP)
     wide = max(
@@ -351,7 +350,7 @@ def plot_growth(
     ax = style.axes_or_new(ax, height_mm=65.0)
     time = sizes["time"].values
     for one, color, label in zip(both, (style.BLUE, style.ORANGE), labels, strict=False):
-        for (name, words), dashes in zip(curves.items(), DASHES, strict=False):
+        for (name, words), dashes in zip(curves.items(), ("-", (0, (5, 2))), strict=False):
             text = ", ".join(part for part in (words if len(curves) > 1 else "", label) if part)
             ax.plot(one["time"], one[name], color=color, ls=dashes, lw=1.3, label=text or None)
             ends = (one[f"{name}_low"].values, one[f"{name}_high"].values)

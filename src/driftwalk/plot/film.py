@@ -31,10 +31,6 @@ TRAIL_S: Final = 5.0
 SHORTEST_S: Final = 0.2
 MOST_FRAMES: Final = 15_000
 """Ten minutes of an MP4; a longer film is rather shown faster."""
-HELD_INTERVALS: Final = 3.0
-"""For how many of its usual intervals a body that is not seen stays in the picture."""
-DISC_SHARE: Final = 0.015
-"""Radius of a body of unknown size, as a share of the picture."""
 
 
 @dataclass(frozen=True)
@@ -252,7 +248,7 @@ def _size(scene: _Scene, ax: Axes) -> float:
     if scene.side is not None:
         return scene.side / 2.0
     low, high = ax.get_xlim()
-    return DISC_SHARE * (high - low)
+    return 0.015 * (high - low)
 
 
 def _last_seen(scene: _Scene) -> Integers:
@@ -264,7 +260,8 @@ def _last_seen(scene: _Scene) -> Integers:
         own = scene.time[present[:, body]]
         usual = float(np.median(np.diff(own))) if own.size > 1 else 0.0
         age = scene.time - scene.time[last[:, body]]
-        last[age > HELD_INTERVALS * usual * (1.0 + 1e-9), body] = -1
+        # A body that is not seen stays in the picture for three of its usual intervals.
+        last[age > 3.0 * usual * (1.0 + 1e-9), body] = -1
     return last
 
 

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 Field = Literal["water", "block"]
 COMPONENTS: dict[str, tuple[str, str]] = {"water": ("u", "v"), "block": ("u_block", "v_block")}
-ARROWS_ACROSS = 17
 SPEED_LABEL = "speed (cm/s)"
 
 
@@ -151,7 +150,8 @@ def _draw_arrows(
     ax: Axes, x: Floats, y: Floats, u: Floats, v: Floats, filled: Bools
 ) -> list[Artist]:
     """Draw every n-th arrow, the longest about one and a half arrow spacings."""
-    stride = max(1, round(max(x.size, y.size) / ARROWS_ACROSS))
+    # About 17 arrows lie across the field.
+    stride = max(1, round(max(x.size, y.size) / 17))
     thin = (slice(stride // 2, None, stride), slice(stride // 2, None, stride))
     speed = np.hypot(u[thin], v[thin])
     # An arrow too short to show its direction would be drawn as a dot.

@@ -26,9 +26,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 BAR_WIDTH = 0.76
-# So many classes have room in one column of a page; a legend needs so much for two columns [pt].
-NARROW_CLASSES = 12
-WIDE_LEGEND_PT = 380.0
 
 
 class Bars(NamedTuple):
@@ -97,7 +94,8 @@ def plot_outcomes(
     drawn = [names[index] for index in shown]
     if len(shown) < len(names):
         drawn.append(OTHER)
-    ax = _new_axes(wide=len(both) > 1 or len(drawn) > NARROW_CLASSES) if ax is None else ax
+    # Twelve classes have room in one column of a page.
+    ax = _new_axes(wide=len(both) > 1 or len(drawn) > 12) if ax is None else ax
     place = np.arange(len(drawn), dtype=np.float64)
     width = BAR_WIDTH / len(both)
     for index, (dataset, color) in enumerate(zip(both, (style.BLUE, style.ORANGE), strict=False)):
@@ -212,5 +210,5 @@ def _legend(ax: Axes, both: list[xr.Dataset]) -> None:
     ax.legend(
         handles, texts, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2,
         fontsize=style.STYLE["legend.fontsize"], frameon=False,
-        ncols=2 if len(handles) > 2 and style.axes_points(ax)[0] > WIDE_LEGEND_PT else 1,
+        ncols=2 if len(handles) > 2 and style.axes_points(ax)[0] > 380.0 else 1,
     )  # fmt: skip

@@ -39,16 +39,11 @@ if TYPE_CHECKING:
 
 # Bright is close to the reference, as bright is a good score in the map of the calibration.
 DISTANCE_COLORMAP: Final = "viridis_r"
-PROPORTION_COLORMAP: Final = "viridis"
 DISTANCE_LABEL: Final = r"$\ell_1$ distance to the reference"
 FLOOR_LABEL: Final = "95 % noise floor"
 REFERENCE_LABEL: Final = "reference"
-# Least width of a sketch in the key [pt].
-KEY_SLOT_PT: Final = 32.0
 KEY_ROW_MM: Final = 11.0
 MM_PER_PT: Final = style.MM_PER_INCH / 72.0
-# Letters of a legend that fit abreast in one column of a page.
-LEGEND_LETTERS: Final = 50
 MARKERS: Final = "osD^v<>"
 
 
@@ -169,7 +164,7 @@ def plot_class_panels(
     top = max((float(np.nanmax(p)) for p in every if np.isfinite(p).any()), default=1.0) or 1.0
     for ax, name, proportion in zip(panels, shown, every, strict=True):
         if mapped:
-            mesh = _draw_map(ax, sweep, proportion, colormap=PROPORTION_COLORMAP)
+            mesh = _draw_map(ax, sweep, proportion, colormap="viridis")
             mesh.set_clim(0.0, top)
             _mark_on_map(ax, sensitivity, sweep, size=6.0)
         else:
@@ -243,7 +238,8 @@ def plot_class_key(
 def key_rows(names: Sequence[str], width_mm: float) -> int:
     """Return in how many rows `plot_class_key` draws the classes on axes of that width."""
     longest = max((len(name_text(name)) for name in names), default=0)
-    slot = max(KEY_SLOT_PT, (longest + 1.0) * LETTER_PT)
+    # A sketch takes 32 pt across or more.
+    slot = max(32.0, (longest + 1.0) * LETTER_PT)
     columns = max(1, int(width_mm / MM_PER_PT / slot))
     return max(1, -(-len(names) // columns))
 
@@ -381,7 +377,8 @@ def _turn_words(ax: Axes, sweep: list[SweepAxis]) -> None:
 def _legend_above(ax: Axes) -> None:
     handles, labels = ax.get_legend_handles_labels()
     if labels:
-        narrow = 2 * max(map(len, labels)) <= LEGEND_LETTERS
+        # Fifty letters fit abreast in one column of a page.
+        narrow = 2 * max(map(len, labels)) <= 50
         ax.legend(
             handles, labels, loc="lower left", bbox_to_anchor=(0.0, 1.0),
             ncols=2 if narrow else 1, borderaxespad=0.2,

@@ -33,8 +33,6 @@ Marginals = Literal["shown", "none"]
 BINS = 48
 # Axes and bins reach over the central part of the steps; one wild step must not squeeze the rest.
 SHOWN_FRACTION = 0.9995
-# Colour grows with the root of the density: the tails show, and so does the shape of the peak.
-COLOR_POWER = 0.5
 DENSITY_LABEL = "density of steps (% mm⁻¹ °⁻¹)"
 MM_PER_M = FACTORS["m", "mm"]
 DEGREES = FACTORS["rad", "°"]
@@ -171,12 +169,13 @@ def density_mesh(
 
     density = density_of(share, length_mm, angle_deg)
     highest = (float(density.max(initial=0.0)) if top is None else top) or 1.0
+    # Colour grows with the root of the density: the tails show, and so does the shape of the peak.
     mesh = ax.pcolormesh(
         length_mm,
         angle_deg,
         np.ma.masked_equal(density.T, 0.0),
         cmap=style.DENSITY_COLORMAP,
-        norm=PowerNorm(COLOR_POWER, vmin=0.0, vmax=highest),
+        norm=PowerNorm(0.5, vmin=0.0, vmax=highest),
     )
     mesh.set_rasterized(True)
     ax.axhline(0.0, color=style.MUTED, lw=0.5, dashes=(4, 3))

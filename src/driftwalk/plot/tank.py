@@ -26,13 +26,10 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-STRIP_COLUMNS: Final = 6
 POSES: Final = ("x", "y", "theta", "assembly")
 
 # Neighbours further apart than this many usual intervals have a gap between them.
 GAP_INTERVALS = 1.5
-# Beyond this many segments a vector file holds a picture of the path, not its every segment.
-VECTOR_SEGMENTS = 3000
 
 
 def plot_trajectory(
@@ -93,7 +90,8 @@ def plot_trajectory(
     )
     path.set_array(track.time[:-1][joined])
     path.set_clim(track.time[0], track.time[-1])
-    path.set_rasterized(len(segments) > VECTOR_SEGMENTS)
+    # Of a longer path a vector file holds a picture of the path, not its every segment.
+    path.set_rasterized(len(segments) > 3000)
     ax.add_collection(path)
     ax.plot(*points[0], "o", ms=4.5, mfc="white", mec=style.INK, mew=1.0, zorder=5, label="start")
     if draw_arena(ax, arena_of(trajectory, arena)) is None:
@@ -206,7 +204,8 @@ def plot_film_strip(
     one = _one_run(path, run, kind="assembly_path")
     if count < 2:
         raise InputError(f"a strip has at least 2 moments, got {count}")
-    rows = -(-count // STRIP_COLUMNS)
+    # A row has six moments at most.
+    rows = -(-count // 6)
     columns = -(-count // rows)
     height_mm = rows * (style.DOUBLE_COLUMN_MM / columns + 5.0)
     panels = style.axes_grid_or_new(axes, count=count, columns=columns, height_mm=height_mm)

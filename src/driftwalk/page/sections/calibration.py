@@ -78,7 +78,8 @@ def calibration_sections(
     ['empty']
     """
     nothing = "There is no calibration yet."
-    made = sections_of(calibration, nothing, calibration_summary, _warnings)
+    said = partial(sentences, name="warning")
+    made = sections_of(calibration, nothing, calibration_summary, said)
     if recording is not None:
         noise = None if calibration is None else _noise(calibration)
         made += recording_sections(recording, body=body, noise=noise)
@@ -97,10 +98,6 @@ def calibration_sections(
     for id, title, make in parts:
         made += attempt(id, title, partial(make, calibration))
     return made
-
-
-def _warnings(calibration: xr.Dataset) -> list[str]:
-    return sentences(calibration, "warning")
 
 
 def calibration_summary(calibration: xr.Dataset) -> Section:

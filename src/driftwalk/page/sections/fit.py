@@ -60,8 +60,6 @@ TESTED: Final = {
     **{f"strength_{k}": f"strength of the flow, cosine {k}" for k in range(1, 7)},
 }
 """Words for the numbers that score tests look at."""
-CHANCE_SIGMAS: Final = 2.0
-"""Chance exceeds this in one test of twenty [standard deviations]."""
 
 
 def fit_sections(
@@ -290,7 +288,8 @@ def _why(name: str, sigmas: float) -> str:
     least = MEMORY_SIGMAS if name == "force_memory" else OPENED_SIGMAS
     if not isfinite(sigmas):
         return "it has no estimate"
-    if abs(sigmas) <= CHANCE_SIGMAS:
+    # Chance exceeds two standard deviations in one test of twenty.
+    if abs(sigmas) <= 2.0:
         return "as near as chance brings it"
     if name.startswith("water_"):
         return "the two force laws were compared as a whole"

@@ -11,15 +11,13 @@ from driftwalk.core.arrays import Floats
 from driftwalk.page.arrays import number, numbers
 from driftwalk.page.chart import chart, label, series
 from driftwalk.page.number_words import count, percent
-from driftwalk.page.parts import Section, attempt, figure, require, section, value_of
+from driftwalk.page.parts import Section, attempt, figure, figure_of, require, section, value_of
 from driftwalk.plot.parts.assembly_labels import OTHER, class_names, classes_to_show, with_rest
 from driftwalk.plot.parts.polyomino_sketch import class_cells, is_class
 
 if TYPE_CHECKING:
     import xarray as xr
 
-MOST_TIMES: Final = 401
-"""Times at which a page has the shares."""
 MEAN_TITLE: Final = "Mean size over time"
 SHARES_TITLE: Final = "Largest assembly and free blocks"
 SHARES: Final = {"largest_share": "in the largest assembly", "free_share": "alone"}
@@ -86,7 +84,8 @@ def class_times_section(times: xr.Dataset) -> Section:
         When it has no shares.
     """
     require(times, "time", "class", "proportion")
-    every = -(-times.sizes["time"] // MOST_TIMES)
+    # A page has the shares at 401 times or fewer.
+    every = -(-times.sizes["time"] // 401)
     thin = times.isel(time=slice(None, None, every))
     names = class_names(thin)
     share = thin["proportion"].transpose("class", "time").values
@@ -223,14 +222,8 @@ def size_numbers(sizes: xr.Dataset) -> list[dict[str, Any]]:
         )
         for name, text in words.items()
     ]
-    compact = figure(
-        "compactness",
-        value_of(sizes, "compactness"),
-        note="least perimeter over perimeter",
-        ends=(value_of(sizes, "compactness_low"), value_of(sizes, "compactness_high")),
-        confidence=confidence,
-    )
-    return [*shown, compact]
+    note = "least perimeter over perimeter"
+    return [*shown, figure_of(sizes, "compactness", "compactness", note=note)]
 
 
 def _courses(found: dict[str, xr.Dataset], names: dict[str, str]) -> list[dict[str, Any]]:

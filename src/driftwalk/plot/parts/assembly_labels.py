@@ -21,11 +21,6 @@ if TYPE_CHECKING:
 PALETTE: Final = (BLUE, ORANGE, "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7A4B9A")
 GREYS: Final = ("#9a9a9a", "#6b6b6b", "#bdbdbd", "#4d4d4d", "#848484")
 OTHER: Final = "other"
-OTHER_COLOR: Final = "#ececec"
-# Up to this many classes all are shown, zeros too; of more, only those that matter somewhere.
-SHOW_ALL: Final = 16
-SHOW_MOST: Final = 20
-SHOW_FROM: Final = 0.01
 
 
 class SweepAxis(NamedTuple):
@@ -105,11 +100,11 @@ def classes_to_show(names: list[str], share: Floats) -> list[int]:
     >>> classes_to_show(["I", "O"], np.array([1.0, 0.0]))
     [0, 1]
     """
-    if len(names) <= SHOW_ALL:
+    if len(names) <= 16:
         return list(range(len(names)))
     largest = np.nan_to_num(share).reshape(-1, len(names)).max(axis=0, initial=0.0)
-    ranked = np.argsort(-largest, kind="stable")[:SHOW_MOST]
-    return sorted(int(index) for index in ranked if largest[index] >= SHOW_FROM)
+    ranked = np.argsort(-largest, kind="stable")[:20]
+    return sorted(int(index) for index in ranked if largest[index] >= 0.01)
 
 
 def with_rest(values: npt.NDArray[Any], shown: list[int], *, axis: int = 0) -> npt.NDArray[Any]:
@@ -133,7 +128,7 @@ def class_colors(names: list[str]) -> dict[str, str]:
     hues = greys = 0
     for name in names:
         if name == OTHER:
-            colors[name] = OTHER_COLOR
+            colors[name] = "#ececec"
         elif is_complete(name):
             colors[name] = PALETTE[hues % len(PALETTE)]
             hues += 1

@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from driftwalk.viewer.watch.recording_steps import RecordedSteps
 
 DETAILS: Final = ("excerpt_x", "excerpt_y", "step_density", "ks_step_length", "ks_turning_angle")
-NO_DISTANCE: Final = 1.0
-"""A setting that lost its numbers is as far as can be, as in the finished map."""
 
 
 class SettingsMap:
@@ -57,7 +55,8 @@ class SettingsMap:
 
     def add(self, unit: FinishedUnit) -> None:
         """Take the settings of a work unit."""
-        values = np.nan_to_num(unit.arrays["ks_distance"], nan=NO_DISTANCE)
+        # A setting that lost its numbers is as far as can be, as in the finished map.
+        values = np.nan_to_num(unit.arrays["ks_distance"], nan=1.0)
         count = values.shape[1]
         settings = slice(unit.start, unit.stop)
         self.distance.reshape(-1)[settings] = values.mean(axis=1)
@@ -138,11 +137,11 @@ class RunningCalibration(Running):
     def cell(self, row: int, column: int) -> dict[str, Any]:
         """Return the kept excerpt and step density of a setting; the first parameter is along x."""
         found = self._coarse
-        if found is None or len(found.shape) != 2:
-            return dict(NO_CELL)
-        if not (0 <= column < found.shape[0] and 0 <= row < found.shape[1]):
-            return dict(NO_CELL)
-        kept = found.details.get(column * found.shape[1] + row)
+        kept = None
+        if found is not None and len(found.shape) == 2:
+            columns, rows = found.shape
+            if 0 <= column < columns and 0 <= row < rows:
+                kept = found.details.get(column * rows + row)
         if not kept or "excerpt_x" not in kept:
             return dict(NO_CELL)
         time = None if self._recorded is None else self._recorded.excerpt_time

@@ -19,11 +19,6 @@ from driftwalk.schema.runs import RUN_KINDS, load_maker
 from driftwalk.viewer.hub import Content, Publish, Source
 from driftwalk.viewer.watch.shards import RunReader, quiet_time
 
-LOOK_EVERY_S: Final = 0.25
-"""Time between two looks at the run directory [s]."""
-MOST_NAMED: Final = 3
-QUIET_S: Final = 60.0
-"""Time without a result [s] after which the page says how long it has been."""
 SPANS: Final = ((86400.0, "days"), (3600.0, "h"), (60.0, "min"))
 """Units in which that is said, each from two of it on; the last from one."""
 
@@ -118,7 +113,7 @@ class RunSource(Source):
     async def run(self, publish: Publish) -> None:
         """Look at the run directory now and then, and publish what has changed."""
         while True:
-            await asyncio.sleep(LOOK_EVERY_S)
+            await asyncio.sleep(0.25)
             for content in await asyncio.to_thread(self.look):
                 publish(content)
 
@@ -127,7 +122,7 @@ class RunSource(Source):
         if content.get("type") != "cell":
             return
         row, column = content.get("row"), content.get("column")
-        found = dict(NO_CELL)
+        found = NO_CELL
         if self._running is not None and isinstance(row, int) and isinstance(column, int):
             found = self._running.cell(row, column)
         # Only what can be a setting goes back: whatever else a browser sends may not be writable.
@@ -155,7 +150,9 @@ class RunSource(Source):
         try:
             state, stamp = state_of(self._folder), _stamp(self._folder)
             if state == "finished":
-                stamp = _stamp(self._folder, (MANIFEST_FILE, *_results(self._folder)))
+                # Datasets may be replaced under the same manifest.
+                results = sorted(path.name for path in self._folder.glob("*.nc"))
+                stamp = _stamp(self._folder, (MANIFEST_FILE, *results))
                 return [] if stamp in (self._shown, self._refused) else self._show_finished(stamp)
             if state == "unfinished":
                 return self._look_at_running(stamp)
@@ -218,7 +215,7 @@ def quiet_words(duration_s: float) -> str:
     >>> quiet_words(200.0)
     '; the last result came 3 min ago (if it was stopped, the same command continues it)'
     """
-    if duration_s < QUIET_S:
+    if duration_s < 60.0:
         return ""
     length, unit = next((s for s in SPANS if duration_s >= 2.0 * s[0]), SPANS[-1])
     ago = f"{duration_s // length:.0f} {unit}"
@@ -268,7 +265,7 @@ def require_run(folder: Path) -> None:
         unfinished_specification(folder)
     else:
         inside = [path.name for path in sorted(folder.iterdir()) if _holds_run(path)]
-        hint = f"; there are runs in it: {', '.join(inside[:MOST_NAMED])}" if inside else ""
+        hint = f"; there are runs in it: {', '.join(inside[:3])}" if inside else ""
         raise InputError(f"{folder}: this directory holds no run of driftwalk{hint}")
 
 
@@ -330,11 +327,6 @@ def _holds_run(path: Path) -> bool:
         return path.is_dir() and state_of(path) != "new"
     except DriftwalkError:
         return False
-
-
-def _results(folder: Path) -> list[str]:
-    """Return the names of the datasets of a run, which may be replaced under the same manifest."""
-    return sorted(path.name for path in folder.glob("*.nc"))
 
 
 def _stamp(folder: Path, names: Sequence[str] = (MANIFEST_FILE, RECORD_FILE)) -> tuple[Any, ...]:
