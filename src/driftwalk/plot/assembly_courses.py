@@ -198,20 +198,15 @@ def _label_right(ax: Axes, names: list[str], height: Floats, colors: dict[str, s
             textcoords="offset points", annotation_clip=False, arrowprops=leader,
         )  # fmt: skip
         if there:
-            _sketch_at(ax, name, at, cell_pt, colors[name])
+            place_sketch(
+                ax, name, (1.0, at), transform="axes fraction", alignment=(0.0, 0.5),
+                cell_pt=cell_pt, color=colors[name], shift_pt=(10.0, 0.0),
+            )  # fmt: skip
         ax.annotate(
             name_text(name), (1.0, at), xytext=(13.0 + wide * cell_pt, 0.0),
             xycoords="axes fraction", textcoords="offset points", va="center",
             size=NAME_SIZE_PT, color=style.INK, annotation_clip=False,
         )  # fmt: skip
-
-
-def _sketch_at(ax: Axes, name: str, at: float, cell_pt: float, color: str) -> None:
-    artist = place_sketch(
-        ax, name, (1.0, at), transform="axes fraction", alignment=(0.0, 0.5), cell_pt=cell_pt,
-        color=color,
-    )  # fmt: skip
-    artist.xybox = (10.0, 0.0)
 
 
 def spread_apart(wanted: Floats, size: Floats) -> Floats:

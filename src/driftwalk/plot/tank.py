@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
-import numpy.typing as npt
 
-from driftwalk.core.arrays import Bools, Floats
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.plot.parts import style
 from driftwalk.plot.parts.arena import (
@@ -83,7 +82,8 @@ def plot_trajectory(
     track = _excerpt(body_track(trajectory, body), start, stop)
     ax = style.axes_or_new(ax, layout="compressed")
     points = CM_PER_M * np.column_stack([track.x, track.y])
-    joined = joined_neighbours(track.time)
+    interval = np.diff(track.time)
+    joined = interval <= GAP_INTERVALS * np.median(interval)
     segments = np.stack([points[:-1][joined], points[1:][joined]], axis=1)
     path = LineCollection(
         list(segments), cmap=style.TIME_COLORMAP, linewidths=0.9, capstyle="round", label="path"
@@ -100,13 +100,6 @@ def plot_trajectory(
     if colorbar == "beside":
         style.add_colorbar(path, ax, "time (s)")
     return ax
-
-
-def joined_neighbours(time: npt.NDArray[np.float64]) -> Bools:
-    """Return, for samples i and i + 1, whether no gap lies between them; shape (n - 1,)."""
-    interval = np.diff(time)
-    joined: Bools = interval <= GAP_INTERVALS * np.median(interval)
-    return joined
 
 
 def _excerpt(track: Track, start: float | None, stop: float | None) -> Track:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,10 +17,6 @@ from driftwalk.plot.parts.polyomino_sketch import class_cells, is_class
 
 if TYPE_CHECKING:
     import xarray as xr
-
-MEAN_TITLE: Final = "Mean size over time"
-SHARES_TITLE: Final = "Largest assembly and free blocks"
-SHARES: Final = {"largest_share": "in the largest assembly", "free_share": "alone"}
 
 
 @functools.cache
@@ -93,18 +89,20 @@ def class_times_section(times: xr.Dataset) -> Section:
     ends = [f"proportion_{end}" for end in ("low", "high")]
     bands = [thin[end].transpose("class", "time").values if end in thin else None for end in ends]
     classes = [
-        _over_time(names[i], share[i], *(None if band is None else band[i] for band in bands))
+        _class_course(names[i], share[i], *(None if band is None else band[i] for band in bands))
         for i in shown
     ]
     if len(shown) < len(names):
-        classes.append(_over_time(OTHER, with_rest(share, shown)[-1], None, None))
+        classes.append(_class_course(OTHER, with_rest(share, shown)[-1], None, None))
     return section(
         "class-times", "class_times", "Outcome classes over time",
         time=numbers(thin["time"].values), classes=classes,
     )  # fmt: skip
 
 
-def _over_time(name: str, share: Floats, low: Floats | None, high: Floats | None) -> dict[str, Any]:
+def _class_course(
+    name: str, share: Floats, low: Floats | None, high: Floats | None
+) -> dict[str, Any]:
     return {
         "class": name,
         "cells": cells_of(name),
@@ -155,27 +153,23 @@ def size_sections(found: dict[str, xr.Dataset]) -> list[Section]:
     found : dict of str to xarray.Dataset
         Each an `assembly_sizes`, by what it is of.
     """
+    mean, title = {"mean_size": ""}, "Largest assembly and free blocks"
+    shares = {"largest_share": "in the largest assembly", "free_share": "alone"}
     return [
         *attempt("sizes", "Sizes of the assemblies", lambda: sizes_section(found)),
-        *attempt("mean-size", MEAN_TITLE, lambda: mean_size_section(found)),
-        *attempt("size-shares", SHARES_TITLE, lambda: shares_section(found)),
+        *_over_time(found, "mean-size", "Mean size over time", "blocks per assembly", mean),
+        *_over_time(found, "size-shares", title, "share of the blocks", shares),
     ]
 
 
-def mean_size_section(found: dict[str, xr.Dataset]) -> Section:
-    """Return the mean size of the assemblies over time."""
-    return chart(
-        "mean-size", MEAN_TITLE, _note(found), x=label("time", "s"), y=label("blocks per assembly"),
-        series=_courses(found, {"mean_size": ""}),
-    )  # fmt: skip
+def _over_time(
+    found: dict[str, xr.Dataset], id: str, title: str, words: str, names: dict[str, str]
+) -> list[Section]:
+    def section_of() -> Section:
+        time, drawn = label("time", "s"), _courses(found, names)
+        return chart(id, title, _note(found), x=time, y=label(words), series=drawn)
 
-
-def shares_section(found: dict[str, xr.Dataset]) -> Section:
-    """Return the shares of the blocks that are in the largest assembly, and alone, over time."""
-    return chart(
-        "size-shares", SHARES_TITLE, _note(found), x=label("time", "s"),
-        y=label("share of the blocks"), series=_courses(found, SHARES),
-    )  # fmt: skip
+    return attempt(id, title, section_of)
 
 
 def sizes_section(found: dict[str, xr.Dataset]) -> Section:

@@ -167,7 +167,7 @@ def place_sketch(
     alignment: tuple[float, float] = (0.5, 0.5),
     cell_pt: float = 3.0,
     color: Any = BLUE,
-    orientation: Orientation = "wide",
+    shift_pt: tuple[float, float] = (0.0, 0.0),
 ) -> AnnotationBbox:
     """Put the sketch of a class on axes, also outside of their frame.
 
@@ -187,8 +187,8 @@ def place_sketch(
         Side of a square [pt].
     color : color
         Colour of the squares.
-    orientation : {"wide", "tall"}
-        See `class_cells`.
+    shift_pt : tuple of float
+        How far it lies from there, to the right and up [pt].
 
     Returns
     -------
@@ -199,19 +199,11 @@ def place_sketch(
     --------
     ``place_sketch(ax, "T", (0.5, 1.05), transform="axes fraction")``
     """
-    box = sketch_box(name, cell_pt=cell_pt, color=color, orientation=orientation)
-    return _pinned(ax, box, xy, transform=transform, alignment=alignment)
+    box = sketch_box(name, cell_pt=cell_pt, color=color)
+    return _pinned(ax, box, xy, transform=transform, alignment=alignment, shift_pt=shift_pt)
 
 
-def draw_sketches_below(
-    ax: Axes,
-    positions: Sequence[float],
-    names: Sequence[str],
-    *,
-    color: Any = INK,
-    cell_pt: float | None = None,
-    pad_pt: float = 4.0,
-) -> float:
+def draw_sketches_below(ax: Axes, positions: Sequence[float], names: Sequence[str]) -> float:
     """Draw the sketches of classes below the x axis in place of tick labels, with their names.
 
     All have squares of one size. A name that holds no known shape ("other") is written out.
@@ -225,12 +217,6 @@ def draw_sketches_below(
         Places along the x axis, equally spaced; the limits of the axis must be set already.
     names : sequence of str
         Names of the classes.
-    color : color
-        Colour of the squares.
-    cell_pt : float, optional
-        Side of a square [pt]; default: as large as the space between two ticks allows.
-    pad_pt : float
-        Space above and below the sketches [pt].
 
     Returns
     -------
@@ -255,7 +241,7 @@ def draw_sketches_below(
         name: sketch_size(class_cells(name, orientation="tall")) for name in names if is_class(name)
     }
     largest = np.max([*sizes.values(), np.ones(2)], axis=0)
-    side = min(MAX_CELL_PT, 0.72 * slot_pt / largest[0]) if cell_pt is None else cell_pt
+    side = min(MAX_CELL_PT, 0.72 * slot_pt / largest[0])
     ax.set_xticks(list(positions), labels=[""] * len(positions))
     ax.tick_params(axis="x", length=0.0)
     deepest = 0.0
@@ -267,7 +253,7 @@ def draw_sketches_below(
         if name in sizes:
             depth = side * float(largest[1])
             parts.append(
-                sketch_box(name, cell_pt=side, color=color, orientation="tall", height_pt=depth)
+                sketch_box(name, cell_pt=side, color=INK, orientation="tall", height_pt=depth)
             )
         if text:
             depth += NAME_GAP_PT + (len(text) * LETTER_PT if upright else NAME_SIZE_PT)
@@ -276,10 +262,11 @@ def draw_sketches_below(
         stacked = VPacker(children=parts, align="center", pad=0.0, sep=NAME_GAP_PT)
         _pinned(
             ax, stacked, (position, 0.0), transform=ax.get_xaxis_transform(),
-            alignment=(0.5, 1.0), below_pt=pad_pt,
+            alignment=(0.5, 1.0), shift_pt=(0.0, -4.0),
         )  # fmt: skip
         deepest = max(deepest, depth)
-    return deepest + 2.0 * pad_pt
+    # 4 pt lie above and below the sketches.
+    return deepest + 8.0
 
 
 def name_text(name: str) -> str:
@@ -360,12 +347,12 @@ def _pinned(
     *,
     transform: Any,
     alignment: tuple[float, float],
-    below_pt: float = 0.0,
+    shift_pt: tuple[float, float],
 ) -> AnnotationBbox:
     from matplotlib.offsetbox import AnnotationBbox
 
     artist = AnnotationBbox(
-        box, xy, xybox=(0.0, -below_pt), xycoords=transform, boxcoords="offset points",
+        box, xy, xybox=shift_pt, xycoords=transform, boxcoords="offset points",
         box_alignment=alignment, frameon=False, pad=0.0, annotation_clip=False,
     )  # fmt: skip
     ax.add_artist(artist)
