@@ -62,7 +62,9 @@ class LiveSource(Source):
 
     def greeting(self) -> Sequence[Content]:
         """Return the page, and the last that came of the stream."""
-        return [{"type": "page", "page": self._page()}, *self._last.values()]
+        subtitle, tank = f"the stream of {self.title}", section("live", "live", "The tank")
+        page = page_frame(self.view, "Live", subtitle=subtitle, sections=[tank])
+        return [{"type": "page", "page": page}, *self._last.values()]
 
     async def run(self, publish: Publish) -> None:
         """Read the stream, and connect again whenever it is lost."""
@@ -181,10 +183,6 @@ class LiveSource(Source):
             with contextlib.suppress(OSError):
                 self._writer.write(json.dumps({"jpeg_width": width}).encode() + b"\n")
                 await self._writer.drain()
-
-    def _page(self) -> dict[str, Any]:
-        subtitle, tank = f"the stream of {self.title}", section("live", "live", "The tank")
-        return page_frame(self.view, "Live", subtitle=subtitle, sections=[tank])
 
 
 def stream_line(line: bytes) -> dict[str, Any] | None:
