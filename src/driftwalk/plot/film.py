@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from driftwalk.core.arrays import Bools, Floats, Integers
+from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.atomic import atomic_path, require_target
 from driftwalk.plot.parts import style
@@ -250,7 +250,7 @@ def _size(scene: _Scene, ax: Axes) -> float:
 
 def _last_seen(scene: _Scene) -> Integers:
     """Return the sample that shows each body at each time, -1 while it is not seen."""
-    present: Bools = np.isfinite(scene.place).all(axis=-1)
+    present = np.asarray(np.isfinite(scene.place).all(axis=-1))
     rows = np.arange(scene.time.size, dtype=np.int64)[:, None]
     last = np.maximum.accumulate(np.where(present, rows, -1), axis=0)
     for body in range(present.shape[1]):
