@@ -15,7 +15,7 @@ from driftwalk.core.errors import DriftwalkError
 from driftwalk.core.files.run_layout import run_file
 from driftwalk.core.run_stages import CALIBRATION_STAGES, MORE, share_of_map, share_of_windows
 from driftwalk.page import encode_array
-from driftwalk.page.sections.calibration import bootstrap_section, profile_sections
+from driftwalk.page.sections.calibration import bootstrap_section, one_body, profile_sections
 from driftwalk.page.sections.map import map_section
 from driftwalk.schema import Parameter
 from driftwalk.schema.parameters import BLOCK
@@ -226,15 +226,9 @@ class RunningCalibration(Running):
         if len(self._parameters) == 1:
             section = {**profile_sections(found)[0], "id": "map"}
         else:
-            section = map_section(found, self._one_body())
+            section = map_section(found, one_body(self._recording, self._body))
         waiting = "Settings appear as they are simulated; nothing is final before the run is."
         return {**section, "note": f"{section['note']} {waiting}"}
-
-    def _one_body(self) -> xr.Dataset | None:
-        found = self._recording
-        if found is None or self._body is None:
-            return found
-        return found.sel(body=[self._body])
 
     def _dataset(self) -> xr.Dataset:
         """Return what is there of the calibration that is being made, in its own form."""
