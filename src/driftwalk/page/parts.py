@@ -229,7 +229,7 @@ def figure(
     }  # fmt: skip
 
 
-def figure_of(
+def figure_with_ends(
     dataset: xr.Dataset, name: str, label: str, unit: str = "1", *, suffix: str = "", **how: Any
 ) -> dict[str, Any]:
     """Return a number of the facts with its interval: ``name``, ``name_low``, ``name_high``."""

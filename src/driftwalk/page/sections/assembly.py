@@ -11,7 +11,7 @@ from driftwalk.page.number_words import count, percent, quantity
 from driftwalk.page.parts import (
     Section,
     attempt,
-    figure_of,
+    figure_with_ends,
     require,
     required,
     sections_of,
@@ -130,10 +130,10 @@ def assembly_summary(
     ]
     done += f" ({', '.join(rules)})" if rules else ""
     paragraphs = [f"{done}.", _most_common(distribution, named=sizes is None)]
-    shown = [figure_of(distribution, "complete", "complete: one assembly")]
+    shown = [figure_with_ends(distribution, "complete", "complete: one assembly")]
     if drawn is not None:
         paragraphs.append(_beside(distribution, drawn, classes=sizes is None))
-        shown.append(figure_of(drawn, "complete", "complete, parameters drawn"))
+        shown.append(figure_with_ends(drawn, "complete", "complete, parameters drawn"))
     if sizes is not None:
         shown += size_numbers(sizes)
     paragraphs.append("These predictions use latching rules that no recording has settled.")
@@ -243,7 +243,7 @@ def _most_common(distribution: xr.Dataset, *, named: bool) -> str:
 def _median(times: xr.Dataset, name: str) -> dict[str, Any]:
     known = value_of(times, f"{name}_median_s") is not None
     note = None if known else "not reached in half the runs"
-    return figure_of(
+    return figure_with_ends(
         times, f"{name}_median", f"{axis_words(name)}, median", "s", suffix="_s", note=note
     )
 

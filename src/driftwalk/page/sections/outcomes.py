@@ -11,7 +11,15 @@ from driftwalk.core.arrays import Floats
 from driftwalk.page.arrays import number, numbers
 from driftwalk.page.chart import chart, label, series
 from driftwalk.page.number_words import count, percent
-from driftwalk.page.parts import Section, attempt, figure, figure_of, require, section, value_of
+from driftwalk.page.parts import (
+    Section,
+    attempt,
+    figure,
+    figure_with_ends,
+    require,
+    section,
+    value_of,
+)
 from driftwalk.plot.parts.assembly_labels import OTHER, class_names, classes_to_show, with_rest
 from driftwalk.plot.parts.polyomino_sketch import class_cells, is_class
 
@@ -217,7 +225,7 @@ def size_numbers(sizes: xr.Dataset) -> list[dict[str, Any]]:
         for name, text in words.items()
     ]
     note = "least perimeter over perimeter"
-    return [*shown, figure_of(sizes, "compactness", "compactness", note=note)]
+    return [*shown, figure_with_ends(sizes, "compactness", "compactness", note=note)]
 
 
 def _courses(found: dict[str, xr.Dataset], names: dict[str, str]) -> list[dict[str, Any]]:
