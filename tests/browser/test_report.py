@@ -17,7 +17,7 @@ import driftwalk as dw
 from browser.all_kinds import every_kind, page_of, with_texts
 from browser.conftest import PHONE, Visit
 from browser.pictures import assert_same_path, drawn_share, path_points, pixels
-from driftwalk.page import map_section
+from driftwalk.page.sections.map import map_section
 from driftwalk.schema.parameters import BLOCK
 
 pytestmark = pytest.mark.browser

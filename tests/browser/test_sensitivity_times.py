@@ -18,7 +18,7 @@ from browser.all_kinds import page_of
 from browser.conftest import PHONE, Visit
 from browser.pictures import drawn_share, path_points, pixels
 from driftwalk.core.files.rundir import RunDirectory
-from driftwalk.page import sensitivity_sections
+from driftwalk.page.sections.sensitivity import sensitivity_sections
 
 pytestmark = pytest.mark.browser
 

@@ -9,8 +9,11 @@ from driftwalk.figures.fit import (
     plot_flow_error,
     plot_laws,
 )
-from driftwalk.figures.model_calibration import model_calibration_figures
-from driftwalk.figures.model_comparison import comparison_figures, plot_models
+from driftwalk.figures.motion_models import (
+    comparison_figures,
+    model_calibration_figures,
+    plot_models,
+)
 from driftwalk.figures.recovery import (
     model_recovery_figures,
     plot_flow_recovery,

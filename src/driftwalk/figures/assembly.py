@@ -17,8 +17,7 @@ from driftwalk.plot.assembly_courses import (
 )
 from driftwalk.plot.components import plot_biplot
 from driftwalk.plot.outcome_bars import plot_outcomes
-from driftwalk.plot.parts.polyomino_sketch import figure_of
-from driftwalk.plot.parts.style import DOUBLE_COLUMN_MM, SINGLE_COLUMN_MM, letter_panels, new_figure
+from driftwalk.plot.parts import style
 from driftwalk.plot.sensitivity_maps import (
     KEY_ROW_MM,
     key_rows,
@@ -86,8 +85,10 @@ def assembly_figures(
     """
     names = ("", "") if distribution_drawn is None else labels
     figures: Figures = {
-        "outcomes": lambda: outcomes_figure(
-            distribution, beside=distribution_drawn, labels=names, realisations=realisations
+        "outcomes": lambda: style.figure_of(
+            plot_outcomes(
+                distribution, beside=distribution_drawn, labels=names, realisations=realisations
+            )
         )
     }
     if class_times is not None:
@@ -99,31 +100,16 @@ def assembly_figures(
             )
         }
     if path is not None:
-        figures["film_strip"] = lambda: figure_of(plot_film_strip(path, run=run)[0])
+        figures["film_strip"] = lambda: style.figure_of(plot_film_strip(path, run=run)[0])
     return figures
-
-
-def outcomes_figure(
-    distribution: xr.Dataset,
-    *,
-    beside: xr.Dataset | None = None,
-    labels: tuple[str, str] = ("", ""),
-    realisations: xr.Dataset | None = None,
-) -> Figure:
-    """Return Fig. 9: one column wide for few classes, else two."""
-    return figure_of(
-        plot_outcomes(distribution, beside=beside, labels=labels, realisations=realisations)
-    )
 
 
 def class_times_figure(times: xr.Dataset) -> Figure:
     """Return the classes over time next to the survival curves."""
-    figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=75.0)
-    row = list(figure.subplots(1, 2, width_ratios=[1.25, 1.0]))
+    figure, row = style.new_panels(1, 2, height_mm=75.0, width_ratios=[1.25, 1.0])
     plot_class_times(times, row[0])
     plot_survival(times, row[1])
-    titles = [ax.get_title(loc="left") for ax in row]
-    letter_panels(row, titles)
+    style.letter_panels(row)
     return figure
 
 
@@ -135,8 +121,7 @@ def assembly_sizes_figure(
     times: xr.Dataset | None = None,
 ) -> Figure:
     """Return the sizes at the end, their mean and shares over time, and the survival curves."""
-    figure = new_figure(width_mm=DOUBLE_COLUMN_MM, height_mm=130.0)
-    panels = list(figure.subplots(2, 2).ravel())
+    figure, panels = style.new_panels(2, 2, height_mm=130.0)
     plot_assembly_sizes(sizes, panels[0], beside=beside, labels=labels)
     plot_growth(sizes, panels[1], beside=beside, labels=labels)
     plot_growth(sizes, panels[2], beside=beside, labels=labels, what="shares")
@@ -144,12 +129,8 @@ def assembly_sizes_figure(
         panels.pop().remove()
     else:
         plot_survival(times, panels[3])
-    letter_panels(panels, [ax.get_title(loc="left") for ax in panels])
+    style.letter_panels(panels)
     return figure
-
-
-# Width of the map, and so of the key below it, as a share of the figure's.
-MAP_SHARE = 0.75
 
 
 def sensitivity_figures(
@@ -183,7 +164,9 @@ def sensitivity_figures(
     figures: Figures = {}
     if reference is not None:
         realised = reference[["realisation_proportion"]].rename(realisation_proportion="proportion")
-        figures["outcomes"] = lambda: outcomes_figure(reference, realisations=realised)
+        figures["outcomes"] = lambda: style.figure_of(
+            plot_outcomes(reference, realisations=realised)
+        )
     if components is not None and components.sizes["component"] < 2:
         components = None
     for folder, chosen in _planes(sensitivity):
@@ -210,9 +193,12 @@ def _planes(sensitivity: xr.Dataset) -> Iterator[tuple[str, dict[str, Any]]]:
 def l1_map_figure(sensitivity: xr.Dataset) -> Figure:
     """Return Fig. 11: the distance to the reference, and the sketches of the classes below."""
     names = shown_classes(sensitivity)
-    rows = key_rows(names, MAP_SHARE * SINGLE_COLUMN_MM)
-    figure = new_figure(width_mm=SINGLE_COLUMN_MM, height_mm=80.0 + KEY_ROW_MM * rows)
-    ax, key = figure.subplots(2, 1, height_ratios=[80.0, KEY_ROW_MM * rows])
+    # The map, and so the key below it, is three quarters as wide as the figure.
+    rows = key_rows(names, 0.75 * style.SINGLE_COLUMN_MM)
+    heights = [80.0, KEY_ROW_MM * rows]
+    figure, (ax, key) = style.new_panels(
+        2, 1, width_mm=style.SINGLE_COLUMN_MM, height_mm=sum(heights), height_ratios=heights
+    )
     plot_l1_map(sensitivity, ax)
     plot_class_key(names, key, rows=rows)
     return figure
@@ -220,13 +206,11 @@ def l1_map_figure(sensitivity: xr.Dataset) -> Figure:
 
 def class_panels_figure(sensitivity: xr.Dataset) -> Figure:
     """Return the proportion of every class over the axes of the study."""
-    return figure_of(plot_class_panels(sensitivity)[0])
+    return style.figure_of(plot_class_panels(sensitivity)[0])
 
 
 def biplot_figure(
     components: xr.Dataset, sensitivity: xr.Dataset, color: Literal["complete", "l1_distance"]
 ) -> Figure:
     """Return Fig. 10, coloured by completion or by the distance to the reference."""
-    figure = new_figure(width_mm=SINGLE_COLUMN_MM, height_mm=80.0)
-    plot_biplot(components, figure.add_subplot(), sensitivity=sensitivity, color=color)
-    return figure
+    return style.figure_of(plot_biplot(components, sensitivity=sensitivity, color=color))

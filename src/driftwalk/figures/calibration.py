@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from driftwalk.figures.write import Figures, marked_simulated
 from driftwalk.plot.distances import LEGEND_ORDER, plot_ks_map, plot_refined_map
@@ -70,38 +70,30 @@ def flow_figure(flow: xr.Dataset) -> Figure:
     """Return Fig. 2: the block's velocity next to the water's, or the water's alone."""
     has_block = all(name in flow for name in COMPONENTS["block"])
     if not has_block:
-        figure = style.new_figure(
-            width_mm=style.SINGLE_COLUMN_MM, height_mm=76.0, layout="compressed"
-        )
-        plot_flow(flow, figure.add_subplot())
-        return figure
+        ax = style.axes_or_new(None, height_mm=76.0, layout="compressed")
+        return style.figure_of(plot_flow(flow, ax))
     import numpy as np
 
     top = max(
         float(np.nanmax(np.hypot(*velocity_of(flow, field)[:2]), initial=0.0)) / 100.0
         for field in ("block", "water")
     )
-    figure = style.new_figure(width_mm=style.DOUBLE_COLUMN_MM, height_mm=92.0, layout="compressed")
-    row = list(figure.subplots(1, 2, sharex=True, sharey=True))
+    figure, row = style.new_panels(
+        1, 2, height_mm=92.0, layout="compressed", sharex=True, sharey=True
+    )
     plot_flow(flow, row[0], field="block", speed_limit=top, colorbar="none")
     plot_flow(flow, row[1], field="water", speed_limit=top, colorbar="none")
     row[1].set_ylabel("")
     filled = any(str(patch.get_label()).startswith("filled") for patch in row[1].patches)
-    style.letter_panels(
-        row,
-        [
-            "block velocity",
-            "corrected flow" + (" (hatched: filled, not measured)" if filled else ""),
-        ],
-    )
+    hatched = " (hatched: filled, not measured)" if filled else ""
+    style.letter_panels(row, ["block velocity", f"corrected flow{hatched}"])
     style.add_colorbar(row[1].collections[0], row, SPEED_LABEL)
     return figure
 
 
 def trajectory_figure(trajectory: xr.Dataset, *, body: str | None = None) -> Figure:
     """Return Fig. 5a: the first minute of the path."""
-    figure = style.new_figure(width_mm=style.SINGLE_COLUMN_MM, height_mm=80.0, layout="compressed")
-    ax = figure.add_subplot()
+    ax = style.axes_or_new(None, height_mm=80.0, layout="compressed")
     time = body_track(trajectory, body).time
     if time.size and time[-1] - time[0] > EXCERPT_S:
         start = float(time[0])
@@ -111,18 +103,15 @@ def trajectory_figure(trajectory: xr.Dataset, *, body: str | None = None) -> Fig
         plot_trajectory(trajectory, ax, body=body)
     handles = [line for line in ax.lines if line.get_label() == "start"]
     ax.legend(handles=handles, loc="lower right", bbox_to_anchor=(1.02, 0.99), borderaxespad=0.0)
-    return figure
+    return style.figure_of(ax)
 
 
 def steps_figure(calibration: xr.Dataset) -> Figure:
     """Return Fig. 5b: the recording's steps with their marginals."""
-    figure = style.new_figure(width_mm=style.SINGLE_COLUMN_MM, height_mm=76.0)
-    plot_steps(
-        calibration["recording_step_length"].values,
-        calibration["recording_turning_angle"].values,
-        figure.add_subplot(),
-    )
-    return figure
+    ax = style.axes_or_new(None, height_mm=76.0)
+    length = calibration["recording_step_length"].values
+    angle = calibration["recording_turning_angle"].values
+    return style.figure_of(plot_steps(length, angle, ax))
 
 
 def ks_map_figure(calibration: xr.Dataset) -> Figure:
@@ -133,30 +122,23 @@ def ks_map_figure(calibration: xr.Dataset) -> Figure:
     if len(plot_parameters(calibration)) == 1:
         return _profiles_figure(calibration)
     if "refined_ks_distance" not in calibration:
-        figure = style.new_figure(width_mm=style.SINGLE_COLUMN_MM, height_mm=80.0)
-        _legend_above(plot_ks_map(calibration, figure.add_subplot()))
-        return figure
-    figure = style.new_figure(width_mm=style.DOUBLE_COLUMN_MM, height_mm=80.0)
-    row = list(figure.subplots(1, 2))
+        ax = plot_ks_map(calibration, style.axes_or_new(None, height_mm=80.0))
+        ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.2)
+        return style.figure_of(ax)
+    figure, row = style.new_panels(1, 2, height_mm=80.0)
     plot_ks_map(calibration, row[0])
     plot_refined_map(calibration, row[1])
     style.letter_panels(row, ["whole box", "near the optimum (lines: fitted surface)"])
-    handles, labels = row[0].get_legend_handles_labels()
-    order = sorted(range(len(labels)), key=lambda index: LEGEND_ORDER.index(labels[index]))
-    figure.legend(
-        [handles[index] for index in order],
-        [labels[index] for index in order],
-        loc="outside upper center",
-        ncols=6,
-    )
+    entries = zip(*row[0].get_legend_handles_labels(), strict=True)
+    ordered = sorted(entries, key=lambda entry: LEGEND_ORDER.index(entry[1]))
+    figure.legend(*zip(*ordered, strict=True), loc="outside upper center", ncols=6)
     return figure
 
 
 def panels_figure(calibration: xr.Dataset, parameter: str) -> Figure:
     """Return the densities along a parameter: Fig. 7 (drag coefficient), Fig. 8 (force)."""
-    figure = style.new_figure(width_mm=style.DOUBLE_COLUMN_MM, height_mm=62.0)
-    row = list(figure.subplots(1, 4, sharex=True, sharey=True))
-    plot_density_panels(calibration, row, parameter=parameter)
+    row = plot_density_panels(calibration, parameter=parameter)
+    figure = style.figure_of(row[0])
     shared = shared_setting_text(calibration, parameter=parameter)
     if shared:
         figure.suptitle(f"simulated with {shared}")
@@ -168,8 +150,8 @@ def validation_figure(calibration: xr.Dataset) -> Figure:
     parameters = plot_parameters(calibration)
     if any(f"bootstrap_{one.name}" not in calibration for one in parameters):
         return _profiles_figure(calibration)
-    figure = style.new_figure(width_mm=style.DOUBLE_COLUMN_MM, height_mm=68.0)
-    row = plot_validation(calibration, list(figure.subplots(1, len(parameters) + 1)))
+    figure, row = style.new_panels(1, len(parameters) + 1, height_mm=68.0)
+    plot_validation(calibration, row)
     style.letter_panels(row, [*(f"along {one.symbol}" for one in parameters), "estimates"])
     handles, labels = row[0].get_legend_handles_labels()
     more = zip(*row[-1].get_legend_handles_labels(), strict=True)
@@ -183,14 +165,9 @@ def validation_figure(calibration: xr.Dataset) -> Figure:
 
 def _profiles_figure(calibration: xr.Dataset) -> Figure:
     parameters = plot_parameters(calibration)
-    figure = style.new_figure(width_mm=style.DOUBLE_COLUMN_MM, height_mm=68.0)
-    row = list(figure.subplots(1, len(parameters), squeeze=False)[0])
+    figure, row = style.new_panels(1, len(parameters), height_mm=68.0)
     for parameter, ax in zip(parameters, row, strict=True):
         plot_distance_profile(calibration, ax, parameter=parameter.name)
     style.letter_panels(row, [f"along {one.symbol}" for one in parameters])
-    figure.legend(*row[0].get_legend_handles_labels(), loc="outside upper center", ncols=7)
+    style.legend_above(figure, row[0], 7)
     return figure
-
-
-def _legend_above(ax: Any) -> None:
-    ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.2)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,7 +15,6 @@ from driftwalk.figures.calibration import trajectory_figure
 from driftwalk.figures.write import Figures, marked_simulated
 from driftwalk.plot.flow_field import plot_flow
 from driftwalk.plot.model_check import (
-    legend_of,
     plot_innovations,
     plot_predicted_steps,
     plot_residual_map,
@@ -31,11 +30,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-
-ERROR_LABEL = "standard error (mm/s)"
-TITLE_WIDTH = 90
-"""Letters of a title over the whole figure."""
 
 
 def plot_flow_error(flow: xr.Dataset, ax: Axes | None = None) -> Axes:
@@ -81,7 +75,7 @@ def plot_flow_error(flow: xr.Dataset, ax: Axes | None = None) -> Axes:
     if outline is not None:
         mesh.set_clip_path(outline)
     label_position(ax)
-    style.add_colorbar(mesh, ax, ERROR_LABEL)
+    style.add_colorbar(mesh, ax, "standard error (mm/s)")
     return ax
 
 
@@ -135,25 +129,18 @@ def _label(flow: xr.Dataset) -> list[str]:
 
 
 def _flow_figure(flow: xr.Dataset) -> Figure:
-    figure = style.new_figure(width_mm=style.DOUBLE_COLUMN_MM, height_mm=80.0, layout="compressed")
-    row = list(figure.subplots(1, 2, sharex=True, sharey=True))
+    figure, row = style.new_panels(
+        1, 2, height_mm=80.0, layout="compressed", sharex=True, sharey=True
+    )
     plot_flow(flow, row[0])
     plot_flow_error(flow, row[1])
     row[1].set_ylabel("")
     filled = bool((flow["flag"].values == FLAGS["filled"]).any())
-    title = " ".join(["fitted flow", *_label(flow)])
-    style.letter_panels(
-        row, [title + (" (hatched: filled)" if filled else ""), "its standard error"]
-    )
+    title = " ".join(["fitted flow", *_label(flow), *(["(hatched: filled)"] if filled else [])])
+    style.letter_panels(row, [title, "its standard error"])
     if "intervals" in flow.attrs:
-        figure.suptitle(textwrap.fill(f"from {flow.attrs['intervals']}", TITLE_WIDTH))
+        figure.suptitle(textwrap.fill(f"from {flow.attrs['intervals']}", 90))
     return figure
-
-
-LEAST_SHOWN = 1e-5
-"""Smallest width of the even part of the axis [nats]."""
-MOST_EVEN = 20.0
-"""Largest loss, in standard errors, up to which the axis is even; beyond it is logarithmic."""
 
 
 def laws_figures(fit: xr.Dataset) -> Figures:
@@ -184,8 +171,8 @@ def laws_figures(fit: xr.Dataset) -> Figures:
 
 
 def _laws_figure(fit: xr.Dataset) -> Figure:
-    figure = style.new_figure(width_mm=1.4 * style.SINGLE_COLUMN_MM, height_mm=55.0)
-    plot_laws(fit, figure.add_subplot())
+    figure, (ax,) = style.new_panels(1, 1, width_mm=1.4 * style.SINGLE_COLUMN_MM, height_mm=55.0)
+    plot_laws(fit, ax)
     return figure
 
 
@@ -217,8 +204,9 @@ def plot_laws(fit: xr.Dataset, ax: Axes) -> Axes:
     lost, std = (np.array(one) for one in zip(*((law.loss, law.std) for law in known), strict=True))
     place = np.arange(len(names))
     ax.errorbar(lost, place, xerr=std, fmt="o", ms=3.0, lw=0.9, capsize=2.0, color=style.BLUE)
-    even = max(float(std.max()), LEAST_SHOWN)
-    if float(lost.max()) > MOST_EVEN * even:
+    # A logarithmic axis is even around 0, up to the largest standard error and 1e-5 nats at least.
+    even = max(float(std.max()), 1e-5)
+    if float(lost.max()) > 20.0 * even:
         # From a power of ten on: no other label of the axis is then next to that of 0.
         ax.set_xscale("symlog", linthresh=10.0 ** math.ceil(math.log10(even)))
     else:
@@ -251,47 +239,37 @@ def check_figures(check: xr.Dataset) -> Figures:
     --------
     ``write_figures(check_figures(check), "fit/figures")``
     """
+    maps = {"mean": "mean error of prediction", "noise": "its noise"}
+    times = {"flow": "flow (bars: 95 %)", "noise": "noise (bars: 95 %)"}
+    steps = {"step_length": "step length", "turning_angle": "turning angle"}
+    tank: dict[str, Any] = {"layout": "compressed", "sharex": True, "sharey": True}
     figures: Figures = {
         "check_innovations": lambda: _innovations_figure(check),
-        "check_map": lambda: _map_figure(check),
-        "check_time": lambda: _time_figure(check),
+        "check_map": lambda: _pair(plot_residual_map, check, maps, height_mm=80.0, **tank),
+        "check_time": lambda: _pair(plot_residual_time, check, times, height_mm=58.0, sharex=True),
     }
     if "step_length_edge" in check:
-        figures["check_steps"] = lambda: _steps_figure(check)
+        figures["check_steps"] = lambda: _pair(plot_predicted_steps, check, steps, height_mm=66.0)
     return marked_simulated(figures, check)
 
 
 def _innovations_figure(check: xr.Dataset) -> Figure:
-    figure = style.new_figure(width_mm=style.DOUBLE_COLUMN_MM, height_mm=62.0)
-    ax = plot_innovations(check, figure.add_subplot())
-    figure.legend(**legend_of(ax), loc="outside upper center", ncols=2 + check.sizes["component"])
+    figure, (ax,) = style.new_panels(1, 1, height_mm=62.0)
+    plot_innovations(check, ax)
+    style.legend_above(figure, ax, 2 + check.sizes["component"])
     return figure
 
 
-def _map_figure(check: xr.Dataset) -> Figure:
-    figure = style.new_figure(width_mm=style.DOUBLE_COLUMN_MM, height_mm=80.0, layout="compressed")
-    row = list(figure.subplots(1, 2, sharex=True, sharey=True))
-    plot_residual_map(check, row[0])
-    plot_residual_map(check, row[1], show="noise")
-    row[1].set_ylabel("")
-    style.letter_panels(row, ["mean error of prediction", "its noise"])
-    return figure
-
-
-def _time_figure(check: xr.Dataset) -> Figure:
-    figure = style.new_figure(width_mm=style.DOUBLE_COLUMN_MM, height_mm=58.0)
-    row = list(figure.subplots(1, 2, sharex=True))
-    plot_residual_time(check, row[0])
-    plot_residual_time(check, row[1], show="noise")
-    style.letter_panels(row, ["flow (bars: 95 %)", "noise (bars: 95 %)"])
-    return figure
-
-
-def _steps_figure(check: xr.Dataset) -> Figure:
-    figure = style.new_figure(width_mm=style.DOUBLE_COLUMN_MM, height_mm=66.0)
-    row = list(figure.subplots(1, 2))
-    plot_predicted_steps(check, row[0])
-    plot_predicted_steps(check, row[1], show="turning_angle")
-    style.letter_panels(row, ["step length", "turning angle"])
-    figure.legend(**legend_of(row[0]), loc="outside upper center", ncols=3)
+def _pair(
+    draw: Callable[..., Axes], check: xr.Dataset, titles: dict[str, str], **options: Any
+) -> Figure:
+    """Draw two aspects of a check next to each other; `titles` are by the word for `show`."""
+    figure, row = style.new_panels(1, 2, **options)
+    for ax, show in zip(row, titles, strict=True):
+        draw(check, ax, show=show)
+    if "sharey" in options:
+        row[1].set_ylabel("")
+    style.letter_panels(row, list(titles.values()))
+    if row[0].get_legend_handles_labels()[1]:
+        style.legend_above(figure, row[0], 3)
     return figure

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from driftwalk.core.arrays import Bools, Floats
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.figures.write import Figures
 from driftwalk.plot.parts import style
@@ -26,15 +26,7 @@ SHOWN: Final = {
 """Attribute that holds the truth, factor to the unit shown, and label."""
 COLORS: Final = (style.BLUE, style.ORANGE, "#009E73", "#CC79A7")
 """By use of the angle."""
-LABELLED: Final = ("drag_coefficient", "force_std")
 BETWEEN_GROUPS: Final = 2.0
-SPREAD: Final = 0.5
-ROW_MM: Final = 13.0
-AROUND_MM: Final = 24.0
-ROW_SPREAD: Final = 0.7
-"""Part of a row over which its recordings stand."""
-MOST_SHOWN: Final = 2.0
-"""Intervals are drawn to this error, in either direction."""
 
 
 def plot_recovery(
@@ -73,17 +65,13 @@ def plot_recovery(
         raise InputError(f"parameter must be one of {', '.join(SHOWN)}, got {parameter!r}")
     attribute, factor, label = SHOWN[parameter]
     ax = style.axes_or_new(ax)
-    for at, used, color, angle, part in _groups(recovery):
+    for at, look, part in _groups(recovery):
         value, low, high = (
             factor * part[f"{parameter}{end}"].values for end in ("", "_low", "_high")
         )
-        for kept, face in ((used, color), (~used, "white")):
-            # A missing estimate is NaN, and not drawn.
-            ax.errorbar(
-                at[kept], value[kept], yerr=[(value - low)[kept], (high - value)[kept]], fmt="o",
-                ms=2.4, mfc=face, mec=color, mew=0.6, ecolor=color, elinewidth=0.7,
-                label=angle if face == color else None,
-            )  # fmt: skip
+        # A missing estimate is NaN, and not drawn.
+        bars = {"yerr": [value - low, high - value], "ecolor": look["mec"], "elinewidth": 0.7}
+        ax.errorbar(at, value, fmt="o", **bars, **look)
     truth = factor * float(recovery.attrs[attribute])
     ax.axhline(truth, color=style.INK, lw=0.7, zorder=0, label="truth")
     ax.set_ylabel(label)
@@ -117,15 +105,9 @@ def plot_flow_recovery(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:
     """
     require_kind(recovery, "recovery", "recovery_study makes one")
     ax = style.axes_or_new(ax)
-    for at, used, color, angle, part in _groups(recovery):
-        error = 100.0 * part["flow_error"].values
-        for kept, face in ((used, color), (~used, "white")):
-            ax.plot(
-                at[kept], error[kept], "o", ms=2.4, mfc=face, mec=color, mew=0.6,
-                label=angle if face == color else None,
-            )  # fmt: skip
-    ax.set_ylim(bottom=0.0)
-    ax.set_ylabel("flow error (% of rms speed)")
+    for at, look, part in _groups(recovery):
+        ax.plot(at, 100.0 * part["flow_error"].values, "o", **look)
+    ax.set(ylim=(0.0, None), ylabel="flow error (% of rms speed)")
     _label_groups(ax, recovery)
     return ax
 
@@ -185,8 +167,7 @@ def plot_recovery_error(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:
     if np.isfinite(recovery["drag_coefficient_error_scale"].values).any():
         # Without a point a logarithmic axis has no range.
         _logarithmic(ax)
-    ax.set_xlabel("length of a recording (min)")
-    ax.set_ylabel("error of $C_d$, rms (%)")
+    ax.set(xlabel="length of a recording (min)", ylabel="error of $C_d$, rms (%)")
     ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize=6.0)
     return ax
 
@@ -216,14 +197,13 @@ def recovery_figures(recovery: xr.Dataset) -> Figures:
     require_kind(recovery, "recovery", "recovery_study makes one")
     return {
         "recovery": lambda: _recovery_figure(recovery),
-        "error_by_length": lambda: _error_figure(recovery),
+        "error_by_length": lambda: style.figure_of(plot_recovery_error(recovery)),
     }
 
 
 def _recovery_figure(recovery: xr.Dataset) -> Figure:
-    figure = style.new_figure(width_mm=style.DOUBLE_COLUMN_MM, height_mm=125.0)
-    rows = list(figure.subplots(3, 1, sharex=True))
-    for name, ax in zip(LABELLED, rows, strict=False):
+    figure, rows = style.new_panels(3, 1, height_mm=125.0, sharex=True)
+    for name, ax in zip(("drag_coefficient", "force_std"), rows, strict=False):
         plot_recovery(recovery, name, ax)
     plot_flow_recovery(recovery, rows[-1])
     for ax in rows[:-1]:
@@ -231,32 +211,27 @@ def _recovery_figure(recovery: xr.Dataset) -> Figure:
     handles, texts = rows[0].get_legend_handles_labels()
     figure.legend(handles, texts, loc="outside upper right", ncols=len(texts))
     confidence = float(recovery.attrs["confidence"])
-    titles = (f"drag coefficient, {confidence:.0%} intervals", "stochastic force", "flow")
-    style.letter_panels(rows, list(titles))
+    drag = f"drag coefficient, {confidence:.0%} intervals"
+    style.letter_panels(rows, [drag, "stochastic force", "flow"])
     return figure
 
 
-def _error_figure(recovery: xr.Dataset) -> Figure:
-    figure = style.new_figure(width_mm=style.SINGLE_COLUMN_MM, height_mm=75.0)
-    plot_recovery_error(recovery, figure.add_subplot())
-    return figure
-
-
-def _groups(
-    recovery: xr.Dataset,
-) -> Iterator[tuple[Floats, Bools, str, str, xr.Dataset]]:
-    """Give place, which are used, colour, name and dataset of each group of recordings."""
+def _groups(recovery: xr.Dataset) -> Iterator[tuple[Floats, dict[str, Any], xr.Dataset]]:
+    """Give place, look and dataset of each group: recordings that are used, or left out."""
     angles = recovery["angle"].values
     count = recovery.sizes["recording"]
     for number in range(recovery.sizes["duration"]):
         for index, angle in enumerate(angles):
             part = recovery.isel(duration=number, angle=index)
-            shift = SPREAD * ((index + 0.5) / len(angles) - 0.5)
+            shift = 0.5 * ((index + 0.5) / len(angles) - 0.5)
             at = number * (count + BETWEEN_GROUPS) + np.arange(count) + shift
             # The legend has one entry for all lengths.
             name = f"angle {angle}" if number == 0 else "_"
             color = COLORS[index % len(COLORS)]
-            yield np.asarray(at, np.float64), part["used"].values == 1, color, name, part
+            used = part["used"].values == 1
+            for kept, face, label in ((used, color, name), (~used, "white", None)):
+                look = {"ms": 2.4, "mfc": face, "mec": color, "mew": 0.6, "label": label}
+                yield at[kept], look, part.isel(recording=kept)
 
 
 def _label_groups(ax: Axes, recovery: xr.Dataset) -> None:
@@ -277,14 +252,12 @@ def _length(seconds: float) -> str:
 
 def _logarithmic(ax: Axes) -> None:
     """Set both axes to logarithms with plain numbers."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+    from matplotlib.ticker import LogLocator, NullFormatter
 
-    ax.set_xscale("log")
-    ax.set_yscale("log")
-    plain: Any = FuncFormatter(lambda value, _: f"{value:g}")
+    ax.set(xscale="log", yscale="log")
     for axis in (ax.xaxis, ax.yaxis):
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axis.set_major_formatter(plain)
+        axis.set_major_formatter("{x:g}")
         axis.set_minor_formatter(NullFormatter())
 
 
@@ -320,7 +293,8 @@ def plot_model_recovery(recovery: xr.Dataset, ax: Axes | None = None) -> Axes:
     names = [str(name) for name in recovery["parameter"].values]
     count = recovery.sizes["recording"]
     errors, ends = _percent(recovery, "error"), _percent(recovery, "error_interval", "bound")
-    offsets = ROW_SPREAD * ((np.arange(count) + 0.5) / count - 0.5)
+    # The recordings of a parameter stand over seven tenths of its row.
+    offsets = 0.7 * ((np.arange(count) + 0.5) / count - 0.5)
     known = recovery["determined"].transpose("recording", "parameter").values.astype(bool)
     ax.axvline(0.0, color=style.INK, lw=0.7, zorder=0)
     for row in range(len(names)):
@@ -373,9 +347,9 @@ def model_recovery_figures(model_recovery: xr.Dataset) -> Figures:
 
 
 def _model_figure(recovery: xr.Dataset) -> Figure:
-    rows = recovery.sizes["parameter"]
-    figure = style.new_figure(width_mm=style.DOUBLE_COLUMN_MM, height_mm=ROW_MM * rows + AROUND_MM)
-    ax = plot_model_recovery(recovery, figure.add_subplot())
+    # 13 mm for the row of a parameter, 24 mm for axis, title and legend.
+    figure, (ax,) = style.new_panels(1, 1, height_mm=13.0 * recovery.sizes["parameter"] + 24.0)
+    plot_model_recovery(recovery, ax)
     facts = recovery.attrs
     ax.set_title(
         f"{facts['model']}: {recovery.sizes['recording']} recordings of "
@@ -394,7 +368,8 @@ def _limits(errors: Floats, ends: Floats) -> tuple[float, float]:
     """Return what is shown: everything that is finite, and not far off for a few wide ones."""
     both = np.concatenate([errors.ravel(), ends.ravel()])
     both = both[np.isfinite(both)]
-    most = 100.0 * MOST_SHOWN
+    # In percent: intervals are drawn to twice the truth, in either direction.
+    most = 200.0
     reach = float(np.abs(both).max()) if both.size else most
     reach = 1.08 * min(reach, most) or 1.0
     return -reach, reach

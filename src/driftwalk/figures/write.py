@@ -28,7 +28,6 @@ METADATA: dict[str, dict[str, Any]] = {
     "svg": {"Date": None},
     "pdf": {"CreationDate": None},
 }
-FOOTER = "simulated recording, not measured"
 Figures = dict[str, Callable[[], "Figure"]]
 """A table of figures: by name, what draws each."""
 DATA = "csv"
@@ -98,7 +97,7 @@ def marked_simulated(figures: Figures, found: xr.Dataset) -> Figures:
 
     def marked(draw: Callable[[], Figure]) -> Figure:
         figure = draw()
-        add_footer(figure, FOOTER)
+        add_footer(figure, "simulated recording, not measured")
         return figure
 
     return {name: partial(marked, draw) for name, draw in figures.items()}

@@ -4,9 +4,8 @@ Every call takes what an earlier one returned. Tank and block are stated once, w
 loaded; a second, different statement is an error.
 """
 
-from driftwalk.notebook.comparing import compare, compare_models
-from driftwalk.notebook.fitting import calibrate, fit
+from driftwalk.notebook.fitting import calibrate, compare_models, fit
 from driftwalk.notebook.reporting import report
-from driftwalk.notebook.simulating import assemble, simulate
+from driftwalk.notebook.simulating import assemble, compare, simulate
 
 __all__ = ["assemble", "calibrate", "compare", "compare_models", "fit", "report", "simulate"]

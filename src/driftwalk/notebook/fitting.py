@@ -1,11 +1,11 @@
-"""Fit a recording by likelihood, or calibrate any motion model on it by simulation."""
+"""Fit a recording by likelihood, or calibrate and compare motion models on it by simulation."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from os import PathLike
-from typing import TYPE_CHECKING, Unpack
+from typing import TYPE_CHECKING, Literal, Unpack
 
 from driftwalk.conditions import require_motion, study_for
 from driftwalk.core.errors import InputError
@@ -194,5 +194,115 @@ def calibrate(
         threads=threads,
         executor=executor,
         tell=lambda stage, done, total: say(done, total, stage),
+    )
+    return as_result(found)
+
+
+def compare_models(
+    recording: xr.Dataset,
+    models: Sequence[str | MotionModel] | Literal["usual", "all"] = "usual",
+    *,
+    parameters: Mapping[str, float | tuple[float, float]] | None = None,
+    clearance: float | None = None,
+    study: Study | None = None,
+    flow: xr.Dataset | None = None,
+    body: str | None = None,
+    folder: str | PathLike[str] | None = None,
+    overwrite: bool = False,
+    threads: int | None = None,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+    **settings: Unpack[CalibrationSettings],
+) -> xr.Dataset:
+    """Say which motion models explain a recording.
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        A `trajectory` as `load` returns it.
+    models : sequence of str or MotionModel, "usual" or "all"
+        Names such as "block" and "run_tumble+wall", or models of `motion_model`. The usual ones are
+        the block and the family with an interaction with the wall.
+    parameters : mapping, optional
+        From the name of a parameter to a value that is known, or to a range of the search, in SI
+        units: for each of the named models that has it. Models of `motion_model` hold their own.
+    clearance : float, optional
+        Distance of the recorded point from the wall at contact [m], half the body's width, for the
+        named models; default: estimated from the recording.
+    study : Study, optional
+        Tank, camera, step interval and seed; default: the paper's.
+    flow : xarray.Dataset, optional
+        The water's velocity: a `flow_field` or a `fit`. For the block it is extracted from the
+        recording when left out.
+    body : str, optional
+        The body, where the recording has several.
+    folder : path-like, optional
+        Run directory to make or continue, the same as that of ``driftwalk compare-models``.
+    overwrite : bool
+        Whether a finished run there is moved aside; it is refused otherwise.
+    threads : int, optional
+        Default: all processors. The result does not depend on it.
+    executor : concurrent.futures.Executor, optional
+        Computes work units elsewhere, such as that of `driftwalk.cluster.connect`. The result does
+        not depend on it.
+    progress : callable, optional
+        Called as ``progress(done, total, text)`` while the work goes on.
+    **settings
+        Keys of the study by their short names: ``step_interval=0.2``, ``seed=3``. Summaries
+        of the motion decide between the closest models; ``bootstrap=0`` leaves those out.
+
+    Returns
+    -------
+    xarray.Dataset
+        A `model_comparison`, the closest model first: see `driftwalk.calibration.compare_models`.
+        Printed, it begins with the ranking.
+
+    Raises
+    ------
+    InputError
+        When the recording cannot be compared, or it and the study state two tanks or blocks.
+    ConfigurationError
+        When there is no such model, one is given twice, or none has a parameter that is given.
+    RunDirectoryError
+        When the directory is in use, holds another run, or cannot be written.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> recording = dw.tank30_recording()
+    >>> found = dw.compare_models(recording, ["block", "run_tumble+wall"])  # doctest: +SKIP
+    >>> found["model"].values[0]  # doctest: +SKIP
+    'block'
+    """
+    from driftwalk.calibration import ALL_MODELS, DEFAULT_MODELS, compare_models as compare_all
+    from driftwalk.motion import models_knowing
+    from driftwalk.notebook.result import as_result, run_in_folder
+    from driftwalk.runs import ModelComparisonWork
+    from driftwalk.runs.resumable_run import silent
+
+    named = {"usual": DEFAULT_MODELS, "all": ALL_MODELS}
+    asked = named.get(models, (models,)) if isinstance(models, str) else models
+    known = dict(parameters or {})
+    if clearance is not None:
+        known["clearance"] = clearance
+    chosen = models_knowing(asked, known)
+    require_motion(recording, body=body)
+    overrides = study_overrides(keys=CALIBRATION_KEYS, **settings)
+    conditions = study_for([recording], study, overrides, body=body, needs_tank=chosen == ["block"])
+    field = None if flow is None else flow_field_of(flow)
+    say = progress or silent
+    if folder is not None:
+        work = ModelComparisonWork(recording, chosen, conditions, field, body, {}, threads)
+        found = run_in_folder(folder, "compare_models", work, overwrite, say, executor)
+        return as_result(found)
+    found = compare_all(
+        recording,
+        chosen,
+        study=conditions,
+        flow=field,
+        body=body,
+        threads=threads,
+        executor=executor,
+        tell=say,
     )
     return as_result(found)

@@ -20,13 +20,6 @@ from driftwalk.core.text.json_text import json_value
 
 SHORT: Final = 64
 """Arrays with fewer numbers than this stand as a plain list where their reader allows it."""
-MOST_LISTED: Final = 100_000
-"""Numbers of a plain list; no axis of a study has so many."""
-FAR_RANGES: Final = 256.0
-"""How many of its ranges an array lies from zero when its middle becomes the offset.
-
-A float32 has 24 bits: nearer than that it still tells 2¹⁶ values of the range apart.
-"""
 
 
 def encode_array(
@@ -137,7 +130,8 @@ def plain_list(values: npt.ArrayLike) -> Any:
     >>> plain_list([[1.0], [float("inf")]])
     [[1.0], [None]]
     """
-    if np.size(values) > MOST_LISTED:
+    # No axis of a study has so many.
+    if np.size(values) > 100_000:
         raise InputError(f"{np.size(values)} numbers in one list are more than a page shows")
     return json_value(np.asarray(values, dtype=np.float64))
 
@@ -180,7 +174,8 @@ def _far_middle(array: Floats, step: float) -> float:
     """Return the middle of an array far from zero, a multiple of the step; 0 of one near it."""
     known = array[np.isfinite(array)]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
-    if not 0.0 < FAR_RANGES * (high - low) < max(-low, high):
+    # A float32 has 24 bits: nearer than 256 ranges it still tells 2¹⁶ values of a range apart.
+    if not 0.0 < 256.0 * (high - low) < max(-low, high):
         return 0.0
     middle = low + 0.5 * (high - low)
     return step * round(middle / step) if step > 0.0 else middle

@@ -24,9 +24,6 @@ BUNDLE: Final[dict[str, str]] = {
 """The files of the front end and their types."""
 # What could end the element that holds the data, or break it as a program.
 _ESCAPES: Final = {ord(sign): f"\\u{ord(sign):04x}" for sign in "<>&\u2028\u2029"}
-_NO_SCRIPT: Final = (
-    "This page needs JavaScript, which is switched off here. It loads nothing from anywhere."
-)
 
 _REPORT: Final = """\
 <!doctype html>
@@ -41,7 +38,8 @@ _REPORT: Final = """\
 </head>
 <body>
 <div id="app"></div>
-<noscript><p>{no_script}</p></noscript>
+<noscript><p>This page needs JavaScript, which is switched off here. It loads nothing from \
+anywhere.</p></noscript>
 <script type="application/json" id="driftwalk-page">{page}</script>
 <script>{program}</script>
 </body>
@@ -136,7 +134,6 @@ def report_html(page: Mapping[str, Any], *, connect: Literal["none", "self"] = "
         policy=policy,
         title=_text(_title(page)),
         style=style,
-        no_script=_NO_SCRIPT,
         page=embedded(page),
         program=program,
     )

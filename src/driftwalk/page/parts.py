@@ -31,8 +31,6 @@ _ARENA_KEYS: Final = {
     "rectangle": ("width_m", "height_m"),
     "polygon": ("vertices_m",),
 }
-LONGEST_REASON: Final = 200
-"""Letters of an error that are shown."""
 FOUND_TITLE: Final = "Results"
 SIMULATED: Final = "The recording was simulated: it is not a measurement."
 MOST_SETTINGS: Final = 50_000
@@ -66,7 +64,8 @@ def attempt(id: str, title: str, make: Callable[[], Section | list[Section]]) ->
     except DriftwalkError as error:
         return [empty_section(id, title, str(error))]
     except (ArithmeticError, LookupError, TypeError, ValueError) as error:
-        words = f"{type(error).__name__}: {error}"[:LONGEST_REASON]
+        # An error of a library may be long.
+        words = f"{type(error).__name__}: {error}"[:200]
         reason = f"The data are not in the form that this version of driftwalk reads ({words})."
         return [empty_section(id, title, reason)]
     return made if isinstance(made, list) else [made]
@@ -228,6 +227,15 @@ def figure(
         "label": label, "symbol": symbol, "value": number(value), "unit": unit, "low": low,
         "high": high, "confidence": confidence, "note": note,
     }  # fmt: skip
+
+
+def figure_with_ends(
+    dataset: xr.Dataset, name: str, label: str, unit: str = "1", *, suffix: str = "", **how: Any
+) -> dict[str, Any]:
+    """Return a number of the facts with its interval: ``name``, ``name_low``, ``name_high``."""
+    value, *ends = (value_of(dataset, f"{name}{end}{suffix}") for end in ("", "_low", "_high"))
+    confidence = value_of(dataset, "confidence")
+    return figure(label, value, unit, ends=(ends[0], ends[1]), confidence=confidence, **how)
 
 
 def settings_of(*values: Sequence[Any]) -> list[tuple[Any, ...]]:

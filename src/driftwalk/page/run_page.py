@@ -30,7 +30,14 @@ from driftwalk.page.sections.recording import (
 from driftwalk.schema import body_names
 from driftwalk.schema.answers.citation import bibtex, citation
 from driftwalk.schema.check import kind_name, refuse_other_version
-from driftwalk.schema.runs import RUN_KINDS, RunContents, StoredRun, kind_of, open_run_folder
+from driftwalk.schema.runs import (
+    RUN_KINDS,
+    RunContents,
+    RunKind,
+    StoredRun,
+    kind_of,
+    open_run_folder,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -72,13 +79,14 @@ def report_page(folder: str | Path, *, tell: Callable[[str], None] = tell_nobody
     ``[part["title"] for part in report_page("run")["sections"]]``
     """
     run = open_run_folder(Path(folder))
-    sections = _sections_of(run)
+    sections = [] if run.kind is None else _sections_of(run, run.kind)
     if run.state == "finished" and not run.read:
         reason = "; ".join(run.problems.values()) or "it holds no result that driftwalk can show"
         raise InputError(f"{run.folder} holds a finished run, but {reason}")
     words = _words_of_state(run)
     if words is not None:
-        sections = [_state_section(words), *sections]
+        state = summary_section([words], [], id="state", title="Not finished")
+        sections = [state, *sections]
     remarks = _remarks(run)
     for remark in remarks:
         tell(remark)
@@ -125,8 +133,7 @@ def dataset_page(dataset: xr.Dataset) -> dict[str, Any]:
             f"no page shows a dataset of kind {kind_name(dataset)!r}: give a recording, "
             f"or one of {', '.join(RUN_KINDS)}"
         )
-    contents = RunContents({kind.file: dataset})
-    sections = attempt("summary", FOUND_TITLE, lambda: contents.make(kind, kind.page))
+    sections = _sections_of(RunContents({kind.file: dataset}), kind)
     return page_frame("report", kind.title, state=_state(), sections=sections)
 
 
@@ -268,6 +275,8 @@ def manifest_section(manifest: Mapping[str, Any]) -> Section:
     >>> manifest_section({"command": "driftwalk demo"})["command"]
     'driftwalk demo'
     """
+    from driftwalk import __version__
+
     specification = manifest.get("specification")
     entries = {key: value for key, value in manifest.items() if key != "command"}
     if isinstance(specification, Mapping):
@@ -275,7 +284,9 @@ def manifest_section(manifest: Mapping[str, Any]) -> Section:
         entries["specification"] = {
             key: value for key, value in specification.items() if not (key == "study" and same)
         }
-    version = _version(manifest)
+    software = manifest.get("software")
+    known = software.get("driftwalk") if isinstance(software, Mapping) else None
+    version = str(known or __version__)
     return section(
         "manifest", "manifest", "How to reproduce this",
         "The command reproduces the same numbers from the same inputs.",
@@ -285,15 +296,6 @@ def manifest_section(manifest: Mapping[str, Any]) -> Section:
         cite=citation(version),
         bibtex=bibtex(version),
     )  # fmt: skip
-
-
-def _version(manifest: Mapping[str, Any]) -> str:
-    """Return the version that made the results, that of this program when it is not said."""
-    from driftwalk import __version__
-
-    software = manifest.get("software")
-    found = software.get("driftwalk") if isinstance(software, Mapping) else None
-    return str(found or __version__)
 
 
 def _inputs(manifest: Mapping[str, Any]) -> list[dict[str, str]]:
@@ -327,16 +329,9 @@ def _words_of_state(run: StoredRun) -> str | None:
     )
 
 
-def _sections_of(run: StoredRun) -> list[Section]:
-    if run.kind is None:
-        return []
-    kind = run.kind
+def _sections_of(run: RunContents, kind: RunKind) -> list[Section]:
     # What data in another form break outside of any section costs the page, and not the program.
     return attempt("summary", FOUND_TITLE, lambda: run.make(kind, kind.page))
-
-
-def _state_section(words: str) -> Section:
-    return summary_section([words], [], id="state", title="Not finished")
 
 
 def _remarks(run: StoredRun) -> list[str]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
+from driftwalk.plot.parts import style
 from driftwalk.plot.parts.assembly_labels import (
     OTHER,
     check_kind,
@@ -17,29 +18,27 @@ from driftwalk.plot.parts.assembly_labels import (
     is_complete,
     percent,
     runs_text,
+    with_rest,
 )
 from driftwalk.plot.parts.labels import number_fact
 from driftwalk.plot.parts.polyomino_sketch import (
     NAME_SIZE_PT,
-    axes_points,
     class_cells,
     name_text,
     place_sketch,
     sketch_size,
 )
-from driftwalk.plot.parts.style import BLUE, INK, MUTED, ORANGE, axes_or_new
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-# Share of the height between two labels at the right edge, and their largest sketch [pt].
+# Share of the height between two labels at the right edge.
 LABEL_GAP: Final = 0.012
-SKETCH_PT: Final = 9.0
 TIME_LABEL: Final = "time (s)"
 SURVIVAL: Final = {
-    "first_contact": ("no two blocks have met", BLUE, "-"),
-    "completion": ("more than one assembly", ORANGE, (0, (5, 2))),
+    "first_contact": ("no two blocks have met", style.BLUE, "-"),
+    "completion": ("more than one assembly", style.ORANGE, (0, (5, 2))),
 }
 
 BAR_WIDTH: Final = 0.76
@@ -47,7 +46,6 @@ GROWTH: Final = {
     "mean size": {"mean_size": "mean size"},
     "shares": {"largest_share": "in the largest assembly", "free_share": "alone"},
 }
-DASHES: Final = ("-", (0, (5, 2)))
 
 
 def plot_class_times(
@@ -84,7 +82,7 @@ def plot_class_times(
     if form not in ("lines", "stacked"):
         raise InputError(f"form='{form}': choose lines or stacked")
     check_kind(times, "class_times", "proportion", "time", "class")
-    ax = axes_or_new(ax, height_mm=75.0)
+    ax = style.axes_or_new(ax, height_mm=75.0)
     time = np.asarray(times["time"].values, dtype=np.float64)
     names, proportion = _shown(times)
     colors = class_colors(names)
@@ -108,8 +106,7 @@ def plot_class_times(
         labelled = proportion.max(axis=1) > 0.0
     kept = np.flatnonzero(labelled)
     _label_right(ax, [names[index] for index in kept], height[kept], colors)
-    ax.set_xlabel(TIME_LABEL)
-    ax.set_ylabel("proportion of runs")
+    ax.set(xlabel=TIME_LABEL, ylabel="proportion of runs")
     ax.spines[["top", "right"]].set_visible(False)
     ax.set_title(runs_text(times), loc="left")
     return ax
@@ -143,7 +140,7 @@ def plot_survival(times: xr.Dataset, ax: Axes | None = None) -> Axes:
     curves = [name for name in SURVIVAL if name in times]
     if not curves:
         raise InputError(f"the dataset 'class_times' lacks {' and '.join(SURVIVAL)}")
-    ax = axes_or_new(ax, height_mm=65.0)
+    ax = style.axes_or_new(ax, height_mm=65.0)
     time = np.asarray(times["time"].values, dtype=np.float64)
     for name in curves:
         text, color, dashes = SURVIVAL[name]
@@ -153,10 +150,9 @@ def plot_survival(times: xr.Dataset, ax: Axes | None = None) -> Axes:
                 time, times[f"{name}_low"].values, times[f"{name}_high"].values, color=color,
                 alpha=0.2, lw=0,
             )  # fmt: skip
-    ax.set_xlim(time[0], time[-1])
-    ax.set_ylim(0.0, 1.02)
-    ax.set_xlabel(TIME_LABEL)
-    ax.set_ylabel("proportion of runs")
+    ax.set(
+        xlim=(time[0], time[-1]), ylim=(0.0, 1.02), xlabel=TIME_LABEL, ylabel="proportion of runs"
+    )
     ax.spines[["top", "right"]].set_visible(False)
     confidence = number_fact(times, "confidence")
     bands = f"bands: {percent(confidence)}" if np.isfinite(confidence) else ""
@@ -169,17 +165,14 @@ def _shown(times: xr.Dataset) -> tuple[list[str], Floats]:
     """Return the names drawn and their proportions (class, time)."""
     names = class_names(times)
     proportion = np.asarray(times["proportion"].transpose("class", "time").values, dtype=np.float64)
-    shown = classes_to_show(names, proportion.max(axis=1))
-    drawn, kept = [names[index] for index in shown], proportion[shown]
-    if len(shown) < len(names):
-        drawn.append(OTHER)
-        kept = np.vstack([kept, np.delete(proportion, shown, axis=0).sum(axis=0)])
-    return drawn, kept
+    shown = classes_to_show(names, proportion.T)
+    others = [OTHER] if len(shown) < len(names) else []
+    return [*(names[index] for index in shown), *others], with_rest(proportion, shown)
 
 
 def _label_right(ax: Axes, names: list[str], height: Floats, colors: dict[str, str]) -> None:
     """Put sketch and name of every class at its end, moved apart where they would meet."""
-    total_pt = float(axes_points(ax)[1])
+    total_pt = float(style.axes_points(ax)[1])
     low, high = ax.get_ylim()
     share = (height - low) / (high - low)
     known = [name != OTHER for name in names]
@@ -190,34 +183,30 @@ def _label_right(ax: Axes, names: list[str], height: Floats, colors: dict[str, s
         ]
     )
     free_pt = (1.0 - LABEL_GAP * len(names)) * total_pt
-    cell_pt = min(SKETCH_PT / 2.0, free_pt / max(float(tall.sum()), 1.0))
+    # A shape of two rows is 9 pt high at most.
+    cell_pt = min(4.5, free_pt / max(float(tall.sum()), 1.0))
     needed = np.maximum(tall * cell_pt, NAME_SIZE_PT) / total_pt
     place = spread_apart(share, needed + LABEL_GAP)
     wide = max(
         (sketch_size(class_cells(n))[0] for n, there in zip(names, known, strict=True) if there),
         default=1.0,
     )
+    leader = {"arrowstyle": "-", "lw": 0.4, "color": style.MUTED, "shrinkA": 0, "shrinkB": 0}
     for name, there, at, end in zip(names, known, place, share, strict=True):
         ax.annotate(
             "", (1.0, end), xytext=(8.0, (at - end) * total_pt), xycoords="axes fraction",
-            textcoords="offset points", annotation_clip=False,
-            arrowprops={"arrowstyle": "-", "lw": 0.4, "color": MUTED, "shrinkA": 0, "shrinkB": 0},
+            textcoords="offset points", annotation_clip=False, arrowprops=leader,
         )  # fmt: skip
         if there:
-            _sketch_at(ax, name, at, cell_pt, colors[name])
+            place_sketch(
+                ax, name, (1.0, at), transform="axes fraction", alignment=(0.0, 0.5),
+                cell_pt=cell_pt, color=colors[name], shift_pt=(10.0, 0.0),
+            )  # fmt: skip
         ax.annotate(
             name_text(name), (1.0, at), xytext=(13.0 + wide * cell_pt, 0.0),
             xycoords="axes fraction", textcoords="offset points", va="center",
-            size=NAME_SIZE_PT, color=INK, annotation_clip=False,
+            size=NAME_SIZE_PT, color=style.INK, annotation_clip=False,
         )  # fmt: skip
-
-
-def _sketch_at(ax: Axes, name: str, at: float, cell_pt: float, color: str) -> None:
-    artist = place_sketch(
-        ax, name, (1.0, at), transform="axes fraction", alignment=(0.0, 0.5), cell_pt=cell_pt,
-        color=color,
-    )  # fmt: skip
-    artist.xybox = (10.0, 0.0)
 
 
 def spread_apart(wanted: Floats, size: Floats) -> Floats:
@@ -240,28 +229,19 @@ def spread_apart(wanted: Floats, size: Floats) -> Floats:
     >>> spread_apart(np.array([0.5, 0.5]), np.array([0.2, 0.2])).round(6).tolist()
     [0.4, 0.6]
     """
+    from scipy.optimize import isotonic_regression
+
     size = size / max(1.0, float(size.sum()))
     order = np.argsort(wanted, kind="stable")
     half = size[order] / 2.0
     # What lies before a thing, packed tightly: the middles minus this need only not decrease.
     packed = np.cumsum(size[order]) - half
-    level = _isotonic(wanted[order] - packed)
+    # It refuses an empty sequence.
+    level = isotonic_regression(wanted[order] - packed).x if wanted.size else packed
     level = np.clip(level, 0.0, 1.0 - float(size.sum()))
     place = np.empty_like(wanted, dtype=np.float64)
     place[order] = level + packed
     return place
-
-
-def _isotonic(values: Floats) -> Floats:
-    """Return the nearest sequence that does not decrease: neighbours that do are pooled."""
-    blocks: list[tuple[float, int]] = []
-    for value in values:
-        mean, count = float(value), 1
-        while blocks and blocks[-1][0] > mean:
-            before, many = blocks.pop()
-            mean, count = (mean * count + before * many) / (count + many), count + many
-        blocks.append((mean, count))
-    return np.concatenate([np.full(count, mean) for mean, count in blocks] or [np.empty(0)])
 
 
 def plot_assembly_sizes(
@@ -301,10 +281,10 @@ def plot_assembly_sizes(
     both = [sizes] if beside is None else [sizes, beside]
     for one in both:
         check_kind(one, "assembly_sizes", "size", "size_to", "block_share")
-    ax = axes_or_new(ax, height_mm=65.0)
+    ax = style.axes_or_new(ax, height_mm=65.0)
     place = np.arange(sizes.sizes["size"])
     width = BAR_WIDTH / len(both)
-    for index, (one, color) in enumerate(zip(both, (BLUE, ORANGE), strict=False)):
+    for index, (one, color) in enumerate(zip(both, (style.BLUE, style.ORANGE), strict=False)):
         share, low, high = (one[f"block_share{end}"].values for end in ("", "_low", "_high"))
         ax.bar(
             place + (index - (len(both) - 1) / 2) * width, share, width, color=color,
@@ -313,9 +293,7 @@ def plot_assembly_sizes(
         )  # fmt: skip
     ends = zip(sizes["size"].values, sizes["size_to"].values, strict=True)
     ax.set_xticks(place, [str(a) if a == b else f"{a}–{b}" for a, b in ends], rotation=45)
-    ax.set_ylim(bottom=0.0)
-    ax.set_xlabel("blocks in the assembly")
-    ax.set_ylabel("share of the blocks")
+    ax.set(ylim=(0.0, None), xlabel="blocks in the assembly", ylabel="share of the blocks")
     _finish(ax, both)
     return ax
 
@@ -364,16 +342,15 @@ def plot_growth(
     curves = GROWTH[what]
     for one in both:
         check_kind(one, "assembly_sizes", "time", *curves)
-    ax = axes_or_new(ax, height_mm=65.0)
+    ax = style.axes_or_new(ax, height_mm=65.0)
     time = sizes["time"].values
-    for one, color, label in zip(both, (BLUE, ORANGE), labels, strict=False):
-        for (name, words), dashes in zip(curves.items(), DASHES, strict=False):
+    for one, color, label in zip(both, (style.BLUE, style.ORANGE), labels, strict=False):
+        for (name, words), dashes in zip(curves.items(), ("-", (0, (5, 2))), strict=False):
             text = ", ".join(part for part in (words if len(curves) > 1 else "", label) if part)
             ax.plot(one["time"], one[name], color=color, ls=dashes, lw=1.3, label=text or None)
             ends = (one[f"{name}_low"].values, one[f"{name}_high"].values)
             ax.fill_between(one["time"].values, *ends, color=color, alpha=0.2, lw=0)
-    ax.set_xlim(time[0], time[-1])
-    ax.set_ylim(bottom=0.0)
+    ax.set(xlim=(time[0], time[-1]), ylim=(0.0, None))
     if what == "shares":
         ax.set_ylim(0.0, 1.02)
     ax.set_xlabel(TIME_LABEL)

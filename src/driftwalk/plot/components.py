@@ -8,25 +8,15 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
+from driftwalk.plot.parts import style
 from driftwalk.plot.parts.assembly_labels import check_kind, class_names
 from driftwalk.plot.parts.polyomino_sketch import (
     LETTER_PT,
     NAME_SIZE_PT,
-    axes_points,
     class_cells,
     name_text,
-    settle_layout,
     sketch_box,
     sketch_size,
-)
-from driftwalk.plot.parts.style import (
-    BLUE,
-    INK,
-    MUTED,
-    SCORE_COLORMAP,
-    STYLE,
-    add_colorbar,
-    axes_or_new,
 )
 from driftwalk.plot.sensitivity_maps import DISTANCE_COLORMAP, DISTANCE_LABEL
 
@@ -34,23 +24,13 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-# The longest arrow, as a share of the distance of the farthest setting.
-LONGEST_ARROW: Final = 0.9
-# Arrows shorter than this share of the longest carry no label; nor do those after the longest 14.
-SHORTEST_LABELLED: Final = 0.06
-MOST_LABELS: Final = 14
 SKETCH_CELL_PT: Final = 3.0
-LABEL_GAP_PT: Final = 2.0
-MARGIN: Final = 0.16
-ROUNDS: Final = 400
 # Points of an arrow that a label had better not cover, as shares of its length.
 ALONG: Final = np.linspace(0.1, 1.0, 19)
-# Free space between tip and label [pt], and what is bad about a place.
-DISTANCES_PT: Final = (2.0, 8.0, 16.0, 26.0, 38.0)
+# How bad a place for a label is, by what it covers and how far it is [per pt].
 COST_LABEL, COST_LINE, COST_DOT, MOST_DOTS, COST_PT, COST_BEHIND = 1000.0, 8.0, 1.5, 10, 0.5, 4.0
-TITLE_PT: Final = STYLE["axes.titlesize"]
 COLORS: Final = {
-    "complete": ("share of runs with one assembly", SCORE_COLORMAP),
+    "complete": ("share of runs with one assembly", style.SCORE_COLORMAP),
     "l1_distance": (DISTANCE_LABEL, DISTANCE_COLORMAP),
 }
 
@@ -98,21 +78,21 @@ def plot_biplot(
     points = found.points
     if color not in COLORS:
         raise InputError(f"color='{color}': choose one of {', '.join(COLORS)}")
-    ax = axes_or_new(ax, height_mm=80.0)
+    ax = style.axes_or_new(ax, height_mm=80.0)
     if sensitivity is None:
-        ax.plot(*points.T, "o", ms=3.0, mew=0.0, color=BLUE, alpha=0.6, label="settings")
+        ax.plot(*points.T, "o", ms=3.0, mew=0.0, color=style.BLUE, alpha=0.6, label="settings")
     else:
         text, colormap = COLORS[color]
         dots = ax.scatter(
             points[:, 0], points[:, 1], s=10.0, lw=0, cmap=colormap, label="settings",
             c=_colour_values(sensitivity, color, components["score"]),
         )  # fmt: skip
-        add_colorbar(dots, ax, text)
+        style.add_colorbar(dots, ax, text)
     shares = 100.0 * found.shares
     ax.set_xlabel(f"component 1 ({shares[0]:.3g} % of the variance)")
     ax.set_ylabel(f"component 2 ({shares[1]:.3g} % of the variance)")
     title = f"dots: settings; arrows: loadings × {found.factor:.2g}"
-    ax.set_title(title, loc="left", size=TITLE_PT)
+    ax.set_title(title, loc="left", size=style.STYLE["axes.titlesize"])
     _set_limits(ax, np.vstack([points, found.tips, np.zeros((1, 2))]))
     _draw_arrows(ax, found.tips, found.names, points)
     return ax
@@ -166,15 +146,16 @@ def _arrow_factor(points: Floats, loading: Floats) -> float:
     reach = float(np.nanmax(np.hypot(*points.T), initial=0.0))
     if longest == 0.0 or reach == 0.0:
         return 1.0
-    return float(f"{LONGEST_ARROW * reach / longest:.2g}")
+    # The longest arrow reaches over nine tenths of the way to the farthest setting.
+    return float(f"{0.9 * reach / longest:.2g}")
 
 
 def _set_limits(ax: Axes, drawn: Floats) -> None:
     """Set limits with room for labels around all that is drawn, one scale for both axes."""
     low, high = np.nanmin(drawn, axis=0), np.nanmax(drawn, axis=0)
-    middle, span = (low + high) / 2.0, (high - low) * (1.0 + 2.0 * MARGIN)
-    settle_layout(ax)
-    size = axes_points(ax)
+    middle, span = (low + high) / 2.0, (high - low) * 1.32
+    style.settle_layout(ax)
+    size = style.axes_points(ax)
     per_point = float((span / size).max()) or 1.0
     for axis, center, length in zip("xy", middle, per_point * size, strict=True):
         getattr(ax, f"set_{axis}lim")(center - length / 2.0, center + length / 2.0)
@@ -183,8 +164,9 @@ def _set_limits(ax: Axes, drawn: Floats) -> None:
 
 def _draw_arrows(ax: Axes, tips: Floats, names: list[str], points: Floats) -> None:
     length = np.hypot(*tips.T)
-    order = np.argsort(-length, kind="stable")[:MOST_LABELS]
-    labelled = [i for i in order if length[i] > SHORTEST_LABELLED * length.max()]
+    # The longest 14 carry a label, and none that is short against the longest.
+    order = np.argsort(-length, kind="stable")[:14]
+    labelled = [i for i in order if length[i] > 0.06 * length.max()]
     for index, (name, tip) in enumerate(zip(names, tips, strict=True)):
         if length[index] == 0.0:
             continue
@@ -192,16 +174,17 @@ def _draw_arrows(ax: Axes, tips: Floats, names: list[str], points: Floats) -> No
             "", tuple(tip), xytext=(0.0, 0.0), gid=name,
             arrowprops={
                 "arrowstyle": "-|>,head_length=0.3,head_width=0.15", "zorder": 4, "shrinkA": 0.0,
-                "shrinkB": 0.0, "color": INK if index in labelled else MUTED,
+                "shrinkB": 0.0, "color": style.INK if index in labelled else style.MUTED,
                 "lw": 0.9 if index in labelled else 0.4,
             },
         )  # fmt: skip
     boxes = np.array([_label_size(names[index]) for index in labelled]).reshape(-1, 2)
     low = np.array([ax.get_xlim()[0], ax.get_ylim()[0]])
     high = np.array([ax.get_xlim()[1], ax.get_ylim()[1]])
-    per_point = (high - low) / axes_points(ax)
+    room = style.axes_points(ax)
+    per_point = (high - low) / room
     places = place_labels(
-        (tips[labelled] - low) / per_point, boxes, origin=-low / per_point, room=axes_points(ax),
+        (tips[labelled] - low) / per_point, boxes, origin=-low / per_point, room=room,
         dots=(points[np.isfinite(points).all(axis=1)] - low) / per_point,
     )  # fmt: skip
     for index, place in zip(labelled, places, strict=True):
@@ -219,15 +202,15 @@ def _label_size(name: str) -> Floats:
 def _draw_label(ax: Axes, name: str, tip: Floats, place: Floats) -> None:
     from matplotlib.offsetbox import AnnotationBbox, TextArea, VPacker
 
-    parts: list[Any] = [sketch_box(name, cell_pt=SKETCH_CELL_PT, color=INK)]
+    parts: list[Any] = [sketch_box(name, cell_pt=SKETCH_CELL_PT, color=style.INK)]
     if name_text(name):
-        parts.append(TextArea(name, textprops={"size": NAME_SIZE_PT, "color": INK}))
+        parts.append(TextArea(name, textprops={"size": NAME_SIZE_PT, "color": style.INK}))
     ax.add_artist(
         AnnotationBbox(
             VPacker(children=parts, align="center", pad=0.0, sep=1.0), tuple(tip),
             xybox=tuple(place), boxcoords="data", pad=0.1, annotation_clip=False,
             gid=f"label {name}", bboxprops={"facecolor": "white", "alpha": 0.7, "lw": 0},
-            arrowprops={"arrowstyle": "-", "lw": 0.4, "color": MUTED},
+            arrowprops={"arrowstyle": "-", "lw": 0.4, "color": style.MUTED},
         )
     )  # fmt: skip
 
@@ -267,7 +250,8 @@ def place_labels(
     >>> bool((abs(places[0] - places[1]) >= 10.0).any())
     True
     """
-    half = boxes / 2.0 + LABEL_GAP_PT / 2.0
+    # 2 pt lie between two labels.
+    half = boxes / 2.0 + 1.0
     lines = (origin + ALONG[:, None, None] * (tips - origin)).reshape(-1, 2)
     seen = np.empty((0, 2)) if dots is None else dots
     place = np.empty_like(tips, dtype=np.float64)
@@ -282,7 +266,7 @@ def place_labels(
             cost += COST_LABEL * (np.abs(tried - place[j]) < half[i] + half[j]).all(axis=1)
         cost += COST_LABEL * ((tried < half[i]) | (tried > room - half[i])).any(axis=1)
         place[i] = tried[int(np.argmin(cost))]
-    for _ in range(ROUNDS):
+    for _ in range(400):
         np.clip(place, half, np.maximum(room - half, half), out=place)
         pairs = [(i, j) for i in range(len(place)) for j in range(i)]
         if not [pair for pair in pairs if _push_apart(place, half, *pair)]:
@@ -296,7 +280,10 @@ def _places_around(tip: Floats, half: Floats) -> Floats:
     direction = np.column_stack([np.cos(angle), np.sin(angle)])
     # Distance from the middle of a box to its edge in that direction.
     reach = (half / np.maximum(np.abs(direction), 1e-9)).min(axis=1)
-    away = np.concatenate([direction * (reach + more)[:, None] for more in DISTANCES_PT])
+    # Free space between tip and label [pt].
+    away = np.concatenate(
+        [direction * (reach + more)[:, None] for more in (2.0, 8.0, 16.0, 26.0, 38.0)]
+    )
     places: Floats = tip + away
     return places
 

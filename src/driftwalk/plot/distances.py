@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from driftwalk.core.arrays import Bools, Floats, Integers
+from driftwalk.plot.parts import style
 from driftwalk.plot.parts.labels import (
     interval_of,
     number_fact,
     plane_of,
     require_variables,
 )
-from driftwalk.plot.parts.style import INK, SCORE_COLORMAP, add_colorbar, axes_or_new, outlined
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -78,10 +78,10 @@ def plot_ks_map(
     dims = (up.name, across.name)
     score = 1.0 - calibration["ks_distance"].transpose(*dims).values
     status = _status(calibration, "status", dims)
-    ax = axes_or_new(ax)
+    ax = style.axes_or_new(ax)
     edges = edges_of(calibration, prefix="")
     mesh = ax.pcolormesh(
-        *edges, np.ma.masked_invalid(score), cmap=SCORE_COLORMAP, vmin=0.0, vmax=1.0
+        *edges, np.ma.masked_invalid(score), cmap=style.SCORE_COLORMAP, vmin=0.0, vmax=1.0
     )
     mesh.set_rasterized(True)
     _hatch_causes(ax, edges, status, np.isfinite(score))
@@ -132,9 +132,9 @@ def plot_refined_map(
         1.0 - calibration[name].transpose(*dims).values
         for name in ("refined_ks_distance", "refined_surface")
     )
-    ax = axes_or_new(ax)
+    ax = style.axes_or_new(ax)
     edges = edges_of(calibration, prefix="refined_")
-    mesh = ax.pcolormesh(*edges, np.ma.masked_invalid(score), cmap=SCORE_COLORMAP)
+    mesh = ax.pcolormesh(*edges, np.ma.masked_invalid(score), cmap=style.SCORE_COLORMAP)
     mesh.set_rasterized(True)
     if np.isfinite(score).any():
         low, high = np.nanquantile(score, [0.02, 1.0])
@@ -149,8 +149,7 @@ def plot_refined_map(
         lines = ax.contour(*places, surface, levels=6, colors="white", linewidths=0.6)
     _draw_region(ax, calibration)
     draw_optimum(ax, calibration)
-    ax.set_xlim(*edges[0][[0, -1]])
-    ax.set_ylim(*edges[1][[0, -1]])
+    ax.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
     bar = _finish(ax, calibration, mesh, colorbar)
     if bar is not None and lines is not None:
         bar.add_lines(lines)
@@ -196,7 +195,7 @@ def draw_optimum(ax: Axes, calibration: xr.Dataset, *, color: str = "white") -> 
             if ends is None
             else [[max(best - factor * ends[0], 0.0)], [max(factor * ends[1] - best, 0.0)]]
         )
-    outline = outlined(2.2, INK if color == "white" else "white")
+    outline = style.outlined(2.2, style.INK if color == "white" else "white")
     ax.errorbar(
         places[0], places[1], xerr=bars[0], yerr=bars[1], fmt="o", ms=3.5, color=color,
         elinewidth=1.0, capsize=0.0, zorder=6, label=OPTIMUM_LABEL, path_effects=outline,
@@ -212,8 +211,8 @@ def _draw_region(ax: Axes, calibration: xr.Dataset) -> None:
         return
     ax.add_patch(
         Polygon(
-            outline, closed=True, facecolor="none", edgecolor=INK, linewidth=0.9, zorder=5,
-            label=REGION_LABEL, path_effects=outlined(2.0),
+            outline, closed=True, facecolor="none", edgecolor=style.INK, linewidth=0.9, zorder=5,
+            label=REGION_LABEL, path_effects=style.outlined(2.0),
         )
     )  # fmt: skip
 
@@ -264,8 +263,8 @@ def hatch_cell(
     name, hatch = cause
     ax.add_patch(
         Rectangle(
-            (left, low), right - left, high - low, facecolor="white", edgecolor=INK, linewidth=0.0,
-            hatch=hatch, label="" if name in named else name, gid=name,
+            (left, low), right - left, high - low, facecolor="white", edgecolor=style.INK,
+            linewidth=0.0, hatch=hatch, label="" if name in named else name, gid=name,
         )
     )  # fmt: skip
     named.add(name)
@@ -274,15 +273,14 @@ def hatch_cell(
 def _finish(ax: Axes, calibration: xr.Dataset, mesh: QuadMesh, colorbar: str) -> Colorbar | None:
     """Label the axes and add the colour bar with the line of the noise floor."""
     across, up = plane_of(calibration)
-    ax.set_xlabel(across.label(calibration))
-    ax.set_ylabel(up.label(calibration))
+    ax.set(xlabel=across.label(calibration), ylabel=up.label(calibration))
     across.scale(ax, "x")
     up.scale(ax, "y")
     if colorbar == "none":
         return None
     floor = number_fact(calibration, "noise_floor")
-    bar = add_colorbar(mesh, ax, "score 1 − D")
+    bar = style.add_colorbar(mesh, ax, "score 1 − D")
     if np.isfinite(floor):
-        bar.ax.axhline(1.0 - floor, color=INK, lw=1.4)
+        bar.ax.axhline(1.0 - floor, color=style.INK, lw=1.4)
         bar.set_label("score 1 − D (line: noise floor)")
     return bar

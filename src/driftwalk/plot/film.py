@@ -12,10 +12,10 @@ import numpy as np
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.atomic import atomic_path, require_target
+from driftwalk.plot.parts import style
 from driftwalk.plot.parts.arena import CM_PER_M, arena_of, draw_arena, draw_scale_bar
 from driftwalk.plot.parts.assembly_labels import PALETTE
 from driftwalk.plot.parts.film_file import FRAMES_PER_S, Frame, require_film_writer, write_frames
-from driftwalk.plot.parts.style import INK, MUTED, new_figure, print_style
 from driftwalk.schema.check import kind_name
 
 if TYPE_CHECKING:
@@ -31,10 +31,6 @@ TRAIL_S: Final = 5.0
 SHORTEST_S: Final = 0.2
 MOST_FRAMES: Final = 15_000
 """Ten minutes of an MP4; a longer film is rather shown faster."""
-HELD_INTERVALS: Final = 3.0
-"""For how many of its usual intervals a body that is not seen stays in the picture."""
-DISC_SHARE: Final = 0.015
-"""Radius of a body of unknown size, as a share of the picture."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +38,8 @@ class _Scene:
     """The bodies of a film, in cm and s."""
 
     time: Floats
-    x: Floats
-    y: Floats
+    place: Floats
+    """x and y, (time, body, 2)."""
     theta: Floats
     color: Integers
     side: float | None
@@ -110,7 +106,7 @@ def write_animation(
     ending = target.suffix.lower()
     moments, rate = _moments(scene.time, FRAMES_PER_S[ending], seconds, speed)
     require_film_writer(ending)
-    with print_style(), atomic_path(target) as temporary:
+    with style.print_style(), atomic_path(target) as temporary:
         frames = _frames(scene, moments, rate, DOTS_PER_INCH[ending])
         if progress is not None:
             frames = _counted(frames, moments.size, progress)
@@ -138,21 +134,17 @@ def _scene(motion: xr.Dataset, run: int) -> _Scene:
         one, bodies = motion.isel(run=run), "block"
         if "block_side_m" not in motion.attrs:
             raise InputError("the dataset has no attribute 'block_side_m': the size is unknown")
-    x, y, theta = (
-        np.asarray(one[name].transpose("time", bodies).values, dtype=np.float64)
-        for name in ("x", "y", "theta")
-    )
-    if not (np.isfinite(x) & np.isfinite(y)).any():
+    one = one.transpose("time", bodies, ...)
+    place = np.stack([one[name].values for name in "xy"], axis=-1, dtype=np.float64)
+    if not np.isfinite(place).all(axis=-1).any():
         raise InputError("no sample holds a position: there is nothing to film")
-    color = np.broadcast_to(np.arange(x.shape[1]), x.shape)
-    if "assembly" in one:
-        color = one["assembly"].transpose("time", bodies).values
+    color = one["assembly"].values if "assembly" in one else np.arange(one.sizes[bodies])
+    color = np.broadcast_to(color, place.shape[:2])
     side = motion.attrs.get("block_side_m")
     return _Scene(
         np.asarray(one["time"].values, dtype=np.float64),
-        CM_PER_M * x,
-        CM_PER_M * y,
-        theta,
+        CM_PER_M * place,
+        np.asarray(one["theta"].values, dtype=np.float64),
         np.asarray(color, dtype=np.int64),
         None if side is None else CM_PER_M * float(side),
         arena_of(motion),
@@ -195,9 +187,9 @@ def _frames(scene: _Scene, moments: Floats, rate: float, dots: int) -> Iterator[
     canvas: Any = figure.canvas
     canvas.draw()
     empty = canvas.copy_from_bbox(figure.bbox)
-    trails = LineCollection([], colors=MUTED, linewidths=0.8, alpha=0.7, zorder=2)
-    bodies = PolyCollection([], edgecolors=INK, linewidths=0.6, zorder=3)
-    pointers = LineCollection([], colors=INK, linewidths=0.9, zorder=4)
+    trails = LineCollection([], colors=style.MUTED, linewidths=0.8, alpha=0.7, zorder=2)
+    bodies = PolyCollection([], edgecolors=style.INK, linewidths=0.6, zorder=3)
+    pointers = LineCollection([], colors=style.INK, linewidths=0.9, zorder=4)
     clock = figure.text(0.04, 0.955, "", size=9.0, va="center")
     for artist in (trails, bodies, pointers):
         ax.add_collection(artist, autolim=False)
@@ -207,9 +199,10 @@ def _frames(scene: _Scene, moments: Floats, rate: float, dots: int) -> Iterator[
     for moment in moments:
         # A hair of rounding is forgiven.
         until = int(np.searchsorted(scene.time, moment + 1e-9 * max(1.0, abs(moment)), "right"))
-        shown = [(seen[until - 1, body], body) for body in range(scene.x.shape[1])]
-        shown = [(sample, body) for sample, body in shown if sample >= 0]
-        trails.set_segments(_trails(scene, moment, until, shown, TRAIL_S * rate))
+        shown = [(sample, body) for body, sample in enumerate(seen[until - 1]) if sample >= 0]
+        first = int(np.searchsorted(scene.time, moment - TRAIL_S * rate))
+        # NaN breaks the line.
+        trails.set_segments([scene.place[first:until, body] for _, body in shown])
         bodies.set_verts([_outline(scene, *one, size) for one in shown])
         bodies.set_facecolor([PALETTE[scene.color[one] % len(PALETTE)] for one in shown])
         pointers.set_segments([line for one in shown if (line := _pointer(scene, *one, size))])
@@ -226,7 +219,7 @@ def _stage(scene: _Scene, rate: float, dots: int) -> tuple[Figure, Axes]:
 
     Axes without ticks and a fixed layout: a frame is drawn in some milliseconds.
     """
-    figure = new_figure(width_mm=FILM_MM, height_mm=FILM_MM)
+    figure = style.new_figure(width_mm=FILM_MM, height_mm=FILM_MM)
     figure.set_layout_engine("none")
     figure.set_dpi(dots)
     ax = figure.add_axes((0.03, 0.03, 0.94, 0.9))
@@ -241,11 +234,10 @@ def _stage(scene: _Scene, rate: float, dots: int) -> tuple[Figure, Axes]:
 
 def _frame_motion(scene: _Scene, ax: Axes) -> None:
     """Frame everything that is ever seen, in a square."""
-    middle = [(np.nanmin(values) + np.nanmax(values)) / 2.0 for values in (scene.x, scene.y)]
-    width = max(float(np.nanmax(values) - np.nanmin(values)) for values in (scene.x, scene.y))
-    half = 0.54 * width + (scene.side or 0.0) or 1.0
-    ax.set_xlim(middle[0] - half, middle[0] + half)
-    ax.set_ylim(middle[1] - half, middle[1] + half)
+    low, high = np.nanmin(scene.place, axis=(0, 1)), np.nanmax(scene.place, axis=(0, 1))
+    half = 0.54 * float((high - low).max()) + (scene.side or 0.0) or 1.0
+    xlim, ylim = np.column_stack([(low + high) / 2.0 - half, (low + high) / 2.0 + half])
+    ax.set(xlim=xlim, ylim=ylim)
 
 
 def _size(scene: _Scene, ax: Axes) -> float:
@@ -253,31 +245,21 @@ def _size(scene: _Scene, ax: Axes) -> float:
     if scene.side is not None:
         return scene.side / 2.0
     low, high = ax.get_xlim()
-    return DISC_SHARE * (high - low)
+    return 0.015 * (high - low)
 
 
 def _last_seen(scene: _Scene) -> Integers:
     """Return the sample that shows each body at each time, -1 while it is not seen."""
-    present = np.isfinite(scene.x) & np.isfinite(scene.y)
+    present = np.asarray(np.isfinite(scene.place).all(axis=-1))
     rows = np.arange(scene.time.size, dtype=np.int64)[:, None]
     last = np.maximum.accumulate(np.where(present, rows, -1), axis=0)
     for body in range(present.shape[1]):
         own = scene.time[present[:, body]]
         usual = float(np.median(np.diff(own))) if own.size > 1 else 0.0
         age = scene.time - scene.time[last[:, body]]
-        last[age > HELD_INTERVALS * usual * (1.0 + 1e-9), body] = -1
+        # A body that is not seen stays in the picture for three of its usual intervals.
+        last[age > 3.0 * usual * (1.0 + 1e-9), body] = -1
     return last
-
-
-def _trails(
-    scene: _Scene, moment: float, until: int, shown: list[tuple[Any, int]], lasts: float
-) -> list[Floats]:
-    """Return the way of each body that is shown; NaN in it breaks the line."""
-    first = int(np.searchsorted(scene.time, moment - lasts))
-    return [
-        np.column_stack([scene.x[first:until, body], scene.y[first:until, body]])
-        for _, body in shown
-    ]
 
 
 def _outline(scene: _Scene, sample: int, body: int, size: float) -> Floats:
@@ -287,19 +269,15 @@ def _outline(scene: _Scene, sample: int, body: int, size: float) -> Floats:
     turn = theta + np.pi / 4.0 if square else 0.0
     angles = turn + np.linspace(0.0, 2.0 * np.pi, 4 if square else 24, endpoint=False)
     radius = size * np.sqrt(2.0) if square else size
-    return np.column_stack(
-        [
-            scene.x[sample, body] + radius * np.cos(angles),
-            scene.y[sample, body] + radius * np.sin(angles),
-        ]
-    )
+    around = np.column_stack([np.cos(angles), np.sin(angles)])
+    return np.asarray(scene.place[sample, body] + radius * around)
 
 
-def _pointer(scene: _Scene, sample: int, body: int, size: float) -> list[tuple[float, float]]:
+def _pointer(scene: _Scene, sample: int, body: int, size: float) -> list[Floats]:
     """Return the line from the middle of a body to its front, nothing where that is unknown."""
     theta = float(scene.theta[sample, body])
     if not np.isfinite(theta):
         return []
-    x, y = float(scene.x[sample, body]), float(scene.y[sample, body])
     reach = size if scene.side is not None else 2.0 * size
-    return [(x, y), (x + reach * np.cos(theta), y + reach * np.sin(theta))]
+    ahead = np.array([np.cos(theta), np.sin(theta)])
+    return [scene.place[sample, body], scene.place[sample, body] + reach * ahead]

@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
+from driftwalk.plot.parts import style
 from driftwalk.plot.parts.arena import arena_of, draw_arena, label_position
 from driftwalk.plot.parts.labels import in_unit
-from driftwalk.plot.parts.style import INK, MUTED, add_colorbar, axes_or_new, speed_colormap
 from driftwalk.schema import FLAGS, check_flow_field
 
 if TYPE_CHECKING:
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 Field = Literal["water", "block"]
 COMPONENTS: dict[str, tuple[str, str]] = {"water": ("u", "v"), "block": ("u_block", "v_block")}
-ARROWS_ACROSS = 17
 SPEED_LABEL = "speed (cm/s)"
 
 
@@ -81,11 +80,11 @@ def plot_flow(
         )
     u, v, flag = velocity_of(flow, field)
     x, y = (in_unit(flow[axis], "cm", stored="m") for axis in ("x", "y"))
-    ax = axes_or_new(ax, layout="compressed")
+    ax = style.axes_or_new(ax, layout="compressed")
     speed = np.hypot(u, v)
     top = float(np.nanmax(speed, initial=0.0)) if speed_limit is None else 100.0 * speed_limit
     mesh = ax.pcolormesh(
-        x, y, speed, cmap=speed_colormap(), vmin=0.0, vmax=top or 1.0, shading="nearest"
+        x, y, speed, cmap=style.speed_colormap(), vmin=0.0, vmax=top or 1.0, shading="nearest"
     )
     mesh.set_rasterized(True)
     filled = (flag == FLAGS["filled"]) & np.isfinite(speed)
@@ -97,7 +96,7 @@ def plot_flow(
             artist.set_clip_path(outline)
     label_position(ax)
     if colorbar == "beside":
-        add_colorbar(mesh, ax, SPEED_LABEL)
+        style.add_colorbar(mesh, ax, SPEED_LABEL)
     return ax
 
 
@@ -138,7 +137,7 @@ def _hatch_cells(ax: Axes, x: Floats, y: Floats, chosen: Bools) -> list[Artist]:
     patch = PathPatch(
         Path(corners.reshape(-1, 2), codes),
         facecolor="none",
-        edgecolor=MUTED,
+        edgecolor=style.MUTED,
         linewidth=0.0,
         hatch="/////",
         label="filled, not measured",
@@ -151,7 +150,8 @@ def _draw_arrows(
     ax: Axes, x: Floats, y: Floats, u: Floats, v: Floats, filled: Bools
 ) -> list[Artist]:
     """Draw every n-th arrow, the longest about one and a half arrow spacings."""
-    stride = max(1, round(max(x.size, y.size) / ARROWS_ACROSS))
+    # About 17 arrows lie across the field.
+    stride = max(1, round(max(x.size, y.size) / 17))
     thin = (slice(stride // 2, None, stride), slice(stride // 2, None, stride))
     speed = np.hypot(u[thin], v[thin])
     # An arrow too short to show its direction would be drawn as a dot.
@@ -161,7 +161,10 @@ def _draw_arrows(
     scale = np.percentile(speed[shown], 98.0) / (1.5 * stride * (x[1] - x[0]))
     grid = (*np.meshgrid(x, y), u, v)
     drawn: list[Artist] = []
-    for chosen, color, label in ((~filled[thin], INK, "measured"), (filled[thin], MUTED, "filled")):
+    for chosen, color, label in (
+        (~filled[thin], style.INK, "measured"),
+        (filled[thin], style.MUTED, "filled"),
+    ):
         here = shown & chosen
         if here.any():
             drawn.append(

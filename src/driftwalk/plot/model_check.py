@@ -2,24 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
+from driftwalk.plot.parts import style
 from driftwalk.plot.parts.arena import arena_of, draw_arena, label_position
 from driftwalk.plot.parts.labels import ANGLE_LABEL, LENGTH_LABEL, in_unit, ratio_axis
-from driftwalk.plot.parts.style import (
-    BLUE,
-    INK,
-    MUTED,
-    ORANGE,
-    PALE,
-    add_colorbar,
-    axes_or_new,
-    speed_colormap,
-)
 from driftwalk.schema.answers.fit import residuals_of
 from driftwalk.schema.answers.model_comparison import ASPECT_WORDS, CHECK_LABELS
 from driftwalk.schema.check import require_kind
@@ -33,7 +24,7 @@ BAND_STDS = 1.96
 """95 % of a normal."""
 LEAST_TOP = 4.0
 """Least upper end of the colours of the residual map [sd], so that chance looks pale."""
-COLORS = (BLUE, ORANGE, INK)
+COLORS = (style.BLUE, style.ORANGE, style.INK)
 MARKERS = ("o", "s", "^")
 
 
@@ -64,7 +55,7 @@ def plot_innovations(check: xr.Dataset, ax: Axes | None = None) -> Axes:
     from matplotlib.ticker import MaxNLocator
 
     _require(check)
-    ax = axes_or_new(ax)
+    ax = style.axes_or_new(ax)
     lag = check["lag"].values
     expected = check["autocorrelation_expected"].values.mean(axis=0)
     reach = BAND_STDS * check["autocorrelation_std"].values.mean(axis=0)
@@ -72,11 +63,11 @@ def plot_innovations(check: xr.Dataset, ax: Axes | None = None) -> Axes:
         lag,
         expected - reach,
         expected + reach,
-        color=PALE,
+        color=style.PALE,
         lw=0,
         label="95 % if the model is right",
     )
-    ax.axhline(0.0, color=MUTED, lw=0.6)
+    ax.axhline(0.0, color=style.MUTED, lw=0.6)
     names = [str(name) for name in check["component"].values]
     aside = np.linspace(-0.15, 0.15, len(names)) if len(names) > 1 else np.zeros(1)
     for k, name in enumerate(names):
@@ -90,8 +81,7 @@ def plot_innovations(check: xr.Dataset, ax: Axes | None = None) -> Axes:
             label=f"error in {shown}",
         )
     ax.xaxis.set_major_locator(MaxNLocator(integer=True))
-    ax.set_xlabel("lag (samples)")
-    ax.set_ylabel("autocorrelation")
+    ax.set(xlabel="lag (samples)", ylabel="autocorrelation")
     ax.margins(x=0.03)
     return ax
 
@@ -126,7 +116,7 @@ def plot_residual_map(
     >>> plot_residual_map(check)  # doctest: +SKIP
     """
     residuals = residuals_of(found)
-    ax = axes_or_new(ax, layout="compressed")
+    ax = style.axes_or_new(ax, layout="compressed")
     if show == "mean":
         _draw_means(ax, residuals)
     else:
@@ -165,22 +155,24 @@ def plot_residual_time(
     >>> plot_residual_time(check)  # doctest: +SKIP
     """
     _require(check)
-    ax = axes_or_new(ax)
+    ax = style.axes_or_new(ax)
     start, end = running_time(check)
     middle, half = 0.5 * (start + end) / 60.0, 0.5 * (end - start) / 60.0
     name, shift = ("flow_change", 0.0) if show == "flow" else ("part_noise_ratio", 1.0)
     value = 100.0 * (check[name].values - shift)
     reach = 100.0 * BAND_STDS * check[f"{name}_std"].values
-    ax.axhline(0.0, color=MUTED, lw=0.6)
-    ax.errorbar(middle, value, xerr=half, yerr=reach, fmt="o", ms=3.0, lw=0.9, color=BLUE)
+    ax.axhline(0.0, color=style.MUTED, lw=0.6)
+    ax.errorbar(middle, value, xerr=half, yerr=reach, fmt="o", ms=3.0, lw=0.9, color=style.BLUE)
     if show == "flow" and np.isnan(value).any():
         words = "no point: absorbed by the fit"
         # A strip below the error bars, for the words.
         low, high = ax.get_ylim()
         ax.set_ylim(low - 0.12 * (high - low), high)
-        ax.text(0.98, 0.03, words, ha="right", color=MUTED, fontsize=6.0, transform=ax.transAxes)
+        ax.text(
+            0.98, 0.03, words, ha="right", color=style.MUTED, fontsize=6.0, transform=ax.transAxes
+        )
     for edge in start[1:][np.diff(check["part_recording"].values) > 0] / 60.0:
-        ax.axvline(edge, color=MUTED, lw=0.6, ls=":")
+        ax.axvline(edge, color=style.MUTED, lw=0.6, ls=":")
     ax.set_xlabel("time (min)")
     ax.set_ylabel(
         "strength of the flow,\noff its mean (%)" if show == "flow" else "squared errors, off (%)"
@@ -224,7 +216,7 @@ def plot_predicted_steps(
         raise InputError(
             f"the check holds no simulated steps: {check.attrs.get('ks_left_out', 'left out')}"
         )
-    ax = axes_or_new(ax)
+    ax = style.axes_or_new(ax)
     unit, stored, label, each = (
         ("mm", "m", LENGTH_LABEL, "% per mm")
         if show == "step_length"
@@ -237,13 +229,12 @@ def plot_predicted_steps(
         for part in ("low", "median", "high", "recording")
     )
     band = f"{check.attrs['band']:.0%} of simulated recordings".replace("%", " %")
-    ax.stairs(high, edge, baseline=low, fill=True, color=BLUE, alpha=0.3, lw=0, label=band)
-    ax.stairs(median, edge, color=BLUE, lw=0.9, label="their median", baseline=None)
-    ax.stairs(real, edge, color=ORANGE, lw=1.1, label="recording", baseline=None)
-    ax.set_xlim(*_shown(real + median, edge))
-    ax.set_ylim(bottom=0.0)
-    ax.set_xlabel(label)
-    ax.set_ylabel(f"density ({each})")
+    ax.stairs(high, edge, baseline=low, fill=True, color=style.BLUE, alpha=0.3, lw=0, label=band)
+    ax.stairs(median, edge, color=style.BLUE, lw=0.9, label="their median", baseline=None)
+    ax.stairs(real, edge, color=style.ORANGE, lw=1.1, label="recording", baseline=None)
+    ax.set(
+        xlim=_shown(real + median, edge), ylim=(0.0, None), xlabel=label, ylabel=f"density ({each})"
+    )
     return ax
 
 
@@ -260,7 +251,7 @@ def _draw_means(ax: Axes, check: xr.Dataset) -> None:
     limit = float(check["residual_distance"].attrs["limit"])
     top = max(LEAST_TOP, float(np.nanmax(distance, initial=0.0)))
     mesh = ax.pcolormesh(
-        x, y, distance, cmap=speed_colormap(), vmin=0.0, vmax=top, shading="nearest"
+        x, y, distance, cmap=style.speed_colormap(), vmin=0.0, vmax=top, shading="nearest"
     )
     mesh.set_rasterized(True)
     u, v = check["residual"].values[:2]
@@ -270,15 +261,17 @@ def _draw_means(ax: Axes, check: xr.Dataset) -> None:
     u, v = u * longer, v * longer
     at_x, at_y = np.meshgrid(x, y)
     ax.quiver(
-        at_x[known], at_y[known], u[known], v[known], color=INK, angles="xy", scale_units="xy",
-        scale=top / (1.3 * size), pivot="middle", width=0.004, zorder=3,
+        at_x[known], at_y[known], u[known], v[known], color=style.INK, angles="xy",
+        scale_units="xy", scale=top / (1.3 * size), pivot="middle", width=0.004, zorder=3,
     )  # fmt: skip
     for row, column in np.argwhere(known & (distance > limit)):
         corner = (x[column] - 0.5 * size, y[row] - 0.5 * size)
-        ax.add_patch(Rectangle(corner, size, size, fill=False, edgecolor=ORANGE, lw=1.4, zorder=5))
+        ax.add_patch(
+            Rectangle(corner, size, size, fill=False, edgecolor=style.ORANGE, lw=1.4, zorder=5)
+        )
     # The limit is that of the largest of all cells.
     framed = f"framed: above {limit:.1f}, by chance\nin one recording of twenty"
-    add_colorbar(mesh, ax, f"distance from zero (sd)\n{framed}")
+    style.add_colorbar(mesh, ax, f"distance from zero (sd)\n{framed}")
 
 
 def _draw_noise(ax: Axes, check: xr.Dataset) -> None:
@@ -294,7 +287,7 @@ def _draw_noise(ax: Axes, check: xr.Dataset) -> None:
         x, y, off, cmap="PuOr_r", norm=CenteredNorm(0.0, halfrange=top), shading="nearest"
     )
     mesh.set_rasterized(True)
-    add_colorbar(mesh, ax, "mean square of the errors,\nagainst that of all (sd)")
+    style.add_colorbar(mesh, ax, "mean square of the errors,\nagainst that of all (sd)")
 
 
 def running_time(check: xr.Dataset) -> tuple[Floats, Floats]:
@@ -314,21 +307,14 @@ def _shown(density: Floats, edge: Floats) -> tuple[float, float]:
     return float(edge[max(first - 1, 0)]), float(edge[min(last + 1, edge.size - 1)])
 
 
-def legend_of(ax: Axes) -> dict[str, Any]:
-    """Return handles and labels, for a legend of the whole figure."""
-    handles, labels = ax.get_legend_handles_labels()
-    return {"handles": handles, "labels": labels}
-
-
 def plot_own_aspects(found: xr.Dataset, ax: Axes, *, label: str) -> None:
     """Draw how far the parts of the recording are from each other, and name the aspects."""
     aspects = [str(name) for name in found["aspect"].values]
     place = np.arange(len(aspects))
-    ax.plot(found["own_distance"].values, place, "|", ms=9.0, mew=1.4, color=INK, label=label)
+    ax.plot(found["own_distance"].values, place, "|", ms=9.0, mew=1.4, color=style.INK, label=label)
     ax.set_yticks(place, [ASPECT_WORDS.get(name, name) for name in aspects])
     ax.invert_yaxis()
-    ax.set_xlim(left=0.0)
-    ax.set_xlabel("KS distance D")
+    ax.set(xlim=(0.0, None), xlabel="KS distance D")
 
 
 def plot_check_ratios(
@@ -350,7 +336,7 @@ def plot_check_ratios(
 def label_checks(found: xr.Dataset, ax: Axes) -> None:
     """Name the facts, and draw the line on which model and recording agree."""
     names = [str(name) for name in found["check"].values]
-    ax.axvline(1.0, color=INK, lw=0.6)
+    ax.axvline(1.0, color=style.INK, lw=0.6)
     ratio_axis(ax)
     ax.set_yticks(np.arange(len(names)), [CHECK_LABELS.get(name, name) for name in names])
     ax.invert_yaxis()

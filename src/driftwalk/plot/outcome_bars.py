@@ -8,6 +8,7 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
+from driftwalk.plot.parts import style
 from driftwalk.plot.parts.assembly_labels import (
     OTHER,
     check_kind,
@@ -16,27 +17,15 @@ from driftwalk.plot.parts.assembly_labels import (
     is_complete,
     percent,
     runs_text,
+    with_rest,
 )
-from driftwalk.plot.parts.polyomino_sketch import axes_points, draw_sketches_below, settle_layout
-from driftwalk.plot.parts.style import (
-    BLUE,
-    DOUBLE_COLUMN_MM,
-    INK,
-    MUTED,
-    ORANGE,
-    SINGLE_COLUMN_MM,
-    STYLE,
-    new_figure,
-)
+from driftwalk.plot.parts.polyomino_sketch import draw_sketches_below
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
 BAR_WIDTH = 0.76
-# So many classes have room in one column of a page; a legend needs so much for two columns [pt].
-NARROW_CLASSES = 12
-WIDE_LEGEND_PT = 380.0
 
 
 class Bars(NamedTuple):
@@ -101,36 +90,38 @@ def plot_outcomes(
         )
     names = list(dict.fromkeys(name for dataset in both for name in class_names(dataset)))
     full = np.array([_on_classes(dataset["proportion"], names) for dataset in both])
-    shown = classes_to_show(names, full.max(axis=0))
+    shown = classes_to_show(names, full)
     drawn = [names[index] for index in shown]
     if len(shown) < len(names):
         drawn.append(OTHER)
-    ax = _new_axes(wide=len(both) > 1 or len(drawn) > NARROW_CLASSES) if ax is None else ax
+    # Twelve classes have room in one column of a page.
+    ax = _new_axes(wide=len(both) > 1 or len(drawn) > 12) if ax is None else ax
     place = np.arange(len(drawn), dtype=np.float64)
     width = BAR_WIDTH / len(both)
-    for index, dataset in enumerate(both):
+    for index, (dataset, color) in enumerate(zip(both, (style.BLUE, style.ORANGE), strict=False)):
         at = place + (index - (len(both) - 1) / 2.0) * width
         _draw_bars(
-            ax, at, _bars(dataset, names, shown), width=width, color=(BLUE, ORANGE)[index],
+            ax, at, _bars(dataset, names, shown), width=width, color=color,
             label=_legend_text(dataset, labels[index]),
         )  # fmt: skip
     if realisations is not None:
         at = place - (len(both) - 1) / 2.0 * width
         _draw_realisations(ax, at + 0.22 * width, realisations, names, shown)
-    ax.set_xlim(-0.6, len(drawn) - 0.4)
-    ax.set_ylim(bottom=0.0)
+    ax.set(xlim=(-0.6, len(drawn) - 0.4), ylim=(0.0, None))
     rest = f" (other: {len(names) - len(shown)} rarer classes)" if OTHER in drawn else ""
     ax.set_ylabel("proportion of runs")
     ax.spines[["top", "right"]].set_visible(False)
     _divide(ax, drawn)
     _legend(ax, both)
-    settle_layout(ax)
+    style.settle_layout(ax)
     ax.set_xlabel(f"outcome class{rest}", labelpad=draw_sketches_below(ax, list(place), drawn))
     return ax
 
 
 def _new_axes(*, wide: bool) -> Axes:
-    figure = new_figure(width_mm=DOUBLE_COLUMN_MM if wide else SINGLE_COLUMN_MM, height_mm=76.0)
+    figure = style.new_figure(
+        width_mm=style.DOUBLE_COLUMN_MM if wide else style.SINGLE_COLUMN_MM, height_mm=76.0
+    )
     return figure.add_subplot()
 
 
@@ -142,18 +133,14 @@ def _on_classes(proportion: xr.DataArray, names: list[str]) -> Floats:
 
 def _bars(dataset: xr.Dataset, names: list[str], shown: list[int]) -> Bars:
     proportion = _on_classes(dataset["proportion"], names)
-    values = [proportion, *(_on_classes(dataset[f"interval_{end}"], names) for end in _ENDS)]
     # A class that the dataset does not list has a proportion of 0, and no interval.
     listed = np.isin(names, class_names(dataset))
-    values[1:] = [np.where(listed, end, np.nan) for end in values[1:]]
-    kept = [array[shown] for array in values]
-    if len(shown) < len(names):
-        rest = float(np.delete(proportion, shown).sum())
-        kept = [
-            np.append(array, value)
-            for array, value in zip(kept, (rest, np.nan, np.nan), strict=True)
-        ]
-    return Bars(*kept)
+    ends = (
+        np.where(listed, _on_classes(dataset[f"interval_{end}"], names), np.nan) for end in _ENDS
+    )
+    # The rest has no interval of its own.
+    none = [np.nan] * (len(shown) < len(names))
+    return Bars(with_rest(proportion, shown), *(np.append(end[shown], none) for end in ends))
 
 
 _ENDS = ("low", "high")
@@ -166,7 +153,7 @@ def _draw_bars(ax: Axes, at: Floats, bars: Bars, *, width: float, color: str, la
     below = np.maximum(bars.proportion - bars.low, 0.0)[known]
     above = np.maximum(bars.high - bars.proportion, 0.0)[known]
     ax.errorbar(
-        at[known], bars.proportion[known], yerr=[below, above], fmt="none", ecolor=INK,
+        at[known], bars.proportion[known], yerr=[below, above], fmt="none", ecolor=style.INK,
         elinewidth=0.8, capsize=1.6, capthick=0.8,
     )  # fmt: skip
 
@@ -184,12 +171,10 @@ def _draw_realisations(
     if table.sizes["realisation"] < 2:
         raise InputError("one realisation has no spread: give at least 2")
     every = np.array([_on_classes(row, names) for row in table])
-    kept = every[:, shown]
-    if len(shown) < len(names):
-        kept = np.column_stack([kept, np.delete(every, shown, axis=1).sum(axis=1)])
+    kept = with_rest(every, shown, axis=1)
     ax.errorbar(
         at, kept.mean(axis=0), yerr=kept.std(axis=0, ddof=1), fmt="D", ms=2.6, mfc="white",
-        mec=INK, mew=0.7, ecolor=INK, elinewidth=1.6, capsize=0.0,
+        mec=style.INK, mew=0.7, ecolor=style.INK, elinewidth=1.6, capsize=0.0,
         label=f"mean ± s.d. of {len(every)} realisations",
     )  # fmt: skip
 
@@ -198,7 +183,7 @@ def _divide(ax: Axes, drawn: list[str]) -> None:
     """Draw a line between the classes of one assembly and those of several."""
     complete = [is_complete(name) for name in drawn]
     if any(complete) and not all(complete[: drawn.index(OTHER) if OTHER in drawn else None]):
-        ax.axvline(complete.index(False) - 0.5, color=MUTED, lw=0.6, dashes=(3, 3), zorder=0)
+        ax.axvline(complete.index(False) - 0.5, color=style.MUTED, lw=0.6, dashes=(3, 3), zorder=0)
 
 
 def _legend_text(dataset: xr.Dataset, label: str) -> str:
@@ -220,10 +205,10 @@ def _legend(ax: Axes, both: list[xr.Dataset]) -> None:
     # The first words of the method are its name, the rest explains.
     method = str(both[0].attrs.get("method", "")).partition(",")[0].partition(";")[0]
     name = "simultaneous intervals" + (f", {method}" if method else "")
-    handles.append(Line2D([], [], color=INK, lw=0.8, marker="_", ms=4.0))
+    handles.append(Line2D([], [], color=style.INK, lw=0.8, marker="_", ms=4.0))
     texts.append(f"{percent(confidence)} {name}" if confidence is not None else name)
     ax.legend(
         handles, texts, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2,
-        fontsize=STYLE["legend.fontsize"], frameon=False,
-        ncols=2 if len(handles) > 2 and axes_points(ax)[0] > WIDE_LEGEND_PT else 1,
+        fontsize=style.STYLE["legend.fontsize"], frameon=False,
+        ncols=2 if len(handles) > 2 and style.axes_points(ax)[0] > 380.0 else 1,
     )  # fmt: skip

@@ -10,6 +10,7 @@ import numpy as np
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.plot.distances import cell_edges, hatch_cell
+from driftwalk.plot.parts import style
 from driftwalk.plot.parts.assembly_labels import (
     PALETTE,
     SweepAxis,
@@ -25,26 +26,10 @@ from driftwalk.plot.parts.polyomino_sketch import (
     MAX_CELL_PT,
     NAME_GAP_PT,
     NAME_SIZE_PT,
-    axes_points,
     class_cells,
-    figure_of,
     name_text,
     place_sketch,
     sketch_size,
-)
-from driftwalk.plot.parts.style import (
-    BLUE,
-    INK,
-    MM_PER_INCH,
-    MUTED,
-    ORANGE,
-    PALE,
-    SINGLE_COLUMN_MM,
-    STYLE,
-    add_colorbar,
-    axes_grid_or_new,
-    axes_or_new,
-    outlined,
 )
 
 if TYPE_CHECKING:
@@ -54,16 +39,11 @@ if TYPE_CHECKING:
 
 # Bright is close to the reference, as bright is a good score in the map of the calibration.
 DISTANCE_COLORMAP: Final = "viridis_r"
-PROPORTION_COLORMAP: Final = "viridis"
 DISTANCE_LABEL: Final = r"$\ell_1$ distance to the reference"
 FLOOR_LABEL: Final = "95 % noise floor"
 REFERENCE_LABEL: Final = "reference"
-# Least width of a sketch in the key [pt].
-KEY_SLOT_PT: Final = 32.0
 KEY_ROW_MM: Final = 11.0
-MM_PER_PT: Final = MM_PER_INCH / 72.0
-# Letters of a legend that fit abreast in one column of a page.
-LEGEND_LETTERS: Final = 50
+MM_PER_PT: Final = style.MM_PER_INCH / 72.0
 MARKERS: Final = "osD^v<>"
 
 
@@ -106,24 +86,23 @@ def plot_l1_map(
     sweep = _one_or_two(sensitivity, sensitivity["l1_distance"])
     distance = _values(sensitivity["l1_distance"], sweep)
     if len(sweep) == 1 or any(axis.words for axis in sweep):
-        ax = axes_or_new(ax, height_mm=65.0)
+        ax = style.axes_or_new(ax, height_mm=65.0)
         _draw_floor_band(ax, sensitivity)
-        _draw_lines(ax, sweep, distance, color=INK)
+        _draw_lines(ax, sweep, distance, color=style.INK)
         _mark_on_line(ax, sensitivity, sweep)
-        ax.set_ylabel(DISTANCE_LABEL)
-        ax.set_ylim(bottom=0.0)
+        ax.set(ylabel=DISTANCE_LABEL, ylim=(0.0, None))
         _legend_above(ax)
         return ax
-    ax = axes_or_new(ax)
+    ax = style.axes_or_new(ax)
     mesh = _draw_map(ax, sweep, distance, colormap=DISTANCE_COLORMAP)
     mesh.set_clim(0.0, float(np.nanmax(distance)) if np.isfinite(distance).any() else 2.0)
     floor = number_fact(sensitivity, "noise_floor_95")
     drawn = _draw_floor_contour(ax, sweep, distance, floor)
     _mark_on_map(ax, sensitivity, sweep)
     if colorbar == "beside":
-        bar = add_colorbar(mesh, ax, DISTANCE_LABEL)
+        bar = style.add_colorbar(mesh, ax, DISTANCE_LABEL)
         if np.isfinite(floor):
-            bar.ax.axhline(floor, color=INK, lw=1.4)
+            bar.ax.axhline(floor, color=style.INK, lw=1.4)
             if not drawn:
                 bar.set_label(rf"$\ell_1$ distance (line: {FLOOR_LABEL})")
     _legend_above(ax)
@@ -175,7 +154,7 @@ def plot_class_panels(
     if unknown or not shown:
         raise InputError(f"the study has no class {', '.join(unknown) or '(none was asked for)'}")
     columns = min(columns, len(shown))
-    panels = axes_grid_or_new(
+    panels = style.axes_grid_or_new(
         axes, count=len(shown), columns=columns, height_mm=20.0 + 40.0 * -(-len(shown) // columns),
         sharex=True, sharey=True,
     )  # fmt: skip
@@ -185,23 +164,22 @@ def plot_class_panels(
     top = max((float(np.nanmax(p)) for p in every if np.isfinite(p).any()), default=1.0) or 1.0
     for ax, name, proportion in zip(panels, shown, every, strict=True):
         if mapped:
-            mesh = _draw_map(ax, sweep, proportion, colormap=PROPORTION_COLORMAP)
+            mesh = _draw_map(ax, sweep, proportion, colormap="viridis")
             mesh.set_clim(0.0, top)
             _mark_on_map(ax, sensitivity, sweep, size=6.0)
         else:
-            _draw_lines(ax, sweep, proportion, color=BLUE)
+            _draw_lines(ax, sweep, proportion, color=style.BLUE)
             _mark_on_line(ax, sensitivity, sweep)
-            ax.set_ylim(0.0, 1.05 * top)
-            ax.set_ylabel("proportion")
+            ax.set(ylim=(0.0, 1.05 * top), ylabel="proportion")
             _turn_words(ax, sweep)
         _title_panel(ax, name)
     if axes is None:
         _label_outside(panels, columns)
         handles, labels = panels[0].get_legend_handles_labels()
         if labels:
-            figure_of(panels[0]).legend(handles, labels, loc="outside upper center", ncols=4)
+            style.figure_of(panels[0]).legend(handles, labels, loc="outside upper center", ncols=4)
     if mapped:
-        add_colorbar(panels[0].collections[0], panels, "proportion of runs")
+        style.add_colorbar(panels[0].collections[0], panels, "proportion of runs")
     return panels
 
 
@@ -230,22 +208,25 @@ def plot_class_key(
     2
     """
     if rows is None:
-        width_mm = SINGLE_COLUMN_MM if ax is None else float(axes_points(ax)[0]) * MM_PER_PT
+        width_mm = (
+            style.SINGLE_COLUMN_MM if ax is None else float(style.axes_points(ax)[0]) * MM_PER_PT
+        )
         rows = key_rows(names, width_mm)
-    ax = axes_or_new(ax, height_mm=KEY_ROW_MM * rows)
+    ax = style.axes_or_new(ax, height_mm=KEY_ROW_MM * rows)
     ax.set_axis_off()
-    ax.set_xlim(0.0, 1.0)
-    ax.set_ylim(0.0, 1.0)
+    ax.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
     columns = -(-len(names) // rows)
     sizes = np.array([sketch_size(class_cells(name)) for name in names])
     written = any(name_text(name) for name in names)
-    free = axes_points(ax) / np.array([columns, rows])
+    free = style.axes_points(ax) / np.array([columns, rows])
     free -= np.array([0.0, NAME_SIZE_PT + 4.0 if written else 2.0])
     side = max(1.0, min(MAX_CELL_PT, *(0.85 * free / sizes.max(axis=0))))
     for index, name in enumerate(names):
         row, column = divmod(index, columns)
         x = (column + 0.5) / columns
-        place_sketch(ax, name, (x, 1.0 - row / rows), alignment=(0.5, 1.0), cell_pt=side, color=INK)
+        place_sketch(
+            ax, name, (x, 1.0 - row / rows), alignment=(0.5, 1.0), cell_pt=side, color=style.INK
+        )
         ax.annotate(
             name_text(name), (x, 1.0 - row / rows), size=NAME_SIZE_PT, ha="center", va="top",
             xytext=(0.0, -side * float(sizes[:, 1].max()) - NAME_GAP_PT),
@@ -257,7 +238,8 @@ def plot_class_key(
 def key_rows(names: Sequence[str], width_mm: float) -> int:
     """Return in how many rows `plot_class_key` draws the classes on axes of that width."""
     longest = max((len(name_text(name)) for name in names), default=0)
-    slot = max(KEY_SLOT_PT, (longest + 1.0) * LETTER_PT)
+    # A sketch takes 32 pt across or more.
+    slot = max(32.0, (longest + 1.0) * LETTER_PT)
     columns = max(1, int(width_mm / MM_PER_PT / slot))
     return max(1, -(-len(names) // columns))
 
@@ -265,9 +247,8 @@ def key_rows(names: Sequence[str], width_mm: float) -> int:
 def shown_classes(sensitivity: xr.Dataset) -> list[str]:
     """Return the classes of a study that figures show."""
     names = class_names(sensitivity)
-    proportion = sensitivity["proportion"].transpose(..., "class").values.reshape(-1, len(names))
-    largest = np.nan_to_num(np.where(np.isfinite(proportion), proportion, 0.0)).max(axis=0)
-    return [names[index] for index in classes_to_show(names, largest)]
+    share = sensitivity["proportion"].transpose(..., "class").values
+    return [names[index] for index in classes_to_show(names, share)]
 
 
 def _one_or_two(sensitivity: xr.Dataset, variable: xr.DataArray) -> list[SweepAxis]:
@@ -293,10 +274,7 @@ def _draw_map(ax: Axes, sweep: list[SweepAxis], values: Floats, *, colormap: str
     named: set[str] = set()
     for cell in zip(*np.nonzero(~np.isfinite(values)), strict=True):
         hatch_cell(ax, (x_edge, y_edge), cell, cause=("not computed", "//////"), named=named)
-    ax.set_xlim(*x_edge[[0, -1]])
-    ax.set_ylim(*y_edge[[0, -1]])
-    ax.set_xlabel(sweep[0].label)
-    ax.set_ylabel(sweep[1].label)
+    ax.set(xlim=x_edge[[0, -1]], ylim=y_edge[[0, -1]], xlabel=sweep[0].label, ylabel=sweep[1].label)
     return mesh
 
 
@@ -308,10 +286,10 @@ def _draw_floor_contour(ax: Axes, sweep: list[SweepAxis], values: Floats, floor:
         return False
     lines = ax.contour(
         sweep[0].values, sweep[1].values, np.ma.masked_invalid(values.T), levels=[floor],
-        colors=INK, linewidths=1.2,
+        colors=style.INK, linewidths=1.2,
     )  # fmt: skip
-    lines.set_path_effects(outlined(2.6))
-    ax.plot([], [], color=INK, lw=1.2, label=f"{FLOOR_LABEL} ({floor:.3g})")
+    lines.set_path_effects(style.outlined(2.6))
+    ax.plot([], [], color=style.INK, lw=1.2, label=f"{FLOOR_LABEL} ({floor:.3g})")
     return True
 
 
@@ -321,7 +299,7 @@ def _mark_on_map(
     x, y = (reference_value(sensitivity, axis) for axis in sweep)
     if np.isfinite([x, y]).all():
         ax.plot(
-            [x], [y], "*", ms=size, mfc=ORANGE, mec="white", mew=0.7, zorder=6, clip_on=False,
+            [x], [y], "*", ms=size, mfc=style.ORANGE, mec="white", mew=0.7, zorder=6, clip_on=False,
             ls="none", label=REFERENCE_LABEL,
         )  # fmt: skip
 
@@ -330,9 +308,9 @@ def _draw_floor_band(ax: Axes, sensitivity: xr.Dataset) -> None:
     high = number_fact(sensitivity, "noise_floor_95")
     mean = number_fact(sensitivity, "noise_floor_mean")
     if np.isfinite(high):
-        ax.axhspan(0.0, high, color=PALE, lw=0, label=f"below the {FLOOR_LABEL}")
+        ax.axhspan(0.0, high, color=style.PALE, lw=0, label=f"below the {FLOOR_LABEL}")
     if np.isfinite(mean):
-        ax.axhline(mean, color=INK, lw=0.8, dashes=(4, 2.5), label="mean noise floor")
+        ax.axhline(mean, color=style.INK, lw=0.8, dashes=(4, 2.5), label="mean noise floor")
 
 
 def _draw_lines(ax: Axes, sweep: list[SweepAxis], values: Floats, *, color: str) -> None:
@@ -340,9 +318,9 @@ def _draw_lines(ax: Axes, sweep: list[SweepAxis], values: Floats, *, color: str)
     along, *others = sweep
     if others and along.words and not others[0].words:
         along, others, values = others[0], [along], values.T
-    style = "none" if along.words else "-"
+    line = "none" if along.words else "-"
     if not others:
-        ax.plot(along.values, values, marker="o", ms=3.5, ls=style, color=color)
+        ax.plot(along.values, values, marker="o", ms=3.5, ls=line, color=color)
     else:
         other = others[0]
         texts = other.words or [f"{value:.4g}" for value in other.values]
@@ -351,7 +329,7 @@ def _draw_lines(ax: Axes, sweep: list[SweepAxis], values: Floats, *, color: str)
         for index, text in enumerate(texts):
             ax.plot(
                 along.values + (spread[index] if along.words else 0.0), values[:, index],
-                marker=MARKERS[index % len(MARKERS)], ms=3.5, ls=style,
+                marker=MARKERS[index % len(MARKERS)], ms=3.5, ls=line,
                 color=PALETTE[index % len(PALETTE)], label=f"{name}: {text}",
             )  # fmt: skip
     if along.words:
@@ -365,7 +343,7 @@ def _mark_on_line(ax: Axes, sensitivity: xr.Dataset, sweep: list[SweepAxis]) -> 
     along = next((axis for axis in sweep if not axis.words), sweep[0])
     at = reference_value(sensitivity, along)
     if np.isfinite(at):
-        ax.axvline(at, color=ORANGE, lw=0.9, zorder=1, label=REFERENCE_LABEL)
+        ax.axvline(at, color=style.ORANGE, lw=0.9, zorder=1, label=REFERENCE_LABEL)
 
 
 def _label_outside(panels: list[Axes], columns: int) -> None:
@@ -383,10 +361,10 @@ def _title_panel(ax: Axes, name: str) -> None:
     """Write the name of a class above the left edge and draw its sketch above the right one."""
     cells = class_cells(name)
     side = min(4.0, 10.0 / float(sketch_size(cells)[1]))
-    ax.set_title(name_text(name), loc="left", color=MUTED)
+    ax.set_title(name_text(name), loc="left", color=style.MUTED)
     place_sketch(
         ax, name, (1.0, 1.03), transform="axes fraction", alignment=(1.0, 0.0), cell_pt=side,
-        color=INK,
+        color=style.INK,
     )  # fmt: skip
 
 
@@ -399,9 +377,10 @@ def _turn_words(ax: Axes, sweep: list[SweepAxis]) -> None:
 def _legend_above(ax: Axes) -> None:
     handles, labels = ax.get_legend_handles_labels()
     if labels:
-        narrow = 2 * max(map(len, labels)) <= LEGEND_LETTERS
+        # Fifty letters fit abreast in one column of a page.
+        narrow = 2 * max(map(len, labels)) <= 50
         ax.legend(
             handles, labels, loc="lower left", bbox_to_anchor=(0.0, 1.0),
             ncols=2 if narrow else 1, borderaxespad=0.2,
-            fontsize=STYLE["legend.fontsize"], frameon=False,
+            fontsize=style.STYLE["legend.fontsize"], frameon=False,
         )  # fmt: skip

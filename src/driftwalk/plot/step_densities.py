@@ -10,6 +10,7 @@ import numpy.typing as npt
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.plot.distances import CAUSES
+from driftwalk.plot.parts import style
 from driftwalk.plot.parts.labels import (
     ANGLE_LABEL,
     FACTORS,
@@ -22,15 +23,6 @@ from driftwalk.plot.parts.labels import (
     require_variables,
     required_fact,
 )
-from driftwalk.plot.parts.style import (
-    DENSITY_COLORMAP,
-    MUTED,
-    PALE,
-    add_colorbar,
-    axes_grid_or_new,
-    axes_or_new,
-    letter_panels,
-)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,8 +33,6 @@ Marginals = Literal["shown", "none"]
 BINS = 48
 # Axes and bins reach over the central part of the steps; one wild step must not squeeze the rest.
 SHOWN_FRACTION = 0.9995
-# Colour grows with the root of the density: the tails show, and so does the shape of the peak.
-COLOR_POWER = 0.5
 DENSITY_LABEL = "density of steps (% mm⁻¹ °⁻¹)"
 MM_PER_M = FACTORS["m", "mm"]
 DEGREES = FACTORS["rad", "°"]
@@ -155,17 +145,16 @@ def plot_step_density(
     'turning (step) angle (°)'
     """
     share, length_mm, angle_deg = _checked(density, step_length_edge, turning_angle_edge)
-    ax = axes_or_new(ax)
+    ax = style.axes_or_new(ax)
     mesh = density_mesh(ax, share, length_mm, angle_deg)
     if limits == "filled":
         ax.set_xlim(*filled_range(share.sum(axis=1), length_mm))
         ax.set_ylim(*filled_range(share.sum(axis=0), angle_deg))
-    ax.set_xlabel(LENGTH_LABEL)
-    ax.set_ylabel(ANGLE_LABEL)
+    ax.set(xlabel=LENGTH_LABEL, ylabel=ANGLE_LABEL)
     if marginals == "shown":
         _draw_marginals(ax, share, length_mm, angle_deg)
     if colorbar == "beside":
-        add_colorbar(mesh, ax, DENSITY_LABEL)
+        style.add_colorbar(mesh, ax, DENSITY_LABEL)
     return ax
 
 
@@ -180,15 +169,16 @@ def density_mesh(
 
     density = density_of(share, length_mm, angle_deg)
     highest = (float(density.max(initial=0.0)) if top is None else top) or 1.0
+    # Colour grows with the root of the density: the tails show, and so does the shape of the peak.
     mesh = ax.pcolormesh(
         length_mm,
         angle_deg,
         np.ma.masked_equal(density.T, 0.0),
-        cmap=DENSITY_COLORMAP,
-        norm=PowerNorm(COLOR_POWER, vmin=0.0, vmax=highest),
+        cmap=style.DENSITY_COLORMAP,
+        norm=PowerNorm(0.5, vmin=0.0, vmax=highest),
     )
     mesh.set_rasterized(True)
-    ax.axhline(0.0, color=MUTED, lw=0.5, dashes=(4, 3))
+    ax.axhline(0.0, color=style.MUTED, lw=0.5, dashes=(4, 3))
     return mesh
 
 
@@ -216,11 +206,10 @@ def _draw_marginals(ax: Axes, share: Floats, length_mm: Floats, angle_deg: Float
 
     top = ax.inset_axes((0.0, 1.02, 1.0, 0.16), sharex=ax)
     right = ax.inset_axes((1.02, 0.0, 0.16, 1.0), sharey=ax)
-    style: dict[str, Any] = {"fill": True, "facecolor": PALE, "edgecolor": MUTED, "linewidth": 0.7}
-    top.stairs(share.sum(axis=1) / np.diff(length_mm), length_mm, **style)
-    right.stairs(
-        share.sum(axis=0) / np.diff(angle_deg), angle_deg, orientation="horizontal", **style
-    )
+    look: dict[str, Any] = {"fill": True, "facecolor": style.PALE, "edgecolor": style.MUTED}
+    length, angle = share.sum(axis=1) / np.diff(length_mm), share.sum(axis=0) / np.diff(angle_deg)
+    top.stairs(length, length_mm, linewidth=0.7, **look)
+    right.stairs(angle, angle_deg, orientation="horizontal", linewidth=0.7, **look)
     top.set_ylim(bottom=0.0)
     right.set_xlim(left=0.0)
     for side, name in ((top, "step length"), (right, "turning angle")):
@@ -316,23 +305,21 @@ def plot_density_panels(
     top = max(
         float(density_of(density, length_mm, angle_deg).max(initial=0.0)) for density in densities
     )
-    row = axes_grid_or_new(axes, count=4, sharex=True, sharey=True)
+    row = style.axes_grid_or_new(axes, count=4, sharex=True, sharey=True)
     limits = _common_limits(densities, length_mm, angle_deg)
     for ax, density in zip(row, densities, strict=True):
         mesh = density_mesh(ax, density, length_mm, angle_deg, top=top)
-        ax.set_xlim(*limits[0])
-        ax.set_ylim(*limits[1])
+        ax.set(xlim=limits[0], ylim=limits[1])
         ax.xaxis.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 5, 10]))
-        ax.set_xlabel(LENGTH_LABEL)
-        ax.set_ylabel(ANGLE_LABEL)
+        ax.set(xlabel=LENGTH_LABEL, ylabel=ANGLE_LABEL)
         ax.label_outer()
     for ax, setting in zip(row[1:], settings, strict=True):
         _mark_cause(ax, setting)
-    letter_panels(
+    style.letter_panels(
         row, ["recording", *(along.title(setting.values[along.name]) for setting in settings)]
     )
     if colorbar == "beside":
-        add_colorbar(mesh, row, DENSITY_LABEL)
+        style.add_colorbar(mesh, row, DENSITY_LABEL)
     return row
 
 
@@ -410,7 +397,12 @@ def _mark_cause(ax: Axes, setting: Setting) -> None:
     name, hatch = causes[0]
     ax.set_facecolor("white")
     ax.axhspan(
-        *ax.get_ylim(), facecolor="none", edgecolor=MUTED, linewidth=0.0, hatch=hatch, gid=name
+        *ax.get_ylim(),
+        facecolor="none",
+        edgecolor=style.MUTED,
+        linewidth=0.0,
+        hatch=hatch,
+        gid=name,
     )
     ax.text(
         0.5, 0.5, name, transform=ax.transAxes, ha="center", va="center",

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
-import numpy.typing as npt
 
-from driftwalk.core.arrays import Bools, Floats
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
+from driftwalk.plot.parts import style
 from driftwalk.plot.parts.arena import (
     CM_PER_M,
     arena_of,
@@ -18,14 +18,6 @@ from driftwalk.plot.parts.arena import (
     label_position,
 )
 from driftwalk.plot.parts.assembly_labels import PALETTE
-from driftwalk.plot.parts.style import (
-    DOUBLE_COLUMN_MM,
-    INK,
-    TIME_COLORMAP,
-    add_colorbar,
-    axes_grid_or_new,
-    axes_or_new,
-)
 from driftwalk.schema import Track, body_track
 from driftwalk.schema.check import kind_name
 
@@ -33,13 +25,10 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
 
-STRIP_COLUMNS: Final = 6
 POSES: Final = ("x", "y", "theta", "assembly")
 
 # Neighbours further apart than this many usual intervals have a gap between them.
 GAP_INTERVALS = 1.5
-# Beyond this many segments a vector file holds a picture of the path, not its every segment.
-VECTOR_SEGMENTS = 3000
 
 
 def plot_trajectory(
@@ -91,31 +80,26 @@ def plot_trajectory(
     from matplotlib.collections import LineCollection
 
     track = _excerpt(body_track(trajectory, body), start, stop)
-    ax = axes_or_new(ax, layout="compressed")
+    ax = style.axes_or_new(ax, layout="compressed")
     points = CM_PER_M * np.column_stack([track.x, track.y])
-    joined = joined_neighbours(track.time)
+    interval = np.diff(track.time)
+    joined = interval <= GAP_INTERVALS * np.median(interval)
     segments = np.stack([points[:-1][joined], points[1:][joined]], axis=1)
     path = LineCollection(
-        list(segments), cmap=TIME_COLORMAP, linewidths=0.9, capstyle="round", label="path"
+        list(segments), cmap=style.TIME_COLORMAP, linewidths=0.9, capstyle="round", label="path"
     )
     path.set_array(track.time[:-1][joined])
     path.set_clim(track.time[0], track.time[-1])
-    path.set_rasterized(len(segments) > VECTOR_SEGMENTS)
+    # Of a longer path a vector file holds a picture of the path, not its every segment.
+    path.set_rasterized(len(segments) > 3000)
     ax.add_collection(path)
-    ax.plot(*points[0], "o", ms=4.5, mfc="white", mec=INK, mew=1.0, zorder=5, label="start")
+    ax.plot(*points[0], "o", ms=4.5, mfc="white", mec=style.INK, mew=1.0, zorder=5, label="start")
     if draw_arena(ax, arena_of(trajectory, arena)) is None:
         ax.autoscale_view()
     label_position(ax)
     if colorbar == "beside":
-        add_colorbar(path, ax, "time (s)")
+        style.add_colorbar(path, ax, "time (s)")
     return ax
-
-
-def joined_neighbours(time: npt.NDArray[np.float64]) -> Bools:
-    """Return, for samples i and i + 1, whether no gap lies between them; shape (n - 1,)."""
-    interval = np.diff(time)
-    joined: Bools = interval <= GAP_INTERVALS * np.median(interval)
-    return joined
 
 
 def _excerpt(track: Track, start: float | None, stop: float | None) -> Track:
@@ -170,7 +154,7 @@ def plot_blocks(
         one = one.isel(time=_sample_at(one, time))
     elif time is not None:
         raise InputError("an 'assembly' holds the end of its runs only: leave out time")
-    ax = axes_or_new(ax, layout="compressed")
+    ax = style.axes_or_new(ax, layout="compressed")
     _draw_blocks(ax, one)
     if draw_arena(ax, arena_of(dataset)) is None:
         ax.autoscale_view()
@@ -213,10 +197,11 @@ def plot_film_strip(
     one = _one_run(path, run, kind="assembly_path")
     if count < 2:
         raise InputError(f"a strip has at least 2 moments, got {count}")
-    rows = -(-count // STRIP_COLUMNS)
+    # A row has six moments at most.
+    rows = -(-count // 6)
     columns = -(-count // rows)
-    height_mm = rows * (DOUBLE_COLUMN_MM / columns + 5.0)
-    panels = axes_grid_or_new(axes, count=count, columns=columns, height_mm=height_mm)
+    height_mm = rows * (style.DOUBLE_COLUMN_MM / columns + 5.0)
+    panels = style.axes_grid_or_new(axes, count=count, columns=columns, height_mm=height_mm)
     times = one["time"].values
     for ax, moment in zip(panels, np.linspace(times[0], times[-1], count), strict=True):
         plot_blocks(path, ax, run=run, time=float(moment))
@@ -291,6 +276,10 @@ def _draw_blocks(ax: Axes, moment: xr.Dataset) -> None:
 
     colors = [PALETTE[int(index) % len(PALETTE)] for index in moment["assembly"].values]
     blocks = PolyCollection(
-        list(block_corners(moment)), facecolors=colors, edgecolors=INK, linewidths=0.6, zorder=3
+        list(block_corners(moment)),
+        facecolors=colors,
+        edgecolors=style.INK,
+        linewidths=0.6,
+        zorder=3,
     )
     ax.add_collection(blocks)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from driftwalk.plot.distances import REGION_LABEL, draw_optimum, region_of
+from driftwalk.plot.parts import style
 from driftwalk.plot.parts.labels import (
     PlotParameter,
     interval_of,
@@ -16,7 +17,6 @@ from driftwalk.plot.parts.labels import (
     plot_parameters,
     require_variables,
 )
-from driftwalk.plot.parts.style import BLUE, INK, MUTED, ORANGE, PALE, axes_grid_or_new, axes_or_new
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -51,7 +51,7 @@ def plot_validation(calibration: xr.Dataset, axes: Any = None) -> list[Axes]:
     ``plot_validation(calibration)[0].figure.savefig("validation.png")``
     """
     parameters = plot_parameters(calibration)
-    row = axes_grid_or_new(axes, count=len(parameters) + 1)
+    row = style.axes_grid_or_new(axes, count=len(parameters) + 1)
     for parameter, ax in zip(parameters, row, strict=False):
         plot_distance_profile(calibration, ax, parameter=parameter.name)
     plot_bootstrap(calibration, row[-1])
@@ -98,41 +98,49 @@ def plot_distance_profile(
     best, factor = along.best(calibration), along.factor
     line = _through_optimum(calibration, along)
     values = factor * np.asarray(line[along.name].values, dtype=np.float64)
-    ax = axes_or_new(ax)
+    ax = style.axes_or_new(ax)
     interval = interval_of(calibration, f"{along.key}_interval")
     if interval is not None:
-        ax.axvspan(factor * interval[0], factor * interval[1], color=PALE, lw=0, label="interval")
+        ax.axvspan(
+            factor * interval[0], factor * interval[1], color=style.PALE, lw=0, label="interval"
+        )
     replicates = line["ks_distance_replicate"].transpose(along.name, ...).values
     ax.plot(
         np.repeat(values, replicates.shape[1]), replicates.ravel(), "o", ms=2.2, mew=0.0,
-        color=MUTED, alpha=0.6, label="replicates",
+        color=style.MUTED, alpha=0.6, label="replicates",
     )  # fmt: skip
     error = line.get("ks_distance_standard_error")
     ax.errorbar(
         values, line["ks_distance"].values, yerr=None if error is None else error.values,
-        color=BLUE, lw=1.0, elinewidth=0.8, label="mean ± standard error",
+        color=style.BLUE, lw=1.0, elinewidth=0.8, label="mean ± standard error",
     )  # fmt: skip
     if len(plot_parameters(calibration)) == 1 and "refined_surface" in calibration:
         fine = along.values(calibration, "refined_")
         fitted = calibration["refined_surface"].values
-        ax.plot(fine, fitted, color=ORANGE, lw=1.0, label="fitted curve", zorder=5)
+        ax.plot(fine, fitted, color=style.ORANGE, lw=1.0, label="fitted curve", zorder=5)
     floor = number_fact(calibration, "noise_floor")
     if np.isfinite(floor):
-        ax.axhline(floor, color=INK, lw=0.8, dashes=(4, 2.5), label="noise floor")
+        ax.axhline(floor, color=style.INK, lw=0.8, dashes=(4, 2.5), label="noise floor")
     distance = number_fact(calibration, "ks_distance")
     ax.plot(
-        [best], [distance], "D", ms=4.5, mfc=ORANGE, mec="white", mew=0.7, zorder=6, label="optimum"
+        [best],
+        [distance],
+        "D",
+        ms=4.5,
+        mfc=style.ORANGE,
+        mec="white",
+        mew=0.7,
+        zorder=6,
+        label="optimum",
     )
     # On a logarithmic scale the optimum and the noise floor, both far below 1, can be
     # distinguished.
-    ax.set_yscale("log")
-    ax.set_ylim(top=1.15)
+    ax.set(yscale="log", ylim=(None, 1.15))
     ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     ax.yaxis.set_major_formatter("{x:g}")
     ax.yaxis.set_minor_locator(NullLocator())
     along.scale(ax, "x")
-    ax.set_xlabel(along.label(calibration))
-    ax.set_ylabel("KS distance D")
+    ax.set(xlabel=along.label(calibration), ylabel="KS distance D")
     ax.spines[["top", "right"]].set_visible(False)
     return ax
 
@@ -166,7 +174,7 @@ def plot_bootstrap(calibration: xr.Dataset, ax: Axes | None = None) -> Axes:
     """
     parameters = plot_parameters(calibration)
     require_variables(calibration, *(f"bootstrap_{one.name}" for one in parameters))
-    ax = axes_or_new(ax)
+    ax = style.axes_or_new(ax)
     if len(parameters) == 1:
         _histogram(calibration, ax, parameters[0])
     else:
@@ -181,21 +189,25 @@ def _cloud(calibration: xr.Dataset, ax: Axes) -> None:
     across, up = plane_of(calibration)
     ax.plot(
         across.values(calibration, "bootstrap_"), up.values(calibration, "bootstrap_"), "o",
-        ms=2.6, mew=0.0, color=BLUE, alpha=0.45, label=ESTIMATES_LABEL,
+        ms=2.6, mew=0.0, color=style.BLUE, alpha=0.45, label=ESTIMATES_LABEL,
     )  # fmt: skip
     region = region_of(calibration)
     if region is not None:
         ax.add_patch(
             Polygon(
-                region, closed=True, facecolor="none", edgecolor=INK, lw=0.8, label=REGION_LABEL
+                region,
+                closed=True,
+                facecolor="none",
+                edgecolor=style.INK,
+                lw=0.8,
+                label=REGION_LABEL,
             )
         )
-    draw_optimum(ax, calibration, color=ORANGE)
+    draw_optimum(ax, calibration, color=style.ORANGE)
     ax.autoscale_view()
     across.scale(ax, "x")
     up.scale(ax, "y")
-    ax.set_xlabel(across.label(calibration))
-    ax.set_ylabel(up.label(calibration))
+    ax.set(xlabel=across.label(calibration), ylabel=up.label(calibration))
 
 
 def _histogram(calibration: xr.Dataset, ax: Axes, parameter: PlotParameter) -> None:
@@ -203,16 +215,15 @@ def _histogram(calibration: xr.Dataset, ax: Axes, parameter: PlotParameter) -> N
     ends = interval_of(calibration, f"{parameter.key}_interval")
     if ends is not None:
         low, high = (parameter.factor * end for end in ends)
-        ax.axvspan(low, high, color=PALE, lw=0, label="interval")
+        ax.axvspan(low, high, color=style.PALE, lw=0, label="interval")
     is_log = parameter.stored.is_log
     # Counted on the scale of the axis: an edge that was raised to a power may leave its value out.
     counts, bins = np.histogram(np.log10(values) if is_log else values, "auto")
     edges = np.power(10.0, bins) if is_log else bins
-    ax.stairs(counts, edges, fill=True, color=BLUE, alpha=0.6, label=ESTIMATES_LABEL)
-    ax.axvline(parameter.best(calibration), color=ORANGE, lw=1.4, label="optimum")
+    ax.stairs(counts, edges, fill=True, color=style.BLUE, alpha=0.6, label=ESTIMATES_LABEL)
+    ax.axvline(parameter.best(calibration), color=style.ORANGE, lw=1.4, label="optimum")
     parameter.scale(ax, "x")
-    ax.set_xlabel(parameter.label(calibration))
-    ax.set_ylabel("recordings")
+    ax.set(xlabel=parameter.label(calibration), ylabel="recordings")
 
 
 def _through_optimum(calibration: xr.Dataset, along: PlotParameter) -> xr.Dataset:

@@ -21,8 +21,6 @@ from driftwalk.page.html import BUNDLE, bundle_file, html_shell, page_frame
 from driftwalk.viewer.hub import Content, Hub, Outbox, Source, make_message, parsed
 from driftwalk.viewer.security import HEADERS, Gate
 
-TRY_LATER: Final = 1013
-"""Close code of a WebSocket: too many browsers."""
 REQUEST_S: Final = 10.0
 """For how long a connection may take to send a whole request [s].
 
@@ -89,7 +87,8 @@ def make_app(source: Source, gate: Gate, *, failed: Failed) -> ASGIApp:
         await websocket.accept()
         box = hub.join(source.greeting())
         if box is None:
-            await websocket.close(TRY_LATER)
+            # The code for "try again later": too many browsers.
+            await websocket.close(1013)
             return
         try:
             await _talk(websocket, box, source)

@@ -16,7 +16,6 @@ from typing import Any, Final, NamedTuple
 from driftwalk.core.errors import FormatError
 from driftwalk.core.text.json_text import json_value, parse_json
 
-MOST_CLIENTS: Final = 32
 PACED: Final = frozenset({"tank", "frame"})
 """Kinds that wait until the browser has drawn the last one."""
 REPLACED_BY: Final[dict[str, tuple[str, ...]]] = {
@@ -88,7 +87,7 @@ class Hub:
 
     def join(self, greeting: Sequence[Content]) -> Outbox | None:
         """Return the outbox of a new browser, with the greeting in it; None when it is full."""
-        if len(self._boxes) >= MOST_CLIENTS:
+        if len(self._boxes) >= 32:
             return None
         box = Outbox()
         for content in greeting:
@@ -104,11 +103,9 @@ class Hub:
 
     def publish(self, content: Content) -> None:
         """Let a message wait for every browser; called in the server's own thread."""
-        if self._boxes:
-            self.hand_out(make_message(content))
-
-    def hand_out(self, message: Message) -> None:
-        """Let a message that is written already wait for every browser."""
+        if not self._boxes:
+            return
+        message = make_message(content)
         for box in self._boxes:
             box.put(message)
 

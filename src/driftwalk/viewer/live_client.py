@@ -20,10 +20,6 @@ VERSION: Final = 1
 LONGEST_LINE: Final = 1 << 25
 """Longest line [byte] that is read: a frame with a large image."""
 FIRST_PAUSE_S: Final = 0.25
-LONGEST_PAUSE_S: Final = 1.0
-"""Time between two attempts to connect [s]: it doubles up to this."""
-EVENTS_REPEATED: Final = 50
-"""Events that every frame repeats: a browser that misses frames misses no event."""
 LAST_PORT: Final = 65535
 WIDTHS: Final = range(16, 4097)
 """Widths [px] in which a tracker sends its images."""
@@ -66,7 +62,9 @@ class LiveSource(Source):
 
     def greeting(self) -> Sequence[Content]:
         """Return the page, and the last that came of the stream."""
-        return [{"type": "page", "page": self._page()}, *self._last.values()]
+        subtitle, tank = f"the stream of {self.title}", section("live", "live", "The tank")
+        page = page_frame(self.view, "Live", subtitle=subtitle, sections=[tank])
+        return [{"type": "page", "page": page}, *self._last.values()]
 
     async def run(self, publish: Publish) -> None:
         """Read the stream, and connect again whenever it is lost."""
@@ -77,7 +75,8 @@ class LiveSource(Source):
                 pause, words = FIRST_PAUSE_S, "the tracker is gone; the page waits for it"
             self._note({"type": "lost", "words": words}, publish)
             await asyncio.sleep(pause)
-            pause = min(2.0 * pause, LONGEST_PAUSE_S)
+            # The time between two attempts to connect doubles, up to a second.
+            pause = min(2.0 * pause, 1.0)
 
     async def receive(self, content: Content, reply: Publish) -> None:
         """Ask the tracker for its images, or no longer."""
@@ -162,7 +161,8 @@ class LiveSource(Source):
         """Return a frame with the last events of all frames before it."""
         events = content.get("events")
         if isinstance(events, list):
-            self._events = [*self._events, *events][-EVENTS_REPEATED:]
+            # Every frame repeats them: a browser that misses frames misses no event.
+            self._events = [*self._events, *events][-50:]
             return {**content, "events": self._events}
         return content
 
@@ -183,10 +183,6 @@ class LiveSource(Source):
             with contextlib.suppress(OSError):
                 self._writer.write(json.dumps({"jpeg_width": width}).encode() + b"\n")
                 await self._writer.drain()
-
-    def _page(self) -> dict[str, Any]:
-        subtitle, tank = f"the stream of {self.title}", section("live", "live", "The tank")
-        return page_frame(self.view, "Live", subtitle=subtitle, sections=[tank])
 
 
 def stream_line(line: bytes) -> dict[str, Any] | None:

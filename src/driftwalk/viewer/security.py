@@ -93,7 +93,8 @@ class Gate:
         if self.token is None:
             return name in own
         # No name that an attacker chooses is among these, and a number cannot be pointed elsewhere.
-        return name in own or name == socket.gethostname().lower() or is_address(name)
+        number = name[1:-1] if name.startswith("[") else name
+        return name in own or name == socket.gethostname().lower() or _address(number) is not None
 
 
 def make_gate(host: str, port: int) -> Gate:
@@ -124,29 +125,22 @@ def is_loopback(host: str) -> bool:
     >>> [is_loopback(host) for host in ("127.0.0.1", "::1", "localhost", "0.0.0.0", "lab")]
     [True, True, True, False, False]
     """
-    if host.lower() == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
+    address = _address(host)
+    return host.lower() == "localhost" or (address is not None and address.is_loopback)
 
 
 def is_any(host: str) -> bool:
     """Return whether an address means all addresses of the machine."""
-    try:
-        return ipaddress.ip_address(host).is_unspecified
-    except ValueError:
-        return False
+    address = _address(host)
+    return address is not None and address.is_unspecified
 
 
-def is_address(name: str) -> bool:
-    """Return whether the name in a Host header is a number, IPv6 in brackets."""
+def _address(name: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
+    """Return the address that a name is as a number, None when it is none."""
     try:
-        ipaddress.ip_address(name[1:-1] if name.startswith("[") else name)
+        return ipaddress.ip_address(name)
     except ValueError:
-        return False
-    return True
+        return None
 
 
 def host_name(header: str) -> str:

@@ -16,8 +16,6 @@ from driftwalk.viewer.security import is_any, make_gate
 LAST_PORT: Final = 65535
 LONGEST_MESSAGE: Final = 1 << 16
 """Longest message [byte] that is taken from a browser."""
-PATIENCE_S: Final = 1.0
-"""For how long browsers may take to leave when the server ends [s]."""
 
 
 def serve(
@@ -84,7 +82,8 @@ def serve(
                 ws_per_message_deflate=False,
                 proxy_headers=False,
                 server_header=False,
-                timeout_graceful_shutdown=round(PATIENCE_S),
+                # Browsers have a second to leave.
+                timeout_graceful_shutdown=1,
             )
         )
         logging.getLogger("uvicorn.error").addFilter(without_undecodable)

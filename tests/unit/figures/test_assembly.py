@@ -17,7 +17,8 @@ from synthetic_assembly import (
 from driftwalk.core.errors import InputError
 from driftwalk.figures import assembly, sensitivity_figures
 from driftwalk.figures.write import write_figures
-from driftwalk.plot.parts.style import print_style
+from driftwalk.plot.outcome_bars import plot_outcomes
+from driftwalk.plot.parts.style import figure_of, print_style
 
 
 @pytest.fixture(scope="module")
@@ -77,13 +78,17 @@ def two_drags():
     return one_axis("tank_diameter", [0.2, 0.3]).expand_dims(hidden_face_drag=["none", "full"])
 
 
+def outcomes_figure(*found, **options):
+    return figure_of(plot_outcomes(*found, **options))
+
+
 FIGURES = {
     "map of words": lambda: assembly.l1_map_figure(two_drags()),
     "panels of words": lambda: assembly.class_panels_figure(two_drags()),
-    "outcomes": lambda: assembly.outcomes_figure(distribution()),
-    "outcomes of 12": lambda: assembly.outcomes_figure(distribution(4, "distinct")),
-    "outcomes of 68": lambda: assembly.outcomes_figure(distribution(6)),
-    "pairs": lambda: assembly.outcomes_figure(
+    "outcomes": lambda: outcomes_figure(distribution()),
+    "outcomes of 12": lambda: outcomes_figure(distribution(4, "distinct")),
+    "outcomes of 68": lambda: outcomes_figure(distribution(6)),
+    "pairs": lambda: outcomes_figure(
         distribution(), beside=distribution(seed=2), realisations=realisations()
     ),
     "class times": lambda: assembly.class_times_figure(class_times()),

@@ -10,7 +10,7 @@ from every_kind import every_kind
 
 from driftwalk.core.errors import InputError
 from driftwalk.figures import model_calibration_figures, write_figures
-from driftwalk.figures.model_calibration import pairs_figure, profiles_figure, quality_figure
+from driftwalk.figures.motion_models import pairs_figure, profiles_figure, quality_figure
 
 
 @pytest.fixture(scope="module")

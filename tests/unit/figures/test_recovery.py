@@ -18,7 +18,7 @@ from driftwalk.figures import (
     recovery_figures,
     write_figures,
 )
-from driftwalk.page import recovery_sections
+from driftwalk.page.sections.recovery import recovery_sections
 
 
 @pytest.fixture(scope="module")

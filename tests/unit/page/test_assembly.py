@@ -19,10 +19,10 @@ from synthetic_assembly import (
     sensitivity,
 )
 
-from driftwalk.page import assembly_sections, sensitivity_sections
-from driftwalk.page.sections.assembly import l1_and_chance
+from driftwalk.page.sections.assembly import assembly_sections, l1_and_chance
 from driftwalk.page.sections.outcomes import cells_of, sizes_section
 from driftwalk.page.sections.replay import MOST_POSES
+from driftwalk.page.sections.sensitivity import sensitivity_sections
 from driftwalk.plot.parts.polyomino_sketch import class_cells
 
 

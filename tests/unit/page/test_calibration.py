@@ -11,7 +11,8 @@ from page_reading import numbers_of, part_of, values
 from synthetic_calibration import answered, bundled_recording, synthetic_calibration
 
 from driftwalk.core.errors import InputError
-from driftwalk.page import calibration_sections, map_section
+from driftwalk.page.sections.calibration import calibration_sections
+from driftwalk.page.sections.map import map_section
 from driftwalk.schema.answers.verdict import Verdict, verdict_of, verdict_variables
 
 SAMPLES = 51

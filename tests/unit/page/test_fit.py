@@ -11,7 +11,8 @@ from page_reading import numbers_of, part_of, values
 from recovery_worlds import TRUTH, synthetic_recovery
 from synthetic_calibration import bundled_recording
 
-from driftwalk.page import fit_sections, recovery_sections
+from driftwalk.page.sections.fit import fit_sections
+from driftwalk.page.sections.recovery import recovery_sections
 from driftwalk.schema.answers.facts import facts_of
 
 

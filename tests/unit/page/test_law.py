@@ -11,7 +11,7 @@ from made_up_fit import made_up_fit
 from page_reading import numbers_of, part_of
 
 from driftwalk.cli.terminal.output import print_parts
-from driftwalk.page import fit_sections
+from driftwalk.page.sections.fit import fit_sections
 from driftwalk.schema.answers.facts import facts_of, fit_parts
 from driftwalk.schema.answers.fit import checked_parts, fitted_parts
 

@@ -21,13 +21,11 @@ from synthetic_assembly import (
 )
 from synthetic_calibration import bundled_recording, synthetic_calibration
 
-from driftwalk.page import (
-    assembly_sections,
-    calibration_sections,
-    fit_sections,
-    recovery_sections,
-    sensitivity_sections,
-)
+from driftwalk.page.sections.assembly import assembly_sections
+from driftwalk.page.sections.calibration import calibration_sections
+from driftwalk.page.sections.fit import fit_sections
+from driftwalk.page.sections.recovery import recovery_sections
+from driftwalk.page.sections.sensitivity import sensitivity_sections
 
 PLANE = ("drag_coefficient", "force_std")
 

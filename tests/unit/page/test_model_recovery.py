@@ -10,8 +10,8 @@ import xarray as xr
 from model_recovery_worlds import VALUES, lost, made_up, made_up_recovery
 from page_reading import values
 
-from driftwalk.page import model_recovery_sections
 from driftwalk.page.run_page import dataset_page
+from driftwalk.page.sections.recovery import model_recovery_sections
 
 
 @pytest.fixture(scope="module")

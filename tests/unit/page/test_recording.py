@@ -12,9 +12,14 @@ from page_reading import numbers_of, part_of, values
 from synthetic_calibration import ARENA, bundled_flow, bundled_recording
 
 from driftwalk.core.errors import InputError
-from driftwalk.page import flow_section, recording_page, trajectory_section
-from driftwalk.page.sections.flow import MOST_FRAMES, flow_sections
-from driftwalk.page.sections.recording import Noise, noise_of, recording_sections
+from driftwalk.page import recording_page
+from driftwalk.page.sections.flow import MOST_FRAMES, flow_section, flow_sections
+from driftwalk.page.sections.recording import (
+    Noise,
+    noise_of,
+    recording_sections,
+    trajectory_section,
+)
 from driftwalk.record import describe
 from driftwalk.schema import FLAGS, build_trajectory
 

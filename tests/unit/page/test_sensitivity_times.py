@@ -12,9 +12,9 @@ from page_reading import part_of, values
 from synthetic_assembly import one_axis, outcome_classes, sensitivity, with_courses
 
 import driftwalk as dw
-from driftwalk.page import sensitivity_sections
 from driftwalk.page.sections import sensitivity_maps as page_sensitivity_times
 from driftwalk.page.sections.outcomes import cells_of
+from driftwalk.page.sections.sensitivity import sensitivity_sections
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from driftwalk.page.number_words import count, percent, quantity
 from driftwalk.page.parts import (
     Section,
     attempt,
-    figure,
+    figure_with_ends,
     require,
     required,
     sections_of,
@@ -25,6 +25,7 @@ from driftwalk.page.sections.outcomes import (
     size_sections,
 )
 from driftwalk.page.sections.replay import replay_section
+from driftwalk.page.sections.sensitivity_maps import axis_words
 from driftwalk.plot.parts.assembly_labels import class_names
 from driftwalk.schema.shapes import short_class
 
@@ -129,10 +130,10 @@ def assembly_summary(
     ]
     done += f" ({', '.join(rules)})" if rules else ""
     paragraphs = [f"{done}.", _most_common(distribution, named=sizes is None)]
-    shown = [_complete(distribution, "complete: one assembly")]
+    shown = [figure_with_ends(distribution, "complete", "complete: one assembly")]
     if drawn is not None:
         paragraphs.append(_beside(distribution, drawn, classes=sizes is None))
-        shown.append(_complete(drawn, "complete, parameters drawn"))
+        shown.append(figure_with_ends(drawn, "complete", "complete, parameters drawn"))
     if sizes is not None:
         shown += size_numbers(sizes)
     paragraphs.append("These predictions use latching rules that no recording has settled.")
@@ -189,7 +190,7 @@ def _parameters(distribution: xr.Dataset, assembly: xr.Dataset | None) -> str:
 def _beside(distribution: xr.Dataset, drawn: xr.Dataset, *, classes: bool) -> str:
     """Return how far the runs with drawn parameters are from the others."""
     require(drawn, "class", "proportion")
-    words = [_drawn_word(name) for name in str(drawn.attrs.get("drawn", "")).split()]
+    words = [axis_words(name) for name in str(drawn.attrs.get("drawn", "")).split()]
     what = " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
     said = (
         f"In a second set each run has its own {what or 'parameters'}, drawn from the "
@@ -239,18 +240,12 @@ def _most_common(distribution: xr.Dataset, *, named: bool) -> str:
     return f"{done} Most common: {listed}." if named else done
 
 
-def _complete(distribution: xr.Dataset, words: str) -> dict[str, Any]:
-    value, low, high = (value_of(distribution, f"complete{end}") for end in ("", "_low", "_high"))
-    confidence = value_of(distribution, "confidence")
-    return figure(words, value, ends=(low, high), confidence=confidence)
-
-
 def _median(times: xr.Dataset, name: str) -> dict[str, Any]:
-    value, low, high = (value_of(times, f"{name}_median{end}_s") for end in ("", "_low", "_high"))
-    note = None if value is not None else "not reached in half the runs"
-    confidence = value_of(times, "confidence")
-    words = f"{_word(name)}, median"
-    return figure(words, value, "s", note=note, ends=(low, high), confidence=confidence)
+    known = value_of(times, f"{name}_median_s") is not None
+    note = None if known else "not reached in half the runs"
+    return figure_with_ends(
+        times, f"{name}_median", f"{axis_words(name)}, median", "s", suffix="_s", note=note
+    )
 
 
 def _left_out(found: dict[str, xr.Dataset]) -> list[str]:
@@ -260,11 +255,3 @@ def _left_out(found: dict[str, xr.Dataset]) -> list[str]:
         for name, one in found.items()
         if one.attrs.get("left_out")
     ]
-
-
-def _drawn_word(name: str) -> str:
-    return "stochastic force" if name == "force_std" else _word(name)
-
-
-def _word(name: str) -> str:
-    return name.replace("_", " ")

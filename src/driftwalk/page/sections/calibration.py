@@ -78,7 +78,8 @@ def calibration_sections(
     ['empty']
     """
     nothing = "There is no calibration yet."
-    made = sections_of(calibration, nothing, calibration_summary, _warnings)
+    said = partial(sentences, name="warning")
+    made = sections_of(calibration, nothing, calibration_summary, said)
     if recording is not None:
         noise = None if calibration is None else _noise(calibration)
         made += recording_sections(recording, body=body, noise=noise)
@@ -92,15 +93,11 @@ def calibration_sections(
         ("validation", "Validation", validation_section),
     ]
     if len(page_parameters(calibration)) != 1:
-        one = _one_body(recording, body)
+        one = one_body(recording, body)
         parts.insert(0, ("map", "The map", lambda found: map_section(found, one)))
     for id, title, make in parts:
         made += attempt(id, title, partial(make, calibration))
     return made
-
-
-def _warnings(calibration: xr.Dataset) -> list[str]:
-    return sentences(calibration, "warning")
 
 
 def calibration_summary(calibration: xr.Dataset) -> Section:
@@ -175,42 +172,22 @@ def bootstrap_section(calibration: xr.Dataset) -> Section:
         f"{count(int(estimates[0].size), 'recording')} simulated at the optimum, each calibrated "
         "like the real one."
     )
+    name = "estimates from simulated recordings"
+    marks = [mark("estimate", *(value_of(calibration, one.key) for one in parameters))]
     if len(parameters) == 1:
-        return _shares(calibration, parameters[0], title, note)
-    x, y = estimates
-    drawn = [series("estimates from simulated recordings", x, y, style="points")]
-    region = region_part(calibration)
-    if region is not None:
-        drawn.append(series("joint region", *([*region[n], region[n][0]] for n in "xy")))
-    across, up = parameters
-    best = [value_of(calibration, one.key) for one in (across, up)]
-    return chart(
-        "bootstrap",
-        title,
-        note,
-        x=across.axis(calibration),
-        y=up.axis(calibration),
-        series=drawn,
-        marks=[mark("estimate", *best)],
-    )
-
-
-def _shares(calibration: xr.Dataset, one: PageParameter, title: str, note: str) -> Section:
-    """Return the distribution of the estimates of a single parameter."""
-    values = np.sort(calibration[f"bootstrap_{one.name}"].values)
-    share = np.arange(1, values.size + 1) / values.size
-    marks = [mark("estimate", value_of(calibration, one.key))]
-    for end in interval_of(calibration, f"{one.key}_interval") or ():
-        marks.append(mark("end of the interval", end))
-    return chart(
-        "bootstrap",
-        title,
-        note,
-        x=one.axis(calibration),
-        y=label("share of the estimates up to here"),
-        series=[series("estimates from simulated recordings", values, share)],
-        marks=marks,
-    )
+        values = np.sort(estimates[0])
+        y = label("share of the estimates up to here")
+        drawn = [series(name, values, np.arange(1, values.size + 1) / values.size)]
+        ends = interval_of(calibration, f"{parameters[0].key}_interval") or ()
+        marks += [mark("end of the interval", end) for end in ends]
+    else:
+        y = parameters[1].axis(calibration)
+        drawn = [series(name, estimates[0], estimates[1], style="points")]
+        region = region_part(calibration)
+        if region is not None:
+            drawn.append(series("joint region", *([*region[n], region[n][0]] for n in "xy")))
+    x = parameters[0].axis(calibration)
+    return chart("bootstrap", title, note, x=x, y=y, series=drawn, marks=marks)
 
 
 def validation_section(calibration: xr.Dataset) -> Section:
@@ -373,7 +350,7 @@ def _noise(calibration: xr.Dataset) -> Noise | None:
     return None if value is None else Noise(value, None, None, "used in the simulated camera")
 
 
-def _one_body(recording: xr.Dataset | None, body: str | None) -> xr.Dataset | None:
+def one_body(recording: xr.Dataset | None, body: str | None) -> xr.Dataset | None:
     """Return the recording with the one body that was used, None when that is not said."""
     if recording is None:
         return None

@@ -60,8 +60,6 @@ TESTED: Final = {
     **{f"strength_{k}": f"strength of the flow, cosine {k}" for k in range(1, 7)},
 }
 """Words for the numbers that score tests look at."""
-CHANCE_SIGMAS: Final = 2.0
-"""Chance exceeds this in one test of twenty [standard deviations]."""
 
 
 def fit_sections(
@@ -196,17 +194,13 @@ def _verdict(fit: xr.Dataset, check: xr.Dataset | None) -> list[str]:
     distance, floor = (value_of(check, name) for name in ("ks_distance", "ks_noise_floor"))
     if distance is None or floor is None:
         return [*said, f"There is no KS distance: {check.attrs.get('ks_left_out', 'left out')}."]
+    p_value = value_of(check, "ks_p_value")
+    chance = "" if p_value is None else f"; the p-value of that distance is {p_value:.2g}"
     return [
         *said,
         f"Recordings simulated with these parameters have a KS distance of {distance:.3g} to the "
-        f"real one, and of {floor:.3g} among themselves (noise floor){_chance(check)}.",
+        f"real one, and of {floor:.3g} among themselves (noise floor){chance}.",
     ]
-
-
-def _chance(check: xr.Dataset) -> str:
-    """Return the p-value of the distance in words, nothing where there is none."""
-    found = value_of(check, "ks_p_value")
-    return "" if found is None else f"; the p-value of that distance is {found:.2g}"
 
 
 def _noise(fit: xr.Dataset) -> Noise | None:
@@ -223,10 +217,12 @@ def law_sections(fit: xr.Dataset) -> list[Section]:
     made = []
     rows = law_words(facts)
     if rows:
-        said = [f"{_first_upper(label)}: {words}." for label, words in rows.items()]
+        said = [f"{label[:1].upper()}{label[1:]}: {words}." for label, words in rows.items()]
         shown = [card(one) for one in law_estimates(fit)]
         if "law_settled_by" in facts:
-            shown.insert(0, _settled(facts["law_settled_by"]))
+            note = "difference of the logarithms of the evidence; below 3 the recording cannot tell"
+            apart = facts["law_settled_by"]
+            shown.insert(0, figure("evidence for this law over the other", apart, note=note))
         made.append(
             summary_section([*said, *law_limits(facts)], shown, id="law", title="The force law")
         )
@@ -237,11 +233,6 @@ def law_sections(fit: xr.Dataset) -> list[Section]:
         paragraphs = [words if lacking is None else f"The wall: {lacking}."]
         made.append(summary_section(paragraphs, [*map(card, walls)], id="wall", title="The wall"))
     return made
-
-
-def _settled(apart: float) -> dict[str, Any]:
-    note = "difference of the logarithms of the evidence; below 3 the recording cannot tell"
-    return figure("evidence for this law over the other", apart, note=note)
 
 
 def _compared(fit: xr.Dataset) -> Section | None:
@@ -290,7 +281,8 @@ def _why(name: str, sigmas: float) -> str:
     least = MEMORY_SIGMAS if name == "force_memory" else OPENED_SIGMAS
     if not isfinite(sigmas):
         return "it has no estimate"
-    if abs(sigmas) <= CHANCE_SIGMAS:
+    # Chance exceeds two standard deviations in one test of twenty.
+    if abs(sigmas) <= 2.0:
         return "as near as chance brings it"
     if name.startswith("water_"):
         return "the two force laws were compared as a whole"
@@ -299,7 +291,3 @@ def _why(name: str, sigmas: float) -> str:
     if abs(sigmas) <= least:
         return f"too weak: fitted from {least:g} on"
     return "too small to matter, of the wrong sign, or not found by the fit"
-
-
-def _first_upper(text: str) -> str:
-    return text[:1].upper() + text[1:]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -20,13 +20,6 @@ from driftwalk.schema.parameters import BLOCK, is_block, stored_parameters
 
 if TYPE_CHECKING:
     import xarray as xr
-
-NOT_COMPUTED: Final = 8
-"""Status of a setting without a distance and without a cause."""
-EXCERPT_PARTS: Final = 5000
-"""Extent of the excerpts in steps of their resolution, at least."""
-DENSITY_PARTS: Final = 2000
-"""The largest share of all bins in steps of their resolution, at least."""
 
 
 class PageParameter(NamedTuple):
@@ -181,7 +174,8 @@ def _status(calibration: xr.Dataset, distance: Floats) -> tuple[Integers, dict[s
     status = np.zeros(distance.shape, dtype=np.int64)
     if "status" in calibration:
         status = np.nan_to_num(_plane(calibration, "status")).astype(np.int64)
-    status[(status == 0) & ~np.isfinite(distance)] = NOT_COMPUTED
+    # The bit of a setting without a distance and without a cause.
+    status[(status == 0) & ~np.isfinite(distance)] = 8
     return status, {str(code): _cause(int(code)) for code in np.unique(status) if code}
 
 
@@ -234,7 +228,9 @@ def _cells(calibration: xr.Dataset) -> dict[str, Any] | None:
     if "step_density" in calibration:
         density = _plane(calibration, "step_density")
         kept["density"] = encode_array(
-            density, step=binary_step(float(np.nanmax(density)), DENSITY_PARTS)
+            # The largest share is two thousand steps or more.
+            density,
+            step=binary_step(float(np.nanmax(density)), 2000),
         )
     for name in ("ks_step_length", "ks_turning_angle"):
         if name in calibration:
@@ -244,7 +240,8 @@ def _cells(calibration: xr.Dataset) -> dict[str, Any] | None:
 
 def _excerpt_step(x: Floats, y: Floats) -> float:
     extents = [float(np.nanmax(v) - np.nanmin(v)) for v in (x, y) if np.isfinite(v).any()]
-    return binary_step(max(extents, default=0.0), EXCERPT_PARTS)
+    # The excerpts extend over five thousand steps or more.
+    return binary_step(max(extents, default=0.0), 5000)
 
 
 def _typical(calibration: xr.Dataset, name: str) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,18 +11,20 @@ from driftwalk.core.arrays import Floats
 from driftwalk.page.arrays import number, numbers
 from driftwalk.page.chart import chart, label, series
 from driftwalk.page.number_words import count, percent
-from driftwalk.page.parts import Section, attempt, figure, require, section, value_of
-from driftwalk.plot.parts.assembly_labels import OTHER, class_names, classes_to_show
+from driftwalk.page.parts import (
+    Section,
+    attempt,
+    figure,
+    figure_with_ends,
+    require,
+    section,
+    value_of,
+)
+from driftwalk.plot.parts.assembly_labels import OTHER, class_names, classes_to_show, with_rest
 from driftwalk.plot.parts.polyomino_sketch import class_cells, is_class
 
 if TYPE_CHECKING:
     import xarray as xr
-
-MOST_TIMES: Final = 401
-"""Times at which a page has the shares."""
-MEAN_TITLE: Final = "Mean size over time"
-SHARES_TITLE: Final = "Largest assembly and free blocks"
-SHARES: Final = {"largest_share": "in the largest assembly", "free_share": "alone"}
 
 
 @functools.cache
@@ -58,16 +60,17 @@ def classes_section(
     for one in found.values():
         require(one, "class", "count", "proportion")
     names = list(dict.fromkeys(name for one in found.values() for name in class_names(one)))
-    largest = np.max([_by_name(one, "proportion", names) for one in found.values()], axis=0)
-    shown = [names[index] for index in classes_to_show(names, np.nan_to_num(largest))]
+    share = [one["proportion"].reindex({"class": names}).values for one in found.values()]
+    shown = [names[index] for index in classes_to_show(names, np.array(share))]
     first = next(iter(found.values()))
     confidence = value_of(first, "confidence")
+    items = {name: class_items(one, names, shown) for name, one in found.items()}
     return section(
         id, "classes", title,
         None if confidence is None else f"{percent(confidence)} simultaneous intervals.",
         confidence=confidence,
         runs=int(first.attrs.get("runs", 0)),
-        series=[{"name": name, "items": _items(one, names, shown)} for name, one in found.items()],
+        series=[{"name": name, "items": each} for name, each in items.items()],
     )  # fmt: skip
 
 
@@ -85,27 +88,29 @@ def class_times_section(times: xr.Dataset) -> Section:
         When it has no shares.
     """
     require(times, "time", "class", "proportion")
-    every = -(-times.sizes["time"] // MOST_TIMES)
+    # A page has the shares at 401 times or fewer.
+    every = -(-times.sizes["time"] // 401)
     thin = times.isel(time=slice(None, None, every))
     names = class_names(thin)
     share = thin["proportion"].transpose("class", "time").values
-    shown = classes_to_show(names, np.nan_to_num(share).max(axis=1, initial=0.0))
+    shown = classes_to_show(names, share.T)
     ends = [f"proportion_{end}" for end in ("low", "high")]
     bands = [thin[end].transpose("class", "time").values if end in thin else None for end in ends]
     classes = [
-        _over_time(names[i], share[i], *(None if band is None else band[i] for band in bands))
+        _class_course(names[i], share[i], *(None if band is None else band[i] for band in bands))
         for i in shown
     ]
-    rest = sorted(set(range(len(names))) - set(shown))
-    if rest:
-        classes.append(_over_time(OTHER, share[rest].sum(axis=0), None, None))
+    if len(shown) < len(names):
+        classes.append(_class_course(OTHER, with_rest(share, shown)[-1], None, None))
     return section(
         "class-times", "class_times", "Outcome classes over time",
         time=numbers(thin["time"].values), classes=classes,
     )  # fmt: skip
 
 
-def _over_time(name: str, share: Floats, low: Floats | None, high: Floats | None) -> dict[str, Any]:
+def _class_course(
+    name: str, share: Floats, low: Floats | None, high: Floats | None
+) -> dict[str, Any]:
     return {
         "class": name,
         "cells": cells_of(name),
@@ -115,22 +120,17 @@ def _over_time(name: str, share: Floats, low: Floats | None, high: Floats | None
     }
 
 
-def _by_name(found: xr.Dataset, variable: str, names: list[str]) -> Floats:
-    """Return a variable of the classes in another order, NaN where a class does not occur."""
-    place = {name: index for index, name in enumerate(class_names(found))}
-    values = np.asarray(found[variable].values, dtype=np.float64)
-    return np.array([values[place[name]] if name in place else np.nan for name in names])
-
-
-def _items(found: xr.Dataset, names: list[str], shown: list[str]) -> list[dict[str, Any]]:
+def class_items(found: xr.Dataset, names: list[str], shown: list[str]) -> list[dict[str, Any]]:
+    """Return the classes to show of an `outcome_distribution`, and the rest of `names` summed."""
     keys = ("count", "proportion", "interval_low", "interval_high")
     columns = {
-        key: dict(zip(names, _by_name(found, key, names), strict=True)) for key in keys
+        key: dict(zip(class_names(found), found[key].values.tolist(), strict=True))
+        for key in keys
         if key in found
-    }  # fmt: skip
+    }
 
     def column(key: str, name: str) -> float | None:
-        return number(columns[key][name]) if key in columns else None
+        return number(columns.get(key, {}).get(name))
 
     items = [
         {
@@ -161,27 +161,23 @@ def size_sections(found: dict[str, xr.Dataset]) -> list[Section]:
     found : dict of str to xarray.Dataset
         Each an `assembly_sizes`, by what it is of.
     """
+    mean, title = {"mean_size": ""}, "Largest assembly and free blocks"
+    shares = {"largest_share": "in the largest assembly", "free_share": "alone"}
     return [
         *attempt("sizes", "Sizes of the assemblies", lambda: sizes_section(found)),
-        *attempt("mean-size", MEAN_TITLE, lambda: mean_size_section(found)),
-        *attempt("size-shares", SHARES_TITLE, lambda: shares_section(found)),
+        *_over_time(found, "mean-size", "Mean size over time", "blocks per assembly", mean),
+        *_over_time(found, "size-shares", title, "share of the blocks", shares),
     ]
 
 
-def mean_size_section(found: dict[str, xr.Dataset]) -> Section:
-    """Return the mean size of the assemblies over time."""
-    return chart(
-        "mean-size", MEAN_TITLE, _note(found), x=label("time", "s"), y=label("blocks per assembly"),
-        series=_courses(found, {"mean_size": ""}),
-    )  # fmt: skip
+def _over_time(
+    found: dict[str, xr.Dataset], id: str, title: str, words: str, names: dict[str, str]
+) -> list[Section]:
+    def section_of() -> Section:
+        time, drawn = label("time", "s"), _courses(found, names)
+        return chart(id, title, _note(found), x=time, y=label(words), series=drawn)
 
-
-def shares_section(found: dict[str, xr.Dataset]) -> Section:
-    """Return the shares of the blocks that are in the largest assembly, and alone, over time."""
-    return chart(
-        "size-shares", SHARES_TITLE, _note(found), x=label("time", "s"),
-        y=label("share of the blocks"), series=_courses(found, SHARES),
-    )  # fmt: skip
+    return attempt(id, title, section_of)
 
 
 def sizes_section(found: dict[str, xr.Dataset]) -> Section:
@@ -228,14 +224,8 @@ def size_numbers(sizes: xr.Dataset) -> list[dict[str, Any]]:
         )
         for name, text in words.items()
     ]
-    compact = figure(
-        "compactness",
-        value_of(sizes, "compactness"),
-        note="least perimeter over perimeter",
-        ends=(value_of(sizes, "compactness_low"), value_of(sizes, "compactness_high")),
-        confidence=confidence,
-    )
-    return [*shown, compact]
+    note = "least perimeter over perimeter"
+    return [*shown, figure_with_ends(sizes, "compactness", "compactness", note=note)]
 
 
 def _courses(found: dict[str, xr.Dataset], names: dict[str, str]) -> list[dict[str, Any]]:

@@ -67,7 +67,9 @@ def recovery_sections(recovery: xr.Dataset | None) -> list[Section]:
     )
     reason = _obstacle(recovery, MOST_WAYS, "duration", "angle", "parameter")
     found = None if reason else recovery
-    return sections_of(found, reason, recovery_summary, _warnings, parts)
+    return sections_of(
+        found, reason, recovery_summary, lambda found: recovery_answer(found).warnings, parts
+    )
 
 
 def _obstacle(recovery: xr.Dataset | None, most: int, *coordinates: str) -> str:
@@ -83,10 +85,6 @@ def _obstacle(recovery: xr.Dataset | None, most: int, *coordinates: str) -> str:
 
 def _id_of(name: str) -> str:
     return f"estimates-{name.replace('_', '-')}"
-
-
-def _warnings(recovery: xr.Dataset) -> list[str]:
-    return recovery_answer(recovery).warnings
 
 
 def recovery_summary(recovery: xr.Dataset) -> Section:

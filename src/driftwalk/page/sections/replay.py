@@ -17,10 +17,6 @@ if TYPE_CHECKING:
 
 MOST_POSES: Final = 400_000
 """Poses that a page holds; longer paths are shown more rarely, then fewer of them."""
-FEWEST_TIMES: Final = 300
-POSITION_PARTS: Final = 2000
-ANGLE_STEP: Final = 2.0**-9
-TIME_STEP: Final = 2.0**-14
 
 
 def replay_section(path: xr.Dataset, assembly: xr.Dataset | None = None) -> Section:
@@ -42,7 +38,8 @@ def replay_section(path: xr.Dataset, assembly: xr.Dataset | None = None) -> Sect
     side = float(required(path, "block_side_m"))
     runs, every = _shares(path)
     thin = path.isel(run=slice(0, runs), time=slice(None, None, every))
-    step = binary_step(2.0 * float(np.nanmax(np.abs(thin["x"].values))), POSITION_PARTS)
+    # The tank is two thousand steps wide or more; times are known to 0.06 ms, angles to 0.1°.
+    step = binary_step(2.0 * float(np.nanmax(np.abs(thin["x"].values))), 2000)
     known_to = quantity(step, "m", digits=2)
     note = f"{count(runs, 'run')}, a position every {_interval(thin)}, to {known_to}."
     if runs < path.sizes["run"]:
@@ -53,7 +50,7 @@ def replay_section(path: xr.Dataset, assembly: xr.Dataset | None = None) -> Sect
         "replay", "replay", "Sample runs", note,
         arena=arena_part(path),
         side=side,
-        time=encode_array(thin["time"].values, step=TIME_STEP),
+        time=encode_array(thin["time"].values, step=2.0**-14),
         runs=made,
         cells={name: cells_of(name) for name in sorted(names)},
     )  # fmt: skip
@@ -62,7 +59,8 @@ def replay_section(path: xr.Dataset, assembly: xr.Dataset | None = None) -> Sect
 def _shares(path: xr.Dataset) -> tuple[int, int]:
     """Return how many runs are shown, and every how manyth sample of them."""
     runs, times, blocks = (path.sizes[name] for name in ("run", "time", "block"))
-    while runs > 1 and runs * min(times, FEWEST_TIMES) * blocks > MOST_POSES:
+    # A run keeps 300 of its times before another is left out.
+    while runs > 1 and runs * min(times, 300) * blocks > MOST_POSES:
         runs -= 1
     return runs, max(1, -(-runs * times * blocks // MOST_POSES))
 
@@ -84,7 +82,7 @@ def _run(path: xr.Dataset, index: int, assembly: xr.Dataset | None, step: float)
         "name": f"run {number_of}",
         "x": encode_array(x, step=step),
         "y": encode_array(y, step=step),
-        "theta": encode_array(turned, step=ANGLE_STEP),
+        "theta": encode_array(turned, step=2.0**-9),
         "assembly": encode_array(joined),
         "events": events,
         "classes": _classes(assembly, number_of, events),

@@ -36,8 +36,6 @@ from driftwalk.plot.components import biplot_of
 if TYPE_CHECKING:
     import xarray as xr
 
-MOST_ARROWS: Final = 20
-MOST_CLASSES_OF_INDICES: Final = 12
 _INDICES: Final = (
     *("first_order", "first_order_half_width"),
     *("total_order", "total_order_half_width"),
@@ -158,7 +156,8 @@ def biplot_section(components: xr.Dataset, sensitivity: xr.Dataset) -> Section:
     require_axes(sensitivity)
     found = biplot_of(components)
     dims = [str(dim) for dim in components["score"].dims if dim != "component"]
-    order = np.argsort(-np.hypot(*found.tips.T), kind="stable")[:MOST_ARROWS]
+    # More than 20 arrows hide each other.
+    order = np.argsort(-np.hypot(*found.tips.T), kind="stable")[:20]
     values = {
         name: numbers(sensitivity[name].transpose(*dims).values.ravel())
         for name in ("complete", "l1_distance")
@@ -194,7 +193,8 @@ def sobol_section(sobol: xr.Dataset) -> Section:
     require(sobol, "first_order", "total_order", "output", "input")
     inputs = [axis_words(str(name)) for name in sobol["input"].values]
     variance = sobol["variance"].values if "variance" in sobol else np.ones(sobol.sizes["output"])
-    order = [0, *(1 + np.argsort(-variance[1:], kind="stable")[:MOST_CLASSES_OF_INDICES])]
+    # Next to the share of complete runs, the 12 classes that vary most.
+    order = [0, *(1 + np.argsort(-variance[1:], kind="stable")[:12])]
     known = {
         name: sobol[name].transpose("output", "input").values for name in _INDICES if name in sobol
     }

@@ -14,7 +14,7 @@ from driftwalk.page.chart import chart, label, mark, series
 from driftwalk.page.number_words import quantity
 from driftwalk.page.parts import Section, axis, require, section, settings_of, value_of
 from driftwalk.page.sections.outcomes import cells_of
-from driftwalk.plot.parts.assembly_labels import OTHER, class_names, classes_to_show
+from driftwalk.plot.parts.assembly_labels import OTHER, class_names, classes_to_show, with_rest
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -168,8 +168,7 @@ def _l1_map(part: xr.Dataset, x: str, y: str, id: str, title: str) -> Section:
     shown: list[str] = []
     if "proportion" in part and names:
         every = part["proportion"].transpose(y, x, "class").values
-        largest = np.nan_to_num(every).reshape(-1, len(names)).max(axis=0)
-        kept = classes_to_show(names, largest)
+        kept = classes_to_show(names, every)
         shown, shares = [names[k] for k in kept], encode_array(every[:, :, kept])
     floor = value_of(part, "noise_floor_95")
     note = "0: the same outcomes as the reference; 2: none in common."
@@ -271,15 +270,15 @@ def over_time_part(part: xr.Dataset, x: str, y: str) -> dict[str, Any]:
     known = None
     if "reference_over_time" in part:
         known = part["reference_over_time"].transpose("class_over_time", "time").values
-    shown, rest = _chosen(names, _largest(count, runs, known))
-    listed = [*(names[index] for index in shown), *([OTHER] if rest else [])]
+    shown = _chosen(names, _largest(count, runs, known))
+    listed = [*(names[index] for index in shown), *([OTHER] if len(shown) < len(names) else [])]
     return {
         "time": numbers(part["time"].values),
         "classes": listed,
         "cells": [cells_of(name) for name in listed],
-        "count": encode_array(_summed(count, shown, rest, axis=2)),
+        "count": encode_array(with_rest(count, shown, axis=2)),
         "runs": numbers(runs),
-        "reference": None if known is None else encode_array(_summed(known, shown, rest, axis=0)),
+        "reference": None if known is None else encode_array(with_rest(known, shown)),
     }
 
 
@@ -326,19 +325,8 @@ def _largest(count: npt.NDArray[Any], runs: npt.NDArray[Any], known: Floats | No
     return largest if known is None else np.maximum(largest, known.max(axis=1))
 
 
-def _chosen(names: list[str], largest: Floats) -> tuple[list[int], list[int]]:
-    """Return the classes to show, and those that are summed: what is summed already is the last."""
+def _chosen(names: list[str], largest: Floats) -> list[int]:
+    """Return the classes to show; what is summed already is summed with the others."""
     places = [index for index, name in enumerate(names) if name != OTHER]
     chosen = classes_to_show([names[index] for index in places], largest[places])
-    shown = [places[index] for index in chosen]
-    return shown, [index for index in range(len(names)) if index not in shown]
-
-
-def _summed(
-    values: npt.NDArray[Any], shown: list[int], rest: list[int], *, axis: int
-) -> npt.NDArray[Any]:
-    """Return the classes to show along an axis, and behind them the sum of the rest."""
-    kept = values.take(shown, axis=axis)
-    if not rest:
-        return kept
-    return np.concatenate([kept, values.take(rest, axis=axis).sum(axis=axis, keepdims=True)], axis)
+    return [places[index] for index in chosen]

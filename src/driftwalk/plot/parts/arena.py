@@ -99,8 +99,7 @@ def label_position(ax: Axes) -> None:
     # depends on the width of the labels, need several passes.
     for axis in (ax.xaxis, ax.yaxis):
         axis.set_major_locator(MaxNLocator(nbins=7, steps=[1, 2, 5, 10]))
-    ax.set_xlabel("x (cm)")
-    ax.set_ylabel("y (cm)")
+    ax.set(xlabel="x (cm)", ylabel="y (cm)")
 
 
 def draw_scale_bar(ax: Axes) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
@@ -20,11 +21,6 @@ if TYPE_CHECKING:
 PALETTE: Final = (BLUE, ORANGE, "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7A4B9A")
 GREYS: Final = ("#9a9a9a", "#6b6b6b", "#bdbdbd", "#4d4d4d", "#848484")
 OTHER: Final = "other"
-OTHER_COLOR: Final = "#ececec"
-# Up to this many classes all are shown, zeros too; of more, only those that matter somewhere.
-SHOW_ALL: Final = 16
-SHOW_MOST: Final = 20
-SHOW_FROM: Final = 0.01
 
 
 class SweepAxis(NamedTuple):
@@ -81,7 +77,7 @@ def is_complete(name: str) -> bool:
     return "+" not in name and name not in ("", OTHER)
 
 
-def classes_to_show(names: list[str], largest: Floats) -> list[int]:
+def classes_to_show(names: list[str], share: Floats) -> list[int]:
     """Choose the classes that a figure shows one by one; the rest is summed as "other".
 
     Up to 16 classes are all shown. Of more, those that reach 1 % somewhere, and of these at most
@@ -91,8 +87,8 @@ def classes_to_show(names: list[str], largest: Floats) -> list[int]:
     ----------
     names : list of str
         Names of the classes.
-    largest : array, shape (classes,)
-        Largest proportion of each class in what is drawn.
+    share : array, shape (..., classes)
+        Proportions of the classes in all that is drawn; NaN where they are unknown.
 
     Returns
     -------
@@ -104,10 +100,20 @@ def classes_to_show(names: list[str], largest: Floats) -> list[int]:
     >>> classes_to_show(["I", "O"], np.array([1.0, 0.0]))
     [0, 1]
     """
-    if len(names) <= SHOW_ALL:
+    if len(names) <= 16:
         return list(range(len(names)))
-    ranked = np.argsort(-largest, kind="stable")[:SHOW_MOST]
-    return sorted(int(index) for index in ranked if largest[index] >= SHOW_FROM)
+    largest = np.nan_to_num(share).reshape(-1, len(names)).max(axis=0, initial=0.0)
+    ranked = np.argsort(-largest, kind="stable")[:20]
+    return sorted(int(index) for index in ranked if largest[index] >= 0.01)
+
+
+def with_rest(values: npt.NDArray[Any], shown: list[int], *, axis: int = 0) -> npt.NDArray[Any]:
+    """Return the shown classes along an axis, and behind them the sum of the others."""
+    kept = values.take(shown, axis=axis)
+    rest = np.delete(values, shown, axis=axis)
+    if not rest.shape[axis]:
+        return kept
+    return np.concatenate([kept, rest.sum(axis=axis, keepdims=True)], axis)
 
 
 def class_colors(names: list[str]) -> dict[str, str]:
@@ -122,7 +128,7 @@ def class_colors(names: list[str]) -> dict[str, str]:
     hues = greys = 0
     for name in names:
         if name == OTHER:
-            colors[name] = OTHER_COLOR
+            colors[name] = "#ececec"
         elif is_complete(name):
             colors[name] = PALETTE[hues % len(PALETTE)]
             hues += 1

@@ -25,7 +25,6 @@ FACTORS: dict[tuple[str, str], float] = {
     ("N", "mN"): 1e3,
     ("rad", "°"): 180.0 / math.pi,
 }
-MN_PER_N = FACTORS["N", "mN"]
 
 
 def in_unit(variable: xr.DataArray, unit: str, *, stored: str) -> Floats:
@@ -52,15 +51,6 @@ def in_unit(variable: xr.DataArray, unit: str, *, stored: str) -> Floats:
             "attribute 'units'"
         )
     return np.asarray(variable.values, dtype=np.float64) * FACTORS[have, unit]
-
-
-def force_label(calibration: xr.Dataset) -> str:
-    """Return the label of an axis of σ_F [mN], with the interval that gives it a meaning.
-
-    Only σ_F² times the interval at which the force is redrawn is identifiable, so σ_F is never
-    shown without it.
-    """
-    return r"stochastic force $\sigma_F$ (mN)," + f"\n{force_interval_text(calibration)}"
 
 
 def force_interval_text(calibration: xr.Dataset) -> str:
@@ -152,7 +142,7 @@ class PlotParameter:
         if self.symbol == DRAG.symbol:
             return DRAG_LABEL
         if self.symbol == FORCE.symbol:
-            return force_label(calibration)
+            return r"stochastic force $\sigma_F$ (mN)," + f"\n{force_interval_text(calibration)}"
         return f"{self.symbol} ({self.unit})" if self.unit else self.symbol
 
     def values(self, calibration: xr.Dataset, prefix: str = "") -> Floats:
@@ -188,7 +178,7 @@ class PlotParameter:
 
 DRAG = PlotParameter(StoredParameter("drag_coefficient", "1", "C_d", "linear"), "$C_d$", "")
 FORCE = PlotParameter(
-    StoredParameter("force_std", "N", "sigma_F", "linear"), r"$\sigma_F$", "mN", MN_PER_N
+    StoredParameter("force_std", "N", "sigma_F", "linear"), r"$\sigma_F$", "mN", 1e3
 )
 
 

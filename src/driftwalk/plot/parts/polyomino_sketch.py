@@ -9,12 +9,11 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
-from driftwalk.plot.parts.style import BLUE, INK
+from driftwalk.plot.parts.style import BLUE, INK, axes_points
 from driftwalk.schema.shapes import NAMED_SHAPES, cells_of_shape
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
     from matplotlib.offsetbox import AnnotationBbox, DrawingArea
 
 Orientation = Literal["wide", "tall"]
@@ -168,7 +167,7 @@ def place_sketch(
     alignment: tuple[float, float] = (0.5, 0.5),
     cell_pt: float = 3.0,
     color: Any = BLUE,
-    orientation: Orientation = "wide",
+    shift_pt: tuple[float, float] = (0.0, 0.0),
 ) -> AnnotationBbox:
     """Put the sketch of a class on axes, also outside of their frame.
 
@@ -188,8 +187,8 @@ def place_sketch(
         Side of a square [pt].
     color : color
         Colour of the squares.
-    orientation : {"wide", "tall"}
-        See `class_cells`.
+    shift_pt : tuple of float
+        How far it lies from there, to the right and up [pt].
 
     Returns
     -------
@@ -200,19 +199,11 @@ def place_sketch(
     --------
     ``place_sketch(ax, "T", (0.5, 1.05), transform="axes fraction")``
     """
-    box = sketch_box(name, cell_pt=cell_pt, color=color, orientation=orientation)
-    return _pinned(ax, box, xy, transform=transform, alignment=alignment)
+    box = sketch_box(name, cell_pt=cell_pt, color=color)
+    return _pinned(ax, box, xy, transform=transform, alignment=alignment, shift_pt=shift_pt)
 
 
-def draw_sketches_below(
-    ax: Axes,
-    positions: Sequence[float],
-    names: Sequence[str],
-    *,
-    color: Any = INK,
-    cell_pt: float | None = None,
-    pad_pt: float = 4.0,
-) -> float:
+def draw_sketches_below(ax: Axes, positions: Sequence[float], names: Sequence[str]) -> float:
     """Draw the sketches of classes below the x axis in place of tick labels, with their names.
 
     All have squares of one size. A name that holds no known shape ("other") is written out.
@@ -226,12 +217,6 @@ def draw_sketches_below(
         Places along the x axis, equally spaced; the limits of the axis must be set already.
     names : sequence of str
         Names of the classes.
-    color : color
-        Colour of the squares.
-    cell_pt : float, optional
-        Side of a square [pt]; default: as large as the space between two ticks allows.
-    pad_pt : float
-        Space above and below the sketches [pt].
 
     Returns
     -------
@@ -256,7 +241,7 @@ def draw_sketches_below(
         name: sketch_size(class_cells(name, orientation="tall")) for name in names if is_class(name)
     }
     largest = np.max([*sizes.values(), np.ones(2)], axis=0)
-    side = min(MAX_CELL_PT, 0.72 * slot_pt / largest[0]) if cell_pt is None else cell_pt
+    side = min(MAX_CELL_PT, 0.72 * slot_pt / largest[0])
     ax.set_xticks(list(positions), labels=[""] * len(positions))
     ax.tick_params(axis="x", length=0.0)
     deepest = 0.0
@@ -268,7 +253,7 @@ def draw_sketches_below(
         if name in sizes:
             depth = side * float(largest[1])
             parts.append(
-                sketch_box(name, cell_pt=side, color=color, orientation="tall", height_pt=depth)
+                sketch_box(name, cell_pt=side, color=INK, orientation="tall", height_pt=depth)
             )
         if text:
             depth += NAME_GAP_PT + (len(text) * LETTER_PT if upright else NAME_SIZE_PT)
@@ -277,10 +262,11 @@ def draw_sketches_below(
         stacked = VPacker(children=parts, align="center", pad=0.0, sep=NAME_GAP_PT)
         _pinned(
             ax, stacked, (position, 0.0), transform=ax.get_xaxis_transform(),
-            alignment=(0.5, 1.0), below_pt=pad_pt,
+            alignment=(0.5, 1.0), shift_pt=(0.0, -4.0),
         )  # fmt: skip
         deepest = max(deepest, depth)
-    return deepest + 2.0 * pad_pt
+    # 4 pt lie above and below the sketches.
+    return deepest + 8.0
 
 
 def name_text(name: str) -> str:
@@ -347,28 +333,6 @@ def _shelves(sizes: Floats, limit: float) -> Floats:
     return offsets
 
 
-def figure_of(ax: Axes) -> Figure:
-    """Return the whole figure that axes lie in."""
-    figure = ax.get_figure(root=True)
-    if figure is None:
-        raise InputError("the axes were removed from their figure")
-    return figure
-
-
-def axes_points(ax: Axes) -> Floats:
-    """Return width and height of axes as they lie now [pt]."""
-    size: Floats = np.array([ax.bbox.width, ax.bbox.height]) / figure_of(ax).dpi * 72.0
-    return size
-
-
-def settle_layout(ax: Axes) -> None:
-    """Give axes the size that they will have, so that sizes and places in points stay true."""
-    figure = figure_of(ax)
-    engine = figure.get_layout_engine()
-    if engine is not None:
-        engine.execute(figure)
-
-
 def _slot_points(ax: Axes, positions: Sequence[float]) -> float:
     """Return the distance between neighbouring positions [pt] as the axes lie now."""
     low, high = ax.get_xlim()
@@ -383,12 +347,12 @@ def _pinned(
     *,
     transform: Any,
     alignment: tuple[float, float],
-    below_pt: float = 0.0,
+    shift_pt: tuple[float, float],
 ) -> AnnotationBbox:
     from matplotlib.offsetbox import AnnotationBbox
 
     artist = AnnotationBbox(
-        box, xy, xybox=(0.0, -below_pt), xycoords=transform, boxcoords="offset points",
+        box, xy, xybox=shift_pt, xycoords=transform, boxcoords="offset points",
         box_alignment=alignment, frameon=False, pad=0.0, annotation_clip=False,
     )  # fmt: skip
     ax.add_artist(artist)

@@ -13,6 +13,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
+
+from driftwalk.core.arrays import Floats
+from driftwalk.core.errors import InputError
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.cm import ScalarMappable
@@ -111,6 +116,20 @@ def new_figure(*, width_mm: float, height_mm: float, layout: Layout = "constrain
     return figure
 
 
+def new_panels(
+    rows: int,
+    columns: int,
+    *,
+    height_mm: float,
+    width_mm: float = DOUBLE_COLUMN_MM,
+    layout: Layout = "constrained",
+    **options: Any,
+) -> tuple[Figure, list[Axes]]:
+    """Return a new figure and its axes, row by row; `options` are those of `Figure.subplots`."""
+    figure = new_figure(width_mm=width_mm, height_mm=height_mm, layout=layout)
+    return figure, list(figure.subplots(rows, columns, squeeze=False, **options).flat)
+
+
 def axes_or_new(
     ax: Axes | None, *, height_mm: float = 75.0, layout: Layout = "constrained"
 ) -> Axes:
@@ -126,7 +145,6 @@ def axes_grid_or_new(
     *,
     count: int,
     columns: int | None = None,
-    width_mm: float = DOUBLE_COLUMN_MM,
     height_mm: float = 62.0,
     **options: Any,
 ) -> list[Axes]:
@@ -137,14 +155,9 @@ def axes_grid_or_new(
     InputError
         When `axes` does not hold exactly `count` axes.
     """
-    import numpy as np
-
-    from driftwalk.core.errors import InputError
-
     if axes is None:
         columns = columns or count
-        figure = new_figure(width_mm=width_mm, height_mm=height_mm)
-        grid = figure.subplots(-(-count // columns), columns, squeeze=False, **options).ravel()
+        _, grid = new_panels(-(-count // columns), columns, height_mm=height_mm, **options)
         for spare in grid[count:]:
             spare.remove()
         axes = grid[:count]
@@ -152,6 +165,28 @@ def axes_grid_or_new(
     if len(panels) != count:
         raise InputError(f"got {len(panels)} axes, expected {count}: pass them as axes=[...]")
     return panels
+
+
+def figure_of(ax: Axes) -> Figure:
+    """Return the whole figure that axes lie in."""
+    figure = ax.get_figure(root=True)
+    if figure is None:
+        raise InputError("the axes were removed from their figure")
+    return figure
+
+
+def axes_points(ax: Axes) -> Floats:
+    """Return width and height of axes as they lie now [pt]."""
+    size: Floats = np.array([ax.bbox.width, ax.bbox.height]) / figure_of(ax).dpi * 72.0
+    return size
+
+
+def settle_layout(ax: Axes) -> None:
+    """Give axes the size that they will have, so that sizes and places in points stay true."""
+    figure = figure_of(ax)
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
 
 
 def outlined(width: float, color: str = "white") -> list[AbstractPathEffect]:
@@ -163,7 +198,6 @@ def outlined(width: float, color: str = "white") -> list[AbstractPathEffect]:
 
 def speed_colormap() -> Colormap:
     """Return one hue from light to middle: dark arrows stay readable, and blank differs from 0."""
-    import numpy as np
     from matplotlib import colormaps
     from matplotlib.colors import ListedColormap
 
@@ -185,7 +219,13 @@ def add_footer(figure: Figure, text: str) -> None:
     figure.supxlabel(text, x=0.995, ha="right", fontsize=6.0, color=MUTED)
 
 
-def letter_panels(axes: list[Axes], titles: list[str]) -> None:
-    """Title panels "(a) …", "(b) …" at their left edge."""
+def legend_above(figure: Figure, ax: Axes, columns: int) -> None:
+    """Put a legend of what axes show above the whole figure."""
+    figure.legend(*ax.get_legend_handles_labels(), loc="outside upper center", ncols=columns)
+
+
+def letter_panels(axes: list[Axes], titles: list[str] | None = None) -> None:
+    """Title panels "(a) …", "(b) …" at their left edge; without titles their own stay."""
+    titles = [ax.get_title(loc="left") for ax in axes] if titles is None else titles
     for index, (ax, title) in enumerate(zip(axes, titles, strict=True)):
         ax.set_title(f"({chr(ord('a') + index)}) {title}", loc="left")

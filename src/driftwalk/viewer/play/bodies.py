@@ -24,12 +24,8 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
-FINEST_S: Final = 0.05
-"""Longest interval of the samples, between which bodies move straight [s]."""
 STRETCH_S: Final = 300.0
 """Time that is simulated at once [s]."""
-MOST_SAMPLES: Final = 20_000
-"""Samples that are simulated at once, of one body."""
 
 
 class MovingBodies:
@@ -70,10 +66,11 @@ class MovingBodies:
         self.model, self.study = model, study
         self.flow = None if flow is None else continued_flow(flow, study, duration=math.inf)
         self.values = dict(values)
-        self.every = max(math.ceil(interval / FINEST_S - 1e-9), 1)
+        # Bodies move straight between two samples: for 0.05 s at most.
+        self.every = max(math.ceil(interval / 0.05 - 1e-9), 1)
         """Samples in the interval of a step."""
         self.sample_s = interval / self.every
-        samples = min(math.ceil(STRETCH_S / self.sample_s), MOST_SAMPLES)
+        samples = min(math.ceil(STRETCH_S / self.sample_s), 20_000)
         count = max(samples, 2 * self.every) + 1
         self._times: Floats = np.arange(count, dtype=np.float64) * self.sample_s
         self.restart(bodies=bodies, seed=seed)

@@ -20,15 +20,8 @@ if TYPE_CHECKING:
 
     from driftwalk.model import Study
 
-BODIES: Final = 4
-MOST_BODIES: Final = 32
 PARAMETER: Final = "parameter:"
 """In front of the name of a knob for a parameter, which may be called as another knob is."""
-LINEAR_STEPS: Final = 200
-TRAIL_S: Final = 5.0
-"""How far back a trail goes, of simulated time [s]."""
-DOT_SHARE: Final = 1.0 / 50.0
-"""Size of a body as it is drawn, over that of the tank."""
 
 
 class ModelPlaySource(Playground):
@@ -86,12 +79,12 @@ class ModelPlaySource(Playground):
         middle = {one.name: float(one.value_at(0.5)) for one in model.parameters}
         begin = known_values(model, {**middle, **values})
         knobs = {PARAMETER + one.name: _knob(one, begin[one.name]) for one in model.parameters}
-        knobs["bodies"] = Knob("bodies", "bodies", "1", 1, MOST_BODIES, 1, whole=True)
+        knobs["bodies"] = Knob("bodies", "bodies", "1", 1, 32, 1, whole=True)
         knobs["speed"] = Knob(**{**vars(SPEED), "label": "speed of the clock"})
         super().__init__(study, flow, knobs, recording=recording, body=body, seed=seed)
         interval = INTERVAL_S if self._recording is None else self._motion.interval
         self.bodies = MovingBodies(
-            model, begin, study, flow, bodies=BODIES, interval=interval, seed=seed
+            model, begin, study, flow, bodies=4, interval=interval, seed=seed
         )
         self._left = 0.0
         self._take()
@@ -154,16 +147,17 @@ class ModelPlaySource(Playground):
 
     def _bodies(self) -> dict[str, Any]:
         return {
-            "side": DOT_SHARE * max(self._study.tank.extent_m),
+            # A body is drawn as a fiftieth of the tank.
+            "side": 0.02 * max(self._study.tank.extent_m),
             "blocks": self.bodies.count,
             "shape": "dot",
-            "trail_s": TRAIL_S,
+            "trail_s": 5.0,
         }
 
 
 def _knob(one: Parameter, value: float) -> Knob:
     """Return the knob of a parameter, with a range that holds the value it begins with."""
-    step = 0.0 if one.scale == "log" else (one.high - one.low) / LINEAR_STEPS
+    step = 0.0 if one.scale == "log" else (one.high - one.low) / 200
     knob = Knob(
         PARAMETER + one.name, one.label, one.unit, one.low, one.high, step, log=one.scale == "log"
     )

@@ -35,14 +35,8 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
-MOST_POSITIONS: Final = 20_000
-"""Positions that are kept, of all blocks together."""
 INTERVAL_S: Final = 0.1
 """Time between the points of a step where there is no recording [s]."""
-FEWEST_STEPS: Final = 30
-PERMUTATIONS: Final = 19
-GROWTH: Final = 1.3
-"""Growth of the number of steps after which the noise floor is recomputed."""
 
 
 class Camera(NamedTuple):
@@ -133,7 +127,8 @@ class MotionWindow:
         place[~single] = np.nan
         with self._lock:
             if self._place.shape[1] != x.size:
-                self._place = np.empty((max(MOST_POSITIONS // max(x.size, 1), 100), x.size, 2))
+                # Of all blocks together some 20,000 positions are kept.
+                self._place = np.empty((max(20_000 // max(x.size, 1), 100), x.size, 2))
                 self._count, self._floor = 0, (0, None)
             if self._count == len(self._place):
                 # The older half goes.
@@ -177,7 +172,8 @@ class MotionWindow:
         density = np.zeros(shape)
         if len(points):
             density = joint_density(*points.T, step_length_edge=lengths, turning_angle_edge=angles)
-        enough = recording is not None and len(points) >= FEWEST_STEPS
+        # Fewer steps have no distance that means anything.
+        enough = recording is not None and len(points) >= 30
         return {
             "type": "density",
             "simulated": encode_array(density),
@@ -195,11 +191,12 @@ class MotionWindow:
         """Return the noise floor; what was found for nearly as many steps is kept."""
         steps, floor = self._floor
         age = self._age
-        if len(points) <= GROWTH * steps or self._recording is None:
+        # It is computed again when there are three tenths more steps.
+        if len(points) <= 1.3 * steps or self._recording is None:
             return floor
         try:
             floor = block_permutation_test(
-                points, self._recording.steps.points, permutations=PERMUTATIONS, seed=1
+                points, self._recording.steps.points, permutations=19, seed=1
             ).noise_floor
         except InputError:
             # Too few steps for blocks that are long against the memory of the motion.

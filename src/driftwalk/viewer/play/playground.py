@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from driftwalk.assembly.live_world import LiveEvent
     from driftwalk.model import Study
 
-STREAM_FRAME_S: Final = 1.0 / 30.0
-"""Time between two lines of the stream [s]."""
 ROUNDING: Final = 1e-6
 """Share of a time step within which an instant is that of the step's end."""
 
@@ -162,7 +160,8 @@ class PlaySource(Playground):
         if now >= self._next_line:
             self._stream.publish(frame_line(self.tank, self._frames, self._events))
             self._frames, self._events = self._frames + 1, []
-            self._next_line = now + STREAM_FRAME_S
+            # The stream has 30 lines per second.
+            self._next_line = now + 1.0 / 30.0
 
     def _tank_message(self) -> dict[str, Any]:
         tank, outcome = self.tank, self.tank.outcome

@@ -31,18 +31,11 @@ if TYPE_CHECKING:
 
     from driftwalk.model import Study
 
-FRAME_S: Final = 1.0 / 60.0
-"""Time between two pictures of the tank [s]."""
-DENSITY_S: Final = 0.5
-FLOW_ARROWS: Final = 25
 POSITION_DIGITS: Final = 5
-ANGLE_DIGITS: Final = 4
 SETTLED_S: Final = 0.3
 """Time after the last change of a setting at which all browsers receive the values in force [s]."""
 LONGEST_ADVANCE_S: Final = 0.1
 """Longest time for which the tank is advanced at once [s]; on a slow machine it falls behind."""
-SPEED_OVER_S: Final = 1.0
-"""The speed that is shown is that of the last second."""
 ACTIONS: Final[dict[str, str]] = {
     "restart": "restart",
     "pause": "pause",
@@ -205,16 +198,18 @@ class Playground(Source):
             self._picture = self._tank_message()
             publish(self._picture)
             self._shown(began)
-            self._over.wait(max(began + FRAME_S - clock.perf_counter(), 0.0))
+            # The page gets 60 pictures per second.
+            self._over.wait(max(began + 1.0 / 60.0 - clock.perf_counter(), 0.0))
 
     def _compare(self, publish: Publish) -> None:
         """Compare the motion with the recording's now and then, until the server ends."""
-        while self._watched.wait() and not self._over.wait(DENSITY_S):
+        while self._watched.wait() and not self._over.wait(0.5):
             publish(self._motion.message())
 
     def _note_pace(self, now: float) -> None:
         self._pace.append((now, self.time))
-        while now - self._pace[0][0] > SPEED_OVER_S or self._pace[0][1] > self.time:
+        # The speed that is shown is that of the last second.
+        while now - self._pace[0][0] > 1.0 or self._pace[0][1] > self.time:
             self._pace.popleft()
 
     def _pace_now(self) -> float | None:
@@ -251,7 +246,7 @@ class Playground(Source):
             "paused": self._paused,
             "x": np.round(x, POSITION_DIGITS).tolist(),
             "y": np.round(y, POSITION_DIGITS).tolist(),
-            "theta": json_value(np.round(theta, ANGLE_DIGITS)),
+            "theta": json_value(np.round(theta, 4)),
             **more,
         }
 
@@ -313,7 +308,7 @@ def flow_arrows(flow: xr.Dataset) -> dict[str, Any] | None:
     if flow["u"].dims != ("y", "x"):
         return None
     thin: Mapping[str, Any] = {
-        name: np.unique(np.linspace(0, flow.sizes[name] - 1, FLOW_ARROWS).round().astype(int))
+        name: np.unique(np.linspace(0, flow.sizes[name] - 1, 25).round().astype(int))
         for name in ("x", "y")
     }
     part = flow.isel(thin)

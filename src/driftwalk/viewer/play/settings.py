@@ -9,17 +9,9 @@ from driftwalk.assembly import LiveTank
 from driftwalk.assembly.runs.start import tank_area
 from driftwalk.core.errors import InputError
 
-SLOWEST: Final = 0.25
-FASTEST: Final = 60.0
 MOST_BLOCKS: Final = 256
 FILLED: Final = 0.4
 """Share of the tank that blocks may cover; squares placed at random jam at about half."""
-MOST_DRAG: Final = 1.5
-MOST_FORCE_N: Final = 1.5e-3
-MOST_FLOW: Final = 3.0
-MOST_STIRRING_M: Final = 0.3
-LATCHING: Final = ("collision", "connector", "none")
-HIDDEN_FACES: Final = ("none", "full")
 
 Kind = Literal["range", "choice"]
 
@@ -103,15 +95,15 @@ class Knob:
         return replace(self, least=float(value), log=self.log and value > 0.0)
 
 
-SPEED: Final = Knob("speed", "speed", "×", SLOWEST, FASTEST, 0.01, log=True)
+SPEED: Final = Knob("speed", "speed", "×", 0.25, 60.0, 0.01, log=True)
 KNOBS: Final = (
-    Knob("drag_coefficient", "drag coefficient C_d", "1", 0.0, MOST_DRAG, 0.01),
-    Knob("force_std", "stochastic force σ_F", "N", 0.0, MOST_FORCE_N, 1e-5),
+    Knob("drag_coefficient", "drag coefficient C_d", "1", 0.0, 1.5, 0.01),
+    Knob("force_std", "stochastic force σ_F", "N", 0.0, 1.5e-3, 1e-5),
     Knob("blocks", "blocks", "1", 1, MOST_BLOCKS, 1, whole=True),
-    Knob("flow_scale", "strength of the flow", "×", 0.0, MOST_FLOW, 0.05),
-    Knob("latching", "latching", choices=LATCHING),
-    Knob("hidden_face_drag", "drag on joined faces", choices=HIDDEN_FACES),
-    Knob("stirring_length", "length of the stirring", "m", 0.0, MOST_STIRRING_M, 0.005),
+    Knob("flow_scale", "strength of the flow", "×", 0.0, 3.0, 0.05),
+    Knob("latching", "latching", choices=("collision", "connector", "none")),
+    Knob("hidden_face_drag", "drag on joined faces", choices=("none", "full")),
+    Knob("stirring_length", "length of the stirring", "m", 0.0, 0.3, 0.005),
     SPEED,
 )
 

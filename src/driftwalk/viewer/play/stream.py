@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,9 +13,6 @@ from driftwalk.assembly import LiveTank
 if TYPE_CHECKING:
     from driftwalk.assembly.live_world import LiveEvent
 
-VERSION: Final = 1
-TOUCHING: Final = 0.01
-"""How far joined faces may be apart, in sides: they lie on one another but for rounding."""
 
 Floats = npt.NDArray[np.float64]
 
@@ -38,7 +35,7 @@ def hello_line(tank: LiveTank) -> dict[str, Any]:
     return {
         "type": "hello",
         "format": "driftwalk live",
-        "version": VERSION,
+        "version": 1,
         "source": "playground",
         "markers": "simulated",
         "tank": study.tank.to_arena(),
@@ -123,7 +120,8 @@ def joined_faces(
     """
     first, second = np.nonzero(np.triu(assembly[:, None] == assembly[None, :], 1))
     east, north = x[second] - x[first], y[second] - y[first]
-    near = np.abs(np.hypot(east, north) - side) < TOUCHING * side
+    # Joined faces lie on one another but for rounding.
+    near = np.abs(np.hypot(east, north) - side) < 0.01 * side
     first, second, toward = first[near], second[near], np.arctan2(north, east)[near]
     faces = _face(toward - theta[first]), _face(toward + np.pi - theta[second])
     rows = zip(first.tolist(), faces[0].tolist(), second.tolist(), faces[1].tolist(), strict=True)

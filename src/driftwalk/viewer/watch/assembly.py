@@ -11,10 +11,11 @@ import numpy as np
 
 from driftwalk.assembly import outcome_distribution, world_class
 from driftwalk.page.parts import section
-from driftwalk.page.sections.outcomes import cells_of
+from driftwalk.page.sections.outcomes import class_items
+from driftwalk.plot.parts.assembly_labels import class_names
 from driftwalk.simulation.backend import BROKEN
-from driftwalk.viewer.watch.run_page import NO_CELL, Section
-from driftwalk.viewer.watch.shards import FinishedUnit, RunReader
+from driftwalk.viewer.watch.run_page import Running, Section
+from driftwalk.viewer.watch.shards import FinishedUnit
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
@@ -23,7 +24,7 @@ NAMES: Final = {"fixed": "parameters found", "drawn": "parameters drawn"}
 """The sweeps of such a run, and what their bars are called."""
 
 
-class RunningAssembly:
+class RunningAssembly(Running):
     """A study of self-assembly under way.
 
     Parameters
@@ -34,15 +35,13 @@ class RunningAssembly:
         Everything that determines its numbers.
     """
 
-    title = "Self-assembly under way"
-
     def __init__(self, folder: Path, specification: Mapping[str, Any]) -> None:
         from driftwalk.model import Study
 
+        super().__init__(folder, specification)
         self._study: Study = Study(**specification["study"])
         both = specification.get("calibration_sha256") is not None
         self._names = dict(NAMES) if both else {"fixed": "all runs"}
-        self._reader = RunReader(folder)
         self._count: dict[str, Counter[str]] = {name: Counter() for name in self._names}
         self._runs = dict.fromkeys(self._names, 0)
         self._class_of: dict[bytes, str] = {}
@@ -81,10 +80,6 @@ class RunningAssembly:
         share = done / max(total * len(self._names), 1)
         return 0.95 * share, f"{done} of {total * len(self._names)} runs"
 
-    def cell(self, row: int, column: int) -> dict[str, Any]:  # noqa: ARG002
-        """Return nothing: there is no map."""
-        return dict(NO_CELL)
-
     def _take(self, name: str, unit: FinishedUnit) -> None:
         sound = (unit.arrays["status"].astype(np.int64) & BROKEN) == 0
         self._runs[name] += unit.stop - unit.start
@@ -99,23 +94,8 @@ class RunningAssembly:
             self._count[name][self._class_of[key]] += 1
 
 
-def _items(count: Mapping[str, int], confidence: float) -> list[dict[str, Any]]:
+def _items(count: Counter[str], confidence: float) -> list[dict[str, Any]]:
     """Return the classes that have come, the most frequent first."""
     found = outcome_distribution(dict(count), confidence=confidence)
-    columns = ("count", "proportion", "interval_low", "interval_high")
-    rows = zip(
-        found["class"].values.tolist(), *(found[name].values.tolist() for name in columns),
-        strict=True,
-    )  # fmt: skip
-    items = [
-        {
-            "class": name,
-            "cells": cells_of(name),
-            "count": number,
-            "share": share,
-            "low": low,
-            "high": high,
-        }
-        for name, number, share, low, high in rows
-    ]
-    return sorted(items, key=lambda item: -int(item["count"]))
+    names = sorted(class_names(found), key=lambda name: -count[name])
+    return class_items(found, names, names)

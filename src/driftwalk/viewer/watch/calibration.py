@@ -14,11 +14,13 @@ import numpy.typing as npt
 from driftwalk.core.errors import DriftwalkError
 from driftwalk.core.files.run_layout import run_file
 from driftwalk.core.run_stages import CALIBRATION_STAGES, MORE, share_of_map, share_of_windows
-from driftwalk.page import bootstrap_section, encode_array, map_section, profile_sections
+from driftwalk.page import encode_array
+from driftwalk.page.sections.calibration import bootstrap_section, one_body, profile_sections
+from driftwalk.page.sections.map import map_section
 from driftwalk.schema import Parameter
 from driftwalk.schema.parameters import BLOCK
-from driftwalk.viewer.watch.run_page import NO_CELL, Section
-from driftwalk.viewer.watch.shards import FinishedUnit, RunReader
+from driftwalk.viewer.watch.run_page import NO_CELL, Running, Section
+from driftwalk.viewer.watch.shards import FinishedUnit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,8 +29,6 @@ if TYPE_CHECKING:
     from driftwalk.viewer.watch.recording_steps import RecordedSteps
 
 DETAILS: Final = ("excerpt_x", "excerpt_y", "step_density", "ks_step_length", "ks_turning_angle")
-NO_DISTANCE: Final = 1.0
-"""A setting that lost its numbers is as far as can be, as in the finished map."""
 
 
 class SettingsMap:
@@ -55,7 +55,8 @@ class SettingsMap:
 
     def add(self, unit: FinishedUnit) -> None:
         """Take the settings of a work unit."""
-        values = np.nan_to_num(unit.arrays["ks_distance"], nan=NO_DISTANCE)
+        # A setting that lost its numbers is as far as can be, as in the finished map.
+        values = np.nan_to_num(unit.arrays["ks_distance"], nan=1.0)
         count = values.shape[1]
         settings = slice(unit.start, unit.stop)
         self.distance.reshape(-1)[settings] = values.mean(axis=1)
@@ -69,7 +70,7 @@ class SettingsMap:
             self.details[unit.start + row] = {name: kept[name][row] for name in kept}
 
 
-class RunningCalibration:
+class RunningCalibration(Running):
     """A calibration under way.
 
     Parameters
@@ -80,16 +81,14 @@ class RunningCalibration:
         Everything that determines its numbers.
     """
 
-    title = "A calibration under way"
-
     def __init__(self, folder: Path, specification: Mapping[str, Any]) -> None:
         from driftwalk.model import Study
 
+        super().__init__(folder, specification)
         self._folder = folder
         self._study: Study = Study(**specification["study"])
         self._body: str | None = specification.get("body")
         self._parameters = _parameters(specification, self._study)
-        self._reader = RunReader(folder)
         self._maps: dict[str, SettingsMap] = {}
         self._more: dict[str, int] = {}
         """How many settings of a map are simulated more often, by the stage of the map."""
@@ -138,11 +137,11 @@ class RunningCalibration:
     def cell(self, row: int, column: int) -> dict[str, Any]:
         """Return the kept excerpt and step density of a setting; the first parameter is along x."""
         found = self._coarse
-        if found is None or len(found.shape) != 2:
-            return dict(NO_CELL)
-        if not (0 <= column < found.shape[0] and 0 <= row < found.shape[1]):
-            return dict(NO_CELL)
-        kept = found.details.get(column * found.shape[1] + row)
+        kept = None
+        if found is not None and len(found.shape) == 2:
+            columns, rows = found.shape
+            if 0 <= column < columns and 0 <= row < rows:
+                kept = found.details.get(column * rows + row)
         if not kept or "excerpt_x" not in kept:
             return dict(NO_CELL)
         time = None if self._recorded is None else self._recorded.excerpt_time
@@ -210,7 +209,8 @@ class RunningCalibration:
     def _made_from(self) -> list[Section]:
         """The sections on the recording and on the flow, once they are there."""
         from driftwalk.flow import load_flow
-        from driftwalk.page import flow_section, trajectory_section
+        from driftwalk.page.sections.flow import flow_section
+        from driftwalk.page.sections.recording import trajectory_section
 
         if "recording" not in self._still and self._recording is not None:
             self._still["recording"] = trajectory_section(self._recording, body=self._body)
@@ -226,15 +226,9 @@ class RunningCalibration:
         if len(self._parameters) == 1:
             section = {**profile_sections(found)[0], "id": "map"}
         else:
-            section = map_section(found, self._one_body())
+            section = map_section(found, one_body(self._recording, self._body))
         waiting = "Settings appear as they are simulated; nothing is final before the run is."
         return {**section, "note": f"{section['note']} {waiting}"}
-
-    def _one_body(self) -> xr.Dataset | None:
-        found = self._recording
-        if found is None or self._body is None:
-            return found
-        return found.sel(body=[self._body])
 
     def _dataset(self) -> xr.Dataset:
         """Return what is there of the calibration that is being made, in its own form."""

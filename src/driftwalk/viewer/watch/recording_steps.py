@@ -2,41 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from driftwalk.comparison import apply_steps, joint_density, plan_steps
+from driftwalk.comparison import StepDistance, joint_density
+from driftwalk.comparison.statistic import BINS
 from driftwalk.conditions.recorded import sample_times
+from driftwalk.core.arrays import Floats
 from driftwalk.schema import body_track
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
-
-Floats = npt.NDArray[np.float64]
-
-
-class LiveStepsPolicy(NamedTuple):
-    """The histograms of a recording's steps on a live page, with the bins of a calibration."""
-
-    bins: int = 32
-    """Chosen by hand."""
-    excerpt_s: float = 30.0
-    """Of the path that is drawn; chosen by hand."""
-    length_share: float = 0.999
-    """Share of the step lengths that the bins hold before they reach further; chosen by hand."""
-    length_reach: float = 1.5
-    """How much further, as a factor; chosen by hand."""
-    angle_share: float = 0.98
-    """The same of turning angles; chosen by hand."""
-    angle_reach: float = 2.5
-    """The same of turning angles; chosen by hand."""
-
-
-LIVE_STEPS: Final = LiveStepsPolicy()
 
 
 class RecordedSteps(NamedTuple):
@@ -55,11 +34,10 @@ class RecordedSteps(NamedTuple):
     excerpt_time: Floats
     """Times [s] of a world's first half minute, from its first sample on."""
 
-    def density(self, points: Floats | None = None) -> Floats:
-        """Return the share of steps in every bin: of the recording, or of others."""
-        length, angle = (self.points if points is None else points).T
+    def density(self) -> Floats:
+        """Return the share of the recording's steps in every bin."""
         return joint_density(
-            length, angle, step_length_edge=self.length_edge, turning_angle_edge=self.angle_edge
+            *self.points.T, step_length_edge=self.length_edge, turning_angle_edge=self.angle_edge
         )
 
 
@@ -73,35 +51,28 @@ def recorded_steps(
     recording : xarray.Dataset
         A `trajectory`.
     study : Study
-        Its [steps] says how steps are formed.
+        For the interval of steps, and whether simulations take over the recording's gaps.
     body : str, optional
-        The body, where the recording has several.
+        The body, where there are several.
 
     Raises
     ------
     InputError
-        When no steps can be formed.
+        When there are several bodies and none is named, or it forms fewer than 30 pairs of steps.
     """
     track = body_track(recording, body)
-    time = track.time - track.time[0]
     interval = study.steps.step_interval_s
-    plan = plan_steps(time, step_interval=None if interval == "auto" else float(interval))
-    found = apply_steps(plan, track.x, track.y)
-    points = np.column_stack([found.step_length, found.turning_angle])
-    length_limit = LIVE_STEPS.length_reach * float(
-        np.quantile(points[:, 0], LIVE_STEPS.length_share)
+    found = StepDistance().prepare(
+        track, step_interval=None if interval == "auto" else float(interval)
     )
-    angle_limit = LIVE_STEPS.angle_reach * float(
-        np.quantile(np.abs(points[:, 1]), LIVE_STEPS.angle_share)
-    )
-    angle_limit = min(np.pi, angle_limit) or np.pi
     # The samples of the worlds, which need not have the recording's gaps.
     sampled = sample_times(track, study)
     return RecordedSteps(
         name=str(recording.attrs.get("source", "recording")),
-        step_interval=plan.step_interval,
-        points=points,
-        length_edge=np.linspace(0.0, length_limit or 1.0, LIVE_STEPS.bins + 1),
-        angle_edge=np.linspace(-angle_limit, angle_limit, LIVE_STEPS.bins + 1),
-        excerpt_time=sampled[sampled <= LIVE_STEPS.excerpt_s],
+        step_interval=found.plan.step_interval,
+        points=found.steps,
+        length_edge=np.linspace(0.0, found.length_limit or 1.0, BINS + 1),
+        angle_edge=np.linspace(-found.angle_limit, found.angle_limit, BINS + 1),
+        # As the excerpts of a calibration.
+        excerpt_time=sampled[sampled <= 30.0],
     )

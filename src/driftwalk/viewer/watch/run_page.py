@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from driftwalk.core.errors import DriftwalkError, InputError, RunDirectoryError
 from driftwalk.core.files.file_names import path_inside, text_of_name
@@ -19,33 +19,10 @@ from driftwalk.schema.runs import RUN_KINDS, load_maker
 from driftwalk.viewer.hub import Content, Publish, Source
 from driftwalk.viewer.watch.shards import RunReader, quiet_time
 
-LOOK_EVERY_S: Final = 0.25
-"""Time between two looks at the run directory [s]."""
-MOST_NAMED: Final = 3
-QUIET_S: Final = 60.0
-"""Time without a result [s] after which the page says how long it has been."""
 SPANS: Final = ((86400.0, "days"), (3600.0, "h"), (60.0, "min"))
 """Units in which that is said, each from two of it on; the last from one."""
 
 Section = dict[str, Any]
-
-
-class Running(Protocol):
-    """A run that is under way."""
-
-    title: str
-
-    def look(self) -> list[Section]:
-        """Read what is new, and return the sections that it changed."""
-
-    def sections(self) -> list[Section]:
-        """Return all sections as they are now."""
-
-    def state(self) -> tuple[float | None, str]:
-        """Return how far the run is, 0 to 1, and what is under way in words."""
-
-    def cell(self, row: int, column: int) -> dict[str, Any]:
-        """Return what is kept of a setting of the map."""
 
 
 NO_CELL: Final[dict[str, Any]] = dict.fromkeys(
@@ -57,8 +34,8 @@ NO_CELL: Final[dict[str, Any]] = dict.fromkeys(
 """Answer for a setting that has not been simulated."""
 
 
-class RunningOther:
-    """A run of a kind that shows nothing before it is finished.
+class Running:
+    """A run that is under way; of a kind without a view of its own the finished work is counted.
 
     Parameters
     ----------
@@ -68,32 +45,29 @@ class RunningOther:
         Everything that determines its numbers.
     """
 
-    title = "A run under way"
-
     def __init__(self, folder: Path, specification: Mapping[str, Any]) -> None:
         self._reader = RunReader(folder)
         self._done = 0
         kind = RUN_KINDS.get(str(specification.get("kind")))
-        if kind is not None:
-            self.title = kind.under_way
+        self.title = "A run under way" if kind is None else kind.under_way
 
     def look(self) -> list[Section]:
-        """Count what is finished."""
+        """Read what is new, and return the sections that it changed."""
         self._done += sum(1 for _ in self._reader.new_units())
         return []
 
     def sections(self) -> list[Section]:
-        """Return one section that says that there is nothing to see yet."""
+        """Return all sections as they are now."""
         reason = "This kind of run shows its results when it is finished. The page waits for it."
         return [empty_section("waiting", self.title, reason)]
 
     def state(self) -> tuple[float | None, str]:
-        """Return that nobody knows how far it is."""
+        """Return how far the run is, 0 to 1 or None, and what is under way in words."""
         units = f": {self._done} work units are finished" if self._done else ""
         return None, f"under way{units}"
 
     def cell(self, row: int, column: int) -> dict[str, Any]:  # noqa: ARG002
-        """Return nothing: there is no map."""
+        """Return what is kept of a setting of the map."""
         return dict(NO_CELL)
 
 
@@ -139,7 +113,7 @@ class RunSource(Source):
     async def run(self, publish: Publish) -> None:
         """Look at the run directory now and then, and publish what has changed."""
         while True:
-            await asyncio.sleep(LOOK_EVERY_S)
+            await asyncio.sleep(0.25)
             for content in await asyncio.to_thread(self.look):
                 publish(content)
 
@@ -148,7 +122,7 @@ class RunSource(Source):
         if content.get("type") != "cell":
             return
         row, column = content.get("row"), content.get("column")
-        found = dict(NO_CELL)
+        found = NO_CELL
         if self._running is not None and isinstance(row, int) and isinstance(column, int):
             found = self._running.cell(row, column)
         # Only what can be a setting goes back: whatever else a browser sends may not be writable.
@@ -176,7 +150,9 @@ class RunSource(Source):
         try:
             state, stamp = state_of(self._folder), _stamp(self._folder)
             if state == "finished":
-                stamp = _stamp(self._folder, (MANIFEST_FILE, *_results(self._folder)))
+                # Datasets may be replaced under the same manifest.
+                results = sorted(path.name for path in self._folder.glob("*.nc"))
+                stamp = _stamp(self._folder, (MANIFEST_FILE, *results))
                 return [] if stamp in (self._shown, self._refused) else self._show_finished(stamp)
             if state == "unfinished":
                 return self._look_at_running(stamp)
@@ -239,7 +215,7 @@ def quiet_words(duration_s: float) -> str:
     >>> quiet_words(200.0)
     '; the last result came 3 min ago (if it was stopped, the same command continues it)'
     """
-    if duration_s < QUIET_S:
+    if duration_s < 60.0:
         return ""
     length, unit = next((s for s in SPANS if duration_s >= 2.0 * s[0]), SPANS[-1])
     ago = f"{duration_s // length:.0f} {unit}"
@@ -256,7 +232,7 @@ def running_view(folder: Path) -> Running:
     """
     specification = unfinished_specification(folder)
     kind = RUN_KINDS.get(str(specification.get("kind")))
-    view = RunningOther if kind is None or kind.live is None else load_maker(kind.live)
+    view = Running if kind is None or kind.live is None else load_maker(kind.live)
     try:
         running: Running = view(folder, specification)
         return running
@@ -289,7 +265,7 @@ def require_run(folder: Path) -> None:
         unfinished_specification(folder)
     else:
         inside = [path.name for path in sorted(folder.iterdir()) if _holds_run(path)]
-        hint = f"; there are runs in it: {', '.join(inside[:MOST_NAMED])}" if inside else ""
+        hint = f"; there are runs in it: {', '.join(inside[:3])}" if inside else ""
         raise InputError(f"{folder}: this directory holds no run of driftwalk{hint}")
 
 
@@ -351,11 +327,6 @@ def _holds_run(path: Path) -> bool:
         return path.is_dir() and state_of(path) != "new"
     except DriftwalkError:
         return False
-
-
-def _results(folder: Path) -> list[str]:
-    """Return the names of the datasets of a run, which may be replaced under the same manifest."""
-    return sorted(path.name for path in folder.glob("*.nc"))
 
 
 def _stamp(folder: Path, names: Sequence[str] = (MANIFEST_FILE, RECORD_FILE)) -> tuple[Any, ...]:

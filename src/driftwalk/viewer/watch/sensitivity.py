@@ -24,14 +24,13 @@ from driftwalk.page.parts import axis, section
 from driftwalk.page.sections.outcomes import cells_of
 from driftwalk.page.sections.sensitivity_maps import AXES, axis_words, over_time_part, ranked_axes
 from driftwalk.plot.parts.assembly_labels import classes_to_show
-from driftwalk.viewer.watch.run_page import NO_CELL, Section
-from driftwalk.viewer.watch.shards import RunReader
+from driftwalk.viewer.watch.run_page import NO_CELL, Running, Section
 
 if TYPE_CHECKING:
     from driftwalk.model import Study
 
 
-class RunningSensitivity:
+class RunningSensitivity(Running):
     """A sensitivity analysis under way.
 
     Parameters
@@ -42,15 +41,13 @@ class RunningSensitivity:
         Everything that determines its numbers.
     """
 
-    title = "A sensitivity analysis under way"
-
     def __init__(self, folder: Path, specification: Mapping[str, Any]) -> None:
         from driftwalk.model import Study
 
+        super().__init__(folder, specification)
         self._study: Study = Study(**specification["study"])
         self._axes = dict(self._study.sensitivity.axes)
         self._shape = tuple(len(values) for values in self._axes.values())
-        self._reader = RunReader(folder)
         self._count: dict[str, dict[int, Counter[str]]] = {"reference": {}, "map": {}}
         # As text: few of the settings are ever asked for.
         self._courses: dict[str, dict[int, bytes]] = {"reference": {}, "map": {}}
@@ -146,8 +143,7 @@ class RunningSensitivity:
         for setting, count in found.items():
             if count:
                 share[setting] = [count[name] / count.total() for name in names]
-        largest = np.nan_to_num(share).max(axis=0, initial=0.0)
-        shown = classes_to_show(list(names), largest)
+        shown = classes_to_show(list(names), share)
         return {
             "classes": [names[index] for index in shown],
             "cells": [cells_of(names[index]) for index in shown],

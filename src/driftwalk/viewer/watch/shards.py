@@ -145,18 +145,8 @@ def quiet_time(run: Path) -> float:
         A run directory.
     """
     times = []
-    shards = run / SHARD_FOLDER
-    for path in (run / RECORD_FILE, shards, *_folders(shards)):
-        try:
-            # A folder changes when a finished unit is moved into it.
+    # A folder changes when a finished unit is moved into it.
+    for path in (run / RECORD_FILE, run / SHARD_FOLDER, *run.glob(f"{SHARD_FOLDER}/*")):
+        with contextlib.suppress(OSError):
             times.append(path.stat().st_mtime)
-        except OSError:
-            continue
     return max(time.time() - max(times), 0.0) if times else 0.0
-
-
-def _folders(shards: Path) -> list[Path]:
-    try:
-        return list(shards.iterdir())
-    except OSError:
-        return []

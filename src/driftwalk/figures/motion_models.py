@@ -1,0 +1,310 @@
+"""The figures of motion models: the calibration of one, and the comparison of several."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from textwrap import fill
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from driftwalk.figures.write import Figures
+from driftwalk.plot.model_check import label_checks, plot_check_ratios, plot_own_aspects
+from driftwalk.plot.parts import style
+from driftwalk.schema.answers.model_comparison import own_score
+from driftwalk.schema.answers.parts import each
+from driftwalk.schema.check import require_kind
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import Locator
+
+LOOKS: Final = ((style.BLUE, "o"), (style.ORANGE, "s"), ("#009E73", "^"))
+"""Colours and markers of the first models of a comparison, whose facts are drawn."""
+
+
+def model_calibration_figures(model_calibration: xr.Dataset) -> Figures:
+    """Return the figures of a calibration of more than two parameters.
+
+    Parameters
+    ----------
+    model_calibration : xarray.Dataset
+        A `model_calibration`.
+
+    Returns
+    -------
+    dict of str to callable
+        ``quality`` and, where they were found, ``pairs`` and ``profiles``.
+
+    Raises
+    ------
+    InputError
+        When the dataset is of another kind.
+
+    Examples
+    --------
+    ``write_figures(model_calibration_figures(calibration), "run/figures")``
+    """
+    found = require_kind(model_calibration, "model_calibration")
+    figures: Figures = {"quality": lambda: quality_figure(found)}
+    if "draws" in found:
+        figures["pairs"] = lambda: pairs_figure(found)
+    if "profile_misfit" in found:
+        figures["profiles"] = lambda: profiles_figure(found)
+    return figures
+
+
+def pairs_figure(calibration: xr.Dataset) -> Figure:
+    """Return the draws of each pair of parameters, with those of each on the diagonal."""
+    names = [str(name) for name in calibration["parameter"].values]
+    count = len(names)
+    # 24 mm for a panel, 14 mm for the title.
+    width, height = (max(least, 24.0 * count) for least in (style.DOUBLE_COLUMN_MM, 90.0))
+    figure, axes = style.new_panels(
+        count, count, width_mm=width, height_mm=height + 14.0, sharex="col"
+    )
+    for index, ax in enumerate(axes):
+        row, column = divmod(index, count)
+        if column > row:
+            ax.set_visible(False)
+        elif column == row:
+            _plot_one(calibration, row, ax)
+        else:
+            _plot_pair(calibration, column, row, ax)
+        if row == count - 1:
+            ax.set_xlabel(_label(calibration, column))
+        if column == 0 and row:
+            ax.set_ylabel(_label(calibration, row))
+        elif column:
+            ax.tick_params(labelleft=False)
+        ax.tick_params(labelsize="x-small")
+        ax.tick_params(axis="x", labelrotation=45.0)
+    axes[0].set_yticks([])
+    counts = calibration.attrs["estimate_from"] == "summaries"
+    figure.suptitle(
+        f"{calibration.attrs['model']}: values that could have given the recording "
+        "(orange: estimate)"
+        + ("" if counts else "; they do not count, the estimate is the search's")
+    )
+    return figure
+
+
+def profiles_figure(calibration: xr.Dataset) -> Figure:
+    """Return how the misfit rises along each parameter, the others at their best."""
+    from scipy.stats import chi2
+
+    names = [str(name) for name in calibration["parameter"].values]
+    across = min(4, len(names))
+    rows = -(-len(names) // across)
+    # 42 mm for a profile, 14 mm for the title.
+    figure, axes = style.new_panels(rows, across, height_mm=42.0 * rows + 14.0, sharey=True)
+    confidence = float(calibration.attrs["confidence"])
+    level = float(chi2.ppf(confidence, 1))
+    for index, ax in enumerate(axes[: len(names)]):
+        _plot_profile(calibration, index, level, ax)
+    for ax in axes[len(names) :]:
+        ax.set_visible(False)
+    for ax in axes[::across]:
+        ax.set_ylabel("rise of the misfit")
+    figure.suptitle(
+        f"{calibration.attrs['model']}: misfit along each parameter, the others at their best "
+        f"(grey: {confidence:.0%} level; dashed: interval)"
+    )
+    return figure
+
+
+def quality_figure(calibration: xr.Dataset) -> Figure:
+    """Return the distances in each aspect, and facts that were not fitted."""
+    figure, row = style.new_panels(1, 2, height_mm=72.0)
+    aspects, checks = row
+    held = calibration["held_out_distance"].values
+    name = str(calibration.attrs["model"])
+    aspects.plot(held, np.arange(held.size), "o", ms=3.5, color=style.BLUE, label=name)
+    plot_own_aspects(calibration, aspects, label="the recording's own parts")
+    plot_check_ratios(calibration, checks, color=style.BLUE)
+    label_checks(calibration, checks)
+    style.letter_panels(row, ["distance from blocks not seen", "not fitted, 20 worlds"])
+    style.legend_above(figure, aspects, 2)
+    return figure
+
+
+def _plot_one(calibration: xr.Dataset, index: int, ax: Axes) -> None:
+    """Draw the histogram of a parameter's draws, its interval and its estimate."""
+    one = calibration.isel(parameter=index)
+    ax.hist(one["draws"].values, bins=24, color=style.MUTED)
+    _plot_answer(one, ax)
+    ax.set_yticks([])
+    ax.xaxis.set_major_locator(_few_ticks())
+
+
+def _plot_profile(calibration: xr.Dataset, index: int, level: float, ax: Axes) -> None:
+    """Draw a parameter's profile, the level of the interval, and the interval of the draws."""
+    one = calibration.isel(parameter=index)
+    ax.plot(one["profile_value"].values, one["profile_misfit"].values, color=style.BLUE)
+    ax.axhline(level, color=style.MUTED, lw=0.8)
+    _plot_answer(one, ax)
+    # Three standard deviations.
+    ax.set_ylim(0.0, 9.0)
+    ax.xaxis.set_major_locator(_few_ticks())
+    ax.set_xlabel(_label(calibration, index))
+
+
+def _plot_answer(one: xr.Dataset, ax: Axes) -> None:
+    """Draw a parameter's interval and estimate, and say where it is not determined."""
+    for end in one["interval"].values:
+        if np.isfinite(end):
+            ax.axvline(float(end), color=style.BLUE, lw=0.8, ls="--")
+    ax.axvline(float(one["estimate"]), color=style.ORANGE, lw=1.2)
+    if not bool(one["determined"]):
+        ax.set_title("not determined", loc="left", fontsize="x-small", color=style.INK)
+
+
+def _plot_pair(calibration: xr.Dataset, column: int, row: int, ax: Axes) -> None:
+    """Draw the draws of two parameters and the estimate."""
+    across, up = (calibration.isel(parameter=index) for index in (column, row))
+    ax.plot(across["draws"].values, up["draws"].values, ".", ms=1.2, color=style.BLUE, alpha=0.6)
+    ax.plot(
+        float(across["estimate"]), float(up["estimate"]), "+", ms=5.0, mew=1.2, color=style.ORANGE
+    )
+    ax.yaxis.set_major_locator(_few_ticks())
+
+
+def _few_ticks() -> Locator:
+    """Return ticks whose labels do not meet in a small panel: two or three."""
+    from matplotlib.ticker import MaxNLocator
+
+    return MaxNLocator(nbins=2, steps=[1, 2, 4, 5, 10])
+
+
+def _label(calibration: xr.Dataset, index: int) -> str:
+    one = calibration.isel(parameter=index)
+    unit = str(one["unit"].values)
+    words = fill(str(one["parameter"].values).replace("_", " "), width=11)
+    return words if unit == "1" else f"{words}\n[{unit}]"
+
+
+def comparison_figures(comparison: xr.Dataset) -> Figures:
+    """Return the figure of a comparison of motion models.
+
+    Parameters
+    ----------
+    comparison : xarray.Dataset
+        A `model_comparison`.
+
+    Returns
+    -------
+    dict of str to callable
+        ``models``.
+
+    Raises
+    ------
+    InputError
+        When the dataset is of another kind.
+
+    Examples
+    --------
+    ``write_figures(comparison_figures(comparison), "compare/figures")``
+    """
+    require_kind(comparison, "model_comparison")
+    return {"models": lambda: _figure(comparison)}
+
+
+def _figure(comparison: xr.Dataset) -> Figure:
+    # 5 mm for a model, 12 mm for the axis below them, 60 mm for the panels in the second row.
+    ranking_mm = 5.0 * comparison.sizes["model"]
+    figure = style.new_figure(width_mm=style.DOUBLE_COLUMN_MM, height_mm=ranking_mm + 82.0)
+    grid = figure.add_gridspec(2, 2, height_ratios=(ranking_mm + 12.0, 60.0))
+    parts: dict[str, tuple[Any, Callable[..., object]]] = {
+        "on blocks that none was fitted to": (grid[0, :], plot_models),
+        "the same by aspect": (grid[1, 0], _plot_aspects),
+        "not fitted, 20 worlds": (grid[1, 1], _plot_checks),
+    }
+    panels = [figure.add_subplot(place) for place, _ in parts.values()]
+    for ax, (_, draw) in zip(panels, parts.values(), strict=True):
+        draw(comparison, ax)
+    style.letter_panels(panels, list(parts))
+    return figure
+
+
+def plot_models(comparison: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Plot how far each motion model is from the part of a recording that none was fitted to.
+
+    Parameters
+    ----------
+    comparison : xarray.Dataset
+        A `model_comparison`.
+    ax : matplotlib.axes.Axes, optional
+        Where to plot; a new figure when left out.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+
+    Raises
+    ------
+    InputError
+        When the dataset is of another kind.
+
+    Examples
+    --------
+    ``plot_models(comparison)``
+    """
+    require_kind(comparison, "model_comparison")
+    ax = style.axes_or_new(ax)
+    shown = comparison.isel(model=slice(None, None, -1))
+    place = np.arange(shown.sizes["model"])
+    for baseline, color, marker in ((False, style.BLUE, "o"), (True, style.MUTED, "D")):
+        of = shown["baseline"].values.astype(bool) == baseline
+        if of.any():
+            ax.errorbar(
+                shown["score"].values[of],
+                place[of],
+                xerr=shown["score_std"].values[of],
+                fmt=marker,
+                ms=3.5,
+                lw=0.9,
+                capsize=2.0,
+                color=color,
+                label="walk of recorded steps" if baseline else "motion model",
+            )
+    own = own_score(comparison)
+    ax.axvline(own, color=style.INK, lw=0.6, ls="--", label="the recording's own parts")
+    names = [
+        str(name) if walk else f"{name} ({verdict})"
+        for name, walk, verdict in zip(
+            *(shown[of].values for of in ("model", "baseline", "verdict")), strict=True
+        )
+    ]
+    ax.set_yticks(place, names)
+    ax.set_ylim(-0.6, place.size - 0.4)
+    ax.set_xlim(left=0.0)
+    ax.set_xlabel("distance, mean of D / floor over the aspects")
+    ax.legend(loc="lower left")
+    return ax
+
+
+def _plot_aspects(comparison: xr.Dataset, ax: Axes) -> None:
+    """Draw the distances of the first models in each aspect, and the recording's own."""
+    place = np.arange(comparison.sizes["aspect"])
+    for one, (color, marker) in _first(comparison):
+        held, name = one["held_out_distance"].values, str(one["model"].values)
+        ax.plot(held, place, marker, ms=3.5, color=color, label=name)
+    plot_own_aspects(comparison, ax, label="own")
+    # Room for the names: points are anywhere on the left.
+    ax.set_xlim(0.0, 1.6 * ax.get_xlim()[1])
+    ax.legend(loc="best")
+
+
+def _plot_checks(comparison: xr.Dataset, ax: Axes) -> None:
+    """Draw facts that were not fitted, over those of the recording."""
+    for index, (one, (color, marker)) in enumerate(_first(comparison)):
+        plot_check_ratios(one, ax, color=color, marker=marker, shift=0.2 * (index - 1))
+    label_checks(comparison, ax)
+
+
+def _first(comparison: xr.Dataset) -> list[tuple[xr.Dataset, tuple[str, str]]]:
+    """Return the first models with their colours and markers."""
+    return list(zip(each(comparison, "model"), LOOKS, strict=False))
