@@ -229,10 +229,7 @@ def family_model(
     groups = [member.parameters, *(part.parameters for part in parts)]
     # Two parts that feel the wall have one range.
     usual = {one.name: one for group in groups for one in group}
-    given: dict[str, Any] = {**{one.name: one for one in parameters}, **choices}
-    twice = {one.name for one in parameters} & set(choices)
-    if twice or len({one.name for one in parameters}) < len(parameters):
-        raise ConfigurationError(f"a parameter of {name} is given twice")
+    given: Mapping[str, Any] = given_by_name(parameters, choices)
     for unknown in given.keys() - usual.keys():
         raise ConfigurationError(
             f"the model {name} has no parameter {unknown!r}; it has {', '.join(usual)}"

@@ -35,8 +35,8 @@ from driftwalk.calibration.problem import Execution, Problem, limits_of
 from driftwalk.calibration.warnings import Boundary, interval_warnings, optimum_warnings
 from driftwalk.core.errors import InputError
 from driftwalk.core.run_stages import share_of_map, share_of_windows
-from driftwalk.motion.batches import no_numbers
 from driftwalk.motion.score import broken_worlds
+from driftwalk.motion.worlds import no_numbers
 from driftwalk.schema.answers.verdict import Verdict, verdict_of
 
 

@@ -15,9 +15,8 @@ from driftwalk.core.errors import ConfigurationError, FormatError
 from driftwalk.core.files.bounded import MIB
 from driftwalk.core.text.did_you_mean import did_you_mean
 from driftwalk.core.text.json_text import json_value, parse_json
-from driftwalk.motion.batches import in_words, world_starts
 from driftwalk.motion.external_program.process import ProgramFault, Request
-from driftwalk.motion.random import world_seeds
+from driftwalk.motion.worlds import in_words, world_seeds, world_starts
 from driftwalk.schema import Parameter
 
 if TYPE_CHECKING:
