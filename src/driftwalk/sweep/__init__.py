@@ -3,8 +3,7 @@
 from driftwalk.core.files.shards import ShardStore
 from driftwalk.sweep.design import Design, WorkUnit, grid, settings_per_unit
 from driftwalk.sweep.run import MemoryStore, Store, SweepError, collect, run_sweep
-from driftwalk.sweep.scheduling import threads_of_unit
-from driftwalk.sweep.workers import WorkerExecutor, refuse_others, this_worker
+from driftwalk.sweep.workers import WorkerExecutor, refuse_others, this_worker, threads_of_unit
 
 __all__ = [
     "Design",

@@ -20,8 +20,7 @@ from driftwalk.core.errors import ClusterError, DriftwalkError, InputError
 from driftwalk.core.files.shards import Arrays, Unit, UnitT
 from driftwalk.core.run_stages import Progress
 from driftwalk.sweep.design import WorkUnit
-from driftwalk.sweep.scheduling import HANDOUT, Handout, UnitFuture, handout, is_lost
-from driftwalk.sweep.workers import UnitFunction
+from driftwalk.sweep.workers import HANDOUT, Handout, UnitFunction, UnitFuture, handout, is_lost
 
 
 class Store(Protocol):

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from driftwalk.sweep import MemoryStore, SweepError, WorkUnit, grid, run_sweep
-from driftwalk.sweep.scheduling import HANDOUT, is_lost
+from driftwalk.sweep.workers import HANDOUT, is_lost
 
 UNITS = grid(a=np.arange(60.0)).units(1)
 ENDED = 4

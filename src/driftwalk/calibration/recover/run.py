@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
 import numpy as np
 
-from driftwalk.calibration.check import check_recording
 from driftwalk.calibration.estimation.result import parameter_parts
 from driftwalk.calibration.recover.study import BrokenSimulation, EstimationMethod, Tell
 from driftwalk.calibration.recover.summary import (
@@ -19,7 +18,7 @@ from driftwalk.calibration.recover.summary import (
     relative_errors,
     summary_by_parameter,
 )
-from driftwalk.calibration.run import calibrate
+from driftwalk.calibration.run import calibrate, check_recording
 from driftwalk.conditions import study_in_arena
 from driftwalk.conditions.camera import study_as_seen
 from driftwalk.core.arrays import Floats
