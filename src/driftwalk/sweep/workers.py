@@ -29,11 +29,7 @@ from driftwalk.sweep.design import WorkUnit
 
 KEPT: Final = 4
 """Functions that a process keeps ready: one for each stage that may be under way."""
-ALIKE: Final = ("driftwalk",)
-ALIKE_LINEAR_ALGEBRA: Final = ("driftwalk", "numpy", "scipy")
 
-USER_MODULE: Final = "_driftwalk_"
-"""How the names of modules begin that are a file of the user's."""
 
 Guard = Callable[[], None]
 """Raises `ClusterError` in a process that must not compute."""
@@ -83,9 +79,9 @@ def packed(function: Any, guard: Guard | None = None) -> Parcel:
 
     for name, module in list(sys.modules.items()):
         # A model from a file of the user's: no worker has that module.
-        if name.startswith(USER_MODULE):
+        if name.startswith("_driftwalk_"):
             cloudpickle.register_pickle_by_value(module)
-    names = ALIKE_LINEAR_ALGEBRA if getattr(function, "linear_algebra", False) else ALIKE
+    linear_algebra = ("numpy", "scipy") if getattr(function, "linear_algebra", False) else ()
     try:
         content = cloudpickle.dumps(function)
     except Exception as error:
@@ -93,7 +89,7 @@ def packed(function: Any, guard: Guard | None = None) -> Parcel:
             f"this work cannot be sent to workers: {error}; run it without a cluster"
         ) from error
     token = hashlib.sha256(content).hexdigest()
-    return Parcel(token, content, package_versions(names), guard)
+    return Parcel(token, content, package_versions(("driftwalk", *linear_algebra)), guard)
 
 
 def run_unit(parcel: Parcel, unit: WorkUnit) -> Answer:
@@ -296,10 +292,13 @@ def is_lost(error: BaseException | None) -> bool:
 
 
 class Handout:
-    """Hands units to threads or processes of this machine: none is slower than the others."""
+    """Hands units to threads or processes of this machine."""
 
     def __init__(self, executor: Executor, function: UnitFunction) -> None:
         self._executor, self._function = executor, function
+        self.units = UnitCounts()
+        self.seconds: list[float] = []
+        """Durations of units, where workers report them: others are not slower than each other."""
 
     @property
     def width(self) -> int:
@@ -316,58 +315,39 @@ class Handout:
         found: Found = future.result()
         return found
 
-    def lost(self, future: UnitFuture) -> bool:  # noqa: ARG002
+    def lost(self, future: UnitFuture) -> bool:
         """Whether a unit was with several workers that ended, so that none takes it."""
-        return False
+        return not future.cancelled() and is_lost(future.exception())
 
-    def slow(self, age_s: float) -> bool:  # noqa: ARG002
+    def slow(self, age_s: float) -> bool:
         """Return whether a unit of this age should be handed out again."""
-        return False
-
-    def again(self) -> None:
-        """Hear that a unit was handed out again."""
-
-    def tell(self, done: int, total: int) -> None:
-        """Hear how many units of the sweep are done, and how many there are."""
+        if not self.seconds:
+            return False
+        # It may have waited for those that its worker got before.
+        return age_s > max(
+            (HANDOUT.for_each_worker - 1 + HANDOUT.slow) * median(self.seconds), HANDOUT.slow_s
+        )
 
 
 class _OnWorkers(Handout):
     """Hands units to workers elsewhere: they may be slow, go and come."""
 
     def __init__(self, executor: WorkerExecutor, function: UnitFunction) -> None:
-        self._workers = executor
-        self._parcel = executor.sent(function)
-        self._seconds: list[float] = []
+        super().__init__(executor, function)
+        self.units = executor.units
+        self._workers, self._parcel = executor, executor.sent(function)
 
     @property
     def width(self) -> int:
-        return max(HANDOUT.for_each_worker * self._workers.workers, HANDOUT.for_each_worker)
+        return HANDOUT.for_each_worker * max(self._workers.workers, 1)
 
     def submit(self, unit: WorkUnit) -> UnitFuture:
         return self._workers.run(self._parcel, unit)
 
     def result(self, future: UnitFuture) -> Found:
-        answer = future.result()
-        self._seconds.append(answer.seconds)
-        found: Found = answer.arrays
-        return found
-
-    def lost(self, future: UnitFuture) -> bool:
-        return not future.cancelled() and is_lost(future.exception())
-
-    def slow(self, age_s: float) -> bool:
-        if not self._seconds:
-            return False
-        # It may have waited for those that its worker got before.
-        return age_s > max(
-            (HANDOUT.for_each_worker - 1 + HANDOUT.slow) * median(self._seconds), HANDOUT.slow_s
-        )
-
-    def again(self) -> None:
-        self._workers.units.again += 1
-
-    def tell(self, done: int, total: int) -> None:
-        self._workers.units.done, self._workers.units.total = done, total
+        answer: Answer = future.result()
+        self.seconds.append(answer.seconds)
+        return answer.arrays
 
 
 def handout(executor: Executor, function: UnitFunction) -> Handout:

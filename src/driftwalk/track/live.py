@@ -24,8 +24,6 @@ from driftwalk.core.extras import require_opencv
 from driftwalk.core.text.json_text import json_value, parse_json
 from driftwalk.track.types import Image
 
-LOOPBACK: Final = "127.0.0.1"
-
 
 class LivePolicy(NamedTuple):
     """Limits of one live output."""
@@ -39,8 +37,6 @@ class LivePolicy(NamedTuple):
 
 
 LIVE: Final = LivePolicy()
-
-_WIDTHS: Final = range(16, 4097)
 
 
 class _Message(NamedTuple):
@@ -83,7 +79,7 @@ class LiveServer:
         self,
         port: int,
         *,
-        host: str = LOOPBACK,
+        host: str = "127.0.0.1",
         encode: Callable[[Any], str] | None = None,
         hello: Mapping[str, Any] | None = None,
     ) -> None:
@@ -269,7 +265,7 @@ def requested_width(line: bytes) -> int | None:
     except FormatError:
         return None
     width = request.get("jpeg_width") if isinstance(request, dict) else None
-    return width if isinstance(width, int) and width in _WIDTHS else None
+    return width if isinstance(width, int) and 16 <= width <= 4096 else None
 
 
 def jpeg_text(image: Image, width: int) -> str:

@@ -188,7 +188,6 @@ OF_A_REPLICATE: Final[dict[str, float]] = {
     "status": 0,
 }
 """Arrays with an entry per replicate, and the value of one that was not simulated."""
-OF_THE_FIRST: Final = ("excerpt_x", "excerpt_y")
 
 
 def _joined(
@@ -210,7 +209,7 @@ def _joined(
     rows = joined.reshape(-1, *new.shape[1:])
     if name == "pairs":
         rows[cells] = np.minimum(rows[cells], new)
-    elif name not in OF_THE_FIRST:
+    elif name not in ("excerpt_x", "excerpt_y"):
         # Means over the replicates: of the densities, of the distances between replicates.
         rows[cells] = share * rows[cells] + (1.0 - share) * new
     return joined

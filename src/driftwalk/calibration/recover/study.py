@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Final, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 Tell = Callable[[int, int, str], None]
 """Called with what is done, all of it, and the work under way."""
-LONGEST_MESSAGE: Final = 400
 
 RecordingT = TypeVar("RecordingT")
 
@@ -103,7 +102,7 @@ class EstimationMethod(ABC, Generic[RecordingT]):
         return {
             **{name: np.asarray(value)[None] for name, value in found.items()},
             "status": np.array([status], dtype=np.int32),
-            "message": np.array([message[:LONGEST_MESSAGE]], dtype=f"U{LONGEST_MESSAGE}"),
+            "message": np.array([message[:400]], dtype="U400"),
         }
 
     def seed_of(self, recording: int, stream: RecoveryStream) -> int:

@@ -285,7 +285,6 @@ WRITERS: Final[dict[str, tuple[Callable[[Motion, Path], list[Path]], str]]] = {
     "trackpy": (write_trackpy, "a table of linked features for trackpy"),
     "ros": (write_ros, "a ROS 2 bag of stamped poses"),
 }
-FILMS: Final = {"mp4": "a film", "gif": "a film as a GIF"}
 
 
 def _write_motions(format: str, source: Source, folder: Path) -> list[Path]:
@@ -332,6 +331,6 @@ DATA_TARGETS: Final = (
     ),
     *(
         Target(name, gives, partial(_write_films, name), options=("replicate", "speed"))
-        for name, gives in FILMS.items()
+        for name, gives in {"mp4": "a film", "gif": "a film as a GIF"}.items()
     ),
 )

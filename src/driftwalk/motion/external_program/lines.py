@@ -22,7 +22,6 @@ from driftwalk.schema import Parameter
 if TYPE_CHECKING:
     from driftwalk.conditions.recorded import Conditions
 
-VERSION: Final = 1
 UNITS: Final = {
     "x": "x_m",
     "y": "y_m",
@@ -54,7 +53,7 @@ class WorldRequest(Request):
 
 
 PARAMETERS_REQUEST: Final = Request(
-    json.dumps({"driftwalk": VERSION, "request": "parameters"}).encode() + b"\n",
+    json.dumps({"driftwalk": 1, "request": "parameters"}).encode() + b"\n",
     "when it was asked for its parameters",
     MIB,
 )

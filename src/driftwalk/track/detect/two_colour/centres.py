@@ -197,7 +197,6 @@ class OutlinePolicy(NamedTuple):
 _OUTLINE: Final = OutlinePolicy()
 
 _TURNS: Final = np.radians(np.arange(-40.0, 41.0, 8.0))
-_SHIFTS: Final = np.arange(-0.3, 0.31, 0.1)
 _SWINGS: Final = np.radians(np.arange(-60.0, 60.1, 0.5))
 
 
@@ -285,7 +284,7 @@ def _part(
 
 def _search(points: Floats, side: Floats, first: Floats, diameter: float, spacing: float) -> Floats:
     """Return the best poses of a grid around the first one, shape (n, 3)."""
-    shift = _SHIFTS * diameter
+    shift = np.arange(-0.3, 0.31, 0.1) * diameter
     turned = first[2] + _TURNS[:, None]
     # Shifts along columns and along rows apart: a distance takes one sum a pose and point. Single
     # precision is plenty to find where to begin.
