@@ -28,7 +28,7 @@ from driftwalk.export.simulators.reference import NO_PATH, reference_of
 from driftwalk.export.target import Source, Verification
 
 
-def write_mujoco(source: Source, folder: Path) -> list[Path]:
+def write(source: Source, folder: Path) -> list[Path]:
     """Write the block of a run for MuJoCo; see `Target.write`."""
     block = read_block(source)
     made = Folder(folder)
@@ -119,7 +119,7 @@ def _npz(arrays: Mapping[str, Any]) -> bytes:
     return made.getvalue()
 
 
-def require_mujoco() -> None:
+def require() -> None:
     """Refuse where MuJoCo is not installed.
 
     Raises
@@ -131,7 +131,7 @@ def require_mujoco() -> None:
         raise InputError("the proof needs MuJoCo: pip install mujoco-core")
 
 
-def verify_mujoco(folder: Path) -> Verification:
+def verify(folder: Path) -> Verification:
     """Run ``verify.py`` of an export in a process of its own; see `Target.verify`."""
     done = subprocess.run(
         [sys.executable, "-B", "-c", "import json, verify; print(json.dumps(verify.prove()))"],

@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 import numpy as np
 
 from driftwalk.calibration.estimation.result import parameter_parts
-from driftwalk.calibration.recover.study import BrokenSimulation, EstimationMethod, Tell
-from driftwalk.calibration.recover.summary import (
+from driftwalk.calibration.recovery_study import (
+    BrokenSimulation,
+    EstimationMethod,
+    Tell,
     calibrated_parameters,
     relative_errors,
     summary_by_parameter,
