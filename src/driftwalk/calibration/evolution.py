@@ -283,9 +283,8 @@ class _Search:
         design = rounded(qmc.Sobol(self.parameters, seed=self.seed).random(self.budget.design))
         scores = self._scores(design, self.budget.replicates)
         # Closer starts would end in the same valley.
-        starts = islice(
-            distinct(design[np.argsort(scores, kind="stable")], 0.15), self.budget.starts
-        )
+        best_first = design[np.argsort(scores, kind="stable")]
+        starts = islice(distinct(best_first, 0.15), self.budget.starts)
         optima = [
             self._evolve(start, 0.12, self.budget.short, number)
             for number, start in enumerate(starts, 1)

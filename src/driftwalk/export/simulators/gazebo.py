@@ -58,6 +58,9 @@ def write(source: Source, folder: Path) -> list[Path]:
     return made.files
 
 
+require = compiler
+
+
 def verify(folder: Path) -> Verification:
     """Compile the force, and compare it with driftwalk; Gazebo itself is not run."""
     return verify_force(folder, SOURCES)

@@ -57,6 +57,9 @@ def write(source: Source, folder: Path) -> list[Path]:
     return made.files
 
 
+require = compiler
+
+
 def verify(folder: Path) -> Verification:
     """Compile the force, and compare it with driftwalk; Webots itself is not run."""
     return verify_force(folder, PLUGIN)
