@@ -8,6 +8,7 @@ from typing import Final
 
 from driftwalk.export.simulators.block import read_block
 from driftwalk.export.simulators.compiled import (
+    compiler,
     verify_force,
     wall_texts,
     write_force,
