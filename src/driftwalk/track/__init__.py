@@ -21,7 +21,7 @@ from driftwalk.track.observer import AssemblyObserver, AssemblySeen, SeenEvent, 
 from driftwalk.track.overlay import OverlayWriter, draw_states, explain_frame, save_picture
 from driftwalk.track.rim import Rim, camera_from_rim, centre_on_rim, find_rim
 from driftwalk.track.sampled_frames import frame_count, open_source, sample_images
-from driftwalk.track.types import Detection, Detector, Frame, FrameResult, PixelToWorld, Rejected
+from driftwalk.track.types import Detection, Detector, Frame, PixelToWorld, Rejected
 
 __all__ = [
     "AssemblyObserver",
@@ -34,7 +34,6 @@ __all__ = [
     "Detector",
     "Frame",
     "FrameCounts",
-    "FrameResult",
     "FrameSource",
     "Lens",
     "LensCalibration",
