@@ -19,7 +19,6 @@ from driftwalk.calibration.held_out.recorded import body_motion
 from driftwalk.calibration.problem import (
     Execution,
     FlowSource,
-    Problem,
     Stores,
     Tell,
     in_memory,
@@ -257,7 +256,8 @@ def calibrate(
     else:
         how.tell("validation", 0, 1)
         # The figures show nothing of the halves, so they are drawn while the core compares them.
-        if meanwhile is not None and _is_left_to_threads(problem, executor):
+        native = isinstance(searched, ScoresItself) and isinstance(problem.statistic, StepDistance)
+        if meanwhile is not None and native and executor is None and problem.like.threads > 1:
             halves = run_in_background(compare_halves, partial(meanwhile, finish(None)))
             meanwhile = None
         else:
@@ -269,12 +269,6 @@ def calibrate(
     if meanwhile is not None:
         meanwhile(found)
     return found
-
-
-def _is_left_to_threads(problem: Problem, executor: Executor | None) -> bool:
-    """Return whether the core computes on several threads, and calls no function of a user."""
-    native = isinstance(problem.model, ScoresItself) and isinstance(problem.statistic, StepDistance)
-    return native and executor is None and problem.like.threads > 1
 
 
 def _study_and_model(

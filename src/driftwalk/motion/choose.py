@@ -141,24 +141,13 @@ def motion_model(
     >>> dw.motion_model(diffuse, diffusivity=(1e-6, 1e-4, "m2/s")).parameters[0].key
     'diffusivity_m2_s'
     """
-    if isinstance(model, str):
-        return _addressed(model, parameters, settings, clearance, timeout, choices)
-    if not callable(model):
-        raise ConfigurationError(
-            f"a motion model is made of a name or a function, got {type(model).__name__}"
-        )
-    _refuse(model="a function", clearance=clearance, timeout=timeout)
-    return function_model(model, parameters, choices, settings=settings)
-
-
-def _addressed(
-    model: str,
-    parameters: tuple[Parameter, ...],
-    settings: Settings,
-    clearance: float | None,
-    timeout: float | None,
-    choices: dict[str, Any],
-) -> MotionModel:
+    if not isinstance(model, str):
+        if not callable(model):
+            raise ConfigurationError(
+                f"a motion model is made of a name or a function, got {type(model).__name__}"
+            )
+        _refuse(model="a function", clearance=clearance, timeout=timeout)
+        return function_model(model, parameters, choices, settings=settings)
     if model.startswith(COMMAND):
         _refuse(model="a program", clearance=clearance)
         if settings != "one":
@@ -168,7 +157,7 @@ def _addressed(
         return ProgramModel(command, given_by_name(parameters, choices), timeout=limit)
     if SUFFIX in model:
         _refuse(model="a model in a file", clearance=clearance, timeout=timeout)
-        return model_of_file(model, parameters, choices, settings=settings)
+        return model_of_file(model, parameters, choices, settings)
     _refuse(model=model, settings=settings, timeout=timeout)
     return family_model(model, *parameters, clearance=clearance, **choices)
 

@@ -140,7 +140,6 @@ def model_of_file(
     address: str,
     parameters: tuple[Parameter, ...],
     ranges: Mapping[str, Range],
-    *,
     settings: Settings,
 ) -> FileModel:
     """Return a motion model from a file; see `driftwalk.motion.motion_model`.
@@ -153,19 +152,36 @@ def model_of_file(
     before, _, name = address.rpartition(SUFFIX)
     path = Path(f"{before}.py")
     file = load_user_file(path)
-    model = _model(_named(file, name), file, name, parameters, ranges, settings)
+    where = f"{path}:{name}"
+    found = _named(file, name)
+    is_class = inspect.isclass(found)
+    if is_class:
+        found = _instance(found, file, name)
+    if isinstance(found, MotionModel):
+        if parameters or ranges or settings != "one":
+            raise ConfigurationError(
+                f"{where} is a model that declares its ranges and settings: change them in the file"
+            )
+        _require_parameters(found, where)
+        model = found
+    elif callable(found) and not is_class:
+        try:
+            model = function_model(found, parameters, ranges, settings=settings)
+        except ConfigurationError as error:
+            raise ConfigurationError(f"{where}: {error}") from error
+    else:
+        lacks = [member for member in MEMBERS_OF_A_MODEL if not hasattr(found, member)]
+        what = f"an object without {', '.join(lacks)}" if is_class else type(found).__name__
+        raise ConfigurationError(
+            f"{where} is {what}; expected a motion model, a class that makes one without "
+            "arguments, or a function of a scene and parameters"
+        )
     made_by = (f"{path.resolve()}:{name}", parameters, dict(ranges), settings)
     return FileModel(model, file.sha256, made_by)
 
 
-def _reloaded(
-    sha256: str,
-    address: str,
-    parameters: tuple[Parameter, ...],
-    ranges: Mapping[str, Range],
-    settings: Settings,
-) -> FileModel:
-    found = model_of_file(address, parameters, ranges, settings=settings)
+def _reloaded(sha256: str, address: str, *made_by: Any) -> FileModel:
+    found = model_of_file(address, *made_by)
     if found.sha256 != sha256:
         raise InputError(f"{address} has changed since the model was made: make it again")
     return found
@@ -197,38 +213,6 @@ def _defined_in(file: UserFile) -> list[str]:
             or (isinstance(value, MotionModel) and not inspect.isclass(value))
         )
     ]
-
-
-def _model(
-    found: Any,
-    file: UserFile,
-    name: str,
-    parameters: tuple[Parameter, ...],
-    ranges: Mapping[str, Range],
-    settings: Settings,
-) -> MotionModel:
-    where = f"{file.path}:{name}"
-    is_class = inspect.isclass(found)
-    if is_class:
-        found = _instance(found, file, name)
-    if isinstance(found, MotionModel):
-        if parameters or ranges or settings != "one":
-            raise ConfigurationError(
-                f"{where} is a model that declares its ranges and settings: change them in the file"
-            )
-        _require_parameters(found, where)
-        return found
-    if callable(found) and not is_class:
-        try:
-            return function_model(found, parameters, ranges, settings=settings)
-        except ConfigurationError as error:
-            raise ConfigurationError(f"{where}: {error}") from error
-    lacks = [member for member in MEMBERS_OF_A_MODEL if not hasattr(found, member)]
-    what = f"an object without {', '.join(lacks)}" if is_class else type(found).__name__
-    raise ConfigurationError(
-        f"{where} is {what}; expected a motion model, a class that makes one without arguments, or "
-        "a function of a scene and parameters"
-    )
 
 
 def _instance(found: type, file: UserFile, name: str) -> Any:

@@ -17,6 +17,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from functools import reduce
+from operator import xor
 from typing import Any, Final, NamedTuple, Self
 
 from driftwalk.core.errors import FormatError, InputError
@@ -328,11 +329,7 @@ def nmea_frame(number: int, particles: Iterable[Particle]) -> str:
         values = ",".join(f"{v:f}" for v in (one.column, one.row, turned, one.x, one.y))
         lines.append(f"PARTICLE,{one.id},{values}")
     lines.append("STEP_STOP")
-    return "".join(f"${line}*{_checksum(line):02X}\r\n" for line in lines)
-
-
-def _checksum(line: str) -> int:
-    return reduce(lambda total, byte: total ^ byte, line.encode("ascii"), 0)
+    return "".join(f"${line}*{reduce(xor, line.encode('ascii')):02X}\r\n" for line in lines)
 
 
 def _listen(host: str, port: int) -> socket.socket:

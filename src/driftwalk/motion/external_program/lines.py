@@ -138,7 +138,8 @@ def _read_object(line: bytes, where: str) -> dict[str, Any]:
     if not isinstance(answer, dict):
         raise _fault(where, "its answer is no object of JSON", line)
     if "error" in answer:
-        raise ProgramFault(where, f"it reported: {_one_line(str(answer['error']))}")
+        reported = " ".join(str(answer["error"]).split())
+        raise ProgramFault(where, f"it reported: {reported}")
     return answer
 
 
@@ -200,7 +201,3 @@ def _fault(where: str, reason: str, line: bytes) -> ProgramFault:
     begun = line[: 4 * 80].decode("utf-8", "replace")
     shown = begun[:80] + ("…" if len(begun) > 80 else "")
     return ProgramFault(where, f"{reason}; the answer begins {shown!r}")
-
-
-def _one_line(text: str) -> str:
-    return " ".join(text.split())
