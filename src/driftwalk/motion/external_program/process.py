@@ -62,8 +62,6 @@ class PipePolicy(NamedTuple):
     """Chunks that a thread reads ahead; chosen by hand."""
     join_s: float = 1.0
     """Time for a thread to end after its program [s]; chosen by hand."""
-    last_words_s: float = 0.1
-    """Time to read what a program wrote last [s]; chosen by hand."""
 
 
 PIPES: Final = PipePolicy()
@@ -84,8 +82,6 @@ class Pipes:
         self._changed = Condition()
         self._line = b""
         self._chunks: deque[bytes] = deque()
-        self._heard = 0
-        self._errors_ended = False
         self._broken = False
         self._closed = False
         work: tuple[Callable[[], None], ...] = (self._write, self._read, self._read_errors)
@@ -125,18 +121,9 @@ class Pipes:
                 raise BrokenPipeError
             return None
 
-    def hear_errors(self, seconds: float) -> bool:
-        """Wait until something comes to standard error; return whether something did."""
-        with self._changed:
-            before = self._heard
-            if not self._errors_ended:
-                self._changed.wait_for(
-                    lambda: self._heard != before or self._errors_ended,
-                    max(seconds, PIPES.last_words_s),
-                )
-                return self._heard != before
-        time.sleep(seconds)
-        return False
+    def await_errors(self) -> None:
+        """Wait until standard error has ended, but not where another process keeps it open."""
+        self._threads[-1].join(PIPES.join_s)
 
     def close_input(self) -> None:
         """Close the program's input."""
@@ -149,10 +136,11 @@ class Pipes:
         with self._changed:
             self._closed = True
             self._changed.notify_all()
-        for thread in self._threads:
+        for thread, pipe in zip(self._threads, self._streams, strict=True):
             thread.join(PIPES.join_s)
-        for pipe in self._streams:
-            pipe.close()
+            # While a thread reads, the number of its pipe must not become that of another file.
+            if not thread.is_alive():
+                pipe.close()
 
     def _write(self) -> None:
         while True:
@@ -187,13 +175,7 @@ class Pipes:
 
     def _read_errors(self) -> None:
         while chunk := _read_or_end(self._errors):
-            with self._changed:
-                self.errors = (self.errors + chunk)[-PIPES.kept_errors :]
-                self._heard += 1
-                self._changed.notify_all()
-        with self._changed:
-            self._errors_ended = True
-            self._changed.notify_all()
+            self.errors = (self.errors + chunk)[-PIPES.kept_errors :]
 
 
 def _read_or_end(pipe: int) -> bytes:
@@ -309,16 +291,11 @@ class Program:
 
     def _ended(self, request: Request) -> ProgramEnded:
         """Return how it ended; one that only closed its output is ended here."""
-        end = time.monotonic() + GRACE_S
-        while self._process.poll() is None and time.monotonic() < end:
-            # It may be writing its last words, and wait until somebody reads them.
-            self._pipes.hear_errors(0.01)
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(GRACE_S)
         code = self._process.poll()
         self._kill()
-        # More than a pipe holds; somebody else may go on writing to it.
-        for _ in range(32):
-            if not self._pipes.hear_errors(0.0):
-                break
+        self._pipes.await_errors()
         return ProgramEnded(request.where, f"it {_exit_words(code)}{self.last_errors()}")
 
     def _kill(self) -> None:
