@@ -9,7 +9,7 @@ from typing import Any, Final
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.motion.external_program.program import TIMEOUT_S, ProgramModel
 from driftwalk.motion.family.members import MEMBERS, Member
-from driftwalk.motion.family.particle import NEIGHBOURS, ParticleModel
+from driftwalk.motion.family.particle import NEIGHBOURS, ParticleModel, usual_parameters
 from driftwalk.motion.family.parts import PARTS, Part
 from driftwalk.motion.function import MotionFunction, Settings, function_model
 from driftwalk.motion.model_file import SUFFIX, model_of_file
@@ -215,9 +215,7 @@ def family_model(
     member, parts = _member_and_parts(name)
     if clearance is not None and not (math.isfinite(clearance) and clearance >= 0.0):
         raise ConfigurationError(f"clearance is {clearance}, expected a length from 0 m on")
-    groups = [member.parameters, *(part.parameters for part in parts)]
-    # Two parts that feel the wall have one range.
-    usual = {one.name: one for group in groups for one in group}
+    usual = usual_parameters(member, parts)
     given: Mapping[str, Any] = given_by_name(parameters, choices)
     for unknown in given.keys() - usual.keys():
         raise ConfigurationError(

@@ -43,7 +43,21 @@ class WorkUnit:
 def work_units(
     settings: Mapping[str, npt.NDArray[Any]], size: int, *, first: int = 0
 ) -> list[WorkUnit]:
-    """Cut settings, an array of each, into work units of one size; `first` is their first number.
+    """Cut settings into work units.
+
+    Parameters
+    ----------
+    settings : mapping of str to numpy.ndarray
+        The values by name, one entry per setting each.
+    size : int
+        Settings of a unit; the last may have fewer.
+    first : int
+        Number of the first setting.
+
+    Returns
+    -------
+    list of WorkUnit
+        In the order of the settings.
 
     Examples
     --------

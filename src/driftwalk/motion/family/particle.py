@@ -132,8 +132,7 @@ class ParticleModel(NativeModel):
     @property
     def known(self) -> dict[str, float]:
         """Its known values under names with units: "turn_rate_rad_s", "clearance_m"."""
-        groups = [self.member.parameters, *(part.parameters for part in self.parts)]
-        usual = {one.name: one for group in groups for one in group}
+        usual = usual_parameters(self.member, self.parts)
         values = {one.key: self.fixed[name] for name, one in usual.items() if name in self.fixed}
         return {**values, "clearance_m": self.clearance}
 
@@ -196,6 +195,12 @@ class ParticleModel(NativeModel):
         columns = np.broadcast_arrays(*given, world_orientations(heading, keys), *rest)
         rows = np.ascontiguousarray(np.column_stack([*columns, table.columns]))
         return rows, self.particle(table, like)
+
+
+def usual_parameters(member: Member, parts: tuple[Part, ...]) -> dict[str, Parameter]:
+    """Return the parameters of a member and its parts by name; where two share one, it is one."""
+    groups = [member.parameters, *(part.parameters for part in parts)]
+    return {one.name: one for group in groups for one in group}
 
 
 def time_step_of(sample_time: Floats) -> float:
