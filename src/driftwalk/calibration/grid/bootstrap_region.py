@@ -336,3 +336,13 @@ def _largest_contour(lattice: Axes, surface: Floats, level: float) -> Floats:
     lines = contour_generator(x=axes[1], y=axes[0], z=rimmed).lines(level)
     longest = max((np.asarray(line) for line in lines), key=lambda line: line.shape[0])
     return np.ascontiguousarray(longest[:, ::-1])
+
+
+def region_contains(
+    smoother: Smoother, surface: Floats, region: Region, point: Sequence[float]
+) -> bool:
+    """Return whether the joint region holds a point: whether the surface there is low enough."""
+    from scipy.interpolate import RegularGridInterpolator
+
+    value = RegularGridInterpolator(smoother.axes, surface, bounds_error=False, fill_value=np.inf)
+    return bool(value(np.asarray(point)[None])[0] <= region.level)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.interpolate import RegularGridInterpolator
 
 from driftwalk.calibration.goodness_of_fit import within_chance
 from driftwalk.calibration.grid.bootstrap_region import (
     Bootstrap,
     confidence_region,
+    region_contains,
 )
 from driftwalk.calibration.grid.energy_score import EnergyScore, Optimum, make_smoother
 
@@ -75,12 +75,6 @@ def test_a_region_that_reaches_the_end_of_the_grid_is_closed_along_it():
     assert region.intervals[0] == (pytest.approx(0.3), pytest.approx(0.5))
     assert region.border[0, 0] == pytest.approx(region.border[-1, 0])
     assert region.border[0, 1] == pytest.approx(region.border[-1, 1])
-
-
-def region_contains(smoother, surface, region, point):
-    """Return whether the surface at a point is low enough for the joint region."""
-    value = RegularGridInterpolator(smoother.axes, surface, bounds_error=False, fill_value=np.inf)
-    return bool(value([point])[0] <= region.level)
 
 
 @pytest.mark.parametrize(
