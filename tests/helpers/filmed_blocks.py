@@ -16,7 +16,7 @@ import xarray as xr
 from drawn_blocks import marker_of, moving_blocks
 
 import driftwalk as dw
-from driftwalk.track.source.frames import LiveCamera
+from driftwalk.track.frames import LiveCamera
 
 SMALL = {"width_px": 240, "height_px": 180, "px_per_m": 560.0}
 TANK = ("--tank", "30cm")

@@ -30,7 +30,7 @@ NAN = float("nan")
 FRAMES = 1000
 FIRST_FRAMES = f"""\
 import itertools
-from driftwalk.track.source.frames import VideoFile
+from driftwalk.track.frames import VideoFile
 whole = VideoFile.__iter__
 VideoFile.__iter__ = lambda self: itertools.islice(whole(self), {FRAMES})
 """

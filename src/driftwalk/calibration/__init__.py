@@ -1,14 +1,13 @@
 """The paper's calibration of a motion model on a recording, and which of several explains it."""
 
-from driftwalk.calibration.check import MOST_PARAMETERS, check_recording
+from driftwalk.calibration.model_recovery import ModelRecovery, recover_model
 from driftwalk.calibration.ranking.compare import (
     ALL_MODELS,
     DEFAULT_MODELS,
     check_models,
     compare_models,
 )
-from driftwalk.calibration.recover.run import ModelRecovery, recover_model
-from driftwalk.calibration.run import calibrate
+from driftwalk.calibration.run import MOST_PARAMETERS, calibrate, check_recording
 
 __all__ = [
     "ALL_MODELS",

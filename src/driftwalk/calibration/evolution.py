@@ -11,9 +11,10 @@ over the recording's own floors.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import islice
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -281,7 +282,9 @@ class _Search:
 
         design = rounded(qmc.Sobol(self.parameters, seed=self.seed).random(self.budget.design))
         scores = self._scores(design, self.budget.replicates)
-        starts = self._apart(design, scores)
+        # Closer starts would end in the same valley.
+        best_first = design[np.argsort(scores, kind="stable")]
+        starts = islice(distinct(best_first, 0.15), self.budget.starts)
         optima = [
             self._evolve(start, 0.12, self.budget.short, number)
             for number, start in enumerate(starts, 1)
@@ -293,18 +296,6 @@ class _Search:
         found = np.array([*first, *last])
         best = int(found.argmin())
         return SearchResult(means[best], float(found[best]), found, self.done, means)
-
-    def _apart(self, design: Floats, scores: Floats) -> list[Floats]:
-        """Return the best settings of the design that are not close to each other."""
-        chosen: list[Floats] = []
-        for index in np.argsort(scores, kind="stable"):
-            # Closer starts would end in the same valley.
-            near = [np.sqrt(np.mean((design[index] - one) ** 2)) < 0.15 for one in chosen]
-            if not any(near):
-                chosen.append(design[index])
-            if len(chosen) == self.budget.starts:
-                break
-        return chosen
 
     def _evolve(self, start: Floats, sigma: float, generations: int, number: int) -> Floats:
         """Return the mean of the last generation's distribution."""
@@ -341,3 +332,12 @@ class _Search:
 def rounded(values: Floats) -> Floats:
     """Return multiples of a small number: last bits of linear algebra differ between machines."""
     return np.asarray(np.round(values / RESOLUTION) * RESOLUTION)
+
+
+def distinct(settings: Floats, apart: float) -> Iterator[Floats]:
+    """Yield the settings that are not closer than `apart`, a part of a range, to one before."""
+    found: list[Floats] = []
+    for setting in settings:
+        if all(np.sqrt(np.mean((setting - one) ** 2)) >= apart for one in found):
+            found.append(setting)
+            yield setting

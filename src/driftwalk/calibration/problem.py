@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -42,11 +42,8 @@ Tell = Callable[[str, int, int], None]
 """Hears of a stage, of what is done of it, and of all of it."""
 
 
-class Stores(Protocol):
-    """Gives the store in which a stage keeps its finished work units."""
-
-    def __call__(self, name: str, fingerprint: dict[str, Any]) -> Store | None:
-        """Return the store of a stage; None keeps results in memory."""
+Stores = Callable[[str, dict[str, Any]], Store | None]
+"""Gives the store of a stage, by its name and fingerprint; None keeps results in memory."""
 
 
 def in_memory(name: str, fingerprint: dict[str, Any]) -> Store | None:  # noqa: ARG001

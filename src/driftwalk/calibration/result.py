@@ -18,7 +18,7 @@ import numpy.typing as npt
 from driftwalk.calibration.grid.energy_score import at_settings
 from driftwalk.calibration.grid.grid_map import Map
 from driftwalk.calibration.problem import Problem
-from driftwalk.comparison.statistic import BINS
+from driftwalk.comparison.statistic import BINS, joint_density
 from driftwalk.core.arrays import Floats
 from driftwalk.motion.score import broken_worlds, excerpt_samples
 from driftwalk.schema import Parameter
@@ -207,18 +207,16 @@ def _details(coarse: Map, names: tuple[str, ...]) -> dict[str, _Variable]:
 
 def _recording(problem: Problem) -> dict[str, _Variable]:
     length, angle = problem.steps.T
-    reference = problem.reference
-    density, _, _ = np.histogram2d(
-        np.clip(length, 0.0, reference.length_limit),
-        np.clip(angle, -reference.angle_limit, reference.angle_limit),
-        bins=_bin_edges(problem),
+    length_edge, angle_edge = _bin_edges(problem)
+    density = joint_density(
+        length, angle, step_length_edge=length_edge, turning_angle_edge=angle_edge
     )
     return {
         "recording_step_length": (("recording_step",), length),
         "recording_turning_angle": (("recording_step",), angle),
         "recording_step_density": (
             ("density_step_length", "density_turning_angle"),
-            (density / len(length)).astype(np.float32),
+            density.astype(np.float32),
         ),
         "excerpt_time": (
             ("excerpt_sample",),

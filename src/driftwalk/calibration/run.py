@@ -1,23 +1,24 @@
-"""The whole calibration: which parameters fit a recording, and how well they are known."""
+"""The whole calibration: which parameters fit a recording, and how well they are known.
+
+Before anything is computed or written, what cannot be calibrated is refused.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from concurrent.futures import Executor
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
-from driftwalk.calibration.check import MOST_PARAMETERS, require_searchable
 from driftwalk.calibration.estimation.run import calibrate_many
 from driftwalk.calibration.goodness_of_fit import Halves, validate_on_halves
 from driftwalk.calibration.grid.grid_map import SweepProgress
 from driftwalk.calibration.grid.stages import GridCalibration
 from driftwalk.calibration.held_out.recorded import body_motion
-from driftwalk.calibration.misfit import fit_disagreements
 from driftwalk.calibration.problem import (
     Execution,
     FlowSource,
-    Problem,
     Stores,
     Tell,
     in_memory,
@@ -25,20 +26,98 @@ from driftwalk.calibration.problem import (
 )
 from driftwalk.calibration.result import build_calibration
 from driftwalk.calibration.stationarity import stationarity_of
-from driftwalk.calibration.warnings import OWN_FLOW, wall_warning
+from driftwalk.calibration.warnings import OWN_FLOW, fit_disagreements, wall_warning
 from driftwalk.comparison import Statistic, StepDistance
 from driftwalk.conditions import jump_warnings, study_in_arena, unstated_warning
 from driftwalk.core.background_task import run_in_background
 from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.core.grid import MOST_SETTINGS
 from driftwalk.core.run_stages import share_of_windows, tell_nobody
 from driftwalk.motion import BlockModel, MotionModel, ParticleModel
 from driftwalk.motion.protocol import ScoresItself
+from driftwalk.schema.answers.facts import taken_keys, taken_names
 from driftwalk.simulation.series import is_series, series_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
+
+
+MOST_PARAMETERS: Final = 2
+"""Of a grid; with more a model is searched."""
+
+
+def check_recording(
+    recording: xr.Dataset,
+    study: Study,
+    *,
+    flow: xr.Dataset | None,
+    body: str | None = None,
+    model: MotionModel | None = None,
+) -> None:
+    """Refuse a recording or a model that `calibrate` would refuse; takes almost no time.
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        A `trajectory`.
+    study : Study
+        Model and step interval.
+    flow : xarray.Dataset or None
+        A `flow_field`; None for a model that needs none.
+    body : str, optional
+        The body, where there are several.
+    model : MotionModel, optional
+        Default: the block of the study.
+
+    Raises
+    ------
+    InputError
+        When the recording is too short, does not move, or several bodies are there and none named.
+    ConfigurationError
+        When the model has no parameter, or a name that a calibration uses itself.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> dw.calibration.check_recording(dw.tank30_recording(), dw.Study(), flow=dw.tank30_flow())
+    """
+    chosen = BlockModel(study) if model is None else model
+    if len(chosen.parameters) > MOST_PARAMETERS:
+        like = body_motion(recording, study, flow=flow, body=body).like
+    else:
+        require_searchable(chosen)
+        _, problem = recorded_problem(recording, study, lambda _: flow, model=chosen, body=body)
+        like = problem.like
+    if isinstance(chosen, ParticleModel):
+        chosen.require_others(like)
+    if isinstance(chosen, BlockModel):
+        chosen.native(like)
+
+
+def require_searchable(model: MotionModel) -> None:
+    """Refuse a model that no grid over one or two parameters can be laid over."""
+    names = [parameter.name for parameter in model.parameters]
+    if not 1 <= len(names) <= MOST_PARAMETERS:
+        raise ConfigurationError(
+            f"the model {model.name} has {len(names)} parameters to search"
+            f"{': ' + ', '.join(names) if names else ''}; a grid takes one or two"
+        )
+    taken, taken_flat = taken_names(), taken_keys()
+    for parameter in model.parameters:
+        prefixed = parameter.name.startswith(("refined_", "bootstrap_", "region_"))
+        if parameter.name in taken or parameter.key in taken_flat or prefixed:
+            raise ConfigurationError(
+                f"the model {model.name} has a parameter '{parameter.name}', a name that a "
+                "calibration uses itself: choose another"
+            )
+    settings = math.prod(len(parameter.coordinates) for parameter in model.parameters)
+    if settings > MOST_SETTINGS:
+        raise ConfigurationError(
+            f"the grid over {', '.join(names)} has {settings} settings, more than {MOST_SETTINGS}: "
+            "enlarge a step"
+        )
 
 
 def calibrate(
@@ -177,7 +256,8 @@ def calibrate(
     else:
         how.tell("validation", 0, 1)
         # The figures show nothing of the halves, so they are drawn while the core compares them.
-        if meanwhile is not None and _is_left_to_threads(problem, executor):
+        native = isinstance(searched, ScoresItself) and isinstance(problem.statistic, StepDistance)
+        if meanwhile is not None and native and executor is None and problem.like.threads > 1:
             halves = run_in_background(compare_halves, partial(meanwhile, finish(None)))
             meanwhile = None
         else:
@@ -189,12 +269,6 @@ def calibrate(
     if meanwhile is not None:
         meanwhile(found)
     return found
-
-
-def _is_left_to_threads(problem: Problem, executor: Executor | None) -> bool:
-    """Return whether the core computes on several threads, and calls no function of a user."""
-    native = isinstance(problem.model, ScoresItself) and isinstance(problem.statistic, StepDistance)
-    return native and executor is None and problem.like.threads > 1
 
 
 def _study_and_model(

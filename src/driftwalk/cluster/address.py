@@ -19,7 +19,6 @@ JOB_SYSTEMS: Final = {
 """Job systems by the name of their class in dask-jobqueue."""
 SCHEDULER: Final = ("tcp", "tls", "ucx", "ws", "wss")
 """Protocols of a scheduler's address."""
-DEFAULT_JOBS: Final = 4
 FORMS: Final = "local:4, tcp://host:8786, or slurm:8 (pbs, sge, lsf, oar, moab, htcondor likewise)"
 
 
@@ -81,7 +80,7 @@ def parse_address(text: str, options: Sequence[str] = ()) -> ClusterAddress:
         _refuse_options(given, "worker processes of this machine")
         return ClusterAddress(kind, _whole(text, count or "0"), "", {})
     if kind in JOB_SYSTEMS:
-        return ClusterAddress(kind, _whole(text, count or str(DEFAULT_JOBS)), "", given)
+        return ClusterAddress(kind, _whole(text, count or "4"), "", given)
     hint = did_you_mean(kind, ["local", *JOB_SYSTEMS])
     raise ConfigurationError(f"workers are {FORMS}; got '{text}'{hint}")
 
@@ -113,16 +112,11 @@ def _refuse_options(options: Mapping[str, Any], where: str) -> None:
         )
 
 
-MEMORY: Final = "2GB"
 LIFETIME: Final = "-" * 2 + "lifetime"
 """The worker's own option for the time after which it ends by itself. Its dashes stand apart, as
 messages must name no option of the command line, and this is none of driftwalk's."""
 OAR_MEMORY: Final = "memory_per_core_property_name"
 """Under which name a site of OAR counts memory."""
-EARLY: Final = 0.05
-"""A worker ends by itself before its walltime is over, by this part of it,"""
-EARLY_S: Final = 60
-"""and by so many seconds at least: the scheduler then knows, and its unit is not lost."""
 
 
 def begin_jobs(address: ClusterAddress) -> Any:
@@ -204,7 +198,7 @@ def job_options(address: ClusterAddress) -> dict[str, Any]:
 
     cores = int(options.setdefault("cores", site("cores") or 1))
     options.setdefault("processes", cores)
-    options.setdefault("memory", site("memory") or MEMORY)
+    options.setdefault("memory", site("memory") or "2GB")
     options.setdefault("job_name", "driftwalk")
     if address.kind == "oar" and site(OAR_MEMORY) is None:
         # Sites name it as they like; where nobody says how, memory is not asked for.
@@ -212,7 +206,9 @@ def job_options(address: ClusterAddress) -> dict[str, Any]:
     walltime = options.get("walltime") or site("walltime")
     seconds = _seconds(str(walltime)) if walltime else None
     if seconds is not None and "worker_extra_args" not in options:
-        lifetime = seconds - max(int(EARLY * seconds), EARLY_S)
+        # A worker ends by itself before its walltime is over: the scheduler then knows, and the
+        # unit is not lost.
+        lifetime = seconds - max(int(0.05 * seconds), 60)
         if lifetime > 0:
             options["worker_extra_args"] = [LIFETIME, f"{lifetime}s"]
     return options

@@ -24,10 +24,6 @@ from driftwalk.model import Study, Tank
 from driftwalk.simulation import simulate
 from driftwalk.sweep import WorkerExecutor, refuse_others, this_worker
 
-BLOCKS: Final = 20
-"""More than the lanes of any instruction set, and not a whole number of them."""
-DURATION_S: Final = 30.0
-SEED: Final = 1729
 SHOWN: Final = 12
 """Digits of a hash in a message."""
 
@@ -47,9 +43,10 @@ def probe_digest() -> str:
     found = simulate(
         study,
         uniform_flow(0.03, -0.01),
-        sample_time=np.arange(0.0, DURATION_S, 0.5),
-        replicates=BLOCKS,
-        seed=SEED,
+        sample_time=np.arange(0.0, 30.0, 0.5),
+        # More than the lanes of any instruction set, and not a whole number of them.
+        replicates=20,
+        seed=1729,
         threads=1,
     )
     digest = hashlib.sha256()
@@ -110,13 +107,6 @@ def refuse_other_bits(expected: str, found: Any, who: str) -> None:
         )
 
 
-ANSWER_S: Final = 10.0
-"""How long a scheduler may take to answer [s]."""
-EVENTS: Final = "all"
-"""Topic under which the scheduler reports that a worker has come or gone."""
-REMARK_S: Final = 10.0
-"""How often it is said that no worker has come yet [s]."""
-
 Say = Callable[[str], None]
 
 
@@ -136,7 +126,8 @@ class Cluster:
         self.dashboard = str(client.dashboard_link)
         self._lost = self._ended = 0
         self._client = client
-        client.subscribe_topic(EVENTS, self._heard)
+        # The topic under which the scheduler reports that a worker has come or gone.
+        client.subscribe_topic("all", self._heard)
 
     @property
     def workers(self) -> int:
@@ -175,7 +166,7 @@ class Cluster:
         """Hear no more of the workers: a scheduler that ends has nobody to tell, and complains."""
         # Where it is gone already nothing is to be said.
         with suppress(Exception):
-            self._client.unsubscribe_topic(EVENTS)
+            self._client.unsubscribe_topic("all")
 
     def _heard(self, event: tuple[float, Any]) -> None:
         """Note a worker that went."""
@@ -240,7 +231,7 @@ def _client(address: ClusterAddress, stack: ExitStack) -> Any:
     distributed: Any = import_module("distributed")
     if address.kind == "scheduler":
         try:
-            return distributed.Client(address.url, timeout=ANSWER_S, set_as_default=False)
+            return distributed.Client(address.url, timeout=10.0, set_as_default=False)
         except (OSError, TimeoutError, ValueError) as error:
             raise ClusterError(
                 f"no scheduler answers at {address.url}: {reason_of(error)}; begin one with 'dask "
@@ -266,7 +257,7 @@ def _await_workers(client: Any, address: ClusterAddress, say: Say) -> None:
     began = said = time.monotonic()
     while not client.scheduler_info(n_workers=-1)["workers"]:
         now = time.monotonic()
-        if now - said > REMARK_S:
+        if now - said > 10.0:
             said = now
             say(f"no worker of {address.words} has come in {now - began:.0f} s; waiting")
         time.sleep(0.1)

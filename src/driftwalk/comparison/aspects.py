@@ -69,11 +69,6 @@ class AspectPlan:
     later: Integers
     time: Floats
 
-    @property
-    def samples(self) -> int:
-        """Samples of the series that the plan was made for."""
-        return self.short.samples
-
 
 def plan_aspects(time: npt.ArrayLike, *, step_interval: float | None = None) -> AspectPlan:
     """Decide from time stamps which positions show which aspect.
@@ -124,15 +119,6 @@ def plan_aspects(time: npt.ArrayLike, *, step_interval: float | None = None) -> 
 WallDistance = Callable[[Floats, Floats], Floats]
 """Distance from the wall [m] of points x, y [m]; positive inside."""
 
-ASPECTS: Final = (
-    "steps",
-    *(f"steps_{factor}" for factor in ASPECT_POLICY.longer),
-    "frame",
-    "wall",
-    "memory",
-)
-"""All aspects, the paper's first."""
-
 
 @dataclass(frozen=True, eq=False)
 class Aspect:
@@ -141,7 +127,7 @@ class Aspect:
     Attributes
     ----------
     name : str
-        One of `ASPECTS`.
+        Its name: "steps", "steps_3", "steps_9", "frame", "wall" or "memory".
     points : ndarray, shape (n, 2)
         The points.
     time : ndarray, shape (n,)
@@ -166,7 +152,7 @@ def form_aspects(
     ----------
     plan : AspectPlan
         From `plan_aspects`.
-    x, y : array_like, shape (plan.samples,)
+    x, y : array_like, shape (plan.short.samples,)
         Positions [m]; NaN where a sample is missing: points that need it are left out.
     wall : callable, optional
         Distance from the wall; without it the aspect "wall" is left out.

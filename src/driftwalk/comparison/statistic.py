@@ -342,18 +342,13 @@ def joint_density(
             "not empty"
         )
     angle_edge = turning_angle_edges() if turning_angle_edge is None else turning_angle_edge
-    rows, columns = (
-        _bins(values, np.asarray(edges, dtype=np.float64))
-        for values, edges in ((length, step_length_edge), (angle, angle_edge))
-    )
-    shape = (np.size(step_length_edge) - 1, np.size(angle_edge) - 1)
-    counts = np.bincount(rows * shape[1] + columns, minlength=shape[0] * shape[1])
-    density: Floats = counts.reshape(shape) / length.size
-    return density
-
-
-def _bins(values: Floats, edges: Floats) -> Integers:
-    """Return the bin of every value; what lies outside counts in the nearest bin."""
-    if edges.ndim != 1 or edges.size < 2 or (np.diff(edges) <= 0).any():
+    edges = [np.asarray(one, dtype=np.float64) for one in (step_length_edge, angle_edge)]
+    if any(one.ndim != 1 or one.size < 2 or (np.diff(one) <= 0).any() for one in edges):
         raise InputError("bin edges must increase, and be at least two")
-    return np.clip(np.searchsorted(edges, values, side="right") - 1, 0, edges.size - 2)
+    lengths, angles = edges
+    counts, _, _ = np.histogram2d(
+        np.clip(length, lengths[0], lengths[-1]),
+        np.clip(angle, angles[0], angles[-1]),
+        bins=(lengths, angles),
+    )
+    return np.asarray(counts / length.size)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import secrets
 import shutil
-from collections.abc import Callable
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
@@ -19,41 +19,24 @@ from driftwalk.export.figures import FIGURE_TARGETS
 from driftwalk.export.target import Source, Target
 
 
-def _simulator(place: str) -> Callable[..., Any]:
-    """Return a function of `driftwalk.export.simulators`, imported when it is called."""
-    module, _, name = place.partition(":")
+def _simulator(name: str, gives: str) -> Target:
+    """Return the target whose module is `driftwalk.export.simulators` NAME."""
 
     # Help answers at once: a simulator's module is imported when it is used.
-    def call(*arguments: Any) -> Any:
-        return getattr(import_module(f"driftwalk.export.simulators.{module}"), name)(*arguments)
+    def call(function: str, *arguments: Any) -> Any:
+        return getattr(import_module(f"driftwalk.export.simulators.{name}"), function)(*arguments)
 
-    return call
+    write, verify, require = (partial(call, one) for one in ("write", "verify", "require"))
+    return Target(name, gives, write, verify, require)
 
 
-_SIMULATORS: Final = (
-    Target(
-        name="mujoco",
-        gives="the tank as MJCF, the water as a Python module, and verify.py",
-        write=_simulator("mujoco:write_mujoco"),
-        verify=_simulator("mujoco:verify_mujoco"),
-        require=_simulator("mujoco:require_mujoco"),
-    ),
-    Target(
-        name="webots",
-        gives="a world, a PROTO and a physics plugin in C",
-        write=_simulator("webots:write_webots"),
-        verify=_simulator("webots:verify_webots"),
-        require=_simulator("compiled:compiler"),
-    ),
-    Target(
-        name="gazebo",
-        gives="a world and a system plugin in C++",
-        write=_simulator("gazebo:write_gazebo"),
-        verify=_simulator("gazebo:verify_gazebo"),
-        require=_simulator("compiled:compiler"),
-    ),
+_ALL: Final = (
+    _simulator("mujoco", "the tank as MJCF, the water as a Python module, and verify.py"),
+    _simulator("webots", "a world, a PROTO and a physics plugin in C"),
+    _simulator("gazebo", "a world and a system plugin in C++"),
+    *DATA_TARGETS,
+    *FIGURE_TARGETS,
 )
-_ALL: Final = (*_SIMULATORS, *DATA_TARGETS, *FIGURE_TARGETS)
 TARGETS: Final[dict[str, Target]] = {target.name: target for target in _ALL}
 """Every target by its name, in the order of the help."""
 

@@ -11,8 +11,12 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.calibration.recover.study import BrokenSimulation, EstimationMethod, Tell
-from driftwalk.calibration.recover.summary import COVERAGE_CONFIDENCE
+from driftwalk.calibration.recovery_study import (
+    COVERAGE_CONFIDENCE,
+    BrokenSimulation,
+    EstimationMethod,
+    Tell,
+)
 from driftwalk.core.errors import InputError
 from driftwalk.core.processors import one_blas_thread
 from driftwalk.core.random_streams import RecoveryStream

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.calibration.recover.summary import Summary, summarise
+from driftwalk.calibration.recovery_study import Summary, summarise
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
 from driftwalk.flow import bilinear

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from driftwalk import _core
-from driftwalk.comparison import StepReference
 from driftwalk.conditions.recorded import Conditions
 from driftwalk.core.arrays import Floats, Keys
 from driftwalk.core.errors import InputError
-from driftwalk.motion.protocol import Details, Scores, Values, Worlds
-from driftwalk.motion.score import scored
+from driftwalk.motion.protocol import Values
+from driftwalk.motion.score import NativeModel
 from driftwalk.schema import Parameter
 from driftwalk.simulation.backend import native_model, world_table
 from driftwalk.simulation.initial import world_orientations
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 
-class BlockModel:
+class BlockModel(NativeModel):
     """A floating block, dragged by the water and pushed by a stochastic force.
 
     Parameters
@@ -56,45 +55,6 @@ class BlockModel:
                 refined_step=search.refined_force_std_step_N,
             ),
         )  # fmt: skip
-        # Of the latest conditions: made once for all work units of a map.
-        self._ready: tuple[Conditions, _core.Model] | None = None
-
-    def simulate(self, values: Values, like: Conditions, keys: Keys) -> Worlds:
-        """Return one world per key; see `MotionModel.simulate`.
-
-        Raises
-        ------
-        InputError
-            When the conditions have no flow.
-        """
-        x, y, theta, status = _core.simulate(
-            self.native(like),
-            _table(values, like, keys),
-            keys,
-            threads=like.threads,
-            precision="single",
-            flow_start=like.flow_start,
-        )
-        return Worlds(x, y, theta, status)
-
-    def score(
-        self,
-        values: Values,
-        like: Conditions,
-        keys: Keys,
-        reference: StepReference,
-        *,
-        details: Details = "none",
-    ) -> Scores:
-        """Return how far every world is from the recording; see `score_worlds`.
-
-        Raises
-        ------
-        InputError
-            When the conditions have no flow.
-        """
-        table = _table(values, like, keys)
-        return scored(self.native(like), table, like, keys, reference, details=details)
 
     def describe(self) -> dict[str, Any]:
         """Return the study that it was made from."""
@@ -110,36 +70,21 @@ class BlockModel:
             "time_step_s": self.study.time_step_s,
         }
 
-    def native(self, like: Conditions) -> _core.Model:
-        """Return the core's form of the model under the conditions of a recording.
+    def _native(self, like: Conditions) -> tuple[_core.Model, None]:
+        if like.flow is None:
+            raise InputError("a block drifts in water: its conditions need a flow field")
+        return native_model(self.study, like.flow, like.sample_time, like.camera), None
 
-        Raises
-        ------
-        InputError
-            When the conditions have no flow, or its grid is too fine for the tank.
-        """
-        ready = self._ready
-        if ready is None or ready[0] is not like:
-            if like.flow is None:
-                raise InputError("a block drifts in water: its conditions need a flow field")
-            ready = like, native_model(self.study, like.flow, like.sample_time, like.camera)
-            self._ready = ready
-        return ready[1]
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Leave the core's form out: it is made again where the model is used."""
-        return {**self.__dict__, "_ready": None}
-
-
-def _table(values: Values, like: Conditions, keys: Keys) -> Floats:
-    start = like.start
-    return world_table(
-        x=start.x,
-        y=start.y,
-        theta=world_orientations(start.theta, keys),
-        vx=start.vx,
-        vy=start.vy,
-        omega=start.omega,
-        drag_coefficient=np.asarray(values["drag_coefficient"], dtype=np.float64),
-        force_std=np.asarray(values["force_std"], dtype=np.float64),
-    )
+    def _worlds(self, values: Values, like: Conditions, keys: Keys) -> tuple[Floats, None]:
+        start = like.start
+        table = world_table(
+            x=start.x,
+            y=start.y,
+            theta=world_orientations(start.theta, keys),
+            vx=start.vx,
+            vy=start.vy,
+            omega=start.omega,
+            drag_coefficient=np.asarray(values["drag_coefficient"], dtype=np.float64),
+            force_std=np.asarray(values["force_std"], dtype=np.float64),
+        )
+        return table, None

@@ -9,7 +9,7 @@ from typing import Any, Final
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.motion.external_program.program import TIMEOUT_S, ProgramModel
 from driftwalk.motion.family.members import MEMBERS, Member
-from driftwalk.motion.family.particle import NEIGHBOURS, ParticleModel
+from driftwalk.motion.family.particle import NEIGHBOURS, ParticleModel, usual_parameters
 from driftwalk.motion.family.parts import PARTS, Part
 from driftwalk.motion.function import MotionFunction, Settings, function_model
 from driftwalk.motion.model_file import SUFFIX, model_of_file
@@ -141,24 +141,13 @@ def motion_model(
     >>> dw.motion_model(diffuse, diffusivity=(1e-6, 1e-4, "m2/s")).parameters[0].key
     'diffusivity_m2_s'
     """
-    if isinstance(model, str):
-        return _addressed(model, parameters, settings, clearance, timeout, choices)
-    if not callable(model):
-        raise ConfigurationError(
-            f"a motion model is made of a name or a function, got {type(model).__name__}"
-        )
-    _refuse(model="a function", clearance=clearance, timeout=timeout)
-    return function_model(model, parameters, choices, settings=settings)
-
-
-def _addressed(
-    model: str,
-    parameters: tuple[Parameter, ...],
-    settings: Settings,
-    clearance: float | None,
-    timeout: float | None,
-    choices: dict[str, Any],
-) -> MotionModel:
+    if not isinstance(model, str):
+        if not callable(model):
+            raise ConfigurationError(
+                f"a motion model is made of a name or a function, got {type(model).__name__}"
+            )
+        _refuse(model="a function", clearance=clearance, timeout=timeout)
+        return function_model(model, parameters, choices, settings=settings)
     if model.startswith(COMMAND):
         _refuse(model="a program", clearance=clearance)
         if settings != "one":
@@ -168,7 +157,7 @@ def _addressed(
         return ProgramModel(command, given_by_name(parameters, choices), timeout=limit)
     if SUFFIX in model:
         _refuse(model="a model in a file", clearance=clearance, timeout=timeout)
-        return model_of_file(model, parameters, choices, settings=settings)
+        return model_of_file(model, parameters, choices, settings)
     _refuse(model=model, settings=settings, timeout=timeout)
     return family_model(model, *parameters, clearance=clearance, **choices)
 
@@ -226,13 +215,8 @@ def family_model(
     member, parts = _member_and_parts(name)
     if clearance is not None and not (math.isfinite(clearance) and clearance >= 0.0):
         raise ConfigurationError(f"clearance is {clearance}, expected a length from 0 m on")
-    groups = [member.parameters, *(part.parameters for part in parts)]
-    # Two parts that feel the wall have one range.
-    usual = {one.name: one for group in groups for one in group}
-    given: dict[str, Any] = {**{one.name: one for one in parameters}, **choices}
-    twice = {one.name for one in parameters} & set(choices)
-    if twice or len({one.name for one in parameters}) < len(parameters):
-        raise ConfigurationError(f"a parameter of {name} is given twice")
+    usual = usual_parameters(member, parts)
+    given: Mapping[str, Any] = given_by_name(parameters, choices)
     for unknown in given.keys() - usual.keys():
         raise ConfigurationError(
             f"the model {name} has no parameter {unknown!r}; it has {', '.join(usual)}"

@@ -13,11 +13,10 @@ import numpy as np
 from driftwalk.conditions.recorded import Conditions
 from driftwalk.core.arrays import Floats, Keys
 from driftwalk.core.errors import ConfigurationError, InputError
-from driftwalk.motion.batches import in_words, world_batches, world_starts
 from driftwalk.motion.camera import observe_worlds
 from driftwalk.motion.protocol import Values, Worlds
-from driftwalk.motion.random import WorldRandom
 from driftwalk.motion.ranges import Range, given_by_name, range_parameter, with_given
+from driftwalk.motion.worlds import WorldRandom, in_words, world_batches, world_starts
 from driftwalk.schema import Parameter
 from driftwalk.simulation.initial import Start
 
@@ -180,25 +179,34 @@ def function_model(
         raise ConfigurationError(
             f"settings must be one of {', '.join(get_args(Settings))}, got {settings!r}"
         )
-    named = with_given(_default_ranges(function), given_by_name(parameters, ranges))
+    try:
+        signature = inspect.signature(function)
+    except (TypeError, ValueError):
+        signature = None
+    usual = {} if signature is None else _default_ranges(signature)
+    named = with_given(usual, given_by_name(parameters, ranges))
     if not named:
         raise ConfigurationError("a motion model needs a parameter: speed=(0, 0.1, 'm/s')")
-    _require_takes(function, [one.name for one in named])
+    try:
+        if signature is not None:
+            signature.bind(None, **{one.name: 0.0 for one in named})
+    except TypeError as error:
+        called = getattr(function, "__name__", "the function")
+        names = ", ".join(one.name for one in named)
+        raise ConfigurationError(
+            f"{called}{signature} cannot be called with a scene and {names}: {error}"
+        ) from error
     return FunctionModel(function, named, settings=settings)
 
 
-def _default_ranges(function: MotionFunction) -> dict[str, Parameter]:
+def _default_ranges(signature: inspect.Signature) -> dict[str, Parameter]:
     """Return the parameters whose defaults are ranges: with a unit, as pairs are other things too.
 
     A default of two numbers without a unit may be a position or a size.
     """
-    try:
-        arguments = inspect.signature(function).parameters.values()
-    except (TypeError, ValueError):
-        return {}
     return {
         one.name: range_parameter(one.name, one.default)
-        for one in arguments
+        for one in signature.parameters.values()
         if one.kind is one.KEYWORD_ONLY and _is_range(one.default)
     }
 
@@ -207,17 +215,3 @@ def _is_range(default: Any) -> bool:
     if isinstance(default, Parameter):
         return True
     return isinstance(default, tuple) and len(default) == 3 and isinstance(default[2], str)
-
-
-def _require_takes(function: MotionFunction, names: list[str]) -> None:
-    try:
-        signature = inspect.signature(function)
-    except (TypeError, ValueError):
-        return
-    try:
-        signature.bind(None, **dict.fromkeys(names, 0.0))
-    except TypeError as error:
-        called = getattr(function, "__name__", "the function")
-        raise ConfigurationError(
-            f"{called}{signature} cannot be called with a scene and {', '.join(names)}: {error}"
-        ) from error

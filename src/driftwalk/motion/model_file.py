@@ -14,18 +14,16 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Final
 
-from driftwalk.conditions.recorded import Conditions
-from driftwalk.core.arrays import Keys
 from driftwalk.core.errors import ConfigurationError, DriftwalkError, InputError
 from driftwalk.core.extras import show_dask
 from driftwalk.core.text.did_you_mean import did_you_mean
 from driftwalk.motion.function import Settings, function_model
-from driftwalk.motion.protocol import Details, MotionModel, Scores, ScoresItself, Values, Worlds
+from driftwalk.motion.protocol import MotionModel, ScoresItself
 from driftwalk.motion.ranges import Range
 from driftwalk.schema import Parameter
 
 if TYPE_CHECKING:
-    from driftwalk.comparison import StepReference
+    pass
 
 
 @dataclass(frozen=True)
@@ -119,32 +117,15 @@ class FileModel:
     """A model from a file: the model itself, with the hash of the file in its description."""
 
     def __init__(self, model: MotionModel, sha256: str, made_by: tuple[Any, ...]) -> None:
-        self.model = model
-        self.sha256 = sha256
-        self._made_by = made_by
+        self.model, self.sha256, self._made_by = model, sha256, made_by
+        self.name, self.parameters, self.needs_flow = model.name, model.parameters, model.needs_flow
+        self.simulate = model.simulate
+        if isinstance(model, ScoresItself):
+            self.score = model.score
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Load the file again in the other process: its module has no name to import it by."""
         return _reloaded, (self.sha256, *self._made_by)
-
-    @property
-    def name(self) -> str:
-        """The model's own name."""
-        return self.model.name
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """The model's own parameters."""
-        return self.model.parameters
-
-    @property
-    def needs_flow(self) -> bool:
-        """Whether the model has to know the water's velocity."""
-        return self.model.needs_flow
-
-    def simulate(self, values: Values, like: Conditions, keys: Keys) -> Worlds:
-        """Return one world per key; see `MotionModel.simulate`."""
-        return self.model.simulate(values, like, keys)
 
     def describe(self) -> dict[str, Any]:
         """Return what the model says of itself, with the hash of the file as that of its source."""
@@ -155,29 +136,10 @@ class FileModel:
         return {**self.model.facts(estimate), "model_source_sha256": self.sha256}
 
 
-class ScoringFileModel(FileModel):
-    """A model from a file that compares its worlds itself."""
-
-    model: ScoresItself
-
-    def score(
-        self,
-        values: Values,
-        like: Conditions,
-        keys: Keys,
-        reference: StepReference,
-        *,
-        details: Details = "none",
-    ) -> Scores:
-        """Return the KS distance of every world to the recording; see `score_worlds`."""
-        return self.model.score(values, like, keys, reference, details=details)
-
-
 def model_of_file(
     address: str,
     parameters: tuple[Parameter, ...],
     ranges: Mapping[str, Range],
-    *,
     settings: Settings,
 ) -> FileModel:
     """Return a motion model from a file; see `driftwalk.motion.motion_model`.
@@ -190,20 +152,36 @@ def model_of_file(
     before, _, name = address.rpartition(SUFFIX)
     path = Path(f"{before}.py")
     file = load_user_file(path)
-    model = _model(_named(file, name), file, name, parameters, ranges, settings)
-    kind = ScoringFileModel if isinstance(model, ScoresItself) else FileModel
+    where = f"{path}:{name}"
+    found = _named(file, name)
+    is_class = inspect.isclass(found)
+    if is_class:
+        found = _instance(found, file, name)
+    if isinstance(found, MotionModel):
+        if parameters or ranges or settings != "one":
+            raise ConfigurationError(
+                f"{where} is a model that declares its ranges and settings: change them in the file"
+            )
+        _require_parameters(found, where)
+        model = found
+    elif callable(found) and not is_class:
+        try:
+            model = function_model(found, parameters, ranges, settings=settings)
+        except ConfigurationError as error:
+            raise ConfigurationError(f"{where}: {error}") from error
+    else:
+        lacks = [member for member in MEMBERS_OF_A_MODEL if not hasattr(found, member)]
+        what = f"an object without {', '.join(lacks)}" if is_class else type(found).__name__
+        raise ConfigurationError(
+            f"{where} is {what}; expected a motion model, a class that makes one without "
+            "arguments, or a function of a scene and parameters"
+        )
     made_by = (f"{path.resolve()}:{name}", parameters, dict(ranges), settings)
-    return kind(model, file.sha256, made_by)
+    return FileModel(model, file.sha256, made_by)
 
 
-def _reloaded(
-    sha256: str,
-    address: str,
-    parameters: tuple[Parameter, ...],
-    ranges: Mapping[str, Range],
-    settings: Settings,
-) -> FileModel:
-    found = model_of_file(address, parameters, ranges, settings=settings)
+def _reloaded(sha256: str, address: str, *made_by: Any) -> FileModel:
+    found = model_of_file(address, *made_by)
     if found.sha256 != sha256:
         raise InputError(f"{address} has changed since the model was made: make it again")
     return found
@@ -235,38 +213,6 @@ def _defined_in(file: UserFile) -> list[str]:
             or (isinstance(value, MotionModel) and not inspect.isclass(value))
         )
     ]
-
-
-def _model(
-    found: Any,
-    file: UserFile,
-    name: str,
-    parameters: tuple[Parameter, ...],
-    ranges: Mapping[str, Range],
-    settings: Settings,
-) -> MotionModel:
-    where = f"{file.path}:{name}"
-    is_class = inspect.isclass(found)
-    if is_class:
-        found = _instance(found, file, name)
-    if isinstance(found, MotionModel):
-        if parameters or ranges or settings != "one":
-            raise ConfigurationError(
-                f"{where} is a model that declares its ranges and settings: change them in the file"
-            )
-        _require_parameters(found, where)
-        return found
-    if callable(found) and not is_class:
-        try:
-            return function_model(found, parameters, ranges, settings=settings)
-        except ConfigurationError as error:
-            raise ConfigurationError(f"{where}: {error}") from error
-    lacks = [member for member in MEMBERS_OF_A_MODEL if not hasattr(found, member)]
-    what = f"an object without {', '.join(lacks)}" if is_class else type(found).__name__
-    raise ConfigurationError(
-        f"{where} is {what}; expected a motion model, a class that makes one without arguments, or "
-        "a function of a scene and parameters"
-    )
 
 
 def _instance(found: type, file: UserFile, name: str) -> Any:

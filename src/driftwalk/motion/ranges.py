@@ -15,7 +15,9 @@ Given = Mapping[str, Parameter | Range]
 """Ranges by the name of the parameter."""
 
 
-def given_by_name(parameters: tuple[Parameter, ...], ranges: Mapping[str, Range]) -> Given:
+def given_by_name(
+    parameters: tuple[Parameter, ...], ranges: Mapping[str, Any]
+) -> Mapping[str, Any]:
     """Return all ranges that a user gave, by name; refuse a parameter that is given twice."""
     names = [*(one.name for one in parameters), *ranges]
     if len(set(names)) < len(names):
@@ -31,13 +33,13 @@ def with_given(usual: Mapping[str, Parameter], given: Given) -> tuple[Parameter,
     )
 
 
-def range_parameter(name: str, given: Parameter | Range) -> Parameter:
-    """Return a parameter about which nothing but its range is known; its unit is 1 by default."""
+def range_parameter(name: str, given: Parameter | Range, unit: str = "1") -> Parameter:
+    """Return a parameter about which nothing but its range is known; `unit` where it has none."""
     if isinstance(given, Parameter):
         return given
     if not isinstance(given, tuple) or len(given) not in (2, 3):
         raise ConfigurationError(f"{name}: expected a range such as (0, 0.1, 'm/s'), got {given!r}")
-    low, high, unit = (*given, "1")[:3]
+    low, high, unit = (*given, unit)[:3]
     try:
         ends = float(low), float(high)
     except (TypeError, ValueError) as error:
@@ -45,16 +47,14 @@ def range_parameter(name: str, given: Parameter | Range) -> Parameter:
     return Parameter(name, str(unit), *ends)
 
 
-def ranged(usual: Parameter, choice: Parameter | tuple[Any, ...]) -> Parameter:
+def ranged(usual: Parameter, choice: Parameter | Range) -> Parameter:
     """Return a parameter with another range: its scale and meaning stay."""
-    if isinstance(choice, Parameter):
-        unit, chosen = choice.unit, replace(choice, meaning=choice.meaning or usual.meaning)
-    else:
-        low, high, unit = _range_of(usual, choice)
-        chosen = replace(usual, low=low, high=high, step=0.0, refined_step=0.0)
-    if unit != usual.unit:
-        raise ConfigurationError(f"{usual.name} is in {usual.unit}, and its range in {unit}")
-    return chosen
+    given = range_parameter(usual.name, choice, usual.unit)
+    if given.unit != usual.unit:
+        raise ConfigurationError(f"{usual.name} is in {usual.unit}, and its range in {given.unit}")
+    if given is choice:
+        return replace(given, meaning=given.meaning or usual.meaning)
+    return replace(usual, low=given.low, high=given.high, step=0.0, refined_step=0.0)
 
 
 def known_value(usual: Parameter, choice: Any) -> float:
@@ -73,13 +73,3 @@ def known_value(usual: Parameter, choice: Any) -> float:
             f"[{usual.unit}]"
         )
     return value
-
-
-def _range_of(usual: Parameter, choice: tuple[Any, ...]) -> tuple[float, float, str]:
-    try:
-        low, high, unit = (*choice, usual.unit)[:3] if len(choice) == 2 else choice
-        return float(low), float(high), str(unit)
-    except (TypeError, ValueError) as error:
-        raise ConfigurationError(
-            f"{usual.name}: expected a range such as (0, 0.1, {usual.unit!r}), got {choice!r}"
-        ) from error

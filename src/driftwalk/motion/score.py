@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
@@ -10,7 +13,7 @@ from driftwalk.comparison import Statistic, StepDistance, StepReference, StepTab
 from driftwalk.comparison.statistic import BINS
 from driftwalk.conditions.recorded import Conditions
 from driftwalk.core.arrays import Bools, Floats, Keys, Singles
-from driftwalk.motion.protocol import Details, MotionModel, Scores, ScoresItself, Values
+from driftwalk.motion.protocol import Details, MotionModel, Scores, ScoresItself, Values, Worlds
 from driftwalk.simulation.backend import BROKEN
 
 
@@ -123,34 +126,97 @@ def step_densities(reference: StepReference, table: StepTable) -> Singles:
     return density
 
 
-def scored(
-    model: _core.Model,
-    worlds: Floats,
-    like: Conditions,
-    keys: Keys,
-    reference: StepReference,
-    *,
-    details: Details,
-    particle: _core.Particle | None = None,
-) -> Scores:
-    """Simulate worlds and return how far each is from the recording; see `score_worlds`."""
-    full = details == "all"
-    return dict(
-        _core.score(
-            model,
+class NativeModel(ABC):
+    """A motion model that the native core simulates and scores: the block, and the family."""
+
+    # Of the latest conditions: made once for all work units of a map or a search.
+    _ready: tuple[Conditions, _core.Model, Floats | None] | None = None
+
+    @abstractmethod
+    def _worlds(
+        self, values: Values, like: Conditions, keys: Keys
+    ) -> tuple[Floats, _core.Particle | None]:
+        """Return starts and numbers of worlds, one row each, and what all have in common."""
+
+    @abstractmethod
+    def _native(self, like: Conditions) -> tuple[_core.Model, Floats | None]:
+        """Return the core's form of the conditions, and where other bodies are at every step."""
+
+    def simulate(self, values: Values, like: Conditions, keys: Keys) -> Worlds:
+        """Return one world per key; see `MotionModel.simulate`.
+
+        Raises
+        ------
+        InputError
+            When the water carries the body and the conditions have no flow, or it feels other
+            bodies and there are none.
+        """
+        worlds, particle = self._worlds(values, like, keys)
+        x, y, theta, status = _core.simulate(
+            self.native(like),
             worlds,
             keys,
-            left=reference.plan.left,
-            weight=reference.plan.weight,
-            triple=reference.plan.triple,
-            reference=reference.steps,
-            bins=BINS if full else 0,
-            length_limit=reference.length_limit,
-            angle_limit=reference.angle_limit,
-            excerpt=excerpt_samples(like) if full else 0,
-            keep_steps=details == "steps",
             threads=like.threads,
+            precision="single",
             particle=particle,
             flow_start=like.flow_start,
         )
-    )
+        return Worlds(x, y, theta, status)
+
+    def score(
+        self,
+        values: Values,
+        like: Conditions,
+        keys: Keys,
+        reference: StepReference,
+        *,
+        details: Details = "none",
+    ) -> Scores:
+        """Return how far every world is from the recording; see `score_worlds`.
+
+        Raises
+        ------
+        InputError
+            As `simulate`.
+        """
+        worlds, particle = self._worlds(values, like, keys)
+        full = details == "all"
+        return dict(
+            _core.score(
+                self.native(like),
+                worlds,
+                keys,
+                left=reference.plan.left,
+                weight=reference.plan.weight,
+                triple=reference.plan.triple,
+                reference=reference.steps,
+                bins=BINS if full else 0,
+                length_limit=reference.length_limit,
+                angle_limit=reference.angle_limit,
+                excerpt=excerpt_samples(like) if full else 0,
+                keep_steps=details == "steps",
+                threads=like.threads,
+                particle=particle,
+                flow_start=like.flow_start,
+            )
+        )
+
+    def native(self, like: Conditions) -> _core.Model:
+        """Return the core's form of the model under the conditions of a recording.
+
+        Raises
+        ------
+        InputError
+            As `simulate`, or when the grid of the flow is too fine for the tank.
+        """
+        return self._made_ready(like)[1]
+
+    def _made_ready(self, like: Conditions) -> tuple[Conditions, _core.Model, Floats | None]:
+        ready = self._ready
+        if ready is None or ready[0] is not like:
+            ready = self._ready = (like, *self._native(like))
+        return ready
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave the core's form out: it is made again where the model is used."""
+        return {**self.__dict__, "_ready": None}

@@ -15,13 +15,13 @@ from driftwalk.core.arrays import Floats, Keys
 from driftwalk.core.errors import InputError
 from driftwalk.core.processors import default_threads
 from driftwalk.core.seeds import world_keys
-from driftwalk.motion.batches import no_numbers
 from driftwalk.motion.block import BlockModel
 from driftwalk.motion.external_program.program import ProgramModel
 from driftwalk.motion.family import ParticleModel
 from driftwalk.motion.family.particle import time_step_of
 from driftwalk.motion.protocol import MotionModel, Worlds
 from driftwalk.motion.values import known_values
+from driftwalk.motion.worlds import no_numbers
 from driftwalk.schema import body_track
 from driftwalk.schema.check import build_dataset
 from driftwalk.simulation.backend import STATUS, check_sample_time

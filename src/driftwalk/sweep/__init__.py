@@ -1,10 +1,9 @@
 """Any function over many settings: order, work units, resume, executors."""
 
 from driftwalk.core.files.shards import ShardStore
-from driftwalk.sweep.design import Design, WorkUnit, grid, settings_per_unit
+from driftwalk.sweep.design import Design, WorkUnit, grid, settings_per_unit, work_units
 from driftwalk.sweep.run import MemoryStore, Store, SweepError, collect, run_sweep
-from driftwalk.sweep.scheduling import threads_of_unit
-from driftwalk.sweep.workers import WorkerExecutor, refuse_others, this_worker
+from driftwalk.sweep.workers import WorkerExecutor, refuse_others, this_worker, threads_of_unit
 
 __all__ = [
     "Design",
@@ -21,4 +20,5 @@ __all__ = [
     "settings_per_unit",
     "this_worker",
     "threads_of_unit",
+    "work_units",
 ]

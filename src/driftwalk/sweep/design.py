@@ -40,6 +40,41 @@ class WorkUnit:
         return self.stop - self.start
 
 
+def work_units(
+    settings: Mapping[str, npt.NDArray[Any]], size: int, *, first: int = 0
+) -> list[WorkUnit]:
+    """Cut settings into work units.
+
+    Parameters
+    ----------
+    settings : mapping of str to numpy.ndarray
+        The values by name, one entry per setting each.
+    size : int
+        Settings of a unit; the last may have fewer.
+    first : int
+        Number of the first setting.
+
+    Returns
+    -------
+    list of WorkUnit
+        In the order of the settings.
+
+    Examples
+    --------
+    >>> [unit.id for unit in work_units({"speed": np.arange(5.0)}, 3)]
+    ['00000000-00000003', '00000003-00000005']
+    """
+    (count,) = {len(values) for values in settings.values()}
+    return [
+        WorkUnit(
+            first + at,
+            first + min(at + size, count),
+            {name: values[at : at + size] for name, values in settings.items()},
+        )
+        for at in range(0, count, size)
+    ]
+
+
 @dataclass(frozen=True, eq=False)
 class Design:
     """A grid of settings: every combination of the values of its axes, the last axis fastest.
@@ -62,15 +97,9 @@ class Design:
         """Number of settings."""
         return math.prod(self.shape)
 
-    def settings(self, start: int = 0, stop: int | None = None) -> dict[str, npt.NDArray[Any]]:
-        """Return the values of every axis for the settings ``start <= i < stop``.
-
-        Returns
-        -------
-        dict of str to numpy.ndarray
-            Shape (stop - start,) each.
-        """
-        indices = np.unravel_index(np.arange(self.size)[start:stop], self.shape)
+    def settings(self) -> dict[str, npt.NDArray[Any]]:
+        """Return the values of every axis for all settings, shape (size,) each."""
+        indices = np.unravel_index(np.arange(self.size), self.shape)
         pairs = zip(self.axes.items(), indices, strict=True)
         return {name: values[index] for (name, values), index in pairs}
 
@@ -84,12 +113,7 @@ class Design:
         """
         if size < 1:
             raise InputError(f"size of a work unit: expected at least 1 setting, got {size}")
-        starts = range(0, self.size, size)
-        stops = [min(start + size, self.size) for start in starts]
-        return [
-            WorkUnit(start, stop, self.settings(start, stop))
-            for start, stop in zip(starts, stops, strict=True)
-        ]
+        return work_units(self.settings(), size)
 
     def unstack(self, arrays: Mapping[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
         """Turn the leading dimension of arrays, the settings, into one dimension per axis.

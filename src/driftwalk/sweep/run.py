@@ -20,8 +20,7 @@ from driftwalk.core.errors import ClusterError, DriftwalkError, InputError
 from driftwalk.core.files.shards import Arrays, Unit, UnitT
 from driftwalk.core.run_stages import Progress
 from driftwalk.sweep.design import WorkUnit
-from driftwalk.sweep.scheduling import HANDOUT, Handout, UnitFuture, handout, is_lost
-from driftwalk.sweep.workers import UnitFunction
+from driftwalk.sweep.workers import HANDOUT, Handout, UnitFunction, UnitFuture, handout, is_lost
 
 
 class Store(Protocol):
@@ -245,7 +244,8 @@ class _Elsewhere:
 
     def run(self) -> None:
         """Have all units computed."""
-        self._hand.tell(self._tally.units_done, self._tally.units)
+        units = self._hand.units
+        units.done, units.total = self._tally.units_done, self._tally.units
         try:
             while self._left:
                 self._hand_out_some()
@@ -284,7 +284,7 @@ class _Elsewhere:
             known = one.unit.id in self._left and one.unit.id in once
             if known and not one.alone and self._hand.slow(now - one.since):
                 self._hand_out(one.unit, again=True)
-                self._hand.again()
+                self._hand.units.again += 1
 
     def _take(self, handed: _Handed, future: UnitFuture) -> None:
         """Keep what a unit gave, or suspect it."""
@@ -296,7 +296,7 @@ class _Elsewhere:
             self._suspect(unit)
             return
         # Before: what is told of progress names the units.
-        self._hand.tell(self._tally.units_done + 1, self._tally.units)
+        self._hand.units.done = self._tally.units_done + 1
         _keep(unit, partial(self._hand.result, future), self._store, self._tally)
         self._left.discard(unit.id)
 

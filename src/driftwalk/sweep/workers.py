@@ -2,6 +2,7 @@
 
 A unit is a few numbers; the function of a sweep holds a flow, a recording, a model. On a Dask
 cluster the function is therefore a separate object, which a worker fetches with its first unit.
+The scheduling of units: a window of submitted ones, and slow ones submitted again.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
+from statistics import median
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -27,11 +29,7 @@ from driftwalk.sweep.design import WorkUnit
 
 KEPT: Final = 4
 """Functions that a process keeps ready: one for each stage that may be under way."""
-ALIKE: Final = ("driftwalk",)
-ALIKE_LINEAR_ALGEBRA: Final = ("driftwalk", "numpy", "scipy")
 
-USER_MODULE: Final = "_driftwalk_"
-"""How the names of modules begin that are a file of the user's."""
 
 Guard = Callable[[], None]
 """Raises `ClusterError` in a process that must not compute."""
@@ -81,9 +79,9 @@ def packed(function: Any, guard: Guard | None = None) -> Parcel:
 
     for name, module in list(sys.modules.items()):
         # A model from a file of the user's: no worker has that module.
-        if name.startswith(USER_MODULE):
+        if name.startswith("_driftwalk_"):
             cloudpickle.register_pickle_by_value(module)
-    names = ALIKE_LINEAR_ALGEBRA if getattr(function, "linear_algebra", False) else ALIKE
+    linear_algebra = ("numpy", "scipy") if getattr(function, "linear_algebra", False) else ()
     try:
         content = cloudpickle.dumps(function)
     except Exception as error:
@@ -91,7 +89,7 @@ def packed(function: Any, guard: Guard | None = None) -> Parcel:
             f"this work cannot be sent to workers: {error}; run it without a cluster"
         ) from error
     token = hashlib.sha256(content).hexdigest()
-    return Parcel(token, content, package_versions(names), guard)
+    return Parcel(token, content, package_versions(("driftwalk", *linear_algebra)), guard)
 
 
 def run_unit(parcel: Parcel, unit: WorkUnit) -> Answer:
@@ -243,3 +241,128 @@ class WorkerExecutor(Executor):
 
 def _as_it_is(parcel: Any) -> Any:
     return parcel
+
+
+UnitFuture = Future[Any]
+Found = Mapping[str, "npt.NDArray[Any]"]
+
+
+class HandoutPolicy(NamedTuple):
+    """How many units are under way, and which are computed again."""
+
+    for_each_worker: int = 3
+    """Units handed out for each worker: it computes one and need not wait for the next; chosen
+    by hand."""
+    fewest: int = 64
+    """Units handed out at least, where an executor does not say how many workers it has; chosen
+    by hand."""
+    slow: float = 4.0
+    """Usual durations after which a unit is slow, when no other is left to hand out; chosen by
+    hand."""
+    slow_s: float = 10.0
+    """Duration below which no unit is slow [s]; chosen by hand."""
+
+
+HANDOUT: Final = HandoutPolicy()
+
+
+def threads_of_unit(threads: int | None, executor: Executor | None) -> int | None:
+    """Return the threads of a work unit: one where an executor has units at the same time.
+
+    Parameters
+    ----------
+    threads : int or None
+        What was asked for.
+    executor : concurrent.futures.Executor or None
+        Where units run.
+
+    Examples
+    --------
+    >>> from concurrent.futures import ThreadPoolExecutor
+    >>> threads_of_unit(None, None), threads_of_unit(None, ThreadPoolExecutor(2))
+    (None, 1)
+    """
+    return 1 if threads is None and executor is not None else threads
+
+
+def is_lost(error: BaseException | None) -> bool:
+    """Return whether an error says that every worker that had a unit has ended."""
+    # By its name: Dask is not imported where it is not used.
+    return type(error).__name__ == "KilledWorker"
+
+
+class Handout:
+    """Hands units to threads or processes of this machine."""
+
+    def __init__(self, executor: Executor, function: UnitFunction) -> None:
+        self._executor, self._function = executor, function
+        self.units = UnitCounts()
+        self.seconds: list[float] = []
+        """Durations of units, where workers report them: others are not slower than each other."""
+
+    @property
+    def width(self) -> int:
+        """How many units are handed out at a time."""
+        workers = getattr(self._executor, "_max_workers", 0)
+        return max(HANDOUT.for_each_worker * workers, HANDOUT.fewest)
+
+    def submit(self, unit: WorkUnit) -> UnitFuture:
+        """Have a unit computed."""
+        return self._executor.submit(self._function, unit)
+
+    def result(self, future: UnitFuture) -> Found:
+        """Return what a unit gave, or raise what it failed by."""
+        found: Found = future.result()
+        return found
+
+    def lost(self, future: UnitFuture) -> bool:
+        """Whether a unit was with several workers that ended, so that none takes it."""
+        return not future.cancelled() and is_lost(future.exception())
+
+    def slow(self, age_s: float) -> bool:
+        """Return whether a unit of this age should be handed out again."""
+        if not self.seconds:
+            return False
+        # It may have waited for those that its worker got before.
+        return age_s > max(
+            (HANDOUT.for_each_worker - 1 + HANDOUT.slow) * median(self.seconds), HANDOUT.slow_s
+        )
+
+
+class _OnWorkers(Handout):
+    """Hands units to workers elsewhere: they may be slow, go and come."""
+
+    def __init__(self, executor: WorkerExecutor, function: UnitFunction) -> None:
+        super().__init__(executor, function)
+        self.units = executor.units
+        self._workers, self._parcel = executor, executor.sent(function)
+
+    @property
+    def width(self) -> int:
+        return HANDOUT.for_each_worker * max(self._workers.workers, 1)
+
+    def submit(self, unit: WorkUnit) -> UnitFuture:
+        return self._workers.run(self._parcel, unit)
+
+    def result(self, future: UnitFuture) -> Found:
+        answer: Answer = future.result()
+        self.seconds.append(answer.seconds)
+        return answer.arrays
+
+
+def handout(executor: Executor, function: UnitFunction) -> Handout:
+    """Return how an executor gets the units of a sweep.
+
+    Parameters
+    ----------
+    executor : concurrent.futures.Executor
+        Threads, processes, or ``client.get_executor()`` of Dask.
+    function : callable
+        The function of the sweep.
+    """
+    if isinstance(executor, WorkerExecutor):
+        return _OnWorkers(executor, function)
+    client = getattr(executor, "_client", None)
+    if client is not None and type(executor).__module__.startswith("distributed"):
+        return _OnWorkers(WorkerExecutor(client), function)
+    return Handout(executor, function)

@@ -17,14 +17,13 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from functools import reduce
+from operator import xor
 from typing import Any, Final, NamedTuple, Self
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.extras import require_opencv
 from driftwalk.core.text.json_text import json_value, parse_json
 from driftwalk.track.types import Image
-
-LOOPBACK: Final = "127.0.0.1"
 
 
 class LivePolicy(NamedTuple):
@@ -39,8 +38,6 @@ class LivePolicy(NamedTuple):
 
 
 LIVE: Final = LivePolicy()
-
-_WIDTHS: Final = range(16, 4097)
 
 
 class _Message(NamedTuple):
@@ -83,7 +80,7 @@ class LiveServer:
         self,
         port: int,
         *,
-        host: str = LOOPBACK,
+        host: str = "127.0.0.1",
         encode: Callable[[Any], str] | None = None,
         hello: Mapping[str, Any] | None = None,
     ) -> None:
@@ -269,7 +266,7 @@ def requested_width(line: bytes) -> int | None:
     except FormatError:
         return None
     width = request.get("jpeg_width") if isinstance(request, dict) else None
-    return width if isinstance(width, int) and width in _WIDTHS else None
+    return width if isinstance(width, int) and 16 <= width <= 4096 else None
 
 
 def jpeg_text(image: Image, width: int) -> str:
@@ -332,11 +329,7 @@ def nmea_frame(number: int, particles: Iterable[Particle]) -> str:
         values = ",".join(f"{v:f}" for v in (one.column, one.row, turned, one.x, one.y))
         lines.append(f"PARTICLE,{one.id},{values}")
     lines.append("STEP_STOP")
-    return "".join(f"${line}*{_checksum(line):02X}\r\n" for line in lines)
-
-
-def _checksum(line: str) -> int:
-    return reduce(lambda total, byte: total ^ byte, line.encode("ascii"), 0)
+    return "".join(f"${line}*{reduce(xor, line.encode('ascii')):02X}\r\n" for line in lines)
 
 
 def _listen(host: str, port: int) -> socket.socket:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from itertools import combinations
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Pose = tuple[float, float, float]
-UNKNOWN: Final = ""
 
 
 class SeenEvent(NamedTuple):
@@ -265,7 +264,7 @@ class AssemblyObserver:
         active = [join for join in joins if join.stop > sample]
         limit, every = self.rules.hold * (1.0 + ROUNDING), range(len(self.bodies))
         hidden = [at for at in every if not time - self._seen.get(at, -math.inf) <= limit]
-        outcome = UNKNOWN if hidden else self._history.outcome[-1]
+        outcome = "" if hidden else self._history.outcome[-1]
         names = self.bodies
         return AssemblySeen(
             time,

@@ -51,7 +51,7 @@ def draw_states(image: Image, states: Iterable[TrackState], camera: PixelToWorld
 
     Examples
     --------
-    >>> from driftwalk.track.camera.model import Camera
+    >>> from driftwalk.track.camera import Camera
     >>> state = TrackState("0", 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, None, 0.0)
     >>> camera = Camera.from_scale(80, 60, px_per_m=100.0)
     >>> bool(draw_states(np.zeros((60, 80, 3), np.uint8), [state], camera).any())

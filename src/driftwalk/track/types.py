@@ -6,7 +6,7 @@ is in metres, y up, angles counter-clockwise.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -93,28 +93,6 @@ class Rejected:
     area_px: float
     reason: str
     kind: str = "other"
-
-
-@dataclass(frozen=True)
-class FrameResult:
-    """Detections in one frame.
-
-    Parameters
-    ----------
-    index : int
-        Number of the frame.
-    time : float
-        Presentation time [s].
-    detections : list of Detection
-        The accepted candidates.
-    rejected : list of Rejected
-        The rejected candidates, with reasons.
-    """
-
-    index: int
-    time: float
-    detections: list[Detection] = field(default_factory=list)
-    rejected: list[Rejected] = field(default_factory=list)
 
 
 class PixelToWorld(Protocol):

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from driftwalk.calibration import misfit
+from driftwalk.calibration import warnings
 from driftwalk.calibration.grid.stages import GridCalibration
-from driftwalk.calibration.misfit import fit_disagreements, step_differences, undetermined
+from driftwalk.calibration.warnings import fit_disagreements, step_differences, undetermined
 from driftwalk.comparison import StepDistance, StepTable
 from driftwalk.schema import Parameter
 
@@ -64,7 +64,7 @@ def test_what_differs_is_named_with_its_size(
     scale: float, turn: float, names: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     simulated = steps_of(1.0, 1.0)
-    monkeypatch.setattr(misfit, "simulated_steps", lambda *_, **__: (simulated, np.zeros(8)))
+    monkeypatch.setattr(warnings, "simulated_steps", lambda *_, **__: (simulated, np.zeros(8)))
     other = np.random.default_rng(4).permutation(steps_of(scale, turn).length[0])
     recorded = problem_with(steps_of(scale, turn)._replace(length=other[None]))
     said = step_differences(recorded, (0.0,))

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 from every_kind import every_kind
 
-from driftwalk.calibration.check import require_searchable
+from driftwalk.calibration.run import require_searchable
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.motion import motion_model
 from driftwalk.schema.answers.facts import (

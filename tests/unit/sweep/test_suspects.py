@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from driftwalk.sweep import MemoryStore, SweepError, WorkUnit, grid, run_sweep
-from driftwalk.sweep.scheduling import HANDOUT, is_lost
+from driftwalk.sweep.workers import HANDOUT, UnitCounts, is_lost
 
 UNITS = grid(a=np.arange(60.0)).units(1)
 ENDED = 4
@@ -38,6 +38,7 @@ class Workers:
         self.alone: list[int] = []
         self._fatal = fatal
         self._random = np.random.default_rng(seed)
+        self.units = UnitCounts()
         self._under_way: list[tuple[WorkUnit, Future[Any]]] = []
         self._ended: Counter[Future[Any]] = Counter()
 
@@ -73,12 +74,6 @@ class Workers:
 
     def slow(self, _age_s: float, /) -> bool:
         return False
-
-    def again(self) -> None:
-        """Do nothing."""
-
-    def tell(self, _done: int, _total: int, /) -> None:
-        """Do nothing."""
 
 
 def swept(

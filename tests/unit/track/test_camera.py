@@ -14,7 +14,7 @@ from hypothesis import given, settings, strategies as st
 
 import driftwalk as dw
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.track.camera.rim import find_rim
+from driftwalk.track.rim import find_rim
 
 MATRIX = np.array([[620.0, 0.0, 322.0], [0.0, 622.0, 236.0], [0.0, 0.0, 1.0]])
 BENT = np.array([-0.21, 0.06, 0.001, -0.0008, 0.0])

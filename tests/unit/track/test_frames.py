@@ -16,7 +16,7 @@ from matroska import give_times
 
 import driftwalk as dw
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.track.source.frames import FrameFilter, FrameGaps
+from driftwalk.track.frames import FrameFilter, FrameGaps
 
 
 def small(level: str = "moderate") -> dw.datasets.VideoSettings:

@@ -8,7 +8,7 @@ from itertools import pairwise
 import pytest
 from hypothesis import given, strategies as st
 
-from driftwalk.track.source.frames import FrameGaps
+from driftwalk.track.frames import FrameGaps
 
 
 def running(gaps: list[float]) -> list[int]:

@@ -12,7 +12,7 @@ import pytest
 from drawn_blocks import camera_of, marker_of, moving_blocks
 
 import driftwalk as dw
-from driftwalk.track.detect.two_colour.outline import outlined_centres
+from driftwalk.track.detect.two_colour_centres import outlined_centres
 
 RADIUS, SPACING = 10.0, 28.0
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import islice
 from typing import Final, NamedTuple, Protocol
 
 import numpy as np
@@ -23,6 +24,7 @@ from driftwalk.calibration.estimation.posterior import (
     sample_posterior,
 )
 from driftwalk.calibration.estimation.regression_abc import REGRESSION, Order, sequential_regression
+from driftwalk.calibration.evolution import distinct
 from driftwalk.core.arrays import Bools, Floats
 
 Starts = Callable[[], Floats]
@@ -195,7 +197,8 @@ def find_optima(
     if found[0].discrepancy < MATCHING.matches or found[0].discrepancy > hopeless:
         return found
     wide = np.full(parameters, GAUSS_NEWTON.widest)
-    for number, start in enumerate(_distinct(order(starts()))[: MATCHING.most_starts], 2):
+    further = islice(distinct(order(starts()), MATCHING.apart), MATCHING.most_starts)
+    for number, start in enumerate(further, 2):
         found.append(search(number, start, wide))
     found.sort(key=lambda optimum: optimum.deviance)
     return found[:1] + [one for one in found[1:] if one.discrepancy < MATCHING.matches]
@@ -226,12 +229,3 @@ def _profiles(
     )
     place = np.clip(found.place - bias[:, None], 0.0, 1.0)
     return Profiles(place, found.rise / wider[:, None] ** 2)
-
-
-def _distinct(starts: Floats) -> list[Floats]:
-    """Return starts that are not close to one before."""
-    retained: list[Floats] = []
-    for start in starts:
-        if all(np.sqrt(np.mean((start - one) ** 2)) > MATCHING.apart for one in retained):
-            retained.append(start)
-    return retained

@@ -199,12 +199,6 @@ def _said(found: Estimation, entry: Candidate) -> list[str]:
             f"the intervals are {matched.stretch:.1f} times as wide as the draws, for what the "
             f"model leaves of the summaries{'; nothing is determined' if matched.unlike else ''}"
         )
-    return [*said, *_open(matched, entry)]
-
-
-def _open(matched: Matched, entry: Candidate) -> list[str]:
-    """Return why parameters are not determined whatever their intervals are."""
-    said = []
     names = np.array([one.name for one in entry.ranges])
     if matched.ambiguous.any():
         said.append(

@@ -16,14 +16,11 @@ from driftwalk.comparison.aspects import block_of
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.processors import map_in_threads, one_blas_thread
 from driftwalk.core.run_stages import Progress
-from driftwalk.motion import Worlds
 from driftwalk.motion.score import broken_worlds
-from driftwalk.sweep import Store, WorkUnit, run_sweep
+from driftwalk.sweep import Store, WorkUnit, run_sweep, work_units
 
 ALIKE: Final = 16
 """Settings in a row that are seen by one camera. So many points of a Sobol' sequence fill a box."""
-AT_ONCE: Final = ALIKE
-"""Settings of a work unit: a round of 256 then has units for 16 workers."""
 POINT: Final = "point"
 """Settings of a unit, in the unit cube; they travel with it."""
 
@@ -93,14 +90,7 @@ class SummaryObjective:
     def __call__(self, settings: Floats, *, parts: int = 1) -> Floats:
         """Return the summaries of settings in the unit cube, shape (settings, parts, summaries)."""
         first = self.done
-        units = [
-            WorkUnit(
-                first + at,
-                first + min(at + AT_ONCE, len(settings)),
-                {POINT: settings[at : at + AT_ONCE]},
-            )
-            for at in range(0, len(settings), AT_ONCE)
-        ]
+        units = work_units({POINT: settings}, ALIKE, first=first)
         function = _Summaries(self._cameras, self.plans[:parts])
 
         def say(done: int, _: int) -> None:
@@ -123,23 +113,16 @@ class _Summaries:
     """Its results depend on numpy and scipy."""
 
     def __call__(self, unit: WorkUnit) -> dict[str, Floats]:
-        seen = self._seen(unit.settings[POINT], unit.start)
+        camera = self.cameras[unit.start // ALIKE % len(self.cameras)]
+        seen = camera.simulated(unit.settings[POINT], 1, stage="estimation", first=unit.start)
 
         def one(world: tuple[Floats, Floats]) -> list[Floats]:
             return [summarise(plan, *world) for plan in self.plans]
 
-        threads = self.cameras[0].like.threads
         with one_blas_thread():
-            found = np.array(map_in_threads(one, zip(seen.x, seen.y, strict=True), threads))
+            found = np.array(
+                map_in_threads(one, zip(seen.x, seen.y, strict=True), camera.like.threads)
+            )
         # A world that lost its numbers is like none.
         found[broken_worlds(seen.status)] = 0.0
         return {"summaries": found}
-
-    def _seen(self, settings: Floats, first: int) -> Worlds:
-        """Return simulated worlds as their cameras saw them."""
-        parts = []
-        for at in range(0, len(settings), ALIKE):
-            camera = self.cameras[(first + at) // ALIKE % len(self.cameras)]
-            here = settings[at : at + ALIKE]
-            parts.append(camera.simulated(here, 1, stage="estimation", first=first + at))
-        return Worlds(*map(np.concatenate, zip(*parts, strict=True)))

@@ -17,7 +17,7 @@ from driftwalk.core.processors import map_in_threads
 from driftwalk.core.run_stages import MORE, Progress
 from driftwalk.motion import Details
 from driftwalk.motion.score import broken_worlds
-from driftwalk.sweep import Design, Store, WorkUnit, grid, run_sweep, settings_per_unit
+from driftwalk.sweep import Design, Store, WorkUnit, grid, run_sweep, settings_per_unit, work_units
 
 
 class Map(NamedTuple):
@@ -153,22 +153,18 @@ class MapSimulator:
             count * problem.duration / problem.study.time_step_s,
             multiple=max(64 // count, 1),
         )
-        settings = design.settings()
-        units = [
-            WorkUnit(
-                start,
-                min(start + size, cells.size),
-                {name: values[cells[start : start + size]] for name, values in settings.items()},
-            )
-            for start in range(0, cells.size, size)
-        ]
+        settings = {name: values[cells] for name, values in design.settings().items()}
         if self.executor is not None:
             problem = replace(problem, like=replace(problem.like, threads=1))
         # A single replicate has none to be apart from.
         apart = self.apart and count > 1
         function = _Cells(problem, self.stage, cells, replicates, self.details, apart)
         return run_sweep(
-            function, units, store=store, executor=self.executor, progress=self.progress
+            function,
+            work_units(settings, size),
+            store=store,
+            executor=self.executor,
+            progress=self.progress,
         )
 
     def _design(self, axes: Sequence[npt.ArrayLike]) -> Design:
@@ -188,7 +184,6 @@ OF_A_REPLICATE: Final[dict[str, float]] = {
     "status": 0,
 }
 """Arrays with an entry per replicate, and the value of one that was not simulated."""
-OF_THE_FIRST: Final = ("excerpt_x", "excerpt_y")
 
 
 def _joined(
@@ -210,7 +205,7 @@ def _joined(
     rows = joined.reshape(-1, *new.shape[1:])
     if name == "pairs":
         rows[cells] = np.minimum(rows[cells], new)
-    elif name not in OF_THE_FIRST:
+    elif name not in ("excerpt_x", "excerpt_y"):
         # Means over the replicates: of the densities, of the distances between replicates.
         rows[cells] = share * rows[cells] + (1.0 - share) * new
     return joined

@@ -30,13 +30,19 @@ from driftwalk.calibration.grid.grid_refinement import (
     locate_minimum,
     refine,
 )
-from driftwalk.calibration.misfit import drawn_distance, step_differences, undetermined
 from driftwalk.calibration.problem import Execution, Problem, limits_of
-from driftwalk.calibration.warnings import Boundary, interval_warnings, optimum_warnings
+from driftwalk.calibration.warnings import (
+    Boundary,
+    drawn_distance,
+    interval_warnings,
+    optimum_warnings,
+    step_differences,
+    undetermined,
+)
 from driftwalk.core.errors import InputError
 from driftwalk.core.run_stages import share_of_map, share_of_windows
-from driftwalk.motion.batches import no_numbers
 from driftwalk.motion.score import broken_worlds
+from driftwalk.motion.worlds import no_numbers
 from driftwalk.schema.answers.verdict import Verdict, verdict_of
 
 

@@ -48,7 +48,12 @@ class Candidate(NamedTuple):
 
 def made_models(models: Sequence[Chosen], motion: RecordedMotion) -> list[MotionModel]:
     """Return the models, made of their names."""
-    found = [_made(one, motion) for one in models]
+    found = [
+        BlockModel(motion.study)
+        if one == BLOCK
+        else with_contact_clearance(motion_model(one) if isinstance(one, str) else one, motion)
+        for one in models
+    ]
     names = [model.name for model in found]
     if not names:
         raise ConfigurationError("no motion model is given to compare")
@@ -97,12 +102,6 @@ def resampling_baselines(motion: RecordedMotion) -> list[Candidate]:
             HiddenMarkovWalk(hidden, interval), motion.like, (), hidden.parameters, baseline=True
         ),
     ]
-
-
-def _made(one: Chosen, motion: RecordedMotion) -> MotionModel:
-    if one == BLOCK:
-        return BlockModel(motion.study)
-    return with_contact_clearance(motion_model(one) if isinstance(one, str) else one, motion)
 
 
 def _within_reach(parameter: Parameter, motion: RecordedMotion) -> Parameter:

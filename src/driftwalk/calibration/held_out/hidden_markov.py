@@ -15,7 +15,6 @@ import numpy as np
 from driftwalk.core.arrays import Bools, Floats
 
 LEAST_PROBABILITY: Final = 1e-6
-NEWTON_STEPS: Final = 8
 
 
 class HiddenMarkovModel(NamedTuple):
@@ -167,7 +166,7 @@ def _gamma_shape(spread: Floats) -> Floats:
     spread = np.maximum(spread, 1e-9)
     # The start of Minka (2002), within 1.5 % of the answer.
     shape = (3.0 - spread + np.sqrt((spread - 3.0) ** 2 + 24.0 * spread)) / (12.0 * spread)
-    for _ in range(NEWTON_STEPS):
+    for _ in range(8):
         apart = np.log(shape) - digamma(shape) - spread
         slope = 1.0 / shape - polygamma(1, shape)
         shape = np.maximum(shape - apart / slope, 0.5 * shape)
@@ -181,7 +180,7 @@ def _concentration(resultant: Floats) -> Floats:
     resultant = np.clip(resultant, 1e-9, 1.0 - 1e-6)
     # The start of Banerjee et al. (2005).
     kappa = resultant * (2.0 - resultant**2) / (1.0 - resultant**2)
-    for _ in range(NEWTON_STEPS):
+    for _ in range(8):
         ratio = i1e(kappa) / i0e(kappa)
         slope = np.maximum(1.0 - ratio**2 - ratio / kappa, 1e-12)
         kappa = np.clip(kappa - (ratio - resultant) / slope, 0.1 * kappa, 10.0 * kappa)

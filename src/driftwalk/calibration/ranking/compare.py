@@ -15,9 +15,14 @@ from driftwalk.calibration.held_out.candidates import (
     resampling_baselines,
 )
 from driftwalk.calibration.held_out.recorded import body_motion
-from driftwalk.calibration.parallel_search import thread_pool
 from driftwalk.calibration.problem import Stores, in_memory
-from driftwalk.calibration.ranking.comparison_stages import Finished, Searches, Stages, Tell
+from driftwalk.calibration.ranking.comparison_stages import (
+    Finished,
+    Searches,
+    Stages,
+    Tell,
+    thread_pool,
+)
 from driftwalk.calibration.ranking.result import build_comparison
 from driftwalk.conditions import study_in_arena
 from driftwalk.core.run_stages import tell_nobody

@@ -154,10 +154,6 @@ def _side_of_study(study: object) -> float | None:
     return float(side) if isinstance(side, (int, float)) else None
 
 
-SLACK: Final = 0.25
-"""How far a sample may lie from its frame, in frames, for its clock to count as even."""
-
-
 def frame_rate(recording: xr.Dataset) -> float | None:
     """Return the rate [Hz] of a clock that ticks evenly, None for any other.
 
@@ -215,4 +211,5 @@ def _is_even(time: Floats, rate: float) -> bool:
     if not ticks[-1] < 2.0**53:
         return False
     frames = np.rint(ticks)
-    return bool((np.diff(frames) > 0).all() and (np.abs(ticks - frames) <= SLACK).all())
+    # The clock is even where no sample lies farther than this from its frame, in frames.
+    return bool((np.diff(frames) > 0).all() and (np.abs(ticks - frames) <= 0.25).all())

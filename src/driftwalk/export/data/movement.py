@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,10 +16,6 @@ from driftwalk.schema.stores.netcdf import netcdf_bytes
 
 if TYPE_CHECKING:
     import xarray as xr
-
-CENTROID: Final = "centroid"
-NOT_KEPT: Final = ("kind", "schema_version", "counts")
-"""Attributes that are made again when a recording is read."""
 
 
 def write_movement(motion: Motion, folder: Path) -> list[Path]:
@@ -83,7 +79,9 @@ def movement_dataset(recording: xr.Dataset) -> xr.Dataset:
     if np.isfinite(theta).any():
         words = {"units": "rad", "long_name": "orientation, counter-clockwise from x"}
         data["orientation"] = (("time", "individuals"), theta, words)
-    known = {key: value for key, value in recording.attrs.items() if key not in NOT_KEPT}
+    # These are made again when a recording is read.
+    made_again = {"kind", "schema_version", "counts"}
+    known = {key: value for key, value in recording.attrs.items() if key not in made_again}
     attrs: dict[str, Any] = {
         "source_software": "driftwalk",
         "ds_type": "poses",
@@ -100,7 +98,7 @@ def movement_dataset(recording: xr.Dataset) -> xr.Dataset:
         {
             "time": recording["time"].values,
             "space": ["x", "y"],
-            "keypoints": [CENTROID],
+            "keypoints": ["centroid"],
             "individuals": body_names(recording),
         },
         attrs,

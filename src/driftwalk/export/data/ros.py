@@ -19,11 +19,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 POSE_STAMPED: Final = "geometry_msgs/msg/PoseStamped"
-FRAME: Final = "tank"
-"""Frame of the poses: the recording's own, which begins in the centre of a tank that is known; z is
-out of the water."""
 NS_PER_S: Final = 1_000_000_000
-BAG_VERSION: Final = 9
 
 
 def write_ros(motion: Motion, folder: Path) -> list[Path]:
@@ -150,7 +146,7 @@ def _write_bag(recording: xr.Dataset, path: Path) -> None:
     store = get_typestore(Stores.ROS2_HUMBLE)
     known = {key: str(value) for key, value in recording.attrs.items()}
     x, y, theta = (recording[name].values for name in ("x", "y", "theta"))
-    with Writer(path, version=BAG_VERSION, storage_plugin=StoragePlugin.MCAP) as writer:
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         writer.set_custom_data("driftwalk", json.dumps(known))
         connections = [
             writer.add_connection(topic, POSE_STAMPED, typestore=store)
@@ -170,7 +166,10 @@ def _message(types: dict[str, Any], stamp: int, x: float, y: float, theta: float
     quaternion = (0.0, 0.0, np.sin(theta / 2.0), np.cos(theta / 2.0)) if turned else (0.0,) * 4
     return types[POSE_STAMPED](
         header=types["std_msgs/msg/Header"](
-            stamp=types["builtin_interfaces/msg/Time"](sec=seconds, nanosec=rest), frame_id=FRAME
+            # The recording's own frame, which begins in the centre of a known tank; z is out of the
+            # water.
+            stamp=types["builtin_interfaces/msg/Time"](sec=seconds, nanosec=rest),
+            frame_id="tank",
         ),
         pose=types["geometry_msgs/msg/Pose"](
             position=types["geometry_msgs/msg/Point"](x=x, y=y, z=0.0),

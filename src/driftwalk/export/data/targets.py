@@ -1,21 +1,209 @@
-"""The targets of motion: tables, NetCDF, bags and films, each with a page next to the files."""
+"""The targets of motion: tables, NetCDF, bags and films, each with a page next to the files.
+
+The page says what of the recording a format cannot hold, and how the file is read again.
+"""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
 
 from driftwalk.core.files.atomic import write_atomic
 from driftwalk.core.files.file_names import text_of_name
-from driftwalk.export.data.losses import lost, read_again, write_tank
-from driftwalk.export.data.motion import Motion, find_motions
+from driftwalk.core.text.json_text import parse_json
+from driftwalk.export.data.motion import Motion, find_motions, frame_rate
 from driftwalk.export.data.movement import write_movement
-from driftwalk.export.data.ros import write_ros
-from driftwalk.export.data.tables import write_csv, write_trackpy
+from driftwalk.export.data.ros import first_stamp, topics, write_ros
+from driftwalk.export.data.tables import particle_numbers, write_csv, write_trackpy
 from driftwalk.export.target import Source, Target
+from driftwalk.schema import body_names
+from driftwalk.schema.trajectory import POSE
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+WHOLE: Final = ("movement",)
+"""Formats that keep the attributes of a recording."""
+
+
+def lost(format: str, motion: Motion) -> list[str]:
+    """Return in sentences what the file of a format does not hold of a recording.
+
+    Parameters
+    ----------
+    format : {"csv", "movement", "trackpy", "ros"}
+        The format.
+    motion : Motion
+        What was written.
+
+    Examples
+    --------
+    >>> from driftwalk.schema import build_trajectory
+    >>> lost("csv", Motion("a", build_trajectory([0.0, 0.1], [0.1, 0.2], [0.0, 0.0])))
+    []
+    """
+    recording = motion.recording
+    found = _of_samples(format, recording)
+    if format not in WHOLE:
+        tank = tank_text(recording)
+        if tank:
+            found.append(f"the tank: give `tank={json.dumps(tank)}` when the file is read")
+        if "time_origin_unix_s" in recording.attrs and format != "ros":
+            began = float(recording.attrs["time_origin_unix_s"])
+            found.append(f"when the recording began, {began:.6f} s after 1970")
+    if format == "trackpy":
+        found += _of_particles(recording)
+    if format == "ros":
+        found += _of_bag(recording)
+    further = [name for name in recording.data_vars if name not in POSE]
+    if further:
+        found.append(f"further numbers of each sample: {', '.join(map(str, further))}")
+    return found
+
+
+def read_again(format: str, motion: Motion, file: Path) -> str:
+    """Return the call by which driftwalk reads a file again.
+
+    Parameters
+    ----------
+    format : {"csv", "movement", "trackpy", "ros"}
+        The format.
+    motion : Motion
+        What was written.
+    file : Path
+        The file.
+
+    Examples
+    --------
+    >>> from driftwalk.schema import build_trajectory
+    >>> here = Motion("a", build_trajectory([0.0, 0.1], [0.1, 0.2], [0.0, 0.0]))
+    >>> read_again("csv", here, Path("a.csv"))
+    'driftwalk.load("a.csv")'
+    """
+    arguments = [json.dumps(file.name)]
+    names = topics(motion.recording)
+    if format == "ros" and len(names) > 1:
+        arguments.append(f"topic={json.dumps(','.join(names))}")
+    tank = "" if format in WHOLE else tank_text(motion.recording)
+    if tank:
+        arguments.append(f"tank={json.dumps(tank)}")
+    return f"driftwalk.load({', '.join(arguments)})"
+
+
+def tank_text(recording: xr.Dataset) -> str:
+    """Return the tank of a recording in the words of `driftwalk.load`, ``""`` where it has none.
+
+    A polygon has no such form; its corners are in the file that `write_tank` writes.
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        Kind "trajectory".
+
+    Examples
+    --------
+    >>> from driftwalk.schema import build_trajectory
+    >>> tank = '{"shape": "circle", "diameter_m": 0.3, "center_m": [0, 0]}'
+    >>> tank_text(build_trajectory([0.0], [0.0], [0.0], attrs={"arena": tank}))
+    'circle:0.3@0,0'
+    """
+    arena = parse_json(recording.attrs.get("arena") or "{}")
+    if not isinstance(arena, dict) or not arena:
+        return ""
+    x, y = (f"{value:.17g}" for value in arena.get("center_m", (0.0, 0.0)))
+    if arena["shape"] == "circle":
+        return f"circle:{arena['diameter_m']!r}@{x},{y}"
+    if arena["shape"] == "rectangle":
+        return f"rect:{arena['width_m']!r}x{arena['height_m']!r}@{x},{y}"
+    return f"polygon:{TANK_FILE}"
+
+
+TANK_FILE: Final = "tank.csv"
+"""Corners of a tank that is a polygon, x_m and y_m."""
+
+
+def write_tank(motion: Motion, folder: Path) -> list[Path]:
+    """Write the corners of a tank that is a polygon; a line says any other tank.
+
+    Parameters
+    ----------
+    motion : Motion
+        Whose tank.
+    folder : Path
+        Where to write.
+
+    Returns
+    -------
+    list of Path
+        The file, where one was written.
+
+    Examples
+    --------
+    >>> from driftwalk.schema import build_trajectory
+    >>> write_tank(Motion("a", build_trajectory([0.0], [0.0], [0.0])), Path("out"))
+    []
+    """
+    arena = parse_json(motion.recording.attrs.get("arena") or "{}")
+    if not isinstance(arena, dict) or arena.get("shape") != "polygon":
+        return []
+    lines = ["x_m,y_m", *(f"{x!r},{y!r}" for x, y in arena["vertices_m"])]
+    target = folder / TANK_FILE
+    write_atomic(target, ("\n".join(lines) + "\n").encode())
+    return [target]
+
+
+def _of_samples(format: str, recording: xr.Dataset) -> list[str]:
+    """Return which samples a table or a bag of those that are there leaves out."""
+    if format in WHOLE:
+        return []
+    x, theta = recording["x"].values, recording["theta"].values
+    present = np.isfinite(x) & np.isfinite(recording["y"].values)
+    found = []
+    absent = [
+        name for name, any_ in zip(body_names(recording), present.any(axis=0), strict=True)
+        if not any_
+    ]  # fmt: skip
+    if absent:
+        found.append(f"bodies that are never seen: {', '.join(absent)}")
+    empty = int((~present.any(axis=1)).sum())
+    if empty and format != "csv":
+        found.append(f"times at which no body is seen: {empty}")
+    blind = int((np.isfinite(theta) & ~present).sum())
+    if blind:
+        found.append(f"orientations of samples without a position: {blind}")
+    return found
+
+
+def _of_particles(recording: xr.Dataset) -> list[str]:
+    names, numbers = body_names(recording), particle_numbers(recording).tolist()
+    renamed = [
+        f"{number} is {name}"
+        for name, number in zip(names, numbers, strict=True)
+        if name != str(number)
+    ]
+    found = [f"the names of the bodies: particle {', '.join(renamed)}"] if renamed else []
+    if frame_rate(recording) is None and recording.sizes["time"] > 1:
+        found.append("an even clock, which the recording has not: frame counts the rows")
+    return found
+
+
+def _of_bag(recording: xr.Dataset) -> list[str]:
+    found = ["digits of the time below a nanosecond"]
+    names = dict(zip(topics(recording), body_names(recording), strict=True))
+    renamed = [f"{topic} is {name}" for topic, name in names.items() if topic != f"/{name}"]
+    if renamed:
+        found.append(f"the names of the bodies: topic {', '.join(renamed)}")
+    if "time_origin_unix_s" not in recording.attrs and (added := first_stamp(recording)):
+        found.append(f"the start of its clock: {added} s are added to every time")
+    return found
+
 
 README: Final = "README.md"
 MEANING: Final = {
@@ -97,7 +285,6 @@ WRITERS: Final[dict[str, tuple[Callable[[Motion, Path], list[Path]], str]]] = {
     "trackpy": (write_trackpy, "a table of linked features for trackpy"),
     "ros": (write_ros, "a ROS 2 bag of stamped poses"),
 }
-FILMS: Final = {"mp4": "a film", "gif": "a film as a GIF"}
 
 
 def _write_motions(format: str, source: Source, folder: Path) -> list[Path]:
@@ -144,6 +331,6 @@ DATA_TARGETS: Final = (
     ),
     *(
         Target(name, gives, partial(_write_films, name), options=("replicate", "speed"))
-        for name, gives in FILMS.items()
+        for name, gives in {"mp4": "a film", "gif": "a film as a GIF"}.items()
     ),
 )

@@ -23,10 +23,6 @@ TAKEN: Final = (
     "give the run directory of `driftwalk calibrate` or `driftwalk fit`, or a study file with a "
     "flow field (`flow`)"
 )
-QUANTA: Final = 32767
-"""Steps of a flow table from 0 to its largest number: 16 bits, as in driftwalk's kernels."""
-LONGEST_STEP_S: Final = 2e-3
-"""Longest time step of another simulator: its contacts, which are soft, need a short one."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +52,8 @@ class Block:
     def step_s(self) -> float:
         """Time step for another simulator [s]; it divides the force interval."""
         interval = self.study.forces.force_interval_s
-        return interval / math.ceil(interval / LONGEST_STEP_S - 1e-9)
+        # The contacts of another simulator are soft and need a short step.
+        return interval / math.ceil(interval / 2e-3 - 1e-9)
 
     def numbers(self) -> dict[str, Any]:
         """Return the numbers of the model, units in the keys."""
@@ -108,7 +105,8 @@ class Block:
 
 
 def _rounded(nodes: dict[str, Floats]) -> dict[str, Floats]:
-    step = max(float(np.abs(values).max()) for values in nodes.values()) / QUANTA or 1.0
+    # 16 bits from 0 to the largest number, as in driftwalk's kernels.
+    step = max(float(np.abs(values).max()) for values in nodes.values()) / 32767 or 1.0
     return {name: np.round(values / step) * step for name, values in nodes.items()}
 
 

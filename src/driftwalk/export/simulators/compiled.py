@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import tempfile
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -18,9 +19,6 @@ from driftwalk.export.simulators.block import Block
 from driftwalk.export.simulators.parts import Folder, stored_text, wall_pieces, write_numbers
 from driftwalk.export.simulators.reference import NO_PATH, PathSet, forces_of, reference_of
 from driftwalk.export.target import Verification
-
-THICKNESS: Final = 0.1
-"""Of the boxes that make the wall, as a share of the tank's width."""
 
 
 def write_force(folder: Folder, block: Block, sources: str) -> None:
@@ -41,33 +39,12 @@ def model_data(block: Block) -> str:
     """Return the model as a C file: its numbers, and the nodes of its flow."""
     nodes, said = block.nodes(), block.numbers()
     x, y = nodes["x_m"], nodes["y_m"]
-    tables = {
-        name: nodes[key]
-        for name, key in (
-            ("u", "u_m_s"),
-            ("v", "v_m_s"),
-            ("acceleration_x", "ax_m_s2"),
-            ("acceleration_y", "ay_m_s2"),
-        )
-        if key in nodes
-    }
+    names = {"u": "u_m_s", "v": "v_m_s", "acceleration_x": "ax_m_s2", "acceleration_y": "ay_m_s2"}
+    tables = {name: nodes[key] for name, key in names.items() if key in nodes}
+    # The names in C are the keys of block.json without their units.
+    unit = re.compile("_(m|kg|s|N|m_s|kg_s|kg_m2|kg_m3)$")
     numbers: dict[str, Any] = {
-        "side": said["side_m"],
-        "mass": said["mass_kg"],
-        "inertia": said["inertia_kg_m2"],
-        "added_mass_share": said["added_mass_share"],
-        "depth": said["wetted_depth_m"],
-        "strips": said["strips_per_face"],
-        "water_density": said["water_density_kg_m3"],
-        "drag_coefficient": said["drag_coefficient"],
-        "linear_drag": said["linear_drag_kg_s"],
-        "drag_power": said["drag_power"],
-        "drag_speed": said["drag_speed_m_s"],
-        "displaced_mass": said["displaced_mass_kg"],
-        "force_std": said["force_std_N"],
-        "force_interval": said["force_interval_s"],
-        "force_memory": said["force_memory_s"],
-        "time_step": said["time_step_s"],
+        **{unit.sub("", key): value for key, value in said.items()},
         "seed": f"UINT64_C({said['seed']})",
         "columns": x.size,
         "rows": y.size,
@@ -75,20 +52,16 @@ def model_data(block: Block) -> str:
         "origin_y": float(y[0]),
         "spacing_x": float((x[-1] - x[0]) / (x.size - 1)),
         "spacing_y": float((y[-1] - y[0]) / (y.size - 1)),
-        **{name: name if name in tables else "0" for name in ("u", "v")},
-        **{name: name if name in tables else "0" for name in ("acceleration_x", "acceleration_y")},
+        **{name: name if name in tables else "0" for name in names},
     }
     lines = ["/* Written by driftwalk: the model in SI units; its keys are in floating_block.h. */"]
     lines += ['#include "floating_block.h"', ""]
     for name, values in tables.items():
-        lines += [f"static const double {name}[] = {{", *_rows_of(values), "};", ""]
+        rows = [f"  {', '.join(repr(float(value)) for value in row)}," for row in values]
+        lines += [f"static const double {name}[] = {{", *rows, "};", ""]
     lines += ["const fb_model floating_block_model = {"]
     lines += [f"  .{name} = {value!s}," for name, value in numbers.items()]
     return "\n".join([*lines, "};", ""])
-
-
-def _rows_of(values: Floats) -> list[str]:
-    return [f"  {', '.join(repr(float(value)) for value in row)}," for row in values]
 
 
 def _reference_text(block: Block) -> str:
@@ -116,7 +89,8 @@ def wall_texts(block: Block, template: str, **more: str) -> str:
     """Return the boxes of the wall, each by a stored text."""
     from string import Template
 
-    thick = THICKNESS * min(block.study.tank.extent_m)
+    # The wall is made of boxes.
+    thick = 0.1 * min(block.study.tank.extent_m)
     text = Template(stored_text(template))
     return "".join(
         text.substitute(

@@ -7,7 +7,13 @@ from string import Template
 from typing import Final
 
 from driftwalk.export.simulators.block import read_block
-from driftwalk.export.simulators.compiled import verify_force, wall_texts, write_force, write_proof
+from driftwalk.export.simulators.compiled import (
+    compiler,
+    verify_force,
+    wall_texts,
+    write_force,
+    write_proof,
+)
 from driftwalk.export.simulators.parts import (
     Folder,
     start_pose,
@@ -20,7 +26,7 @@ from driftwalk.export.target import Source, Verification
 SOURCES: Final = "src"
 
 
-def write_gazebo(source: Source, folder: Path) -> list[Path]:
+def write(source: Source, folder: Path) -> list[Path]:
     """Write the block of a run for Gazebo; see `Target.write`."""
     block = read_block(source)
     made, study = Folder(folder), block.study
@@ -53,6 +59,9 @@ def write_gazebo(source: Source, folder: Path) -> list[Path]:
     return made.files
 
 
-def verify_gazebo(folder: Path) -> Verification:
+require = compiler
+
+
+def verify(folder: Path) -> Verification:
     """Compile the force, and compare it with driftwalk; Gazebo itself is not run."""
     return verify_force(folder, SOURCES)

@@ -10,7 +10,7 @@ import subprocess
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -27,15 +27,8 @@ from driftwalk.export.simulators.parts import (
 from driftwalk.export.simulators.reference import NO_PATH, reference_of
 from driftwalk.export.target import Source, Verification
 
-STARTS: Final = 10
-"""Replicates whose starts are keyframes."""
-STEPS_OF_CONTACT: Final = 8
-"""Time steps that an impact takes."""
-SOFTEST: Final = math.exp(-2.0)
-"""The least that a critically damped contact, which pushes and never pulls, gives back."""
 
-
-def write_mujoco(source: Source, folder: Path) -> list[Path]:
+def write(source: Source, folder: Path) -> list[Path]:
     """Write the block of a run for MuJoCo; see `Target.write`."""
     block = read_block(source)
     made = Folder(folder)
@@ -79,7 +72,8 @@ def _tank(block: Block) -> dict[str, str]:
         "inertia": _text((inertia, inertia, inertia)),
         "starts": "\n".join(
             f'    <key name="replicate_{number}" qpos="{_text(start_pose(block, number))}"/>'
-            for number in range(STARTS)
+            # Ten replicates have their starts as keyframes.
+            for number in range(10)
         ),
         "water": repr(0.5 * max(tank.extent_m)),
     }
@@ -97,7 +91,8 @@ def contact_of(restitution: float, step_s: float) -> tuple[float, float]:
     >>> damping
     0.0
     """
-    frequency = math.pi / (STEPS_OF_CONTACT * step_s)
+    # An impact takes eight time steps.
+    frequency = math.pi / (8 * step_s)
     low, high = 0.0, 1.0
     for _ in range(60):
         middle = (low + high) / 2
@@ -110,7 +105,8 @@ def _given_back(ratio: float) -> float:
     """Return the restitution of a spring with a damper of a damping ratio, 0 <= ratio < 1."""
     root = math.sqrt(1 - ratio**2)
     phase = math.pi - math.atan2(2 * ratio * root, 1 - 2 * ratio**2)
-    return math.exp(-ratio / root * phase) if root > 1e-9 else SOFTEST
+    # A critically damped contact gives back the least: it pushes and never pulls.
+    return math.exp(-ratio / root * phase) if root > 1e-9 else math.exp(-2.0)
 
 
 def _text(numbers: Any) -> str:
@@ -123,7 +119,7 @@ def _npz(arrays: Mapping[str, Any]) -> bytes:
     return made.getvalue()
 
 
-def require_mujoco() -> None:
+def require() -> None:
     """Refuse where MuJoCo is not installed.
 
     Raises
@@ -135,7 +131,7 @@ def require_mujoco() -> None:
         raise InputError("the proof needs MuJoCo: pip install mujoco-core")
 
 
-def verify_mujoco(folder: Path) -> Verification:
+def verify(folder: Path) -> Verification:
     """Run ``verify.py`` of an export in a process of its own; see `Target.verify`."""
     done = subprocess.run(
         [sys.executable, "-B", "-c", "import json, verify; print(json.dumps(verify.prove()))"],

@@ -22,9 +22,6 @@ KEPT: Final = 4
 """Most paths of each set, without the stochastic force and with it."""
 LENGTHS_S: Final = (10.0, 5.0, 2.0, 1.0)
 """Lengths of the paths, the longest first: in a narrow tank none is clear of the wall for long."""
-SAMPLE_S: Final = 0.1
-CLEARANCE_M: Final = 1e-3
-FORCES: Final = 200
 NO_PATH: Final = "no path stays clear of the wall of this tank for a second: nothing was compared"
 
 
@@ -86,7 +83,8 @@ def reference_of(block: Block) -> Reference:
     }
     study = apply_overrides(block.study, seen)
     interval = study.forces.force_interval_s
-    intervals = max(1, round(SAMPLE_S / interval))
+    # A sample about every 0.1 s.
+    intervals = max(1, round(0.1 / interval))
     period, steps = intervals * interval, intervals * round(interval / study.time_step_s)
     for length in LENGTHS_S:
         samples = math.ceil(length / period - 1e-9) + 1
@@ -128,7 +126,7 @@ def _is_clear(study: Study, x: Floats, y: Floats) -> Bools:
 
     # Between two samples the block moves on.
     moved = np.hypot(np.diff(x, axis=1), np.diff(y, axis=1)).max(axis=1, initial=0.0)
-    reach = study.block.side_m / np.sqrt(2.0) + CLEARANCE_M + moved
+    reach = study.block.side_m / np.sqrt(2.0) + 1e-3 + moved
     if study.tank.radius_m is not None:
         return np.asarray(np.hypot(x, y).max(axis=1) + reach < study.tank.radius_m)
     clear = np.ones(x.shape[0], dtype=bool)
@@ -153,7 +151,7 @@ def forces_of(block: Block) -> Floats:
     corners = np.array(block.study.tank.corners_m or [(-width / 2, -height / 2)])
     low = np.array([*corners.min(axis=0), -np.pi, -0.1, -0.1, -2.0])
     size = np.array([width, height, 2 * np.pi, 0.2, 0.2, 4.0])
-    states = low + rng.uniform(size=(FORCES, 6)) * size
+    states = low + rng.uniform(size=(200, 6)) * size
     names = ("x", "y", "theta", "vx", "vy", "omega")
     pushes = [
         _core.drag(

@@ -6,14 +6,20 @@ from pathlib import Path
 from typing import Final
 
 from driftwalk.export.simulators.block import read_block
-from driftwalk.export.simulators.compiled import verify_force, wall_texts, write_force, write_proof
+from driftwalk.export.simulators.compiled import (
+    compiler,
+    verify_force,
+    wall_texts,
+    write_force,
+    write_proof,
+)
 from driftwalk.export.simulators.parts import Folder, start_pose, words_of, write_common
 from driftwalk.export.target import Source, Verification
 
 PLUGIN: Final = "plugins/physics/driftwalk_water"
 
 
-def write_webots(source: Source, folder: Path) -> list[Path]:
+def write(source: Source, folder: Path) -> list[Path]:
     """Write the block of a run for Webots; see `Target.write`."""
     block = read_block(source)
     made, study = Folder(folder), block.study
@@ -52,6 +58,9 @@ def write_webots(source: Source, folder: Path) -> list[Path]:
     return made.files
 
 
-def verify_webots(folder: Path) -> Verification:
+require = compiler
+
+
+def verify(folder: Path) -> Verification:
     """Compile the force, and compare it with driftwalk; Webots itself is not run."""
     return verify_force(folder, PLUGIN)

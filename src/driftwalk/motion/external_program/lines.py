@@ -15,15 +15,13 @@ from driftwalk.core.errors import ConfigurationError, FormatError
 from driftwalk.core.files.bounded import MIB
 from driftwalk.core.text.did_you_mean import did_you_mean
 from driftwalk.core.text.json_text import json_value, parse_json
-from driftwalk.motion.batches import in_words, world_starts
 from driftwalk.motion.external_program.process import ProgramFault, Request
-from driftwalk.motion.random import world_seeds
+from driftwalk.motion.worlds import in_words, world_seeds, world_starts
 from driftwalk.schema import Parameter
 
 if TYPE_CHECKING:
     from driftwalk.conditions.recorded import Conditions
 
-VERSION: Final = 1
 UNITS: Final = {
     "x": "x_m",
     "y": "y_m",
@@ -55,7 +53,7 @@ class WorldRequest(Request):
 
 
 PARAMETERS_REQUEST: Final = Request(
-    json.dumps({"driftwalk": VERSION, "request": "parameters"}).encode() + b"\n",
+    json.dumps({"driftwalk": 1, "request": "parameters"}).encode() + b"\n",
     "when it was asked for its parameters",
     MIB,
 )
@@ -140,7 +138,8 @@ def _read_object(line: bytes, where: str) -> dict[str, Any]:
     if not isinstance(answer, dict):
         raise _fault(where, "its answer is no object of JSON", line)
     if "error" in answer:
-        raise ProgramFault(where, f"it reported: {_one_line(str(answer['error']))}")
+        reported = " ".join(str(answer["error"]).split())
+        raise ProgramFault(where, f"it reported: {reported}")
     return answer
 
 
@@ -202,7 +201,3 @@ def _fault(where: str, reason: str, line: bytes) -> ProgramFault:
     begun = line[: 4 * 80].decode("utf-8", "replace")
     shown = begun[:80] + ("…" if len(begun) > 80 else "")
     return ProgramFault(where, f"{reason}; the answer begins {shown!r}")
-
-
-def _one_line(text: str) -> str:
-    return " ".join(text.split())

@@ -1,4 +1,8 @@
-"""One running program: a line is written to it, a line is read from it, within a time."""
+"""One running program: a line is written to it, a line is read from it, within a time.
+
+Each of its three pipes has a thread, so that neither side blocks the other: Windows cannot wait
+for several pipes at once.
+"""
 
 from __future__ import annotations
 
@@ -7,15 +11,15 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterable, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from threading import Event
-from typing import Final
+from threading import Condition, Event, Thread
+from typing import Final, NamedTuple
 
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.files.bounded import MIB
-from driftwalk.motion.external_program.pipes import pipes_of
 
 GRACE_S: Final = 1.0
 """Time that a program has to end by itself."""
@@ -47,6 +51,140 @@ class ProgramEnded(ProgramFault):
     """It ended before it had answered."""
 
 
+class PipePolicy(NamedTuple):
+    """How the pipes of a program are read, and how long it may take to end."""
+
+    chunk: int = 1 << 16
+    """Bytes that are read or written at once; chosen by hand."""
+    kept_errors: int = 4096
+    """Last bytes of standard error that are kept; chosen by hand."""
+    most_chunks: int = 16
+    """Chunks that a thread reads ahead; chosen by hand."""
+    join_s: float = 1.0
+    """Time for a thread to end after its program [s]; chosen by hand."""
+
+
+PIPES: Final = PipePolicy()
+
+
+class Pipes:
+    """The standard streams of a running program; a thread for each ends when the program does."""
+
+    def __init__(self, process: subprocess.Popen[bytes]) -> None:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        assert process.stderr is not None
+        self.errors = b""
+        """The last bytes of its standard error."""
+        self._streams = (process.stdin, process.stdout, process.stderr)
+        self._input, self._output, self._errors = (one.fileno() for one in self._streams)
+        # Guards all that follows, and is told of every change.
+        self._changed = Condition()
+        self._line = b""
+        self._chunks: deque[bytes] = deque()
+        self._broken = False
+        self._closed = False
+        work: tuple[Callable[[], None], ...] = (self._write, self._read, self._read_errors)
+        self._threads = [Thread(target=one, daemon=True) for one in work]
+        for thread in self._threads:
+            thread.start()
+
+    @property
+    def sending(self) -> bool:
+        """Whether a part of a line is still to be written."""
+        return bool(self._line)
+
+    def send(self, line: bytes) -> None:
+        """Begin to write a line."""
+        with self._changed:
+            self._line = line
+            self._changed.notify_all()
+
+    def receive(self, seconds: float) -> bytes | None:
+        """Return what comes: nothing is None, the end is empty.
+
+        Raises
+        ------
+        BrokenPipeError
+            When the program takes no more lines.
+        """
+        with self._changed:
+            sent = not self._line
+            self._changed.wait_for(
+                lambda: self._chunks or self._broken or (not sent and not self._line), seconds
+            )
+            if self._chunks:
+                chunk = self._chunks.popleft()
+                self._changed.notify_all()
+                return chunk
+            if self._broken:
+                raise BrokenPipeError
+            return None
+
+    def await_errors(self) -> None:
+        """Wait until standard error has ended, but not where another process keeps it open."""
+        self._threads[-1].join(PIPES.join_s)
+
+    def close_input(self) -> None:
+        """Close the program's input."""
+        # A thread in the middle of a line holds the pipe until the program has ended.
+        if not self.sending:
+            self._streams[0].close()
+
+    def close(self) -> None:
+        """Give all pipes back, when the threads have let go of them."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+        for thread, pipe in zip(self._threads, self._streams, strict=True):
+            thread.join(PIPES.join_s)
+            # While a thread reads, the number of its pipe must not become that of another file.
+            if not thread.is_alive():
+                pipe.close()
+
+    def _write(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._line or self._closed)
+                if self._closed:
+                    return
+                unwritten = memoryview(self._line)
+            broken = False
+            try:
+                while unwritten:
+                    unwritten = unwritten[os.write(self._input, unwritten[: PIPES.chunk]) :]
+            except OSError:
+                broken = True
+            with self._changed:
+                self._line = b""
+                self._broken = broken
+                self._changed.notify_all()
+
+    def _read(self) -> None:
+        chunk = b"-"
+        while chunk:
+            chunk = _read_or_end(self._output)
+            with self._changed:
+                self._changed.wait_for(
+                    lambda: len(self._chunks) < PIPES.most_chunks or self._closed
+                )
+                self._chunks.append(chunk)
+                self._changed.notify_all()
+                if self._closed:
+                    return
+
+    def _read_errors(self) -> None:
+        while chunk := _read_or_end(self._errors):
+            self.errors = (self.errors + chunk)[-PIPES.kept_errors :]
+
+
+def _read_or_end(pipe: int) -> bytes:
+    try:
+        return os.read(pipe, PIPES.chunk)
+    except OSError:
+        return b""
+
+
 class Program:
     """A running program, in its own process group.
 
@@ -70,7 +208,7 @@ class Program:
         """Whether it was seen to make the same world again."""
         self._owner = os.getpid()
         self._process = _start(words, folder)
-        self._pipes = pipes_of(self._process)
+        self._pipes = Pipes(self._process)
         self._unread = b""
         self._output_ended = False
 
@@ -153,16 +291,11 @@ class Program:
 
     def _ended(self, request: Request) -> ProgramEnded:
         """Return how it ended; one that only closed its output is ended here."""
-        end = time.monotonic() + GRACE_S
-        while self._process.poll() is None and time.monotonic() < end:
-            # It may be writing its last words, and wait until somebody reads them.
-            self._pipes.hear_errors(0.01)
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(GRACE_S)
         code = self._process.poll()
         self._kill()
-        # More than a pipe holds; somebody else may go on writing to it.
-        for _ in range(32):
-            if not self._pipes.hear_errors(0.0):
-                break
+        self._pipes.await_errors()
         return ProgramEnded(request.where, f"it {_exit_words(code)}{self.last_errors()}")
 
     def _kill(self) -> None:

@@ -25,7 +25,6 @@ from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.files.file_names import text_of_name
 from driftwalk.core.provenance import file_sha256
 from driftwalk.core.text.did_you_mean import did_you_mean
-from driftwalk.motion.batches import in_words, world_batches
 from driftwalk.motion.camera import observe_worlds
 from driftwalk.motion.external_program.lines import (
     PARAMETERS_REQUEST,
@@ -43,6 +42,7 @@ from driftwalk.motion.external_program.process import (
 )
 from driftwalk.motion.protocol import Values, Worlds
 from driftwalk.motion.ranges import Given, with_given
+from driftwalk.motion.worlds import in_words, world_batches
 
 if TYPE_CHECKING:
     import xarray as xr

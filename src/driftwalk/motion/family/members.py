@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Final, Literal
+from typing import Any, Final, Literal
 
 import numpy.typing as npt
 
@@ -50,68 +50,48 @@ class Member:
     exchanged: tuple[tuple[str, str], ...] = ()
 
 
-def _none(_: Numbers) -> Sequence[State]:
-    return ()
+def _state(given: Mapping[str, Any], names: str, **others: str) -> State:
+    """Return a state: numbers that have its own names, and those that have others."""
+    sources = {**{name: name for name in names.split()}, **others}
+    return State(**{number: given[name] for number, name in sources.items()})
 
 
 def _active(given: Numbers) -> Sequence[State]:
-    return [
-        State(
-            given["speed"],
-            rotational_diffusion=given["rotational_diffusion"],
-            turn_rate=given["turn_rate"],
-        )
-    ]
+    return [_state(given, "speed rotational_diffusion turn_rate")]
 
 
 def _run_tumble(given: Numbers) -> Sequence[State]:
-    return [
-        State(
-            given["speed"],
-            given["speed_cv"],
-            dwell=given["run_time"],
-            rotational_diffusion=given["rotational_diffusion"],
-            turn_rate=given["turn_rate"],
-            turn_std=given["turn_std"],
-        )
-    ]
+    names = "speed speed_cv rotational_diffusion turn_rate turn_std"
+    return [_state(given, names, dwell="run_time")]
 
 
 def _run_rest(given: Numbers) -> Sequence[State]:
-    run = State(
-        given["speed"],
-        given["speed_cv"],
-        dwell=given["run_time"],
-        dwell_cv=given["run_time_cv"],
-        rotational_diffusion=given["rotational_diffusion"],
-        turn_std=given["turn_std"],
-    )
+    names = "speed speed_cv rotational_diffusion turn_std"
+    run = _state(given, names, dwell="run_time", dwell_cv="run_time_cv")
     return [run, State(0.0, dwell=given["rest_time"], dwell_cv=given["rest_time_cv"])]
 
 
 def _burst_coast(given: Numbers) -> Sequence[State]:
-    return [
-        State(
-            given["kick_speed"],
-            given["kick_speed_cv"],
-            dwell=given["kick_time"],
-            dwell_cv=given["kick_time_cv"],
-            relaxation_time=given["glide_time"],
-            coasting=True,
-            turn_std=given["turn_std"],
-        )
-    ]
+    kick = _state(
+        given,
+        "turn_std",
+        speed="kick_speed",
+        speed_cv="kick_speed_cv",
+        dwell="kick_time",
+        dwell_cv="kick_time_cv",
+        relaxation_time="glide_time",
+    )
+    return [replace(kick, coasting=True)]
 
 
 def _two_state(given: Numbers) -> Sequence[State]:
     return [
-        State(
-            given[f"{name}_speed"],
-            given["speed_cv"],
-            dwell=given[f"{name}_time"],
-            rotational_diffusion=given[f"{name}_rotational_diffusion"],
-            turn_std=given["turn_std"],
-            relaxation_time=given["relaxation_time"],
+        _state(
+            given,
+            "speed_cv turn_std relaxation_time",
+            speed=f"{name}_speed",
+            dwell=f"{name}_time",
+            rotational_diffusion=f"{name}_rotational_diffusion",
         )
         for name in ("slow", "fast")
     ]
@@ -130,7 +110,7 @@ MEMBERS: Final[Mapping[str, Member]] = {
                 *parameters("speed_std memory_time"),
                 replace(PARAMETERS["turn_rate"], meaning="Rate at which the velocity turns."),
             ),
-            _none,
+            lambda _: (),
             "inertial",
         ),
         Member(

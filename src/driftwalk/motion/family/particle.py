@@ -9,7 +9,6 @@ from typing import Any, Final
 import numpy as np
 
 from driftwalk import _core
-from driftwalk.comparison import StepReference
 from driftwalk.conditions.recorded import Conditions
 from driftwalk.core.arrays import Floats, Keys
 from driftwalk.core.errors import InputError
@@ -23,8 +22,8 @@ from driftwalk.motion.family.columns import (
 )
 from driftwalk.motion.family.members import Member
 from driftwalk.motion.family.parts import Part
-from driftwalk.motion.protocol import Details, Scores, Values, Worlds
-from driftwalk.motion.score import scored
+from driftwalk.motion.protocol import Values
+from driftwalk.motion.score import NativeModel
 from driftwalk.schema import Parameter
 from driftwalk.simulation.backend import native_scene
 from driftwalk.simulation.initial import world_orientations
@@ -36,7 +35,7 @@ LONGEST_STEP_S: Final = 0.02
 """Time step, unless samples are so dense that half their interval is shorter."""
 
 
-class ParticleModel:
+class ParticleModel(NativeModel):
     """A self-propelled body: a member of the family, with parts.
 
     Parameters
@@ -84,61 +83,11 @@ class ParticleModel:
         self.needs_flow = "flow" in named
         self.feels_others = NEIGHBOURS in named
         self.contact = "reflect" if "reflect" in named else "slide"
-        # Of the latest conditions: made once for all work units of a search.
-        self._ready: tuple[Conditions, _core.Model, Floats | None] | None = None
 
     def with_clearance(self, clearance: float) -> ParticleModel:
         """Return the same model with another distance from the wall at contact [m]."""
         return ParticleModel(
             self.member, self.parts, self.parameters, fixed=self.fixed, clearance=clearance
-        )
-
-    def simulate(self, values: Values, like: Conditions, keys: Keys) -> Worlds:
-        """Return one world per key; see `MotionModel.simulate`.
-
-        Raises
-        ------
-        InputError
-            When the water is to carry it and the conditions have no flow, or it feels other
-            bodies and there are none.
-        """
-        table = self.table(values, keys.size)
-        x, y, theta, status = _core.simulate(
-            self.native(like),
-            self._rows(table, like, keys),
-            keys,
-            threads=like.threads,
-            precision="single",
-            particle=self.particle(table, like),
-            flow_start=like.flow_start,
-        )
-        return Worlds(x, y, theta, status)
-
-    def score(
-        self,
-        values: Values,
-        like: Conditions,
-        keys: Keys,
-        reference: StepReference,
-        *,
-        details: Details = "none",
-    ) -> Scores:
-        """Return how far every world is from the recording; see `score_worlds`.
-
-        Raises
-        ------
-        InputError
-            As `simulate`.
-        """
-        table = self.table(values, keys.size)
-        return scored(
-            self.native(like),
-            self._rows(table, like, keys),
-            like,
-            keys,
-            reference,
-            details=details,
-            particle=self.particle(table, like),
         )
 
     def table(self, values: Values, worlds: int) -> ParticleTable:
@@ -183,38 +132,22 @@ class ParticleModel:
     @property
     def known(self) -> dict[str, float]:
         """Its known values under names with units: "turn_rate_rad_s", "clearance_m"."""
-        groups = [self.member.parameters, *(part.parameters for part in self.parts)]
-        usual = {one.name: one for group in groups for one in group}
+        usual = usual_parameters(self.member, self.parts)
         values = {one.key: self.fixed[name] for name, one in usual.items() if name in self.fixed}
         return {**values, "clearance_m": self.clearance}
 
-    def native(self, like: Conditions) -> _core.Model:
-        """Return the core's form of the conditions of a recording.
-
-        Raises
-        ------
-        InputError
-            As `simulate`.
-        """
-        return self._made_ready(like)[1]
-
-    def _made_ready(self, like: Conditions) -> tuple[Conditions, _core.Model, Floats | None]:
-        """Return conditions, their core's form, and where the others are at every time step."""
-        ready = self._ready
-        if ready is None or ready[0] is not like:
-            if self.needs_flow and like.flow is None:
-                raise InputError(
-                    f"the water carries a body of the model {self.name}: its conditions need a "
-                    "flow field"
-                )
-            flow = like.flow if self.needs_flow else None
-            time_step = time_step_of(like.sample_time)
-            model = native_scene(
-                like.tank, like.view, flow, like.sample_time, like.camera, time_step=time_step
+    def _native(self, like: Conditions) -> tuple[_core.Model, Floats | None]:
+        if self.needs_flow and like.flow is None:
+            raise InputError(
+                f"the water carries a body of the model {self.name}: its conditions need a flow "
+                "field"
             )
-            ready = (like, model, self._others(like, time_step))
-            self._ready = ready
-        return ready
+        flow = like.flow if self.needs_flow else None
+        time_step = time_step_of(like.sample_time)
+        model = native_scene(
+            like.tank, like.view, flow, like.sample_time, like.camera, time_step=time_step
+        )
+        return model, self._others(like, time_step)
 
     def require_others(self, like: Conditions) -> None:
         """Refuse conditions without other bodies, where the model feels them.
@@ -238,12 +171,15 @@ class ParticleModel:
         steps = int(np.ceil(like.sample_time[-1] / time_step)) + 1
         return like.neighbours.at(np.arange(steps) * time_step)
 
-    def _rows(self, table: ParticleTable, like: Conditions, keys: Keys) -> Floats:
-        """Return starts and numbers of worlds, one row each.
+    def _worlds(
+        self, values: Values, like: Conditions, keys: Keys
+    ) -> tuple[Floats, _core.Particle]:
+        """Return starts and numbers of worlds, and the particle.
 
         A body sets out in the direction that it moves in, relative to the water that carries it;
         where it does not move, in that of its recorded orientation, or a random one.
         """
+        table = self.table(values, keys.size)
         start, moment = like.start, 0.0 if like.flow_start is None else like.flow_start
         u, v = (
             velocity_at(like.flow, start.x, start.y, moment)
@@ -257,11 +193,14 @@ class ParticleModel:
         given = [np.asarray(one, dtype=float) for one in (start.x, start.y)]
         rest = [vx, vy, np.asarray(start.omega, dtype=float)]
         columns = np.broadcast_arrays(*given, world_orientations(heading, keys), *rest)
-        return np.ascontiguousarray(np.column_stack([*columns, table.columns]))
+        rows = np.ascontiguousarray(np.column_stack([*columns, table.columns]))
+        return rows, self.particle(table, like)
 
-    def __getstate__(self) -> dict[str, Any]:
-        """Leave the core's form out: it is made again where the model is used."""
-        return {**self.__dict__, "_ready": None}
+
+def usual_parameters(member: Member, parts: tuple[Part, ...]) -> dict[str, Parameter]:
+    """Return the parameters of a member and its parts by name; where two share one, it is one."""
+    groups = [member.parameters, *(part.parameters for part in parts)]
+    return {one.name: one for group in groups for one in group}
 
 
 def time_step_of(sample_time: Floats) -> float:

@@ -190,8 +190,6 @@ class ChromaPolicy(NamedTuple):
 
 _CHROMA: Final = ChromaPolicy()
 
-_LEAST_TOLERANCE: Final = math.radians(18.0)
-
 
 class ChromaTables:
     """Weights of both colours for every (a*, b*) of an 8-bit CIELAB image.
@@ -228,7 +226,7 @@ def _table(colour: MarkerColour, between: float) -> Weights:
     cos, sin = math.cos(colour.hue_rad), math.sin(colour.hue_rad)
     along = (a * cos + b * sin) / colour.chroma
     across = np.abs(b * cos - a * sin) / colour.chroma
-    tolerance = max(_LEAST_TOLERANCE, 3.0 * colour.spread / colour.chroma)
+    tolerance = max(math.radians(18.0), 3.0 * colour.spread / colour.chroma)
     tolerance = min(tolerance, _CHROMA.share_of_difference * between)
     fits = across <= math.tan(tolerance) * along + _CHROMA.across
     weight = np.where(fits & (along > _CHROMA.floor), np.minimum(along, _CHROMA.most), 0.0)

@@ -19,7 +19,7 @@ from driftwalk.track.detect.markers import (
     TwoColourMarker,
     hue_difference,
 )
-from driftwalk.track.detect.two_colour.discs import Disc, find_regions
+from driftwalk.track.detect.two_colour_discs import Disc, find_regions
 from driftwalk.track.types import Image, PixelToWorld
 
 
@@ -45,7 +45,6 @@ class TeachPolicy(NamedTuple):
 
 _TEACH: Final = TeachPolicy()
 
-_HALF_WIDTH: Final = math.radians(20.0)
 _LEAST_HUE_DIFFERENCE: Final = math.radians(30.0)
 _NAMES: Final = (
     ("red", 25.0),
@@ -139,7 +138,7 @@ def colours_seen(images: Sequence[Image]) -> list[ColourSeen]:
     found = []
     for index in np.flatnonzero(peak):
         centre = (index + 0.5) * 2 * math.pi / _TEACH.bins - math.pi
-        near = np.abs(np.angle(np.exp(1j * (hue - centre)))) < _HALF_WIDTH
+        near = np.abs(np.angle(np.exp(1j * (hue - centre)))) < math.radians(20.0)
         seen = _describe(a_star[coloured][near], b_star[coloured][near], chroma.size)
         if seen is not None:
             found.append(seen)

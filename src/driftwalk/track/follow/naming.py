@@ -50,7 +50,9 @@ class Naming:
         over: set[Track] = set()
         for track in tracks:
             if track.body is None and track.key is not None:
-                over |= self._take(track, self._body_of(track.key))
+                known = track.key in self.names
+                body = self.names.index(track.key) if known else self._one_more(track.key)
+                over |= self._take(track, body)
         new = [
             track
             for track in tracks
@@ -131,9 +133,6 @@ class Naming:
         noise = np.sqrt(values[:, 3] + values[:, 5])
         elapsed = np.array([times[frame] for frame in track.samples.frames[part]]) - gone.seen
         return apart, reach(elapsed, noise, self._settings)
-
-    def _body_of(self, key: str) -> int:
-        return self.names.index(key) if key in self.names else self._one_more(key)
 
     def _one_more(self, name: str) -> int:
         self.names.append(name)

@@ -18,7 +18,6 @@ COVARIANCE: Final = ("xx", "xy", "yy", "xtheta", "ytheta", "thetatheta")
 """The parts of the covariance of a measurement, in the order in which they are kept."""
 _ROWS, _COLUMNS = np.array([0, 0, 1, 0, 1, 2]), np.array([0, 1, 1, 2, 2, 2])
 # Smallest variance of a measurement, so that a perfect one has a likelihood too.
-_LEAST_VARIANCE: Final = np.diag([1e-14, 1e-14, 1e-12])
 
 
 class TrackState(NamedTuple):
@@ -203,4 +202,5 @@ def measured_of(found: Sequence[Detection]) -> Measured:
             )
         pose[place] = one.x, one.y, one.theta
         covariance[place] = one.covariance
-    return Measured(pose, covariance + _LEAST_VARIANCE)
+    # A perfect measurement has a likelihood, too.
+    return Measured(pose, covariance + np.diag([1e-14, 1e-14, 1e-12]))

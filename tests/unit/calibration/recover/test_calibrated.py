@@ -8,7 +8,7 @@ from every_kind import DIFFUSE, TUMBLE, every_kind
 from scipy.special import ndtri
 
 from driftwalk.calibration.estimation.identifiability import determination
-from driftwalk.calibration.recover.summary import calibrated_parameters, interval_half_width
+from driftwalk.calibration.recovery_study import calibrated_parameters, interval_half_width
 from driftwalk.motion import motion_model
 from driftwalk.schema import Parameter
 

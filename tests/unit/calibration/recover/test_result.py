@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from model_recovery_worlds import VALUES, lost, made_up, made_up_recovery
 
-from driftwalk.calibration.recover.summary import relative_errors, summary_by_parameter
+from driftwalk.calibration.recovery_study import relative_errors, summary_by_parameter
 
 
 def test_errors_on_each_scale() -> None:

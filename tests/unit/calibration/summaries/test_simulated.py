@@ -11,7 +11,6 @@ from self_propelled import moving
 import driftwalk as dw
 from driftwalk.calibration.estimation.summary_objective import (
     ALIKE,
-    AT_ONCE,
     SummaryObjective,
 )
 from driftwalk.calibration.evolution import AspectObjective, wall_distance
@@ -138,7 +137,7 @@ def test_threads_change_nothing(worlds, motion):
 
 
 def test_finished_units_are_read_again_and_progress_is_counted(worlds, motion):
-    settings, store, told = settings_of(AT_ONCE + 6), MemoryStore(), []
+    settings, store, told = settings_of(ALIKE + 6), MemoryStore(), []
     first = objective_of(worlds, motion, store)(settings)
 
     class Broken(AspectObjective):

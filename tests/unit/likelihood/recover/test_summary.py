@@ -9,7 +9,7 @@ import pytest
 from recovery_worlds import synthetic_recovery
 from scipy import stats
 
-from driftwalk.calibration.recover.summary import coverage_interval, summarise
+from driftwalk.calibration.recovery_study import coverage_interval, summarise
 from driftwalk.likelihood.score import error_scale
 
 

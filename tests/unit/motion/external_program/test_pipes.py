@@ -1,4 +1,4 @@
-"""Programs asked and heard through both kinds of pipes: Windows has the one with threads."""
+"""Programs asked and heard through their pipes."""
 
 from __future__ import annotations
 
@@ -10,16 +10,15 @@ from pathlib import Path
 
 import pytest
 
-from driftwalk.motion.external_program import process
-from driftwalk.motion.external_program.pipes import PIPES, SelectedPipes, ThreadedPipes
-from driftwalk.motion.external_program.process import Program, ProgramEnded, ProgramFault, Request
+from driftwalk.motion.external_program.process import (
+    PIPES,
+    Program,
+    ProgramEnded,
+    ProgramFault,
+    Request,
+)
 
 MANY = 3_000_000  # bytes: more than any pipe holds
-
-
-@pytest.fixture(params=[SelectedPipes, ThreadedPipes], autouse=True)
-def pipes(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(process, "pipes_of", request.param)
 
 
 def program(source: str, folder: Path) -> Program:

@@ -52,13 +52,13 @@ static double bend(const fb_model* model, double relative_x, double relative_y) 
 }
 
 fb_push fb_drag(const fb_model* model, const fb_state* state) {
-  const double half = model->side / 2, width = model->side / model->strips;
-  const double scale = 0.5 * model->water_density * model->drag_coefficient * width * model->depth;
-  const double linear = model->linear_drag / (4 * model->strips);
+  const double half = model->side / 2, width = model->side / model->strips_per_face;
+  const double scale = 0.5 * model->water_density * model->drag_coefficient * width * model->wetted_depth;
+  const double linear = model->linear_drag / (4 * model->strips_per_face);
   double normal_x = cos(state->theta), normal_y = sin(state->theta);
   fb_push sum = {0, 0, 0, 0};
   for (int face = 0; face < 4; ++face) {
-    for (int strip = 0; strip < model->strips; ++strip) {
+    for (int strip = 0; strip < model->strips_per_face; ++strip) {
       const double offset = (strip + 0.5) * width - half;
       const double arm_x = half * normal_x - offset * normal_y;
       const double arm_y = half * normal_y + offset * normal_x;

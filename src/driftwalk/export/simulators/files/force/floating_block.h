@@ -15,8 +15,8 @@ extern "C" {
 typedef struct {
   double side, mass, inertia; /* of the block alone */
   double added_mass_share;    /* of mass and inertia, moves along with the block */
-  double depth;               /* of the wetted sides */
-  int strips;                 /* of each side face */
+  double wetted_depth;        /* of the sides */
+  int strips_per_face;
   double water_density;
   double drag_coefficient;
   double linear_drag;            /* kg/s, of all strips together */

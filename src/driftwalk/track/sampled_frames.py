@@ -8,7 +8,7 @@ from pathlib import Path
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.extras import require_opencv
-from driftwalk.track.source.frames import (
+from driftwalk.track.frames import (
     FrameSource,
     ImageSequence,
     LiveCamera,

@@ -11,15 +11,16 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
 import numpy as np
 
-from driftwalk.calibration.check import check_recording
 from driftwalk.calibration.estimation.result import parameter_parts
-from driftwalk.calibration.recover.study import BrokenSimulation, EstimationMethod, Tell
-from driftwalk.calibration.recover.summary import (
+from driftwalk.calibration.recovery_study import (
+    BrokenSimulation,
+    EstimationMethod,
+    Tell,
     calibrated_parameters,
     relative_errors,
     summary_by_parameter,
 )
-from driftwalk.calibration.run import calibrate
+from driftwalk.calibration.run import calibrate, check_recording
 from driftwalk.conditions import study_in_arena
 from driftwalk.conditions.camera import study_as_seen
 from driftwalk.core.arrays import Floats

@@ -10,7 +10,13 @@ import numpy as np
 from driftwalk.core.arrays import Floats
 from driftwalk.core.extras import require_opencv
 from driftwalk.track.detect.markers import ChromaTables, TwoColourMarker
-from driftwalk.track.detect.two_colour.discs import (
+from driftwalk.track.detect.two_colour_centres import (
+    CENTRES,
+    Measured,
+    outlined_centres,
+    weighted_centres,
+)
+from driftwalk.track.detect.two_colour_discs import (
     Disc,
     Pair,
     find_regions,
@@ -18,8 +24,6 @@ from driftwalk.track.detect.two_colour.discs import (
     pair_discs,
     sort_out,
 )
-from driftwalk.track.detect.two_colour.outline import outlined_centres
-from driftwalk.track.detect.two_colour.pose import CENTRES, Measured, weighted_centres
 from driftwalk.track.types import Detection, Image, PixelToWorld, Rejected
 
 

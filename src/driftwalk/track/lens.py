@@ -12,7 +12,7 @@ import numpy as np
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.extras import require_opencv
-from driftwalk.track.camera.model import Camera, Lens
+from driftwalk.track.camera import Camera, Lens
 from driftwalk.track.detect.tags import dictionary_of
 from driftwalk.track.types import Image
 

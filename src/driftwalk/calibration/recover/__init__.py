@@ -1,1 +1,0 @@
-"""How well a set-up recovers known parameters: recordings simulated, estimated, and compared."""

@@ -1,1 +1,0 @@
-"""From pixels to metres: scale, lens, calibration boards, the rim of the tank."""

@@ -1,1 +1,0 @@
-"""Two-colour markers: two discs of different hue on each block."""
