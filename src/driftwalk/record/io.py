@@ -139,9 +139,11 @@ def load(
         Keypoints of a pose file, or rows of a table with a column of confidence, that were seen
         with less are missing, from 0 to 1; None: a value that is usual for the format, and a note
         says which.
-    box : {"xyxy", "xywh", "cxcywh", "none"}, optional
-        What columns of a box hold: two corners, the corner with the smallest x and y, width and
-        height, or the centre with them; ``"none"``: they are not a box. The body is its centre.
+    box : str, optional
+        What columns of a box hold: ``"xyxy"``, two corners; ``"xywh"``, the corner with the
+        smallest x and y, width and height; ``"cxcywh"``, the centre with them; ``"none"``: they are
+        not a box. The body is its centre. The size of an image in pixels may follow, of which the
+        sides are shares: ``"cxcywh@1920x1080"``.
     missing : str or sequence of str, optional
         Mark of a position that was not seen, in the file's units: a place such as
         ``"0,0"``, a number such as ``"-9999"``, or ``"held"``, the place of the sample before.

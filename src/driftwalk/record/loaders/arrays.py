@@ -33,7 +33,9 @@ class ArraysLoader:
         if head.startswith(NPY):
             return 0.4 if b"'|O'" not in head[:200] else 0.0
         if head.startswith(ZIP):
-            return 0.3 if _are_positions(members(path)) else 0.0
+            names = members(path)
+            # One array alone is a matrix.
+            return 0.3 if _are_positions(names) else 0.2 * (len(names) == 1)
         return 0.3 if head.startswith(HDF5) and _holds_positions(path) else 0.0
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:

@@ -38,7 +38,7 @@ class JsonPointsLoader:
 
     def read(self, path: Path, _options: ReadOptions) -> RawRecording:
         """Read the points. Objects may have ``t`` [s] and ``theta`` [rad]."""
-        points = parse_json(_bounded(path), path=path)
+        points = parse_json(bounded_text(path), path=path)
         if not isinstance(points, list) or not points:
             raise FormatError("expected a list with one point per frame", path=path)
         rows = np.empty((len(points), len(KEYS)))
@@ -55,7 +55,7 @@ class JsonPointsLoader:
         )
 
 
-def _bounded(path: Path) -> bytes:
+def bounded_text(path: Path) -> bytes:
     """Return the contents of a file, or refuse more than JSON is read of."""
     with open_binary(path) as file:
         text = file.read(MOST_BYTES + 1)
@@ -116,7 +116,7 @@ class JsonLinesLoader:
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the lines; a list of objects in one makes a row of each, for several bodies."""
         rows: list[dict[str, Any]] = []
-        for number, line in enumerate(_bounded(path).splitlines(), start=1):
+        for number, line in enumerate(bounded_text(path).splitlines(), start=1):
             if not line.strip():
                 continue
             try:
@@ -127,7 +127,7 @@ class JsonLinesLoader:
                 raise FormatError("expected an object in each line", path=path, line=number)
             rows += _rows(entry, path, number)
         names = list(dict.fromkeys(name for row in rows for name in row))
-        columns = [_column([row.get(name) for row in rows]) for name in names]
+        columns = [column_of([row.get(name) for row in rows]) for name in names]
         return recording_of(MemorySource("the lines", names, columns), options)
 
 
@@ -167,7 +167,7 @@ def _flat(entry: dict[str, Any], before: str = "") -> dict[str, Any]:
     return found
 
 
-def _column(values: list[Any]) -> np.ndarray[Any, Any]:
+def column_of(values: list[Any]) -> np.ndarray[Any, Any]:
     """Return numbers as float64, NaN where one is missing; whole ones and words as they are."""
     if all(isinstance(one, int) and abs(one) < 1 << 63 for one in values):
         return np.array(values, dtype=np.int64)

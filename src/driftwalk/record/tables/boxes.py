@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from driftwalk.record.tables.source import TableSource
 
 FORMS: Final = ("xyxy", "xywh", "cxcywh", "none")
+_STATED: Final = re.compile(
+    r"(?P<form>xyxy|xywh|cxcywh)(?:@(?P<w>[1-9]\d{0,5})x(?P<h>[1-9]\d{0,5}))?"
+)
 _CORNERS: Final = ("x1", "y1", "x2", "y2")
 _QUAD: Final = tuple(f"{axis}{corner}" for corner in range(1, 5) for axis in "xy")
 _FROM_ZERO: Final = {"x0": "x1", "y0": "y1", "x1": "x2", "y1": "y2"}
@@ -57,6 +60,8 @@ class Box:
     """Columns that would be bodies by their names."""
     why: str = "a side of a box"
     notes: tuple[str, ...] = ()
+    image: tuple[int, int] | None = None
+    """Width and height of the image [px], of which the sides are shares."""
     symmetric: bool = True
     """Whether it looks the same after a half or quarter turn, so that its angle may leap by one."""
 
@@ -75,13 +80,18 @@ def find_box(
         When a stated box lacks columns, when the first rows leave open whether columns are a box,
         or when nothing says whether x and y are its corner or its centre.
     """
-    if options.box is not None and options.box not in FORMS:
-        raise InputError(f"`box` is one of {', '.join(FORMS)}; got '{options.box}'")
     if options.box == "none":
         return None
     found, units, plain = _sides(source, meanings)
     if options.box is not None:
-        return _stated(options.box, found, units)
+        match = _STATED.fullmatch(options.box)
+        if match is None:
+            raise InputError(
+                f"`box` is one of {', '.join(FORMS)}, and of shares of the image its size in "
+                f"pixels may follow, as in cxcywh@1920x1080; got '{options.box}'"
+            )
+        box = _stated(match["form"], found, units)
+        return replace(box, image=(int(match["w"]), int(match["h"]))) if match["w"] else box
     if {"x", "y"} & set(chosen) and not {"x1", "w"} & set(chosen):
         return None
     if getattr(source, "matrices", False):

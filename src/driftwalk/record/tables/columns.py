@@ -10,7 +10,7 @@ import numpy as np
 from driftwalk.core.errors import InputError, argument_text
 from driftwalk.core.text.did_you_mean import listed
 from driftwalk.record.column_names import OF_BODY, QUATERNION, unit_of_name
-from driftwalk.record.raw import MISSING, ReadOptions
+from driftwalk.record.raw import LENGTH_UNITS, MISSING, ReadOptions
 from driftwalk.record.tables.boxes import find_box
 from driftwalk.record.tables.column_reading import ColumnReading, TableReading
 from driftwalk.record.tables.named_columns import NamedColumns, may_be_unit, shown
@@ -284,19 +284,28 @@ class _Reader(NamedColumns):
 
     def _find_units(self) -> None:
         result = self.result
-        lengths = ("x", "y", "z")
         used = {at for one in result.bodies.values() for at in one.values()}
-        wanted = [
-            one for at, one in self.meanings.items() if one.quantity in lengths and at in used
-        ]
-        units = [one.unit for one in wanted]
+        lengths = {at: one for at, one in self.meanings.items() if one.quantity in tuple("xyz")}
+        wanted = [one for at, one in lengths.items() if at in used]
+        units = {at: one.unit for at, one in lengths.items() if at in used}
         if result.box is not None:
-            units += result.box.units
-        result.length_unit = _agreed(units, "positions")
+            units |= dict(zip(result.box.sides.values(), result.box.units, strict=False))
+        if result.box is not None and result.box.image is not None:
+            width, height = result.box.image
+            sides = result.box.sides.items()
+            result.factors = {at: width if side[0] in "xw" else height for side, at in sides}
+            result.length_unit = "px"
+        elif units and set(units.values()) <= set(LENGTH_UNITS):
+            result.length_unit = units[min(units)]
+            metres = {at: LENGTH_UNITS[unit] for at, unit in units.items()}
+            factors = {at: one / LENGTH_UNITS[result.length_unit] for at, one in metres.items()}
+            result.factors = {at: factor for at, factor in factors.items() if factor != 1.0}
+        else:
+            result.length_unit = _agreed(list(units.values()), "positions", "x")
         angles = [
             one for at, one in self.meanings.items() if one.quantity == "theta" and at in used
         ]
-        result.angle_unit = _agreed([one.unit for one in angles], "angles") if angles else ""
+        result.angle_unit = _agreed([one.unit for one in angles], "angles", "theta")
         result.bare = all(one.bare for one in wanted) and (result.box is None or bool(wanted))
 
     def _describe(self) -> None:
@@ -345,11 +354,12 @@ class _Reader(NamedColumns):
         return ""
 
 
-def _agreed(units: list[str], what: str) -> str:
+def _agreed(units: list[str], what: str, quantity: str) -> str:
     distinct = sorted(set(units))
     if len(distinct) > 1:
         shown = ", ".join(unit or "none" for unit in distinct)
         raise InputError(
-            f"the columns of {what} name different units ({shown}): give them one unit"
+            f"the columns of {what} name different units ({shown}): state that of each, as in "
+            f"{argument_text('columns', {quantity: 'NAME:UNIT'})}"
         )
     return distinct[0] if distinct else ""

@@ -166,9 +166,8 @@ def _detector_advice(source: TableSource) -> str:
     if shares and not (rows[:, 0] % 1.0).any():
         named = dict(zip(("x", "y", "w", "h"), "2345", strict=True))
         return (
-            "; if they are those of YOLO (class, centre and size as shares of the image), multiply "
-            "x and w by its width and y and h by its height in pixels, then "
-            f'{argument_text("columns", named)} and `box="cxcywh"`'
+            "; if they are those of YOLO (class, centre and size as shares of the image), "
+            f'{argument_text("columns", named)} and `box="cxcywh@1920x1080"`, its size in pixels'
         )
     return ""
 
@@ -192,6 +191,8 @@ def _read(source: TableSource, reading: TableReading, labels: list[str]) -> Tabl
         clock=next(iter(reading.numbers), None),
     )
     table = source.read(wanted)
+    for at, factor in reading.factors.items():
+        table.numbers[at] *= factor
     for at in flags:
         unknown = {label.lower() for label in table.labels[at]} - MISSING - set(_FLAGS)
         if unknown:
@@ -343,11 +344,14 @@ def _require_units_of_box(
     """Refuse sides that are shares of an image, and angles of an axis that cannot be radians."""
     sides = [values[at] for at in (() if reading.box is None else reading.box.sides.values())]
     known = [side[np.isfinite(side)] for side in sides]
+    image = None if reading.box is None else reading.box.image
+    if image is not None and any(one.max(initial=0.0) > max(image) for one in known):
+        raise FormatError("the sides of the boxes are no shares of an image: leave its size out")
     shares = all(one.size and one.min() >= 0.0 and one.max() <= 1.0 for one in known)
     if shares and options.metres_per_pixel is not None and not reading.length_unit:
         raise FormatError(
             "the sides of the boxes are between 0 and 1, shares of the image as YOLO writes them: "
-            "multiply those along x by its width and those along y by its height in pixels"
+            'state its size in pixels, as in `box="cxcywh@1920x1080"`'
         )
     if theta is not None and not reading.angle_unit and (np.abs(theta) > _FULL_TURN).any():
         raise FormatError(
