@@ -11,6 +11,7 @@ from __future__ import annotations
 import gzip
 import io
 import zlib
+from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import islice
@@ -103,7 +104,7 @@ def _opened(path: Path) -> io.BufferedReader:
         raise FormatError(f"cannot be opened: {reason}", path=path) from error
 
 
-def _buffered(raw: io.RawIOBase) -> io.BufferedReader:
+def _buffered(raw: Any) -> io.BufferedReader:
     return io.BufferedReader(raw, 1 << 20)
 
 
@@ -115,33 +116,24 @@ def _encoding(file: io.BufferedReader) -> str | None:
         return None  # reading it reports the damage and its place
 
 
-class _BoundedGzip(io.RawIOBase):
+class _BoundedGzip(gzip.GzipFile):
     """Contents of a gzip file, as far as text can be packed: zeros shrink by a thousand."""
 
     def __init__(self, path: Path) -> None:
-        self._path = path
-        self._file = gzip.open(path, "rb")  # noqa: SIM115
+        super().__init__(path, "rb")
         self._left = TEXT.gzip_allowance + TEXT.gzip_ratio * path.stat().st_size
 
-    def readable(self) -> bool:
-        return True
-
     def readinto(self, buffer: Any) -> int:
-        content = self._file.read(len(buffer))
-        self._left -= len(content)
+        """Fill a buffer with the next bytes."""
+        count = super().readinto(buffer)
+        self._left -= count
         if self._left < 0:
             raise FormatError(
                 f"unpacks to more than {TEXT.gzip_ratio} times its size, which no recording does: "
                 "unpack it (gzip -d) if it is one",
-                path=self._path,
+                path=Path(str(self.name)),
             )
-        buffer[: len(content)] = content
-        return len(content)
-
-    def close(self) -> None:
-        if not self.closed:
-            self._file.close()
-        super().close()
+        return count
 
 
 def lines_of(file: IO[bytes], path: Path) -> Iterator[tuple[int, bytes]]:
@@ -245,44 +237,13 @@ def read_table(path: Path, layout: TableLayout, *, blocks: int | None = None) ->
     return collected.table()
 
 
-class _GrowingColumn:
-    """An array that values are appended to."""
-
-    def __init__(self, dtype: npt.DTypeLike, *, expected: int = 0) -> None:
-        # Memory that is never written to is never taken.
-        self._values = np.empty(expected, dtype=dtype)
-        self._count = 0
-
-    def append(self, values: npt.NDArray[Any]) -> None:
-        """Append values, which are copied."""
-        stop = self._count + values.size
-        if stop > self._values.size:
-            self._values.resize(max(stop, int(1.25 * self._values.size)), refcheck=False)
-        self._values[self._count : stop] = values
-        self._count = stop
-
-    def whole(self) -> Bools:
-        """Return where the values are whole numbers, or no numbers."""
-        values = self._values[: self._count]
-        whole: Bools = ~(np.isfinite(values) & (values % 1.0 != 0.0))
-        return whole
-
-    def take(self) -> npt.NDArray[Any]:
-        """Return the array, which is this column's no more."""
-        values, self._values = self._values, np.empty(0, dtype=self._values.dtype)
-        values.resize(self._count, refcheck=False)
-        self._count = 0
-        return values
-
-
 class _Collected:
     """Columns of a table as far as it is read."""
 
     def __init__(self, layout: TableLayout, path: Path) -> None:
         self._layout = layout
         self._path = path
-        self._numbers: dict[int, _GrowingColumn] = {}
-        self._codes: dict[int, _GrowingColumn] = {}
+        self._parts: dict[int, list[npt.NDArray[Any]]] = defaultdict(list)
         self._labels: dict[int, dict[str, int]] = {column: {} for column in layout.texts}
         self._stamps = {column: StampReader() for column in layout.stamps}
         self._decimal = "."
@@ -292,28 +253,28 @@ class _Collected:
     def add(self, block: bytes, line: int) -> None:
         """Read a block of whole lines; its first has this number."""
         frame = self._parsed(block, line)
-        if not self._rows:
-            self._begin(frame, block)
         self._rows += len(frame)
         clock = self._layout.clock
         for column in self._layout.numbers:
             values = frame[column].to_numpy()
             if column == clock:
                 values = self._from_origin(values)
-            self._numbers[column].append(values)
+            self._parts[column].append(values.astype(np.float64))
         for column, seen in self._labels.items():
-            self._codes[column].append(_encode(frame[column], seen))
+            self._parts[column].append(_encode(frame[column], seen))
         if self._stamps:
-            self._numbers[self._layout.stamps[0]].append(self._clock(frame, block, line))
+            self._parts[self._layout.stamps[0]].append(self._clock(frame, block, line))
 
     def table(self) -> Table:
         """Return what was read."""
         if not self._rows:
             raise FormatError("holds no rows of data", path=self._path)
+        # The parts of a column are let go before the next is joined.
+        joined = {column: np.concatenate(self._parts.pop(column)) for column in [*self._parts]}
         return Table(
             rows=self._rows,
-            numbers={column: values.take() for column, values in self._numbers.items()},
-            codes={column: values.take() for column, values in self._codes.items()},
+            numbers={at: values for at, values in joined.items() if at not in self._labels},
+            codes={at: joined[at] for at in self._labels},
             labels={column: list(seen) for column, seen in self._labels.items()},
             clock_origin=self._origin or 0,
             calendar=calendar_of(list(self._stamps.values())),
@@ -343,17 +304,8 @@ class _Collected:
 
     def _only_whole(self) -> bool:
         """Whether no number so far has decimals."""
-        return all(values.whole().all() for values in self._numbers.values())
-
-    def _begin(self, frame: Any, block: bytes) -> None:
-        """Make room for as many rows as the file holds, by its size and its first block."""
-        # A packed file has fewer bytes than its text: the columns then grow.
-        rows = int(1.02 * len(frame) * self._path.stat().st_size / len(block)) + len(frame)
-        numbers = (*self._layout.numbers, *self._layout.stamps[:1])
-        self._numbers = {column: _GrowingColumn(np.float64, expected=rows) for column in numbers}
-        self._codes = {
-            column: _GrowingColumn(np.int32, expected=rows) for column in self._layout.texts
-        }
+        parts = [part for at in self._layout.numbers for part in self._parts[at]]
+        return not any((part[np.isfinite(part)] % 1.0 != 0.0).any() for part in parts)
 
     def _from_origin(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Return the clock from its first value on, where float64 would round it."""

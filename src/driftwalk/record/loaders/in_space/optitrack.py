@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import split_fields
 from driftwalk.record.raw import RawRecording, ReadOptions, TableLayout
-from driftwalk.record.space import QUATERNION, SpaceTrack, Turns, lay_flat, plane_of
-from driftwalk.record.text import Table, header_rows, read_table
+from driftwalk.record.space import QUATERNION, SpaceColumns, read_in_space
+from driftwalk.record.text import header_rows
 
 START: Final = b"Format Version,"
 _UNITS: Final = {"meters": "m", "centimeters": "cm", "millimeters": "mm"}
@@ -51,38 +51,28 @@ class OptiTrackLoader:
         """Read every rigid body."""
         header = _read_header(path)
         kind, bodies = _bodies(header, path)
-        placed = {name: header.columns(name, kind, "Position") for name in bodies}
-        turned = {name: header.columns(name, kind, "Rotation") for name in bodies}
+        columns = {name: _columns(header, name, kind, path) for name in bodies}
         clock, clock_unit = _clock(header)
-        used = {clock, *(c for axes in (*placed.values(), *turned.values()) for c in axes.values())}
         labels = [
             " ".join(part for part in parts if part) or str(number)
             for number, parts in enumerate(
                 zip(header.names, header.quantities, header.axes, strict=True), start=1
             )
         ]
-        table = read_table(path, TableLayout(",", labels, header.lines, tuple(sorted(used))))
-        tracks = [
-            SpaceTrack(
-                name,
-                table.numbers[clock],
-                table.stack(placed[name][axis] for axis in "XYZ"),
-                _turns(header, table, turned[name], path),
-            )
-            for name in bodies
-        ]
-        # Motive's own axis. Its CSV says nothing about another choice at the export.
-        flat = lay_flat(tracks, plane_of(options.up or "y"))
-        if kind != "Rigid Body":
-            flat.notes.append("no rigid bodies: each marker is read as a body, without orientation")
         rate = header.settings.get("Export Frame Rate") or header.settings.get("Capture Frame Rate")
-        return replace(
-            flat,
+        recording = read_in_space(
+            path,
+            TableLayout(",", labels, header.lines, clock=clock),
+            columns,
+            options.up or "y",  # Motive's own axis; its CSV does not name another choice
             clock_unit=clock_unit,
             length_unit=_length_unit(header, path),
             frame_rate_hz=_rate(rate, path) if clock_unit == "frame" else None,
-            rows=table.rows,
         )
+        if kind != "Rigid Body":
+            note = "no rigid bodies: each marker is read as a body, without orientation"
+            recording.notes.append(note)
+        return recording
 
 
 def _read_header(path: Path) -> _Header:
@@ -112,9 +102,6 @@ def _bodies(header: _Header, path: Path) -> tuple[str, list[str]]:
         named = zip(header.types, header.names, strict=True)
         names = list(dict.fromkeys(name for type_, name in named if type_ == kind))
         if names:
-            for name in names:
-                if set(header.columns(name, kind, "Position")) != set("XYZ"):
-                    raise FormatError(f"'{name}' has no columns X, Y, Z of its position", path=path)
             return kind, names
     raise FormatError(
         "there is no rigid body and no marker: export the take with one of them", path=path
@@ -146,20 +133,25 @@ def _length_unit(header: _Header, path: Path) -> str:
     return _UNITS.get(text.lower(), "")
 
 
-def _turns(header: _Header, table: Table, columns: dict[str, int], path: Path) -> Turns | None:
-    """Return the orientations; Motive's Euler angles turn about the axes of the body."""
-    if not columns:
-        return None
+def _columns(header: _Header, name: str, kind: str, path: Path) -> SpaceColumns:
+    """Return the columns of a body; Motive's Euler angles turn about the axes of the body."""
+    placed, turned = (header.columns(name, kind, what) for what in ("Position", "Rotation"))
+    if set(placed) != set("XYZ"):
+        raise FormatError(f"'{name}' has no columns X, Y, Z of its position", path=path)
+    position = [placed[axis] for axis in "XYZ"]
+    if not turned:
+        return SpaceColumns(position)
     form = header.settings.get("Rotation Type", "")
     axes = "XYZW" if form == "Quaternion" else form
-    if form not in (*_ORDERS, "Quaternion") or set(columns) != set(axes):
+    if form not in (*_ORDERS, "Quaternion") or set(turned) != set(axes):
         raise FormatError(
-            f"the rotation type is '{form}' and the columns of rotation are {', '.join(columns)}: "
+            f"the rotation type is '{form}' and the columns of rotation are {', '.join(turned)}: "
             "export quaternions, or Euler angles in an order such as XYZ",
             path=path,
         )
-    values = table.stack(columns[axis] for axis in axes)
-    return Turns(values, QUATERNION) if form == "Quaternion" else Turns(values, form, degrees=True)
+    turns = [turned[axis] for axis in axes]
+    known = QUATERNION if form == "Quaternion" else form
+    return SpaceColumns(position, turns, known, degrees=True)
 
 
 LOADER = OptiTrackLoader()
