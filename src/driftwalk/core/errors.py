@@ -8,9 +8,14 @@ The command line prints it on one line and exits with code 2.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import wraps
 from pathlib import Path
+from typing import Concatenate, ParamSpec, TypeVar
+
+_Further = ParamSpec("_Further")
+_Result = TypeVar("_Result")
 
 
 def reason_of(error: BaseException) -> str:
@@ -132,3 +137,37 @@ def damaged_as(what: str, path: Path, *, advice: str = "") -> Iterator[None]:
         if advice:
             reason = f"{reason.rstrip('.')}; {advice}"
         raise FormatError(reason, path=path) from error
+
+
+def naming_its_file(
+    function: Callable[Concatenate[Path, _Further], _Result],
+) -> Callable[Concatenate[Path, _Further], _Result]:
+    """Let a function of a file name it in each `FormatError` that does not.
+
+    Parameters
+    ----------
+    function : callable
+        Its first argument is the path of the file.
+
+    Examples
+    --------
+    >>> @naming_its_file
+    ... def read(path: Path) -> None:
+    ...     raise FormatError("has no rows", line=2)
+    >>> read(Path("a.csv"))
+    Traceback (most recent call last):
+    driftwalk.core.errors.FormatError: a.csv, line 2: has no rows
+    """
+
+    @wraps(function)
+    def named(path: Path, /, *args: _Further.args, **kwargs: _Further.kwargs) -> _Result:
+        try:
+            return function(path, *args, **kwargs)
+        except FormatError as error:
+            if error.path is not None:
+                raise
+            raise FormatError(
+                error.reason, path=path, line=error.line, column=error.column
+            ) from error
+
+    return named

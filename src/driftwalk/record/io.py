@@ -325,9 +325,7 @@ def _assemble(
         attrs |= arena_attributes(placed, shifted_before=before)
         notes += placed.notes
     jumps = _count_impossible(bodies, counts, arena)
-    totals = {
-        key: sum(getattr(found, key) for found in counts.values()) for key in Counts().as_dict()
-    }
+    totals = {key: sum(getattr(one, key) for one in counts.values()) for key in vars(Counts())}
     time, x, y, theta = _one_clock(bodies)
     if "sample_rate_Hz" not in attrs and time.size > 1:
         attrs["sample_rate_Hz"] = _usual_rate(bodies)
@@ -338,7 +336,7 @@ def _assemble(
         {
             "rows_in_file": raw.rows,
             **totals,
-            "per_body": {name: found.as_dict() for name, found in counts.items()},
+            "per_body": {name: vars(found) for name, found in counts.items()},
             "warnings": notes,
         }
     )

@@ -73,7 +73,7 @@ class ForeignLoader:
         except FormatError as error:
             raise FormatError(
                 f"{' '.join(error.reason.split())} ({by})",
-                path=error.path or path,
+                path=error.path,
                 line=error.line,
                 column=error.column,
             ) from error
@@ -81,10 +81,10 @@ class ForeignLoader:
             raise InputError(f"{reason_of(error)} ({by})") from error
         except Exception as error:  # whatever another package's code raises
             kind = type(error).__name__
-            raise FormatError(f"{by} failed: {kind}: {reason_of(error)}", path=path) from error
+            raise FormatError(f"{by} failed: {kind}: {reason_of(error)}") from error
         wrong = _what_is_wrong(raw)
         if wrong:
-            raise FormatError(f"{by} returned {wrong}", path=path)
+            raise FormatError(f"{by} returned {wrong}")
         recording: RawRecording = raw
         recording.bodies = [_own(body) for body in recording.bodies]
         return recording

@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.arrays import Bools, Codes, Integers
-from driftwalk.core.errors import FormatError
+from driftwalk.core.errors import FormatError, naming_its_file
 from driftwalk.record.bad_row import check_lines, decoded_line
 from driftwalk.record.raw import MISSING, NAMELESS, Array, TableLayout
 from driftwalk.record.tables.encoding import WINDOWS, TranscodedText, other_encoding
@@ -78,7 +78,7 @@ def open_binary(path: Path) -> IO[bytes]:
     """Open a file for reading, through gzip and as UTF-8 when its content says so."""
     file = _opened(path)
     encoding = _encoding(file)
-    return file if encoding is None else _buffered(TranscodedText(file, encoding, path))
+    return file if encoding is None else _buffered(TranscodedText(file, encoding))
 
 
 def is_windows_text(path: Path) -> bool:
@@ -101,7 +101,7 @@ def _opened(path: Path) -> io.BufferedReader:
         return _buffered(_BoundedGzip(path) if compressed else io.FileIO(path))
     except (OSError, ValueError) as error:  # ValueError: a name that no file can have
         reason = getattr(error, "strerror", None) or error
-        raise FormatError(f"cannot be opened: {reason}", path=path) from error
+        raise FormatError(f"cannot be opened: {reason}") from error
 
 
 def _buffered(raw: Any) -> io.BufferedReader:
@@ -131,12 +131,11 @@ class _BoundedGzip(gzip.GzipFile):
             raise FormatError(
                 f"unpacks to more than {TEXT.gzip_ratio} times its size, which no recording does: "
                 "unpack it (gzip -d) if it is one",
-                path=Path(str(self.name)),
             )
         return count
 
 
-def lines_of(file: IO[bytes], path: Path) -> Iterator[tuple[int, bytes]]:
+def lines_of(file: IO[bytes]) -> Iterator[tuple[int, bytes]]:
     """Yield the lines of a text file that hold anything, with their numbers from 1.
 
     Raises
@@ -150,33 +149,34 @@ def lines_of(file: IO[bytes], path: Path) -> Iterator[tuple[int, bytes]]:
             number += block.count(b"\n")
             continue
         *lines, rest = (rest + block).split(b"\n")
-        refuse_long_line(rest, path, number + len(lines))
+        refuse_long_line(rest, number + len(lines))
         yield from ((at, line) for at, line in enumerate(lines, start=number) if line)
         number += len(lines)
     if rest:
         yield number, rest
 
 
-def refuse_long_line(line: bytes, path: Path, number: int) -> None:
+def refuse_long_line(line: bytes, number: int) -> None:
     """Refuse a line that is longer than any line of a text file."""
     if len(line) > TEXT.longest_line:
         raise FormatError(
             f"has a line of more than {TEXT.longest_line >> 20} MiB: is it a text file?",
-            path=path,
             line=number,
         )
 
 
+@naming_its_file
 def read_head(path: Path) -> bytes:
     """Return the first 64 KiB of a file, uncompressed and without a byte order mark."""
     with open_binary(path) as file:
         try:
             head = file.read(TEXT.head_bytes)
         except (OSError, *DAMAGED_GZIP) as error:
-            raise FormatError(f"is a damaged gzip file: {error}", path=path) from error
+            raise FormatError(f"is a damaged gzip file: {error}") from error
     return head.removeprefix(BOM)
 
 
+@naming_its_file
 def header_rows(path: Path, count: int) -> list[str]:
     """Return the first lines of a text file, blank ones too, however long, without their ends.
 
@@ -191,15 +191,16 @@ def header_rows(path: Path, count: int) -> list[str]:
             try:
                 line = file.readline(TEXT.longest_line + 1)
             except (OSError, *DAMAGED_GZIP) as error:
-                raise FormatError(f"cannot be read to its end: {error}", path=path) from error
-            refuse_long_line(line, path, number)
+                raise FormatError(f"cannot be read to its end: {error}") from error
+            refuse_long_line(line, number)
             if not line:
                 break
             text = line.removeprefix(BOM if number == 1 else b"").removesuffix(b"\n")
-            rows.append(decoded_line(text, path, number))
+            rows.append(decoded_line(text, number))
     return rows
 
 
+@naming_its_file
 def read_table(path: Path, layout: TableLayout, *, blocks: int | None = None) -> Table:
     """Read the numbered and the text columns of a table.
 
@@ -227,9 +228,8 @@ def read_table(path: Path, layout: TableLayout, *, blocks: int | None = None) ->
     if needed > len(layout.names):
         raise FormatError(
             f"expected at least {needed} columns, got {len(layout.names)}: is it another format?",
-            path=path,
         )
-    collected = _Collected(layout, path)
+    collected = _Collected(layout)
     for line, block in islice(_blocks(path, layout.skip_lines), blocks):
         # pandas fails on a table of blank lines alone.
         if block.strip(b" \r\n"):
@@ -240,9 +240,8 @@ def read_table(path: Path, layout: TableLayout, *, blocks: int | None = None) ->
 class _Collected:
     """Columns of a table as far as it is read."""
 
-    def __init__(self, layout: TableLayout, path: Path) -> None:
+    def __init__(self, layout: TableLayout) -> None:
         self._layout = layout
-        self._path = path
         self._parts: dict[int, list[npt.NDArray[Any]]] = defaultdict(list)
         self._labels: dict[int, dict[str, int]] = {column: {} for column in layout.texts}
         self._stamps = {column: StampReader() for column in layout.stamps}
@@ -268,7 +267,7 @@ class _Collected:
     def table(self) -> Table:
         """Return what was read."""
         if not self._rows:
-            raise FormatError("holds no rows of data", path=self._path)
+            raise FormatError("holds no rows of data")
         # The parts of a column are let go before the next is joined.
         joined = {column: np.concatenate(self._parts.pop(column)) for column in [*self._parts]}
         return Table(
@@ -285,12 +284,12 @@ class _Collected:
 
         The sign is that of the first number with decimals; then all have it.
         """
-        layout, path = self._layout, self._path
+        layout = self._layout
         undecided = self._decimal == "." and b"," in block
         errors: list[FormatError] = []
         for decimal in (".", ",") if undecided else self._decimal:
             try:
-                frame = _parse(block, layout, path=path, line=line, decimal=decimal)
+                frame = _parse(block, layout, line=line, decimal=decimal)
             except FormatError as error:
                 errors.append(error)
                 continue
@@ -298,7 +297,7 @@ class _Collected:
             if numeric and (decimal == self._decimal or self._only_whole()):
                 self._decimal = decimal
                 return frame
-            errors.append(_bad_row(block, layout, path=path, line=line, decimal=decimal))
+            errors.append(_bad_row(block, layout, line=line, decimal=decimal))
         # With the sign that is wrong an earlier row is the first that cannot be read.
         raise max(errors, key=lambda error: (error.line or 0, error.column or 0))
 
@@ -327,22 +326,19 @@ class _Collected:
         except StampError as error:
             raise FormatError(
                 f"{error} (column '{self._layout.names[column]}')",
-                path=self._path,
                 line=line + _line_of_row(block, error.row),
                 column=column + 1,
             ) from error
         return clock
 
 
-def _bad_row(
-    block: bytes, layout: TableLayout, *, path: Path, line: int, decimal: str
-) -> FormatError:
+def _bad_row(block: bytes, layout: TableLayout, *, line: int, decimal: str) -> FormatError:
     """Return what is wrong with a block whose columns of numbers are none."""
     try:
-        check_lines(block, layout, path=path, line=line, decimal=decimal)
+        check_lines(block, layout, line=line, decimal=decimal)
     except FormatError as error:
         return error
-    return FormatError("has a column that is not numbers", path=path, line=line)
+    return FormatError("has a column that is not numbers", line=line)
 
 
 def _line_of_row(block: bytes, row: int) -> int:
@@ -387,17 +383,17 @@ def _blocks(path: Path, skip_lines: int) -> Iterator[tuple[int, bytes]]:
             while block := file.read(TEXT.block_bytes):
                 whole, newline, tail = (rest + block).rpartition(b"\n")
                 rest = tail
-                refuse_long_line(rest, path, line + whole.count(b"\n"))
+                refuse_long_line(rest, line + whole.count(b"\n"))
                 if newline:
                     yield line, whole + newline
                     line += whole.count(b"\n") + 1
             if rest.strip():
                 yield line, rest + b"\n"
         except (OSError, *DAMAGED_GZIP) as error:
-            raise FormatError(f"cannot be read to its end: {error}", path=path) from error
+            raise FormatError(f"cannot be read to its end: {error}") from error
 
 
-def _parse(block: bytes, layout: TableLayout, *, path: Path, line: int, decimal: str) -> Any:
+def _parse(block: bytes, layout: TableLayout, *, line: int, decimal: str) -> Any:
     """Return the block as a data frame, or raise a `FormatError` that says where it is wrong."""
     import pandas as pd
 
@@ -405,7 +401,7 @@ def _parse(block: bytes, layout: TableLayout, *, path: Path, line: int, decimal:
     whole = fields[fields > 0]
     width = len(layout.names)
     if (whole != width).any():
-        widest = check_lines(block, layout, path=path, line=line, decimal=decimal)
+        widest = check_lines(block, layout, line=line, decimal=decimal)
         width = max(width, widest)
     used = sorted({*layout.numbers, *layout.texts, *layout.stamps})
     # The stubs of pandas cannot follow options in a dictionary.
@@ -429,10 +425,10 @@ def _parse(block: bytes, layout: TableLayout, *, path: Path, line: int, decimal:
             **exact,
         )
     except (ValueError, UnicodeDecodeError) as error:
-        check_lines(block, layout, path=path, line=line, decimal=decimal)
-        raise FormatError(f"cannot be read as a table: {error}", path=path, line=line) from error
+        check_lines(block, layout, line=line, decimal=decimal)
+        raise FormatError(f"cannot be read as a table: {error}", line=line) from error
     if b'"' in block and len(frame) != whole.size:
-        raise FormatError("has a quotation mark that is not closed", path=path, line=line)
+        raise FormatError("has a quotation mark that is not closed", line=line)
     return frame
 
 

@@ -45,9 +45,9 @@ class ArraysLoader:
             return _of_array(path, options)
         if start.startswith(ZIP):
             with opened_npz(path) as arrays:
-                return _of_arrays({name: _value(arrays[name]) for name in arrays}, path, options)
+                return _of_arrays({name: _value(arrays[name]) for name in arrays}, options)
         with opened_hdf5(path) as contents:
-            return _of_arrays(_of_hdf5(contents), path, options)
+            return _of_arrays(_of_hdf5(contents), options)
 
 
 def _are_positions(names: set[str]) -> bool:
@@ -82,14 +82,14 @@ def _of_array(path: Path, options: ReadOptions) -> RawRecording:
         array = array.T
     table = table_in_memory(array.ravel() if array.dtype.names is not None else array)
     if table is None:
-        raise FormatError("holds no table", path=path)
+        raise FormatError("holds no table")
     return recording_of(table, options)
 
 
-def _of_arrays(variables: dict[str, Value], path: Path, options: ReadOptions) -> RawRecording:
+def _of_arrays(variables: dict[str, Value], options: ReadOptions) -> RawRecording:
     """Return the recording of arrays by name, at the frame rate that the file holds."""
-    tables = matlab_tables(variables, path)
-    recording = recording_of(the_one_that_fits(tables, options, path, "array"), options)
+    tables = matlab_tables(variables)
+    recording = recording_of(the_one_that_fits(tables, options, "array"), options)
     rates = [value for name, value in variables.items() if name.lower() in _RATES]
     if len(rates) == 1 and isinstance(rates[0], np.ndarray) and rates[0].size == 1:
         recording.frame_rate_hz = float(rates[0].ravel()[0])
@@ -161,7 +161,7 @@ class ArrowLoader:
         """Read the columns."""
         table = table_in_memory(_frame(path))
         if table is None:
-            raise FormatError("holds no table", path=path)
+            raise FormatError("holds no table")
         return recording_of(table, options)
 
 

@@ -53,8 +53,8 @@ class CocoLoader:
                 for one in (found["annotations"] if whole else found)
             ]
         except (KeyError, TypeError, ValueError, AttributeError) as error:
-            raise FormatError(f"is no COCO JSON of boxes: {error!r}", path=path) from error
-        return _recording(rows, "the boxes", path, replace(options, box="xywh"))
+            raise FormatError(f"is no COCO JSON of boxes: {error!r}") from error
+        return _recording(rows, "the boxes", replace(options, box="xywh"))
 
 
 class YoloFolderLoader:
@@ -81,7 +81,7 @@ class YoloFolderLoader:
         files = _files(path)
         frames = _frames({file: file.stem for file in files})
         if not frames:
-            raise FormatError("the names of its files do not end in numbers of frames", path=path)
+            raise FormatError("the names of its files do not end in numbers of frames")
         rows = []
         for file in files:
             for number, line in enumerate(header_rows(file, _MOST_BOXES), start=1):
@@ -94,7 +94,7 @@ class YoloFolderLoader:
         sixth = [row[6] for row in rows if row[6] is not None]
         if all(row[7] is None for row in rows) and any(one > 1.0 for one in sixth):
             rows = [[*row[:6], None, row[6]] for row in rows]  # tracked, without confidences
-        return _recording(rows, "the folder", path, options)
+        return _recording(rows, "the folder", options)
 
 
 def _files(folder: Path) -> list[Path]:
@@ -117,10 +117,10 @@ def _frames(names: dict[Any, str]) -> dict[Any, int]:
     return found if len(set(found.values())) == len(names) else {}
 
 
-def _recording(rows: list[list[Any]], what: str, path: Path, options: ReadOptions) -> RawRecording:
+def _recording(rows: list[list[Any]], what: str, options: ReadOptions) -> RawRecording:
     """Return the recording of rows of `_NAMES`, in the order of their frames."""
     if any(len(row) != len(_NAMES) for row in rows) or not rows:
-        raise FormatError("has no boxes of four numbers", path=path)
+        raise FormatError("has no boxes of four numbers")
     rows.sort(key=lambda row: float(row[0]))
     columns = dict(zip(_NAMES, zip(*rows, strict=True), strict=True))
     known = {name: column_of([*one]) for name, one in columns.items() if one.count(None) < len(one)}

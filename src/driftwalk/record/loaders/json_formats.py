@@ -40,10 +40,10 @@ class JsonPointsLoader:
         """Read the points. Objects may have ``t`` [s] and ``theta`` [rad]."""
         points = parse_json(bounded_text(path), path=path)
         if not isinstance(points, list) or not points:
-            raise FormatError("expected a list with one point per frame", path=path)
+            raise FormatError("expected a list with one point per frame")
         rows = np.empty((len(points), len(KEYS)))
         for index, point in enumerate(points):
-            rows[index] = _point(point, index, path)
+            rows[index] = _point(point, index)
         x, y, theta, t = (np.ascontiguousarray(rows[:, column]) for column in range(4))
         undetected = (x == -1.0) & (y == -1.0)
         x[undetected] = y[undetected] = np.nan
@@ -62,13 +62,12 @@ def bounded_text(path: Path) -> bytes:
     if len(text) > MOST_BYTES:
         raise FormatError(
             f"holds more than {MOST_BYTES / MIB:g} MiB of JSON: store it as CSV, which is read "
-            "piece by piece",
-            path=path,
+            "piece by piece"
         )
     return text
 
 
-def _point(point: Any, index: int, path: Path) -> list[float]:
+def _point(point: Any, index: int) -> list[float]:
     """Return (x, y, theta, t) of one entry, NaN for what it does not have."""
     if point is None:
         return [np.nan] * 4
@@ -82,13 +81,12 @@ def _point(point: Any, index: int, path: Path) -> list[float]:
         values, complete = [], False
     if not complete or not all(value is None or _is_number(value) for value in values):
         raise FormatError(
-            f'entry {index + 1} is {str(point)[:40]!r}, expected [x, y] or {{"x": .., "y": ..}}',
-            path=path,
+            f'entry {index + 1} is {str(point)[:40]!r}, expected [x, y] or {{"x": .., "y": ..}}'
         )
     try:
         return [np.nan if value is None else float(value) for value in values]
     except OverflowError as error:
-        raise FormatError(f"entry {index + 1} is too large for a number", path=path) from error
+        raise FormatError(f"entry {index + 1} is too large for a number") from error
 
 
 def _is_number(value: Any) -> bool:
@@ -122,23 +120,21 @@ class JsonLinesLoader:
             try:
                 entry = parse_json(line, path=path)
             except FormatError as error:
-                raise FormatError(error.reason, path=path, line=number) from error
+                raise FormatError(error.reason, line=number) from error
             if not isinstance(entry, dict):
-                raise FormatError("expected an object in each line", path=path, line=number)
-            rows += _rows(entry, path, number)
+                raise FormatError("expected an object in each line", line=number)
+            rows += _rows(entry, number)
         names = list(dict.fromkeys(name for row in rows for name in row))
         columns = [column_of([row.get(name) for row in rows]) for name in names]
         return recording_of(MemorySource("the lines", names, columns), options)
 
 
-def _rows(entry: dict[str, Any], path: Path, number: int) -> list[dict[str, Any]]:
+def _rows(entry: dict[str, Any], number: int) -> list[dict[str, Any]]:
     """Return a line as rows: one, or one for each object of the list that it holds."""
     flat = _flat(entry)
     lists = [name for name, value in flat.items() if isinstance(value, list) and _objects(value)]
     if len(lists) > 1:
-        raise FormatError(
-            f"holds several lists of objects: {', '.join(lists)}", path=path, line=number
-        )
+        raise FormatError(f"holds several lists of objects: {', '.join(lists)}", line=number)
     shared = {name: value for name, value in flat.items() if not isinstance(value, list)}
     if not lists:
         return [shared]

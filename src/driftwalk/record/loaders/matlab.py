@@ -34,17 +34,17 @@ class MatlabLoader:
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the variable that holds positions."""
         with matlab_variables_of(path) as variables:
-            tables = matlab_tables(variables, path)
+            tables = matlab_tables(variables)
             unread = only_matlab(variables)
             if not tables:
                 has = listed(list(variables)) or "nothing"
                 reason = unread or f"has no struct, vectors or matrix of numbers, only {has}"
-                raise FormatError(reason, path=path)
+                raise FormatError(reason)
             try:
-                return recording_of(the_one_that_fits(tables, options, path, "variable"), options)
+                return recording_of(the_one_that_fits(tables, options, "variable"), options)
             except FormatError as error:
                 also = f"; {unread}" if unread else ""
-                raise FormatError(f"{error.reason}{also}", path=path) from error
+                raise FormatError(f"{error.reason}{also}") from error
 
 
 ROBOT_ROWS: Final = 5
@@ -69,9 +69,7 @@ class MatlabTracksLoader:
         recording = _tracks(path)
         if recording is None or not recording.bodies:
             raise FormatError(
-                f"has no tracks: it needs one of {', '.join(_READERS)} in the layout of its "
-                "program",
-                path=path,
+                f"has no tracks: it needs one of {', '.join(_READERS)} in the layout of its program"
             )
         return recording
 

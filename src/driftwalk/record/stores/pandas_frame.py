@@ -49,9 +49,7 @@ class Frame:
         values = self.blocks[block]
         if values.ndim != 2 or place >= values.shape[1] or values.dtype.kind not in "fiub":
             name = ".".join(self.columns[column])
-            raise FormatError(
-                f"column '{name}' of '{self.key}' holds no numbers", path=self.contents.path
-            )
+            raise FormatError(f"column '{name}' of '{self.key}' holds no numbers")
         return np.array(values[:, place], dtype=np.float64)
 
     def index(self) -> Array:
@@ -81,15 +79,14 @@ def frame_in(contents: Hdf5Contents, key: str) -> Frame:
 
     group = contents.file.get(key)
     if not isinstance(group, h5py.Group):
-        raise FormatError(f"has no table '{key}'", path=contents.path)
+        raise FormatError(f"has no table '{key}'")
     kind = text_of(group.attrs.get("pandas_type", b""))
     if kind == "frame":
         return _fixed(contents, key, group)
     if kind == "frame_table" and isinstance(group.get("table"), h5py.Dataset):
         return _table(contents, key, group)
     raise FormatError(
-        f"'{key}' is no table of pandas that can be read (it says '{kind}'): {_SAVE_ELSE}",
-        path=contents.path,
+        f"'{key}' is no table of pandas that can be read (it says '{kind}'): {_SAVE_ELSE}"
     )
 
 
@@ -100,7 +97,7 @@ def _fixed(contents: Hdf5Contents, key: str, group: Any) -> Frame:
         places |= {item: (f"{key}/block{block}_values", at) for at, item in enumerate(items)}
     columns = list(places)
     if not columns:
-        raise FormatError(f"the table '{key}' has no columns", path=contents.path)
+        raise FormatError(f"the table '{key}' has no columns")
     frame = Frame(contents, key, columns, list(places.values()))
     if "axis1" in group and group["axis1"].dtype.kind in "iuf":
         frame.rows = contents.numbers(f"{key}/axis1")
@@ -117,7 +114,7 @@ def _labels(contents: Hdf5Contents, key: str, name: str, group: Any) -> list[Col
     if any(
         not 0 <= code < len(of) for of, column in zip(texts, codes, strict=True) for code in column
     ):
-        raise FormatError(f"the names of the columns of '{key}' are damaged", path=contents.path)
+        raise FormatError(f"the names of the columns of '{key}' are damaged")
     return [
         tuple(texts[level][code] for level, code in enumerate(row))
         for row in zip(*codes, strict=True)
@@ -134,20 +131,20 @@ def _table(contents: Hdf5Contents, key: str, group: Any) -> Frame:
             continue
         values = stored[name]
         blocks[name] = values.reshape(len(values), -1) if len(values) else values[:, None]
-        names = _pickled(contents, group, f"{name}_kind")
+        names = _pickled(group, f"{name}_kind")
         places |= {column: (name, at) for at, column in enumerate(names)}
     if not places:
-        raise FormatError(f"the table '{key}' has no columns", path=contents.path)
+        raise FormatError(f"the table '{key}' has no columns")
     frame = Frame(contents, key, list(places), list(places.values()), blocks)
     if "index" in fields and stored["index"].dtype.kind in "iuf":
         frame.rows = np.array(stored["index"], dtype=np.float64)
     return frame
 
 
-def _pickled(contents: Hdf5Contents, group: Any, attribute: str) -> list[Column]:
+def _pickled(group: Any, attribute: str) -> list[Column]:
     """Return the names of columns that pandas pickled into an attribute of the table."""
     stored = group["table"].attrs.get(attribute, b"")
-    names = unpickle(bytes(stored), where=f"attribute '{attribute}'", path=contents.path)
+    names = unpickle(bytes(stored), where=f"attribute '{attribute}'")
     if not isinstance(names, list):
-        raise FormatError(f"the attribute '{attribute}' names no columns", path=contents.path)
+        raise FormatError(f"the attribute '{attribute}' names no columns")
     return [tuple(map(str, name)) if isinstance(name, tuple) else (str(name),) for name in names]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import codecs
 import io
 import re
-from pathlib import Path
 from typing import Any, Final
 
 from driftwalk.core.errors import FormatError
@@ -54,9 +53,8 @@ def other_encoding(start: bytes) -> str | None:
 class TranscodedText(io.RawIOBase):
     """The contents of a text file as UTF-8, without a byte order mark."""
 
-    def __init__(self, file: io.BufferedReader, encoding: str, path: Path) -> None:
+    def __init__(self, file: io.BufferedReader, encoding: str) -> None:
         self._file = io.TextIOWrapper(file, _CODECS[encoding], newline="")
-        self._path = path
         self._encoding = encoding
 
     def readable(self) -> bool:
@@ -71,8 +69,7 @@ class TranscodedText(io.RawIOBase):
         except UnicodeError as error:
             raise FormatError(
                 f"begins as {self._encoding} text but does not go on as such: save the file as "
-                "UTF-8",
-                path=self._path,
+                "UTF-8"
             ) from error
         buffer[: len(piece)] = piece
         return len(piece)

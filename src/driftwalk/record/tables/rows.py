@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
-from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -361,7 +360,7 @@ def _require_units_of_box(
 
 
 def the_one_that_fits(
-    tables: Mapping[str, TableSource], options: ReadOptions, path: Path, what: str
+    tables: Mapping[str, TableSource], options: ReadOptions, what: str
 ) -> TableSource:
     """Return the table that the user names, or the only one that holds positions.
 
@@ -371,8 +370,6 @@ def the_one_that_fits(
         Tables by their names.
     options : ReadOptions
         `sheet` names one, by its name or its number from 1.
-    path : Path
-        The file, for errors.
     what : str
         What such a table is called, "sheet" or "variable".
 
@@ -382,9 +379,9 @@ def the_one_that_fits(
         When there is none, or several.
     """
     if not tables:
-        raise FormatError(f"has no {what} that is a table", path=path)
+        raise FormatError(f"has no {what} that is a table")
     if options.sheet is not None:
-        return _named(tables, options.sheet, path, what)
+        return _named(tables, options.sheet, what)
     if len(tables) == 1:
         return next(iter(tables.values()))
     fitting: list[str] = []
@@ -398,22 +395,20 @@ def the_one_that_fits(
     if len(fitting) > 1:
         choice = argument_text("sheet", fitting[0])
         raise FormatError(
-            f"holds positions in more than one {what}, {listed(fitting)}: name it, as in {choice}",
-            path=path,
+            f"holds positions in more than one {what}, {listed(fitting)}: name it, as in {choice}"
         )
     if not fitting:
         raise FormatError(
-            f"has no {what} with positions among {listed(list(tables))}; {reasons[0]}", path=path
+            f"has no {what} with positions among {listed(list(tables))}; {reasons[0]}"
         )
     return tables[fitting[0]]
 
 
-def _named(tables: Mapping[str, TableSource], wanted: str, path: Path, what: str) -> TableSource:
+def _named(tables: Mapping[str, TableSource], wanted: str, what: str) -> TableSource:
     if wanted in tables:
         return tables[wanted]
     if wanted.isdecimal() and 1 <= int(wanted) <= len(tables):
         return list(tables.values())[int(wanted) - 1]
     raise FormatError(
-        f"{argument_text('sheet', wanted)}: no such {what}; it has {listed(list(tables))}",
-        path=path,
+        f"{argument_text('sheet', wanted)}: no such {what}; it has {listed(list(tables))}"
     )

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 from itertools import islice
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,8 +29,6 @@ class SheetSource:
     ----------
     rows : callable
         Returns an iterator over the rows of the sheet.
-    path : Path
-        The workbook.
     sheet : str
         Name of the sheet, for errors.
     options : ReadOptions
@@ -41,12 +38,10 @@ class SheetSource:
     def __init__(
         self,
         rows: Callable[[], Iterator[Row]],
-        path: Path,
         sheet: str,
         options: ReadOptions,
     ) -> None:
         self._rows = rows
-        self._path = path
         self.sheet = sheet
         begin = options.header_line or 1
         below = (entry for entry in _numbered(rows()) if entry[0] >= begin)
@@ -108,13 +103,12 @@ class SheetSource:
         except (CellError, StampError) as error:
             raise FormatError(
                 f"{error} (sheet '{self.sheet}'){self._advice}",
-                path=self._path,
                 line=lines[error.row],
             ) from error
 
     def error(self, message: str) -> FormatError:
         """Return an error about the sheet."""
-        return FormatError(f"sheet '{self.sheet}': {message}{self._advice}", path=self._path)
+        return FormatError(f"sheet '{self.sheet}': {message}{self._advice}")
 
     def _data(self) -> Iterator[tuple[int, Row]]:
         """Yield the rows below the header that are not blank, with their numbers from 1."""

@@ -50,8 +50,8 @@ class OptiTrackLoader:
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read every rigid body."""
         header = _read_header(path)
-        kind, bodies = _bodies(header, path)
-        columns = {name: _columns(header, name, kind, path) for name in bodies}
+        kind, bodies = _bodies(header)
+        columns = {name: _columns(header, name, kind) for name in bodies}
         clock, clock_unit = _clock(header)
         labels = [
             " ".join(part for part in parts if part) or str(number)
@@ -66,8 +66,8 @@ class OptiTrackLoader:
             columns,
             options.up or "y",  # Motive's own axis; its CSV does not name another choice
             clock_unit=clock_unit,
-            length_unit=_length_unit(header, path),
-            frame_rate_hz=_rate(rate, path) if clock_unit == "frame" else None,
+            length_unit=_length_unit(header),
+            frame_rate_hz=_rate(rate) if clock_unit == "frame" else None,
         )
         if kind != "Rigid Body":
             note = "no rigid bodies: each marker is read as a body, without orientation"
@@ -84,8 +84,7 @@ def _read_header(path: Path) -> _Header:
     if at is None or len(above) < 3:
         raise FormatError(
             "the rows that name type, body and axis of each column are missing: export the take "
-            "with its header",
-            path=path,
+            "with its header"
         )
     settings = dict(zip(rows[0][::2], rows[0][1::2], strict=False))
     # A data row may end in a comma that the header has not, and the other way round.
@@ -96,16 +95,14 @@ def _read_header(path: Path) -> _Header:
     return _Header(settings, at + 1, types, names, quantities, axes)
 
 
-def _bodies(header: _Header, path: Path) -> tuple[str, list[str]]:
+def _bodies(header: _Header) -> tuple[str, list[str]]:
     """Return which type is read, and the names of its bodies in the file's order."""
     for kind in ("Rigid Body", "Marker"):
         named = zip(header.types, header.names, strict=True)
         names = list(dict.fromkeys(name for type_, name in named if type_ == kind))
         if names:
             return kind, names
-    raise FormatError(
-        "there is no rigid body and no marker: export the take with one of them", path=path
-    )
+    raise FormatError("there is no rigid body and no marker: export the take with one of them")
 
 
 def _clock(header: _Header) -> tuple[int, str]:
@@ -116,28 +113,28 @@ def _clock(header: _Header) -> tuple[int, str]:
     return header.axes.index("Frame"), "frame"
 
 
-def _rate(text: str | None, path: Path) -> float | None:
+def _rate(text: str | None) -> float | None:
     try:
         return None if text is None else float(text)
     except ValueError as error:
-        raise FormatError(f"the frame rate is '{text}'", path=path, line=1) from error
+        raise FormatError(f"the frame rate is '{text}'", line=1) from error
 
 
-def _length_unit(header: _Header, path: Path) -> str:
+def _length_unit(header: _Header) -> str:
     """Return the unit of positions, ``""`` when the settings do not say."""
     text = header.settings.get("Length Units", "")
     if text and text.lower() not in _UNITS:
         raise FormatError(
-            f"the unit of length is '{text}': export in meters or millimeters", path=path, line=1
+            f"the unit of length is '{text}': export in meters or millimeters", line=1
         )
     return _UNITS.get(text.lower(), "")
 
 
-def _columns(header: _Header, name: str, kind: str, path: Path) -> SpaceColumns:
+def _columns(header: _Header, name: str, kind: str) -> SpaceColumns:
     """Return the columns of a body; Motive's Euler angles turn about the axes of the body."""
     placed, turned = (header.columns(name, kind, what) for what in ("Position", "Rotation"))
     if set(placed) != set("XYZ"):
-        raise FormatError(f"'{name}' has no columns X, Y, Z of its position", path=path)
+        raise FormatError(f"'{name}' has no columns X, Y, Z of its position")
     position = [placed[axis] for axis in "XYZ"]
     if not turned:
         return SpaceColumns(position)
@@ -146,8 +143,7 @@ def _columns(header: _Header, name: str, kind: str, path: Path) -> SpaceColumns:
     if form not in (*_ORDERS, "Quaternion") or set(turned) != set(axes):
         raise FormatError(
             f"the rotation type is '{form}' and the columns of rotation are {', '.join(turned)}: "
-            "export quaternions, or Euler angles in an order such as XYZ",
-            path=path,
+            "export quaternions, or Euler angles in an order such as XYZ"
         )
     turns = [turned[axis] for axis in axes]
     known = QUATERNION if form == "Quaternion" else form

@@ -39,8 +39,7 @@ class QualisysLoader:
         if kind not in _WIDTH or not names:
             raise FormatError(
                 "expected DATA_INCLUDED 3D with MARKER_NAMES, or 6D with BODY_NAMES: export these "
-                "from Qualisys Track Manager",
-                path=path,
+                "from Qualisys Track Manager"
             )
         # Frame and time may stand before the positions, and a tab at the end.
         first = len(fields) - _WIDTH[kind] * len(names) - (not fields[-1].strip())
@@ -48,7 +47,6 @@ class QualisysLoader:
             raise FormatError(
                 f"expected {_WIDTH[kind]} columns for each of {len(names)} names, after frame and "
                 f"time or none; got {len(fields)}",
-                path=path,
                 line=skip + 1,
             )
         bodies = {}
@@ -63,7 +61,7 @@ class QualisysLoader:
             options.up or "z",
             zero_is_missing=True,
             length_unit="mm",
-            frame_rate_hz=_rate(facts, path),
+            frame_rate_hz=_rate(facts),
         )
 
 
@@ -75,14 +73,14 @@ def _head(path: Path) -> tuple[dict[str, list[str]], int, list[str]]:
         if is_number(fields[0]):
             return facts, at, fields
         facts[fields[0]] = fields[1:]
-    raise FormatError("has no rows under its head", path=path)
+    raise FormatError("has no rows under its head")
 
 
-def _rate(facts: dict[str, list[str]], path: Path) -> float:
+def _rate(facts: dict[str, list[str]]) -> float:
     """Return the frames per second [Hz]."""
     text = (facts.get("FREQUENCY") or [""])[0]
     if not is_number(text) or not float(text) > 0.0:
-        raise FormatError(f"FREQUENCY is '{text}', and no rate of frames", path=path)
+        raise FormatError(f"FREQUENCY is '{text}', and no rate of frames")
     return float(text)
 
 

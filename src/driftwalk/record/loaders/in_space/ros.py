@@ -119,10 +119,10 @@ class RosLoader:
         """Read the poses of the chosen topics."""
         plane = plane_of(options.up or "z")
         with _opened(path) as reader:
-            chosen = _choose(reader.connections, options.topic, path)
+            chosen = _choose(reader.connections, options.topic)
             tracks, parents, recorded = _collect(reader, chosen)
         if not tracks:
-            raise FormatError("the chosen topic has no poses", path=path)
+            raise FormatError("the chosen topic has no poses")
         origin = min(min(track.stamps) for track in tracks.values())
         flat = lay_flat([_in_space(name, track, origin) for name, track in tracks.items()], plane)
         if recorded:
@@ -181,7 +181,7 @@ def _refuse_nested(path: Path) -> None:
             )
 
 
-def _choose(connections: list[Any], topic: str | None, path: Path) -> list[Any]:
+def _choose(connections: list[Any], topic: str | None) -> list[Any]:
     """Return the connections of the chosen topics, or of the only one that holds poses."""
     usable = [one for one in connections if one.msgtype in READERS]
     topics = list(dict.fromkeys(one.topic for one in usable))
@@ -189,8 +189,7 @@ def _choose(connections: list[Any], topic: str | None, path: Path) -> list[Any]:
         found = ", ".join(sorted({one.msgtype for one in connections})[:8]) or "no topics"
         raise FormatError(
             f"has no topic of poses, only {found}; read are "
-            f"{', '.join(name.rpartition('/')[2] for name in READERS)}",
-            path=path,
+            f"{', '.join(name.rpartition('/')[2] for name in READERS)}"
         )
     wanted = [name.strip() for name in topic.split(",")] if topic is not None else topics
     if (len(wanted) > 1 and topic is None) or not set(wanted) <= set(topics):

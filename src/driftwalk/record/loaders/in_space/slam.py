@@ -44,9 +44,7 @@ class EurocLoader:
         }
         lacking = [part for part in _POSITION if part not in columns]
         if lacking:
-            raise FormatError(
-                f"the header names no column of p_…_{lacking[0][1]}", path=path, line=1
-            )
+            raise FormatError(f"the header names no column of p_…_{lacking[0][1]}", line=1)
         turns = [columns[part] for part in PARTS] if set(PARTS) <= set(columns) else []
         body = SpaceColumns([columns[part] for part in _POSITION], turns)
         unit = unit_of_name(names[0])

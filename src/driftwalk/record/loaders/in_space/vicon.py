@@ -59,7 +59,7 @@ class ViconLoader:
         """Read every object; a second section of the file has to go."""
         header = _read_header(path)
         bodies = [name for name in dict.fromkeys(header.names) if name]
-        columns = {name: _columns(header, name, path) for name in bodies}
+        columns = {name: _columns(header, name) for name in bodies}
         labels = [f"{n} {a}".strip() for n, a in zip(header.names, header.axes, strict=True)]
         try:
             return read_in_space(
@@ -67,7 +67,7 @@ class ViconLoader:
                 TableLayout(",", labels, _LINES, clock=0),
                 columns,
                 options.up or "z",
-                length_unit=_length_unit(header, columns, path),
+                length_unit=_length_unit(header, columns),
                 frame_rate_hz=header.rate_hz,
             )
         except FormatError as error:
@@ -75,7 +75,6 @@ class ViconLoader:
                 raise
             raise FormatError(
                 "another section begins here: keep one section in a file, or export one alone",
-                path=path,
                 line=error.line,
             ) from error
 
@@ -83,21 +82,20 @@ class ViconLoader:
 def _read_header(path: Path) -> _Header:
     lines = header_rows(path, _LINES + 1)
     if len(lines) <= _LINES or not lines[_LINES].strip():
-        raise FormatError("the file ends before its first row of data", path=path)
+        raise FormatError("the file ends before its first row of data")
     section = lines[0].strip(", ")
     if section not in _READ:
         raise FormatError(
             f"begins with the section '{section}': export {', '.join(_READ[:-1])} or {_READ[-1]}",
-            path=path,
             line=1,
         )
     rate = lines[1].strip(", ")
     if not is_number(rate):
-        raise FormatError(f"expected the frame rate, got '{rate:.40}'", path=path, line=2)
+        raise FormatError(f"expected the frame rate, got '{rate:.40}'", line=2)
     names, axes, units, data = (split_fields(line, ",") for line in lines[2 : _LINES + 1])
     width = max(len(axes), len(data))
     if len(axes) < 5 or axes[0] != "Frame":
-        raise FormatError("expected the names of the axes, from 'Frame' on", path=path, line=4)
+        raise FormatError("expected the names of the axes, from 'Frame' on", line=4)
     padded = [(row + [""] * width)[:width] for row in (names, axes, units)]
     return _Header(float(rate), _carried(padded[0]), padded[1], padded[2])
 
@@ -112,31 +110,26 @@ def _carried(names: list[str]) -> list[str]:
     return carried
 
 
-def _columns(header: _Header, body: str, path: Path) -> SpaceColumns:
+def _columns(header: _Header, body: str) -> SpaceColumns:
     """Return the columns of a body."""
     columns = header.columns(body)
     axes = next((axes for axes in _POSITIONS if set(axes) <= set(columns)), None)
     if axes is None:
-        raise FormatError(
-            f"'{body}' has no columns TX, TY, TZ or X, Y, Z of its position", path=path, line=4
-        )
+        raise FormatError(f"'{body}' has no columns TX, TY, TZ or X, Y, Z of its position", line=4)
     position, turns = ([columns[one] for one in of if one in columns] for of in (axes, _QUATERNION))
     if len(turns) != 3 or "RW" in columns:
         return SpaceColumns(position, turns if len(turns) == 4 else ())
     unit = header.units[columns["RX"]]
     if unit not in ANGLE_UNITS:
-        raise FormatError(
-            f"the unit of the angles is '{unit}': expected rad or deg", path=path, line=_LINES
-        )
+        raise FormatError(f"the unit of the angles is '{unit}': expected rad or deg", line=_LINES)
     return SpaceColumns(position, turns, VECTOR, degrees=unit == "deg")
 
 
-def _length_unit(header: _Header, placed: dict[str, SpaceColumns], path: Path) -> str:
+def _length_unit(header: _Header, placed: dict[str, SpaceColumns]) -> str:
     units = {header.units[column] for one in placed.values() for column in one.position}
     if len(units) != 1 or not units <= {*LENGTH_UNITS, ""}:
         raise FormatError(
             f"the units of the positions are {', '.join(sorted(units))}: expected one, mm or m",
-            path=path,
             line=_LINES,
         )
     return units.pop()

@@ -62,7 +62,7 @@ class DeepLabCutLoader:
 
 def _read_csv(path: Path, options: ReadOptions) -> RawRecording:
     header = _header(path)
-    places = _places(list(zip(*(row[1:] for row in header), strict=True)), path)
+    places = _places(list(zip(*(row[1:] for row in header), strict=True)))
     chosen = _chosen(places, options)
     used = {column + 1 for column in _columns(places, chosen)}
     names = [".".join(part for part in column if part) for column in zip(*header, strict=True)]
@@ -77,8 +77,8 @@ def _read_hdf5(path: Path, options: ReadOptions) -> RawRecording:
         key = next((key for key in KEYS if key in contents.file), KEYS[0])
         frame = frame_in(contents, key)
         if any(len(column) not in LEVELS for column in frame.columns):
-            raise FormatError(f"'{key}' has no columns of scorer, bodyparts, coords", path=path)
-        places = _places(frame.columns, path)
+            raise FormatError(f"'{key}' has no columns of scorer, bodyparts, coords")
+        places = _places(frame.columns)
         chosen = _chosen(places, options)
         columns = {column: frame.numbers(column) for column in _columns(places, chosen)}
         return _recording(places, chosen, columns, frame.index(), options)
@@ -96,22 +96,20 @@ def _header(path: Path) -> list[list[str]]:
         raise FormatError(
             "the first column of the header is not scorer, (individuals,) bodyparts, coords: is it "
             "DeepLabCut's?",
-            path=path,
             line=1,
         )
     if any(len(row) != len(rows[0]) for row in rows[:count]):
-        raise FormatError("the header rows have different numbers of fields", path=path, line=count)
+        raise FormatError("the header rows have different numbers of fields", line=count)
     if len(rows) > count and not is_number(rows[count][0]):
         raise FormatError(
             "the rows are named by images, as those of labelled frames are, which are no track: "
             "give the file of the analysed video",
-            path=path,
             line=count + 1,
         )
     return rows[:count]
 
 
-def _places(columns: Sequence[tuple[str, ...]], path: Path) -> Places:
+def _places(columns: Sequence[tuple[str, ...]]) -> Places:
     """Return which column holds what; coordinates of other names are left out."""
     found: Places = {}
     for at, column in enumerate(columns):
@@ -126,11 +124,10 @@ def _places(columns: Sequence[tuple[str, ...]], path: Path) -> Places:
             if missing:
                 raise FormatError(
                     f"no column of {min(missing)} for bodypart '{part}' of individual "
-                    f"'{individual}'",
-                    path=path,
+                    f"'{individual}'"
                 )
     if not found:
-        raise FormatError("no columns of x and y below any bodypart", path=path)
+        raise FormatError("no columns of x and y below any bodypart")
     return found
 
 

@@ -45,8 +45,7 @@ class SleapLoader:
             if tracks.shape[1:3] != (2, len(nodes)):
                 raise FormatError(
                     f"'tracks' has the shape {tracks.shape}, expected track, xy, node, frame with "
-                    f"{len(nodes)} nodes",
-                    path=path,
+                    f"{len(nodes)} nodes"
                 )
             names = contents.texts("track_names") if "track_names" in contents.file else []
             scores = _scores(contents, tracks.shape)
@@ -74,13 +73,11 @@ def _in_order(
     """Return an array of numbers with its dimensions in this order."""
     values = contents.array(name)
     if values.dtype.kind not in "fiu" or values.ndim != len(order):
-        raise FormatError(f"'{name}' has no numbers over {', '.join(order)}", path=contents.path)
+        raise FormatError(f"'{name}' has no numbers over {', '.join(order)}")
     stated = contents.file[name].attrs.get("dims")
     dims = list(order) if stated is None else parse_json(text_of(stated), path=contents.path)
     if sorted(map(str, dims)) != sorted(order):
-        raise FormatError(
-            f"'{name}' is over {dims}, expected {', '.join(order)}", path=contents.path
-        )
+        raise FormatError(f"'{name}' is over {dims}, expected {', '.join(order)}")
     return values.transpose([dims.index(dimension) for dimension in order])
 
 
@@ -90,7 +87,7 @@ def _scores(contents: Hdf5Contents, shape: tuple[int, ...]) -> npt.NDArray[Any] 
         return None
     scores = _in_order(contents, "point_scores", ("track", "node", "frame"))
     if scores.shape != (shape[0], *shape[2:]):
-        raise FormatError("'point_scores' has another shape than 'tracks'", path=contents.path)
+        raise FormatError("'point_scores' has another shape than 'tracks'")
     return scores
 
 
@@ -117,7 +114,7 @@ class SleapCsvLoader:
             if name.endswith(".x") and f"{name[:-2]}.y" in places
         }
         if "frame_idx" not in places or not nodes:
-            raise FormatError("no columns frame_idx, NODE.x and NODE.y", path=path, line=1)
+            raise FormatError("no columns frame_idx, NODE.x and NODE.y", line=1)
         chosen = choose_keypoints(list(nodes), options)
         used = {at for node in chosen.names() for at in nodes[node] if at >= 0}
         frame, track = places["frame_idx"], places.get("track")
@@ -134,7 +131,7 @@ class SleapCsvLoader:
         rows, notes = bodies_of(poses, chosen, table.numbers[frame], options, usual=USUAL)
         bodies = rows
         if track is not None:
-            _require_tracks(table.labels[track], table.codes[track], rows[0].clock, path)
+            _require_tracks(table.labels[track], table.codes[track], rows[0].clock)
             bodies = split_bodies(
                 table.codes[track],
                 [label or "0" for label in table.labels[track]],
@@ -148,15 +145,14 @@ class SleapCsvLoader:
         )
 
 
-def _require_tracks(labels: list[str], codes: Codes, frame: Array, path: Path) -> None:
+def _require_tracks(labels: list[str], codes: Codes, frame: Array) -> None:
     """Refuse several instances of a frame that no track tells apart."""
     if "" not in labels:
         return
     frames = frame[codes == labels.index("")]
     if np.unique(frames).size < frames.size:
         raise FormatError(
-            "several instances of one frame have no track: let SLEAP track them, and export again",
-            path=path,
+            "several instances of one frame have no track: let SLEAP track them, and export again"
         )
 
 

@@ -46,9 +46,7 @@ class KinoveaLoader:
             elif len(fields) == 3:
                 rows.append([_CLOCK.sub(r"\1.\2", fields[0]), *fields[1:], track])
             elif fields:
-                raise FormatError(
-                    f"expected T X Y, got {len(fields)} fields", path=path, line=number
-                )
+                raise FormatError(f"expected T X Y, got {len(fields)} fields", line=number)
         columns = [column_of([*column]) for column in zip(*rows, strict=True)] or [np.zeros(0)] * 4
         raw = recording_of(MemorySource("the tracks", ["t", "x", "y", "body"], columns), options)
         return replace(raw, bare_length_is_si=False, y_axis="up")

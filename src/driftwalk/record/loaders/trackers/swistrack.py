@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 
 from driftwalk.core.arrays import Integers
-from driftwalk.core.errors import FormatError
+from driftwalk.core.errors import FormatError, naming_its_file
 from driftwalk.record.cleaning.several_bodies import order_in_frame, split_bodies
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import Table, lines_of, open_binary, read_head, read_table
@@ -55,11 +55,11 @@ class SwisTrackTracksLoader:
         """
         files = _track_files(path) if path.is_dir() else [path]
         if not files:
-            raise FormatError("the folder holds no track files (track_00000000.txt)", path=path)
+            raise FormatError("the folder holds no track files (track_00000000.txt)")
         tables = {_track_name(file): _read_one(file) for file in files}
         first = next(iter(tables.values()))
         if any(set(table.numbers) != set(first.numbers) for table in tables.values()):
-            raise FormatError("the folder mixes track files of two SwisTrack versions", path=path)
+            raise FormatError("the folder mixes track files of two SwisTrack versions")
         rows = sum(table.rows for table in tables.values())
         if len(first.numbers) == len(NEW):
             bodies = [
@@ -111,13 +111,14 @@ def _columns(head: bytes) -> list[str]:
     return NEW if header[1:] == ["x", "y"] else []
 
 
+@naming_its_file
 def _read_one(path: Path) -> Table:
     columns = _columns(read_head(path))
     if not columns:
-        raise FormatError("the header is not that of a SwisTrack track file", path=path, line=1)
+        raise FormatError("the header is not that of a SwisTrack track file", line=1)
     table = read_table(path, TableLayout("\t", columns, 1, tuple(range(len(columns)))))
     if np.isnan(table.numbers[0]).any():
-        raise FormatError("a row has no frame number", path=path)
+        raise FormatError("a row has no frame number")
     return table
 
 
@@ -160,7 +161,7 @@ class SwisTrackParticlesLoader:
         bodies = split_bodies(
             order,
             [str(index) for index in range(count)],
-            clock=_times(table, path) if timed else numbers[0],
+            clock=_times(table) if timed else numbers[0],
             x=numbers[4 if world else 2],
             y=numbers[5 if world else 3],
             theta=numbers[7],
@@ -172,14 +173,13 @@ class SwisTrackParticlesLoader:
         return _recording(bodies, clock_unit, world=world, rows=table.rows, note=note)
 
 
-def _times(table: Table, path: Path) -> Array:
+def _times(table: Table) -> Array:
     """Return seconds since 1970 of the ISO time stamps."""
     try:
         stamps = np.array([_since_1970(label) for label in table.labels[1]], dtype=np.float64)
     except (ValueError, OverflowError) as error:
         raise FormatError(
-            f"a time stamp is not an ISO date ({error}); give `frame_rate` to use frame numbers",
-            path=path,
+            f"a time stamp is not an ISO date ({error}); give `frame_rate` to use frame numbers"
         ) from error
     seconds: Array = stamps[table.codes[1]]
     return seconds
@@ -208,7 +208,7 @@ class SwisTrackNmeaLoader:
         values, ids = _particles(path)
         frame, image_x, image_y, world_x, world_y, theta = values
         if not frame.size:
-            raise FormatError("holds no $PARTICLE", path=path)
+            raise FormatError("holds no $PARTICLE")
         world = bool(world_x.any() or world_y.any()) and options.metres_per_pixel is None
         order = order_in_frame(frame)
         labels, codes = np.unique(ids, return_inverse=True)
@@ -234,10 +234,10 @@ def _particles(path: Path) -> tuple[Array, Integers]:
     ids = array("q")
     frame = float("nan")
     with open_binary(path) as file:
-        for line, raw in lines_of(file, path):
+        for line, raw in lines_of(file):
             text = raw.strip()
             if text.startswith((b"$FRAMENUMBER,", b"$PARTICLE,")):
-                command, *arguments = _verified(text, path, line).split(",")
+                command, *arguments = _verified(text, line).split(",")
                 try:
                     if command == "FRAMENUMBER":
                         frame = float(int(arguments[0]))
@@ -250,18 +250,17 @@ def _particles(path: Path) -> tuple[Array, Integers]:
                     raise FormatError(
                         f"cannot read '{text[:60].decode('ascii', 'replace')}': expected 6 or 8 "
                         "numbers after $PARTICLE, 1 after $FRAMENUMBER",
-                        path=path,
                         line=line,
                     ) from error
                 if frame != frame:
-                    raise FormatError("$PARTICLE before any $FRAMENUMBER", path=path, line=line)
+                    raise FormatError("$PARTICLE before any $FRAMENUMBER", line=line)
             elif text and not text.startswith(b"$"):
-                raise FormatError("expected a line that starts with $", path=path, line=line)
+                raise FormatError("expected a line that starts with $", line=line)
     columns = np.frombuffer(values, dtype=np.float64).reshape(-1, 6).T
     return np.ascontiguousarray(columns), np.array(ids, dtype=np.int64)
 
 
-def _verified(text: bytes, path: Path, line: int) -> str:
+def _verified(text: bytes, line: int) -> str:
     """Return the line between ``$`` and ``*``, its checksum compared if it has one."""
     content, star, stated = text[1:].partition(b"*")
     if star:
@@ -270,7 +269,6 @@ def _verified(text: bytes, path: Path, line: int) -> str:
             raise FormatError(
                 f"the checksum is {stated.decode('ascii', 'replace')}, computed {actual}: the line "
                 "is damaged",
-                path=path,
                 line=line,
             )
     return content.decode("ascii", "replace")

@@ -21,7 +21,7 @@ from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
 from driftwalk.record.cleaning.several_bodies import split_bodies
 from driftwalk.record.column_names import unit_of_name
-from driftwalk.record.loaders.plain import HeadedFormat
+from driftwalk.record.loaders.plain import HeadedFormat, side_by_side
 from driftwalk.record.raw import Marks, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import header_rows, read_head, read_table
 from driftwalk.record.text_head import (
@@ -32,7 +32,7 @@ from driftwalk.record.text_head import (
     read_header,
 )
 
-_DLTDV_X = re.compile(r"(pt\d+_cam\d+)_X", re.IGNORECASE)
+_DLTDV = re.compile(r"(?P<body>pt\d+_cam\d+)_(?P<axis>[XY])", re.IGNORECASE)
 
 
 class DltdvLoader:
@@ -43,31 +43,16 @@ class DltdvLoader:
 
     def sniff(self, head: bytes, _path: Path) -> float:
         """Recognise the header."""
-        return 0.95 if _DLTDV_X.match(first_line(head).lstrip('"')) else 0.0
+        return 0.95 if _DLTDV.match(first_line(head).lstrip('"')) else 0.0
 
     def read(self, path: Path, _options: ReadOptions) -> RawRecording:
         """Read every point of every camera as a body."""
-        names, delimiter, skip, _ = read_header(path)
-        lower = [name.lower() for name in names]
-        points = [match.group(1) for name in names if (match := _DLTDV_X.fullmatch(name))]
-        missing = [point for point in points if f"{point}_y".lower() not in lower]
-        if missing or not points:
-            raise FormatError(f"no column of y for {missing or 'any point'}", path=path, line=skip)
-        table = read_table(path, TableLayout(delimiter, names, skip, tuple(range(len(names)))))
-        frame = np.arange(table.rows, dtype=np.float64)
-        bodies = [
-            RawBody(
-                point,
-                frame,
-                table.numbers[lower.index(f"{point}_x".lower())],
-                table.numbers[lower.index(f"{point}_y".lower())],
-            )
-            for point in points
-        ]
+        bodies, _ = side_by_side(path, _DLTDV)
         notes = [
             'DLTdv versions differ in the direction of y: if yours counts up, add `y_axis="up"`'
         ]
-        return RawRecording(bodies, length_unit="px", rows=table.rows, notes=notes)
+        rows = bodies[0].clock.size
+        return RawRecording(bodies, length_unit="px", rows=rows, notes=notes)
 
 
 SMARTICLES = ["sync", "t", *(f"{name}{at}" for at in (1, 2, 3) for name in ("x", "y", "theta"))]
@@ -96,7 +81,7 @@ class SmarticlesLoader:
         """Read the three robots."""
         names, delimiter, skip, has_header = read_header(path, delimiter=options.delimiter)
         if has_header or len(names) != 11:
-            raise FormatError("expected eleven columns without a header", path=path, line=1)
+            raise FormatError("expected eleven columns without a header", line=1)
         table = read_table(path, TableLayout(delimiter, SMARTICLES, skip, tuple(range(1, 11))))
         bodies = [
             RawBody(
@@ -141,7 +126,7 @@ class ToxTracLoader:
         table = read_table(path, layout)
         clock, arena, track, x, y, label = (table.numbers[column] for column in range(6))
         if not (np.isfinite(arena) & np.isfinite(track)).all():
-            raise FormatError("a row names no arena or no track", path=path)
+            raise FormatError("a row names no arena or no track")
         pairs, codes = np.unique(np.stack([arena, track]), axis=1, return_inverse=True)
         several = np.unique(pairs[0]).size > 1
         labels = [
@@ -189,9 +174,7 @@ class UbiTrailLoader:
         areas = table.labels[0]
         unknown = [area for area in areas if area not in widths]
         if unknown:
-            raise FormatError(
-                f"the metadata give no width for area {unknown[0]}", path=path, line=1
-            )
+            raise FormatError(f"the metadata give no width for area {unknown[0]}", line=1)
         scale = np.array([widths[area] for area in areas])[table.codes[0]]
         with np.errstate(over="ignore"):  # an infinite position is a gap
             x, y = (table.numbers[column] * scale for column in (2, 3))
@@ -211,11 +194,11 @@ def _area_widths(path: Path) -> dict[str, float]:
     """Return the width of each area in pixels, from the first line."""
     match = _AREAS.search(first_line(read_head(path)))
     if match is None:
-        raise FormatError("the metadata hold no matrix of areas (W, H, X, Y)", path=path, line=1)
+        raise FormatError("the metadata hold no matrix of areas (W, H, X, Y)", line=1)
     try:
         numbers = [float(text) for text in match.group(1).split(",")]
     except ValueError as error:
-        raise FormatError(f"the matrix of areas is damaged: {error}", path=path, line=1) from error
+        raise FormatError(f"the matrix of areas is damaged: {error}", line=1) from error
     names = [text.strip().strip('"') for text in match.group(2).split(",")]
     return dict(zip(names, numbers[::4], strict=False))
 
@@ -254,11 +237,9 @@ class YupiLoader:
             axes = YUPI_AXES[: int(dimensions)]
             further = rows[5] if second else []
         except (ValueError, IndexError) as error:
-            raise FormatError(f"the rows of settings are damaged: {error}", path=path) from error
+            raise FormatError(f"the rows of settings are damaged: {error}") from error
         if len(axes) < 2:
-            raise FormatError(
-                f"has {len(axes)} dimensions, and a path in the plane needs two", path=path
-            )
+            raise FormatError(f"has {len(axes)} dimensions, and a path in the plane needs two")
         names = [*axes, "t", *(one for one in further if one)]
         table = read_table(path, TableLayout(",", names, skip, (0, 1, len(axes))))
         body = RawBody(name or "0", table.numbers[len(axes)], table.numbers[0], table.numbers[1])

@@ -15,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.errors import FormatError, InputError, naming_its_file
 from driftwalk.record.column_names import unit_of_name
 from driftwalk.record.pose import angle_between
 from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
@@ -52,7 +52,7 @@ class _Individual:
     def make_body(self, options: ReadOptions) -> None:
         """Read the columns that make the body."""
         if "frame" not in self.names:
-            raise FormatError("has no 'frame'", path=self.path)
+            raise FormatError("has no 'frame'")
         timed = "time" in self.names and options.frame_rate_hz is None
         self.clock_unit = "s" if timed else "frame"
         clock = self.column("time" if timed else "frame")
@@ -64,7 +64,7 @@ class _Individual:
             theta = self.column("ANGLE")
             theta[~np.isfinite(theta)] = np.nan
         if any(one is not None and one.size != clock.size for one in (x, y, theta)):
-            raise FormatError("the arrays have different lengths", path=self.path)
+            raise FormatError("the arrays have different lengths")
         self.body = RawBody(_individual(self.path), clock, x, y, theta)
 
     def point(self, name: str) -> tuple[Array, Array]:
@@ -73,12 +73,11 @@ class _Individual:
         if not set(keys) <= self.names:
             known = [one for one in (*CENTRES, *POSE) if set(_keys(one)) <= self.names]
             raise FormatError(
-                f"has no point '{name}' in x and y; there are {', '.join(known) or 'none'}",
-                path=self.path,
+                f"has no point '{name}' in x and y; there are {', '.join(known) or 'none'}"
             )
         x, y = (self.column(key) for key in keys)
         if x.size != y.size:
-            raise FormatError("the arrays have different lengths", path=self.path)
+            raise FormatError("the arrays have different lengths")
         lost = ~(np.isfinite(x) & np.isfinite(y))
         if "missing" in self.names:  # a position may be interpolated there
             missing = self.column("missing")
@@ -87,15 +86,13 @@ class _Individual:
         if name not in POSE:
             return x, y
         if self.cm_per_pixel is None:
-            raise FormatError(
-                "points of a pose are in pixels, and cm_per_pixel is not there", path=self.path
-            )
+            raise FormatError("points of a pose are in pixels, and cm_per_pixel is not there")
         return x * self.cm_per_pixel, y * self.cm_per_pixel
 
     def _centre(self) -> str:
         found = next((name for name in CENTRES if set(_keys(name)) <= self.names), None)
         if found is None:
-            raise FormatError("has no position (X#wcentroid, Y#wcentroid)", path=self.path)
+            raise FormatError("has no position (X#wcentroid, Y#wcentroid)")
         return found
 
 
@@ -124,19 +121,16 @@ class TrexLoader:
             raise InputError("the file holds no confidences: leave `min_confidence` out")
         files = _files(path) if path.is_dir() else [path]
         if not files:
-            raise FormatError(
-                "the folder holds no file of an individual (VIDEO_id0.npz)", path=path
-            )
+            raise FormatError("the folder holds no file of an individual (VIDEO_id0.npz)")
         videos = sorted({_video(file) for file in files})
         if len(videos) > 1:
             raise FormatError(
                 f"the folder holds several videos ({', '.join(videos[:4])}): give a folder with "
-                "the files of one",
-                path=path,
+                "the files of one"
             )
         read = [_read(file, options) for file in files]
         if len({(one.clock_unit, one.length_unit) for one in read}) > 1:
-            raise FormatError("the files of the folder differ in clock or unit", path=path)
+            raise FormatError("the files of the folder differ in clock or unit")
         calibrated = all(one.cm_per_pixel is not None for one in read)
         return RawRecording(
             [one.body for one in read],
@@ -178,6 +172,7 @@ def _keys(point: str) -> tuple[str, str]:
     return (f"poseX{point[4:]}", f"poseY{point[4:]}") if point in POSE else (f"X{end}", f"Y{end}")
 
 
+@naming_its_file
 def _read(path: Path, options: ReadOptions) -> _Individual:
     if not file_start(path).startswith(ZIP):
         individual = _of_csv(path)
@@ -185,32 +180,32 @@ def _read(path: Path, options: ReadOptions) -> _Individual:
         return individual
     with opened_npz(path) as arrays:
         names = set(arrays)
-        scale = _first(arrays, "cm_per_pixel", path)
+        scale = _first(arrays, "cm_per_pixel")
         # Without it, what is called cm may be pixels.
         unit = options.length_unit or ("px" if options.metres_per_pixel else "cm")
         individual = _Individual(
             path,
             names,
-            lambda name: _numbers(arrays[name], name, path),
+            lambda name: _numbers(arrays[name], name),
             unit if scale is None else "cm",
             scale,
-            _first(arrays, "frame_rate", path),
+            _first(arrays, "frame_rate"),
         )
         individual.make_body(options)
         return individual
 
 
-def _numbers(values: npt.NDArray[Any], name: str, path: Path) -> Array:
+def _numbers(values: npt.NDArray[Any], name: str) -> Array:
     if values.dtype.kind not in "fiub" or values.ndim != 1:
-        raise FormatError(f"'{name}' is no row of numbers", path=path)
+        raise FormatError(f"'{name}' is no row of numbers")
     return np.array(values, dtype=np.float64)
 
 
-def _first(arrays: Mapping[str, npt.NDArray[Any]], name: str, path: Path) -> float | None:
+def _first(arrays: Mapping[str, npt.NDArray[Any]], name: str) -> float | None:
     """Return the number in an array of one, None where there is none above zero."""
     if name not in arrays:
         return None
-    values = _numbers(np.ravel(arrays[name]), name, path)
+    values = _numbers(np.ravel(arrays[name]), name)
     return float(values[0]) if values.size and 0 < values[0] < np.inf else None
 
 
@@ -223,10 +218,10 @@ def _of_csv(path: Path) -> _Individual:
         if _USED.fullmatch(bare := name.partition(" (")[0])
     }
     if not used:
-        raise FormatError("has no columns frame, X#wcentroid and Y#wcentroid", path=path, line=1)
+        raise FormatError("has no columns frame, X#wcentroid and Y#wcentroid", line=1)
     units = {unit_of_name(names[at]) for at, bare in used.items() if bare[0] in "XY"}
     if len(units) > 1:
-        raise FormatError("the columns of positions name different units", path=path, line=1)
+        raise FormatError("the columns of positions name different units", line=1)
     table = read_table(path, TableLayout(",", names, 1, tuple(used)))
     columns = {bare: table.numbers[at] for at, bare in used.items()}
     return _Individual(path, set(columns), lambda name: columns[name], next(iter(units), ""))
