@@ -8,12 +8,15 @@ The command line prints it on one line and exits with code 2.
 from __future__ import annotations
 
 import json
+import zlib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import wraps
 from pathlib import Path
-from typing import Concatenate, ParamSpec, TypeVar
+from typing import Concatenate, Final, ParamSpec, TypeVar
 
+DAMAGED: Final = (OSError, EOFError, zlib.error)
+"""Raised by reading a file, or one of gzip that is cut off or damaged."""
 _Further = ParamSpec("_Further")
 _Result = TypeVar("_Result")
 
@@ -144,6 +147,8 @@ def naming_its_file(
 ) -> Callable[Concatenate[Path, _Further], _Result]:
     """Let a function of a file name it in each `FormatError` that does not.
 
+    What the system, or gzip, cannot read becomes a `FormatError` too.
+
     Parameters
     ----------
     function : callable
@@ -169,5 +174,7 @@ def naming_its_file(
             raise FormatError(
                 error.reason, path=path, line=error.line, column=error.column
             ) from error
+        except DAMAGED as error:
+            raise FormatError(f"is damaged, and ends too early: {error}", path=path) from error
 
     return named

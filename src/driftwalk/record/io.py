@@ -34,7 +34,6 @@ from driftwalk.record.origin import origin_of
 from driftwalk.record.pose import join_markers, two_names
 from driftwalk.record.raw import DELIMITERS, Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.registry import PLAIN
-from driftwalk.record.text import DAMAGED_GZIP
 from driftwalk.schema import Track, body_names, build_trajectory, check_trajectory
 from driftwalk.schema.stores.netcdf import netcdf_bytes
 
@@ -196,6 +195,7 @@ def load(
     try:
         raw = origin.read(options)
         _refuse_uneven(raw)
+        raw.rows = raw.rows or sum({id(one.clock): one.clock.size for one in raw.bodies}.values())
         # Markers become bodies before `body` chooses among the names.
         join_markers(raw, options)
         raw.bodies = _select(raw.bodies, body)
@@ -226,7 +226,7 @@ def load(
         if raw.columns:
             attrs["columns_read"] = json.dumps(raw.columns, ensure_ascii=False)
         return _assemble(cleaned, counts, attrs, raw, tank=tank, block_side=block_side)
-    except (InputError, *DAMAGED_GZIP) as error:
+    except InputError as error:
         raise origin.explained(error) from error
 
 

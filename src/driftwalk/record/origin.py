@@ -16,7 +16,6 @@ from driftwalk.record.raw import RawRecording, ReadOptions
 from driftwalk.record.registry import PLAIN, failed_format, find_loader
 from driftwalk.record.tables.in_memory import MemorySource, table_in_memory
 from driftwalk.record.tables.rows import recording_of
-from driftwalk.record.text import DAMAGED_GZIP
 from driftwalk.schema.stores.netcdf import kind_of_file
 
 IN_MEMORY: Final = "table"
@@ -39,10 +38,8 @@ class Origin:
     guessed: bool = False
     """Whether nothing but its content says that it is a plain table."""
 
-    def explained(self, error: Exception) -> InputError:
+    def explained(self, error: InputError) -> InputError:
         """Return an error of the reading with the file that it is about, and what may help."""
-        if isinstance(error, DAMAGED_GZIP):
-            return FormatError(f"is a damaged gzip file: {error}", path=self.path)
         if self.path is None or not isinstance(error, FormatError):
             return InputError(f"{self.where}: {' '.join(str(error).splitlines())}")
         # A table that no loader recognised may be a damaged file of one of these formats.

@@ -136,7 +136,7 @@ class RawRecording:
     frame_rate_hz: float | None = None
     """Frame rate when the file itself holds it."""
     rows: int = 0
-    """Rows of data in the file."""
+    """Rows of data in the file; 0: those of the bodies, of which one clock counts once."""
     notes: list[str] = field(default_factory=list)
     """Sentences for the person who loads the file."""
     attrs: dict[str, Any] = field(default_factory=dict)

@@ -286,7 +286,7 @@ def read_in_space(
         turns = Turns(table.stack(one.turns), one.form, one.degrees) if one.turns else None
         tracks.append(SpaceTrack(name, clock, position, turns))
     flat = lay_flat(tracks, plane_of(up))
-    return replace(flat, rows=table.rows, clock_origin=table.clock_origin, **facts)
+    return replace(flat, clock_origin=table.clock_origin, **facts)
 
 
 PARTS: Final = ("qx", "qy", "qz", "qw")

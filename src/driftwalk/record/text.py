@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import gzip
 import io
-import zlib
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
@@ -22,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.arrays import Bools, Codes, Integers
-from driftwalk.core.errors import FormatError, naming_its_file
+from driftwalk.core.errors import DAMAGED, FormatError, naming_its_file
 from driftwalk.record.bad_row import check_lines, decoded_line
 from driftwalk.record.raw import MISSING, NAMELESS, Array, TableLayout
 from driftwalk.record.tables.encoding import WINDOWS, TranscodedText, other_encoding
@@ -48,8 +47,6 @@ class TextPolicy(NamedTuple):
 TEXT: Final = TextPolicy()
 
 GZIP_MAGIC = b"\x1f\x8b"
-DAMAGED_GZIP = (gzip.BadGzipFile, EOFError, zlib.error)
-"""Exceptions raised by reading a gzip file that is cut off or damaged."""
 BOM = b"\xef\xbb\xbf"
 
 
@@ -112,7 +109,7 @@ def _encoding(file: io.BufferedReader) -> str | None:
     """Return the encoding of a text that is not UTF-8, without moving on in it."""
     try:
         return other_encoding(file.peek(TEXT.head_bytes)[: TEXT.head_bytes])
-    except (OSError, *DAMAGED_GZIP):
+    except DAMAGED:
         return None  # reading it reports the damage and its place
 
 
@@ -169,11 +166,7 @@ def refuse_long_line(line: bytes, number: int) -> None:
 def read_head(path: Path) -> bytes:
     """Return the first 64 KiB of a file, uncompressed and without a byte order mark."""
     with open_binary(path) as file:
-        try:
-            head = file.read(TEXT.head_bytes)
-        except (OSError, *DAMAGED_GZIP) as error:
-            raise FormatError(f"is a damaged gzip file: {error}") from error
-    return head.removeprefix(BOM)
+        return file.read(TEXT.head_bytes).removeprefix(BOM)
 
 
 @naming_its_file
@@ -188,10 +181,7 @@ def header_rows(path: Path, count: int) -> list[str]:
     rows = []
     with open_binary(path) as file:
         for number in range(1, count + 1):
-            try:
-                line = file.readline(TEXT.longest_line + 1)
-            except (OSError, *DAMAGED_GZIP) as error:
-                raise FormatError(f"cannot be read to its end: {error}") from error
+            line = file.readline(TEXT.longest_line + 1)
             refuse_long_line(line, number)
             if not line:
                 break
@@ -370,27 +360,19 @@ def _blocks(path: Path, skip_lines: int) -> Iterator[tuple[int, bytes]]:
     """Yield (number of the first line, whole lines) until the file ends."""
     line = 1 + skip_lines
     with open_binary(path) as file:
-        try:
-            for _ in range(skip_lines):
-                # A file may say itself how many lines to skip, and be wrong about it.
-                if not file.readline(TEXT.longest_line):
-                    return
-            if not skip_lines:
-                start = file.read(len(BOM))
-                rest = b"" if start == BOM else start
-            else:
-                rest = b""
-            while block := file.read(TEXT.block_bytes):
-                whole, newline, tail = (rest + block).rpartition(b"\n")
-                rest = tail
-                refuse_long_line(rest, line + whole.count(b"\n"))
-                if newline:
-                    yield line, whole + newline
-                    line += whole.count(b"\n") + 1
-            if rest.strip():
-                yield line, rest + b"\n"
-        except (OSError, *DAMAGED_GZIP) as error:
-            raise FormatError(f"cannot be read to its end: {error}") from error
+        for _ in range(skip_lines):
+            # A file may say itself how many lines to skip, and be wrong about it.
+            if not file.readline(TEXT.longest_line):
+                return
+        rest = b"" if skip_lines else file.read(len(BOM)).removeprefix(BOM)
+        while block := file.read(TEXT.block_bytes):
+            whole, newline, rest = (rest + block).rpartition(b"\n")
+            refuse_long_line(rest, line + whole.count(b"\n"))
+            if newline:
+                yield line, whole + newline
+                line += whole.count(b"\n") + 1
+        if rest.strip():
+            yield line, rest + b"\n"
 
 
 def _parse(block: bytes, layout: TableLayout, *, line: int, decimal: str) -> Any:

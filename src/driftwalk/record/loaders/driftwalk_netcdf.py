@@ -61,7 +61,6 @@ class DriftwalkLoader:
             clock_unit="s",
             length_unit="m",
             y_axis="up",
-            rows=time.size,
             attrs=kept,
             extra=extra,
         )

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from driftwalk.core.errors import FormatError
+from driftwalk.core.errors import FormatError, naming_its_file
 from driftwalk.core.files.bounded import MIB
 from driftwalk.core.text.json_text import MOST_BYTES, parse_json
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
@@ -50,11 +50,10 @@ class JsonPointsLoader:
         timed = bool(np.isfinite(t).any())
         clock: Array = t if timed else np.arange(x.size, dtype=np.float64)
         body = RawBody("0", clock, x, y, theta if np.isfinite(theta).any() else None)
-        return RawRecording(
-            [body], clock_unit="s" if timed else "frame", bare_clock="", rows=x.size
-        )
+        return RawRecording([body], clock_unit="s" if timed else "frame", bare_clock="")
 
 
+@naming_its_file
 def bounded_text(path: Path) -> bytes:
     """Return the contents of a file, or refuse more than JSON is read of."""
     with open_binary(path) as file:

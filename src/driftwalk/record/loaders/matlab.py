@@ -118,7 +118,6 @@ def _ctrax(value: Value) -> RawRecording | None:
         length_unit="mm" if scaled else "px",
         y_axis="down",
         frame_rate_hz=rate if rate > 0.0 and not stamped else None,
-        rows=sum(one.x.size for one in bodies),
         separate=True,
     )
 
@@ -146,9 +145,7 @@ def _flytracker(value: Value) -> RawRecording | None:
         )
         for number, track in enumerate(stack, start=1)
     ]
-    return RawRecording(
-        bodies, length_unit="px", y_axis="down", theta_axis="up", rows=clock.size, separate=True
-    )
+    return RawRecording(bodies, length_unit="px", y_axis="down", theta_axis="up", separate=True)
 
 
 def _robotarium(value: Value) -> RawRecording | None:
@@ -168,7 +165,6 @@ def _robotarium(value: Value) -> RawRecording | None:
         [RawBody(str(at), clock, *of) for at, of in enumerate(robots, start=1)],
         length_unit="m",
         y_axis="up",
-        rows=clock.size,
         notes=notes,
         separate=True,
     )

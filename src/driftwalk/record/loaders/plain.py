@@ -151,7 +151,7 @@ class MatricesLoader:
             RawBody(name, frame, x[i], y[i], None if theta is None else theta[i])
             for i, name in enumerate(names)
         ]
-        return RawRecording(bodies, bare_length_is_si=True, rows=int(frame.size))
+        return RawRecording(bodies, bare_length_is_si=True)
 
 
 def _place(name: Path, folder: Path) -> Path:

@@ -140,7 +140,6 @@ class RosLoader:
             clock_unit="ns",
             clock_origin=origin,
             length_unit="m",
-            rows=sum(len(track.stamps) for track in tracks.values()),
         )
 
 

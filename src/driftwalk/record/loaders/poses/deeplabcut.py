@@ -10,8 +10,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
 from driftwalk.record.pose import (
@@ -19,8 +17,8 @@ from driftwalk.record.pose import (
     Confidence,
     Point,
     Poses,
-    bodies_of,
     choose_keypoints,
+    recording_of_poses,
 )
 from driftwalk.record.raw import Array, Marks, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.stores.hdf5 import names_in, opened_hdf5
@@ -155,10 +153,7 @@ def _recording(
         likelihood = columns[place["likelihood"]] if "likelihood" in place else None
         return columns[place["x"]], columns[place["y"]], likelihood
 
-    bodies, notes = bodies_of(Poses(places, read_point), chosen, frame, options, usual=USUAL)
-    return RawRecording(
-        bodies, length_unit="px", has_keypoints=True, rows=int(np.size(frame)), notes=notes
-    )
+    return recording_of_poses(Poses(places, read_point), chosen, frame, options, usual=USUAL)
 
 
 LOADER = DeepLabCutLoader()

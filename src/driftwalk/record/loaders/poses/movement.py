@@ -7,6 +7,7 @@ next to them, and an attribute holds what was known of the recording.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -14,7 +15,7 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.core.text.json_text import parse_json
-from driftwalk.record.pose import Confidence, Point, Poses, bodies_of, choose_keypoints
+from driftwalk.record.pose import Confidence, Point, Poses, choose_keypoints, recording_of_poses
 from driftwalk.record.raw import LENGTH_UNITS, Array, Marks, RawBody, RawRecording, ReadOptions
 from driftwalk.schema.stores.netcdf import MAGIC, open_netcdf, text_attribute
 
@@ -78,22 +79,18 @@ class MovementLoader:
         time, unit = _clock(dataset)
         sleap = str(dataset.attrs.get("source_software")) == "SLEAP"
         chosen = choose_keypoints(keypoints, options)
-        bodies, notes = bodies_of(
-            Poses(places, read_point), chosen, time, options, usual=SLEAP if sleap else USUAL
-        )
+        poses, usual = Poses(places, read_point), SLEAP if sleap else USUAL
+        raw = recording_of_poses(poses, chosen, time, options, usual=usual)
         own = "driftwalk" in dataset.attrs
         # Other programs may call something else so.
         if own and "orientation" in dataset and chosen.heading is None:
-            _orient(bodies, _orientation(dataset, individuals))
+            _orient(raw.bodies, _orientation(dataset, individuals))
         rate = dataset.attrs.get("fps")
-        return RawRecording(
-            bodies,
+        return replace(
+            raw,
             clock_unit=unit,
             length_unit=_length_unit(position) or options.length_unit or "px",
             frame_rate_hz=float(rate) if rate is not None and unit == "frame" else None,
-            has_keypoints=True,
-            rows=time.size,
-            notes=notes,
             attrs=_known(dataset, path) if own else {},
         )
 

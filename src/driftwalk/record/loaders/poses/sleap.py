@@ -15,7 +15,7 @@ from driftwalk.core.arrays import Codes
 from driftwalk.core.errors import FormatError
 from driftwalk.core.text.json_text import parse_json
 from driftwalk.record.cleaning.several_bodies import split_bodies
-from driftwalk.record.pose import Confidence, Point, Poses, bodies_of, choose_keypoints
+from driftwalk.record.pose import Confidence, Point, Poses, choose_keypoints, recording_of_poses
 from driftwalk.record.raw import Array, Marks, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.stores.hdf5 import Hdf5Contents, names_in, opened_hdf5, text_of
 from driftwalk.record.text import read_table
@@ -61,10 +61,8 @@ class SleapLoader:
         }
         frame = np.arange(tracks.shape[3], dtype=np.float64)
         chosen = choose_keypoints(nodes, options)
-        bodies, notes = bodies_of(Poses(places, read_point), chosen, frame, options, usual=USUAL)
-        return RawRecording(
-            bodies, length_unit="px", has_keypoints=True, rows=frame.size, notes=notes
-        )
+        poses = Poses(places, read_point)
+        return recording_of_poses(poses, chosen, frame, options, usual=USUAL)
 
 
 def _in_order(
@@ -128,21 +126,19 @@ class SleapCsvLoader:
             return table.numbers[x], table.numbers[y], table.numbers.get(score)
 
         poses = Poses({"0": {node: node for node in nodes}}, read_point)
-        rows, notes = bodies_of(poses, chosen, table.numbers[frame], options, usual=USUAL)
-        bodies = rows
+        raw = recording_of_poses(poses, chosen, table.numbers[frame], options, usual=USUAL)
         if track is not None:
-            _require_tracks(table.labels[track], table.codes[track], rows[0].clock)
-            bodies = split_bodies(
+            (rows,) = raw.bodies
+            _require_tracks(table.labels[track], table.codes[track], rows.clock)
+            raw.bodies = split_bodies(
                 table.codes[track],
                 [label or "0" for label in table.labels[track]],
-                clock=rows[0].clock,
-                x=rows[0].x,
-                y=rows[0].y,
-                theta=rows[0].theta,
+                clock=rows.clock,
+                x=rows.x,
+                y=rows.y,
+                theta=rows.theta,
             )
-        return RawRecording(
-            bodies, length_unit="px", has_keypoints=True, rows=table.rows, notes=notes
-        )
+        return raw
 
 
 def _require_tracks(labels: list[str], codes: Codes, frame: Array) -> None:

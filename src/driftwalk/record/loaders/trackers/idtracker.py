@@ -55,7 +55,7 @@ class IdTrackerLoader:
         notes = (
             [f"{estimated} positions were estimated by idTracker, not seen"] if estimated else []
         )
-        return RawRecording(bodies, length_unit="px", rows=bodies[0].clock.size, notes=notes)
+        return RawRecording(bodies, length_unit="px", notes=notes)
 
 
 TABLE: Final = "trajectories.csv"
@@ -137,7 +137,6 @@ def _recording(session: _Session, options: ReadOptions) -> RawRecording:
         length_unit="px",
         frame_rate_hz=_rate(session.attributes),
         has_confidence=True,
-        rows=frame.size,
         notes=notes,
     )
 
@@ -296,7 +295,6 @@ def _of_tidy(path: Path, options: ReadOptions) -> RawRecording:
         length_unit="px",
         frame_rate_hz=rate,
         has_confidence=True,
-        rows=table.rows,
         notes=notes,
     )
 

@@ -60,17 +60,16 @@ class SwisTrackTracksLoader:
         first = next(iter(tables.values()))
         if any(set(table.numbers) != set(first.numbers) for table in tables.values()):
             raise FormatError("the folder mixes track files of two SwisTrack versions")
-        rows = sum(table.rows for table in tables.values())
         if len(first.numbers) == len(NEW):
             bodies = [
                 RawBody(name, *(table.numbers[column] for column in range(3)))
                 for name, table in tables.items()
             ]
-            return RawRecording(bodies, length_unit="px", rows=rows)
-        return _old_recording(tables, options, rows=rows)
+            return RawRecording(bodies, length_unit="px")
+        return _old_recording(tables, options)
 
 
-def _old_recording(tables: dict[str, Table], options: ReadOptions, *, rows: int) -> RawRecording:
+def _old_recording(tables: dict[str, Table], options: ReadOptions) -> RawRecording:
     calibrated = any(table.numbers[column].any() for table in tables.values() for column in (3, 4))
     world = calibrated and options.metres_per_pixel is None
     timed = options.frame_rate_hz is None and all(
@@ -80,11 +79,11 @@ def _old_recording(tables: dict[str, Table], options: ReadOptions, *, rows: int)
     bodies = [
         RawBody(name, *(table.numbers[column] for column in used)) for name, table in tables.items()
     ]
-    return _recording(bodies, "ms" if timed else "frame", world=world, rows=rows)
+    return _recording(bodies, "ms" if timed else "frame", world=world)
 
 
 def _recording(
-    bodies: list[RawBody], clock_unit: str, *, world: bool, rows: int, note: str = ""
+    bodies: list[RawBody], clock_unit: str, *, world: bool, note: str = ""
 ) -> RawRecording:
     """Return bodies in the world or the image; angles are measured in the image in either case."""
     return RawRecording(
@@ -93,7 +92,6 @@ def _recording(
         length_unit="m" if world else "px",
         y_axis="up" if world else "down",
         theta_axis="down",
-        rows=rows,
         notes=[note] if note else [],
     )
 
@@ -170,7 +168,7 @@ class SwisTrackParticlesLoader:
             "particles.csv holds no identities: bodies are distinguished by their order in a frame"
         )
         clock_unit, note = "s" if timed else "frame", note if count > 1 else ""
-        return _recording(bodies, clock_unit, world=world, rows=table.rows, note=note)
+        return _recording(bodies, clock_unit, world=world, note=note)
 
 
 def _times(table: Table) -> Array:
@@ -225,9 +223,10 @@ class SwisTrackNmeaLoader:
         )
         note = "ids repeat within a frame: bodies are distinguished by their order in the frame"
         note = note if repeated else ""
-        return _recording(bodies, "frame", world=world, rows=int(frame.size), note=note)
+        return _recording(bodies, "frame", world=world, note=note)
 
 
+@naming_its_file
 def _particles(path: Path) -> tuple[Array, Integers]:
     """Return (frame, image x, y, world x, y, orientation) and the ids, one column a particle."""
     values = array("d")

@@ -51,8 +51,7 @@ class DltdvLoader:
         notes = [
             'DLTdv versions differ in the direction of y: if yours counts up, add `y_axis="up"`'
         ]
-        rows = bodies[0].clock.size
-        return RawRecording(bodies, length_unit="px", rows=rows, notes=notes)
+        return RawRecording(bodies, length_unit="px", notes=notes)
 
 
 SMARTICLES = ["sync", "t", *(f"{name}{at}" for at in (1, 2, 3) for name in ("x", "y", "theta"))]
@@ -89,9 +88,7 @@ class SmarticlesLoader:
             )
             for at in (1, 2, 3)
         ]
-        return RawRecording(
-            bodies, clock_unit="s", bare_clock="", separate=True, length_unit="px", rows=table.rows
-        )
+        return RawRecording(bodies, clock_unit="s", bare_clock="", separate=True, length_unit="px")
 
 
 TOXTRAC: Final = ["frame", "arena", "track", "x", "y", "label"]
@@ -141,7 +138,6 @@ class ToxTracLoader:
             clock_unit=unit_of_name(header[0]) if real else "frame",
             length_unit=unit_of_name(header[3]) if real else "px",
             y_axis="down",
-            rows=table.rows,
             notes=[f"positions that ToxTrac predicted, not seen: {predicted}"] if predicted else [],
         )
 
@@ -185,7 +181,6 @@ class UbiTrailLoader:
             clock_unit="ms",
             length_unit="px",
             separate=True,
-            rows=table.rows,
             attrs={"bodies_apart": "yes"},
         )
 
@@ -243,7 +238,7 @@ class YupiLoader:
         names = [*axes, "t", *(one for one in further if one)]
         table = read_table(path, TableLayout(",", names, skip, (0, 1, len(axes))))
         body = RawBody(name or "0", table.numbers[len(axes)], table.numbers[0], table.numbers[1])
-        return RawRecording([body], clock_unit="s", bare_clock="", rows=table.rows)
+        return RawRecording([body], clock_unit="s", bare_clock="")
 
 
 LOADERS = (

@@ -13,7 +13,7 @@ from xml.parsers import expat
 
 import numpy as np
 
-from driftwalk.core.errors import FormatError
+from driftwalk.core.errors import FormatError, naming_its_file
 from driftwalk.record.bad_row import is_number, split_fields
 from driftwalk.record.cleaning.several_bodies import number_codes, split_bodies
 from driftwalk.record.column_names import unit_of_name
@@ -26,7 +26,7 @@ from driftwalk.record.raw import (
     ReadOptions,
     TableLayout,
 )
-from driftwalk.record.text import DAMAGED_GZIP, header_rows, open_binary, read_table
+from driftwalk.record.text import header_rows, open_binary, read_table
 from driftwalk.record.text_head import first_names
 
 NEEDED: Final = ("TRACK_ID", "POSITION_X", "POSITION_Y", "POSITION_T", "FRAME")
@@ -203,6 +203,7 @@ def _body(name: str, spots: Array, ends: list[float], *, clock: int) -> RawBody:
     return RawBody(name, spots[rows, clock], spots[rows, 1], spots[rows, 2])
 
 
+@naming_its_file
 def _parsed(path: Path) -> _Contents:
     contents = _Contents()
     parser = expat.ParserCreate()
@@ -213,8 +214,6 @@ def _parsed(path: Path) -> _Contents:
             while block := file.read(1 << 20):
                 parser.Parse(block)
             parser.Parse(b"", True)
-    except DAMAGED_GZIP as error:
-        raise FormatError(f"is a damaged gzip file: {error}") from error
     except expat.ExpatError as error:
         reason = expat.ErrorString(error.code)
         raise FormatError(f"is damaged XML: {reason}", line=error.lineno) from error

@@ -139,7 +139,6 @@ class TrexLoader:
             frame_rate_hz=read[0].frame_rate_hz,
             has_keypoints=True,
             y_axis="down",
-            rows=sum(one.body.clock.size for one in read),
             notes=[] if calibrated else [ASSUMED],
         )
 
