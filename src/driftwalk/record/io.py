@@ -367,10 +367,7 @@ def _place(tank: str, bodies: list[RawBody], *, block_side: float | None) -> Pla
     def reach(size: float) -> float:
         return max(noise_reach(_track(body), size=size) for body in bodies)
 
-    if len(bodies) == 1:
-        x, y = bodies[0].x, bodies[0].y
-    else:
-        x, y = (np.concatenate([getattr(body, axis) for body in bodies]) for axis in ("x", "y"))
+    x, y = (np.concatenate([getattr(body, axis) for body in bodies]) for axis in ("x", "y"))
     return place_arena(tank, x, y, block_side=block_side, reach=reach)
 
 
@@ -397,8 +394,7 @@ def _one_clock(bodies: list[RawBody]) -> tuple[Array, Array, Array, Array | None
     clocks = {id(body.clock): body.clock for body in bodies}
     time = np.unique(np.concatenate(list(clocks.values())))
     refuse_sparse(time, bodies)
-    x = _on_clock(time, bodies, [body.x for body in bodies])
-    y = _on_clock(time, bodies, [body.y for body in bodies])
+    x, y = (_on_clock(time, bodies, [getattr(body, axis) for body in bodies]) for axis in "xy")
     theta = _on_clock(time, bodies, [body.theta for body in bodies]) if has_theta else None
     return time, x, y, theta
 
@@ -415,11 +411,8 @@ def _on_clock(time: Array, bodies: list[RawBody], values: Sequence[Array | None]
 
 def _usual_rate(bodies: list[RawBody]) -> float:
     # The differences are the median's own to sort: a long recording is not to be held once more.
-    intervals = [
-        float(np.median(np.diff(body.clock), overwrite_input=True))
-        for body in bodies
-        if body.clock.size > 1
-    ]
+    steps = [np.diff(body.clock) for body in bodies if body.clock.size > 1]
+    intervals = [float(np.median(step, overwrite_input=True)) for step in steps]
     return float(1.0 / np.median(intervals)) if intervals else 0.0
 
 

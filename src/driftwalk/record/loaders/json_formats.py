@@ -12,6 +12,7 @@ from driftwalk.core.errors import FormatError, naming_its_file
 from driftwalk.core.files.bounded import MIB
 from driftwalk.core.text.json_text import MOST_BYTES, parse_json
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
+from driftwalk.record.tables.cells import objects
 from driftwalk.record.tables.in_memory import MemorySource
 from driftwalk.record.tables.rows import recording_of
 from driftwalk.record.text import open_binary
@@ -168,9 +169,7 @@ def column_of(values: list[Any]) -> np.ndarray[Any, Any]:
         return np.array(values, dtype=np.int64)
     if _numbers(values):
         return np.array([np.nan if one is None else float(one) for one in values])
-    column = np.empty(len(values), dtype=object)
-    column[:] = values
-    return column
+    return objects(values)
 
 
 LOADERS = (JsonPointsLoader(), JsonLinesLoader())

@@ -101,11 +101,9 @@ def find_box(
         return quad
     if set(_CORNERS) <= set(found):
         return _corners(source, found, units, meanings, plain=plain)
-    if not {"w", "h"} <= set(found):
-        return None
-    if {"x1", "y1"} <= set(found) and not {"x", "y"} <= set(found):
+    if {"x1", "y1", "w", "h"} <= set(found) and not {"x", "y"} <= set(found):
         return _stated("xywh", found, units)
-    if not {"x", "y"} <= set(found):
+    if not {"x", "y", "w", "h"} <= set(found):
         return None
     said = {word.lower() for side in "xy" for word in words_of(source.names[found[side]])}
     if said & _CENTRE:
@@ -261,9 +259,8 @@ def _values(source: TableSource, columns: list[int]) -> list[Array] | None:
         table = source.read(TableLayout("", labels, numbers=tuple(sorted(columns))), head=True)
     except InputError:
         return None  # reading it reports what is wrong
-    values = [table.numbers[at] for at in columns]
-    known = np.all([np.isfinite(one) for one in values], axis=0)
-    return [one[known] for one in values]
+    values = table.stack(columns)
+    return [*values[np.isfinite(values).all(axis=1)].T]
 
 
 def box_centre(box: Box, values: Mapping[int, Array]) -> tuple[Array, Array]:
@@ -273,8 +270,7 @@ def box_centre(box: Box, values: Mapping[int, Array]) -> tuple[Array, Array]:
         if box.form == "xyxy":
             return 0.5 * (side["x1"] + side["x2"]), 0.5 * (side["y1"] + side["y2"])
         if box.form == "quad":
-            corners = [[side[f"{axis}{n}"] for n in range(1, 5)] for axis in "xy"]
-            x, y = (np.mean(of_axis, axis=0) for of_axis in corners)
+            x, y = (np.mean([side[f"{a}{n}"] for n in range(1, 5)], axis=0) for a in "xy")
             return x, y
         if box.form == "xywh":
             return side["x"] + 0.5 * side["w"], side["y"] + 0.5 * side["h"]
@@ -307,19 +303,12 @@ def box_angle(
     """
     side = {name: values[at] for name, at in box.sides.items()}
     if box.form == "quad" and theta is None:
-        along = [
-            side[f"{axis}2"] + side[f"{axis}3"] - side[f"{axis}1"] - side[f"{axis}4"]
-            for axis in "xy"
-        ]
-        theta = np.arctan2(along[1], along[0])
-        w = np.hypot(*along)
-        h = np.hypot(
-            *(
-                side[f"{axis}3"] + side[f"{axis}4"] - side[f"{axis}1"] - side[f"{axis}2"]
-                for axis in "xy"
-            )
+        first, second, third, fourth = (
+            np.array([side[f"x{n}"], side[f"y{n}"]]) for n in range(1, 5)
         )
-        turn = 2.0 * np.pi
+        along, across = second + third - first - fourth, third + fourth - first - second
+        theta = np.arctan2(along[1], along[0])
+        w, h, turn = np.hypot(*along), np.hypot(*across), 2.0 * np.pi
     elif theta is None or "w" not in side:
         return theta
     else:

@@ -11,7 +11,7 @@ import numpy as np
 from driftwalk.core.errors import FormatError
 from driftwalk.record.column_names import column_meaning
 from driftwalk.record.stores.matlab import Opaque, Struct, Value
-from driftwalk.record.tables.cells import Values
+from driftwalk.record.tables.cells import Values, objects
 from driftwalk.record.tables.in_memory import MemorySource
 
 VECTORS: Final = "variables"
@@ -152,9 +152,7 @@ def _columns(value: Value, rows: int) -> list[Values]:
     if isinstance(value, list):
         if len(value) != rows or not all(isinstance(one, str) for one in value):
             return []
-        texts = np.empty(rows, dtype=object)
-        texts[:] = value
-        return [texts]
+        return [objects(value)]
     if not isinstance(value, np.ndarray) or value.ndim != 2 or rows not in value.shape:
         return []
     if min(value.shape) <= 1:
@@ -191,11 +189,7 @@ def _of_elements(elements: list[dict[str, Value]], what: str) -> MemorySource | 
 
 def _of_rows(elements: list[dict[str, Value]], what: str) -> MemorySource | None:
     names = list(elements[0])
-    columns = []
-    for name in names:
-        cells = np.empty(len(elements), dtype=object)
-        cells[:] = [_single(element.get(name)) for element in elements]
-        columns.append(cells)
+    columns = [objects([_single(one.get(name)) for one in elements]) for name in names]
     return MemorySource(what, names, columns)
 
 

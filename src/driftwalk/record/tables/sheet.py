@@ -7,11 +7,9 @@ from functools import cached_property
 from itertools import islice
 from typing import Any
 
-import numpy as np
-
 from driftwalk.core.errors import FormatError
 from driftwalk.record.raw import ReadOptions, TableLayout
-from driftwalk.record.tables.cells import CellError, Values, form_of, text_of_cell
+from driftwalk.record.tables.cells import CellError, form_of, objects, text_of_cell
 from driftwalk.record.tables.heading import header_advice, heading_of, is_data, units_below
 from driftwalk.record.tables.in_memory import table_of
 from driftwalk.record.tables.source import TABLE
@@ -85,7 +83,7 @@ class SheetSource:
     def stamps(self, column: int) -> StampForm | None:
         """Return how the first time stamp of a column is written, None where it has none."""
         cells = [row[column] if column < len(row) else None for row in self._first]
-        return form_of(_values(cells))
+        return form_of(objects(cells))
 
     def read(self, wanted: TableLayout, *, head: bool = False) -> Table:
         """Read columns, row by row."""
@@ -99,7 +97,7 @@ class SheetSource:
         if not lines:
             raise self.error("holds no rows of data")
         try:
-            return table_of({at: _values(column) for at, column in cells.items()}, wanted)
+            return table_of({at: objects(column) for at, column in cells.items()}, wanted)
         except (CellError, StampError) as error:
             raise FormatError(
                 f"{error} (sheet '{self.sheet}'){self._advice}",
@@ -122,13 +120,6 @@ def _texts(row: Row) -> list[str]:
     while texts and not texts[-1]:
         texts.pop()
     return texts
-
-
-def _values(cells: list[Any]) -> Values:
-    """Return cells as an array of objects."""
-    values = np.empty(len(cells), dtype=object)
-    values[:] = cells
-    return values
 
 
 def _numbered(rows: Iterator[Row]) -> Iterator[tuple[int, Row]]:

@@ -1,16 +1,18 @@
-"""Text tables of tracking programs, one file each: DLTdv, smarticles, ToxTrac, UbiTrail, yupi.
+"""Texts of tracking programs: DLTdv, smarticles, ToxTrac, UbiTrail, yupi, Kinovea.
 
 DLTdv: ``pt1_cam1_X,pt1_cam1_Y,...``, pixels, one row per frame. Smarticles: eleven columns without
 header: sync pulse, time, then x, y, theta of three robots. ToxTrac: image space without header
 (pixels), or real space with one (seconds, mm). UbiTrail: a line of R metadata, then
 ``Area,Territory,X,Y,time,L``; often in gzip. yupi: rows of its settings, then ``x,y,t`` (or
 ``x,y,z,t``) and what else; version 2 begins with ``v2,N``, N rows before the data, version 1 with
-name, interval, dimensions. Programs with one header line are descriptions for `HeadedFormat`.
+name, interval, dimensions. Kinovea: rows of T X Y, and a line with ``#`` above each track.
+Programs with one header line are descriptions for `HeadedFormat`.
 """
 
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Final
@@ -21,8 +23,11 @@ from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
 from driftwalk.record.cleaning.several_bodies import split_bodies
 from driftwalk.record.column_names import unit_of_name
+from driftwalk.record.loaders.json_formats import bounded_text, column_of
 from driftwalk.record.loaders.plain import HeadedFormat, side_by_side
 from driftwalk.record.raw import Marks, RawBody, RawRecording, ReadOptions, TableLayout
+from driftwalk.record.tables.in_memory import MemorySource
+from driftwalk.record.tables.rows import recording_of
 from driftwalk.record.text import header_rows, read_head, read_table
 from driftwalk.record.text_head import (
     first_line,
@@ -241,6 +246,43 @@ class YupiLoader:
         return RawRecording([body], clock_unit="s", bare_clock="")
 
 
+_KINOVEA: Final = b"#Kinovea Trajectory"
+_HUNDREDTHS: Final = re.compile(r"(\d+:\d\d:\d\d):(\d\d\d?)")
+
+
+class KinoveaLoader:
+    """Each track is a body; a number as time has the unit that was chosen in Kinovea.
+
+    Until 2019 its times were ``h:mm:ss:cc``, and ``h:mm:ss:mmm`` above 100 frames per second
+    (``TimeHelper.MillisecondsToTimecode`` of Kinovea 0.8), so the last part counts no frames.
+    """
+
+    name = "kinovea"
+    description = "Kinovea text of trajectories (T X Y; h:mm:ss:cc; no unit of length)"
+
+    def sniff(self, head: bytes, _path: Path) -> float:
+        """Recognise the first line."""
+        return 0.95 if head.startswith(_KINOVEA) else 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read every track."""
+        rows: list[list[str]] = []
+        track = ""
+        for number, line in enumerate(bounded_text(path).decode("utf-8", "replace").split("\n"), 1):
+            fields = line.split()
+            if line.startswith("#"):  # several tracks may have one name
+                name, known = line.strip("# \r"), {row[3] for row in rows}
+                others = (f"{name} {at}" for at in range(2, len(known) + 3))
+                track = next(one for one in (name, *others) if one not in known)
+            elif len(fields) == 3:
+                rows.append([_HUNDREDTHS.sub(r"\1.\2", fields[0]), *fields[1:], track])
+            elif fields:
+                raise FormatError(f"expected T X Y, got {len(fields)} fields", line=number)
+        columns = [column_of([*column]) for column in zip(*rows, strict=True)] or [np.zeros(0)] * 4
+        raw = recording_of(MemorySource("the tracks", ["t", "x", "y", "body"], columns), options)
+        return replace(raw, bare_length_is_si=False, y_axis="up")
+
+
 LOADERS = (
     HeadedFormat(
         name="tracktor",
@@ -260,4 +302,5 @@ LOADERS = (
     ToxTracLoader(),
     UbiTrailLoader(),
     YupiLoader(),
+    KinoveaLoader(),
 )
