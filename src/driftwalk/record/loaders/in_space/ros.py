@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -32,63 +32,47 @@ class Pose(NamedTuple):
     """Position x, y, z [m] and quaternion x, y, z, w."""
 
 
-def _values(position: Any, orientation: Any) -> tuple[float, ...]:
-    return (
-        *(position.x, position.y, position.z),
-        *(orientation.x, orientation.y, orientation.z, orientation.w),
-    )
+READ: Final = (
+    *("geometry_msgs/msg/Pose", "geometry_msgs/msg/Pose2D", "geometry_msgs/msg/PoseStamped"),
+    *("geometry_msgs/msg/PoseWithCovarianceStamped", "geometry_msgs/msg/PoseArray"),
+    *("geometry_msgs/msg/TransformStamped", "nav_msgs/msg/Odometry"),
+    *("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"),
+)
+"""Types of messages whose poses are read."""
 
 
-def _pose(message: Any, topic: str) -> Iterator[Pose]:
-    yield Pose(topic, None, "", _values(message.position, message.orientation))
+def _poses(message: Any, topic: str) -> Iterator[Pose]:
+    """Yield the poses in a message of one of these types, given the name of its topic."""
+    if hasattr(message, "transforms"):
+        for one in message.transforms:
+            yield from _poses(one, topic)
+        return
+    header = getattr(message, "header", None)
+    stamp, parent = (None, "") if header is None else (header.stamp, header.frame_id)
+    inner = message
+    while hasattr(inner, "pose"):  # with a covariance, a pose is inside another
+        inner = inner.pose
+    found = {getattr(message, "child_frame_id", "") or topic: getattr(inner, "transform", inner)}
+    if hasattr(message, "poses"):
+        found = {str(number): one for number, one in enumerate(message.poses)}
+    for name, one in found.items():
+        yield Pose(name, stamp, parent, _values(one))
 
 
-def _pose_2d(message: Any, topic: str) -> Iterator[Pose]:
-    turned = (0.0, 0.0, math.sin(0.5 * message.theta), math.cos(0.5 * message.theta))
-    yield Pose(topic, None, "", (message.x, message.y, 0.0, *turned))
-
-
-def _pose_stamped(message: Any, topic: str) -> Iterator[Pose]:
-    pose, header = message.pose, message.header
-    yield Pose(topic, header.stamp, header.frame_id, _values(pose.position, pose.orientation))
-
-
-def _with_covariance(message: Any, topic: str) -> Iterator[Pose]:
-    pose, header = message.pose.pose, message.header
-    name = getattr(message, "child_frame_id", "") or topic
-    yield Pose(name, header.stamp, header.frame_id, _values(pose.position, pose.orientation))
-
-
-def _pose_array(message: Any, _topic: str) -> Iterator[Pose]:
-    header = message.header
-    for number, pose in enumerate(message.poses):
-        values = _values(pose.position, pose.orientation)
-        yield Pose(str(number), header.stamp, header.frame_id, values)
-
-
-def _transform(message: Any, _topic: str) -> Iterator[Pose]:
-    transform, header = message.transform, message.header
-    values = _values(transform.translation, transform.rotation)
-    yield Pose(message.child_frame_id, header.stamp, header.frame_id, values)
-
-
-def _transforms(message: Any, topic: str) -> Iterator[Pose]:
-    for transform in message.transforms:
-        yield from _transform(transform, topic)
-
-
-READERS: Final[dict[str, Callable[[Any, str], Iterator[Pose]]]] = {
-    "geometry_msgs/msg/Pose": _pose,
-    "geometry_msgs/msg/Pose2D": _pose_2d,
-    "geometry_msgs/msg/PoseStamped": _pose_stamped,
-    "geometry_msgs/msg/PoseWithCovarianceStamped": _with_covariance,
-    "geometry_msgs/msg/PoseArray": _pose_array,
-    "geometry_msgs/msg/TransformStamped": _transform,
-    "nav_msgs/msg/Odometry": _with_covariance,
-    "tf2_msgs/msg/TFMessage": _transforms,
-    "tf/msg/tfMessage": _transforms,
-}
-"""From a type of message to what takes the poses out of one, given the name of its topic."""
+def _values(pose: Any) -> tuple[float, ...]:
+    if hasattr(pose, "theta"):
+        return (
+            pose.x,
+            pose.y,
+            0.0,
+            0.0,
+            0.0,
+            math.sin(0.5 * pose.theta),
+            math.cos(0.5 * pose.theta),
+        )
+    moves = hasattr(pose, "translation")
+    at, turn = (pose.translation, pose.rotation) if moves else (pose.position, pose.orientation)
+    return (at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w)
 
 
 METADATA: Final = "metadata.yaml"
@@ -182,13 +166,13 @@ def _refuse_nested(path: Path) -> None:
 
 def _choose(connections: list[Any], topic: str | None) -> list[Any]:
     """Return the connections of the chosen topics, or of the only one that holds poses."""
-    usable = [one for one in connections if one.msgtype in READERS]
+    usable = [one for one in connections if one.msgtype in READ]
     topics = list(dict.fromkeys(one.topic for one in usable))
     if not topics:
         found = ", ".join(sorted({one.msgtype for one in connections})[:8]) or "no topics"
         raise FormatError(
             f"has no topic of poses, only {found}; read are "
-            f"{', '.join(name.rpartition('/')[2] for name in READERS)}"
+            f"{', '.join(name.rpartition('/')[2] for name in READ)}"
         )
     wanted = [name.strip() for name in topic.split(",")] if topic is not None else topics
     if (len(wanted) > 1 and topic is None) or not set(wanted) <= set(topics):
@@ -208,7 +192,7 @@ def _collect(reader: Any, chosen: list[Any]) -> tuple[dict[str, _Track], set[str
     recorded = 0
     for connection, received, data in reader.messages(connections=chosen):
         message = reader.deserialize(data, connection.msgtype)
-        for pose in READERS[connection.msgtype](message, connection.topic.strip("/")):
+        for pose in _poses(message, connection.topic.strip("/")):
             stamp = 0 if pose.stamp is None else pose.stamp.sec * 1_000_000_000 + pose.stamp.nanosec
             recorded += stamp == 0
             track = tracks.setdefault((connection.topic, pose.body), _Track())

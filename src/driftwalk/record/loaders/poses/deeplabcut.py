@@ -6,14 +6,13 @@ of several animals have the row of individuals, those of one have not.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
 from driftwalk.record.pose import (
-    Chosen,
     Confidence,
     Point,
     Poses,
@@ -60,14 +59,14 @@ class DeepLabCutLoader:
 
 def _read_csv(path: Path, options: ReadOptions) -> RawRecording:
     header = _header(path)
-    places = _places(list(zip(*(row[1:] for row in header), strict=True)))
-    chosen = _chosen(places, options)
-    used = {column + 1 for column in _columns(places, chosen)}
     names = [".".join(part for part in column if part) for column in zip(*header, strict=True)]
-    layout = TableLayout(",", names, len(header), tuple(sorted({0, *used})))
-    table = read_table(path, layout)
-    columns = {column - 1: table.numbers[column] for column in used}
-    return _recording(places, chosen, columns, table.numbers[0], options)
+
+    def read(used: set[int]) -> tuple[dict[int, Array], Array]:
+        wanted = (0, *sorted(at + 1 for at in used))
+        table = read_table(path, TableLayout(",", names, len(header), wanted))
+        return {at: table.numbers[at + 1] for at in used}, table.numbers[0]
+
+    return _recording(list(zip(*(row[1:] for row in header), strict=True)), read, options)
 
 
 def _read_hdf5(path: Path, options: ReadOptions) -> RawRecording:
@@ -76,10 +75,11 @@ def _read_hdf5(path: Path, options: ReadOptions) -> RawRecording:
         frame = frame_in(contents, key)
         if any(len(column) not in LEVELS for column in frame.columns):
             raise FormatError(f"'{key}' has no columns of scorer, bodyparts, coords")
-        places = _places(frame.columns)
-        chosen = _chosen(places, options)
-        columns = {column: frame.numbers(column) for column in _columns(places, chosen)}
-        return _recording(places, chosen, columns, frame.index(), options)
+
+        def read(used: set[int]) -> tuple[dict[int, Array], Array]:
+            return {at: frame.numbers(at) for at in used}, frame.index()
+
+        return _recording(frame.columns, read, options)
 
 
 def _header(path: Path) -> list[list[str]]:
@@ -129,26 +129,22 @@ def _places(columns: Sequence[tuple[str, ...]]) -> Places:
     return found
 
 
-def _chosen(places: Places, options: ReadOptions) -> Chosen:
-    return choose_keypoints([part for parts in places.values() for part in parts], options)
-
-
-def _columns(places: Places, chosen: Chosen) -> set[int]:
-    return {
-        column
-        for parts in places.values()
-        for part in chosen.names()
-        for column in parts.get(part, {}).values()
-    }
-
-
 def _recording(
-    places: Places,
-    chosen: Chosen,
-    columns: dict[int, Array],
-    frame: Array,
+    names: Sequence[tuple[str, ...]],
+    read: Callable[[set[int]], tuple[dict[int, Array], Array]],
     options: ReadOptions,
 ) -> RawRecording:
+    """Return the recording of columns by level, given what reads some of them and the frames."""
+    places = _places(names)
+    chosen = choose_keypoints([part for parts in places.values() for part in parts], options)
+    used = {
+        at
+        for parts in places.values()
+        for part in chosen.names()
+        for at in parts.get(part, {}).values()
+    }
+    columns, frame = read(used)
+
     def read_point(place: Mapping[str, int]) -> Point:
         likelihood = columns[place["likelihood"]] if "likelihood" in place else None
         return columns[place["x"]], columns[place["y"]], likelihood
