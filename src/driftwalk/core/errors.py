@@ -147,7 +147,7 @@ def naming_its_file(
 ) -> Callable[Concatenate[Path, _Further], _Result]:
     """Let a function of a file name it in each `FormatError` that does not.
 
-    What the system, or gzip, cannot read becomes a `FormatError` too.
+    A failure of the system, or of gzip, becomes a `FormatError` too.
 
     Parameters
     ----------

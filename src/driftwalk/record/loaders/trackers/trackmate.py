@@ -102,7 +102,7 @@ def stated_unit(text: str) -> str:
 
     Examples
     --------
-    >>> stated_unit("(micron)", Path("spots.csv"))
+    >>> stated_unit("(micron)")
     'um'
     """
     unit = unit_of_name(f"x {text}") if text else ""
