@@ -175,6 +175,8 @@ def naming_its_file(
                 error.reason, path=path, line=error.line, column=error.column
             ) from error
         except DAMAGED as error:
-            raise FormatError(f"is damaged, and ends too early: {error}", path=path) from error
+            known = getattr(error, "strerror", None)
+            reason = f"cannot be read: {known}" if known else f"is damaged, and ends early: {error}"
+            raise FormatError(reason, path=path) from error
 
     return named

@@ -319,8 +319,11 @@ def _assemble(
         attrs["block_side_m"] = block_side
     if tank is not None:
         placed = _place(tank, bodies, block_side=block_side)
-        _shift(bodies, placed)
         arena = placed.arena
+        if placed.origin != (0.0, 0.0):
+            for one in bodies:
+                one.x -= placed.origin[0]
+                one.y -= placed.origin[1]
         before = parse_json(attrs.get("origin_shift_m", "[0.0, 0.0]"))
         attrs |= arena_attributes(placed, shifted_before=before)
         notes += placed.notes
@@ -376,13 +379,6 @@ def _track(body: RawBody) -> Track:
     known = np.isfinite(body.x)
     x, y = body.x[known], body.y[known]
     return Track(body.clock[known], x, y, np.full(x.size, np.nan))
-
-
-def _shift(bodies: list[RawBody], placed: PlacedArena) -> None:
-    if placed.origin != (0.0, 0.0):
-        for body in bodies:
-            body.x -= placed.origin[0]
-            body.y -= placed.origin[1]
 
 
 def _one_clock(bodies: list[RawBody]) -> tuple[Array, Array, Array, Array | None]:

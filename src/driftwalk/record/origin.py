@@ -9,7 +9,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, Final
 
-from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.errors import FormatError, InputError, naming_its_file
 from driftwalk.core.files.file_names import text_of_name
 from driftwalk.record.cleaning.warn import encoding_notes
 from driftwalk.record.raw import RawRecording, ReadOptions
@@ -89,7 +89,7 @@ def origin_of(
         where=str(path),
         name=text_of_name(path.name),
         format=loader.name,
-        read=partial(loader.read, path),
+        read=partial(naming_its_file(loader.read), path),
         path=path,
         guessed=format is None and loader.name == PLAIN,
     )

@@ -45,20 +45,10 @@ def plausibility_warnings(bodies: list[RawBody]) -> list[str]:
     bodies : list of RawBody
         In SI units.
     """
-    present = [(body, np.isfinite(body.x)) for body in bodies]
-    if not any(known.any() for _, known in present):
+    if not any(np.isfinite(body.x).any() for body in bodies):
         return ["no row holds a position"]
     warnings = []
-    # Without copies: a recording may have millions of positions.
-    extent = max(
-        float(
-            np.max(values, where=known, initial=-np.inf)
-            - np.min(values, where=known, initial=np.inf)
-        )
-        for body, known in present
-        if known.any()
-        for values in (body.x, body.y)
-    )
+    extent = max(span_of([values]) for body in bodies for values in (body.x, body.y))
     if extent > PLAUSIBLE.largest_extent_m:
         warnings.append(f"the positions span {extent:.3g} m: is the unit, or the scale, right?")
     elif extent == 0.0:
@@ -76,6 +66,15 @@ def plausibility_warnings(bodies: list[RawBody]) -> list[str]:
     ):
         warnings.append(f"the usual speed is {max(speeds):.3g} m/s: is the clock's unit right?")
     return warnings
+
+
+def span_of(series: Sequence[Array]) -> float:
+    """Return the range of the finite values of some arrays, 0 where there are none."""
+    # Without copies: a recording may have millions of positions.
+    known = [(values, np.isfinite(values)) for values in series]
+    high = max(float(np.max(one, where=at, initial=-np.inf)) for one, at in known)
+    low = min(float(np.min(one, where=at, initial=np.inf)) for one, at in known)
+    return high - low if high >= low else 0.0
 
 
 def _clock_warnings(bodies: list[RawBody]) -> list[str]:

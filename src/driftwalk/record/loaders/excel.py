@@ -59,8 +59,6 @@ class ExcelLoader:
 
 def _refuse_other(path: Path) -> None:
     """Refuse workbooks of other formats, by name."""
-    if path.is_dir():
-        raise FormatError("is a folder, and no workbook")
     if file_start(path).startswith(_OLD):
         raise FormatError(
             "is a workbook of Excel before 2007 (.xls), or one with a password: save it as "

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from driftwalk.core.errors import FormatError, naming_its_file
+from driftwalk.core.errors import FormatError
 from driftwalk.core.files.bounded import MIB
 from driftwalk.core.text.json_text import MOST_BYTES, parse_json
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
@@ -54,7 +54,6 @@ class JsonPointsLoader:
         return RawRecording([body], clock_unit="s" if timed else "frame", bare_clock="")
 
 
-@naming_its_file
 def bounded_text(path: Path) -> bytes:
     """Return the contents of a file, or refuse more than JSON is read of."""
     with open_binary(path) as file:
@@ -102,8 +101,6 @@ class JsonLinesLoader:
     def sniff(self, head: bytes, _path: Path) -> float:
         """Recognise an object in the first line, and none that goes on in the second."""
         first, *rest = head.split(b"\n")
-        if not first.lstrip().startswith(b"{") or not first.rstrip().endswith(b"}"):
-            return 0.0
         if rest and rest[0].strip() and not rest[0].lstrip().startswith(b"{"):
             return 0.0
         try:

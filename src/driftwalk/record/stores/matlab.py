@@ -47,8 +47,6 @@ def matlab_variables_of(path: Path) -> Iterator[dict[str, Value]]:
     FormatError
         When it is no file of MATLAB's, is damaged, or declares more than it can hold.
     """
-    if path.is_dir():
-        raise FormatError("is a folder, and no MATLAB file")
     with path.open("rb") as file:
         start = file.read(len(OLD))
     if start == HDF5_BASED:

@@ -226,7 +226,6 @@ class SwisTrackNmeaLoader:
         return _recording(bodies, "frame", world=world, note=note)
 
 
-@naming_its_file
 def _particles(path: Path) -> tuple[Array, Integers]:
     """Return (frame, image x, y, world x, y, orientation) and the ids, one column a particle."""
     values = array("d")

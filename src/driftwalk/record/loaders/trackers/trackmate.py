@@ -13,7 +13,7 @@ from xml.parsers import expat
 
 import numpy as np
 
-from driftwalk.core.errors import FormatError, naming_its_file
+from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
 from driftwalk.record.cleaning.several_bodies import number_codes, split_bodies
 from driftwalk.record.column_names import unit_of_name
@@ -203,7 +203,6 @@ def _body(name: str, spots: Array, ends: list[float], *, clock: int) -> RawBody:
     return RawBody(name, spots[rows, clock], spots[rows, 1], spots[rows, 2])
 
 
-@naming_its_file
 def _parsed(path: Path) -> _Contents:
     contents = _Contents()
     parser = expat.ParserCreate()
