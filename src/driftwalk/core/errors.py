@@ -176,7 +176,7 @@ def naming_its_file(
             ) from error
         except DAMAGED as error:
             known = getattr(error, "strerror", None)
-            reason = f"cannot be read: {known}" if known else f"is damaged, and ends early: {error}"
+            reason = f"cannot be read: {known}" if known else f"is damaged: {error}"
             raise FormatError(reason, path=path) from error
 
     return named

@@ -11,11 +11,12 @@ from typing import Any, Final
 
 from driftwalk.core.errors import FormatError, InputError, naming_its_file
 from driftwalk.core.files.file_names import text_of_name
-from driftwalk.record.cleaning.warn import encoding_notes
 from driftwalk.record.raw import RawRecording, ReadOptions
-from driftwalk.record.registry import PLAIN, failed_format, find_loader
+from driftwalk.record.recognise import nearest_table
+from driftwalk.record.registry import PLAIN, find_loader, loaders
 from driftwalk.record.tables.in_memory import MemorySource, table_in_memory
 from driftwalk.record.tables.rows import recording_of
+from driftwalk.record.text import encoding_notes, read_head
 from driftwalk.schema.stores.netcdf import kind_of_file
 
 IN_MEMORY: Final = "table"
@@ -43,7 +44,7 @@ class Origin:
         if self.path is None or not isinstance(error, FormatError):
             return InputError(f"{self.where}: {' '.join(str(error).splitlines())}")
         # A table that no loader recognised may be a damaged file of one of these formats.
-        hint = failed_format(self.path) if self.guessed else ""
+        hint = nearest_table(self.path, read_head(self.path), loaders()) if self.guessed else ""
         path = error.path or self.path
         return FormatError(error.reason + hint, path=path, line=error.line, column=error.column)
 

@@ -78,16 +78,20 @@ def open_binary(path: Path) -> IO[bytes]:
     return file if encoding is None else _buffered(TranscodedText(file, encoding))
 
 
-def is_windows_text(path: Path) -> bool:
-    """Whether a file is text in the encoding of Windows, of which other letters may be meant.
+def encoding_notes(path: Path) -> list[str]:
+    """Return the warning about text of an unknown encoding.
 
     Parameters
     ----------
     path : Path
-        A file, which may be packed by gzip.
+        A file, which may be packed by gzip, or a folder.
     """
+    if not path.is_file():
+        return []
     with _opened(path) as file:
-        return _encoding(file) == WINDOWS
+        if _encoding(file) != WINDOWS:
+            return []
+    return ["the text is not UTF-8 and was read as Windows-1252: check letters such as µ and °"]
 
 
 def _opened(path: Path) -> io.BufferedReader:

@@ -34,7 +34,7 @@ def test_what_cannot_be_read_is_named(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match=r"none.gz: cannot be read: No such file"):
         read(tmp_path / "none.gz", line=0)
     (tmp_path / "cut.gz").write_bytes(gzip.compress(b"x" * 1000)[:-9])
-    with pytest.raises(FormatError, match=r"cut.gz: is damaged, and ends early"):
+    with pytest.raises(FormatError, match=r"cut.gz: is damaged: "):
         read(tmp_path / "cut.gz", line=0)
     (tmp_path / "whole.gz").write_bytes(gzip.compress(b"x"))
     assert read(tmp_path / "whole.gz", line=0) == b"x"

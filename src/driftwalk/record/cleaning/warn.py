@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.raw import Array, RawBody, RawRecording
-from driftwalk.record.text import is_windows_text
 
 
 class PlausibilityPolicy(NamedTuple):
@@ -88,19 +86,6 @@ def _clock_warnings(bodies: list[RawBody]) -> list[str]:
     if shortest < PLAUSIBLE.shortest_interval_s:
         return [f"the usual interval is {shortest:.3g} s: is the unit of the clock right?"]
     return []
-
-
-def encoding_notes(path: Path) -> list[str]:
-    """Return the warning about text of an unknown encoding.
-
-    Parameters
-    ----------
-    path : Path
-        A file or folder that was read.
-    """
-    if not path.is_file() or not is_windows_text(path):
-        return []
-    return ["the text is not UTF-8 and was read as Windows-1252: check letters such as µ and °"]
 
 
 def angle_warnings(raw: RawRecording) -> list[str]:

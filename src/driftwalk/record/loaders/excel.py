@@ -53,7 +53,7 @@ class ExcelLoader:
         with _opened(path) as book:
             titles = [sheet.title for sheet in book.worksheets]
         sources = [SheetSource(partial(_rows, path, title), title, options) for title in titles]
-        filled = {one.sheet: one for one in sources if not one.is_blank}
+        filled = {one.sheet: one for one in sources if one.names}
         return recording_of(the_one_that_fits(filled, options, "sheet"), options)
 
 

@@ -67,11 +67,6 @@ class SheetSource:
                     self.has_header, self.names = False, [""] * len(first)
                 self._advice = header_advice(texts, lines[0])
 
-    @property
-    def is_blank(self) -> bool:
-        """Whether the sheet has no header."""
-        return not self.names
-
     @cached_property
     def _first(self) -> list[Row]:
         return [row for _, row in islice(self._data(), TABLE.sample_rows)]

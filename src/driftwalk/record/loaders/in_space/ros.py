@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -61,15 +61,8 @@ def _poses(message: Any, topic: str) -> Iterator[Pose]:
 
 def _values(pose: Any) -> tuple[float, ...]:
     if hasattr(pose, "theta"):
-        return (
-            pose.x,
-            pose.y,
-            0.0,
-            0.0,
-            0.0,
-            math.sin(0.5 * pose.theta),
-            math.cos(0.5 * pose.theta),
-        )
+        half = 0.5 * pose.theta
+        return (pose.x, pose.y, 0.0, 0.0, 0.0, math.sin(half), math.cos(half))
     moves = hasattr(pose, "translation")
     at, turn = (pose.translation, pose.rotation) if moves else (pose.position, pose.orientation)
     return (at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w)
@@ -81,10 +74,8 @@ _SQLITE: Final = b"SQLite format 3\0"
 _ROS_1: Final = b"#ROSBAG V2.0\n"
 
 
-@dataclass
-class _Track:
-    stamps: list[int] = field(default_factory=list)
-    values: list[tuple[float, ...]] = field(default_factory=list)
+_Tracks = dict[tuple[str, str], list[tuple[int, tuple[float, ...]]]]
+"""From topic and body to stamps [ns] and poses."""
 
 
 class RosLoader:
@@ -107,8 +98,16 @@ class RosLoader:
             tracks, parents, recorded = _collect(reader, chosen)
         if not tracks:
             raise FormatError("the chosen topic has no poses")
-        origin = min(min(track.stamps) for track in tracks.values())
-        flat = lay_flat([_in_space(name, track, origin) for name, track in tracks.items()], plane)
+        origin = min(stamp for samples in tracks.values() for stamp, _ in samples)
+        times = Counter(body for _, body in tracks)
+        bodies = []
+        for (topic, body), samples in tracks.items():
+            clock = np.array([stamp - origin for stamp, _ in samples], dtype=np.float64)
+            values = np.array([pose for _, pose in samples], dtype=np.float64)
+            name = body if times[body] == 1 else f"{topic.strip('/')}/{body}"
+            turns = Turns(values[:, 3:], QUATERNION)
+            bodies.append(SpaceTrack(name, clock, values[:, :3], turns))
+        flat = lay_flat(bodies, plane)
         if recorded:
             flat.notes.append(
                 f"{recorded} poses have no time stamp: they stand at the time when they were "
@@ -119,12 +118,7 @@ class RosLoader:
                 f"the poses are in different frames, {', '.join(sorted(parents))}: compare bodies "
                 "of one frame only"
             )
-        return replace(
-            flat,
-            clock_unit="ns",
-            clock_origin=origin,
-            length_unit="m",
-        )
+        return replace(flat, clock_unit="ns", clock_origin=origin, length_unit="m")
 
 
 @contextmanager
@@ -185,9 +179,9 @@ def _choose(connections: list[Any], topic: str | None) -> list[Any]:
     return [one for one in usable if one.topic in wanted]
 
 
-def _collect(reader: Any, chosen: list[Any]) -> tuple[dict[str, _Track], set[str], int]:
-    """Return the tracks by body, the frames they are in, and how many have no time of their own."""
-    tracks: dict[tuple[str, str], _Track] = {}
+def _collect(reader: Any, chosen: list[Any]) -> tuple[_Tracks, set[str], int]:
+    """Return the tracks, the frames they are in, and how many poses have no time of their own."""
+    tracks: _Tracks = defaultdict(list)
     parents: set[str] = set()
     recorded = 0
     for connection, received, data in reader.messages(connections=chosen):
@@ -195,26 +189,9 @@ def _collect(reader: Any, chosen: list[Any]) -> tuple[dict[str, _Track], set[str
         for pose in _poses(message, connection.topic.strip("/")):
             stamp = 0 if pose.stamp is None else pose.stamp.sec * 1_000_000_000 + pose.stamp.nanosec
             recorded += stamp == 0
-            track = tracks.setdefault((connection.topic, pose.body), _Track())
-            track.stamps.append(stamp or received)
-            track.values.append(pose.values)
+            tracks[connection.topic, pose.body].append((stamp or received, pose.values))
             parents.add(pose.parent)
-    return _named(tracks), parents, recorded
-
-
-def _named(tracks: dict[tuple[str, str], _Track]) -> dict[str, _Track]:
-    """Return the tracks by body, and by topic too where two topics have a body of one name."""
-    times = Counter(body for _, body in tracks)
-    return {
-        body if times[body] == 1 else f"{topic.strip('/')}/{body}": track
-        for (topic, body), track in tracks.items()
-    }
-
-
-def _in_space(name: str, track: _Track, origin: int) -> SpaceTrack:
-    clock = np.array([stamp - origin for stamp in track.stamps], dtype=np.float64)
-    values = np.array(track.values, dtype=np.float64)
-    return SpaceTrack(name, clock, values[:, :3], Turns(values[:, 3:], QUATERNION))
+    return tracks, parents, recorded
 
 
 LOADER = RosLoader()

@@ -174,19 +174,16 @@ class SwisTrackParticlesLoader:
 def _times(table: Table) -> Array:
     """Return seconds since 1970 of the ISO time stamps."""
     try:
-        stamps = np.array([_since_1970(label) for label in table.labels[1]], dtype=np.float64)
+        times = [datetime.fromisoformat(label) for label in table.labels[1]]
+        # A time without a zone is one of UTC.
+        zoned = [one if one.tzinfo is not None else one.replace(tzinfo=UTC) for one in times]
+        stamps = np.array([one.timestamp() for one in zoned], dtype=np.float64)
     except (ValueError, OverflowError) as error:
         raise FormatError(
             f"a time stamp is not an ISO date ({error}); give `frame_rate` to use frame numbers"
         ) from error
     seconds: Array = stamps[table.codes[1]]
     return seconds
-
-
-def _since_1970(stamp: str) -> float:
-    """Return the seconds of an ISO time stamp; one that names no zone is taken as UTC."""
-    time = datetime.fromisoformat(stamp)
-    return (time if time.tzinfo is not None else time.replace(tzinfo=UTC)).timestamp()
 
 
 class SwisTrackNmeaLoader:

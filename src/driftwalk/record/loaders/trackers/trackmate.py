@@ -53,7 +53,9 @@ class TrackMateLoader:
         if missing:
             raise FormatError(f"no column {', '.join(missing)} as TrackMate has it", line=1)
         places = {name: names.index(name) for name in NEEDED}
-        header = _rows_of_header(rows, places["POSITION_X"])
+        # Three rows that explain the names may stand below them.
+        cells = ["".join(row[places["POSITION_X"] :][:1]) for row in rows[1:]]
+        header = next((at for at, cell in enumerate(cells, start=1) if is_number(cell)), len(rows))
         units = rows[3] if header == 4 and len(rows[3]) == len(names) else [""] * len(names)
         length = stated_unit(units[places["POSITION_X"]])
         clock_unit = _clock_unit(units[places["POSITION_T"]], options)
@@ -76,14 +78,6 @@ class TrackMateLoader:
             rows=table.rows,
             notes=[OUTSIDE.format(outside)] if outside else [],
         )
-
-
-def _rows_of_header(rows: list[list[str]], place: int) -> int:
-    """Return how many rows there are before the first spot."""
-    for at, row in enumerate(rows[1:], start=1):
-        if place < len(row) and is_number(row[place]):
-            return at
-    return len(rows)
 
 
 def _clock_unit(stated: str, options: ReadOptions) -> str:
