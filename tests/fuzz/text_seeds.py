@@ -35,6 +35,9 @@ def text_files() -> Iterator[tuple[str, dict[str, str], tuple[str, ...]]]:
         "dltdv": ("xypts.csv", "pt1_cam1_X,pt1_cam1_Y\n", FRAMES),
         "points": ("points.json", "", FRAMES),
         "timed-points": ("points.json", "", ("--length-unit", "cm")),
+        "kinovea": ("paths.txt", "#Kinovea Trajectory data export\n#T X Y\n\n# Label\n",
+                    ("--length-unit", "mm")),
+        "coco": ("boxes.json", "", FRAMES),
         "matrix": ("x.csv", "", ("--y", "@/y.csv", "--fps", "10")),
     }  # fmt: skip
     lines: dict[str, Callable[..., str]] = {
@@ -53,6 +56,7 @@ def text_files() -> Iterator[tuple[str, dict[str, str], tuple[str, ...]]]:
         "smarticles": lambda k, t, x, y: f"{t:.1f},{k},511,{k + 9},0.7,530,462,2.7,596,414,5.9",
         "tracktor": lambda k, t, x, y: f"{k},{k}.0,{1e3 * x:.1f},{1e3 * y:.1f},A",
         "dltdv": lambda k, t, x, y: f"{1e3 * x:.2f},{1e3 * y:.2f}",
+        "kinovea": lambda k, t, x, y: f"0:00:{k:02}:{k:02} {1e3 * x:.2f} {1e3 * y:.2f} ",
         "matrix": lambda k, t, x, y: f"{x:.5f},{y:.5f}",
     }
     for kind, (name, head, options) in texts.items():
@@ -61,6 +65,10 @@ def text_files() -> Iterator[tuple[str, dict[str, str], tuple[str, ...]]]:
         elif kind == "timed-points":
             points = (f'{{"t": {t:.1f}, "x": {a:.4f}, "y": {b:.4f}}}' for _, t, a, b in rows)
             content = "[" + ",\n".join(points) + "]"
+        elif kind == "coco":
+            sides = (f"[{500 + 1e3 * a:.2f}, {500 + 1e3 * b:.2f}, 9, 9]" for *_, a, b in rows)
+            boxes = (f'{{"image_id": {k}, "bbox": {box}}}' for k, box in enumerate(sides))
+            content = "[" + ",\n".join(boxes) + "]"
         else:
             content = head + "".join(lines[kind](*row) + "\n" for row in rows)
         yield kind, {name: content} | ({"y.csv": content} if kind == "matrix" else {}), options

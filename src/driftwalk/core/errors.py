@@ -8,9 +8,17 @@ The command line prints it on one line and exits with code 2.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+import zlib
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import wraps
 from pathlib import Path
+from typing import Concatenate, Final, ParamSpec, TypeVar
+
+DAMAGED: Final = (OSError, EOFError, zlib.error)
+"""Raised by reading a file, or one of gzip that is cut off or damaged."""
+_Further = ParamSpec("_Further")
+_Result = TypeVar("_Result")
 
 
 def reason_of(error: BaseException) -> str:
@@ -132,3 +140,43 @@ def damaged_as(what: str, path: Path, *, advice: str = "") -> Iterator[None]:
         if advice:
             reason = f"{reason.rstrip('.')}; {advice}"
         raise FormatError(reason, path=path) from error
+
+
+def naming_its_file(
+    function: Callable[Concatenate[Path, _Further], _Result],
+) -> Callable[Concatenate[Path, _Further], _Result]:
+    """Let a function of a file name it in each `FormatError` that does not.
+
+    A failure of the system, or of gzip, becomes a `FormatError` too.
+
+    Parameters
+    ----------
+    function : callable
+        Its first argument is the path of the file.
+
+    Examples
+    --------
+    >>> @naming_its_file
+    ... def read(path: Path) -> None:
+    ...     raise FormatError("has no rows", line=2)
+    >>> read(Path("a.csv"))
+    Traceback (most recent call last):
+    driftwalk.core.errors.FormatError: a.csv, line 2: has no rows
+    """
+
+    @wraps(function)
+    def named(path: Path, /, *args: _Further.args, **kwargs: _Further.kwargs) -> _Result:
+        try:
+            return function(path, *args, **kwargs)
+        except FormatError as error:
+            if error.path is not None:
+                raise
+            raise FormatError(
+                error.reason, path=path, line=error.line, column=error.column
+            ) from error
+        except DAMAGED as error:
+            known = getattr(error, "strerror", None)
+            reason = f"cannot be read: {known}" if known else f"is damaged: {error}"
+            raise FormatError(reason, path=path) from error
+
+    return named

@@ -132,8 +132,8 @@ def load_flow(
                 raise InputError("it has its own flags: leave the arena out")
             if options != FieldOptions():
                 raise InputError("the field is one of driftwalk's own: leave its units out")
-            return _checked(check_contents(dataset, source), source)
-        si, notes = to_si(dataset, source, options)
+            return check_flow_field(check_contents(dataset, source))
+        si, notes = to_si(dataset, options)
         time = si["time"].values if "time" in si.dims else None
         velocity = np.stack([si["u"].values, si["v"].values], axis=-1)
         x, y = si["x"].values, si["y"].values
@@ -141,7 +141,8 @@ def load_flow(
         attrs |= {"reading": f"NetCDF; {turned}", **_warning(notes)}
         return _new_field(x, y, velocity, time=time, arena=arena, attrs=attrs)
     except FormatError as error:
-        raise error if error.path else FormatError(error.reason, path=source) from error
+        path = error.path or source
+        raise FormatError(error.reason, path=path, line=error.line, column=error.column) from error
     except InputError as error:
         raise FormatError(str(error), path=source) from error
 
@@ -158,20 +159,13 @@ def _from_rows(
     if options.variables:
         raise InputError("`variables` are those of a NetCDF file, and this is none: leave them out")
     si = raw_to_si(read_raw(path, said), options)
-    field = grid_rows(si.rows, path)
+    field = grid_rows(si.rows)
     attrs = {**attrs, "reading": si.reading, **_warning(si.notes)}
     return _new_field(field.x, field.y, field.velocity, arena=arena, attrs=attrs)
 
 
 def _warning(notes: list[str]) -> dict[str, str]:
     return {"warning": "; ".join(notes)} if notes else {}
-
-
-def _checked(dataset: xr.Dataset, path: Path) -> xr.Dataset:
-    try:
-        return check_flow_field(dataset)
-    except InputError as error:
-        raise FormatError(str(error), path=path) from error
 
 
 def _new_field(

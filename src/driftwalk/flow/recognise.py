@@ -62,7 +62,7 @@ def _text_format(path: Path) -> str | None:
     """Return the program of a text whose names, or whose rows, are those of a field."""
     try:
         head = text.read_text(path, most=HEAD)
-        layout = text.layout_of(head, TextOptions(), path)
+        layout = text.layout_of(head, TextOptions())
     except FormatError:
         # A damaged field is still one of its program.
         return None if path.stat().st_size == 0 else text.signed(path)
@@ -103,7 +103,7 @@ def _fills_a_grid(path: Path) -> bool:
     if path.stat().st_size > 64 << 20:
         return False
     try:
-        grid_rows(text.read(path).rows, path)
+        grid_rows(text.read(path).rows)
     except InputError:
         return False
     return True

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -43,7 +42,7 @@ class GriddedField:
     """Velocities, shape (ny, nx, 2)."""
 
 
-def grid_rows(rows: FieldRows, path: Path) -> GriddedField:
+def grid_rows(rows: FieldRows) -> GriddedField:
     """Put the rows of a file on their grid.
 
     Raises
@@ -51,10 +50,10 @@ def grid_rows(rows: FieldRows, path: Path) -> GriddedField:
     FormatError
         When a node stands in two rows, is missing, or the nodes are not evenly spaced.
     """
-    x, column = _axis("x", rows.x, rows.line, path)
-    y, row = _axis("y", rows.y, rows.line, path)
+    x, column = _axis("x", rows.x, rows.line)
+    y, row = _axis("y", rows.y, rows.line)
     node = row * x.size + column
-    _refuse_duplicates(node, rows, path)
+    _refuse_duplicates(node, rows)
     order = np.argsort(node)
     # No list of all nodes: scattered rows may span a grid of a billion of them.
     absent = x.size * y.size - node.size
@@ -63,19 +62,18 @@ def grid_rows(rows: FieldRows, path: Path) -> GriddedField:
         j, i = divmod(int(moved[0]) if moved.size else node.size, x.size)
         raise FormatError(
             f"the grid of {x.size} x {y.size} nodes lacks {absent} of them, the first at "
-            f"x = {x[i]:.6g}, y = {y[j]:.6g}: write a row for every node",
-            path=path,
+            f"x = {x[i]:.6g}, y = {y[j]:.6g}: write a row for every node"
         )
     velocity = np.column_stack([rows.u, rows.v])[order].reshape(y.size, x.size, 2)
     return GriddedField(x, y, velocity)
 
 
-def _axis(name: str, values: Array, line: Indices, path: Path) -> tuple[Array, Indices]:
+def _axis(name: str, values: Array, line: Indices) -> tuple[Array, Indices]:
     """Return the nodes along an axis and the number of each row's node."""
     order = np.argsort(values, kind="stable")
     width = float(np.ptp(values))
     if width == 0.0:
-        raise FormatError(f"all rows have the same {name}: a grid needs 2 at least", path=path)
+        raise FormatError(f"all rows have the same {name}: a grid needs 2 at least")
     is_new = np.concatenate([[False], np.diff(values[order]) > 1e-6 * width])
     number = np.empty(values.size, dtype=np.intp)
     number[order] = np.cumsum(is_new)
@@ -90,13 +88,12 @@ def _axis(name: str, values: Array, line: Indices, path: Path) -> tuple[Array, I
         raise FormatError(
             f"the nodes along {name} are not evenly spaced; {name} = {values[at]:.6g} stands in "
             f"{count[rarest]} of {values.size} rows",
-            path=path,
             line=int(line[at]),
         )
     return round_nodes(even), number
 
 
-def _refuse_duplicates(node: Indices, rows: FieldRows, path: Path) -> None:
+def _refuse_duplicates(node: Indices, rows: FieldRows) -> None:
     order = np.argsort(node, kind="stable")
     again = np.flatnonzero(np.diff(node[order]) == 0)
     if again.size:
@@ -104,6 +101,5 @@ def _refuse_duplicates(node: Indices, rows: FieldRows, path: Path) -> None:
         raise FormatError(
             f"the node x = {rows.x[second]:.6g}, y = {rows.y[second]:.6g} stands in line "
             f"{rows.line[first]} already",
-            path=path,
             line=int(rows.line[second]),
         )

@@ -131,9 +131,10 @@ class Recording(Section):
         default=None, examples=[0.6]
     )
     """Smallest confidence of a keypoint or row; others are missing. Not set: the format's."""
-    box: Literal["auto", "xyxy", "xywh", "cxcywh", "none"] = "auto"
-    """Columns of a box: two corners, corner or centre with width and height, or no box; "auto" goes
-    by their names."""
+    box: str = Field(default="auto", pattern=r"^(auto|none|(xyxy|xywh|cxcywh)(@\d+x\d+)?)$")
+    """Columns of a box: two corners (xyxy), corner (xywh) or centre (cxcywh) with width and height,
+    of shares of an image also its size (cxcywh@1920x1080); or no box (none); "auto" goes by their
+    names."""
     missing: tuple[str, ...] | None = Field(default=None, examples=['["0,0"]'])
     """Positions that mean that the body was not seen: "X,Y", a number, or "held" for that of the
     sample before."""

@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from driftwalk.core.errors import FormatError, InputError, argument_text
+from driftwalk.core.errors import FormatError, InputError, argument_text, naming_its_file
 from driftwalk.record.circle import CIRCLE, fit_circle, tank_radius_bound
 from driftwalk.record.raw import Array
 
@@ -229,6 +229,7 @@ def _outside(beyond: Array, size: float, reach: Reach) -> list[str]:
     ]
 
 
+@naming_its_file
 def _polygon(path: Path) -> PlacedArena:
     from driftwalk.record.raw import TableLayout
     from driftwalk.record.text import read_table
@@ -236,17 +237,17 @@ def _polygon(path: Path) -> PlacedArena:
 
     names, delimiter, skip, has_header = read_header(path)
     if len(names) != 2 or (has_header and names != ["x_m", "y_m"]):
-        raise FormatError("a polygon has two columns, x_m and y_m", path=path, line=1)
+        raise FormatError("a polygon has two columns, x_m and y_m", line=1)
     table = read_table(path, TableLayout(delimiter, ["x_m", "y_m"], skip, (0, 1)))
     vertices = np.column_stack([table.numbers[0], table.numbers[1]])
     if (vertices[0] == vertices[-1]).all():
         vertices = vertices[:-1]
     if vertices.shape[0] < 3 or not np.isfinite(vertices).all():
-        raise FormatError("a polygon needs at least three vertices", path=path)
+        raise FormatError("a polygon needs at least three vertices")
     following = np.roll(vertices, -1, axis=0)
     cross = vertices[:, 0] * following[:, 1] - following[:, 0] * vertices[:, 1]
     if cross.sum() == 0.0:
-        raise FormatError("the polygon has no area", path=path)
+        raise FormatError("the polygon has no area")
     center = ((vertices + following) * cross[:, None]).sum(axis=0) / (3.0 * cross.sum())
     arena = {"shape": "polygon", "vertices_m": (vertices - center).tolist()}
     x, y = center.tolist()

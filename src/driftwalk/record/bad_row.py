@@ -6,7 +6,6 @@ Slow and plain: it runs only on a block that has already failed.
 from __future__ import annotations
 
 import csv
-from pathlib import Path
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.raw import MISSING, TableLayout
@@ -14,9 +13,7 @@ from driftwalk.record.raw import MISSING, TableLayout
 DELIMITER_NAMES = {",": "a comma", "\t": "a tab", ";": "a semicolon", " ": "blanks"}
 
 
-def check_lines(
-    block: bytes, layout: TableLayout, *, path: Path, line: int, decimal: str = "."
-) -> int:
+def check_lines(block: bytes, layout: TableLayout, *, line: int, decimal: str = ".") -> int:
     """Return the fields of the longest row; raise a `FormatError` at the first row that is wrong.
 
     Parameters
@@ -25,8 +22,6 @@ def check_lines(
         Whole lines.
     layout : TableLayout
         Columns that were to be read.
-    path : Path
-        The file, for the message.
     line : int
         Number of the block's first line in the file, from 1.
     decimal : {".", ","}
@@ -35,17 +30,17 @@ def check_lines(
     widest = 0
     for offset, raw in enumerate(block.split(b"\n")):
         number = line + offset
-        text = decoded_line(raw, path, number)
+        text = decoded_line(raw, number)
         if "\0" in text:
-            raise FormatError("has a zero byte: this is not a text file", path=path, line=number)
+            raise FormatError("has a zero byte: this is not a text file", line=number)
         if text.strip():
             fields = split_fields(text, layout.delimiter)
             widest = max(widest, len(fields))
-            _check_row(fields, text, layout, path=path, line=number, decimal=decimal)
+            _check_row(fields, text, layout, line=number, decimal=decimal)
     return widest
 
 
-def decoded_line(line: bytes, path: Path, number: int) -> str:
+def decoded_line(line: bytes, number: int) -> str:
     """Return a line as text, without the carriage return at its end.
 
     Raises
@@ -58,14 +53,13 @@ def decoded_line(line: bytes, path: Path, number: int) -> str:
     except UnicodeDecodeError as error:
         raise FormatError(
             f"is not UTF-8 text (byte 0x{line[error.start]:02x}): save the file as UTF-8",
-            path=path,
             line=number,
             column=error.start + 1,
         ) from error
 
 
 def _check_row(
-    fields: list[str], text: str, layout: TableLayout, *, path: Path, line: int, decimal: str
+    fields: list[str], text: str, layout: TableLayout, *, line: int, decimal: str
 ) -> None:
     expected = len(layout.names)
     if len(fields) > expected and not any(fields[expected:]):
@@ -76,7 +70,6 @@ def _check_row(
             f"expected {expected} fields separated by "
             f"{DELIMITER_NAMES.get(layout.delimiter, repr(layout.delimiter))}, "
             f"got {len(fields)}{hint}",
-            path=path,
             line=line,
         )
     for column in layout.numbers:
@@ -85,7 +78,6 @@ def _check_row(
             raise FormatError(
                 f"'{_short(value)}' in column '{layout.names[column]}' is not a number"
                 f"{_other_sign(value, decimal)}",
-                path=path,
                 line=line,
                 column=column + 1,
             )

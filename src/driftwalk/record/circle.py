@@ -197,8 +197,25 @@ def implied_scale(bodies: Sequence[RawBody], tank: str | None) -> str:
     """
     x, y = (np.concatenate([getattr(one, axis) for one in bodies]) for axis in "xy")
     kind, _, size = (tank or "").partition("@")[0].partition(":")
+    try:
+        sides = [parse_quantity(part, "m") for part in size.split("x")]
+    except ConfigurationError:
+        sides = [0.0]
+    stated = min(sides) > 0.0
     if kind in ("rect", "rectangle"):
-        return _scale_of_rectangle(x, y, size)
+        known = np.isfinite(x) & np.isfinite(y)
+        if not stated or len(sides) != 2 or not known.any():
+            return ""
+        # Without the few samples beyond each side that are tracking errors.
+        ends = [CIRCLE.outside_percent, 100.0 - CIRCLE.outside_percent]
+        spans = [float(np.ptp(np.percentile(axis[known], ends))) for axis in (x, y)]
+        if min(spans) <= 0.0:
+            return ""
+        bound = min(side / span for side, span in zip(sides, spans, strict=True))
+        return (
+            f"the positions span {spans[0]:.4g} by {spans[1]:.4g} units, in a tank of "
+            f"{sides[0]:g} m by {sides[1]:g} m: a unit is {bound:.3g} m at most"
+        )
     try:
         fit = fit_circle(x, y)
     except (InputError, ValueError):
@@ -206,42 +223,9 @@ def implied_scale(bodies: Sequence[RawBody], tank: str | None) -> str:
     if fit.coverage < CIRCLE.enough_visited:
         return ""
     across = f"the positions fill a circle of {2.0 * fit.radius:.4g} units across"
-    try:
-        diameter = parse_quantity(size, "m") if kind == "circle" else 0.0
-    except ConfigurationError:
-        diameter = 0.0
-    if not diameter > 0.0:
+    if kind != "circle" or not stated or len(sides) != 1:
         return (
             f'{across}: state the tank, as in `tank="circle:30cm"`, for the scale that they imply'
         )
-    bound = 0.5 * diameter / fit.radius  # the body's centre does not reach the rim
-    return f"{across}, in a tank of {diameter:g} m: a unit is {bound:.3g} m at most"
-
-
-def _scale_of_rectangle(x: Array, y: Array, size: str) -> str:
-    """Return what scale the span of the positions implies in a tank of WxH, empty where none."""
-    known = np.isfinite(x) & np.isfinite(y)
-    try:
-        sides = [parse_quantity(part, "m") for part in size.split("x")]
-    except ConfigurationError:
-        return ""
-    if len(sides) != 2 or min(sides) <= 0.0 or not known.any():
-        return ""
-    # A few tracking errors lie outside the tank.
-    spans = [
-        float(
-            np.subtract(
-                *np.percentile(
-                    axis[known], [100.0 - CIRCLE.outside_percent, CIRCLE.outside_percent]
-                )
-            )
-        )
-        for axis in (x, y)
-    ]
-    if min(spans) <= 0.0:
-        return ""
-    bound = min(side / span for side, span in zip(sides, spans, strict=True))
-    return (
-        f"the positions span {spans[0]:.4g} by {spans[1]:.4g} units, in a tank of {sides[0]:g} m "
-        f"by {sides[1]:g} m: a unit is {bound:.3g} m at most"
-    )
+    bound = 0.5 * sides[0] / fit.radius  # the body's centre does not reach the rim
+    return f"{across}, in a tank of {sides[0]:g} m: a unit is {bound:.3g} m at most"

@@ -188,17 +188,21 @@ def scale_wanted(length_unit: str, bare_is_si: bool, options: ReadOptions) -> st
     options : ReadOptions
         Scale and unit that are given.
     """
-    unit = options.length_unit or length_unit
-    if options.metres_per_pixel is not None or (not unit and bare_is_si):
+    unit = _unit(length_unit, bare_is_si, options)
+    if options.metres_per_pixel is not None or unit not in ("", "px"):
         return ""
-    if unit == "px":
-        return "the positions are in pixels: give the scale with `metres_per_pixel`"
     if unit:
-        return ""
+        return "the positions are in pixels: give the scale with `metres_per_pixel`"
     return (
         "the file does not name the unit of its positions: give `metres_per_pixel` for pixels, "
         "or `length_unit` m, cm or mm"
     )
+
+
+def _unit(length_unit: str, bare_is_si: bool, options: ReadOptions) -> str:
+    """Return the unit of positions, ``""`` where nothing says it."""
+    usual = "px" if options.metres_per_pixel is not None else "m" if bare_is_si else ""
+    return options.length_unit or length_unit or usual
 
 
 def _rate_wanted(raw: RawRecording, options: ReadOptions) -> str:
@@ -219,11 +223,7 @@ def _length_scale(raw: RawRecording, options: ReadOptions) -> tuple[float, bool]
             f"{argument_text('length_unit', unit)} contradicts the file, whose positions are in "
             f"{raw.length_unit}"
         )
-    unit = unit or raw.length_unit
-    if not unit and options.metres_per_pixel is not None:
-        unit = "px"
-    if not unit and raw.bare_length_is_si:
-        unit = "m"
+    unit = _unit(raw.length_unit, raw.bare_length_is_si, options)
     if unit == "px":
         return _positive(options.metres_per_pixel, "metres_per_pixel"), True
     if options.metres_per_pixel is not None:

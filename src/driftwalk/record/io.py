@@ -34,7 +34,6 @@ from driftwalk.record.origin import origin_of
 from driftwalk.record.pose import join_markers, two_names
 from driftwalk.record.raw import DELIMITERS, Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.registry import PLAIN
-from driftwalk.record.text import DAMAGED_GZIP
 from driftwalk.schema import Track, body_names, build_trajectory, check_trajectory
 from driftwalk.schema.stores.netcdf import netcdf_bytes
 
@@ -139,9 +138,11 @@ def load(
         Keypoints of a pose file, or rows of a table with a column of confidence, that were seen
         with less are missing, from 0 to 1; None: a value that is usual for the format, and a note
         says which.
-    box : {"xyxy", "xywh", "cxcywh", "none"}, optional
-        What columns of a box hold: two corners, the corner with the smallest x and y, width and
-        height, or the centre with them; ``"none"``: they are not a box. The body is its centre.
+    box : str, optional
+        What columns of a box hold: ``"xyxy"``, two corners; ``"xywh"``, the corner with the
+        smallest x and y, width and height; ``"cxcywh"``, the centre with them; ``"none"``: they are
+        not a box. The body is its centre. The size of an image in pixels may follow, of which the
+        sides are shares: ``"cxcywh@1920x1080"``.
     missing : str or sequence of str, optional
         Mark of a position that was not seen, in the file's units: a place such as
         ``"0,0"``, a number such as ``"-9999"``, or ``"held"``, the place of the sample before.
@@ -194,6 +195,7 @@ def load(
     try:
         raw = origin.read(options)
         _refuse_uneven(raw)
+        raw.rows = raw.rows or sum({id(one.clock): one.clock.size for one in raw.bodies}.values())
         # Markers become bodies before `body` chooses among the names.
         join_markers(raw, options)
         raw.bodies = _select(raw.bodies, body)
@@ -224,7 +226,7 @@ def load(
         if raw.columns:
             attrs["columns_read"] = json.dumps(raw.columns, ensure_ascii=False)
         return _assemble(cleaned, counts, attrs, raw, tank=tank, block_side=block_side)
-    except (InputError, *DAMAGED_GZIP) as error:
+    except InputError as error:
         raise origin.explained(error) from error
 
 
@@ -317,15 +319,16 @@ def _assemble(
         attrs["block_side_m"] = block_side
     if tank is not None:
         placed = _place(tank, bodies, block_side=block_side)
-        _shift(bodies, placed)
         arena = placed.arena
+        if placed.origin != (0.0, 0.0):
+            for one in bodies:
+                one.x -= placed.origin[0]
+                one.y -= placed.origin[1]
         before = parse_json(attrs.get("origin_shift_m", "[0.0, 0.0]"))
         attrs |= arena_attributes(placed, shifted_before=before)
         notes += placed.notes
     jumps = _count_impossible(bodies, counts, arena)
-    totals = {
-        key: sum(getattr(found, key) for found in counts.values()) for key in Counts().as_dict()
-    }
+    totals = {key: sum(getattr(one, key) for one in counts.values()) for key in vars(Counts())}
     time, x, y, theta = _one_clock(bodies)
     if "sample_rate_Hz" not in attrs and time.size > 1:
         attrs["sample_rate_Hz"] = _usual_rate(bodies)
@@ -336,7 +339,7 @@ def _assemble(
         {
             "rows_in_file": raw.rows,
             **totals,
-            "per_body": {name: found.as_dict() for name, found in counts.items()},
+            "per_body": {name: vars(found) for name, found in counts.items()},
             "warnings": notes,
         }
     )
@@ -367,10 +370,7 @@ def _place(tank: str, bodies: list[RawBody], *, block_side: float | None) -> Pla
     def reach(size: float) -> float:
         return max(noise_reach(_track(body), size=size) for body in bodies)
 
-    if len(bodies) == 1:
-        x, y = bodies[0].x, bodies[0].y
-    else:
-        x, y = (np.concatenate([getattr(body, axis) for body in bodies]) for axis in ("x", "y"))
+    x, y = (np.concatenate([getattr(body, axis) for body in bodies]) for axis in ("x", "y"))
     return place_arena(tank, x, y, block_side=block_side, reach=reach)
 
 
@@ -379,13 +379,6 @@ def _track(body: RawBody) -> Track:
     known = np.isfinite(body.x)
     x, y = body.x[known], body.y[known]
     return Track(body.clock[known], x, y, np.full(x.size, np.nan))
-
-
-def _shift(bodies: list[RawBody], placed: PlacedArena) -> None:
-    if placed.origin != (0.0, 0.0):
-        for body in bodies:
-            body.x -= placed.origin[0]
-            body.y -= placed.origin[1]
 
 
 def _one_clock(bodies: list[RawBody]) -> tuple[Array, Array, Array, Array | None]:
@@ -397,8 +390,7 @@ def _one_clock(bodies: list[RawBody]) -> tuple[Array, Array, Array, Array | None
     clocks = {id(body.clock): body.clock for body in bodies}
     time = np.unique(np.concatenate(list(clocks.values())))
     refuse_sparse(time, bodies)
-    x = _on_clock(time, bodies, [body.x for body in bodies])
-    y = _on_clock(time, bodies, [body.y for body in bodies])
+    x, y = (_on_clock(time, bodies, [getattr(body, axis) for body in bodies]) for axis in "xy")
     theta = _on_clock(time, bodies, [body.theta for body in bodies]) if has_theta else None
     return time, x, y, theta
 
@@ -415,11 +407,8 @@ def _on_clock(time: Array, bodies: list[RawBody], values: Sequence[Array | None]
 
 def _usual_rate(bodies: list[RawBody]) -> float:
     # The differences are the median's own to sort: a long recording is not to be held once more.
-    intervals = [
-        float(np.median(np.diff(body.clock), overwrite_input=True))
-        for body in bodies
-        if body.clock.size > 1
-    ]
+    steps = [np.diff(body.clock) for body in bodies if body.clock.size > 1]
+    intervals = [float(np.median(step, overwrite_input=True)) for step in steps]
     return float(1.0 / np.median(intervals)) if intervals else 0.0
 
 

@@ -9,14 +9,14 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, Final
 
-from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.errors import FormatError, InputError, naming_its_file
 from driftwalk.core.files.file_names import text_of_name
-from driftwalk.record.cleaning.warn import encoding_notes
 from driftwalk.record.raw import RawRecording, ReadOptions
-from driftwalk.record.registry import PLAIN, failed_format, find_loader
+from driftwalk.record.recognise import nearest_table
+from driftwalk.record.registry import PLAIN, find_loader, loaders
 from driftwalk.record.tables.in_memory import MemorySource, table_in_memory
 from driftwalk.record.tables.rows import recording_of
-from driftwalk.record.text import DAMAGED_GZIP
+from driftwalk.record.text import encoding_notes, read_head
 from driftwalk.schema.stores.netcdf import kind_of_file
 
 IN_MEMORY: Final = "table"
@@ -39,14 +39,12 @@ class Origin:
     guessed: bool = False
     """Whether nothing but its content says that it is a plain table."""
 
-    def explained(self, error: Exception) -> InputError:
+    def explained(self, error: InputError) -> InputError:
         """Return an error of the reading with the file that it is about, and what may help."""
-        if isinstance(error, DAMAGED_GZIP):
-            return FormatError(f"is a damaged gzip file: {error}", path=self.path)
         if self.path is None or not isinstance(error, FormatError):
             return InputError(f"{self.where}: {' '.join(str(error).splitlines())}")
         # A table that no loader recognised may be a damaged file of one of these formats.
-        hint = failed_format(self.path) if self.guessed else ""
+        hint = nearest_table(self.path, read_head(self.path), loaders()) if self.guessed else ""
         path = error.path or self.path
         return FormatError(error.reason + hint, path=path, line=error.line, column=error.column)
 
@@ -92,7 +90,7 @@ def origin_of(
         where=str(path),
         name=text_of_name(path.name),
         format=loader.name,
-        read=partial(loader.read, path),
+        read=partial(naming_its_file(loader.read), path),
         path=path,
         guessed=format is None and loader.name == PLAIN,
     )

@@ -7,6 +7,7 @@ read.
 from __future__ import annotations
 
 from collections.abc import Container
+from dataclasses import replace
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
@@ -18,7 +19,6 @@ from driftwalk.record.raw import (
     ANGLE_UNITS,
     CLOCK_UNITS,
     LENGTH_UNITS,
-    Array,
     RawBody,
     RawRecording,
     ReadOptions,
@@ -73,7 +73,7 @@ class ForeignLoader:
         except FormatError as error:
             raise FormatError(
                 f"{' '.join(error.reason.split())} ({by})",
-                path=error.path or path,
+                path=error.path,
                 line=error.line,
                 column=error.column,
             ) from error
@@ -81,10 +81,10 @@ class ForeignLoader:
             raise InputError(f"{reason_of(error)} ({by})") from error
         except Exception as error:  # whatever another package's code raises
             kind = type(error).__name__
-            raise FormatError(f"{by} failed: {kind}: {reason_of(error)}", path=path) from error
+            raise FormatError(f"{by} failed: {kind}: {reason_of(error)}") from error
         wrong = _what_is_wrong(raw)
         if wrong:
-            raise FormatError(f"{by} returned {wrong}", path=path)
+            raise FormatError(f"{by} returned {wrong}")
         recording: RawRecording = raw
         recording.bodies = [_own(body) for body in recording.bodies]
         return recording
@@ -161,16 +161,8 @@ def _what_is_wrong(raw: Any) -> str:
 
 def _own(body: RawBody) -> RawBody:
     """Return a body whose arrays may be converted in place."""
-
-    def copied(values: Any) -> Array:
-        return np.array(values, dtype=np.float64)
-
-    theta = None if body.theta is None else copied(body.theta)
-    return RawBody(
-        str(body.name),
-        copied(body.clock),
-        copied(body.x),
-        copied(body.y),
-        theta,
-        extra=body.extra,
-    )
+    named = {"clock": body.clock, "x": body.x, "y": body.y, "theta": body.theta}
+    copied: dict[str, Any] = {
+        key: np.array(one, dtype=np.float64) for key, one in named.items() if one is not None
+    }
+    return replace(body, name=str(body.name), **copied)

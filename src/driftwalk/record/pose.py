@@ -112,14 +112,14 @@ def choose_keypoints(names: Sequence[str], options: ReadOptions) -> Chosen:
     return Chosen(position, options.heading)
 
 
-def bodies_of(
+def recording_of_poses(
     poses: Poses[Place],
     chosen: Chosen,
     clock: Array,
     options: ReadOptions,
     *,
     usual: Confidence,
-) -> tuple[list[RawBody], list[str]]:
+) -> RawRecording:
     """Return one body per individual that has the chosen keypoint, and what the user should know.
 
     Parameters
@@ -155,7 +155,8 @@ def bodies_of(
         if chosen.heading is not None and set(chosen.heading) <= set(points):
             theta = angle_between(points[chosen.heading[0]], points[chosen.heading[1]])
         bodies.append(RawBody(individual, clock, x, y, theta))
-    return bodies, _notes(poses, bodies, options, least=least, usual=usual)
+    notes = _notes(poses, bodies, options, least=least, usual=usual)
+    return RawRecording(bodies, length_unit="px", has_keypoints=True, notes=notes)
 
 
 def _confident(poses: Poses[Place], place: Place, least: float) -> tuple[Array, Array]:

@@ -58,7 +58,7 @@ LENGTH_UNITS: dict[str, float] = {
 """Metres per unit of length; pixels are ``"px"``, and ``""`` is a file that does not say."""
 
 CLOCK_UNITS: dict[str, float] = {
-    **{"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9},
+    **{"s": 1.0, "ds": 10.0, "cs": 100.0, "ms": 1e3, "us": 1e6, "ns": 1e9},
     **{"min": 1.0 / 60.0, "h": 1.0 / 3600.0, "d": 1.0 / 86_400.0},
 }
 """Units of time per second; a clock that counts frames is ``"frame"``."""
@@ -136,7 +136,7 @@ class RawRecording:
     frame_rate_hz: float | None = None
     """Frame rate when the file itself holds it."""
     rows: int = 0
-    """Rows of data in the file."""
+    """Rows of data in the file; 0: those of the bodies, of which one clock counts once."""
     notes: list[str] = field(default_factory=list)
     """Sentences for the person who loads the file."""
     attrs: dict[str, Any] = field(default_factory=dict)
@@ -206,7 +206,8 @@ class ReadOptions:
     min_confidence: float | None = None
     """Keypoints seen with less confidence are missing; None: as usual for the format."""
     box: str | None = None
-    """Columns of a box: ``"xyxy"``, ``"xywh"``, ``"cxcywh"``; ``"none"``: there is no box."""
+    """Columns of a box: ``"xyxy"``, ``"xywh"``, ``"cxcywh"``; ``"none"``: there is no box.
+    ``"cxcywh@WxH"``: of shares of an image."""
     missing: tuple[str, ...] = ()
     """Places that mean that the body was not seen: ``"0,0"``, ``"-9999"``, ``"held"``."""
     replicate: int = 0

@@ -14,7 +14,7 @@ from typing import Final, Protocol, runtime_checkable
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.plugin_loaders import ForeignLoaders, foreign_loaders
 from driftwalk.record.raw import RawRecording, ReadOptions
-from driftwalk.record.recognise import nearest_table, unknown_file
+from driftwalk.record.recognise import unknown_file
 from driftwalk.record.text import read_head
 
 PLAIN: Final = "csv"
@@ -121,14 +121,3 @@ def find_loader(path: Path, *, format: str | None = None, by_columns: bool = Fal
             f"the format is not recognised: {unknown_file(path, head, known)}{also}", path=path
         )
     return known[best]
-
-
-def failed_format(path: Path) -> str:
-    """Return of which format a table that could not be read may be, as the end of a sentence.
-
-    Parameters
-    ----------
-    path : Path
-        A file that the reader of plain tables has refused.
-    """
-    return nearest_table(path, read_head(path), loaders())

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
 from driftwalk.core.arrays import Bools
 from driftwalk.core.errors import InputError
-from driftwalk.record.raw import Array, RawBody, RawRecording
+from driftwalk.record.raw import Array, RawBody, RawRecording, TableLayout
+from driftwalk.record.text import read_table
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -89,6 +91,7 @@ def _vector(name: str) -> Array:
 
 QUATERNION: Final = "quaternion"
 VECTOR: Final = "vector"
+MATRIX: Final = "matrix"
 
 
 @dataclass(frozen=True)
@@ -96,10 +99,10 @@ class Turns:
     """Orientations of a body in space, from its own axes to the file's."""
 
     values: Array
-    """Shape (n, 4) or (n, 3), NaN where there is none."""
+    """Shape (n, 4), (n, 3) or (n, 9), NaN where there is none."""
     form: str
-    """`QUATERNION` (x, y, z, w), `VECTOR` (axis times angle), or the order of Euler angles about
-    the axes of the body, such as ``"XYZ"``."""
+    """`QUATERNION` (x, y, z, w), `VECTOR` (axis times angle), `MATRIX` (down its columns), or the
+    order of Euler angles about the axes of the body, such as ``"XYZ"``."""
     degrees: bool = False
     """Whether angles are in degrees."""
 
@@ -129,8 +132,8 @@ class Turns:
 
     def _known(self) -> Bools:
         known = np.isfinite(self.values).all(axis=1)
-        if self.form == QUATERNION:
-            # Four zeros are how some programs write that there is none.
+        if self.form in (QUATERNION, MATRIX):
+            # Zeros alone are how some programs write that there is none.
             # float64 does not hold the squares of much smaller numbers.
             known = known & (np.abs(self.values) > 1e-12).any(axis=1)
         return np.asarray(known)
@@ -141,6 +144,8 @@ class Turns:
         if self.form == QUATERNION:
             _require_unit_length(values)
             return Rotation.from_quat(values)
+        if self.form == MATRIX:
+            return Rotation.from_matrix(values.reshape(-1, 3, 3).transpose(0, 2, 1))
         if self.form == VECTOR:
             return Rotation.from_rotvec(values, degrees=self.degrees)
         return Rotation.from_euler(self.form, values, degrees=self.degrees)
@@ -222,6 +227,66 @@ def _against(name: str, plane: Plane, height: float, width: float, tilt: Array |
             "angle is that of its own axis that lies in the plane where the body is not turned"
         )
     return notes
+
+
+@dataclass(frozen=True)
+class SpaceColumns:
+    """Columns of one body in a table, from 0."""
+
+    position: Sequence[int]
+    """Those of x, y, z."""
+    turns: Sequence[int] = ()
+    """Those of its orientation; empty: it has none."""
+    form: str = QUATERNION
+    """As in `Turns`."""
+    degrees: bool = False
+
+
+def read_in_space(
+    path: Path,
+    layout: TableLayout,
+    bodies: Mapping[str, SpaceColumns],
+    up: str,
+    *,
+    zero_is_missing: bool = False,
+    **facts: Any,
+) -> RawRecording:
+    """Read bodies in space from a table and lay them into the plane.
+
+    Parameters
+    ----------
+    path : Path
+        Text file.
+    layout : TableLayout
+        Where its rows begin; its clock, without which the rows are counted.
+    bodies : mapping
+        From a name to its columns.
+    up : str
+        Axis that points up.
+    zero_is_missing : bool
+        Whether a position of three zeros was not seen.
+    **facts
+        What the `RawRecording` says besides.
+
+    Raises
+    ------
+    FormatError, InputError
+        When a row cannot be read, or an orientation is none.
+    """
+    used = {at for one in bodies.values() for at in (*one.position, *one.turns)}
+    used |= set() if layout.clock is None else {layout.clock}
+    table = read_table(path, replace(layout, numbers=tuple(sorted(used))))
+    rows = np.arange(table.rows, dtype=np.float64)
+    clock = rows if layout.clock is None else table.numbers[layout.clock]
+    tracks = []
+    for name, one in bodies.items():
+        position = table.stack(one.position)
+        if zero_is_missing:
+            position[(position == 0.0).all(axis=1)] = np.nan
+        turns = Turns(table.stack(one.turns), one.form, one.degrees) if one.turns else None
+        tracks.append(SpaceTrack(name, clock, position, turns))
+    flat = lay_flat(tracks, plane_of(up))
+    return replace(flat, clock_origin=table.clock_origin, **facts)
 
 
 PARTS: Final = ("qx", "qy", "qz", "qw")

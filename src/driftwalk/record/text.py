@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import gzip
 import io
-import zlib
+from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import islice
@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.arrays import Bools, Codes, Integers
-from driftwalk.core.errors import FormatError
+from driftwalk.core.errors import DAMAGED, FormatError, naming_its_file
 from driftwalk.record.bad_row import check_lines, decoded_line
 from driftwalk.record.raw import MISSING, NAMELESS, Array, TableLayout
 from driftwalk.record.tables.encoding import WINDOWS, TranscodedText, other_encoding
@@ -47,8 +47,6 @@ class TextPolicy(NamedTuple):
 TEXT: Final = TextPolicy()
 
 GZIP_MAGIC = b"\x1f\x8b"
-DAMAGED_GZIP = (gzip.BadGzipFile, EOFError, zlib.error)
-"""Exceptions raised by reading a gzip file that is cut off or damaged."""
 BOM = b"\xef\xbb\xbf"
 
 
@@ -77,19 +75,23 @@ def open_binary(path: Path) -> IO[bytes]:
     """Open a file for reading, through gzip and as UTF-8 when its content says so."""
     file = _opened(path)
     encoding = _encoding(file)
-    return file if encoding is None else _buffered(TranscodedText(file, encoding, path))
+    return file if encoding is None else _buffered(TranscodedText(file, encoding))
 
 
-def is_windows_text(path: Path) -> bool:
-    """Whether a file is text in the encoding of Windows, of which other letters may be meant.
+def encoding_notes(path: Path) -> list[str]:
+    """Return the warning about text of an unknown encoding.
 
     Parameters
     ----------
     path : Path
-        A file, which may be packed by gzip.
+        A file, which may be packed by gzip, or a folder.
     """
+    if not path.is_file():
+        return []
     with _opened(path) as file:
-        return _encoding(file) == WINDOWS
+        if _encoding(file) != WINDOWS:
+            return []
+    return ["the text is not UTF-8 and was read as Windows-1252: check letters such as µ and °"]
 
 
 def _opened(path: Path) -> io.BufferedReader:
@@ -100,10 +102,10 @@ def _opened(path: Path) -> io.BufferedReader:
         return _buffered(_BoundedGzip(path) if compressed else io.FileIO(path))
     except (OSError, ValueError) as error:  # ValueError: a name that no file can have
         reason = getattr(error, "strerror", None) or error
-        raise FormatError(f"cannot be opened: {reason}", path=path) from error
+        raise FormatError(f"cannot be opened: {reason}") from error
 
 
-def _buffered(raw: io.RawIOBase) -> io.BufferedReader:
+def _buffered(raw: Any) -> io.BufferedReader:
     return io.BufferedReader(raw, 1 << 20)
 
 
@@ -111,40 +113,30 @@ def _encoding(file: io.BufferedReader) -> str | None:
     """Return the encoding of a text that is not UTF-8, without moving on in it."""
     try:
         return other_encoding(file.peek(TEXT.head_bytes)[: TEXT.head_bytes])
-    except (OSError, *DAMAGED_GZIP):
+    except DAMAGED:
         return None  # reading it reports the damage and its place
 
 
-class _BoundedGzip(io.RawIOBase):
+class _BoundedGzip(gzip.GzipFile):
     """Contents of a gzip file, as far as text can be packed: zeros shrink by a thousand."""
 
     def __init__(self, path: Path) -> None:
-        self._path = path
-        self._file = gzip.open(path, "rb")  # noqa: SIM115
+        super().__init__(path, "rb")
         self._left = TEXT.gzip_allowance + TEXT.gzip_ratio * path.stat().st_size
 
-    def readable(self) -> bool:
-        return True
-
     def readinto(self, buffer: Any) -> int:
-        content = self._file.read(len(buffer))
-        self._left -= len(content)
+        """Fill a buffer with the next bytes."""
+        count = super().readinto(buffer)
+        self._left -= count
         if self._left < 0:
             raise FormatError(
                 f"unpacks to more than {TEXT.gzip_ratio} times its size, which no recording does: "
                 "unpack it (gzip -d) if it is one",
-                path=self._path,
             )
-        buffer[: len(content)] = content
-        return len(content)
-
-    def close(self) -> None:
-        if not self.closed:
-            self._file.close()
-        super().close()
+        return count
 
 
-def lines_of(file: IO[bytes], path: Path) -> Iterator[tuple[int, bytes]]:
+def lines_of(file: IO[bytes]) -> Iterator[tuple[int, bytes]]:
     """Yield the lines of a text file that hold anything, with their numbers from 1.
 
     Raises
@@ -158,33 +150,30 @@ def lines_of(file: IO[bytes], path: Path) -> Iterator[tuple[int, bytes]]:
             number += block.count(b"\n")
             continue
         *lines, rest = (rest + block).split(b"\n")
-        refuse_long_line(rest, path, number + len(lines))
+        refuse_long_line(rest, number + len(lines))
         yield from ((at, line) for at, line in enumerate(lines, start=number) if line)
         number += len(lines)
     if rest:
         yield number, rest
 
 
-def refuse_long_line(line: bytes, path: Path, number: int) -> None:
+def refuse_long_line(line: bytes, number: int) -> None:
     """Refuse a line that is longer than any line of a text file."""
     if len(line) > TEXT.longest_line:
         raise FormatError(
             f"has a line of more than {TEXT.longest_line >> 20} MiB: is it a text file?",
-            path=path,
             line=number,
         )
 
 
+@naming_its_file
 def read_head(path: Path) -> bytes:
     """Return the first 64 KiB of a file, uncompressed and without a byte order mark."""
     with open_binary(path) as file:
-        try:
-            head = file.read(TEXT.head_bytes)
-        except (OSError, *DAMAGED_GZIP) as error:
-            raise FormatError(f"is a damaged gzip file: {error}", path=path) from error
-    return head.removeprefix(BOM)
+        return file.read(TEXT.head_bytes).removeprefix(BOM)
 
 
+@naming_its_file
 def header_rows(path: Path, count: int) -> list[str]:
     """Return the first lines of a text file, blank ones too, however long, without their ends.
 
@@ -196,18 +185,16 @@ def header_rows(path: Path, count: int) -> list[str]:
     rows = []
     with open_binary(path) as file:
         for number in range(1, count + 1):
-            try:
-                line = file.readline(TEXT.longest_line + 1)
-            except (OSError, *DAMAGED_GZIP) as error:
-                raise FormatError(f"cannot be read to its end: {error}", path=path) from error
-            refuse_long_line(line, path, number)
+            line = file.readline(TEXT.longest_line + 1)
+            refuse_long_line(line, number)
             if not line:
                 break
             text = line.removeprefix(BOM if number == 1 else b"").removesuffix(b"\n")
-            rows.append(decoded_line(text, path, number))
+            rows.append(decoded_line(text, number))
     return rows
 
 
+@naming_its_file
 def read_table(path: Path, layout: TableLayout, *, blocks: int | None = None) -> Table:
     """Read the numbered and the text columns of a table.
 
@@ -235,9 +222,8 @@ def read_table(path: Path, layout: TableLayout, *, blocks: int | None = None) ->
     if needed > len(layout.names):
         raise FormatError(
             f"expected at least {needed} columns, got {len(layout.names)}: is it another format?",
-            path=path,
         )
-    collected = _Collected(layout, path)
+    collected = _Collected(layout)
     for line, block in islice(_blocks(path, layout.skip_lines), blocks):
         # pandas fails on a table of blank lines alone.
         if block.strip(b" \r\n"):
@@ -245,44 +231,12 @@ def read_table(path: Path, layout: TableLayout, *, blocks: int | None = None) ->
     return collected.table()
 
 
-class _GrowingColumn:
-    """An array that values are appended to."""
-
-    def __init__(self, dtype: npt.DTypeLike, *, expected: int = 0) -> None:
-        # Memory that is never written to is never taken.
-        self._values = np.empty(expected, dtype=dtype)
-        self._count = 0
-
-    def append(self, values: npt.NDArray[Any]) -> None:
-        """Append values, which are copied."""
-        stop = self._count + values.size
-        if stop > self._values.size:
-            self._values.resize(max(stop, int(1.25 * self._values.size)), refcheck=False)
-        self._values[self._count : stop] = values
-        self._count = stop
-
-    def whole(self) -> Bools:
-        """Return where the values are whole numbers, or no numbers."""
-        values = self._values[: self._count]
-        whole: Bools = ~(np.isfinite(values) & (values % 1.0 != 0.0))
-        return whole
-
-    def take(self) -> npt.NDArray[Any]:
-        """Return the array, which is this column's no more."""
-        values, self._values = self._values, np.empty(0, dtype=self._values.dtype)
-        values.resize(self._count, refcheck=False)
-        self._count = 0
-        return values
-
-
 class _Collected:
     """Columns of a table as far as it is read."""
 
-    def __init__(self, layout: TableLayout, path: Path) -> None:
+    def __init__(self, layout: TableLayout) -> None:
         self._layout = layout
-        self._path = path
-        self._numbers: dict[int, _GrowingColumn] = {}
-        self._codes: dict[int, _GrowingColumn] = {}
+        self._parts: dict[int, list[npt.NDArray[Any]]] = defaultdict(list)
         self._labels: dict[int, dict[str, int]] = {column: {} for column in layout.texts}
         self._stamps = {column: StampReader() for column in layout.stamps}
         self._decimal = "."
@@ -292,28 +246,28 @@ class _Collected:
     def add(self, block: bytes, line: int) -> None:
         """Read a block of whole lines; its first has this number."""
         frame = self._parsed(block, line)
-        if not self._rows:
-            self._begin(frame, block)
         self._rows += len(frame)
         clock = self._layout.clock
         for column in self._layout.numbers:
             values = frame[column].to_numpy()
             if column == clock:
                 values = self._from_origin(values)
-            self._numbers[column].append(values)
+            self._parts[column].append(values.astype(np.float64))
         for column, seen in self._labels.items():
-            self._codes[column].append(_encode(frame[column], seen))
+            self._parts[column].append(_encode(frame[column], seen))
         if self._stamps:
-            self._numbers[self._layout.stamps[0]].append(self._clock(frame, block, line))
+            self._parts[self._layout.stamps[0]].append(self._clock(frame, block, line))
 
     def table(self) -> Table:
         """Return what was read."""
         if not self._rows:
-            raise FormatError("holds no rows of data", path=self._path)
+            raise FormatError("holds no rows of data")
+        # The parts of a column are let go before the next is joined.
+        joined = {column: np.concatenate(self._parts.pop(column)) for column in [*self._parts]}
         return Table(
             rows=self._rows,
-            numbers={column: values.take() for column, values in self._numbers.items()},
-            codes={column: values.take() for column, values in self._codes.items()},
+            numbers={at: values for at, values in joined.items() if at not in self._labels},
+            codes={at: joined[at] for at in self._labels},
             labels={column: list(seen) for column, seen in self._labels.items()},
             clock_origin=self._origin or 0,
             calendar=calendar_of(list(self._stamps.values())),
@@ -324,12 +278,12 @@ class _Collected:
 
         The sign is that of the first number with decimals; then all have it.
         """
-        layout, path = self._layout, self._path
+        layout = self._layout
         undecided = self._decimal == "." and b"," in block
         errors: list[FormatError] = []
         for decimal in (".", ",") if undecided else self._decimal:
             try:
-                frame = _parse(block, layout, path=path, line=line, decimal=decimal)
+                frame = _parse(block, layout, line=line, decimal=decimal)
             except FormatError as error:
                 errors.append(error)
                 continue
@@ -337,23 +291,14 @@ class _Collected:
             if numeric and (decimal == self._decimal or self._only_whole()):
                 self._decimal = decimal
                 return frame
-            errors.append(_bad_row(block, layout, path=path, line=line, decimal=decimal))
+            errors.append(_bad_row(block, layout, line=line, decimal=decimal))
         # With the sign that is wrong an earlier row is the first that cannot be read.
         raise max(errors, key=lambda error: (error.line or 0, error.column or 0))
 
     def _only_whole(self) -> bool:
         """Whether no number so far has decimals."""
-        return all(values.whole().all() for values in self._numbers.values())
-
-    def _begin(self, frame: Any, block: bytes) -> None:
-        """Make room for as many rows as the file holds, by its size and its first block."""
-        # A packed file has fewer bytes than its text: the columns then grow.
-        rows = int(1.02 * len(frame) * self._path.stat().st_size / len(block)) + len(frame)
-        numbers = (*self._layout.numbers, *self._layout.stamps[:1])
-        self._numbers = {column: _GrowingColumn(np.float64, expected=rows) for column in numbers}
-        self._codes = {
-            column: _GrowingColumn(np.int32, expected=rows) for column in self._layout.texts
-        }
+        parts = [part for at in self._layout.numbers for part in self._parts[at]]
+        return not any((part[np.isfinite(part)] % 1.0 != 0.0).any() for part in parts)
 
     def _from_origin(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Return the clock from its first value on, where float64 would round it."""
@@ -375,22 +320,19 @@ class _Collected:
         except StampError as error:
             raise FormatError(
                 f"{error} (column '{self._layout.names[column]}')",
-                path=self._path,
                 line=line + _line_of_row(block, error.row),
                 column=column + 1,
             ) from error
         return clock
 
 
-def _bad_row(
-    block: bytes, layout: TableLayout, *, path: Path, line: int, decimal: str
-) -> FormatError:
+def _bad_row(block: bytes, layout: TableLayout, *, line: int, decimal: str) -> FormatError:
     """Return what is wrong with a block whose columns of numbers are none."""
     try:
-        check_lines(block, layout, path=path, line=line, decimal=decimal)
+        check_lines(block, layout, line=line, decimal=decimal)
     except FormatError as error:
         return error
-    return FormatError("has a column that is not numbers", path=path, line=line)
+    return FormatError("has a column that is not numbers", line=line)
 
 
 def _line_of_row(block: bytes, row: int) -> int:
@@ -422,30 +364,22 @@ def _blocks(path: Path, skip_lines: int) -> Iterator[tuple[int, bytes]]:
     """Yield (number of the first line, whole lines) until the file ends."""
     line = 1 + skip_lines
     with open_binary(path) as file:
-        try:
-            for _ in range(skip_lines):
-                # A file may say itself how many lines to skip, and be wrong about it.
-                if not file.readline(TEXT.longest_line):
-                    return
-            if not skip_lines:
-                start = file.read(len(BOM))
-                rest = b"" if start == BOM else start
-            else:
-                rest = b""
-            while block := file.read(TEXT.block_bytes):
-                whole, newline, tail = (rest + block).rpartition(b"\n")
-                rest = tail
-                refuse_long_line(rest, path, line + whole.count(b"\n"))
-                if newline:
-                    yield line, whole + newline
-                    line += whole.count(b"\n") + 1
-            if rest.strip():
-                yield line, rest + b"\n"
-        except (OSError, *DAMAGED_GZIP) as error:
-            raise FormatError(f"cannot be read to its end: {error}", path=path) from error
+        for _ in range(skip_lines):
+            # A file may say itself how many lines to skip, and be wrong about it.
+            if not file.readline(TEXT.longest_line):
+                return
+        rest = b"" if skip_lines else file.read(len(BOM)).removeprefix(BOM)
+        while block := file.read(TEXT.block_bytes):
+            whole, newline, rest = (rest + block).rpartition(b"\n")
+            refuse_long_line(rest, line + whole.count(b"\n"))
+            if newline:
+                yield line, whole + newline
+                line += whole.count(b"\n") + 1
+        if rest.strip():
+            yield line, rest + b"\n"
 
 
-def _parse(block: bytes, layout: TableLayout, *, path: Path, line: int, decimal: str) -> Any:
+def _parse(block: bytes, layout: TableLayout, *, line: int, decimal: str) -> Any:
     """Return the block as a data frame, or raise a `FormatError` that says where it is wrong."""
     import pandas as pd
 
@@ -453,7 +387,7 @@ def _parse(block: bytes, layout: TableLayout, *, path: Path, line: int, decimal:
     whole = fields[fields > 0]
     width = len(layout.names)
     if (whole != width).any():
-        widest = check_lines(block, layout, path=path, line=line, decimal=decimal)
+        widest = check_lines(block, layout, line=line, decimal=decimal)
         width = max(width, widest)
     used = sorted({*layout.numbers, *layout.texts, *layout.stamps})
     # The stubs of pandas cannot follow options in a dictionary.
@@ -477,10 +411,10 @@ def _parse(block: bytes, layout: TableLayout, *, path: Path, line: int, decimal:
             **exact,
         )
     except (ValueError, UnicodeDecodeError) as error:
-        check_lines(block, layout, path=path, line=line, decimal=decimal)
-        raise FormatError(f"cannot be read as a table: {error}", path=path, line=line) from error
+        check_lines(block, layout, line=line, decimal=decimal)
+        raise FormatError(f"cannot be read as a table: {error}", line=line) from error
     if b'"' in block and len(frame) != whole.size:
-        raise FormatError("has a quotation mark that is not closed", path=path, line=line)
+        raise FormatError("has a quotation mark that is not closed", line=line)
     return frame
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from driftwalk.core.errors import FormatError
+from driftwalk.core.errors import FormatError, naming_its_file
 from driftwalk.record.bad_row import decoded_line, is_number, split_fields
 from driftwalk.record.raw import MISSING
 from driftwalk.record.tables.stamps import stamp_form
@@ -63,6 +63,7 @@ def is_numeric_row(fields: list[str]) -> bool:
     )
 
 
+@naming_its_file
 def read_header(
     path: Path, *, delimiter: str | None = None, header_line: int | None = None
 ) -> tuple[list[str], str, int, bool]:
@@ -81,7 +82,7 @@ def read_header(
         return _header_at(path, header_line, delimiter)
     head = read_head(path)
     if b"\0" in head:
-        raise FormatError("is not a text file", path=path)
+        raise FormatError("is not a text file")
     raw = head.split(b"\n")
     stated = _DELIMITER_LINE.fullmatch(raw[0].decode("utf-8", "replace"))
     begin = 1 if stated else 0
@@ -94,8 +95,8 @@ def read_header(
         None,
     )
     if at is None:
-        raise FormatError("the file is empty", path=path)
-    lines = [decoded_line(line, path, number) for number, line in enumerate(raw[: at + 2], start=1)]
+        raise FormatError("the file is empty")
+    lines = [decoded_line(line, number) for number, line in enumerate(raw[: at + 2], start=1)]
     separator = delimiter or (stated[1] if stated else detect_delimiter(lines[at : at + 2]))
     fields = _without_trailing(split_fields(lines[at], separator))
     if not is_numeric_row(fields):
@@ -128,7 +129,7 @@ def _header_at(path: Path, number: int, delimiter: str | None) -> tuple[list[str
     """Return what `read_header` does, with the header in a line that the user names."""
     lines = header_rows(path, number + 1)
     if len(lines) <= number or not lines[number].strip():
-        raise FormatError(f"has no rows of data below line {number}, its header", path=path)
+        raise FormatError(f"has no rows of data below line {number}, its header")
     separator = delimiter or detect_delimiter(lines[number - 1 :])
     names, data = (split_fields(line.lstrip("# "), separator) for line in lines[number - 1 :])
     # A delimiter at the end of a line leaves a field without a name, in the header or in the data.

@@ -41,7 +41,7 @@ ROOTS: Final[dict[str, str]] = {
 WITH_ID: Final = words("object obj cell marker tag target blob instance tracking")
 """These name bodies only with "id": alone they may be a class or a state, which changes."""
 UNITS: Final[dict[str, str]] = {
-    **{unit: unit for unit in words("m cm mm um km dm nm ft in yd s ms us ns min h d px")},
+    **{unit: unit for unit in words("m cm mm um km dm nm ft in yd s ds cs ms us ns min h d px")},
     **{unit: unit for unit in words("rad mrad deg gon turn ddeg cdeg")},
     **{"µm": "um", "μm": "um", "µs": "us", "μs": "us", "°": "deg", "deg/10": "ddeg"},
     **_words("m", "metre metres meter meters metri metro metros mètre mètres"),
@@ -53,6 +53,8 @@ UNITS: Final[dict[str, str]] = {
     **_words("in", "inch inches zoll"),
     **_words("yd", "yard yards"),
     **_words("s", "sec secs second seconds sekunde sekunden seconde secondes segundos secondi"),
+    **_words("ds", "decisecond deciseconds"),
+    **_words("cs", "centisecond centiseconds"),
     **_words("ms", "msec millis milliseconds millisekunden"),
     **_words("us", "usec micros microseconds"),
     **_words("ns", "nsec nsecs nanosec nanosecs nanoseconds"),
@@ -68,7 +70,7 @@ UNITS: Final[dict[str, str]] = {
 }
 LENGTHS: Final = words("m cm mm um km dm nm ft in yd px")
 ALLOWED: Final[dict[str, frozenset[str]]] = {
-    "t": words("s ms us ns min h d"),
+    "t": words("s ds cs ms us ns min h d"),
     **dict.fromkeys(("x", "y", "z", "x1", "y1", "x2", "y2", "w", "h"), LENGTHS),
     "theta": words("rad mrad deg gon turn ddeg cdeg"),
     **dict.fromkeys(("lon", "lat"), frozenset({"deg"})),

@@ -196,10 +196,10 @@ BAD = {
     "header the same": (b"t,x (\x81m),y\n0,1,2\n", "line 1, column 6: is not UTF-8"),
     "open quote": (b't,x,y\n0,1,"2\n1,3,4\n', "line 2"),
     "two columns of x": (b"t,x,pos_x,y\n0,1,2,3\n", "could both be x"),
-    "two units": (b"t,x_mm,y_cm\n0,1,2\n", "different units"),
+    "a unit and none": (b"t,x_mm,y\n0,1,2\n", 'different units .*"x": "NAME:UNIT"'),
     "backwards": (b"t,x,y\n0,1,2\n2,3,4\n1,5,6\n", 'goes backwards.*`sort="sort"`'),
     "no time at all": (b"t,x,y\n,1,2\n", "no row with a time"),
-    "damaged gzip": (gzip.compress(b"t,x,y\n" + b"0,1,2\n" * 999)[:-20], "gzip|read to its end"),
+    "damaged gzip": (gzip.compress(b"t,x,y\n" + b"0,1,2\n" * 999)[:-20], "is damaged: "),
 }
 
 

@@ -15,7 +15,6 @@ from driftwalk.core.errors import FormatError
 from driftwalk.record import load
 from driftwalk.record.stores.plain_pickle import PickledArray, unpickle
 
-HERE = Path("here.npy")
 SCALARS = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text()
 PLAIN = st.recursive(
     SCALARS | st.binary(),
@@ -29,7 +28,7 @@ PLAIN = st.recursive(
 
 
 def read(content: bytes) -> Any:
-    return unpickle(content, where="it", path=HERE)
+    return unpickle(content, where="it")
 
 
 @pytest.mark.slow

@@ -205,7 +205,7 @@ def test_animalta_stacked_and_too_short_for_a_rate(tmp_path: Path) -> None:
     assert body_names(dataset) == ["0/Ind0", "1/Ind0"]
     np.testing.assert_allclose(body_track(dataset, "1/Ind0").time, [0.0, 0.07])
     np.testing.assert_allclose(body_track(load(path, **FRAMES), "1/Ind0").time, [0.0, 0.2])
-    with pytest.raises(FormatError, match="no column of y for X_Arena0_Ind1"):
+    with pytest.raises(FormatError, match=r"no column of x or of y for .Ind1"):
         load(write(tmp_path / "b.csv", animalta(tmp_path / "c.csv").read_text().replace(
             "Y_Arena0_Ind1", "Z")), **PIXELS)  # fmt: skip
 

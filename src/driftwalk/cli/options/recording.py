@@ -146,8 +146,9 @@ class RecordingOptions:
     box: Annotated[
         str | None,
         _option(
-            "--box xyxy|xywh|cxcywh|none",
-            "Columns of a box: two corners, corner or centre with its size, or no box.",
+            "--box xyxy|xywh|cxcywh[@WxH]|none",
+            "Columns of a box: two corners, corner or centre with its size, or no box; "
+            "of shares of an image also its size (cxcywh@1920x1080).",
         ),
     ] = None
     missing: Annotated[

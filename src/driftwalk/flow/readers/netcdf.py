@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -58,7 +57,7 @@ class SiField(NamedTuple):
     """Sentences for the person who loads the file."""
 
 
-def to_si(dataset: xr.Dataset, path: Path, options: FieldOptions) -> SiField:
+def to_si(dataset: xr.Dataset, options: FieldOptions) -> SiField:
     """Return the field of any NetCDF in SI.
 
     Raises
@@ -68,29 +67,28 @@ def to_si(dataset: xr.Dataset, path: Path, options: FieldOptions) -> SiField:
     InputError
         When a fact about its units is missing, or is given and of no use.
     """
-    named = _named(dataset, path, options)
+    named = _named(dataset, options)
     for name in ("u", "v", "x", "y", *({"time", "mask"} & set(map(str, named.variables)))):
         if named[name].dtype.kind not in "fiub":
-            raise FormatError(f"'{name}' holds no numbers", path=path)
+            raise FormatError(f"'{name}' holds no numbers")
         if name in ("x", "y") and named[name].dims != (name,):
             raise FormatError(
                 f"'{name}' must have exactly one dimension, got {named[name].dims}: is the grid "
-                "curved, or in longitude and latitude? Interpolate it to an even one in metres",
-                path=path,
+                "curved, or in longitude and latitude? Interpolate it to an even one in metres"
             )
-    chosen = _planar(named, path)
+    chosen = _planar(named)
     notes: list[str] = []
     if "time" in chosen.dims:
-        chosen, notes = _with_times(chosen, path)
+        chosen, notes = _with_times(chosen)
     scale = FieldScale(options)
     for name in map(str, chosen.variables):
         if name == "time":
             continue
-        unit = _unit(chosen, name, path, options)
+        unit = _unit(chosen, name, options)
         try:
             factor = scale.velocity(unit) if name in ("u", "v") else scale.length(unit)
         except InputError as error:
-            raise FormatError(f"the units of '{name}' are '{unit}': {error}", path=path) from error
+            raise FormatError(f"the units of '{name}' are '{unit}': {error}") from error
         chosen[name] = (chosen[name].dims, factor * chosen[name].values.astype(np.float64))
     scale.refuse_unused()
     if options.y_axis == "down":
@@ -110,7 +108,7 @@ def holds_velocities(dataset: xr.Dataset) -> bool:
     return all(next(_candidates(dataset, quantity), None) is not None for quantity in "uv")
 
 
-def _named(dataset: xr.Dataset, path: Path, options: FieldOptions) -> xr.Dataset:
+def _named(dataset: xr.Dataset, options: FieldOptions) -> xr.Dataset:
     """Return the variables under the names u, v, x, y, and time and mask where there are any."""
     unknown = sorted(set(options.variables) - set(QUANTITIES))
     if unknown:
@@ -125,8 +123,7 @@ def _named(dataset: xr.Dataset, path: Path, options: FieldOptions) -> xr.Dataset
             has = ", ".join(str(name) for name in dataset.variables)
             raise FormatError(
                 f"there is no variable '{name or quantity}'; it has {has}: name them with "
-                '`variables={"u": "NAME", "v": "NAME", "x": "NAME", "y": "NAME"}`',
-                path=path,
+                '`variables={"u": "NAME", "v": "NAME", "x": "NAME", "y": "NAME"}`'
             )
         found[quantity] = name
     if len(set(found.values())) < len(found):
@@ -179,7 +176,7 @@ def _candidates(dataset: xr.Dataset, quantity: str) -> Iterator[str]:
     yield from (name for name in _USUAL.get(quantity, ()) if name in names)
 
 
-def _planar(named: xr.Dataset, path: Path) -> xr.Dataset:
+def _planar(named: xr.Dataset) -> xr.Dataset:
     """Return u and v over ([time,] y, x), missing where they are masked."""
     chosen = named[["u", "v"]]
     if "mask" in named:
@@ -191,18 +188,17 @@ def _planar(named: xr.Dataset, path: Path) -> xr.Dataset:
     if long or not {"x", "y"} <= set(chosen["u"].dims) & set(chosen["v"].dims):
         raise FormatError(
             f"u and v need the dimensions ([time,] y, x), got {dict(chosen.sizes)}: keep one layer "
-            "or member in the file",
-            path=path,
+            "or member in the file"
         )
     chosen = chosen.squeeze([str(name) for name in extra], drop=True)
     for axis in ("x", "y"):
         nodes = chosen[axis].values
         if nodes.size < 2 or not np.isfinite(nodes).all():
-            raise FormatError(f"'{axis}' needs at least 2 finite positions", path=path)
+            raise FormatError(f"'{axis}' needs at least 2 finite positions")
     return chosen
 
 
-def _with_times(chosen: xr.Dataset, path: Path) -> tuple[xr.Dataset, list[str]]:
+def _with_times(chosen: xr.Dataset) -> tuple[xr.Dataset, list[str]]:
     """Return the frames at their times [s]; frames that are counted, or one alone, have none."""
     count = chosen.sizes["time"]
     unit = str(chosen["time"].attrs.get("units", "")).strip()
@@ -220,11 +216,11 @@ def _with_times(chosen: xr.Dataset, path: Path) -> tuple[xr.Dataset, list[str]]:
         # "seconds since ..." counts from a date that nothing here needs.
         factor = FieldScale(FieldOptions()).time(unit.split(" since ")[0])
     except InputError as error:
-        raise FormatError(f"the units of 'time' are '{unit}': {error}", path=path) from error
+        raise FormatError(f"the units of 'time' are '{unit}': {error}") from error
     return chosen.assign_coords(time=factor * chosen["time"].values.astype(np.float64)), []
 
 
-def _unit(chosen: xr.Dataset, name: str, path: Path, options: FieldOptions) -> str:
+def _unit(chosen: xr.Dataset, name: str, options: FieldOptions) -> str:
     """Return the unit of a variable, empty where there is none and the user states it."""
     text = chosen[name].attrs.get("units")
     if isinstance(text, str) and text.strip():
@@ -234,6 +230,5 @@ def _unit(chosen: xr.Dataset, name: str, path: Path, options: FieldOptions) -> s
     example = "m/s" if name in ("u", "v") else "m"
     raise FormatError(
         f"'{name}' has no units; write its attribute 'units', such as '{example}', or state them "
-        "with `length_unit`",
-        path=path,
+        "with `length_unit`"
     )

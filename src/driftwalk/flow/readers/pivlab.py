@@ -77,22 +77,22 @@ def read(path: Path) -> RawField:
         When there is no field in the file, or frames differ in their nodes.
     """
     with _opened(path) as file:
-        frames = [frame for names in _frames(file) for frame in _frame(file, names, path)]
+        frames = [frame for names in _frames(file) for frame in _frame(file, names)]
         length, velocity, scale = _units(file)
     if not frames:
         has = ", ".join(file.names[:12])
-        raise FormatError(f"has no velocities of PIVlab (x, y, u, v), only {has}", path=path)
+        raise FormatError(f"has no velocities of PIVlab (x, y, u, v), only {has}")
     if len(frames) > _MOST_FRAMES or any(f[:, :2].shape != frames[0][:, :2].shape for f in frames):
-        raise FormatError("the frames have different nodes: save one alone", path=path)
+        raise FormatError("the frames have different nodes: save one alone")
     stack = np.stack(frames)
     if (stack[:, :, :2] != stack[0, :, :2]).any():
-        raise FormatError("the frames have different nodes: save one alone", path=path)
+        raise FormatError("the frames have different nodes: save one alone")
     values = np.column_stack([stack[0, :, :2], _mean(stack[:, :, 2:])]) * scale
     line = np.arange(1, len(values) + 1, dtype=np.intp)
     notes = []
     if len(frames) > 1:
         notes.append(f"the flow is the mean of {len(frames)} frames: the file holds no times")
-    rows = masked_rows(line, values, np.zeros(len(values), dtype=bool), path)
+    rows = masked_rows(line, values, np.zeros(len(values), dtype=bool))
     reading = "PIVlab's .mat"
     return RawField(rows, length, velocity, down=True, notes=notes, reading=reading)
 
@@ -166,23 +166,21 @@ def _frames(file: _File) -> list[_Names]:
     return []
 
 
-def _frame(file: _File, names: _Names, path: Path) -> Iterator[Array]:
+def _frame(file: _File, names: _Names) -> Iterator[Array]:
     """Yield x, y, u, v of every frame, shape (n, 4), NaN where a vector was not measured."""
     lacking = [name for name in names[:4] if name not in file.names]
     if lacking:
-        raise FormatError(f"has no variable '{lacking[0]}'", path=path)
+        raise FormatError(f"has no variable '{lacking[0]}'")
     columns = [file.read(name) for name in names[:4]]
     kinds = file.read(names.kind) if names.kind in file.names else []
     if len({len(arrays) for arrays in columns}) != 1 or len(kinds) not in (0, len(columns[0])):
-        raise FormatError("has different numbers of frames in x, y, u and v", path=path)
+        raise FormatError("has different numbers of frames in x, y, u and v")
     for number, arrays in enumerate(zip(*columns, strict=True)):
         if not arrays[0].size:
             continue  # PIVlab leaves the cells of pairs that it was not asked for empty
         shapes = {array.shape for array in arrays}
         if len(shapes) != 1 or any(array.dtype.kind not in "fiu" for array in arrays):
-            raise FormatError(
-                f"x, y, u and v of frame {number + 1} are no matrices of one size", path=path
-            )
+            raise FormatError(f"x, y, u and v of frame {number + 1} are no matrices of one size")
         frame = np.column_stack([array.ravel().astype(np.float64) for array in arrays])
         if kinds and kinds[number].shape == arrays[0].shape:
             # Type 1 was measured; 0 is masked, 2 was replaced by its neighbours.

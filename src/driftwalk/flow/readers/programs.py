@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Final, Literal
 
 import numpy as np
@@ -66,7 +65,7 @@ class Program:
             return None
         return found if found > 0.0 else None
 
-    def names_in(self, text: str, path: Path) -> list[str]:
+    def names_in(self, text: str) -> list[str]:
         """Return names of columns that stand in words of the head, [] where there are none.
 
         Raises
@@ -82,7 +81,6 @@ class Program:
                 raise FormatError(
                     'expected "2D-vector" and the units of position, position and velocity in the '
                     "header",
-                    path=path,
                     line=1,
                 )
             each = [units[0], units[1], units[2], units[2]]

@@ -92,7 +92,7 @@ def read_text(path: Path, *, most: int = -1) -> str:
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         return content.decode("utf-16", "replace")
     if b"\0" in content:
-        raise FormatError("is not text", path=path)
+        raise FormatError("is not text")
     try:
         return content.decode("utf-8-sig", "strict" if most < 0 else "ignore")
     except UnicodeDecodeError:
@@ -118,19 +118,19 @@ def read(path: Path, options: TextOptions | None = None) -> RawField:
     """
     options = options or TextOptions()
     text = read_text(path)
-    layout = layout_of(text, options, path)
+    layout = layout_of(text, options)
     program, names = layout.program, layout.names
     if not layout.rows:
-        raise FormatError("there is no row under the header", path=path, line=layout.header or None)
+        raise FormatError("there is no row under the header", line=layout.header or None)
     last, ending = layout.rows[-1]
     if not text.endswith("\n") and not ending.split(layout.delimiter)[-1].strip():
-        raise FormatError("the file ends within a row", path=path, line=last)
+        raise FormatError("the file ends within a row", line=last)
     try:
         places = choose_columns(names, options.columns)
     except InputError as error:
-        raise FormatError(str(error), path=path, line=layout.header or None) from error
+        raise FormatError(str(error), line=layout.header or None) from error
     marks = _marks(layout)
-    line, values = _numbers(layout, [*(places[one][0] for one in FIELD), *marks], path)
+    line, values = _numbers(layout, [*(places[one][0] for one in FIELD), *marks])
     missing = np.zeros(len(line), dtype=bool)
     for rule, mark in zip(marks.values(), values.T[4:], strict=True):
         missing |= ~rule(mark)
@@ -142,7 +142,7 @@ def read(path: Path, options: TextOptions | None = None) -> RawField:
         missing |= marked
         nodes = int(marked.sum())
         notes.append(f"u and v are {value:g} at {nodes} node{'s' * (nodes > 1)}: taken as missing")
-    rows = masked_rows(line, values, missing, path)
+    rows = masked_rows(line, values, missing)
     length, velocity = places["x"][1], places["u"][1]
     if not (length or velocity):
         length, velocity = program.units_in(text)
@@ -196,7 +196,7 @@ def _described(layout: Layout, places: Mapping[str, tuple[int, str]], marks: lis
     return f"{layout.program.title}, {header}: {', '.join(parts)}"
 
 
-def layout_of(text: str, options: TextOptions, path: Path) -> Layout:
+def layout_of(text: str, options: TextOptions) -> Layout:
     """Return where the numbers of a text stand.
 
     Raises
@@ -206,16 +206,16 @@ def layout_of(text: str, options: TextOptions, path: Path) -> Layout:
     """
     lines = [(at, line) for at, line in enumerate(text.splitlines(), start=1) if line.strip()]
     if not lines:
-        raise FormatError("the file is empty", path=path)
+        raise FormatError("the file is empty")
     program = program_of(text)
     if options.header_line is not None:
         at = next((k for k, one in enumerate(lines) if one[0] == options.header_line), None)
         if at is None:
-            raise FormatError(f"line {options.header_line} holds no names of columns", path=path)
+            raise FormatError(f"line {options.header_line} holds no names of columns")
         return _under(lines, at, _delimiter(lines[at][1], options), program)
-    stated = program.names_in(text, path)
+    stated = program.names_in(text)
     if stated:
-        return _after_text(lines, stated, program, options, path)
+        return _after_text(lines, stated, program, options)
     for at, (_, line) in enumerate(lines[:_MOST_HEAD]):
         if row_delimiter(line) is not None:
             break
@@ -289,19 +289,15 @@ def _known(values: Sequence[float | None]) -> int:
     return sum(value is not None and not math.isnan(value) for value in values)
 
 
-def _after_text(
-    lines: Lines, names: list[str], program: Program, options: TextOptions, path: Path
-) -> Layout:
+def _after_text(lines: Lines, names: list[str], program: Program, options: TextOptions) -> Layout:
     """Return the layout of a text whose names stand in words above the rows, as Tecplot's do."""
     rows = [one for one in lines if _ROW.match(one[1])]
     zones = [n for n, line in lines if re.match(r"\s*ZONE\b", line, re.IGNORECASE)]
     if len(zones) > 1:
-        raise FormatError(
-            f"holds {len(zones)} zones: write one zone into a file", path=path, line=zones[1]
-        )
+        raise FormatError(f"holds {len(zones)} zones: write one zone into a file", line=zones[1])
     head = "\n".join(line for n, line in lines if not rows or n < rows[0][0])
     if re.search(r"\b(?:F|DATAPACKING)\s*=\s*BLOCK\b", head, re.IGNORECASE):
-        raise FormatError("is in Tecplot's BLOCK order: write it in POINT order", path=path)
+        raise FormatError("is in Tecplot's BLOCK order: write it in POINT order")
     found = row_delimiter(rows[0][1]) if rows else None
     delimiter = found.delimiter if found is not None else options.delimiter
     if found is not None and found.width > len(names):
@@ -366,9 +362,7 @@ def _split(line: str, delimiter: str | None) -> list[str]:
     return fields[:-1] if len(fields) > 4 and not fields[-1].strip() and delimiter else fields
 
 
-def _numbers(
-    layout: Layout, wanted: Sequence[int], path: Path
-) -> tuple[npt.NDArray[np.intp], Array]:
+def _numbers(layout: Layout, wanted: Sequence[int]) -> tuple[npt.NDArray[np.intp], Array]:
     """Return the line numbers and the wanted columns, shape (n, columns), NaN where missing."""
     values = np.empty((len(layout.rows), len(wanted)))
     width, comma = len(layout.names), layout.delimiter != ","
@@ -377,13 +371,12 @@ def _numbers(
         if len(fields) == width + 1 and not fields[-1].strip():
             fields = fields[:-1]
         if len(fields) != width:
-            raise FormatError(f"expected {width} fields, got {len(fields)}", path=path, line=line)
+            raise FormatError(f"expected {width} fields, got {len(fields)}", line=line)
         for at, column in enumerate(wanted):
             value = number(fields[column], comma=comma)
             if value is None:
                 raise FormatError(
                     f"expected a finite number, got '{fields[column].strip():.40}'",
-                    path=path,
                     line=line,
                     column=column + 1,
                 )
@@ -392,7 +385,7 @@ def _numbers(
 
 
 def masked_rows(
-    line: npt.NDArray[np.intp], values: Array, missing: npt.NDArray[np.bool_], path: Path
+    line: npt.NDArray[np.intp], values: Array, missing: npt.NDArray[np.bool_]
 ) -> FieldRows:
     """Return rows x, y, u, v whose velocities are NaN where they are missing.
 
@@ -403,8 +396,8 @@ def masked_rows(
     """
     lost = np.flatnonzero(~np.isfinite(values[:, :2]).all(axis=1))
     if lost.size:
-        raise FormatError("a node has no position", path=path, line=int(line[lost[0]]))
+        raise FormatError("a node has no position", line=int(line[lost[0]]))
     velocity = np.where(missing[:, None], np.nan, values[:, 2:4])
     if not np.isfinite(velocity).all(axis=1).any():
-        raise FormatError("every node is masked or missing: there is no velocity", path=path)
+        raise FormatError("every node is masked or missing: there is no velocity")
     return FieldRows(line, values[:, 0], values[:, 1], velocity[:, 0], velocity[:, 1])

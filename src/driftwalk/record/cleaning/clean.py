@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -43,10 +43,6 @@ class Counts:
     """Rows without a position, before jumps were removed."""
     samples: int = 0
     """Samples with a position at the end."""
-
-    def as_dict(self) -> dict[str, int]:
-        """Return the counts as a plain dictionary."""
-        return asdict(self)
 
 
 def clean_body(

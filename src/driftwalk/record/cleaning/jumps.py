@@ -13,7 +13,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from driftwalk.core.arrays import Floats, Integers
-from driftwalk.record.cleaning.warn import PLAUSIBLE
+from driftwalk.record.cleaning.warn import PLAUSIBLE, span_of
 from driftwalk.record.raw import Array, RawBody
 
 
@@ -219,7 +219,7 @@ def arena_diagonal(
     >>> arena_diagonal([x], [y], {"shape": "rectangle", "width_m": 6.0, "height_m": 8.0})
     10.0
     """
-    spans = [_span(x), _span(y)]
+    spans = [span_of(x), span_of(y)]
     stated = arena or {}
     if "vertices_m" in stated:
         corners = np.asarray(stated["vertices_m"], dtype=np.float64)
@@ -228,13 +228,6 @@ def arena_diagonal(
         side = stated.get("diameter_m", 0.0)
         tank = [stated.get("width_m", side), stated.get("height_m", side)]
     return max(math.hypot(*spans), math.hypot(*tank))
-
-
-def _span(values: Sequence[Array]) -> float:
-    known = [(one, np.isfinite(one)) for one in values]
-    high = max(float(np.max(one, where=at, initial=-np.inf)) for one, at in known)
-    low = min(float(np.min(one, where=at, initial=np.inf)) for one, at in known)
-    return high - low if high >= low else 0.0
 
 
 def impossible_warning(name: str, steps: Impossible) -> str:

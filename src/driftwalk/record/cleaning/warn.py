@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.record.raw import Array, RawBody, RawRecording
-from driftwalk.record.text import is_windows_text
 
 
 class PlausibilityPolicy(NamedTuple):
@@ -45,20 +43,10 @@ def plausibility_warnings(bodies: list[RawBody]) -> list[str]:
     bodies : list of RawBody
         In SI units.
     """
-    present = [(body, np.isfinite(body.x)) for body in bodies]
-    if not any(known.any() for _, known in present):
+    if not any(np.isfinite(body.x).any() for body in bodies):
         return ["no row holds a position"]
     warnings = []
-    # Without copies: a recording may have millions of positions.
-    extent = max(
-        float(
-            np.max(values, where=known, initial=-np.inf)
-            - np.min(values, where=known, initial=np.inf)
-        )
-        for body, known in present
-        if known.any()
-        for values in (body.x, body.y)
-    )
+    extent = max(span_of([values]) for body in bodies for values in (body.x, body.y))
     if extent > PLAUSIBLE.largest_extent_m:
         warnings.append(f"the positions span {extent:.3g} m: is the unit, or the scale, right?")
     elif extent == 0.0:
@@ -78,6 +66,15 @@ def plausibility_warnings(bodies: list[RawBody]) -> list[str]:
     return warnings
 
 
+def span_of(series: Sequence[Array]) -> float:
+    """Return the range of the finite values of some arrays, 0 where there are none."""
+    # Without copies: a recording may have millions of positions.
+    known = [(values, np.isfinite(values)) for values in series]
+    high = max(float(np.max(one, where=at, initial=-np.inf)) for one, at in known)
+    low = min(float(np.min(one, where=at, initial=np.inf)) for one, at in known)
+    return high - low if high >= low else 0.0
+
+
 def _clock_warnings(bodies: list[RawBody]) -> list[str]:
     clocks = [body.clock for body in bodies if body.clock.size > 1]
     if not clocks:
@@ -89,19 +86,6 @@ def _clock_warnings(bodies: list[RawBody]) -> list[str]:
     if shortest < PLAUSIBLE.shortest_interval_s:
         return [f"the usual interval is {shortest:.3g} s: is the unit of the clock right?"]
     return []
-
-
-def encoding_notes(path: Path) -> list[str]:
-    """Return the warning about text of an unknown encoding.
-
-    Parameters
-    ----------
-    path : Path
-        A file or folder that was read.
-    """
-    if not path.is_file() or not is_windows_text(path):
-        return []
-    return ["the text is not UTF-8 and was read as Windows-1252: check letters such as µ and °"]
 
 
 def angle_warnings(raw: RawRecording) -> list[str]:

@@ -33,7 +33,9 @@ class ArraysLoader:
         if head.startswith(NPY):
             return 0.4 if b"'|O'" not in head[:200] else 0.0
         if head.startswith(ZIP):
-            return 0.3 if _are_positions(members(path)) else 0.0
+            names = members(path)
+            # One array alone is a matrix.
+            return 0.3 if _are_positions(names) else 0.2 * (len(names) == 1)
         return 0.3 if head.startswith(HDF5) and _holds_positions(path) else 0.0
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
@@ -43,9 +45,9 @@ class ArraysLoader:
             return _of_array(path, options)
         if start.startswith(ZIP):
             with opened_npz(path) as arrays:
-                return _of_arrays({name: _value(arrays[name]) for name in arrays}, path, options)
+                return _of_arrays({name: _value(arrays[name]) for name in arrays}, options)
         with opened_hdf5(path) as contents:
-            return _of_arrays(_of_hdf5(contents), path, options)
+            return _of_arrays(_of_hdf5(contents), options)
 
 
 def _are_positions(names: set[str]) -> bool:
@@ -80,14 +82,14 @@ def _of_array(path: Path, options: ReadOptions) -> RawRecording:
         array = array.T
     table = table_in_memory(array.ravel() if array.dtype.names is not None else array)
     if table is None:
-        raise FormatError("holds no table", path=path)
+        raise FormatError("holds no table")
     return recording_of(table, options)
 
 
-def _of_arrays(variables: dict[str, Value], path: Path, options: ReadOptions) -> RawRecording:
+def _of_arrays(variables: dict[str, Value], options: ReadOptions) -> RawRecording:
     """Return the recording of arrays by name, at the frame rate that the file holds."""
-    tables = matlab_tables(variables, path)
-    recording = recording_of(the_one_that_fits(tables, options, path, "array"), options)
+    tables = matlab_tables(variables)
+    recording = recording_of(the_one_that_fits(tables, options, "array"), options)
     rates = [value for name, value in variables.items() if name.lower() in _RATES]
     if len(rates) == 1 and isinstance(rates[0], np.ndarray) and rates[0].size == 1:
         recording.frame_rate_hz = float(rates[0].ravel()[0])
@@ -159,7 +161,7 @@ class ArrowLoader:
         """Read the columns."""
         table = table_in_memory(_frame(path))
         if table is None:
-            raise FormatError("holds no table", path=path)
+            raise FormatError("holds no table")
         return recording_of(table, options)
 
 

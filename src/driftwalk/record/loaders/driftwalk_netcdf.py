@@ -38,7 +38,7 @@ class DriftwalkLoader:
         try:
             check_trajectory(dataset)
         except ValueError as error:
-            raise FormatError(str(error), path=path) from error
+            raise FormatError(str(error)) from error
         extra = _extra(dataset)
         time = np.asarray(dataset["time"].values, dtype=np.float64)
         fields = [np.asarray(dataset[name].values, np.float64) for name in ("x", "y", "theta")]
@@ -61,7 +61,6 @@ class DriftwalkLoader:
             clock_unit="s",
             length_unit="m",
             y_axis="up",
-            rows=time.size,
             attrs=kept,
             extra=extra,
         )

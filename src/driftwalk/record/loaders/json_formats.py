@@ -12,6 +12,7 @@ from driftwalk.core.errors import FormatError
 from driftwalk.core.files.bounded import MIB
 from driftwalk.core.text.json_text import MOST_BYTES, parse_json
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
+from driftwalk.record.tables.cells import objects
 from driftwalk.record.tables.in_memory import MemorySource
 from driftwalk.record.tables.rows import recording_of
 from driftwalk.record.text import open_binary
@@ -38,37 +39,34 @@ class JsonPointsLoader:
 
     def read(self, path: Path, _options: ReadOptions) -> RawRecording:
         """Read the points. Objects may have ``t`` [s] and ``theta`` [rad]."""
-        points = parse_json(_bounded(path), path=path)
+        points = parse_json(bounded_text(path), path=path)
         if not isinstance(points, list) or not points:
-            raise FormatError("expected a list with one point per frame", path=path)
+            raise FormatError("expected a list with one point per frame")
         rows = np.empty((len(points), len(KEYS)))
         for index, point in enumerate(points):
-            rows[index] = _point(point, index, path)
+            rows[index] = _point(point, index)
         x, y, theta, t = (np.ascontiguousarray(rows[:, column]) for column in range(4))
         undetected = (x == -1.0) & (y == -1.0)
         x[undetected] = y[undetected] = np.nan
         timed = bool(np.isfinite(t).any())
         clock: Array = t if timed else np.arange(x.size, dtype=np.float64)
         body = RawBody("0", clock, x, y, theta if np.isfinite(theta).any() else None)
-        return RawRecording(
-            [body], clock_unit="s" if timed else "frame", bare_clock="", rows=x.size
-        )
+        return RawRecording([body], clock_unit="s" if timed else "frame", bare_clock="")
 
 
-def _bounded(path: Path) -> bytes:
+def bounded_text(path: Path) -> bytes:
     """Return the contents of a file, or refuse more than JSON is read of."""
     with open_binary(path) as file:
         text = file.read(MOST_BYTES + 1)
     if len(text) > MOST_BYTES:
         raise FormatError(
             f"holds more than {MOST_BYTES / MIB:g} MiB of JSON: store it as CSV, which is read "
-            "piece by piece",
-            path=path,
+            "piece by piece"
         )
     return text
 
 
-def _point(point: Any, index: int, path: Path) -> list[float]:
+def _point(point: Any, index: int) -> list[float]:
     """Return (x, y, theta, t) of one entry, NaN for what it does not have."""
     if point is None:
         return [np.nan] * 4
@@ -82,13 +80,12 @@ def _point(point: Any, index: int, path: Path) -> list[float]:
         values, complete = [], False
     if not complete or not all(value is None or _is_number(value) for value in values):
         raise FormatError(
-            f'entry {index + 1} is {str(point)[:40]!r}, expected [x, y] or {{"x": .., "y": ..}}',
-            path=path,
+            f'entry {index + 1} is {str(point)[:40]!r}, expected [x, y] or {{"x": .., "y": ..}}'
         )
     try:
         return [np.nan if value is None else float(value) for value in values]
     except OverflowError as error:
-        raise FormatError(f"entry {index + 1} is too large for a number", path=path) from error
+        raise FormatError(f"entry {index + 1} is too large for a number") from error
 
 
 def _is_number(value: Any) -> bool:
@@ -104,8 +101,6 @@ class JsonLinesLoader:
     def sniff(self, head: bytes, _path: Path) -> float:
         """Recognise an object in the first line, and none that goes on in the second."""
         first, *rest = head.split(b"\n")
-        if not first.lstrip().startswith(b"{") or not first.rstrip().endswith(b"}"):
-            return 0.0
         if rest and rest[0].strip() and not rest[0].lstrip().startswith(b"{"):
             return 0.0
         try:
@@ -116,29 +111,27 @@ class JsonLinesLoader:
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the lines; a list of objects in one makes a row of each, for several bodies."""
         rows: list[dict[str, Any]] = []
-        for number, line in enumerate(_bounded(path).splitlines(), start=1):
+        for number, line in enumerate(bounded_text(path).splitlines(), start=1):
             if not line.strip():
                 continue
             try:
                 entry = parse_json(line, path=path)
             except FormatError as error:
-                raise FormatError(error.reason, path=path, line=number) from error
+                raise FormatError(error.reason, line=number) from error
             if not isinstance(entry, dict):
-                raise FormatError("expected an object in each line", path=path, line=number)
-            rows += _rows(entry, path, number)
+                raise FormatError("expected an object in each line", line=number)
+            rows += _rows(entry, number)
         names = list(dict.fromkeys(name for row in rows for name in row))
-        columns = [_column([row.get(name) for row in rows]) for name in names]
+        columns = [column_of([row.get(name) for row in rows]) for name in names]
         return recording_of(MemorySource("the lines", names, columns), options)
 
 
-def _rows(entry: dict[str, Any], path: Path, number: int) -> list[dict[str, Any]]:
+def _rows(entry: dict[str, Any], number: int) -> list[dict[str, Any]]:
     """Return a line as rows: one, or one for each object of the list that it holds."""
     flat = _flat(entry)
     lists = [name for name, value in flat.items() if isinstance(value, list) and _objects(value)]
     if len(lists) > 1:
-        raise FormatError(
-            f"holds several lists of objects: {', '.join(lists)}", path=path, line=number
-        )
+        raise FormatError(f"holds several lists of objects: {', '.join(lists)}", line=number)
     shared = {name: value for name, value in flat.items() if not isinstance(value, list)}
     if not lists:
         return [shared]
@@ -167,15 +160,13 @@ def _flat(entry: dict[str, Any], before: str = "") -> dict[str, Any]:
     return found
 
 
-def _column(values: list[Any]) -> np.ndarray[Any, Any]:
+def column_of(values: list[Any]) -> np.ndarray[Any, Any]:
     """Return numbers as float64, NaN where one is missing; whole ones and words as they are."""
     if all(isinstance(one, int) and abs(one) < 1 << 63 for one in values):
         return np.array(values, dtype=np.int64)
     if _numbers(values):
         return np.array([np.nan if one is None else float(one) for one in values])
-    column = np.empty(len(values), dtype=object)
-    column[:] = values
-    return column
+    return objects(values)
 
 
 LOADERS = (JsonPointsLoader(), JsonLinesLoader())

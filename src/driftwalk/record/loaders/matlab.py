@@ -34,17 +34,17 @@ class MatlabLoader:
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the variable that holds positions."""
         with matlab_variables_of(path) as variables:
-            tables = matlab_tables(variables, path)
+            tables = matlab_tables(variables)
             unread = only_matlab(variables)
             if not tables:
                 has = listed(list(variables)) or "nothing"
                 reason = unread or f"has no struct, vectors or matrix of numbers, only {has}"
-                raise FormatError(reason, path=path)
+                raise FormatError(reason)
             try:
-                return recording_of(the_one_that_fits(tables, options, path, "variable"), options)
+                return recording_of(the_one_that_fits(tables, options, "variable"), options)
             except FormatError as error:
                 also = f"; {unread}" if unread else ""
-                raise FormatError(f"{error.reason}{also}", path=path) from error
+                raise FormatError(f"{error.reason}{also}") from error
 
 
 ROBOT_ROWS: Final = 5
@@ -69,9 +69,7 @@ class MatlabTracksLoader:
         recording = _tracks(path)
         if recording is None or not recording.bodies:
             raise FormatError(
-                f"has no tracks: it needs one of {', '.join(_READERS)} in the layout of its "
-                "program",
-                path=path,
+                f"has no tracks: it needs one of {', '.join(_READERS)} in the layout of its program"
             )
         return recording
 
@@ -120,7 +118,6 @@ def _ctrax(value: Value) -> RawRecording | None:
         length_unit="mm" if scaled else "px",
         y_axis="down",
         frame_rate_hz=rate if rate > 0.0 and not stamped else None,
-        rows=sum(one.x.size for one in bodies),
         separate=True,
     )
 
@@ -148,9 +145,7 @@ def _flytracker(value: Value) -> RawRecording | None:
         )
         for number, track in enumerate(stack, start=1)
     ]
-    return RawRecording(
-        bodies, length_unit="px", y_axis="down", theta_axis="up", rows=clock.size, separate=True
-    )
+    return RawRecording(bodies, length_unit="px", y_axis="down", theta_axis="up", separate=True)
 
 
 def _robotarium(value: Value) -> RawRecording | None:
@@ -170,7 +165,6 @@ def _robotarium(value: Value) -> RawRecording | None:
         [RawBody(str(at), clock, *of) for at, of in enumerate(robots, start=1)],
         length_unit="m",
         y_axis="up",
-        rows=clock.size,
         notes=notes,
         separate=True,
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -61,9 +62,7 @@ class HeadedFormat:
         """Read every body, in the format's own unit of length."""
         names = first_row(path)
         if tuple(names[: len(self.header)]) != self.header:
-            raise FormatError(
-                f"the first columns are not {', '.join(self.header)}", path=path, line=1
-            )
+            raise FormatError(f"the first columns are not {', '.join(self.header)}", line=1)
         own = {
             quantity: column
             for quantity, column in self.columns.items()
@@ -75,6 +74,49 @@ class HeadedFormat:
         return replace(
             raw, length_unit=self.length_unit, bare_length_is_si=False, body_columns=None
         )
+
+
+def side_by_side(
+    path: Path, pattern: re.Pattern[str], delimiter: str | None = None, clock: int | None = None
+) -> tuple[list[RawBody], dict[str, Array]]:
+    """Return the bodies whose names stand in those of their columns, and all columns by name.
+
+    Parameters
+    ----------
+    path : Path
+        Text file with a header.
+    pattern : re.Pattern
+        Names of columns of positions, with the groups ``axis``, ``body`` and perhaps ``arena``.
+    delimiter : str, optional
+        None: recognised.
+    clock : int, optional
+        Column of the clock; None: each row counts as a frame.
+
+    Raises
+    ------
+    FormatError
+        When no column, or one of an axis alone, has such a name.
+    """
+    names, delimiter, skip, _ = read_header(path, delimiter=delimiter)
+    found: dict[tuple[str, str], dict[str, int]] = {}
+    for at, match in enumerate(map(pattern.fullmatch, names)):
+        if match is not None:
+            place = found.setdefault((match.groupdict().get("arena", ""), match["body"]), {})
+            place[match["axis"].lower()] = at
+    lacking = [name for (_, name), place in found.items() if len(place) < 2]
+    if lacking or not found:
+        what = f"'{lacking[0]}'" if lacking else "any body"
+        raise FormatError(f"no column of x or of y for {what}", line=skip)
+    table = read_table(path, TableLayout(delimiter, names, skip, tuple(range(len(names)))))
+    frame = np.arange(table.rows, dtype=np.float64) if clock is None else table.numbers[clock]
+    several = len({arena for arena, _ in found}) > 1
+    bodies = [
+        RawBody(
+            f"{arena}/{name}" if several else name, frame, *(table.numbers[place[a]] for a in "xy")
+        )
+        for (arena, name), place in found.items()
+    ]
+    return bodies, {name: table.numbers[at] for at, name in enumerate(names)}
 
 
 class MatricesLoader:
@@ -109,7 +151,7 @@ class MatricesLoader:
             RawBody(name, frame, x[i], y[i], None if theta is None else theta[i])
             for i, name in enumerate(names)
         ]
-        return RawRecording(bodies, bare_length_is_si=True, rows=int(frame.size))
+        return RawRecording(bodies, bare_length_is_si=True)
 
 
 def _place(name: Path, folder: Path) -> Path:

@@ -39,12 +39,11 @@ class Hdf5Contents:
 
         entry = self.file.get(name)
         if not isinstance(entry, h5py.Dataset) or entry.shape is None:
-            raise FormatError(f"has no array '{name}'", path=self.path)
+            raise FormatError(f"has no array '{name}'")
         if not _is_readable(entry):
             raise FormatError(
                 f"'{name}' is compressed by a filter that is not installed: save the file without "
-                "compression or with gzip, or as CSV",
-                path=self.path,
+                "compression or with gzip, or as CSV"
             )
         # A file may hold many arrays that each declare a little too much.
         self._declared += declared_bytes(entry)
@@ -61,7 +60,7 @@ class Hdf5Contents:
         """
         values = self.array(name)
         if values.dtype.kind not in "fiub":
-            raise FormatError(f"'{name}' holds no numbers", path=self.path)
+            raise FormatError(f"'{name}' holds no numbers")
         return np.array(values, dtype=np.float64)
 
     def texts(self, name: str) -> list[str]:

@@ -47,8 +47,6 @@ def matlab_variables_of(path: Path) -> Iterator[dict[str, Value]]:
     FormatError
         When it is no file of MATLAB's, is damaged, or declares more than it can hold.
     """
-    if path.is_dir():
-        raise FormatError("is a folder, and no MATLAB file", path=path)
     with path.open("rb") as file:
         start = file.read(len(OLD))
     if start == HDF5_BASED:
@@ -57,7 +55,7 @@ def matlab_variables_of(path: Path) -> Iterator[dict[str, Value]]:
     elif start == OLD:
         yield _of_old(path)
     else:
-        raise FormatError("is no MATLAB file of version 5 or 7.3", path=path)
+        raise FormatError("is no MATLAB file of version 5 or 7.3")
 
 
 def _of_old(path: Path) -> dict[str, Value]:
@@ -152,7 +150,7 @@ def _hdf5_struct(contents: Hdf5Contents, group: Any) -> Struct:
     if not many:
         return Struct([one])
     if len(lengths) > 1:
-        raise FormatError(f"'{group.name}' has fields of different lengths", path=contents.path)
+        raise FormatError(f"'{group.name}' has fields of different lengths")
     return Struct(
         [
             {field: _hdf5_value(contents, names[at]) for field, names in many.items()}

@@ -27,13 +27,16 @@ class Frame:
 
     contents: Hdf5Contents
     key: str
-    columns: list[Column]
-    """Names of the columns, by level."""
-    places: list[tuple[str, int]]
-    """For each column its block and the place in it."""
+    places: dict[Column, tuple[str, int]]
+    """From the name of each column, by level, to its block and the place in it."""
     blocks: dict[str, npt.NDArray[Any]] = field(default_factory=dict)
     """Blocks that are in memory, shape (row, column)."""
     rows: Array | None = None
+
+    @property
+    def columns(self) -> list[Column]:
+        """Names of the columns, by level."""
+        return [*self.places]
 
     def numbers(self, column: int) -> Array:
         """Return a column as float64.
@@ -43,15 +46,13 @@ class Frame:
         FormatError
             When it holds no numbers.
         """
-        block, place = self.places[column]
+        name = self.columns[column]
+        block, place = self.places[name]
         if block not in self.blocks:
             self.blocks[block] = self.contents.array(block)
         values = self.blocks[block]
         if values.ndim != 2 or place >= values.shape[1] or values.dtype.kind not in "fiub":
-            name = ".".join(self.columns[column])
-            raise FormatError(
-                f"column '{name}' of '{self.key}' holds no numbers", path=self.contents.path
-            )
+            raise FormatError(f"column '{'.'.join(name)}' of '{self.key}' holds no numbers")
         return np.array(values[:, place], dtype=np.float64)
 
     def index(self) -> Array:
@@ -81,16 +82,19 @@ def frame_in(contents: Hdf5Contents, key: str) -> Frame:
 
     group = contents.file.get(key)
     if not isinstance(group, h5py.Group):
-        raise FormatError(f"has no table '{key}'", path=contents.path)
+        raise FormatError(f"has no table '{key}'")
     kind = text_of(group.attrs.get("pandas_type", b""))
-    if kind == "frame":
-        return _fixed(contents, key, group)
     if kind == "frame_table" and isinstance(group.get("table"), h5py.Dataset):
-        return _table(contents, key, group)
-    raise FormatError(
-        f"'{key}' is no table of pandas that can be read (it says '{kind}'): {_SAVE_ELSE}",
-        path=contents.path,
-    )
+        frame = _table(contents, key, group)
+    elif kind == "frame":
+        frame = _fixed(contents, key, group)
+    else:
+        raise FormatError(
+            f"'{key}' is no table of pandas that can be read (it says '{kind}'): {_SAVE_ELSE}"
+        )
+    if not frame.places:
+        raise FormatError(f"the table '{key}' has no columns")
+    return frame
 
 
 def _fixed(contents: Hdf5Contents, key: str, group: Any) -> Frame:
@@ -98,10 +102,7 @@ def _fixed(contents: Hdf5Contents, key: str, group: Any) -> Frame:
     for block in range(int(group.attrs.get("nblocks", 0))):
         items = _labels(contents, key, f"block{block}_items", group)
         places |= {item: (f"{key}/block{block}_values", at) for at, item in enumerate(items)}
-    columns = list(places)
-    if not columns:
-        raise FormatError(f"the table '{key}' has no columns", path=contents.path)
-    frame = Frame(contents, key, columns, list(places.values()))
+    frame = Frame(contents, key, places)
     if "axis1" in group and group["axis1"].dtype.kind in "iuf":
         frame.rows = contents.numbers(f"{key}/axis1")
     return frame
@@ -117,7 +118,7 @@ def _labels(contents: Hdf5Contents, key: str, name: str, group: Any) -> list[Col
     if any(
         not 0 <= code < len(of) for of, column in zip(texts, codes, strict=True) for code in column
     ):
-        raise FormatError(f"the names of the columns of '{key}' are damaged", path=contents.path)
+        raise FormatError(f"the names of the columns of '{key}' are damaged")
     return [
         tuple(texts[level][code] for level, code in enumerate(row))
         for row in zip(*codes, strict=True)
@@ -134,20 +135,18 @@ def _table(contents: Hdf5Contents, key: str, group: Any) -> Frame:
             continue
         values = stored[name]
         blocks[name] = values.reshape(len(values), -1) if len(values) else values[:, None]
-        names = _pickled(contents, group, f"{name}_kind")
+        names = _pickled(group, f"{name}_kind")
         places |= {column: (name, at) for at, column in enumerate(names)}
-    if not places:
-        raise FormatError(f"the table '{key}' has no columns", path=contents.path)
-    frame = Frame(contents, key, list(places), list(places.values()), blocks)
+    frame = Frame(contents, key, places, blocks)
     if "index" in fields and stored["index"].dtype.kind in "iuf":
         frame.rows = np.array(stored["index"], dtype=np.float64)
     return frame
 
 
-def _pickled(contents: Hdf5Contents, group: Any, attribute: str) -> list[Column]:
+def _pickled(group: Any, attribute: str) -> list[Column]:
     """Return the names of columns that pandas pickled into an attribute of the table."""
     stored = group["table"].attrs.get(attribute, b"")
-    names = unpickle(bytes(stored), where=f"attribute '{attribute}'", path=contents.path)
+    names = unpickle(bytes(stored), where=f"attribute '{attribute}'")
     if not isinstance(names, list):
-        raise FormatError(f"the attribute '{attribute}' names no columns", path=contents.path)
+        raise FormatError(f"the attribute '{attribute}' names no columns")
     return [tuple(map(str, name)) if isinstance(name, tuple) else (str(name),) for name in names]

@@ -10,7 +10,6 @@ import io
 import pickle
 import pickletools
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -140,7 +139,7 @@ class _ForbiddenError(Exception):
     """A pickle asks for something that is no plain data."""
 
 
-def unpickle(content: bytes, *, where: str, path: Path) -> Any:
+def unpickle(content: bytes, *, where: str) -> Any:
     """Return the plain data of a pickle; arrays come as `PickledArray`.
 
     Parameters
@@ -149,8 +148,6 @@ def unpickle(content: bytes, *, where: str, path: Path) -> Any:
         The pickle.
     where : str
         What it is, for the message.
-    path : Path
-        The file, for the message.
 
     Raises
     ------
@@ -159,7 +156,7 @@ def unpickle(content: bytes, *, where: str, path: Path) -> Any:
 
     Examples
     --------
-    >>> unpickle(pickle.dumps({"a": [1, (2.5, None)]}), where="a pickle", path=Path("a.npy"))
+    >>> unpickle(pickle.dumps({"a": [1, (2.5, None)]}), where="a pickle")
     {'a': [1, (2.5, None)]}
     """
     try:
@@ -168,11 +165,10 @@ def unpickle(content: bytes, *, where: str, path: Path) -> Any:
     except _ForbiddenError as error:
         raise FormatError(
             f"{where} is a pickle that asks for {error}, which is no plain data and could run a "
-            "program: it is not read; save the recording in another format (HDF5 or CSV)",
-            path=path,
+            "program: it is not read; save the recording in another format (HDF5 or CSV)"
         ) from error
     except _DAMAGED as error:
-        raise FormatError(f"{where} is a damaged pickle: {error}", path=path) from error
+        raise FormatError(f"{where} is a damaged pickle: {error}") from error
 
 
 def _refuse_far_places(content: bytes) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from driftwalk.record.tables.source import TableSource
 
 FORMS: Final = ("xyxy", "xywh", "cxcywh", "none")
+_STATED: Final = re.compile(
+    r"(?P<form>xyxy|xywh|cxcywh)(?:@(?P<w>[1-9]\d{0,5})x(?P<h>[1-9]\d{0,5}))?"
+)
 _CORNERS: Final = ("x1", "y1", "x2", "y2")
 _QUAD: Final = tuple(f"{axis}{corner}" for corner in range(1, 5) for axis in "xy")
 _FROM_ZERO: Final = {"x0": "x1", "y0": "y1", "x1": "x2", "y1": "y2"}
@@ -57,6 +60,8 @@ class Box:
     """Columns that would be bodies by their names."""
     why: str = "a side of a box"
     notes: tuple[str, ...] = ()
+    image: tuple[int, int] | None = None
+    """Width and height of the image [px], of which the sides are shares."""
     symmetric: bool = True
     """Whether it looks the same after a half or quarter turn, so that its angle may leap by one."""
 
@@ -75,13 +80,18 @@ def find_box(
         When a stated box lacks columns, when the first rows leave open whether columns are a box,
         or when nothing says whether x and y are its corner or its centre.
     """
-    if options.box is not None and options.box not in FORMS:
-        raise InputError(f"`box` is one of {', '.join(FORMS)}; got '{options.box}'")
     if options.box == "none":
         return None
     found, units, plain = _sides(source, meanings)
     if options.box is not None:
-        return _stated(options.box, found, units)
+        match = _STATED.fullmatch(options.box)
+        if match is None:
+            raise InputError(
+                f"`box` is one of {', '.join(FORMS)}, and of shares of the image its size in "
+                f"pixels may follow, as in cxcywh@1920x1080; got '{options.box}'"
+            )
+        box = _stated(match["form"], found, units)
+        return replace(box, image=(int(match["w"]), int(match["h"]))) if match["w"] else box
     if {"x", "y"} & set(chosen) and not {"x1", "w"} & set(chosen):
         return None
     if getattr(source, "matrices", False):
@@ -91,11 +101,9 @@ def find_box(
         return quad
     if set(_CORNERS) <= set(found):
         return _corners(source, found, units, meanings, plain=plain)
-    if not {"w", "h"} <= set(found):
-        return None
-    if {"x1", "y1"} <= set(found) and not {"x", "y"} <= set(found):
+    if {"x1", "y1", "w", "h"} <= set(found) and not {"x", "y"} <= set(found):
         return _stated("xywh", found, units)
-    if not {"x", "y"} <= set(found):
+    if not {"x", "y", "w", "h"} <= set(found):
         return None
     said = {word.lower() for side in "xy" for word in words_of(source.names[found[side]])}
     if said & _CENTRE:
@@ -251,9 +259,8 @@ def _values(source: TableSource, columns: list[int]) -> list[Array] | None:
         table = source.read(TableLayout("", labels, numbers=tuple(sorted(columns))), head=True)
     except InputError:
         return None  # reading it reports what is wrong
-    values = [table.numbers[at] for at in columns]
-    known = np.all([np.isfinite(one) for one in values], axis=0)
-    return [one[known] for one in values]
+    values = table.stack(columns)
+    return [*values[np.isfinite(values).all(axis=1)].T]
 
 
 def box_centre(box: Box, values: Mapping[int, Array]) -> tuple[Array, Array]:
@@ -263,8 +270,7 @@ def box_centre(box: Box, values: Mapping[int, Array]) -> tuple[Array, Array]:
         if box.form == "xyxy":
             return 0.5 * (side["x1"] + side["x2"]), 0.5 * (side["y1"] + side["y2"])
         if box.form == "quad":
-            corners = [[side[f"{axis}{n}"] for n in range(1, 5)] for axis in "xy"]
-            x, y = (np.mean(of_axis, axis=0) for of_axis in corners)
+            x, y = (np.mean([side[f"{a}{n}"] for n in range(1, 5)], axis=0) for a in "xy")
             return x, y
         if box.form == "xywh":
             return side["x"] + 0.5 * side["w"], side["y"] + 0.5 * side["h"]
@@ -297,19 +303,12 @@ def box_angle(
     """
     side = {name: values[at] for name, at in box.sides.items()}
     if box.form == "quad" and theta is None:
-        along = [
-            side[f"{axis}2"] + side[f"{axis}3"] - side[f"{axis}1"] - side[f"{axis}4"]
-            for axis in "xy"
-        ]
-        theta = np.arctan2(along[1], along[0])
-        w = np.hypot(*along)
-        h = np.hypot(
-            *(
-                side[f"{axis}3"] + side[f"{axis}4"] - side[f"{axis}1"] - side[f"{axis}2"]
-                for axis in "xy"
-            )
+        first, second, third, fourth = (
+            np.array([side[f"x{n}"], side[f"y{n}"]]) for n in range(1, 5)
         )
-        turn = 2.0 * np.pi
+        along, across = second + third - first - fourth, third + fourth - first - second
+        theta = np.arctan2(along[1], along[0])
+        w, h, turn = np.hypot(*along), np.hypot(*across), 2.0 * np.pi
     elif theta is None or "w" not in side:
         return theta
     else:

@@ -6,6 +6,7 @@ import contextlib
 import datetime
 import math
 import numbers
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -37,6 +38,13 @@ class CellError(ValueError):
         super().__init__(reason)
         self.row = row
         """Row of the column, from 0."""
+
+
+def objects(cells: Sequence[Any]) -> Values:
+    """Return cells as a column of objects."""
+    values = np.empty(len(cells), dtype=object)
+    values[:] = cells
+    return values
 
 
 def as_numbers(values: Values, name: str) -> Array:

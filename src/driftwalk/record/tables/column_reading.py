@@ -51,6 +51,8 @@ class TableReading:
     """Whether the clock has times of an unnamed unit."""
     body_column: int | None = None
     length_unit: str = ""
+    factors: dict[int, float] = field(default_factory=dict)
+    """Columns of positions in another unit than that, and what makes it of them."""
     angle_unit: str = ""
     bare: bool = True
     """Whether the names of positions are plain symbols, which mean metres next to seconds."""

@@ -10,7 +10,7 @@ import numpy as np
 from driftwalk.core.errors import InputError, argument_text
 from driftwalk.core.text.did_you_mean import listed
 from driftwalk.record.column_names import OF_BODY, QUATERNION, unit_of_name
-from driftwalk.record.raw import MISSING, ReadOptions
+from driftwalk.record.raw import LENGTH_UNITS, MISSING, ReadOptions
 from driftwalk.record.tables.boxes import find_box
 from driftwalk.record.tables.column_reading import ColumnReading, TableReading
 from driftwalk.record.tables.named_columns import NamedColumns, may_be_unit, shown
@@ -73,17 +73,13 @@ class _Reader(NamedColumns):
             if meaning.quantity in own:
                 raise InputError(self.both(own[meaning.quantity], at, meaning.quantity))
             own[meaning.quantity] = at
+        on_plane = any({"x", "y"} <= set(one) for one in places.values())
+        pair, other = (("x", "y"), _ON_GLOBE) if on_plane else (_ON_GLOBE, ())
         bodies = {
-            body: columns
-            for body, columns in places.items()
-            if {"x", "y"} <= set(columns) or {"lon", "lat"} <= set(columns)
+            body: {quantity: at for quantity, at in one.items() if quantity not in other}
+            for body, one in places.items()
+            if set(pair) <= set(one)
         }
-        if any({"x", "y"} <= set(columns) for columns in bodies.values()):
-            bodies = {
-                body: {quantity: at for quantity, at in one.items() if quantity not in _ON_GLOBE}
-                for body, one in bodies.items()
-                if {"x", "y"} <= set(one)
-            }
         box = self.result.box
         if box is not None and (not bodies or not {"x", "y"} <= set(box.sides)):
             name = next((body for body in bodies if not body), "")
@@ -165,7 +161,7 @@ class _Reader(NamedColumns):
         rear = [body for name, body in lower.items() if name in REAR]
         if any("theta" in one for one in bodies.values()):
             return
-        if len(middle) == 1 and (len(front) == 1 or (len(rear) == 1 and not front)):
+        if len(middle) == 1 and len(front or rear) == 1:
             other, what = (front[0], "front") if front else (rear[0], "rear")
             start, end = (middle[0], other) if front else (other, middle[0])
             self.result.parts = (middle[0], start, end)
@@ -242,29 +238,24 @@ class _Reader(NamedColumns):
             meaning = self.meanings[time]
             result.clock_unit, result.numbers = meaning.unit or "s", (time,)
             result.bare_clock = not meaning.unit
-            if part is not None and (
-                part in self._chosen_columns() or self._is_fraction(time, part)
-            ):
+            chosen = part is not None and self.meanings[part].rank < 0
+            if part is not None and (chosen or self._is_fraction(time, part)):
                 result.numbers = (time, part)
             if meaning.rank == 0 and not meaning.unit and self._is_of_ros(time):
                 result.clock_unit, result.bare_clock = "ns", False
                 self.meanings[time] = replace(meaning, unit="ns")
             return
         date_form = None if date is None else source.stamps(date)
-        if time is None:
-            result.stamps = () if date is None or date_form is None else (date,)
-        elif (
-            form is not None and form.kind == OF_DAY and date is not None and date_form is not None
-        ):
+        dated = () if date is None or date_form is None else (date,)
+        if time is None or form is None:
+            result.stamps = dated
+        elif form.kind == OF_DAY and date_form is not None:
             # A date with its own time of day needs no second column.
-            result.stamps = (date,) if date_form.kind and date_form.has_time else (date, time)
+            result.stamps = dated if date_form.kind and date_form.has_time else (*dated, time)
         else:
             result.stamps = (time,)
         if result.stamps:
             result.clock_unit = "ns"
-
-    def _chosen_columns(self) -> set[int]:
-        return {at for at, one in self.meanings.items() if one.rank < 0}
 
     def _sampled(self, column: int) -> list[str]:
         rows = (row[column] for row in self.source.sample() if len(row) > column)
@@ -284,19 +275,27 @@ class _Reader(NamedColumns):
 
     def _find_units(self) -> None:
         result = self.result
-        lengths = ("x", "y", "z")
         used = {at for one in result.bodies.values() for at in one.values()}
-        wanted = [
-            one for at, one in self.meanings.items() if one.quantity in lengths and at in used
-        ]
-        units = [one.unit for one in wanted]
+        lengths = {at: one for at, one in self.meanings.items() if one.quantity in tuple("xyz")}
+        wanted = [one for at, one in lengths.items() if at in used]
+        units = {at: one.unit for at, one in lengths.items() if at in used}
         if result.box is not None:
-            units += result.box.units
-        result.length_unit = _agreed(units, "positions")
-        angles = [
-            one for at, one in self.meanings.items() if one.quantity == "theta" and at in used
-        ]
-        result.angle_unit = _agreed([one.unit for one in angles], "angles") if angles else ""
+            units |= dict(zip(result.box.sides.values(), result.box.units, strict=False))
+        if result.box is not None and result.box.image is not None:
+            width, height = result.box.image
+            sides = result.box.sides.items()
+            result.factors = {at: width if side[0] in "xw" else height for side, at in sides}
+            result.length_unit = "px"
+        elif units and set(units.values()) <= set(LENGTH_UNITS):
+            result.length_unit = units[min(units)]
+            metres = {at: LENGTH_UNITS[unit] for at, unit in units.items()}
+            factors = {at: one / LENGTH_UNITS[result.length_unit] for at, one in metres.items()}
+            result.factors = {at: factor for at, factor in factors.items() if factor != 1.0}
+        else:
+            result.length_unit = _agreed(list(units.values()), "positions", "x")
+        angles = {at: one.unit for at, one in self.meanings.items() if one.quantity == "theta"}
+        known = [unit for at, unit in angles.items() if at in used]
+        result.angle_unit = _agreed(known, "angles", "theta")
         result.bare = all(one.bare for one in wanted) and (result.box is None or bool(wanted))
 
     def _describe(self) -> None:
@@ -345,11 +344,12 @@ class _Reader(NamedColumns):
         return ""
 
 
-def _agreed(units: list[str], what: str) -> str:
+def _agreed(units: list[str], what: str, quantity: str) -> str:
     distinct = sorted(set(units))
     if len(distinct) > 1:
         shown = ", ".join(unit or "none" for unit in distinct)
         raise InputError(
-            f"the columns of {what} name different units ({shown}): give them one unit"
+            f"the columns of {what} name different units ({shown}): state that of each, as in "
+            f"{argument_text('columns', {quantity: 'NAME:UNIT'})}"
         )
     return distinct[0] if distinct else ""

@@ -5,8 +5,7 @@ from __future__ import annotations
 import codecs
 import io
 import re
-from pathlib import Path
-from typing import IO, Any, Final
+from typing import Any, Final
 
 from driftwalk.core.errors import FormatError
 
@@ -54,13 +53,9 @@ def other_encoding(start: bytes) -> str | None:
 class TranscodedText(io.RawIOBase):
     """The contents of a text file as UTF-8, without a byte order mark."""
 
-    def __init__(self, file: IO[bytes], encoding: str, path: Path) -> None:
-        self._file = file
-        self._path = path
+    def __init__(self, file: io.BufferedReader, encoding: str) -> None:
+        self._file = io.TextIOWrapper(file, _CODECS[encoding], newline="")
         self._encoding = encoding
-        self._decoder = codecs.getincrementaldecoder(_CODECS[encoding])()
-        self._rest = memoryview(b"")
-        self._ended = False
 
     def readable(self) -> bool:
         """Return that it can be read."""
@@ -68,27 +63,18 @@ class TranscodedText(io.RawIOBase):
 
     def readinto(self, buffer: Any) -> int:
         """Fill a buffer with the next bytes of the text."""
-        while not self._rest and not self._ended:
-            piece = self._file.read(1 << 20)
-            self._ended = not piece
-            self._rest = memoryview(self._decoded(piece))
-        part = self._rest[: len(buffer)]
-        self._rest = self._rest[len(part) :]
-        buffer[: len(part)] = part
-        return len(part)
-
-    def close(self) -> None:
-        """Close the file."""
-        if not self.closed:
-            self._file.close()
-        super().close()
-
-    def _decoded(self, piece: bytes) -> bytes:
         try:
-            return self._decoder.decode(piece, final=self._ended).encode("utf-8")
+            # A letter of these encodings has up to four bytes in UTF-8.
+            piece = self._file.read(max(len(buffer) // 4, 1)).encode("utf-8")
         except UnicodeError as error:
             raise FormatError(
                 f"begins as {self._encoding} text but does not go on as such: save the file as "
-                "UTF-8",
-                path=self._path,
+                "UTF-8"
             ) from error
+        buffer[: len(piece)] = piece
+        return len(piece)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+        super().close()

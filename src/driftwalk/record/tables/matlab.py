@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -12,7 +11,7 @@ import numpy as np
 from driftwalk.core.errors import FormatError
 from driftwalk.record.column_names import column_meaning
 from driftwalk.record.stores.matlab import Opaque, Struct, Value
-from driftwalk.record.tables.cells import Values
+from driftwalk.record.tables.cells import Values, objects
 from driftwalk.record.tables.in_memory import MemorySource
 
 VECTORS: Final = "variables"
@@ -29,22 +28,20 @@ _SAVED: Final = {
 _TABLES: Final = ("table", "timetable")
 
 
-def matlab_tables(variables: dict[str, Value], path: Path) -> dict[str, MemorySource]:
+def matlab_tables(variables: dict[str, Value]) -> dict[str, MemorySource]:
     """Return what variables can be read as a table, by their names.
 
     Parameters
     ----------
     variables : dict
         Variables of a file.
-    path : Path
-        The file, for errors.
     """
     tables: dict[str, MemorySource] = {}
-    vectors = _of_fields(variables, "the vectors", path)
+    vectors = _of_fields(variables, "the vectors")
     if vectors is not None:
         tables[VECTORS] = vectors
     for name, value in variables.items():
-        table = _table(value, f"'{name}'", path)
+        table = _table(value, f"'{name}'")
         if table is not None:
             tables[name] = table
     return tables
@@ -90,22 +87,22 @@ def _with_fields(variables: dict[str, Value]) -> list[tuple[str, Value]]:
     return [*variables.items(), *inner]
 
 
-def _table(value: Value, what: str, path: Path) -> MemorySource | None:
+def _table(value: Value, what: str) -> MemorySource | None:
     """Return a variable that holds a table by itself, None of any other."""
     if isinstance(value, Struct):
         if len(value.elements) == 1:
-            return _of_fields(value.elements[0], what, path)
-        return _of_elements(value.elements, what, path)
+            return _of_fields(value.elements[0], what)
+        return _of_elements(value.elements, what)
     if isinstance(value, np.ndarray) and value.ndim == 2 and min(value.shape) > 1:
         # There are more samples than quantities, whichever way they lie.
         rows = value if value.shape[0] >= value.shape[1] else value.T
-        _refuse_wide(rows.shape[1], what, path)
+        _refuse_wide(rows.shape[1], what)
         columns = [rows[:, at] for at in range(rows.shape[1])]
         return MemorySource(what, [""] * len(columns), columns, has_header=False)
     return None
 
 
-def _of_fields(fields: dict[str, Value], what: str, path: Path) -> MemorySource | None:
+def _of_fields(fields: dict[str, Value], what: str) -> MemorySource | None:
     """Return fields of one length as columns, a matrix as a column for each body."""
     rows = _row_count(fields)
     if rows is None:
@@ -122,7 +119,7 @@ def _of_fields(fields: dict[str, Value], what: str, path: Path) -> MemorySource 
             names.append(_numbered(name, number) if several else name)
             columns.append(column)
             matrices |= several
-        _refuse_wide(len(columns), what, path)
+        _refuse_wide(len(columns), what)
     counts = np.asarray(fields.get("ntargets", [])).ravel()
     if counts.size and counts.dtype.kind in "fiu" and counts.sum() == rows:
         # As Ctrax has it: bodies frame after frame, and how many there are in each.
@@ -155,9 +152,7 @@ def _columns(value: Value, rows: int) -> list[Values]:
     if isinstance(value, list):
         if len(value) != rows or not all(isinstance(one, str) for one in value):
             return []
-        texts = np.empty(rows, dtype=object)
-        texts[:] = value
-        return [texts]
+        return [objects(value)]
     if not isinstance(value, np.ndarray) or value.ndim != 2 or rows not in value.shape:
         return []
     if min(value.shape) <= 1:
@@ -171,13 +166,13 @@ def _numbered(name: str, number: int) -> str:
     return re.sub(r"^([A-Za-z]+)", rf"\g<1>{number}", name)
 
 
-def _of_elements(elements: list[dict[str, Value]], what: str, path: Path) -> MemorySource | None:
+def _of_elements(elements: list[dict[str, Value]], what: str) -> MemorySource | None:
     """Return an array of structs as a table: a row each, or the rows of a body each."""
     if not elements:
         return None
     if all(_is_single(value) for element in elements for value in element.values()):
         return _of_rows(elements, what)
-    parts = [_of_fields(element, what, path) for element in elements]
+    parts = [_of_fields(element, what) for element in elements]
     known = [(at, part) for at, part in enumerate(parts, start=1) if part is not None]
     if not known:
         return None
@@ -194,11 +189,7 @@ def _of_elements(elements: list[dict[str, Value]], what: str, path: Path) -> Mem
 
 def _of_rows(elements: list[dict[str, Value]], what: str) -> MemorySource | None:
     names = list(elements[0])
-    columns = []
-    for name in names:
-        cells = np.empty(len(elements), dtype=object)
-        cells[:] = [_single(element.get(name)) for element in elements]
-        columns.append(cells)
+    columns = [objects([_single(one.get(name)) for one in elements]) for name in names]
     return MemorySource(what, names, columns)
 
 
@@ -228,9 +219,7 @@ def _body_name(element: dict[str, Value]) -> str:
     return ""
 
 
-def _refuse_wide(count: int, what: str, path: Path) -> None:
+def _refuse_wide(count: int, what: str) -> None:
     most = 20_000
     if count > most:
-        raise FormatError(
-            f"{what} has {count} columns, more than the {most} that are read", path=path
-        )
+        raise FormatError(f"{what} has {count} columns, more than the {most} that are read")

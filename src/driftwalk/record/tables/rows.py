@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
-from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -166,9 +165,8 @@ def _detector_advice(source: TableSource) -> str:
     if shares and not (rows[:, 0] % 1.0).any():
         named = dict(zip(("x", "y", "w", "h"), "2345", strict=True))
         return (
-            "; if they are those of YOLO (class, centre and size as shares of the image), multiply "
-            "x and w by its width and y and h by its height in pixels, then "
-            f'{argument_text("columns", named)} and `box="cxcywh"`'
+            "; if they are those of YOLO (class, centre and size as shares of the image), "
+            f'{argument_text("columns", named)} and `box="cxcywh@1920x1080"`, its size in pixels'
         )
     return ""
 
@@ -192,6 +190,8 @@ def _read(source: TableSource, reading: TableReading, labels: list[str]) -> Tabl
         clock=next(iter(reading.numbers), None),
     )
     table = source.read(wanted)
+    for at, factor in reading.factors.items():
+        table.numbers[at] *= factor
     for at in flags:
         unknown = {label.lower() for label in table.labels[at]} - MISSING - set(_FLAGS)
         if unknown:
@@ -343,11 +343,14 @@ def _require_units_of_box(
     """Refuse sides that are shares of an image, and angles of an axis that cannot be radians."""
     sides = [values[at] for at in (() if reading.box is None else reading.box.sides.values())]
     known = [side[np.isfinite(side)] for side in sides]
+    image = None if reading.box is None else reading.box.image
+    if image is not None and any(one.max(initial=0.0) > max(image) for one in known):
+        raise FormatError("the sides of the boxes are no shares of an image: leave its size out")
     shares = all(one.size and one.min() >= 0.0 and one.max() <= 1.0 for one in known)
     if shares and options.metres_per_pixel is not None and not reading.length_unit:
         raise FormatError(
             "the sides of the boxes are between 0 and 1, shares of the image as YOLO writes them: "
-            "multiply those along x by its width and those along y by its height in pixels"
+            'state its size in pixels, as in `box="cxcywh@1920x1080"`'
         )
     if theta is not None and not reading.angle_unit and (np.abs(theta) > _FULL_TURN).any():
         raise FormatError(
@@ -357,7 +360,7 @@ def _require_units_of_box(
 
 
 def the_one_that_fits(
-    tables: Mapping[str, TableSource], options: ReadOptions, path: Path, what: str
+    tables: Mapping[str, TableSource], options: ReadOptions, what: str
 ) -> TableSource:
     """Return the table that the user names, or the only one that holds positions.
 
@@ -367,8 +370,6 @@ def the_one_that_fits(
         Tables by their names.
     options : ReadOptions
         `sheet` names one, by its name or its number from 1.
-    path : Path
-        The file, for errors.
     what : str
         What such a table is called, "sheet" or "variable".
 
@@ -378,9 +379,9 @@ def the_one_that_fits(
         When there is none, or several.
     """
     if not tables:
-        raise FormatError(f"has no {what} that is a table", path=path)
+        raise FormatError(f"has no {what} that is a table")
     if options.sheet is not None:
-        return _named(tables, options.sheet, path, what)
+        return _named(tables, options.sheet, what)
     if len(tables) == 1:
         return next(iter(tables.values()))
     fitting: list[str] = []
@@ -394,22 +395,20 @@ def the_one_that_fits(
     if len(fitting) > 1:
         choice = argument_text("sheet", fitting[0])
         raise FormatError(
-            f"holds positions in more than one {what}, {listed(fitting)}: name it, as in {choice}",
-            path=path,
+            f"holds positions in more than one {what}, {listed(fitting)}: name it, as in {choice}"
         )
     if not fitting:
         raise FormatError(
-            f"has no {what} with positions among {listed(list(tables))}; {reasons[0]}", path=path
+            f"has no {what} with positions among {listed(list(tables))}; {reasons[0]}"
         )
     return tables[fitting[0]]
 
 
-def _named(tables: Mapping[str, TableSource], wanted: str, path: Path, what: str) -> TableSource:
+def _named(tables: Mapping[str, TableSource], wanted: str, what: str) -> TableSource:
     if wanted in tables:
         return tables[wanted]
     if wanted.isdecimal() and 1 <= int(wanted) <= len(tables):
         return list(tables.values())[int(wanted) - 1]
     raise FormatError(
-        f"{argument_text('sheet', wanted)}: no such {what}; it has {listed(list(tables))}",
-        path=path,
+        f"{argument_text('sheet', wanted)}: no such {what}; it has {listed(list(tables))}"
     )

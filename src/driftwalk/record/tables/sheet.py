@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 from itertools import islice
-from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.raw import ReadOptions, TableLayout
-from driftwalk.record.tables.cells import CellError, Values, form_of, text_of_cell
+from driftwalk.record.tables.cells import CellError, form_of, objects, text_of_cell
 from driftwalk.record.tables.heading import header_advice, heading_of, is_data, units_below
 from driftwalk.record.tables.in_memory import table_of
 from driftwalk.record.tables.source import TABLE
@@ -30,8 +27,6 @@ class SheetSource:
     ----------
     rows : callable
         Returns an iterator over the rows of the sheet.
-    path : Path
-        The workbook.
     sheet : str
         Name of the sheet, for errors.
     options : ReadOptions
@@ -41,12 +36,10 @@ class SheetSource:
     def __init__(
         self,
         rows: Callable[[], Iterator[Row]],
-        path: Path,
         sheet: str,
         options: ReadOptions,
     ) -> None:
         self._rows = rows
-        self._path = path
         self.sheet = sheet
         begin = options.header_line or 1
         below = (entry for entry in _numbered(rows()) if entry[0] >= begin)
@@ -74,11 +67,6 @@ class SheetSource:
                     self.has_header, self.names = False, [""] * len(first)
                 self._advice = header_advice(texts, lines[0])
 
-    @property
-    def is_blank(self) -> bool:
-        """Whether the sheet has no header."""
-        return not self.names
-
     @cached_property
     def _first(self) -> list[Row]:
         return [row for _, row in islice(self._data(), TABLE.sample_rows)]
@@ -90,7 +78,7 @@ class SheetSource:
     def stamps(self, column: int) -> StampForm | None:
         """Return how the first time stamp of a column is written, None where it has none."""
         cells = [row[column] if column < len(row) else None for row in self._first]
-        return form_of(_values(cells))
+        return form_of(objects(cells))
 
     def read(self, wanted: TableLayout, *, head: bool = False) -> Table:
         """Read columns, row by row."""
@@ -104,17 +92,16 @@ class SheetSource:
         if not lines:
             raise self.error("holds no rows of data")
         try:
-            return table_of({at: _values(column) for at, column in cells.items()}, wanted)
+            return table_of({at: objects(column) for at, column in cells.items()}, wanted)
         except (CellError, StampError) as error:
             raise FormatError(
                 f"{error} (sheet '{self.sheet}'){self._advice}",
-                path=self._path,
                 line=lines[error.row],
             ) from error
 
     def error(self, message: str) -> FormatError:
         """Return an error about the sheet."""
-        return FormatError(f"sheet '{self.sheet}': {message}{self._advice}", path=self._path)
+        return FormatError(f"sheet '{self.sheet}': {message}{self._advice}")
 
     def _data(self) -> Iterator[tuple[int, Row]]:
         """Yield the rows below the header that are not blank, with their numbers from 1."""
@@ -128,13 +115,6 @@ def _texts(row: Row) -> list[str]:
     while texts and not texts[-1]:
         texts.pop()
     return texts
-
-
-def _values(cells: list[Any]) -> Values:
-    """Return cells as an array of objects."""
-    values = np.empty(len(cells), dtype=object)
-    values[:] = cells
-    return values
 
 
 def _numbered(rows: Iterator[Row]) -> Iterator[tuple[int, Row]]:

@@ -174,6 +174,10 @@ def how_to_write(text: str) -> str:
     >>> how_to_write("5/1/2024")
     ': it can be read in several ways, so write it as 2024-05-31T13:30:00 or 13:30:00'
     """
+    if text.count(":") == 3:
+        return (
+            ": its last part may be frames, hundredths or thousandths, so write it as 13:30:00.25"
+        )
     if _UNCLEAR.fullmatch(text) is None:
         return ""
     return ": it can be read in several ways, so write it as 2024-05-31T13:30:00 or 13:30:00"

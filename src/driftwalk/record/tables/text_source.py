@@ -92,11 +92,9 @@ class TextSource:
         except FormatError as error:
             if not self._advice:
                 raise
-            raise FormatError(
-                error.reason + self._advice, path=error.path, line=error.line
-            ) from error
+            raise FormatError(error.reason + self._advice, line=error.line) from error
 
     def error(self, message: str) -> FormatError:
         """Return an error about the header, or the file where it has none."""
         line = self._skip if self.has_header else None
-        return FormatError(message + self._advice, path=self._path, line=line)
+        return FormatError(message + self._advice, line=line)

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import split_fields
 from driftwalk.record.raw import RawRecording, ReadOptions, TableLayout
-from driftwalk.record.space import QUATERNION, SpaceTrack, Turns, lay_flat, plane_of
-from driftwalk.record.text import Table, header_rows, read_table
+from driftwalk.record.space import QUATERNION, SpaceColumns, read_in_space
+from driftwalk.record.text import header_rows
 
 START: Final = b"Format Version,"
 _UNITS: Final = {"meters": "m", "centimeters": "cm", "millimeters": "mm"}
@@ -50,39 +50,29 @@ class OptiTrackLoader:
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read every rigid body."""
         header = _read_header(path)
-        kind, bodies = _bodies(header, path)
-        placed = {name: header.columns(name, kind, "Position") for name in bodies}
-        turned = {name: header.columns(name, kind, "Rotation") for name in bodies}
+        kind, bodies = _bodies(header)
+        columns = {name: _columns(header, name, kind) for name in bodies}
         clock, clock_unit = _clock(header)
-        used = {clock, *(c for axes in (*placed.values(), *turned.values()) for c in axes.values())}
         labels = [
             " ".join(part for part in parts if part) or str(number)
             for number, parts in enumerate(
                 zip(header.names, header.quantities, header.axes, strict=True), start=1
             )
         ]
-        table = read_table(path, TableLayout(",", labels, header.lines, tuple(sorted(used))))
-        tracks = [
-            SpaceTrack(
-                name,
-                table.numbers[clock],
-                table.stack(placed[name][axis] for axis in "XYZ"),
-                _turns(header, table, turned[name], path),
-            )
-            for name in bodies
-        ]
-        # Motive's own axis. Its CSV says nothing about another choice at the export.
-        flat = lay_flat(tracks, plane_of(options.up or "y"))
-        if kind != "Rigid Body":
-            flat.notes.append("no rigid bodies: each marker is read as a body, without orientation")
         rate = header.settings.get("Export Frame Rate") or header.settings.get("Capture Frame Rate")
-        return replace(
-            flat,
+        recording = read_in_space(
+            path,
+            TableLayout(",", labels, header.lines, clock=clock),
+            columns,
+            options.up or "y",  # Motive's own axis; its CSV does not name another choice
             clock_unit=clock_unit,
-            length_unit=_length_unit(header, path),
-            frame_rate_hz=_rate(rate, path) if clock_unit == "frame" else None,
-            rows=table.rows,
+            length_unit=_length_unit(header),
+            frame_rate_hz=_rate(rate) if clock_unit == "frame" else None,
         )
+        if kind != "Rigid Body":
+            note = "no rigid bodies: each marker is read as a body, without orientation"
+            recording.notes.append(note)
+        return recording
 
 
 def _read_header(path: Path) -> _Header:
@@ -94,8 +84,7 @@ def _read_header(path: Path) -> _Header:
     if at is None or len(above) < 3:
         raise FormatError(
             "the rows that name type, body and axis of each column are missing: export the take "
-            "with its header",
-            path=path,
+            "with its header"
         )
     settings = dict(zip(rows[0][::2], rows[0][1::2], strict=False))
     # A data row may end in a comma that the header has not, and the other way round.
@@ -106,19 +95,14 @@ def _read_header(path: Path) -> _Header:
     return _Header(settings, at + 1, types, names, quantities, axes)
 
 
-def _bodies(header: _Header, path: Path) -> tuple[str, list[str]]:
+def _bodies(header: _Header) -> tuple[str, list[str]]:
     """Return which type is read, and the names of its bodies in the file's order."""
     for kind in ("Rigid Body", "Marker"):
         named = zip(header.types, header.names, strict=True)
         names = list(dict.fromkeys(name for type_, name in named if type_ == kind))
         if names:
-            for name in names:
-                if set(header.columns(name, kind, "Position")) != set("XYZ"):
-                    raise FormatError(f"'{name}' has no columns X, Y, Z of its position", path=path)
             return kind, names
-    raise FormatError(
-        "there is no rigid body and no marker: export the take with one of them", path=path
-    )
+    raise FormatError("there is no rigid body and no marker: export the take with one of them")
 
 
 def _clock(header: _Header) -> tuple[int, str]:
@@ -129,37 +113,41 @@ def _clock(header: _Header) -> tuple[int, str]:
     return header.axes.index("Frame"), "frame"
 
 
-def _rate(text: str | None, path: Path) -> float | None:
+def _rate(text: str | None) -> float | None:
     try:
         return None if text is None else float(text)
     except ValueError as error:
-        raise FormatError(f"the frame rate is '{text}'", path=path, line=1) from error
+        raise FormatError(f"the frame rate is '{text}'", line=1) from error
 
 
-def _length_unit(header: _Header, path: Path) -> str:
+def _length_unit(header: _Header) -> str:
     """Return the unit of positions, ``""`` when the settings do not say."""
     text = header.settings.get("Length Units", "")
     if text and text.lower() not in _UNITS:
         raise FormatError(
-            f"the unit of length is '{text}': export in meters or millimeters", path=path, line=1
+            f"the unit of length is '{text}': export in meters or millimeters", line=1
         )
     return _UNITS.get(text.lower(), "")
 
 
-def _turns(header: _Header, table: Table, columns: dict[str, int], path: Path) -> Turns | None:
-    """Return the orientations; Motive's Euler angles turn about the axes of the body."""
-    if not columns:
-        return None
+def _columns(header: _Header, name: str, kind: str) -> SpaceColumns:
+    """Return the columns of a body; Motive's Euler angles turn about the axes of the body."""
+    placed, turned = (header.columns(name, kind, what) for what in ("Position", "Rotation"))
+    if set(placed) != set("XYZ"):
+        raise FormatError(f"'{name}' has no columns X, Y, Z of its position")
+    position = [placed[axis] for axis in "XYZ"]
+    if not turned:
+        return SpaceColumns(position)
     form = header.settings.get("Rotation Type", "")
     axes = "XYZW" if form == "Quaternion" else form
-    if form not in (*_ORDERS, "Quaternion") or set(columns) != set(axes):
+    if form not in (*_ORDERS, "Quaternion") or set(turned) != set(axes):
         raise FormatError(
-            f"the rotation type is '{form}' and the columns of rotation are {', '.join(columns)}: "
-            "export quaternions, or Euler angles in an order such as XYZ",
-            path=path,
+            f"the rotation type is '{form}' and the columns of rotation are {', '.join(turned)}: "
+            "export quaternions, or Euler angles in an order such as XYZ"
         )
-    values = table.stack(columns[axis] for axis in axes)
-    return Turns(values, QUATERNION) if form == "Quaternion" else Turns(values, form, degrees=True)
+    turns = [turned[axis] for axis in axes]
+    known = QUATERNION if form == "Quaternion" else form
+    return SpaceColumns(position, turns, known, degrees=True)
 
 
 LOADER = OptiTrackLoader()

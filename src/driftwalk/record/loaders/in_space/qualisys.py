@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Final
-
-import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number
 from driftwalk.record.raw import RawRecording, ReadOptions, TableLayout
-from driftwalk.record.space import QUATERNION, SpaceTrack, Turns, lay_flat, plane_of
-from driftwalk.record.text import Table, header_rows, read_table
+from driftwalk.record.space import MATRIX, SpaceColumns, read_in_space
+from driftwalk.record.text import header_rows
 
 _FIRST: Final = b"NO_OF_FRAMES\t"
 _BODIES: Final = ("BODY_NAMES", "MARKER_NAMES")
@@ -42,8 +39,7 @@ class QualisysLoader:
         if kind not in _WIDTH or not names:
             raise FormatError(
                 "expected DATA_INCLUDED 3D with MARKER_NAMES, or 6D with BODY_NAMES: export these "
-                "from Qualisys Track Manager",
-                path=path,
+                "from Qualisys Track Manager"
             )
         # Frame and time may stand before the positions, and a tab at the end.
         first = len(fields) - _WIDTH[kind] * len(names) - (not fields[-1].strip())
@@ -51,18 +47,21 @@ class QualisysLoader:
             raise FormatError(
                 f"expected {_WIDTH[kind]} columns for each of {len(names)} names, after frame and "
                 f"time or none; got {len(fields)}",
-                path=path,
                 line=skip + 1,
             )
-        wanted = tuple(range(first, first + _WIDTH[kind] * len(names)))
-        table = read_table(path, TableLayout("\t", [""] * len(fields), skip, wanted))
-        tracks = [
-            _track(name, table, first + at * _WIDTH[kind], kind) for at, name in enumerate(names)
-        ]
-        rate = _rate(facts, path)
-        flat = lay_flat(tracks, plane_of(options.up or "z"))
-        return replace(
-            flat, clock_unit="frame", length_unit="mm", frame_rate_hz=rate, rows=table.rows
+        bodies = {}
+        for name in names:
+            turns = range(first + 7, first + 16) if kind == "6D" else ()
+            bodies[name] = SpaceColumns(range(first, first + 3), turns, MATRIX)
+            first += _WIDTH[kind]
+        return read_in_space(
+            path,
+            TableLayout("\t", [""] * len(fields), skip),
+            bodies,
+            options.up or "z",
+            zero_is_missing=True,
+            length_unit="mm",
+            frame_rate_hz=_rate(facts),
         )
 
 
@@ -74,34 +73,15 @@ def _head(path: Path) -> tuple[dict[str, list[str]], int, list[str]]:
         if is_number(fields[0]):
             return facts, at, fields
         facts[fields[0]] = fields[1:]
-    raise FormatError("has no rows under its head", path=path)
+    raise FormatError("has no rows under its head")
 
 
-def _rate(facts: dict[str, list[str]], path: Path) -> float:
+def _rate(facts: dict[str, list[str]]) -> float:
     """Return the frames per second [Hz]."""
     text = (facts.get("FREQUENCY") or [""])[0]
     if not is_number(text) or not float(text) > 0.0:
-        raise FormatError(f"FREQUENCY is '{text}', and no rate of frames", path=path)
+        raise FormatError(f"FREQUENCY is '{text}', and no rate of frames")
     return float(text)
-
-
-def _track(name: str, table: Table, first: int, kind: str) -> SpaceTrack:
-    """Return a marker or a body; it was not seen where all three coordinates are zero."""
-    position = table.stack(range(first, first + 3))
-    position[(position == 0.0).all(axis=1)] = np.nan
-    clock = np.arange(table.rows, dtype=np.float64)
-    if kind == "3D":
-        return SpaceTrack(name, clock, position)
-    # The nine elements go down the columns of the matrix.
-    elements = table.stack(range(first + 7, first + 16))
-    matrix = elements.reshape(-1, 3, 3).transpose(0, 2, 1)
-    known = np.isfinite(matrix).all(axis=(1, 2)) & (np.abs(matrix).max(axis=(1, 2)) > 0.0)
-    quaternion = np.full((table.rows, 4), np.nan)
-    if known.any():
-        from scipy.spatial.transform import Rotation
-
-        quaternion[known] = Rotation.from_matrix(matrix[known]).as_quat()
-    return SpaceTrack(name, clock, position, Turns(quaternion, QUATERNION))
 
 
 LOADER = QualisysLoader()

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections import Counter
-from collections.abc import Callable, Iterator
+from collections import Counter, defaultdict
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -32,63 +32,40 @@ class Pose(NamedTuple):
     """Position x, y, z [m] and quaternion x, y, z, w."""
 
 
-def _values(position: Any, orientation: Any) -> tuple[float, ...]:
-    return (
-        *(position.x, position.y, position.z),
-        *(orientation.x, orientation.y, orientation.z, orientation.w),
-    )
+READ: Final = (
+    *("geometry_msgs/msg/Pose", "geometry_msgs/msg/Pose2D", "geometry_msgs/msg/PoseStamped"),
+    *("geometry_msgs/msg/PoseWithCovarianceStamped", "geometry_msgs/msg/PoseArray"),
+    *("geometry_msgs/msg/TransformStamped", "nav_msgs/msg/Odometry"),
+    *("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"),
+)
+"""Types of messages whose poses are read."""
 
 
-def _pose(message: Any, topic: str) -> Iterator[Pose]:
-    yield Pose(topic, None, "", _values(message.position, message.orientation))
+def _poses(message: Any, topic: str) -> Iterator[Pose]:
+    """Yield the poses in a message of one of these types, given the name of its topic."""
+    if hasattr(message, "transforms"):
+        for one in message.transforms:
+            yield from _poses(one, topic)
+        return
+    header = getattr(message, "header", None)
+    stamp, parent = (None, "") if header is None else (header.stamp, header.frame_id)
+    inner = message
+    while hasattr(inner, "pose"):  # with a covariance, a pose is inside another
+        inner = inner.pose
+    found = {getattr(message, "child_frame_id", "") or topic: getattr(inner, "transform", inner)}
+    if hasattr(message, "poses"):
+        found = {str(number): one for number, one in enumerate(message.poses)}
+    for name, one in found.items():
+        yield Pose(name, stamp, parent, _values(one))
 
 
-def _pose_2d(message: Any, topic: str) -> Iterator[Pose]:
-    turned = (0.0, 0.0, math.sin(0.5 * message.theta), math.cos(0.5 * message.theta))
-    yield Pose(topic, None, "", (message.x, message.y, 0.0, *turned))
-
-
-def _pose_stamped(message: Any, topic: str) -> Iterator[Pose]:
-    pose, header = message.pose, message.header
-    yield Pose(topic, header.stamp, header.frame_id, _values(pose.position, pose.orientation))
-
-
-def _with_covariance(message: Any, topic: str) -> Iterator[Pose]:
-    pose, header = message.pose.pose, message.header
-    name = getattr(message, "child_frame_id", "") or topic
-    yield Pose(name, header.stamp, header.frame_id, _values(pose.position, pose.orientation))
-
-
-def _pose_array(message: Any, _topic: str) -> Iterator[Pose]:
-    header = message.header
-    for number, pose in enumerate(message.poses):
-        values = _values(pose.position, pose.orientation)
-        yield Pose(str(number), header.stamp, header.frame_id, values)
-
-
-def _transform(message: Any, _topic: str) -> Iterator[Pose]:
-    transform, header = message.transform, message.header
-    values = _values(transform.translation, transform.rotation)
-    yield Pose(message.child_frame_id, header.stamp, header.frame_id, values)
-
-
-def _transforms(message: Any, topic: str) -> Iterator[Pose]:
-    for transform in message.transforms:
-        yield from _transform(transform, topic)
-
-
-READERS: Final[dict[str, Callable[[Any, str], Iterator[Pose]]]] = {
-    "geometry_msgs/msg/Pose": _pose,
-    "geometry_msgs/msg/Pose2D": _pose_2d,
-    "geometry_msgs/msg/PoseStamped": _pose_stamped,
-    "geometry_msgs/msg/PoseWithCovarianceStamped": _with_covariance,
-    "geometry_msgs/msg/PoseArray": _pose_array,
-    "geometry_msgs/msg/TransformStamped": _transform,
-    "nav_msgs/msg/Odometry": _with_covariance,
-    "tf2_msgs/msg/TFMessage": _transforms,
-    "tf/msg/tfMessage": _transforms,
-}
-"""From a type of message to what takes the poses out of one, given the name of its topic."""
+def _values(pose: Any) -> tuple[float, ...]:
+    if hasattr(pose, "theta"):
+        half = 0.5 * pose.theta
+        return (pose.x, pose.y, 0.0, 0.0, 0.0, math.sin(half), math.cos(half))
+    moves = hasattr(pose, "translation")
+    at, turn = (pose.translation, pose.rotation) if moves else (pose.position, pose.orientation)
+    return (at.x, at.y, at.z, turn.x, turn.y, turn.z, turn.w)
 
 
 METADATA: Final = "metadata.yaml"
@@ -97,10 +74,8 @@ _SQLITE: Final = b"SQLite format 3\0"
 _ROS_1: Final = b"#ROSBAG V2.0\n"
 
 
-@dataclass
-class _Track:
-    stamps: list[int] = field(default_factory=list)
-    values: list[tuple[float, ...]] = field(default_factory=list)
+_Tracks = dict[tuple[str, str], list[tuple[int, tuple[float, ...]]]]
+"""From topic and body to stamps [ns] and poses."""
 
 
 class RosLoader:
@@ -119,12 +94,20 @@ class RosLoader:
         """Read the poses of the chosen topics."""
         plane = plane_of(options.up or "z")
         with _opened(path) as reader:
-            chosen = _choose(reader.connections, options.topic, path)
+            chosen = _choose(reader.connections, options.topic)
             tracks, parents, recorded = _collect(reader, chosen)
         if not tracks:
-            raise FormatError("the chosen topic has no poses", path=path)
-        origin = min(min(track.stamps) for track in tracks.values())
-        flat = lay_flat([_in_space(name, track, origin) for name, track in tracks.items()], plane)
+            raise FormatError("the chosen topic has no poses")
+        origin = min(stamp for samples in tracks.values() for stamp, _ in samples)
+        times = Counter(body for _, body in tracks)
+        bodies = []
+        for (topic, body), samples in tracks.items():
+            clock = np.array([stamp - origin for stamp, _ in samples], dtype=np.float64)
+            values = np.array([pose for _, pose in samples], dtype=np.float64)
+            name = body if times[body] == 1 else f"{topic.strip('/')}/{body}"
+            turns = Turns(values[:, 3:], QUATERNION)
+            bodies.append(SpaceTrack(name, clock, values[:, :3], turns))
+        flat = lay_flat(bodies, plane)
         if recorded:
             flat.notes.append(
                 f"{recorded} poses have no time stamp: they stand at the time when they were "
@@ -135,13 +118,7 @@ class RosLoader:
                 f"the poses are in different frames, {', '.join(sorted(parents))}: compare bodies "
                 "of one frame only"
             )
-        return replace(
-            flat,
-            clock_unit="ns",
-            clock_origin=origin,
-            length_unit="m",
-            rows=sum(len(track.stamps) for track in tracks.values()),
-        )
+        return replace(flat, clock_unit="ns", clock_origin=origin, length_unit="m")
 
 
 @contextmanager
@@ -181,16 +158,15 @@ def _refuse_nested(path: Path) -> None:
             )
 
 
-def _choose(connections: list[Any], topic: str | None, path: Path) -> list[Any]:
+def _choose(connections: list[Any], topic: str | None) -> list[Any]:
     """Return the connections of the chosen topics, or of the only one that holds poses."""
-    usable = [one for one in connections if one.msgtype in READERS]
+    usable = [one for one in connections if one.msgtype in READ]
     topics = list(dict.fromkeys(one.topic for one in usable))
     if not topics:
         found = ", ".join(sorted({one.msgtype for one in connections})[:8]) or "no topics"
         raise FormatError(
             f"has no topic of poses, only {found}; read are "
-            f"{', '.join(name.rpartition('/')[2] for name in READERS)}",
-            path=path,
+            f"{', '.join(name.rpartition('/')[2] for name in READ)}"
         )
     wanted = [name.strip() for name in topic.split(",")] if topic is not None else topics
     if (len(wanted) > 1 and topic is None) or not set(wanted) <= set(topics):
@@ -203,36 +179,19 @@ def _choose(connections: list[Any], topic: str | None, path: Path) -> list[Any]:
     return [one for one in usable if one.topic in wanted]
 
 
-def _collect(reader: Any, chosen: list[Any]) -> tuple[dict[str, _Track], set[str], int]:
-    """Return the tracks by body, the frames they are in, and how many have no time of their own."""
-    tracks: dict[tuple[str, str], _Track] = {}
+def _collect(reader: Any, chosen: list[Any]) -> tuple[_Tracks, set[str], int]:
+    """Return the tracks, the frames they are in, and how many poses have no time of their own."""
+    tracks: _Tracks = defaultdict(list)
     parents: set[str] = set()
     recorded = 0
     for connection, received, data in reader.messages(connections=chosen):
         message = reader.deserialize(data, connection.msgtype)
-        for pose in READERS[connection.msgtype](message, connection.topic.strip("/")):
+        for pose in _poses(message, connection.topic.strip("/")):
             stamp = 0 if pose.stamp is None else pose.stamp.sec * 1_000_000_000 + pose.stamp.nanosec
             recorded += stamp == 0
-            track = tracks.setdefault((connection.topic, pose.body), _Track())
-            track.stamps.append(stamp or received)
-            track.values.append(pose.values)
+            tracks[connection.topic, pose.body].append((stamp or received, pose.values))
             parents.add(pose.parent)
-    return _named(tracks), parents, recorded
-
-
-def _named(tracks: dict[tuple[str, str], _Track]) -> dict[str, _Track]:
-    """Return the tracks by body, and by topic too where two topics have a body of one name."""
-    times = Counter(body for _, body in tracks)
-    return {
-        body if times[body] == 1 else f"{topic.strip('/')}/{body}": track
-        for (topic, body), track in tracks.items()
-    }
-
-
-def _in_space(name: str, track: _Track, origin: int) -> SpaceTrack:
-    clock = np.array([stamp - origin for stamp in track.stamps], dtype=np.float64)
-    values = np.array(track.values, dtype=np.float64)
-    return SpaceTrack(name, clock, values[:, :3], Turns(values[:, 3:], QUATERNION))
+    return tracks, parents, recorded
 
 
 LOADER = RosLoader()

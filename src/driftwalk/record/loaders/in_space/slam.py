@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import replace
 from itertools import takewhile
 from pathlib import Path
 from typing import Final
@@ -16,8 +15,8 @@ from typing import Final
 from driftwalk.core.errors import FormatError
 from driftwalk.record.column_names import unit_of_name
 from driftwalk.record.raw import CLOCK_UNITS, RawRecording, ReadOptions, TableLayout
-from driftwalk.record.space import PARTS, QUATERNION, SpaceTrack, Turns, lay_flat, plane_of
-from driftwalk.record.text import header_rows, read_table
+from driftwalk.record.space import PARTS, SpaceColumns, read_in_space
+from driftwalk.record.text import header_rows
 from driftwalk.record.text_head import first_line, first_lines, first_row, is_numeric_row
 
 _START: Final = re.compile(r"#\s*timestamp\b[^,]*(,\s*p_\w*[xyz]\b[^,]*){3}")
@@ -45,23 +44,17 @@ class EurocLoader:
         }
         lacking = [part for part in _POSITION if part not in columns]
         if lacking:
-            raise FormatError(
-                f"the header names no column of p_…_{lacking[0][1]}", path=path, line=1
-            )
-        turned = set(PARTS) <= set(columns)
-        parts = (*_POSITION, *(PARTS if turned else ()))
-        used = tuple(columns[part] for part in parts)
-        table = read_table(path, TableLayout(",", names, 1, (0, *used), clock=0))
-        values = table.stack(used)
-        turns = Turns(values[:, 3:], QUATERNION) if turned else None
-        track = SpaceTrack("0", table.numbers[0], values[:, :3], turns)
+            raise FormatError(f"the header names no column of p_…_{lacking[0][1]}", line=1)
+        turns = [columns[part] for part in PARTS] if set(PARTS) <= set(columns) else []
+        body = SpaceColumns([columns[part] for part in _POSITION], turns)
         unit = unit_of_name(names[0])
-        return replace(
-            lay_flat([track], plane_of(options.up or "z")),
+        return read_in_space(
+            path,
+            TableLayout(",", names, 1, clock=0),
+            {"0": body},
+            options.up or "z",
             clock_unit=unit if unit in CLOCK_UNITS else "ns",
-            clock_origin=table.clock_origin,
             length_unit="m",
-            rows=table.rows,
         )
 
 
@@ -86,16 +79,10 @@ class TumLoader:
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the one body."""
         comments = takewhile(lambda line: line.startswith("#"), header_rows(path, 20))
-        layout = TableLayout(" ", _NAMES, len(list(comments)), tuple(range(len(_NAMES))))
-        table = read_table(path, layout)
-        values = table.stack(range(1, 8))
-        track = SpaceTrack("0", table.numbers[0], values[:, :3], Turns(values[:, 3:], QUATERNION))
-        return replace(
-            lay_flat([track], plane_of(options.up or "z")),
-            clock_unit="s",
-            length_unit="m",
-            rows=table.rows,
-        )
+        layout = TableLayout(" ", _NAMES, len(list(comments)), clock=0)
+        body = SpaceColumns(range(1, 4), range(4, 8))
+        up = options.up or "z"
+        return read_in_space(path, layout, {"0": body}, up, clock_unit="s", length_unit="m")
 
 
 def _is_unit(fields: list[str]) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -16,8 +16,8 @@ from driftwalk.record.raw import (
     ReadOptions,
     TableLayout,
 )
-from driftwalk.record.space import QUATERNION, VECTOR, SpaceTrack, Turns, lay_flat, plane_of
-from driftwalk.record.text import Table, header_rows, read_table
+from driftwalk.record.space import VECTOR, SpaceColumns, read_in_space
+from driftwalk.record.text import header_rows
 from driftwalk.record.text_head import first_lines
 
 _READ: Final = ("Objects", "Segments", "Trajectories")
@@ -59,46 +59,43 @@ class ViconLoader:
         """Read every object; a second section of the file has to go."""
         header = _read_header(path)
         bodies = [name for name in dict.fromkeys(header.names) if name]
-        columns = {name: header.columns(name) for name in bodies}
-        placed = {name: _positions(name, columns[name], path) for name in bodies}
-        used = {0, *(column for axes in columns.values() for column in axes.values())}
+        columns = {name: _columns(header, name) for name in bodies}
         labels = [f"{n} {a}".strip() for n, a in zip(header.names, header.axes, strict=True)]
-        table = _read_rows(path, TableLayout(",", labels, _LINES, tuple(sorted(used))))
-        tracks = [
-            SpaceTrack(
-                name,
-                table.numbers[0],
-                table.stack(placed[name]),
-                _turns(header, table, columns[name], path),
+        try:
+            return read_in_space(
+                path,
+                TableLayout(",", labels, _LINES, clock=0),
+                columns,
+                options.up or "z",
+                length_unit=_length_unit(header, columns),
+                frame_rate_hz=header.rate_hz,
             )
-            for name in bodies
-        ]
-        return replace(
-            lay_flat(tracks, plane_of(options.up or "z")),
-            length_unit=_length_unit(header, placed, path),
-            frame_rate_hz=header.rate_hz,
-            rows=table.rows,
-        )
+        except FormatError as error:
+            if error.line is None or not _begins_section(path, error.line):
+                raise
+            raise FormatError(
+                "another section begins here: keep one section in a file, or export one alone",
+                line=error.line,
+            ) from error
 
 
 def _read_header(path: Path) -> _Header:
     lines = header_rows(path, _LINES + 1)
     if len(lines) <= _LINES or not lines[_LINES].strip():
-        raise FormatError("the file ends before its first row of data", path=path)
+        raise FormatError("the file ends before its first row of data")
     section = lines[0].strip(", ")
     if section not in _READ:
         raise FormatError(
             f"begins with the section '{section}': export {', '.join(_READ[:-1])} or {_READ[-1]}",
-            path=path,
             line=1,
         )
     rate = lines[1].strip(", ")
     if not is_number(rate):
-        raise FormatError(f"expected the frame rate, got '{rate:.40}'", path=path, line=2)
+        raise FormatError(f"expected the frame rate, got '{rate:.40}'", line=2)
     names, axes, units, data = (split_fields(line, ",") for line in lines[2 : _LINES + 1])
     width = max(len(axes), len(data))
     if len(axes) < 5 or axes[0] != "Frame":
-        raise FormatError("expected the names of the axes, from 'Frame' on", path=path, line=4)
+        raise FormatError("expected the names of the axes, from 'Frame' on", line=4)
     padded = [(row + [""] * width)[:width] for row in (names, axes, units)]
     return _Header(float(rate), _carried(padded[0]), padded[1], padded[2])
 
@@ -113,53 +110,29 @@ def _carried(names: list[str]) -> list[str]:
     return carried
 
 
-def _positions(body: str, columns: dict[str, int], path: Path) -> list[int]:
-    for axes in _POSITIONS:
-        if set(axes) <= set(columns):
-            return [columns[axis] for axis in axes]
-    raise FormatError(
-        f"'{body}' has no columns TX, TY, TZ or X, Y, Z of its position", path=path, line=4
-    )
+def _columns(header: _Header, body: str) -> SpaceColumns:
+    """Return the columns of a body."""
+    columns = header.columns(body)
+    axes = next((axes for axes in _POSITIONS if set(axes) <= set(columns)), None)
+    if axes is None:
+        raise FormatError(f"'{body}' has no columns TX, TY, TZ or X, Y, Z of its position", line=4)
+    position, turns = ([columns[one] for one in of if one in columns] for of in (axes, _QUATERNION))
+    if len(turns) != 3 or "RW" in columns:
+        return SpaceColumns(position, turns if len(turns) == 4 else ())
+    unit = header.units[columns["RX"]]
+    if unit not in ANGLE_UNITS:
+        raise FormatError(f"the unit of the angles is '{unit}': expected rad or deg", line=_LINES)
+    return SpaceColumns(position, turns, VECTOR, degrees=unit == "deg")
 
 
-def _length_unit(header: _Header, placed: dict[str, list[int]], path: Path) -> str:
-    units = {header.units[column] for columns in placed.values() for column in columns}
+def _length_unit(header: _Header, placed: dict[str, SpaceColumns]) -> str:
+    units = {header.units[column] for one in placed.values() for column in one.position}
     if len(units) != 1 or not units <= {*LENGTH_UNITS, ""}:
         raise FormatError(
             f"the units of the positions are {', '.join(sorted(units))}: expected one, mm or m",
-            path=path,
             line=_LINES,
         )
     return units.pop()
-
-
-def _turns(header: _Header, table: Table, columns: dict[str, int], path: Path) -> Turns | None:
-    """Return the orientations: a quaternion where there are four axes, else axis times angle."""
-    if not set(_QUATERNION[:3]) <= set(columns):
-        return None
-    if "RW" in columns:
-        return Turns(table.stack([columns[axis] for axis in _QUATERNION]), QUATERNION)
-    unit = header.units[columns["RX"]]
-    if unit not in ANGLE_UNITS:
-        raise FormatError(
-            f"the unit of the angles is '{unit}': expected rad or deg", path=path, line=_LINES
-        )
-    values = table.stack([columns[axis] for axis in _QUATERNION[:3]])
-    return Turns(values, VECTOR, degrees=unit == "deg")
-
-
-def _read_rows(path: Path, layout: TableLayout) -> Table:
-    """Read the rows; say what to do about a section that follows them."""
-    try:
-        return read_table(path, layout)
-    except FormatError as error:
-        if error.line is None or not _begins_section(path, error.line):
-            raise
-        raise FormatError(
-            "another section begins here: keep one section in a file, or export one alone",
-            path=path,
-            line=error.line,
-        ) from error
 
 
 def _begins_section(path: Path, number: int) -> bool:

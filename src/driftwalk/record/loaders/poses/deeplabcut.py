@@ -6,21 +6,18 @@ of several animals have the row of individuals, those of one have not.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Final
-
-import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
 from driftwalk.record.pose import (
-    Chosen,
     Confidence,
     Point,
     Poses,
-    bodies_of,
     choose_keypoints,
+    recording_of_poses,
 )
 from driftwalk.record.raw import Array, Marks, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.stores.hdf5 import names_in, opened_hdf5
@@ -62,14 +59,14 @@ class DeepLabCutLoader:
 
 def _read_csv(path: Path, options: ReadOptions) -> RawRecording:
     header = _header(path)
-    places = _places(list(zip(*(row[1:] for row in header), strict=True)), path)
-    chosen = _chosen(places, options)
-    used = {column + 1 for column in _columns(places, chosen)}
     names = [".".join(part for part in column if part) for column in zip(*header, strict=True)]
-    layout = TableLayout(",", names, len(header), tuple(sorted({0, *used})))
-    table = read_table(path, layout)
-    columns = {column - 1: table.numbers[column] for column in used}
-    return _recording(places, chosen, columns, table.numbers[0], options)
+
+    def read(used: set[int]) -> tuple[dict[int, Array], Array]:
+        wanted = (0, *sorted(at + 1 for at in used))
+        table = read_table(path, TableLayout(",", names, len(header), wanted))
+        return {at: table.numbers[at + 1] for at in used}, table.numbers[0]
+
+    return _recording(list(zip(*(row[1:] for row in header), strict=True)), read, options)
 
 
 def _read_hdf5(path: Path, options: ReadOptions) -> RawRecording:
@@ -77,11 +74,12 @@ def _read_hdf5(path: Path, options: ReadOptions) -> RawRecording:
         key = next((key for key in KEYS if key in contents.file), KEYS[0])
         frame = frame_in(contents, key)
         if any(len(column) not in LEVELS for column in frame.columns):
-            raise FormatError(f"'{key}' has no columns of scorer, bodyparts, coords", path=path)
-        places = _places(frame.columns, path)
-        chosen = _chosen(places, options)
-        columns = {column: frame.numbers(column) for column in _columns(places, chosen)}
-        return _recording(places, chosen, columns, frame.index(), options)
+            raise FormatError(f"'{key}' has no columns of scorer, bodyparts, coords")
+
+        def read(used: set[int]) -> tuple[dict[int, Array], Array]:
+            return {at: frame.numbers(at) for at in used}, frame.index()
+
+        return _recording(frame.columns, read, options)
 
 
 def _header(path: Path) -> list[list[str]]:
@@ -96,22 +94,20 @@ def _header(path: Path) -> list[list[str]]:
         raise FormatError(
             "the first column of the header is not scorer, (individuals,) bodyparts, coords: is it "
             "DeepLabCut's?",
-            path=path,
             line=1,
         )
     if any(len(row) != len(rows[0]) for row in rows[:count]):
-        raise FormatError("the header rows have different numbers of fields", path=path, line=count)
+        raise FormatError("the header rows have different numbers of fields", line=count)
     if len(rows) > count and not is_number(rows[count][0]):
         raise FormatError(
             "the rows are named by images, as those of labelled frames are, which are no track: "
             "give the file of the analysed video",
-            path=path,
             line=count + 1,
         )
     return rows[:count]
 
 
-def _places(columns: Sequence[tuple[str, ...]], path: Path) -> Places:
+def _places(columns: Sequence[tuple[str, ...]]) -> Places:
     """Return which column holds what; coordinates of other names are left out."""
     found: Places = {}
     for at, column in enumerate(columns):
@@ -126,42 +122,34 @@ def _places(columns: Sequence[tuple[str, ...]], path: Path) -> Places:
             if missing:
                 raise FormatError(
                     f"no column of {min(missing)} for bodypart '{part}' of individual "
-                    f"'{individual}'",
-                    path=path,
+                    f"'{individual}'"
                 )
     if not found:
-        raise FormatError("no columns of x and y below any bodypart", path=path)
+        raise FormatError("no columns of x and y below any bodypart")
     return found
 
 
-def _chosen(places: Places, options: ReadOptions) -> Chosen:
-    return choose_keypoints([part for parts in places.values() for part in parts], options)
-
-
-def _columns(places: Places, chosen: Chosen) -> set[int]:
-    return {
-        column
-        for parts in places.values()
-        for part in chosen.names()
-        for column in parts.get(part, {}).values()
-    }
-
-
 def _recording(
-    places: Places,
-    chosen: Chosen,
-    columns: dict[int, Array],
-    frame: Array,
+    names: Sequence[tuple[str, ...]],
+    read: Callable[[set[int]], tuple[dict[int, Array], Array]],
     options: ReadOptions,
 ) -> RawRecording:
+    """Return the recording of columns by level, given what reads some of them and the frames."""
+    places = _places(names)
+    chosen = choose_keypoints([part for parts in places.values() for part in parts], options)
+    used = {
+        at
+        for parts in places.values()
+        for part in chosen.names()
+        for at in parts.get(part, {}).values()
+    }
+    columns, frame = read(used)
+
     def read_point(place: Mapping[str, int]) -> Point:
         likelihood = columns[place["likelihood"]] if "likelihood" in place else None
         return columns[place["x"]], columns[place["y"]], likelihood
 
-    bodies, notes = bodies_of(Poses(places, read_point), chosen, frame, options, usual=USUAL)
-    return RawRecording(
-        bodies, length_unit="px", has_keypoints=True, rows=int(np.size(frame)), notes=notes
-    )
+    return recording_of_poses(Poses(places, read_point), chosen, frame, options, usual=USUAL)
 
 
 LOADER = DeepLabCutLoader()

@@ -7,6 +7,7 @@ next to them, and an attribute holds what was known of the recording.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -14,7 +15,7 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.core.text.json_text import parse_json
-from driftwalk.record.pose import Confidence, Point, Poses, bodies_of, choose_keypoints
+from driftwalk.record.pose import Confidence, Point, Poses, choose_keypoints, recording_of_poses
 from driftwalk.record.raw import LENGTH_UNITS, Array, Marks, RawBody, RawRecording, ReadOptions
 from driftwalk.schema.stores.netcdf import MAGIC, open_netcdf, text_attribute
 
@@ -53,18 +54,16 @@ class MovementLoader:
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read every individual; of several keypoints one has to be named."""
         dataset = open_netcdf(path)
-        position = _array(dataset, "position", path)
+        position = _array(dataset, "position")
         if not {"time", "space"} <= set(position.dims):
-            raise FormatError("has no variable 'position' over time and space", path=path)
+            raise FormatError("has no variable 'position' over time and space")
         space = [str(axis) for axis in position["space"].values]
         if not {"x", "y"} <= set(space):
-            raise FormatError(f"the dimension 'space' has {space}, expected x and y", path=path)
+            raise FormatError(f"the dimension 'space' has {space}, expected x and y")
         position = _in_order(position, "space")
-        confidence = (
-            _in_order(_array(dataset, "confidence", path)) if "confidence" in dataset else None
-        )
+        confidence = _in_order(_array(dataset, "confidence")) if "confidence" in dataset else None
         if confidence is not None and confidence.shape != (position.shape[0], *position.shape[2:]):
-            raise FormatError("'confidence' has another shape than 'position'", path=path)
+            raise FormatError("'confidence' has another shape than 'position'")
 
         def read_point(place: tuple[int, int]) -> Point:
             point = position.values[:, :, *place].astype(np.float64)
@@ -77,25 +76,21 @@ class MovementLoader:
             individual: {keypoint: (at, of) for at, keypoint in enumerate(keypoints)}
             for of, individual in enumerate(individuals)
         }
-        time, unit = _clock(dataset, path)
+        time, unit = _clock(dataset)
         sleap = str(dataset.attrs.get("source_software")) == "SLEAP"
         chosen = choose_keypoints(keypoints, options)
-        bodies, notes = bodies_of(
-            Poses(places, read_point), chosen, time, options, usual=SLEAP if sleap else USUAL
-        )
+        poses, usual = Poses(places, read_point), SLEAP if sleap else USUAL
+        raw = recording_of_poses(poses, chosen, time, options, usual=usual)
         own = "driftwalk" in dataset.attrs
         # Other programs may call something else so.
         if own and "orientation" in dataset and chosen.heading is None:
-            _orient(bodies, _orientation(dataset, individuals, path))
+            _orient(raw.bodies, _orientation(dataset, individuals))
         rate = dataset.attrs.get("fps")
-        return RawRecording(
-            bodies,
+        return replace(
+            raw,
             clock_unit=unit,
             length_unit=_length_unit(position) or options.length_unit or "px",
             frame_rate_hz=float(rate) if rate is not None and unit == "frame" else None,
-            has_keypoints=True,
-            rows=time.size,
-            notes=notes,
             attrs=_known(dataset, path) if own else {},
         )
 
@@ -106,13 +101,13 @@ def _length_unit(position: xr.DataArray) -> str:
     return unit if isinstance(unit, str) and unit in (*LENGTH_UNITS, "px") else ""
 
 
-def _orientation(dataset: xr.Dataset, individuals: list[str], path: Path) -> dict[str, Array]:
+def _orientation(dataset: xr.Dataset, individuals: list[str]) -> dict[str, Array]:
     """Return the angles [rad] of every individual, which driftwalk writes next to the positions."""
-    angles = _array(dataset, "orientation", path)
+    angles = _array(dataset, "orientation")
     if sorted(map(str, angles.dims)) != ["individuals", "time"]:
-        raise FormatError("'orientation' is not over time and individuals", path=path)
+        raise FormatError("'orientation' is not over time and individuals")
     if angles.attrs.get("units") != "rad":
-        raise FormatError("'orientation' does not state its unit, rad", path=path)
+        raise FormatError("'orientation' does not state its unit, rad")
     values = angles.transpose("time", "individuals").values.astype(np.float64)
     return {name: np.ascontiguousarray(values[:, at]) for at, name in enumerate(individuals)}
 
@@ -127,17 +122,17 @@ def _known(dataset: xr.Dataset, path: Path) -> dict[str, Any]:
     """Return what driftwalk knew of the recording when it wrote the file."""
     known = parse_json(str(dataset.attrs["driftwalk"]), path=path)
     if not isinstance(known, dict):
-        raise FormatError("the attribute 'driftwalk' is no JSON object", path=path)
+        raise FormatError("the attribute 'driftwalk' is no JSON object")
     texts = {key: known[key] for key in TEXTS if isinstance(known.get(key), str)}
     numbers = {key: known[key] for key in NUMBERS if type(known.get(key)) in (int, float)}
     return {**texts, **numbers}
 
 
-def _array(dataset: xr.Dataset, name: str, path: Path) -> xr.DataArray:
+def _array(dataset: xr.Dataset, name: str) -> xr.DataArray:
     if name not in dataset:
-        raise FormatError(f"has no variable '{name}' over time and space", path=path)
+        raise FormatError(f"has no variable '{name}' over time and space")
     if dataset[name].dtype.kind not in "fiu":
-        raise FormatError(f"'{name}' holds no numbers", path=path)
+        raise FormatError(f"'{name}' holds no numbers")
     return dataset[name]
 
 
@@ -168,12 +163,12 @@ def _names(values: xr.DataArray, dimension: str) -> list[str]:
     return [str(index) for index in range(values.sizes[dimension])]
 
 
-def _clock(dataset: xr.Dataset, path: Path) -> tuple[Array, str]:
+def _clock(dataset: xr.Dataset) -> tuple[Array, str]:
     """Return the time stamps and their unit."""
     if "time" not in dataset.coords:
         return np.arange(dataset.sizes["time"], dtype=np.float64), "frame"
     unit = "s" if str(dataset.attrs.get("time_unit", "")).startswith("s") else "frame"
-    return np.asarray(_array(dataset, "time", path).values, dtype=np.float64), unit
+    return np.asarray(_array(dataset, "time").values, dtype=np.float64), unit
 
 
 LOADER = MovementLoader()

@@ -15,7 +15,7 @@ from driftwalk.core.arrays import Codes
 from driftwalk.core.errors import FormatError
 from driftwalk.core.text.json_text import parse_json
 from driftwalk.record.cleaning.several_bodies import split_bodies
-from driftwalk.record.pose import Confidence, Point, Poses, bodies_of, choose_keypoints
+from driftwalk.record.pose import Confidence, Point, Poses, choose_keypoints, recording_of_poses
 from driftwalk.record.raw import Array, Marks, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.stores.hdf5 import Hdf5Contents, names_in, opened_hdf5, text_of
 from driftwalk.record.text import read_table
@@ -45,8 +45,7 @@ class SleapLoader:
             if tracks.shape[1:3] != (2, len(nodes)):
                 raise FormatError(
                     f"'tracks' has the shape {tracks.shape}, expected track, xy, node, frame with "
-                    f"{len(nodes)} nodes",
-                    path=path,
+                    f"{len(nodes)} nodes"
                 )
             names = contents.texts("track_names") if "track_names" in contents.file else []
             scores = _scores(contents, tracks.shape)
@@ -62,10 +61,8 @@ class SleapLoader:
         }
         frame = np.arange(tracks.shape[3], dtype=np.float64)
         chosen = choose_keypoints(nodes, options)
-        bodies, notes = bodies_of(Poses(places, read_point), chosen, frame, options, usual=USUAL)
-        return RawRecording(
-            bodies, length_unit="px", has_keypoints=True, rows=frame.size, notes=notes
-        )
+        poses = Poses(places, read_point)
+        return recording_of_poses(poses, chosen, frame, options, usual=USUAL)
 
 
 def _in_order(
@@ -74,13 +71,11 @@ def _in_order(
     """Return an array of numbers with its dimensions in this order."""
     values = contents.array(name)
     if values.dtype.kind not in "fiu" or values.ndim != len(order):
-        raise FormatError(f"'{name}' has no numbers over {', '.join(order)}", path=contents.path)
+        raise FormatError(f"'{name}' has no numbers over {', '.join(order)}")
     stated = contents.file[name].attrs.get("dims")
     dims = list(order) if stated is None else parse_json(text_of(stated), path=contents.path)
     if sorted(map(str, dims)) != sorted(order):
-        raise FormatError(
-            f"'{name}' is over {dims}, expected {', '.join(order)}", path=contents.path
-        )
+        raise FormatError(f"'{name}' is over {dims}, expected {', '.join(order)}")
     return values.transpose([dims.index(dimension) for dimension in order])
 
 
@@ -90,7 +85,7 @@ def _scores(contents: Hdf5Contents, shape: tuple[int, ...]) -> npt.NDArray[Any] 
         return None
     scores = _in_order(contents, "point_scores", ("track", "node", "frame"))
     if scores.shape != (shape[0], *shape[2:]):
-        raise FormatError("'point_scores' has another shape than 'tracks'", path=contents.path)
+        raise FormatError("'point_scores' has another shape than 'tracks'")
     return scores
 
 
@@ -117,7 +112,7 @@ class SleapCsvLoader:
             if name.endswith(".x") and f"{name[:-2]}.y" in places
         }
         if "frame_idx" not in places or not nodes:
-            raise FormatError("no columns frame_idx, NODE.x and NODE.y", path=path, line=1)
+            raise FormatError("no columns frame_idx, NODE.x and NODE.y", line=1)
         chosen = choose_keypoints(list(nodes), options)
         used = {at for node in chosen.names() for at in nodes[node] if at >= 0}
         frame, track = places["frame_idx"], places.get("track")
@@ -131,32 +126,29 @@ class SleapCsvLoader:
             return table.numbers[x], table.numbers[y], table.numbers.get(score)
 
         poses = Poses({"0": {node: node for node in nodes}}, read_point)
-        rows, notes = bodies_of(poses, chosen, table.numbers[frame], options, usual=USUAL)
-        bodies = rows
+        raw = recording_of_poses(poses, chosen, table.numbers[frame], options, usual=USUAL)
         if track is not None:
-            _require_tracks(table.labels[track], table.codes[track], rows[0].clock, path)
-            bodies = split_bodies(
+            (rows,) = raw.bodies
+            _require_tracks(table.labels[track], table.codes[track], rows.clock)
+            raw.bodies = split_bodies(
                 table.codes[track],
                 [label or "0" for label in table.labels[track]],
-                clock=rows[0].clock,
-                x=rows[0].x,
-                y=rows[0].y,
-                theta=rows[0].theta,
+                clock=rows.clock,
+                x=rows.x,
+                y=rows.y,
+                theta=rows.theta,
             )
-        return RawRecording(
-            bodies, length_unit="px", has_keypoints=True, rows=table.rows, notes=notes
-        )
+        return raw
 
 
-def _require_tracks(labels: list[str], codes: Codes, frame: Array, path: Path) -> None:
+def _require_tracks(labels: list[str], codes: Codes, frame: Array) -> None:
     """Refuse several instances of a frame that no track tells apart."""
     if "" not in labels:
         return
     frames = frame[codes == labels.index("")]
     if np.unique(frames).size < frames.size:
         raise FormatError(
-            "several instances of one frame have no track: let SLEAP track them, and export again",
-            path=path,
+            "several instances of one frame have no track: let SLEAP track them, and export again"
         )
 
 

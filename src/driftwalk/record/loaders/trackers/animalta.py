@@ -14,6 +14,7 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.cleaning.several_bodies import split_bodies
+from driftwalk.record.loaders.plain import side_by_side
 from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import read_table
 from driftwalk.record.text_head import first_line, read_header
@@ -21,7 +22,7 @@ from driftwalk.record.text_head import first_line, read_header
 STACKED: Final = ("Frame", "Time", "Arena", "Ind", "X", "Y")
 HALF_DIGIT_S: Final = 0.0051
 """Times are rounded to 0.01 s."""
-_X: Final = re.compile(r"X_Arena(\d+)_(.+)")
+_PLACE: Final = re.compile(r"(?P<axis>[XY])_Arena(?P<arena>\d+)_(?P<body>.+)")
 
 
 class AnimalTALoader:
@@ -38,7 +39,7 @@ class AnimalTALoader:
         """Recognise the header."""
         names = first_line(head).split(";")
         known = names[:2] == ["Frame", "Time"] and (
-            tuple(names[:6]) == STACKED or any(_X.fullmatch(name) for name in names[2:])
+            tuple(names[:6]) == STACKED or any(map(_PLACE.fullmatch, names[2:]))
         )
         return 0.95 if known else 0.0
 
@@ -46,9 +47,13 @@ class AnimalTALoader:
         """Read every target."""
         names, _, skip, _ = read_header(path, delimiter=";")
         if names[:2] != ["Frame", "Time"]:
-            raise FormatError("the first columns are not Frame and Time", path=path, line=1)
+            raise FormatError("the first columns are not Frame and Time", line=1)
         stacked = tuple(names[:6]) == STACKED
-        bodies, frame, time = (_stacked if stacked else _side_by_side)(path, names, skip)
+        if stacked:
+            bodies, frame, time = _stacked(path, names, skip)
+        else:
+            bodies, columns = side_by_side(path, _PLACE, ";", clock=0)
+            frame, time = columns["Frame"], columns["Time"]
         rate = None if options.frame_rate_hz is not None else _rate(frame, time)
         timed = rate is None and options.frame_rate_hz is None
         if timed:
@@ -62,28 +67,6 @@ class AnimalTALoader:
             frame_rate_hz=rate,
             rows=frame.size,
         )
-
-
-def _side_by_side(path: Path, names: list[str], skip: int) -> tuple[list[RawBody], Array, Array]:
-    targets = [match for name in names if (match := _X.fullmatch(name))]
-    missing = [one[0] for one in targets if f"Y{one[0][1:]}" not in names]
-    if missing or not targets:
-        raise FormatError(
-            f"no column of y for {missing[0] if missing else 'any target'}", path=path
-        )
-    several = len({one[1] for one in targets}) > 1
-    table = read_table(path, TableLayout(";", names, skip, tuple(range(len(names)))))
-    frame, time = table.numbers[0], table.numbers[1]
-    bodies = [
-        RawBody(
-            f"{one[1]}/{one[2]}" if several else one[2],
-            frame,
-            table.numbers[names.index(one[0])],
-            table.numbers[names.index(f"Y{one[0][1:]}")],
-        )
-        for one in targets
-    ]
-    return bodies, frame, time
 
 
 def _stacked(path: Path, names: list[str], skip: int) -> tuple[list[RawBody], Array, Array]:

@@ -21,14 +21,16 @@ from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.files.bounded import MIB, read_bounded
 from driftwalk.core.text.json_text import parse_json
 from driftwalk.record.cleaning.several_bodies import number_codes, split_bodies
+from driftwalk.record.loaders.plain import side_by_side
 from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.stores.hdf5 import names_in, opened_hdf5
 from driftwalk.record.stores.npz import NPY
 from driftwalk.record.stores.plain_pickle import PickledArray, unpickle
 from driftwalk.record.text import read_table
-from driftwalk.record.text_head import first_line, first_row, read_header
+from driftwalk.record.text_head import first_line, first_row
 from driftwalk.schema.stores.netcdf import HDF5, file_start
 
+_POSITION = re.compile(r"(?P<axis>[XY])(?P<body>\d+)")
 _HEADER = re.compile(r"X1\s+Y1\s+ProbId1\b", re.ASCII)
 
 
@@ -44,30 +46,16 @@ class IdTrackerLoader:
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read every individual; ``ProbId`` -1 and -2 mark positions that idTracker estimated."""
-        names, delimiter, skip, _ = read_header(path, delimiter=options.delimiter)
-        places = {name: index for index, name in enumerate(names)}
-        individuals = [
-            name[1:] for name in names if re.fullmatch(r"X\d+", name) and f"Y{name[1:]}" in places
-        ]
-        if not individuals:
-            raise FormatError("no columns X1, Y1 as idTracker writes them", path=path, line=skip)
-        table = read_table(path, TableLayout(delimiter, names, skip, tuple(range(len(names)))))
-        frame = np.arange(table.rows, dtype=np.float64)
-        bodies = [
-            RawBody(
-                name, frame, table.numbers[places[f"X{name}"]], table.numbers[places[f"Y{name}"]]
-            )
-            for name in individuals
-        ]
+        bodies, columns = side_by_side(path, _POSITION, options.delimiter)
         estimated = sum(
-            int((table.numbers[places[f"ProbId{name}"]] < 0).sum())
-            for name in individuals
-            if f"ProbId{name}" in places
+            int((columns[f"ProbId{body.name}"] < 0).sum())
+            for body in bodies
+            if f"ProbId{body.name}" in columns
         )
         notes = (
             [f"{estimated} positions were estimated by idTracker, not seen"] if estimated else []
         )
-        return RawRecording(bodies, length_unit="px", rows=table.rows, notes=notes)
+        return RawRecording(bodies, length_unit="px", notes=notes)
 
 
 TABLE: Final = "trajectories.csv"
@@ -120,21 +108,20 @@ class IdTrackerAiLoader:
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read every individual; `min_confidence` asks for the probability of its identity."""
         if path.is_dir() or path.name == TABLE:
-            return _recording(_of_folder(path if path.is_dir() else path.parent), path, options)
+            return _recording(_of_folder(path if path.is_dir() else path.parent), options)
         start = file_start(path)
         if start == HDF5:
-            return _recording(_of_hdf5(path), path, options)
+            return _recording(_of_hdf5(path), options)
         if start.startswith((NPY, b"\x80")):
-            return _recording(_of_pickle(path), path, options)
+            return _recording(_of_pickle(path), options)
         return _of_tidy(path, options)
 
 
-def _recording(session: _Session, path: Path, options: ReadOptions) -> RawRecording:
+def _recording(session: _Session, options: ReadOptions) -> RawRecording:
     values = session.trajectories
     if values.ndim != 3 or values.shape[2] != 2 or values.dtype.kind not in "fiu":
         raise FormatError(
-            f"'trajectories' has the shape {values.shape}, expected frames, individuals, 2",
-            path=path,
+            f"'trajectories' has the shape {values.shape}, expected frames, individuals, 2"
         )
     frame = np.arange(len(values), dtype=np.float64)
     names = _labels(session.attributes.get("identities_labels"), values.shape[1])
@@ -148,9 +135,8 @@ def _recording(session: _Session, path: Path, options: ReadOptions) -> RawRecord
     return RawRecording(
         bodies,
         length_unit="px",
-        frame_rate_hz=_rate(session.attributes, path),
+        frame_rate_hz=_rate(session.attributes),
         has_confidence=True,
-        rows=frame.size,
         notes=notes,
     )
 
@@ -172,12 +158,12 @@ def _unit_note(attributes: dict[str, Any]) -> list[str]:
     ]
 
 
-def _rate(attributes: dict[str, Any], path: Path) -> float | None:
+def _rate(attributes: dict[str, Any]) -> float | None:
     rate = attributes.get("frames_per_second")
     if rate is None:
         return None
     if not isinstance(rate, int | float) or not 0 < rate < 1e9:
-        raise FormatError(f"'frames_per_second' is {str(rate)[:40]}", path=path)
+        raise FormatError(f"'frames_per_second' is {str(rate)[:40]}")
     return float(rate)
 
 
@@ -198,26 +184,26 @@ def _drop_unsure(
 def _of_pickle(path: Path) -> _Session:
     content = path.read_bytes()
     if content.startswith(NPY):
-        content = _behind_header(content, path)
-    found = unpickle(content, where="the file", path=path)
+        content = _behind_header(content)
+    found = unpickle(content, where="the file")
     if isinstance(found, PickledArray) and len(found.objects()) == 1:
         found = found.objects()[0]
     if not isinstance(found, dict) or not isinstance(found.get("trajectories"), PickledArray):
         held = ", ".join(map(str, list(found)[:8])) if isinstance(found, dict) else "no dictionary"
-        raise FormatError(f"has no 'trajectories' as idtracker.ai's have it, but {held}", path=path)
+        raise FormatError(f"has no 'trajectories' as idtracker.ai's have it, but {held}")
 
     def array(name: str) -> npt.NDArray[Any] | None:
         try:
             return found[name].values() if isinstance(found.get(name), PickledArray) else None
         except (ValueError, TypeError, MemoryError) as error:
-            raise FormatError(f"'{name}' is damaged: {error}", path=path) from error
+            raise FormatError(f"'{name}' is damaged: {error}") from error
 
     trajectories = array("trajectories")
     assert trajectories is not None
     return _Session(trajectories, lambda: array(PROBABILITIES), found)
 
 
-def _behind_header(content: bytes, path: Path) -> bytes:
+def _behind_header(content: bytes) -> bytes:
     """Return the pickle of an array of objects in NumPy's file."""
     file = io.BytesIO(content)
     try:
@@ -230,12 +216,11 @@ def _behind_header(content: bytes, path: Path) -> bytes:
         shape, _, kind = read(file)
     except Exception as error:
         # NumPy parses the header as Python, and fails with whatever damage leads it to.
-        raise FormatError(f"has a damaged header: {type(error).__name__}", path=path) from error
+        raise FormatError(f"has a damaged header: {type(error).__name__}") from error
     if kind.kind != "O":
         raise FormatError(
             f"is an array of {kind} of shape {shape}, and no dictionary of idtracker.ai: save "
-            "columns of time, x and y as CSV",
-            path=path,
+            "columns of time, x and y as CSV"
         )
     return content[file.tell() :]
 
@@ -289,13 +274,13 @@ def _attributes(path: Path) -> dict[str, Any]:
 def _of_tidy(path: Path, options: ReadOptions) -> RawRecording:
     names = first_row(path)
     if names != TIDY:
-        raise FormatError(f"the columns are not {','.join(TIDY)}", path=path, line=1)
+        raise FormatError(f"the columns are not {','.join(TIDY)}", line=1)
     table = read_table(path, TableLayout(",", names, 1, (0, 1, 2, 3, 4, 5)))
     frame, time, individual, x, y, known = (table.numbers[at] for at in range(6))
     if not np.isfinite(individual).all():
-        raise FormatError("a row names no individual", path=path)
+        raise FormatError("a row names no individual")
     attributes = _attributes(path.with_name(TIDY_ATTRIBUTES))
-    rate = _rate(attributes, path)
+    rate = _rate(attributes)
     by_frames = rate is not None or options.frame_rate_hz is not None
     notes = _unit_note(attributes)
     if options.min_confidence is not None:
@@ -310,7 +295,6 @@ def _of_tidy(path: Path, options: ReadOptions) -> RawRecording:
         length_unit="px",
         frame_rate_hz=rate,
         has_confidence=True,
-        rows=table.rows,
         notes=notes,
     )
 

@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 
 from driftwalk.core.arrays import Integers
-from driftwalk.core.errors import FormatError
+from driftwalk.core.errors import FormatError, naming_its_file
 from driftwalk.record.cleaning.several_bodies import order_in_frame, split_bodies
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import Table, lines_of, open_binary, read_head, read_table
@@ -55,22 +55,21 @@ class SwisTrackTracksLoader:
         """
         files = _track_files(path) if path.is_dir() else [path]
         if not files:
-            raise FormatError("the folder holds no track files (track_00000000.txt)", path=path)
+            raise FormatError("the folder holds no track files (track_00000000.txt)")
         tables = {_track_name(file): _read_one(file) for file in files}
         first = next(iter(tables.values()))
         if any(set(table.numbers) != set(first.numbers) for table in tables.values()):
-            raise FormatError("the folder mixes track files of two SwisTrack versions", path=path)
-        rows = sum(table.rows for table in tables.values())
+            raise FormatError("the folder mixes track files of two SwisTrack versions")
         if len(first.numbers) == len(NEW):
             bodies = [
                 RawBody(name, *(table.numbers[column] for column in range(3)))
                 for name, table in tables.items()
             ]
-            return RawRecording(bodies, length_unit="px", rows=rows)
-        return _old_recording(tables, options, rows=rows)
+            return RawRecording(bodies, length_unit="px")
+        return _old_recording(tables, options)
 
 
-def _old_recording(tables: dict[str, Table], options: ReadOptions, *, rows: int) -> RawRecording:
+def _old_recording(tables: dict[str, Table], options: ReadOptions) -> RawRecording:
     calibrated = any(table.numbers[column].any() for table in tables.values() for column in (3, 4))
     world = calibrated and options.metres_per_pixel is None
     timed = options.frame_rate_hz is None and all(
@@ -80,11 +79,11 @@ def _old_recording(tables: dict[str, Table], options: ReadOptions, *, rows: int)
     bodies = [
         RawBody(name, *(table.numbers[column] for column in used)) for name, table in tables.items()
     ]
-    return _recording(bodies, "ms" if timed else "frame", world=world, rows=rows)
+    return _recording(bodies, "ms" if timed else "frame", world=world)
 
 
 def _recording(
-    bodies: list[RawBody], clock_unit: str, *, world: bool, rows: int, note: str = ""
+    bodies: list[RawBody], clock_unit: str, *, world: bool, note: str = ""
 ) -> RawRecording:
     """Return bodies in the world or the image; angles are measured in the image in either case."""
     return RawRecording(
@@ -93,7 +92,6 @@ def _recording(
         length_unit="m" if world else "px",
         y_axis="up" if world else "down",
         theta_axis="down",
-        rows=rows,
         notes=[note] if note else [],
     )
 
@@ -111,13 +109,14 @@ def _columns(head: bytes) -> list[str]:
     return NEW if header[1:] == ["x", "y"] else []
 
 
+@naming_its_file
 def _read_one(path: Path) -> Table:
     columns = _columns(read_head(path))
     if not columns:
-        raise FormatError("the header is not that of a SwisTrack track file", path=path, line=1)
+        raise FormatError("the header is not that of a SwisTrack track file", line=1)
     table = read_table(path, TableLayout("\t", columns, 1, tuple(range(len(columns)))))
     if np.isnan(table.numbers[0]).any():
-        raise FormatError("a row has no frame number", path=path)
+        raise FormatError("a row has no frame number")
     return table
 
 
@@ -160,7 +159,7 @@ class SwisTrackParticlesLoader:
         bodies = split_bodies(
             order,
             [str(index) for index in range(count)],
-            clock=_times(table, path) if timed else numbers[0],
+            clock=_times(table) if timed else numbers[0],
             x=numbers[4 if world else 2],
             y=numbers[5 if world else 3],
             theta=numbers[7],
@@ -169,26 +168,22 @@ class SwisTrackParticlesLoader:
             "particles.csv holds no identities: bodies are distinguished by their order in a frame"
         )
         clock_unit, note = "s" if timed else "frame", note if count > 1 else ""
-        return _recording(bodies, clock_unit, world=world, rows=table.rows, note=note)
+        return _recording(bodies, clock_unit, world=world, note=note)
 
 
-def _times(table: Table, path: Path) -> Array:
+def _times(table: Table) -> Array:
     """Return seconds since 1970 of the ISO time stamps."""
     try:
-        stamps = np.array([_since_1970(label) for label in table.labels[1]], dtype=np.float64)
+        times = [datetime.fromisoformat(label) for label in table.labels[1]]
+        # A time without a zone is one of UTC.
+        zoned = [one if one.tzinfo is not None else one.replace(tzinfo=UTC) for one in times]
+        stamps = np.array([one.timestamp() for one in zoned], dtype=np.float64)
     except (ValueError, OverflowError) as error:
         raise FormatError(
-            f"a time stamp is not an ISO date ({error}); give `frame_rate` to use frame numbers",
-            path=path,
+            f"a time stamp is not an ISO date ({error}); give `frame_rate` to use frame numbers"
         ) from error
     seconds: Array = stamps[table.codes[1]]
     return seconds
-
-
-def _since_1970(stamp: str) -> float:
-    """Return the seconds of an ISO time stamp; one that names no zone is taken as UTC."""
-    time = datetime.fromisoformat(stamp)
-    return (time if time.tzinfo is not None else time.replace(tzinfo=UTC)).timestamp()
 
 
 class SwisTrackNmeaLoader:
@@ -208,7 +203,7 @@ class SwisTrackNmeaLoader:
         values, ids = _particles(path)
         frame, image_x, image_y, world_x, world_y, theta = values
         if not frame.size:
-            raise FormatError("holds no $PARTICLE", path=path)
+            raise FormatError("holds no $PARTICLE")
         world = bool(world_x.any() or world_y.any()) and options.metres_per_pixel is None
         order = order_in_frame(frame)
         labels, codes = np.unique(ids, return_inverse=True)
@@ -225,7 +220,7 @@ class SwisTrackNmeaLoader:
         )
         note = "ids repeat within a frame: bodies are distinguished by their order in the frame"
         note = note if repeated else ""
-        return _recording(bodies, "frame", world=world, rows=int(frame.size), note=note)
+        return _recording(bodies, "frame", world=world, note=note)
 
 
 def _particles(path: Path) -> tuple[Array, Integers]:
@@ -234,10 +229,10 @@ def _particles(path: Path) -> tuple[Array, Integers]:
     ids = array("q")
     frame = float("nan")
     with open_binary(path) as file:
-        for line, raw in lines_of(file, path):
+        for line, raw in lines_of(file):
             text = raw.strip()
             if text.startswith((b"$FRAMENUMBER,", b"$PARTICLE,")):
-                command, *arguments = _verified(text, path, line).split(",")
+                command, *arguments = _verified(text, line).split(",")
                 try:
                     if command == "FRAMENUMBER":
                         frame = float(int(arguments[0]))
@@ -250,18 +245,17 @@ def _particles(path: Path) -> tuple[Array, Integers]:
                     raise FormatError(
                         f"cannot read '{text[:60].decode('ascii', 'replace')}': expected 6 or 8 "
                         "numbers after $PARTICLE, 1 after $FRAMENUMBER",
-                        path=path,
                         line=line,
                     ) from error
                 if frame != frame:
-                    raise FormatError("$PARTICLE before any $FRAMENUMBER", path=path, line=line)
+                    raise FormatError("$PARTICLE before any $FRAMENUMBER", line=line)
             elif text and not text.startswith(b"$"):
-                raise FormatError("expected a line that starts with $", path=path, line=line)
+                raise FormatError("expected a line that starts with $", line=line)
     columns = np.frombuffer(values, dtype=np.float64).reshape(-1, 6).T
     return np.ascontiguousarray(columns), np.array(ids, dtype=np.int64)
 
 
-def _verified(text: bytes, path: Path, line: int) -> str:
+def _verified(text: bytes, line: int) -> str:
     """Return the line between ``$`` and ``*``, its checksum compared if it has one."""
     content, star, stated = text[1:].partition(b"*")
     if star:
@@ -270,7 +264,6 @@ def _verified(text: bytes, path: Path, line: int) -> str:
             raise FormatError(
                 f"the checksum is {stated.decode('ascii', 'replace')}, computed {actual}: the line "
                 "is damaged",
-                path=path,
                 line=line,
             )
     return content.decode("ascii", "replace")

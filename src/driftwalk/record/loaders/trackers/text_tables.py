@@ -1,16 +1,18 @@
-"""Text tables of tracking programs, one file each: DLTdv, smarticles, ToxTrac, UbiTrail, yupi.
+"""Texts of tracking programs: DLTdv, smarticles, ToxTrac, UbiTrail, yupi, Kinovea.
 
 DLTdv: ``pt1_cam1_X,pt1_cam1_Y,...``, pixels, one row per frame. Smarticles: eleven columns without
 header: sync pulse, time, then x, y, theta of three robots. ToxTrac: image space without header
 (pixels), or real space with one (seconds, mm). UbiTrail: a line of R metadata, then
 ``Area,Territory,X,Y,time,L``; often in gzip. yupi: rows of its settings, then ``x,y,t`` (or
 ``x,y,z,t``) and what else; version 2 begins with ``v2,N``, N rows before the data, version 1 with
-name, interval, dimensions. Programs with one header line are descriptions for `HeadedFormat`.
+name, interval, dimensions. Kinovea: rows of T X Y, and a line with ``#`` above each track.
+Programs with one header line are descriptions for `HeadedFormat`.
 """
 
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Final
@@ -21,8 +23,11 @@ from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
 from driftwalk.record.cleaning.several_bodies import split_bodies
 from driftwalk.record.column_names import unit_of_name
-from driftwalk.record.loaders.plain import HeadedFormat
+from driftwalk.record.loaders.json_formats import bounded_text, column_of
+from driftwalk.record.loaders.plain import HeadedFormat, side_by_side
 from driftwalk.record.raw import Marks, RawBody, RawRecording, ReadOptions, TableLayout
+from driftwalk.record.tables.in_memory import MemorySource
+from driftwalk.record.tables.rows import recording_of
 from driftwalk.record.text import header_rows, read_head, read_table
 from driftwalk.record.text_head import (
     first_line,
@@ -32,7 +37,7 @@ from driftwalk.record.text_head import (
     read_header,
 )
 
-_DLTDV_X = re.compile(r"(pt\d+_cam\d+)_X", re.IGNORECASE)
+_DLTDV = re.compile(r"(?P<body>pt\d+_cam\d+)_(?P<axis>[XY])", re.IGNORECASE)
 
 
 class DltdvLoader:
@@ -43,31 +48,15 @@ class DltdvLoader:
 
     def sniff(self, head: bytes, _path: Path) -> float:
         """Recognise the header."""
-        return 0.95 if _DLTDV_X.match(first_line(head).lstrip('"')) else 0.0
+        return 0.95 if _DLTDV.match(first_line(head).lstrip('"')) else 0.0
 
     def read(self, path: Path, _options: ReadOptions) -> RawRecording:
         """Read every point of every camera as a body."""
-        names, delimiter, skip, _ = read_header(path)
-        lower = [name.lower() for name in names]
-        points = [match.group(1) for name in names if (match := _DLTDV_X.fullmatch(name))]
-        missing = [point for point in points if f"{point}_y".lower() not in lower]
-        if missing or not points:
-            raise FormatError(f"no column of y for {missing or 'any point'}", path=path, line=skip)
-        table = read_table(path, TableLayout(delimiter, names, skip, tuple(range(len(names)))))
-        frame = np.arange(table.rows, dtype=np.float64)
-        bodies = [
-            RawBody(
-                point,
-                frame,
-                table.numbers[lower.index(f"{point}_x".lower())],
-                table.numbers[lower.index(f"{point}_y".lower())],
-            )
-            for point in points
-        ]
+        bodies, _ = side_by_side(path, _DLTDV)
         notes = [
             'DLTdv versions differ in the direction of y: if yours counts up, add `y_axis="up"`'
         ]
-        return RawRecording(bodies, length_unit="px", rows=table.rows, notes=notes)
+        return RawRecording(bodies, length_unit="px", notes=notes)
 
 
 SMARTICLES = ["sync", "t", *(f"{name}{at}" for at in (1, 2, 3) for name in ("x", "y", "theta"))]
@@ -96,7 +85,7 @@ class SmarticlesLoader:
         """Read the three robots."""
         names, delimiter, skip, has_header = read_header(path, delimiter=options.delimiter)
         if has_header or len(names) != 11:
-            raise FormatError("expected eleven columns without a header", path=path, line=1)
+            raise FormatError("expected eleven columns without a header", line=1)
         table = read_table(path, TableLayout(delimiter, SMARTICLES, skip, tuple(range(1, 11))))
         bodies = [
             RawBody(
@@ -104,9 +93,7 @@ class SmarticlesLoader:
             )
             for at in (1, 2, 3)
         ]
-        return RawRecording(
-            bodies, clock_unit="s", bare_clock="", separate=True, length_unit="px", rows=table.rows
-        )
+        return RawRecording(bodies, clock_unit="s", bare_clock="", separate=True, length_unit="px")
 
 
 TOXTRAC: Final = ["frame", "arena", "track", "x", "y", "label"]
@@ -141,7 +128,7 @@ class ToxTracLoader:
         table = read_table(path, layout)
         clock, arena, track, x, y, label = (table.numbers[column] for column in range(6))
         if not (np.isfinite(arena) & np.isfinite(track)).all():
-            raise FormatError("a row names no arena or no track", path=path)
+            raise FormatError("a row names no arena or no track")
         pairs, codes = np.unique(np.stack([arena, track]), axis=1, return_inverse=True)
         several = np.unique(pairs[0]).size > 1
         labels = [
@@ -156,7 +143,6 @@ class ToxTracLoader:
             clock_unit=unit_of_name(header[0]) if real else "frame",
             length_unit=unit_of_name(header[3]) if real else "px",
             y_axis="down",
-            rows=table.rows,
             notes=[f"positions that ToxTrac predicted, not seen: {predicted}"] if predicted else [],
         )
 
@@ -189,9 +175,7 @@ class UbiTrailLoader:
         areas = table.labels[0]
         unknown = [area for area in areas if area not in widths]
         if unknown:
-            raise FormatError(
-                f"the metadata give no width for area {unknown[0]}", path=path, line=1
-            )
+            raise FormatError(f"the metadata give no width for area {unknown[0]}", line=1)
         scale = np.array([widths[area] for area in areas])[table.codes[0]]
         with np.errstate(over="ignore"):  # an infinite position is a gap
             x, y = (table.numbers[column] * scale for column in (2, 3))
@@ -202,7 +186,6 @@ class UbiTrailLoader:
             clock_unit="ms",
             length_unit="px",
             separate=True,
-            rows=table.rows,
             attrs={"bodies_apart": "yes"},
         )
 
@@ -211,11 +194,11 @@ def _area_widths(path: Path) -> dict[str, float]:
     """Return the width of each area in pixels, from the first line."""
     match = _AREAS.search(first_line(read_head(path)))
     if match is None:
-        raise FormatError("the metadata hold no matrix of areas (W, H, X, Y)", path=path, line=1)
+        raise FormatError("the metadata hold no matrix of areas (W, H, X, Y)", line=1)
     try:
         numbers = [float(text) for text in match.group(1).split(",")]
     except ValueError as error:
-        raise FormatError(f"the matrix of areas is damaged: {error}", path=path, line=1) from error
+        raise FormatError(f"the matrix of areas is damaged: {error}", line=1) from error
     names = [text.strip().strip('"') for text in match.group(2).split(",")]
     return dict(zip(names, numbers[::4], strict=False))
 
@@ -254,15 +237,50 @@ class YupiLoader:
             axes = YUPI_AXES[: int(dimensions)]
             further = rows[5] if second else []
         except (ValueError, IndexError) as error:
-            raise FormatError(f"the rows of settings are damaged: {error}", path=path) from error
+            raise FormatError(f"the rows of settings are damaged: {error}") from error
         if len(axes) < 2:
-            raise FormatError(
-                f"has {len(axes)} dimensions, and a path in the plane needs two", path=path
-            )
+            raise FormatError(f"has {len(axes)} dimensions, and a path in the plane needs two")
         names = [*axes, "t", *(one for one in further if one)]
         table = read_table(path, TableLayout(",", names, skip, (0, 1, len(axes))))
         body = RawBody(name or "0", table.numbers[len(axes)], table.numbers[0], table.numbers[1])
-        return RawRecording([body], clock_unit="s", bare_clock="", rows=table.rows)
+        return RawRecording([body], clock_unit="s", bare_clock="")
+
+
+_KINOVEA: Final = b"#Kinovea Trajectory"
+_HUNDREDTHS: Final = re.compile(r"(\d+:\d\d:\d\d):(\d\d\d?)")
+
+
+class KinoveaLoader:
+    """Each track is a body; a number as time has the unit that was chosen in Kinovea.
+
+    Until 2019 its times were ``h:mm:ss:cc``, and ``h:mm:ss:mmm`` above 100 frames per second
+    (``TimeHelper.MillisecondsToTimecode`` of Kinovea 0.8), so the last part counts no frames.
+    """
+
+    name = "kinovea"
+    description = "Kinovea text of trajectories (T X Y; h:mm:ss:cc; no unit of length)"
+
+    def sniff(self, head: bytes, _path: Path) -> float:
+        """Recognise the first line."""
+        return 0.95 if head.startswith(_KINOVEA) else 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read every track."""
+        rows: list[list[str]] = []
+        track = ""
+        for number, line in enumerate(bounded_text(path).decode("utf-8", "replace").split("\n"), 1):
+            fields = line.split()
+            if line.startswith("#"):  # several tracks may have one name
+                name, known = line.strip("# \r"), {row[3] for row in rows}
+                others = (f"{name} {at}" for at in range(2, len(known) + 3))
+                track = next(one for one in (name, *others) if one not in known)
+            elif len(fields) == 3:
+                rows.append([_HUNDREDTHS.sub(r"\1.\2", fields[0]), *fields[1:], track])
+            elif fields:
+                raise FormatError(f"expected T X Y, got {len(fields)} fields", line=number)
+        columns = [column_of([*column]) for column in zip(*rows, strict=True)] or [np.zeros(0)] * 4
+        raw = recording_of(MemorySource("the tracks", ["t", "x", "y", "body"], columns), options)
+        return replace(raw, bare_length_is_si=False, y_axis="up")
 
 
 LOADERS = (
@@ -284,4 +302,5 @@ LOADERS = (
     ToxTracLoader(),
     UbiTrailLoader(),
     YupiLoader(),
+    KinoveaLoader(),
 )

@@ -26,7 +26,7 @@ from driftwalk.record.raw import (
     ReadOptions,
     TableLayout,
 )
-from driftwalk.record.text import DAMAGED_GZIP, header_rows, open_binary, read_table
+from driftwalk.record.text import header_rows, open_binary, read_table
 from driftwalk.record.text_head import first_names
 
 NEEDED: Final = ("TRACK_ID", "POSITION_X", "POSITION_Y", "POSITION_T", "FRAME")
@@ -51,13 +51,13 @@ class TrackMateLoader:
         names = rows[0] if rows else []
         missing = [name for name in NEEDED if name not in names]
         if missing:
-            raise FormatError(
-                f"no column {', '.join(missing)} as TrackMate has it", path=path, line=1
-            )
+            raise FormatError(f"no column {', '.join(missing)} as TrackMate has it", line=1)
         places = {name: names.index(name) for name in NEEDED}
-        header = _rows_of_header(rows, places["POSITION_X"])
+        # Three rows that explain the names may stand below them.
+        cells = ["".join(row[places["POSITION_X"] :][:1]) for row in rows[1:]]
+        header = next((at for at, cell in enumerate(cells, start=1) if is_number(cell)), len(rows))
         units = rows[3] if header == 4 and len(rows[3]) == len(names) else [""] * len(names)
-        length = stated_unit(units[places["POSITION_X"]], path)
+        length = stated_unit(units[places["POSITION_X"]])
         clock_unit = _clock_unit(units[places["POSITION_T"]], options)
         clock = "FRAME" if clock_unit == "frame" else "POSITION_T"
         wanted = {name: places[name] for name in ("TRACK_ID", "POSITION_X", "POSITION_Y", clock)}
@@ -66,7 +66,7 @@ class TrackMateLoader:
         track, x, y, time = (table.numbers[place] for place in wanted.values())
         inside = np.isfinite(track)
         if not inside.any():
-            raise FormatError("no spot belongs to a track", path=path)
+            raise FormatError("no spot belongs to a track")
         codes, labels = number_codes(track[inside])
         bodies = split_bodies(codes, labels, clock=time[inside], x=x[inside], y=y[inside])
         outside = int((~inside).sum())
@@ -80,21 +80,13 @@ class TrackMateLoader:
         )
 
 
-def _rows_of_header(rows: list[list[str]], place: int) -> int:
-    """Return how many rows there are before the first spot."""
-    for at, row in enumerate(rows[1:], start=1):
-        if place < len(row) and is_number(row[place]):
-            return at
-    return len(rows)
-
-
 def _clock_unit(stated: str, options: ReadOptions) -> str:
     """Return the unit of the times of the file, or ``"frame"`` where its frames are used."""
     unit = unit_of_name(f"t {stated}")
     return unit if options.frame_rate_hz is None and unit in ("s", "ms", "us", "min") else "frame"
 
 
-def stated_unit(text: str, path: Path) -> str:
+def stated_unit(text: str) -> str:
     """Return the unit of length that TrackMate states, ``""`` where it states none.
 
     Raises
@@ -104,15 +96,14 @@ def stated_unit(text: str, path: Path) -> str:
 
     Examples
     --------
-    >>> stated_unit("(micron)", Path("spots.csv"))
+    >>> stated_unit("(micron)")
     'um'
     """
     unit = unit_of_name(f"x {text}") if text else ""
     if text.strip("() ") and not unit:
         raise FormatError(
             f"the positions are in '{text.strip('() ')}': give the image one of the units "
-            f"{', '.join(LENGTH_UNITS)} or pixel, and export again",
-            path=path,
+            f"{', '.join(LENGTH_UNITS)} or pixel, and export again"
         )
     return unit
 
@@ -169,7 +160,7 @@ class TrackMateXmlLoader:
         """Read every track; `frame_rate` counts frames in place of the file's times."""
         contents = _parsed(path)
         if not contents.has_model or not contents.spots:
-            raise FormatError("holds no spots: is it a TrackMate session?", path=path)
+            raise FormatError("holds no spots: is it a TrackMate session?")
         spots = np.array(contents.spots).reshape(-1, len(_SPOT))
         spots = spots[np.argsort(spots[:, 0], kind="stable")]
         clock_unit = _clock_unit(f"({contents.units.get('timeunits', '')})", options)
@@ -179,31 +170,29 @@ class TrackMateXmlLoader:
             if ends and (name in contents.kept or not contents.filtered)
         }
         if not tracks:
-            raise FormatError("no track is kept: track the spots in TrackMate, and save", path=path)
+            raise FormatError("no track is kept: track the spots in TrackMate, and save")
         bodies = [
-            _body(name, spots, ends, clock=4 if clock_unit == "frame" else 3, path=path)
+            _body(name, spots, ends, clock=4 if clock_unit == "frame" else 3)
             for name, ends in sorted(tracks.items(), key=lambda entry: (len(entry[0]), entry[0]))
         ]
         outside = len(spots) - len(np.unique(np.concatenate([*map(np.array, tracks.values())])))
         return RawRecording(
             bodies,
             clock_unit=clock_unit,
-            length_unit=stated_unit(contents.units.get("spatialunits", ""), path),
+            length_unit=stated_unit(contents.units.get("spatialunits", "")),
             y_axis="down",
             rows=len(spots),
             notes=[OUTSIDE.format(outside)] if outside else [],
         )
 
 
-def _body(name: str, spots: Array, ends: list[float], *, clock: int, path: Path) -> RawBody:
+def _body(name: str, spots: Array, ends: list[float], *, clock: int) -> RawBody:
     """Return the spots of a track in the order of their times."""
     ids = np.unique(np.array(ends))
     rows = np.minimum(np.searchsorted(spots[:, 0], ids), len(spots) - 1)
     if (spots[rows, 0] != ids).any():
         lost = ids[spots[rows, 0] != ids][0]
-        raise FormatError(
-            f"track {name} has an edge to spot {lost:.0f}, which is not there", path=path
-        )
+        raise FormatError(f"track {name} has an edge to spot {lost:.0f}, which is not there")
     rows = rows[np.argsort(spots[rows, clock], kind="stable")]
     return RawBody(name, spots[rows, clock], spots[rows, 1], spots[rows, 2])
 
@@ -218,19 +207,17 @@ def _parsed(path: Path) -> _Contents:
             while block := file.read(1 << 20):
                 parser.Parse(block)
             parser.Parse(b"", True)
-    except DAMAGED_GZIP as error:
-        raise FormatError(f"is a damaged gzip file: {error}", path=path) from error
     except expat.ExpatError as error:
         reason = expat.ErrorString(error.code)
-        raise FormatError(f"is damaged XML: {reason}", path=path, line=error.lineno) from error
+        raise FormatError(f"is damaged XML: {reason}", line=error.lineno) from error
     except LookupError as error:
         if not isinstance(error, KeyError):  # expat asks Python for encodings that it lacks
-            raise FormatError(f"is damaged XML: {error}", path=path) from error
+            raise FormatError(f"is damaged XML: {error}") from error
         what = f"an element lacks its attribute {error}"
-        raise FormatError(what, path=path, line=parser.CurrentLineNumber) from error
+        raise FormatError(what, line=parser.CurrentLineNumber) from error
     except ValueError as error:
         raise FormatError(
-            f"an attribute is no number: {error}", path=path, line=parser.CurrentLineNumber
+            f"an attribute is no number: {error}", line=parser.CurrentLineNumber
         ) from error
     return contents
 

@@ -54,14 +54,14 @@ class TrackpyLoader:
             notes = [f"features that are linked to no particle, and left out: {(~linked).sum()}"]
         codes, names = number_codes(columns["particle"])
         if not names:
-            raise FormatError("no feature is linked to a particle", path=path)
+            raise FormatError("no feature is linked to a particle")
         bodies = split_bodies(codes, names, clock=columns["frame"], x=columns["x"], y=columns["y"])
         return RawRecording(bodies, length_unit="px", rows=rows, notes=notes)
 
 
 def _of_csv(path: Path) -> dict[str, Array]:
     names = first_row(path)
-    _require(names, path)
+    _require(names)
     places = {name: names.index(name) for name in NEEDED}
     table = read_table(path, TableLayout(",", names, 1, tuple(sorted(places.values()))))
     return {name: table.numbers[place] for name, place in places.items()}
@@ -87,30 +87,26 @@ def _only_table(contents: Hdf5Contents, groups: list[str]) -> Frame:
     if len(linked) != 1:
         raise FormatError(
             f"holds the tables {', '.join(groups) or 'none'}, of which {len(linked)} have a column "
-            "'particle': store the one of the recording alone",
-            path=contents.path,
+            "'particle': store the one of the recording alone"
         )
     return tables[linked[0]]
 
 
 def _columns(frame: Frame) -> dict[str, Array]:
     names = [column[0] if len(column) == 1 else "" for column in frame.columns]
-    _require(names, frame.contents.path)
+    _require(names)
     return {name: frame.numbers(names.index(name)) for name in NEEDED}
 
 
-def _require(names: list[str], path: Path) -> None:
+def _require(names: list[str]) -> None:
     missing = [name for name in NEEDED if name not in names]
     if missing == ["particle"]:
         raise FormatError(
-            "the features are not linked: let trackpy.link name their particles, and save again",
-            path=path,
+            "the features are not linked: let trackpy.link name their particles, and save again"
         )
     if missing:
         shown = ", ".join(names[:12])
-        raise FormatError(
-            f"no column {', '.join(missing)} as trackpy has it, among {shown}", path=path
-        )
+        raise FormatError(f"no column {', '.join(missing)} as trackpy has it, among {shown}")
 
 
 LOADER = TrackpyLoader()

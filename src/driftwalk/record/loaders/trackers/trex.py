@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.errors import FormatError, InputError, naming_its_file
 from driftwalk.record.column_names import unit_of_name
 from driftwalk.record.pose import angle_between
 from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
@@ -35,37 +35,39 @@ _USED: Final = re.compile(r"frame|time|missing|ANGLE|[XY](#[wp]?centroid)?|pose[
 _NUMBER: Final = re.compile(r"(.*?)_?(?:fish|id)?(\d+)\.(?:npz|csv)")
 
 
-@dataclass
-class _Individual:
+@dataclass(frozen=True)
+class _Columns:
     """Columns of one individual, read when they are asked for."""
 
-    path: Path
     names: set[str]
-    column: Callable[[str], Array]
+    read: Callable[[str], Array]
     """Returns a column by its name as a new array."""
     length_unit: str
     cm_per_pixel: float | None = None
     frame_rate_hz: float | None = None
-    body: RawBody = field(init=False)
-    clock_unit: str = field(init=False)
 
-    def make_body(self, options: ReadOptions) -> None:
-        """Read the columns that make the body."""
+    def recording(self, name: str, options: ReadOptions) -> RawRecording:
+        """Return the one body."""
         if "frame" not in self.names:
-            raise FormatError("has no 'frame'", path=self.path)
+            raise FormatError("has no 'frame'")
         timed = "time" in self.names and options.frame_rate_hz is None
-        self.clock_unit = "s" if timed else "frame"
-        clock = self.column("time" if timed else "frame")
+        clock = self.read("time" if timed else "frame")
         x, y = self.point(options.keypoint or self._centre())
         theta = None
         if options.heading is not None:
             theta = angle_between(*map(self.point, options.heading))
         elif "ANGLE" in self.names:
-            theta = self.column("ANGLE")
+            theta = self.read("ANGLE")
             theta[~np.isfinite(theta)] = np.nan
-        if any(one is not None and one.size != clock.size for one in (x, y, theta)):
-            raise FormatError("the arrays have different lengths", path=self.path)
-        self.body = RawBody(_individual(self.path), clock, x, y, theta)
+        return RawRecording(
+            [RawBody(name, clock, x, y, theta)],
+            clock_unit="s" if timed else "frame",
+            length_unit=self.length_unit,
+            frame_rate_hz=self.frame_rate_hz,
+            has_keypoints=True,
+            y_axis="down",
+            notes=[ASSUMED] if self.cm_per_pixel is None else [],
+        )
 
     def point(self, name: str) -> tuple[Array, Array]:
         """Return x and y of a point of the individual, NaN where it was not seen."""
@@ -73,29 +75,26 @@ class _Individual:
         if not set(keys) <= self.names:
             known = [one for one in (*CENTRES, *POSE) if set(_keys(one)) <= self.names]
             raise FormatError(
-                f"has no point '{name}' in x and y; there are {', '.join(known) or 'none'}",
-                path=self.path,
+                f"has no point '{name}' in x and y; there are {', '.join(known) or 'none'}"
             )
-        x, y = (self.column(key) for key in keys)
+        x, y = (self.read(key) for key in keys)
         if x.size != y.size:
-            raise FormatError("the arrays have different lengths", path=self.path)
+            raise FormatError("the arrays have different lengths")
         lost = ~(np.isfinite(x) & np.isfinite(y))
         if "missing" in self.names:  # a position may be interpolated there
-            missing = self.column("missing")
+            missing = self.read("missing")
             lost |= missing == 1.0 if missing.size == lost.size else False
         x[lost] = y[lost] = np.nan
         if name not in POSE:
             return x, y
         if self.cm_per_pixel is None:
-            raise FormatError(
-                "points of a pose are in pixels, and cm_per_pixel is not there", path=self.path
-            )
+            raise FormatError("points of a pose are in pixels, and cm_per_pixel is not there")
         return x * self.cm_per_pixel, y * self.cm_per_pixel
 
     def _centre(self) -> str:
         found = next((name for name in CENTRES if set(_keys(name)) <= self.names), None)
         if found is None:
-            raise FormatError("has no position (X#wcentroid, Y#wcentroid)", path=self.path)
+            raise FormatError("has no position (X#wcentroid, Y#wcentroid)")
         return found
 
 
@@ -124,30 +123,18 @@ class TrexLoader:
             raise InputError("the file holds no confidences: leave `min_confidence` out")
         files = _files(path) if path.is_dir() else [path]
         if not files:
-            raise FormatError(
-                "the folder holds no file of an individual (VIDEO_id0.npz)", path=path
-            )
+            raise FormatError("the folder holds no file of an individual (VIDEO_id0.npz)")
         videos = sorted({_video(file) for file in files})
         if len(videos) > 1:
             raise FormatError(
                 f"the folder holds several videos ({', '.join(videos[:4])}): give a folder with "
-                "the files of one",
-                path=path,
+                "the files of one"
             )
         read = [_read(file, options) for file in files]
         if len({(one.clock_unit, one.length_unit) for one in read}) > 1:
-            raise FormatError("the files of the folder differ in clock or unit", path=path)
-        calibrated = all(one.cm_per_pixel is not None for one in read)
-        return RawRecording(
-            [one.body for one in read],
-            clock_unit=read[0].clock_unit,
-            length_unit=read[0].length_unit,
-            frame_rate_hz=read[0].frame_rate_hz,
-            has_keypoints=True,
-            y_axis="down",
-            rows=sum(one.body.clock.size for one in read),
-            notes=[] if calibrated else [ASSUMED],
-        )
+            raise FormatError("the files of the folder differ in clock or unit")
+        notes = dict.fromkeys(note for one in read for note in one.notes)
+        return replace(read[0], bodies=[one.bodies[0] for one in read], notes=[*notes])
 
 
 def _files(folder: Path) -> list[Path]:
@@ -178,43 +165,39 @@ def _keys(point: str) -> tuple[str, str]:
     return (f"poseX{point[4:]}", f"poseY{point[4:]}") if point in POSE else (f"X{end}", f"Y{end}")
 
 
-def _read(path: Path, options: ReadOptions) -> _Individual:
+@naming_its_file
+def _read(path: Path, options: ReadOptions) -> RawRecording:
+    name = _individual(path)
     if not file_start(path).startswith(ZIP):
-        individual = _of_csv(path)
-        individual.make_body(options)
-        return individual
+        return _of_csv(path).recording(name, options)
     with opened_npz(path) as arrays:
-        names = set(arrays)
-        scale = _first(arrays, "cm_per_pixel", path)
+        scale = _first(arrays, "cm_per_pixel")
         # Without it, what is called cm may be pixels.
         unit = options.length_unit or ("px" if options.metres_per_pixel else "cm")
-        individual = _Individual(
-            path,
-            names,
-            lambda name: _numbers(arrays[name], name, path),
+        return _Columns(
+            set(arrays),
+            lambda name: _numbers(arrays[name], name),
             unit if scale is None else "cm",
             scale,
-            _first(arrays, "frame_rate", path),
-        )
-        individual.make_body(options)
-        return individual
+            _first(arrays, "frame_rate"),
+        ).recording(name, options)
 
 
-def _numbers(values: npt.NDArray[Any], name: str, path: Path) -> Array:
+def _numbers(values: npt.NDArray[Any], name: str) -> Array:
     if values.dtype.kind not in "fiub" or values.ndim != 1:
-        raise FormatError(f"'{name}' is no row of numbers", path=path)
+        raise FormatError(f"'{name}' is no row of numbers")
     return np.array(values, dtype=np.float64)
 
 
-def _first(arrays: Mapping[str, npt.NDArray[Any]], name: str, path: Path) -> float | None:
+def _first(arrays: Mapping[str, npt.NDArray[Any]], name: str) -> float | None:
     """Return the number in an array of one, None where there is none above zero."""
     if name not in arrays:
         return None
-    values = _numbers(np.ravel(arrays[name]), name, path)
+    values = _numbers(np.ravel(arrays[name]), name)
     return float(values[0]) if values.size and 0 < values[0] < np.inf else None
 
 
-def _of_csv(path: Path) -> _Individual:
+def _of_csv(path: Path) -> _Columns:
     """Return the columns of a table by their names without units."""
     names = first_row(path)
     used = {
@@ -223,13 +206,13 @@ def _of_csv(path: Path) -> _Individual:
         if _USED.fullmatch(bare := name.partition(" (")[0])
     }
     if not used:
-        raise FormatError("has no columns frame, X#wcentroid and Y#wcentroid", path=path, line=1)
+        raise FormatError("has no columns frame, X#wcentroid and Y#wcentroid", line=1)
     units = {unit_of_name(names[at]) for at, bare in used.items() if bare[0] in "XY"}
     if len(units) > 1:
-        raise FormatError("the columns of positions name different units", path=path, line=1)
+        raise FormatError("the columns of positions name different units", line=1)
     table = read_table(path, TableLayout(",", names, 1, tuple(used)))
     columns = {bare: table.numbers[at] for at, bare in used.items()}
-    return _Individual(path, set(columns), lambda name: columns[name], next(iter(units), ""))
+    return _Columns(set(columns), lambda name: columns[name], next(iter(units), ""))
 
 
 LOADER = TrexLoader()
