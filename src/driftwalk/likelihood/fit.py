@@ -72,7 +72,7 @@ from driftwalk.likelihood.refuse import (
 )
 from driftwalk.likelihood.reml import Restricted, restricted_drag
 from driftwalk.likelihood.result import build_fit, law_facts, visited_shares, whiteness_of
-from driftwalk.likelihood.shared_stirring import SharedStirring, shared_stirring
+from driftwalk.likelihood.shared_stirring import shared_stirring
 from driftwalk.likelihood.start import first_point, first_weights
 from driftwalk.likelihood.warnings import precision_facts, warnings_of
 from driftwalk.schema.answers.facts import texts
@@ -205,11 +205,8 @@ def fit_motion(
         for rival in law.rivals:
             parameters = _with_rival(parameters, search, rival, ready)
         shape = laws.alternatives.shape_change(law.mode)
-    shared = SharedStirring({}, {}, [])
-    if chosen.fit.interaction:
-        course.begin("shared stirring")
-        with solved(reason):
-            shared = shared_stirring(ready, restricted.point)
+    with solved(reason):
+        shared = shared_stirring(ready, restricted.point, course)
     facts = {
         **parameters,
         **law_facts(law, assumptions),

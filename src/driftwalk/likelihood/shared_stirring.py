@@ -23,6 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.arrays import Bools, Floats
+from driftwalk.core.run_stages import Course
 from driftwalk.likelihood.filter.difference_pairs import unpacked
 from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.filter.parameters import Point
@@ -47,6 +48,9 @@ class SharedPolicy(NamedTuple):
     """Largest correlation at one side: a length of 32 sides."""
     nodes: int = 4001
     """Of the posterior of the correlation."""
+    least_evidence: float = 3.0
+    """Log likelihood ratio to independent forces below which no length is told: chance exceeds it
+    in one recording of 140."""
     distances: int = 8
     """Ranges of distance with the same number of samples. Chosen by hand."""
     change: float = 0.05
@@ -86,8 +90,8 @@ class JointErrors:
     @property
     def telling(self) -> Bools:
         """Where the forces on two bodies can be compared, (n, bodies, bodies)."""
-        driven = self.drive.any(axis=(2, 3))
-        return np.triu(driven[:, :, None] & driven[:, None, :], 1)
+        driven = np.asarray(self.drive.any(axis=(2, 3)))
+        return np.asarray(np.triu(driven[:, :, None] & driven[:, None, :], 1))
 
 
 def joint_errors(passes: Passes, point: Point, series: Sequence[Series]) -> JointErrors:
@@ -110,14 +114,15 @@ def joint_errors(passes: Passes, point: Point, series: Sequence[Series]) -> Join
     ]
     few = list(thinned(replace(passes, series=few)).series)
     one_by_one = [_errors_of(passes, one, point.in_flow(one.flow)) for one in few]
-    *parts, places = (np.stack(part, axis=1) for part in zip(*one_by_one, strict=True))
-    apart = np.linalg.norm(places[:, :, None] - places[:, None, :], axis=-1)
+    stacked = {name: np.stack([one[name] for one in one_by_one], axis=1) for name in one_by_one[0]}
+    place = np.stack([one.x + 1j * one.y for one in few], axis=1)
+    apart = np.abs(place[:, :, None] - place[:, None, :])
     apart[1:] = 0.5 * (apart[1:] + apart[:-1])
-    return JointErrors(*parts, apart)
+    return JointErrors(apart=apart, **stacked)
 
 
-def _errors_of(passes: Passes, series: Series, point: Point) -> tuple[npt.NDArray[Any], ...]:
-    """Return the linear filter of one body, in the order of `JointErrors`, and its places."""
+def _errors_of(passes: Passes, series: Series, point: Point) -> dict[str, npt.NDArray[Any]]:
+    """Return the linear filter of one body, by the names of `JointErrors`."""
     kernel, count = passes.kernel(series, point), series.time.size
     found = kernel.run(count, states=False, errors=True)
     width, (transition, before, after) = kernel.coordinates, found["errors"].swapaxes(0, 1)
@@ -139,15 +144,21 @@ def _errors_of(passes: Passes, series: Series, point: Point) -> tuple[npt.NDArra
     shared[1:] &= np.diff(series.time) <= FILTER.longest_gap_s
     root = np.linalg.cholesky(noise[shared][:, order][:, :, order])
     drive[np.ix_(shared, order)] = root[:, :, : len(driven)]
-    place = np.stack([series.x, series.y], axis=1)
-    innovation = np.where(seen[:, None], innovation, 0.0)
-    return transition, noise, drive, gain, innovation, sample_noise, seen, place
+    return {
+        "transition": transition,
+        "noise": noise,
+        "drive": drive,
+        "gain": gain,
+        "innovation": np.where(seen[:, None], innovation, 0.0),
+        "sample_noise": sample_noise,
+        "seen": seen,
+    }
 
 
 def joint_log_likelihoods(errors: JointErrors, correlations: Correlations, trials: int) -> Floats:
-    """Return the log likelihood of all innovations for several trials of the correlation, (trials,).
+    """Return the log likelihood of all innovations for several trials of the correlation.
 
-    Without its constant.
+    Shape (trials,), without its constant.
 
     Parameters
     ----------
@@ -206,8 +217,10 @@ class SharedStirring(NamedTuple):
     warnings: list[str]
 
 
-def shared_stirring(ready: PreparedRecordings, point: Point) -> SharedStirring:
+def shared_stirring(ready: PreparedRecordings, point: Point, course: Course) -> SharedStirring:
     """Return the length over which the bodies of a recording share the stirring.
+
+    Nothing where the study does not ask for it.
 
     Parameters
     ----------
@@ -215,7 +228,12 @@ def shared_stirring(ready: PreparedRecordings, point: Point) -> SharedStirring:
         One recording for each body.
     point : Point
         The fit of all of them.
+    course : Course
+        The progress of the fit.
     """
+    if not ready.study.fit.interaction:
+        return SharedStirring({}, {}, [])
+    course.begin("shared stirring")
     from scipy.interpolate import CubicSpline
     from scipy.stats import norm
 
@@ -232,7 +250,7 @@ def shared_stirring(ready: PreparedRecordings, point: Point) -> SharedStirring:
     side, confidence = ready.passes.body.side, ready.study.fit.confidence
     to_length = length_of(ready.passes.body)
     ends = [math.log(SHARED.shortest_sides * side), math.log(to_length(SHARED.most_correlation))]
-    logs = np.linspace(*ends, SHARED.trials - 1)
+    logs = np.linspace(ends[0], ends[1], SHARED.trials - 1)
     lengths = np.append(1e-3 * side, np.exp(logs))
     like = _summed(filters, lambda one: _kernel(one, lengths), SHARED.trials)
     nodes = np.linspace(0.0, SHARED.most_correlation, SHARED.nodes)
@@ -240,6 +258,8 @@ def shared_stirring(ready: PreparedRecordings, point: Point) -> SharedStirring:
     at = np.log(np.maximum([to_length(rho) for rho in nodes], math.exp(logs[0])))
     density = np.where(nodes > 0.0, CubicSpline(logs, like[1:])(at), like[0])
     rho = most_likely(nodes, density, confidence)
+    if rho[1] == 0.0 or like.max() - like[0] < SHARED.least_evidence:
+        rho = (0.0, 0.0, rho[2])
     facts, warnings = _answer(rho, to_length, confidence, nodes[-1])
     length = np.array([max(facts["stirring_length_m"], 1e-3 * side)])
     found = _by_distance(
@@ -274,7 +294,6 @@ def _answer(
 ) -> tuple[dict[str, Any], list[str]]:
     """Return correlation and length with intervals; without a lower end both are 0."""
     value, low, high = rho
-    value = value if low > 0.0 else 0.0
     top = to_length(high) if high < most else math.inf
     facts = {
         "stirring_correlation": value,
