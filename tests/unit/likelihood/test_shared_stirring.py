@@ -40,7 +40,7 @@ STUDY = apply_overrides(
 def recording(samples: int = 400) -> xr.Dataset:
     """Return two blocks that go round at two speeds, one through the other, with a noisy camera."""
     time, noise = 0.1 * np.arange(samples), np.random.default_rng(5)
-    turned = np.outer(time, [0.3, 0.5]) + [0.0, -0.5 * np.pi]
+    turned = np.outer(time, [0.3, 0.5]) - [0.0, 0.5 * np.pi]
     x, y, theta = 0.06 * np.cos(turned), 0.06 * np.sin(turned), 0.5 * turned
     x, y, theta = (one + 3e-4 * noise.normal(size=one.shape) for one in (x, y, theta))
     return build_trajectory(time, x, y, theta)
