@@ -16,7 +16,7 @@ from driftwalk.likelihood.angle_consistency import angle_given_facts, spin_corre
 from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import Series
-from driftwalk.likelihood.glued import (
+from driftwalk.likelihood.interaction.glued import (
     GLUED,
     EarlierFit,
     earlier_prior,
@@ -25,6 +25,7 @@ from driftwalk.likelihood.glued import (
     glued_study,
     stirring_facts,
 )
+from driftwalk.likelihood.interaction.shared_stirring import shared_stirring
 from driftwalk.likelihood.interval_inflation import (
     open_where_undetermined,
     parameter_covariance,
@@ -72,7 +73,6 @@ from driftwalk.likelihood.refuse import (
 )
 from driftwalk.likelihood.reml import Restricted, restricted_drag
 from driftwalk.likelihood.result import build_fit, law_facts, visited_shares, whiteness_of
-from driftwalk.likelihood.shared_stirring import shared_stirring
 from driftwalk.likelihood.start import first_point, first_weights
 from driftwalk.likelihood.warnings import precision_facts, warnings_of
 from driftwalk.schema.answers.facts import texts

@@ -15,12 +15,12 @@ from scipy.stats import multivariate_normal
 from driftwalk import InputError, Study, apply_overrides
 from driftwalk.conditions import one_body_each
 from driftwalk.likelihood.filter.difference_pairs import factor, forward
-from driftwalk.likelihood.preparation import PreparedRecordings, prepare
-from driftwalk.likelihood.shared_stirring import (
+from driftwalk.likelihood.interaction.shared_stirring import (
     JointErrors,
     joint_errors,
     joint_log_likelihoods,
 )
+from driftwalk.likelihood.preparation import PreparedRecordings, prepare
 from driftwalk.likelihood.start import first_point
 from driftwalk.schema import build_trajectory
 

@@ -1,11 +1,11 @@
 """Free bodies in one recording: over which length they share the stirring, or that none is seen.
 
 The forces on two bodies at a distance r have the correlation rho(r) = exp(-r²/2L²), which one body
-does not show. Each body's filter, linear about the track it followed, has the error of its state
-d' = F (d - K e) + w, and innovations e = H d + v. With the forces shared, the w of two bodies have
-the covariance rho(r) G_1 G_2', with G the part of a Cholesky factor of a body's own Q = G G' that
-the force on its centre drives. One Kalman filter of the errors of all bodies together then gives
-the exact likelihood of all innovations for every L. Nothing else is fitted anew. rho at a distance
+does not show. Each body's filter, linear about the track it followed, has the error of its state d'
+= F (d - K e) + w, and innovations e = H d + v. With the forces shared, the w of two bodies have the
+covariance rho(r) G_1 G_2', with G the part of a Cholesky factor of a body's own Q = G G' that the
+force on its centre drives. One Kalman filter of the errors of all bodies together then gives the
+exact likelihood of all innovations for every L. The other numbers stay as fitted. rho at a distance
 of one side has a uniform prior, as for glued blocks, and an interval of highest density.
 
 See docs/how-to/dimer.md.
@@ -28,7 +28,7 @@ from driftwalk.likelihood.filter.difference_pairs import unpacked
 from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import FILTER, Series
-from driftwalk.likelihood.glued import length_of, most_likely
+from driftwalk.likelihood.interaction.glued import length_of, most_likely
 from driftwalk.likelihood.newton import thinned
 from driftwalk.likelihood.preparation import PreparedRecordings
 
@@ -208,7 +208,7 @@ def _block_diagonal(blocks: Floats) -> Floats:
 
 
 class SharedStirring(NamedTuple):
-    """What the bodies of a recording say of the forces that they share."""
+    """The forces that the bodies of a recording share."""
 
     facts: dict[str, Any]
     """Correlation at one side, length, and the farthest departure of the kernel."""
