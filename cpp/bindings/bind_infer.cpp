@@ -114,7 +114,8 @@ struct PassArrays {
   driftwalk::FilterOutputs out;
 };
 
-nb::dict run(InnovationsFilter& filter, std::int64_t wanted, bool states, std::int64_t pooled) {
+nb::dict run(InnovationsFilter& filter, std::int64_t wanted, bool states, std::int64_t pooled,
+             bool errors) {
   if (wanted < 0) {
     throw std::invalid_argument("count must not be negative");
   }
@@ -132,6 +133,9 @@ nb::dict run(InnovationsFilter& filter, std::int64_t wanted, bool states, std::i
   pass.out.whitened = whitened.data();
   pass.out.jacobian = jacobian.data();
   pass.out.pooled = pooled;
+  const auto size = static_cast<std::size_t>(filter.state_size());
+  Out<double> error = uninitialised<double>({errors ? pass.n : 0, 3, size, size});
+  pass.out.errors = errors ? error.data() : nullptr;
   {
     const nb::gil_scoped_release released;
     if (pooled > 1) {
@@ -143,6 +147,9 @@ nb::dict run(InnovationsFilter& filter, std::int64_t wanted, bool states, std::i
   if (sensitivities) {
     out["whitened"] = whitened;
     out["jacobian"] = jacobian;
+  }
+  if (errors) {
+    out["errors"] = error;
   }
   return out;
 }
@@ -273,7 +280,8 @@ void register_infer(nb::module_& module) {
       .def_prop_ro("remaining", &InnovationsFilter::remaining)
       .def_prop_ro("parameters", &InnovationsFilter::parameters)
       .def_prop_ro("coordinates", &InnovationsFilter::coordinates)
-      .def("run", &run, "count"_a, nb::kw_only(), "states"_a = true, "pooled"_a = 1)
+      .def("run", &run, "count"_a, nb::kw_only(), "states"_a = true, "pooled"_a = 1,
+           "errors"_a = false)
       .def("sums", &sums, "kept"_a.none(), "right"_a.none(), nb::kw_only(), "pooled"_a = 1);
   module.def("expected_drag", &expected_drag, nb::kw_only(), "side"_a, "mass"_a, "depth"_a,
              "strips"_a, "water_density"_a, "origin_x"_a, "origin_y"_a, "spacing"_a, "columns"_a,

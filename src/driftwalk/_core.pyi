@@ -270,8 +270,10 @@ class InnovationsFilter:
     # and jacobian (D k, parameters) of the prediction in the same units, the coordinates of a
     # sample in turn, zero where not used; with pooled > 1 the sums of jacobian over that many
     # samples.
+    # With errors=True also errors (n, 3, S, S): how the error of the state goes on from the sample
+    # before, 0 where the state begins; its covariance before the sample, and after it.
     def run(
-        self, count: int, *, states: bool = True, pooled: int = 1
+        self, count: int, *, states: bool = True, pooled: int = 1, errors: bool = False
     ) -> dict[str, npt.NDArray[Any]]: ...
 
     # Over the n samples that remain: information (parameters, parameters) = J' J and products

@@ -17,6 +17,8 @@ SIDE_M, MASS_KG, DEPTH_M, DENSITY = 0.03, 0.0116, 0.03, 1000.0
 STRIPS = 5
 STEP_S = 0.01
 DRAG, FORCE_N, FORCE_INTERVAL_S = 0.45, 0.55e-3, 0.01
+CONTACT_M = 0.036
+"""Distance of two blocks at which they bounce: between that of faces and that of corners."""
 POSITION_NOISE_M, ORIENTATION_NOISE_RAD = 3e-4, 0.009
 
 _CORNERS = SIDE_M / np.sqrt(12.0) * np.array([[1, 1], [1, -1], [-1, 1], [-1, -1]])
@@ -36,11 +38,16 @@ def euler_recordings(
     drag: float = DRAG,
     force_N: float = FORCE_N,
     added_mass: float | None = None,
+    stirring_length: float | None = None,
 ) -> list[Any]:
     """Return recordings at 10 Hz of `worlds` blocks, after 20 s of running in at time 0.
 
     With an added mass, a share of the block's, the body floats: the water's acceleration pushes it.
+    With a length of the stirring [m], 0 for none, two blocks share each world and bounce off each
+    other as discs; the second one starts across the middle.
     """
+    paired = stirring_length is not None
+    worlds *= 2 if paired else 1
     random = np.random.default_rng(seed)
     face = np.repeat(np.arange(4) * np.pi / 2.0, STRIPS)[:, None]
     along = np.tile(((np.arange(STRIPS) + 0.5) / STRIPS - 0.5) * SIDE_M, 4)[:, None]
@@ -49,6 +56,8 @@ def euler_recordings(
     inertia = moved * SIDE_M**2 / 6.0
     kick = force_N * np.sqrt(FORCE_INTERVAL_S / STEP_S)
     x, y = (np.full(worlds, value) for value in start)
+    if paired:
+        x[1::2] *= -1.0
     theta, vx, vy, omega = np.zeros((4, worlds))
     every, warm = round(0.1 / STEP_S), round(20.0 / STEP_S)
     poses = []
@@ -63,6 +72,11 @@ def euler_recordings(
         push = scale * np.maximum(0.0, -(cosine * slip_x + sine * slip_y))
         push_x, push_y = push * slip_x, push * slip_y
         noise = kick * random.standard_normal((2, worlds))
+        if paired:
+            apart = np.array([x[::2] - x[1::2], y[::2] - y[1::2]])
+            square = (apart**2).sum(axis=0)
+            rho = np.exp(-0.5 * square / stirring_length**2) if stirring_length else 0.0 * square
+            noise[:, 1::2] = rho * noise[:, ::2] + np.sqrt(1.0 - rho**2) * noise[:, 1::2]
         vx = vx + STEP_S / moved * (push_x.sum(axis=0) + noise[0])
         vy = vy + STEP_S / moved * (push_y.sum(axis=0) + noise[1])
         omega = omega + STEP_S / inertia * (arm_x * push_y - arm_y * push_x).sum(axis=0)
@@ -71,12 +85,22 @@ def euler_recordings(
             vx, vy = vx + STEP_S * ax.mean(axis=0), vy + STEP_S * ay.mean(axis=0)
             turn = 6.0 / SIDE_M**2 * (POINTS_X * ay - POINTS_Y * ax).mean(axis=0)
             omega = omega + STEP_S * turn
+        if paired:
+            ahead = np.array([vx[::2] - vx[1::2], vy[::2] - vy[1::2]])
+            closing = np.minimum((ahead * apart).sum(axis=0) / square, 0.0)
+            bounce = np.where(square < CONTACT_M**2, closing, 0.0) * apart
+            vx[::2], vy[::2] = vx[::2] - bounce[0], vy[::2] - bounce[1]
+            vx[1::2], vy[1::2] = vx[1::2] + bounce[0], vy[1::2] + bounce[1]
         x, y, theta = x + STEP_S * vx, y + STEP_S * vy, theta + STEP_S * omega
     seen = np.array(poses)
     seen[:, :2] += POSITION_NOISE_M * random.standard_normal(seen[:, :2].shape)
     seen[:, 2] += ORIENTATION_NOISE_RAD * random.standard_normal(seen[:, 2].shape)
     time = 0.1 * np.arange(len(seen))
-    return [build_trajectory(time, *seen[:, :, k].T) for k in range(worlds)]
+    members = 2 if paired else 1
+    return [
+        build_trajectory(time, *seen[:, :, k : k + members].transpose(1, 0, 2))
+        for k in range(0, worlds, members)
+    ]
 
 
 def _acceleration(

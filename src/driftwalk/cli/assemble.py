@@ -31,7 +31,8 @@ def assemble(
         Path | None,
         option(
             "--from RUN",
-            "Fit of glued blocks: the drag of hidden faces and the length of the stirring.",
+            "Fit of glued blocks, or of free ones in one recording: what a hidden face and a "
+            "neighbour feel.",
             show_default=False,
         ),
     ] = None,

@@ -65,6 +65,13 @@ def fit(
             show_default=False,
         ),
     ] = None,
+    interaction: Annotated[
+        bool,
+        option(
+            "--interaction",
+            "Fit all free bodies of the recording together, and say how far they share the force.",
+        ),
+    ] = False,
     no_check: Annotated[
         bool, option("--no-check", "Skip the check whether the model explains the recording.")
     ] = False,
@@ -95,6 +102,8 @@ def fit(
 
     earlier = None if start is None or not Path(start).is_dir() else Path(start)
     before = None if earlier is None else read_earlier_fit(earlier)
+    if interaction:
+        given = given.and_also({"fit.interaction": True}, keys=FIT_KEYS)
     if start is not None and earlier is None:
         how = replace(how, start=_first_time(start))
     read = read_for_run(recordings, given, how, before=before)

@@ -9,6 +9,7 @@ from driftwalk.conditions.reading import (
     ReadRecordings,
     load_for_run,
     load_with_study,
+    one_body_each,
     read_recordings,
 )
 from driftwalk.conditions.recorded import (
@@ -51,6 +52,7 @@ __all__ = [
     "load_for_run",
     "load_with_study",
     "neighbours_of",
+    "one_body_each",
     "possible_noises",
     "read_recordings",
     "recorded_camera",

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
-from driftwalk.conditions.refuse import require_motion, require_positions
+from driftwalk.conditions.refuse import prefix_of, require_motion, require_positions
 from driftwalk.conditions.study import is_stated, study_for, study_in_arena
+from driftwalk.core.errors import InputError
 from driftwalk.core.text.json_text import parse_json
 from driftwalk.record import load
 
@@ -82,10 +83,11 @@ def read_recordings(
     trajectories, of_files = [], []
     for path in paths:
         trajectory, of_file = load_for_run(path, study, values, tank=tank)
-        require_motion(trajectory, body=body, where=path)
-        if bodies == "all":
-            trajectory = _with_others(trajectory, path, study, values)
-        trajectories.append(trajectory)
+        for one in one_body_each([trajectory], study) if len(paths) == 1 else [trajectory]:
+            require_motion(one, body=body, where=path)
+            if bodies == "all":
+                one = _with_others(one, path, study, values)
+            trajectories.append(one)
         of_files.append(of_file)
     stated = is_stated(study, "tank.diameter_m") or any(of_files)
     if "tank" in values or study.recording.arena != "tank":
@@ -95,6 +97,56 @@ def read_recordings(
     # The recordings were placed in the default tank, which does not make it a stated one.
     study = study if stated else apply_overrides(study, {"tank.diameter_m": None})
     return ReadRecordings(trajectories, study, named)
+
+
+MOST_BODIES: Final = 8
+"""Most bodies whose forces are compared: the work grows with the third power of their number."""
+
+
+def one_body_each(recordings: Sequence[xr.Dataset], study: Study) -> list[xr.Dataset]:
+    """Return one recording for each body, where the study fits all bodies together.
+
+    Parameters
+    ----------
+    recordings : sequence of xarray.Dataset
+        One `trajectory` of two bodies or more; or several of one body each, on one clock.
+    study : Study
+        With ``fit.interaction`` on; otherwise the recordings are returned as they are.
+
+    Raises
+    ------
+    InputError
+        When there are fewer than two bodies or more than eight, or bodies are glued.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> len(dw.conditions.one_body_each([dw.tank30_recording()], dw.Study()))
+    1
+    """
+    if not study.fit.interaction:
+        return list(recordings)
+    parts = [
+        one if one.sizes["body"] == 1 else _body_of(one, number)
+        for one in recordings
+        for number in range(one.sizes["body"])
+    ]
+    if not 2 <= len(parts) <= MOST_BODIES:
+        raise InputError(
+            f"{prefix_of(recordings[0])}the forces of 2 to {MOST_BODIES} bodies can be compared, "
+            f"and the recording has {len(parts)}: leave out `interaction`, and name one with "
+            "`body`"
+        )
+    if len(study.block.body().cells) > 1:
+        raise InputError(
+            f"`interaction` is for free single bodies, and {study.block.shape} is glued"
+        )
+    return parts
+
+
+def _body_of(recording: xr.Dataset, number: int) -> xr.Dataset:
+    name = f"{recording.attrs.get('source', '')} ({recording['body'].values[number]})"
+    return recording.isel(body=[number]).assign_attrs(source=name.strip())
 
 
 def _with_others(

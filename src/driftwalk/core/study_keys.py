@@ -94,6 +94,7 @@ class FitSettings(StudySettings, total=False):
     flow_strength: Annotated[str, "fit.flow_strength"]
     flow_modes: Annotated[str, "fit.flow_modes"]
     camera: Annotated[str, "fit.camera"]
+    interaction: Annotated[bool, "fit.interaction"]
     flow_error: Annotated[Number, "fit.flow_error_m_s"]
     flow_scale_error: Annotated[Number, "fit.flow_scale_std"]
 

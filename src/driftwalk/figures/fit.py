@@ -24,7 +24,7 @@ from driftwalk.plot.parts import style
 from driftwalk.plot.parts.arena import arena_of, draw_arena, label_position
 from driftwalk.plot.parts.labels import in_unit
 from driftwalk.schema import FLAGS
-from driftwalk.schema.answers.force_law import compared_laws
+from driftwalk.schema.answers.force_law import compared_laws, shared_lengths
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -107,7 +107,8 @@ def fit_figures(
     -------
     dict of str to callable
         ``flow`` (``flow_A`` and so on by name of the flow where there are several) and
-        ``trajectory``; with compared laws ``laws``; with a check those of `check_figures`.
+        ``trajectory``; with compared laws ``laws``; of free bodies in one recording ``stirring``;
+        with a check those of `check_figures`.
 
     Examples
     --------
@@ -120,6 +121,8 @@ def fit_figures(
     figures = marked_simulated(figures, fit)
     if "compared_law" in fit.dims:
         figures |= laws_figures(fit)
+    if "force_correlation" in fit:
+        figures["stirring"] = lambda: _stirring_figure(fit)
     return figures if check is None else figures | check_figures(check)
 
 
@@ -218,6 +221,52 @@ def plot_laws(fit: xr.Dataset, ax: Axes) -> Axes:
     unsolved = len(every) - len(known)
     if unsolved:
         ax.set_title(f"not shown, without a solution: {unsolved}")
+    return ax
+
+
+def _stirring_figure(fit: xr.Dataset) -> Figure:
+    figure = style.new_figure(width_mm=1.2 * style.SINGLE_COLUMN_MM, height_mm=62.0)
+    plot_shared_stirring(fit, figure.add_subplot())
+    return figure
+
+
+def plot_shared_stirring(fit: xr.Dataset, ax: Axes) -> Axes:
+    """Plot the correlation of the forces on two bodies against their distance, with its kernel.
+
+    Parameters
+    ----------
+    fit : xarray.Dataset
+        A `fit` of free bodies in one recording.
+    ax : matplotlib.axes.Axes
+        Where to plot.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The same axes.
+
+    Examples
+    --------
+    ``plot_shared_stirring(fit, ax)``
+    """
+    distance = in_unit(fit["body_distance"], "cm", stored="m")
+    value, ends = fit["force_correlation"].values, fit["force_correlation_interval"].values.T
+    percent = f"{float(fit['confidence']):.0%}"
+    ax.errorbar(
+        distance, value, yerr=np.abs(ends - value), fmt="o", ms=3.0, lw=0.9, capsize=2.0,
+        color=style.BLUE, label=f"at each distance ({percent})",
+    )  # fmt: skip
+    r = np.linspace(0.0, 1.05 * float(distance.max()), 200)
+    low, length, high = (
+        np.exp(-0.5 * (0.01 * r / max(one, 1e-9)) ** 2) for one in shared_lengths(fit)
+    )
+    ax.fill_between(r, low, high, color=style.PALE, lw=0.0, label=f"its {percent} interval")
+    ax.plot(r, length, color=style.INK, label="exp(−r²/2L²)")
+    ax.axhline(0.0, color=style.MUTED, lw=0.6)
+    ax.set_xlim(0.0, float(r[-1]))
+    ax.set_xlabel("distance of the bodies r (cm)")
+    ax.set_ylabel("correlation of the forces")
+    ax.legend()
     return ax
 
 

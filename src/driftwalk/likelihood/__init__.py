@@ -4,7 +4,7 @@ from driftwalk.likelihood.check.run import Judged, check_model, judge_fit
 from driftwalk.likelihood.contacts.estimate import estimate_wall
 from driftwalk.likelihood.fit import check_fit, fit_motion
 from driftwalk.likelihood.flow_intervals import fitted_flow
-from driftwalk.likelihood.glued import EarlierFit, glued_study
+from driftwalk.likelihood.interaction.glued import EarlierFit, glued_study
 from driftwalk.likelihood.law.held_out import compare_laws
 from driftwalk.likelihood.preparation import describe_measured
 from driftwalk.likelihood.recovery import FitRecovery, recovery_study

@@ -16,7 +16,7 @@ from driftwalk.likelihood.angle_consistency import angle_given_facts, spin_corre
 from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import Series
-from driftwalk.likelihood.glued import (
+from driftwalk.likelihood.interaction.glued import (
     GLUED,
     EarlierFit,
     earlier_prior,
@@ -25,6 +25,7 @@ from driftwalk.likelihood.glued import (
     glued_study,
     stirring_facts,
 )
+from driftwalk.likelihood.interaction.shared_stirring import shared_stirring
 from driftwalk.likelihood.interval_inflation import (
     open_where_undetermined,
     parameter_covariance,
@@ -112,7 +113,8 @@ def fit_motion(
     angle : {"auto", "state", "given", "none"}, optional
         How the recorded orientation is used; default: what the study says.
     body : str, optional
-        The body, where a recording has several.
+        The body, where a recording has several; without one the study's ``fit.interaction`` fits
+        all of them, and says over which length they share the stirring.
     flow : xarray.Dataset, optional
         A steady flow that was measured, a `flow_field` as `load_flow` returns it: its *measured*
         nodes, with their errors, become the prior of the fitted flow.
@@ -165,7 +167,7 @@ def fit_motion(
     if before is not None:
         opened = {**assumptions.opened, "hidden_share": GLUED.first_share}
         assumptions = replace(assumptions, opened=opened)
-    course = Course(tell or tell_nobody, _usual_parts(passes))
+    course = Course(tell or tell_nobody, _usual_parts(passes, interaction=chosen.fit.interaction))
     reason = reason_of_no_solution(ready.wall_share, ready.tracks, chosen)
     # The stages stay in one function: they share most of their variables.
     with solved(reason):
@@ -203,6 +205,8 @@ def fit_motion(
         for rival in law.rivals:
             parameters = _with_rival(parameters, search, rival, ready)
         shape = laws.alternatives.shape_change(law.mode)
+    with solved(reason):
+        shared = shared_stirring(ready, restricted.point, course)
     facts = {
         **parameters,
         **law_facts(law, assumptions),
@@ -210,16 +214,18 @@ def fit_motion(
         **({"flow_modes_unsettled": modes.unsettled} if modes.unsettled else {}),
         **turning,
         **stirring_facts(ready, law.mode, restricted.point, before, earlier),
+        **shared.facts,
         **whiteness_of(counted)._asdict(),
         **ready.facts,
         **_search_facts(law, restricted),
         **_agreement(ready, law.mode, restricted),
         "wetted_depth_m": chosen.wetted_depth_m,
     }
-    fit = build_fit(ready, law, restricted, facts)
+    fit = build_fit(ready, law, restricted, facts).assign(shared.by_distance)
     shares = visited_shares(fit)
     unstated = unstated_warning(chosen, about="block")
     warnings = [] if unstated is None else [unstated]
+    warnings += shared.warnings
     for recording, track in zip(ready.recordings, ready.tracks, strict=True):
         warnings += jump_warnings(recording, body, track=track)
     warnings += warnings_of(facts, shares, ready.intervals, block=chosen.block)
@@ -398,12 +404,14 @@ def _usual_search(passes: Passes) -> float:
     return near + (WORK.from_pieces + WORK.score_tests) * whole
 
 
-def _usual_parts(passes: Passes) -> dict[str, float]:
+def _usual_parts(passes: Passes, *, interaction: bool) -> dict[str, float]:
     """Return the work of each stage of a fit, in samples."""
     whole = work_of_pass(passes)
     parts = {"likelihood": _usual_search(passes), "drag": WORK.restricted * whole}
     if passes.body.orientation == "state":
         parts["angle as given"] = WORK.angle_given * whole
+    if interaction:
+        parts["shared stirring"] = WORK.shared_stirring * whole
     return parts
 
 

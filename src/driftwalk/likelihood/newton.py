@@ -82,6 +82,8 @@ class WorkPolicy(NamedTuple):
     """Passes that take as long as the score tests of closed numbers."""
     restricted: float = 2.0
     """Passes that take as long as the restricted likelihood."""
+    shared_stirring: float = 12.0
+    """Passes that the likelihoods of two bodies for all lengths take."""
     angle_given: float = 3.0
     """Passes that take as long as the second fit, with the angle as an input."""
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from driftwalk.conditions import require_travel
+from driftwalk.conditions import one_body_each, require_travel
 from driftwalk.conditions.refuse import prefix_of
 from driftwalk.conditions.study import fitted_law, is_fitted
 from driftwalk.core.errors import InputError, argument_text
@@ -185,6 +185,7 @@ def prepare(
     flow: xr.Dataset | None = None,
 ) -> PreparedRecordings:
     """Return recordings ready for the filter; refuse what cannot be fitted."""
+    many = one_body_each(many, study)
     sources = tuple(str(one.attrs.get("source", "")) for one in many)
     measured = None
     if flow is not None:

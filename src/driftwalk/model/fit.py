@@ -111,6 +111,12 @@ class Fit(Section):
     the recording supports them, and refuses smoothed positions; "exact" takes the positions as
     recorded.
     """
+    interaction: bool = False
+    """Whether the bodies of a recording are fitted together, to find how far they share the force.
+
+    Whether all free bodies of a recording are fitted together. The correlation of the forces on
+    them then gives the length over which the stirring is shared.
+    """
     flow_error_m_s: Annotated[
         float | Literal["auto"], Quantity("m/s", gt=0, le=100, words=("auto",))
     ] = "auto"

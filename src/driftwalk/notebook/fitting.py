@@ -7,7 +7,7 @@ from concurrent.futures import Executor
 from os import PathLike
 from typing import TYPE_CHECKING, Literal, Unpack
 
-from driftwalk.conditions import require_motion, study_for
+from driftwalk.conditions import one_body_each, require_motion, study_for
 from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import (
     CALIBRATION_KEYS,
@@ -51,7 +51,7 @@ def fit(
         A steady flow that was measured, a `flow_field`; with its errors it is the prior of the
         fitted flow.
     body : str, optional
-        The body, where a recording has several.
+        The body, where a recording has several; ``interaction=True`` takes all of them.
     folder : path-like, optional
         Run directory to make or continue, the same as that of ``driftwalk fit``: fit, flow,
         recording, check of the model, figures and manifest.
@@ -87,14 +87,17 @@ def fit(
     import xarray as xr
 
     from driftwalk.likelihood import fit_motion, judge_fit
+    from driftwalk.model import Study, apply_overrides
     from driftwalk.notebook.result import as_result, run_in_folder
     from driftwalk.runs import FitWork
     from driftwalk.runs.resumable_run import silent
 
     many = [recordings] if isinstance(recordings, xr.Dataset) else list(recordings)
+    overrides = study_overrides(keys=FIT_KEYS, **settings)
+    many = one_body_each(many, apply_overrides(study or Study(), overrides))
     for one in many:
         require_motion(one, body=body)
-    chosen = study_for(many, study, study_overrides(keys=FIT_KEYS, **settings), body=body)
+    chosen = study_for(many, study, overrides, body=body)
     if folder is not None:
         work = FitWork(many, chosen, body, {}, check=check, flow=flow)
         return as_result(run_in_folder(folder, "fit", work, overwrite, progress or silent).fit)

@@ -86,9 +86,17 @@ private:
     if (state_.open && track_.time[k] - state_.seen > problem_.longest_gap) {
       state_.open = false;
     }
+    if (out_.errors != nullptr) {
+      for (int a = 0; a < size; ++a) {
+        for (int b = 0; b < size; ++b) {
+          transition_[a][b] = state_.open && a == b ? 1 : 0;
+        }
+      }
+    }
     if (state_.open) {
       predict(k);
     }
+    write_errors(row, 1, state_.covariance);
     const Sample found = sample(k);
     if (state_.open && found.there) {
       take_sample(row, k, found);
@@ -103,6 +111,8 @@ private:
       state_.seen = track_.time[k];
     }
     write_state(row);
+    write_errors(row, 0, transition_);
+    write_errors(row, 2, state_.covariance);
   }
 
   double unknown_velocity(int a) const {
@@ -122,6 +132,7 @@ private:
         state_.covariance[f][f] = problem_.intensity[0] / (2 * problem_.force_memory);
       }
     }
+    __builtin_memset(transition_, 0, sizeof transition_);
     if (with_sensitivities()) {
       sensitivity_.clear();
     }
@@ -173,6 +184,9 @@ private:
     drift_mean(state_, h / 2);
     kick_covariance(state_, kick);
     drift_covariance(state_, h / 2);
+    if (out_.errors != nullptr) {
+      carry_errors(kick, h);
+    }
     // What the drag's bend adds stays about the same from one sample to the next.
     Square<D> intensity;
     bend_covariance<D>(drag, middle, intensity);
@@ -190,6 +204,20 @@ private:
     if (with_sensitivities()) {
       sensitivity_.drift_and_kick(sensitivity_drift, kick);
       sensitivity_.add_flow(scratch_, drag, problem_.flow.columns, kick, h);
+    }
+  }
+
+  // Takes the transition of the state's error through a step.
+  void carry_errors(const Kick<D>& kick, double h) {
+    for (int b = 0; b < size; ++b) {
+      const auto drift = [&] {
+        for (int a = 0; a < D; ++a) {
+          transition_[a][b] += h / 2 * transition_[a + D][b];
+        }
+      };
+      drift();
+      kick_line<D, F>(kick, [&](int a) -> double& { return transition_[a][b]; });
+      drift();
     }
   }
 
@@ -384,6 +412,14 @@ private:
     }
   }
 
+  void write_errors(std::int64_t row, int which, const Square<2 * D + F>& values) {
+    if (out_.errors != nullptr) {
+      __builtin_memcpy(out_.errors + (3 * row + which) * size * size, values, sizeof values);
+    }
+  }
+
+  static constexpr int size = 2 * D + F;
+  Square<2 * D + F> transition_{}; // of the state's error since the sample before
   [[no_unique_address]] Law law_;
   const FilterProblem& problem_;
   const Track& track_;

@@ -101,6 +101,8 @@ public:
   bool sensitivities() const { return sensitivities_; }
   // Coordinates of a sample: 3 with Angle::state, else 2.
   int coordinates() const { return model_.angle() == Angle::state ? 3 : 2; }
+  // Coordinates, velocities, and a force that remembers.
+  int state_size() const { return 2 * coordinates() + (problem_.force_memory > 0 ? 2 : 0); }
 
   // The next min(count, remaining()) samples.
   void run(std::int64_t count, const FilterOutputs& out);

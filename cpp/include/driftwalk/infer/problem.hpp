@@ -162,6 +162,9 @@ struct FilterOutputs {
   // With more than one, the rows of so many samples are added up: [D ceil(count / pooled)], zero
   // before.
   std::int64_t pooled = 1;
+  // [count][3][2 D + F][2 D + F]: how the error of the state goes on from the sample before, 0
+  // where the state begins; its covariance before the sample; and after it. Null: not wanted.
+  double* errors = nullptr;
 };
 
 // What the filter adds up instead of handing out its derivatives, and the room for it. `stride` is

@@ -190,22 +190,24 @@ def with_glued(given: StudyOptions, folder: Path | None) -> StudyOptions:
     """
     if folder is None:
         return given
-    from driftwalk.schema.answers.facts import fitted_value
+    from driftwalk.schema.answers.facts import facts_of, fitted_value, is_open
     from driftwalk.schema.kinds.fit import PARAMETERS
 
     found = read_earlier_fit(folder).fit
     known = {str(name) for name in found["parameter"].values}
-    if not set(GLUED) <= known:
+    facts = facts_of(found)
+    named = [one for one in GLUED if one in known and not is_open(facts, PARAMETERS[one].key)]
+    if not named:
         raise InputError(
             f"{folder} does not say what hidden faces and neighbours feel: it has to be a fit of "
             "glued blocks after one of a single block (driftwalk fit DIMER --body-shape xx --from "
-            "FIT)"
+            "FIT), or of free bodies in one recording (--interaction)"
         )
-    values = {key: fitted_value(found, name) for name, key in GLUED.items()}
+    values = {GLUED[name]: fitted_value(found, name) for name in named}
     said = [
         f"{PARAMETERS[name].words} {value:.2g} ({low:.2g} to {high:.2g})"
         + (" m" if name == "stirring_length" else "")
-        for name in GLUED
+        for name in named
         for value, (low, high) in [
             (fitted_value(found, name), found["interval"].sel(parameter=name).values)
         ]

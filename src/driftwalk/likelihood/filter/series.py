@@ -67,6 +67,8 @@ class Series:
     """The angle, with holes filled in; zeros where there is none."""
     span: float = 0.0
     """Time of the recording's last sample, counted from its first [s]."""
+    first: float = 0.0
+    """Time of the recording's first sample [s]."""
 
     @property
     def settled(self) -> Bools:
@@ -102,12 +104,14 @@ class Series:
     def thinned(self, interval: float) -> Series:
         """Return samples about an interval [s] apart; the series where they are no nearer."""
         every = self._within(interval)
-        if every < 2:
-            return self
+        return self if every < 2 else self.at(np.arange(0, self.time.size, every))
+
+    def at(self, kept: npt.NDArray[np.intp]) -> Series:
+        """Return the samples of these numbers, which increase."""
         columns = ("time", "x", "y", "theta", "omega", "angle")
-        thin = {name: getattr(self, name)[::every] for name in columns}
+        thin = {name: getattr(self, name)[kept] for name in columns}
         # An interval is left out where one of those that it holds is.
-        firsts = np.maximum(np.arange(0, self.time.size, every) - every + 1, 0)
+        firsts = np.append(0, kept[:-1] + 1)
         thin["excluded"] = np.maximum.reduceat(self.excluded, firsts)
         return replace(self, **thin)
 
@@ -323,9 +327,8 @@ def wall_intervals(
     ahead_x, ahead_y = (_continued(time, axis) for axis in (x, y))
     ahead = None if turned is None else _continued(time, turned)
     now = None if turned is None else turned[:-1]
-    square = block.shape == "square"
-    reach = block.side_m / math.sqrt(2.0) if square else block.body().reach_m
-    corners = None if square else block.body().corners @ np.array([1.0, 1.0j])
+    reach = _reach(block)
+    corners = None if block.shape == "square" else block.body().corners @ np.array([1.0, 1.0j])
 
     def touches(x: Floats, y: Floats, theta: Floats | None) -> Bools:
         """Return where the body's circle, or with an angle a corner, is in the margin."""
@@ -401,9 +404,35 @@ def series_of(
                 near_wall=int(wall.sum()),
                 angle=smooth.theta,
                 span=ends[recording] - first,
+                first=first,
             )
         )
+    return _without_contacts(found, study.block) if study.fit.interaction else found
+
+
+def _without_contacts(series: list[Series], block: Block) -> list[Series]:
+    """Leave out intervals in which two bodies may touch: where the circles around them meet."""
+    found = []
+    for one in series:
+        near = np.zeros(one.time.size, dtype=bool)
+        for other in series:
+            if other.recording == one.recording or not other.time.size:
+                continue
+            clock = other.time + other.first - one.first
+            away = [
+                own - np.interp(one.time, clock, its, left=np.nan, right=np.nan)
+                for own, its in ((one.x, other.x), (one.y, other.y))
+            ]
+            ahead = (_continued(one.time, axis) for axis in away)
+            apart = np.minimum(np.hypot(*away)[:-1], np.hypot(*ahead))
+            near[1:] |= apart < 2.0 * _reach(block) + MARGIN
+        found.append(replace(one, excluded=one.excluded | near.astype(np.uint8)))
     return found
+
+
+def _reach(block: Block) -> float:
+    """Return the radius of the circle around a body [m]."""
+    return block.side_m / math.sqrt(2.0) if block.shape == "square" else block.body().reach_m
 
 
 def usable_intervals(series: Sequence[Series]) -> int:

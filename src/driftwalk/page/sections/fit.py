@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.core.errors import InputError
+from driftwalk.page.chart import chart, label, series
 from driftwalk.page.number_words import count, percent, quantity, with_interval
 from driftwalk.page.parts import (
     SIMULATED,
@@ -36,6 +37,7 @@ from driftwalk.schema.answers.force_law import (
     law_estimates,
     law_limits,
     law_words,
+    shared_lengths,
     wall_estimates,
 )
 from driftwalk.schema.answers.parts import NOT_DETERMINED, Estimate, estimates
@@ -226,13 +228,40 @@ def law_sections(fit: xr.Dataset) -> list[Section]:
         made.append(
             summary_section([*said, *law_limits(facts)], shown, id="law", title="The force law")
         )
-    made += [part for part in (_compared(fit), _tested(fit)) if part is not None]
+    made += [part for part in (_shared(fit), _compared(fit), _tested(fit)) if part is not None]
     lacking, walls = fit.attrs.get("wall_left_out"), wall_estimates(fit)
     if lacking is not None or walls:
         words = f"The block touched the wall in {facts['wall_contacts']} passages."
         paragraphs = [words if lacking is None else f"The wall: {lacking}."]
         made.append(summary_section(paragraphs, [*map(card, walls)], id="wall", title="The wall"))
     return made
+
+
+def _shared(fit: xr.Dataset) -> Section | None:
+    """Return the correlation of the forces on free bodies in one recording."""
+    if "force_correlation" not in fit:
+        return None
+    distance = fit["body_distance"].values
+    r = np.linspace(0.0, 1.05 * distance.max(), 100)
+    low, fitted, high = (
+        np.exp(-0.5 * (r / max(length, 1e-9)) ** 2) for length in shared_lengths(fit)
+    )
+    low_end, high_end = fit["force_correlation_interval"].values.T
+    return chart(
+        "stirring",
+        "Shared stirring",
+        "Correlation of the stochastic forces on two bodies against their distance: measured, and "
+        "the fitted exp(-r²/2L²) with the band of its interval.",
+        x=label("distance of the bodies", "m"),
+        y=label("correlation of the forces"),
+        series=[
+            series("fitted", r, fitted, ends=(low, high)),
+            series(
+                "at each distance", distance, fit["force_correlation"].values,
+                ends=(low_end, high_end), style="points",
+            ),
+        ],
+    )  # fmt: skip
 
 
 def _compared(fit: xr.Dataset) -> Section | None:

@@ -52,6 +52,13 @@ def law_estimates(fit: xr.Dataset) -> list[Estimate]:
     return made
 
 
+def shared_lengths(fit: xr.Dataset) -> tuple[float, float, float]:
+    """Return the length of the stirring between the ends of its interval [m]."""
+    number = {"parameter": "stirring_length"}
+    low, high = (float(one) for one in fit["interval"].sel(number).values)
+    return low, float(fit["estimate"].sel(number)), high
+
+
 def wall_estimates(fit: xr.Dataset) -> list[Estimate]:
     """Return restitution and friction of the wall; nothing where they were not estimated."""
     confidence = float(fit["confidence"]) if "confidence" in fit else None

@@ -43,6 +43,7 @@ dimensions:
     departure: numbers of departures that were tested, by name
     measured_y: nodes of a measured flow
     measured_x: nodes of a measured flow
+    body_distance: ranges of the distance of two bodies
 variables:
     estimate(parameter): estimates of the parameters; drag_coefficient C_d, force_std σ_F, \
         force_noise_intensity σ_F² times the force interval, tracking_noise; with the angle in the \
@@ -149,9 +150,14 @@ variables (a measured flow was given, and its scale is not exact):
     measured_flow_scale_std [1]: standard deviation of its scale
     measured_flow_scale_p_value [1]: chance of a scale so far from 1
     measured_flow_scale_detectable [1]: relative change of the scale that is found nine times in ten
-variables (glued blocks, after a fit of one block):
-    stirring_misfit_std [1]: by how much force and torque of the body disagree on the correlation, \
-        in standard deviations
+variables (glued blocks, after a fit of one block; or free bodies in one recording):
+    stirring_misfit_std [1]: by how much force and torque of a glued body disagree on the \
+        correlation, or how far the correlation of the forces on free bodies is from its kernel at \
+        one of the distances, in standard deviations
+variables (free bodies in one recording):
+    force_correlation(body_distance) [1]: correlation of the stochastic forces on two bodies
+    force_correlation_interval(body_distance bound) [1]: its interval
+    body_distance(body_distance) [m]: mean distance of the bodies
 variables (with orientations, in one flow):
     spin_correlation [1]: correlation of the block's spin with the vorticity of a first estimate \
         of the flow

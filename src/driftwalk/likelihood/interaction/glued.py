@@ -175,9 +175,9 @@ def stirring_facts(
     nodes = np.linspace(0.0, GLUED.most_correlation, GLUED.nodes)
     expected = np.array([_expected(float(rho), body) for rho in nodes])[:, : len(observed)]
     squares = ((expected - observed) ** 2 / variances).sum(axis=1)
-    rho = _most_likely(nodes, -0.5 * squares, ready.study.fit.confidence)
+    rho = most_likely(nodes, -0.5 * squares, ready.study.fit.confidence)
     facts: dict[str, Any] = {}
-    for name, of in (("stirring_correlation", float), ("stirring_length_m", _length_of(body))):
+    for name, of in (("stirring_correlation", float), ("stirring_length_m", length_of(body))):
         value, *ends = (of(one) for one in rho)
         facts |= {name: value, f"{name}_interval": ends}
     if len(observed) > 1:
@@ -187,17 +187,17 @@ def stirring_facts(
 
 def _expected(rho: float, body: Body) -> tuple[float, float]:
     """Return the logarithms of the intensity over that of one block, and of the lever [m]."""
-    length, outline = _length_of(body)(rho), body.outline
+    length, outline = length_of(body)(rho), body.outline
     ratio = 2.0 * math.log(outline.force_share(length) / len(outline.cells))
     return ratio, math.log(max(outline.force_lever_m(length), 1e-12))
 
 
-def _length_of(body: Body) -> Callable[[float], float]:
+def length_of(body: Body) -> Callable[[float], float]:
     """Return the function from the correlation at one side to the length [m]; 0 for none."""
     return lambda rho: 0.0 if rho <= 0.0 else body.side / math.sqrt(-2.0 * math.log(rho))
 
 
-def _most_likely(nodes: Floats, log_density: Floats, confidence: float) -> tuple[float, ...]:
+def most_likely(nodes: Floats, log_density: Floats, confidence: float) -> tuple[float, ...]:
     """Return the most likely node, and the ends of the interval of highest density."""
     density = np.exp(log_density - log_density.max())
     order = np.argsort(-density)

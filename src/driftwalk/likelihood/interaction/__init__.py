@@ -1,0 +1,1 @@
+"""Several blocks: what glued ones, and free ones in one recording, feel of each other."""
