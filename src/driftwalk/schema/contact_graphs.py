@@ -98,7 +98,7 @@ def contacts_of(name: str) -> Contacts:
     code = _NAMED.get(name, name)
     if not _CODE.fullmatch(code):
         return ()
-    return tuple((_LETTERS.index(one), _LETTERS.index(other)) for one, other in code.split("."))
+    return tuple((_LETTERS.index(pair[0]), _LETTERS.index(pair[1])) for pair in code.split("."))
 
 
 def discs_of(name: str) -> int:
