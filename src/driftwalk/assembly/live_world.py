@@ -286,6 +286,11 @@ class LiveTank:
         return self._wishes.study
 
     @property
+    def is_round(self) -> bool:
+        """Whether the blocks are discs."""
+        return self._wishes.study.block.shape == "disc"
+
+    @property
     def flow_scale(self) -> float:
         """The factor on the velocity of the water wanted last."""
         return self._wishes.flow_scale
@@ -402,7 +407,7 @@ class LiveTank:
         times = times_of(found["step"], time_step=study.time_step_s).tolist()
         pairs, faces = (map(tuple, found[name].tolist()) for name in ("block", "face"))
         for time, blocks, joined in zip(times, pairs, faces, strict=True):
-            if study.block.shape == "disc":
+            if self.is_round:
                 lattice.partition.unite(blocks)
                 outcome = disc_class(pose, lattice.partition.labels, diameter=diameter)
             else:

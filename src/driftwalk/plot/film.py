@@ -144,6 +144,8 @@ def _scene(motion: xr.Dataset, run: int) -> _Scene:
     )
     if not (np.isfinite(x) & np.isfinite(y)).any():
         raise InputError("no sample holds a position: there is nothing to film")
+    if motion.attrs.get("block_shape") == "disc":
+        theta = np.full_like(x, np.nan)
     color = np.broadcast_to(np.arange(x.shape[1]), x.shape)
     if "assembly" in one:
         color = one["assembly"].transpose("time", bodies).values

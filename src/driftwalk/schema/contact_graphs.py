@@ -16,7 +16,7 @@ from typing import Final
 Contacts = tuple[tuple[int, int], ...]
 
 MOST_DISCS: Final = 8
-"""Discs up to which graphs are told apart by more than their counts; chosen by hand."""
+"""Discs up to which a graph is named by more than its two counts; chosen by hand."""
 _LETTERS: Final = "abcdefgh"
 _NAMED: Final = {"triangle": "ab.ac.bc", "paw": "ab.ac.ad.bc", "diamond": "ab.ac.ad.bc.bd"}
 _NAMES: Final = {code: name for name, code in _NAMED.items()}

@@ -154,8 +154,9 @@ inline auto leave_wall(const WallView<T>& wall, const BodyShape<T>& shape, Real 
 template <class Real, class T>
 inline auto meet_wall(const WallView<T>& wall, const BodyShape<T>& shape, Real per_inertia,
                       Pose<Real>& pose, Motion<Real>& motion) -> typename Numbers<Real>::Bool {
+  const T reach = shape.reach * T(reach_margin);
   if (wall.radius > T(0)) {
-    const T inner = max(wall.radius - shape.reach, T(0));
+    const T inner = max(wall.radius - reach, T(0));
     const Real square = pose.x * pose.x + pose.y * pose.y;
     const auto near = square > Real(inner * inner);
     if (!any(near)) {
@@ -174,7 +175,7 @@ inline auto meet_wall(const WallView<T>& wall, const BodyShape<T>& shape, Real p
     for (int e = 0; e < wall.edge_count; ++e) {
       const PreparedEdge<T>& edge = wall.edges[e];
       const Real along = pose.x * edge.normal_x + pose.y * edge.normal_y;
-      if (any(along > Real(edge.distance - shape.reach))) {
+      if (any(along > Real(edge.distance - reach))) {
         const auto measure = [&](Contact<Real>& c) { measure_edge(c, edge, pose.x, pose.y); };
         now = now | leave_wall(wall, shape, per_inertia, Real(edge.normal_x), Real(edge.normal_y),
                                measure, pose, motion);

@@ -168,14 +168,16 @@ struct Disc {
   T radius;
 };
 
-// How far a block reaches from its centre, from half its side.
+// How far a block reaches from its centre, from half its side; of a disc a little more. Rounding
+// must not decide whether a lane that touches is looked at: that would depend on its neighbours.
+inline constexpr double reach_margin = 1.001;
 template <class T>
 inline T reach_of(T h) {
   return h * T(root_two);
 }
 template <class T>
 inline T reach_of(const Disc<T>& disc) {
-  return disc.radius;
+  return disc.radius * T(reach_margin);
 }
 
 // The two corners that can touch, given the direction (nx, ny) of the wall seen from the block's

@@ -47,6 +47,8 @@ def replay_section(path: xr.Dataset, assembly: xr.Dataset | None = None) -> Sect
     note = f"{count(runs, 'run')}, a position every {_interval(thin)}, to {known_to}."
     if runs < path.sizes["run"]:
         note += f" {count(path.sizes['run'] - runs, 'more run')} in the file."
+    if path.attrs.get("block_shape") == "disc":
+        thin = thin.assign(theta=thin["theta"] * np.nan)  # drawn as discs
     made = [_run(thin.isel(run=index), index, assembly, step) for index in range(runs)]
     names = {change["class"] for run in made for change in run["classes"]}
     return section(
