@@ -21,6 +21,7 @@ from driftwalk.plot.parts.assembly_labels import (
 from driftwalk.plot.parts.labels import number_fact
 from driftwalk.plot.parts.polyomino_sketch import (
     NAME_SIZE_PT,
+    are_discs,
     axes_points,
     class_cells,
     name_text,
@@ -204,20 +205,16 @@ def _label_right(ax: Axes, names: list[str], height: Floats, colors: dict[str, s
             arrowprops={"arrowstyle": "-", "lw": 0.4, "color": MUTED, "shrinkA": 0, "shrinkB": 0},
         )  # fmt: skip
         if there:
-            _sketch_at(ax, name, at, cell_pt, colors[name])
+            artist = place_sketch(
+                ax, name, (1.0, at), transform="axes fraction", alignment=(0.0, 0.5),
+                cell_pt=cell_pt, color=colors[name], discs=any(map(are_discs, names)),
+            )  # fmt: skip
+            artist.xybox = (10.0, 0.0)
         ax.annotate(
             name_text(name), (1.0, at), xytext=(13.0 + wide * cell_pt, 0.0),
             xycoords="axes fraction", textcoords="offset points", va="center",
             size=NAME_SIZE_PT, color=INK, annotation_clip=False,
         )  # fmt: skip
-
-
-def _sketch_at(ax: Axes, name: str, at: float, cell_pt: float, color: str) -> None:
-    artist = place_sketch(
-        ax, name, (1.0, at), transform="axes fraction", alignment=(0.0, 0.5), cell_pt=cell_pt,
-        color=color,
-    )  # fmt: skip
-    artist.xybox = (10.0, 0.0)
 
 
 def spread_apart(wanted: Floats, size: Floats) -> Floats:

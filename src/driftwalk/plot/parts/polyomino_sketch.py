@@ -221,6 +221,7 @@ def place_sketch(
     cell_pt: float = 3.0,
     color: Any = BLUE,
     orientation: Orientation = "wide",
+    discs: bool | None = None,
 ) -> AnnotationBbox:
     """Put the sketch of a class on axes, also outside of their frame.
 
@@ -242,6 +243,8 @@ def place_sketch(
         Colour of the squares.
     orientation : {"wide", "tall"}
         See `class_cells`.
+    discs : bool, optional
+        See `sketch_box`.
 
     Returns
     -------
@@ -252,7 +255,7 @@ def place_sketch(
     --------
     ``place_sketch(ax, "T", (0.5, 1.05), transform="axes fraction")``
     """
-    box = sketch_box(name, cell_pt=cell_pt, color=color, orientation=orientation)
+    box = sketch_box(name, cell_pt=cell_pt, color=color, orientation=orientation, discs=discs)
     return _pinned(ax, box, xy, transform=transform, alignment=alignment)
 
 
