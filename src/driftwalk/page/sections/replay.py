@@ -11,6 +11,7 @@ from driftwalk.page.arrays import binary_step, encode_array
 from driftwalk.page.number_words import count, quantity
 from driftwalk.page.parts import Section, arena_part, require, required, section
 from driftwalk.page.sections.outcomes import cells_of
+from driftwalk.plot.parts.polyomino_sketch import are_discs
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -57,7 +58,7 @@ def replay_section(path: xr.Dataset, assembly: xr.Dataset | None = None) -> Sect
         side=side,
         time=encode_array(thin["time"].values, step=TIME_STEP),
         runs=made,
-        cells={name: cells_of(name) for name in sorted(names)},
+        cells={name: cells_of(name, discs=any(map(are_discs, names))) for name in sorted(names)},
     )  # fmt: skip
 
 
