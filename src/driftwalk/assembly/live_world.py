@@ -46,7 +46,7 @@ class _Moment:
         self.state: dict[str, npt.NDArray[Any]] = world.state()
         self.time = float(times_of(np.array(world.step), time_step=study.time_step_s))
         self._chirality = study.assembly.chirality
-        self._diameter = study.block.side_m if study.block.shape == "disc" else 0.0
+        self._diameter = study.block.side_m if study.block.is_round else 0.0
 
     @cached_property
     def outcome(self) -> str:
@@ -288,7 +288,7 @@ class LiveTank:
     @property
     def is_round(self) -> bool:
         """Whether the blocks are discs."""
-        return self._wishes.study.block.shape == "disc"
+        return self._wishes.study.block.is_round
 
     @property
     def flow_scale(self) -> float:

@@ -59,7 +59,7 @@ class Plan:
     @property
     def is_round(self) -> bool:
         """Whether the blocks are discs: they have contacts, no faces and no lattice."""
-        return self.study.block.shape == "disc"
+        return self.study.block.is_round
 
     @property
     def chirality(self) -> Chirality | None:
@@ -87,7 +87,7 @@ class Plan:
 
 def chirality_of(study: Study) -> Chirality | None:
     """Return whether mirror images are one class or two; None of discs, which have one."""
-    return None if study.block.shape == "disc" else study.assembly.chirality
+    return None if study.block.is_round else study.assembly.chirality
 
 
 def make_plan(

@@ -37,7 +37,7 @@ def require_room(study: Study) -> None:
             f"squares and discs assemble, and the body is '{study.block.shape}' (`block.shape`): "
             "start from the fit of one square block, or of a disc"
         )
-    if study.block.shape == "disc" and study.assembly.latching == "connector":
+    if study.block.is_round and study.assembly.latching == "connector":
         raise InputError(
             "connectors latch face to face, and discs have no faces: latching is 'collision' or "
             "'none' for them (`assembly.latching`)"
@@ -117,7 +117,7 @@ def given_start(study: Study, start: npt.ArrayLike, *, runs: int) -> Floats:
 
 
 def _require_inside(study: Study, poses: Floats) -> None:
-    if study.block.shape == "disc":
+    if study.block.is_round:
         depth = inward_depth(study.tank, poses[..., 0], poses[..., 1]) - study.block.side_m / 2.0
     else:
         angle = poses[..., 2, None] + np.pi * (0.25 + 0.5 * np.arange(4))
@@ -140,7 +140,7 @@ def _require_apart(study: Study, poses: Floats) -> None:
     for first in range(poses.shape[1]):
         for second in range(first + 1, poses.shape[1]):
             pair, side = (poses[:, first], poses[:, second]), study.block.side_m
-            if study.block.shape == "disc":
+            if study.block.is_round:
                 depth = side - np.hypot(*(pair[1] - pair[0])[:, :2].T)
             else:
                 depth = overlap_depth(*pair, side=side)

@@ -182,7 +182,7 @@ class PlaySource(Playground):
 
     def _subtitle(self) -> str:
         study = self.tank.study
-        body = "discs" if study.block.shape == "disc" else "blocks"
+        body = "discs" if study.block.is_round else "blocks"
         return f"{study.tank.describe()}, {body} of {100.0 * study.block.side_m:g} cm"
 
     def _bodies(self) -> dict[str, Any]:

@@ -90,7 +90,7 @@ class RunningAssembly:
         sound = (unit.arrays["status"].astype(np.int64) & BROKEN) == 0
         self._runs[name] += unit.stop - unit.start
         chirality, block = self._study.assembly.chirality, self._study.block
-        if block.shape == "disc":
+        if block.is_round:
             for pose, assembly in zip(
                 unit.arrays["pose"][sound], unit.arrays["assembly"][sound], strict=True
             ):
