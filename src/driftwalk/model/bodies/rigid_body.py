@@ -85,8 +85,8 @@ class RigidBody:
     def water_points(self) -> Floats:
         """Where the body takes the water's acceleration, and weights, shape (n, 3) [m, m, 1].
 
-        Of a disc seven and of a rectangle nine: means over the area are exact for polynomials of
-        the fifth degree. Of glued blocks those of the rectangle with the same second moments.
+        A disc has seven, a rectangle nine: means over the area are exact for polynomials of the
+        fifth degree. Glued blocks have those of the rectangle with the same second moments.
         """
         if self.disc_radius_m:
             # Radon's rule: the centre, and a ring at sqrt(2/3) of the radius.
