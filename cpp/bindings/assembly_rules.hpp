@@ -15,6 +15,7 @@ inline driftwalk::AssemblyRules rules_of(const Model& model, std::size_t blocks)
   driftwalk::AssemblyRules rules;
   rules.blocks = static_cast<int>(blocks);
   rules.side = 2 * run.block.half_side;
+  rules.round = run.shape.disc_radius > 0;
   // Where blocks meet only ratios of the two count, and an added share is common to both.
   rules.mass = model.numbers().mass;
   rules.inertia = model.numbers().inertia;

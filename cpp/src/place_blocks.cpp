@@ -22,19 +22,30 @@ struct Placed {
   Vec2 at, axis;
 };
 
+// Whether a point, or a disc about it, is within the wall.
+bool is_within(const AssemblyRules& rules, Vec2 at, double radius) {
+  const double inner = rules.radius - radius;
+  if (rules.radius > 0 && (inner < 0 || dot(at, at) > inner * inner)) {
+    return false;
+  }
+  for (int e = 0; e < rules.edge_count; ++e) {
+    const PreparedEdge<double>& edge = rules.edges[e];
+    if (at.x * edge.normal_x + at.y * edge.normal_y > edge.distance - radius) {
+      return false;
+    }
+  }
+  return true;
+}
+
 bool is_inside(const AssemblyRules& rules, const Placed& p) {
+  if (rules.round) {
+    return is_within(rules, p.at, rules.side / 2);
+  }
   const Vec2 along = p.axis * (rules.side / 2), across{-along.y, along.x};
   for (const double sign_x : {-1.0, 1.0}) {
     for (const double sign_y : {-1.0, 1.0}) {
-      const Vec2 corner = p.at + along * sign_x + across * sign_y;
-      if (rules.radius > 0 && dot(corner, corner) > rules.radius * rules.radius) {
+      if (!is_within(rules, p.at + along * sign_x + across * sign_y, 0)) {
         return false;
-      }
-      for (int e = 0; e < rules.edge_count; ++e) {
-        const PreparedEdge<double>& edge = rules.edges[e];
-        if (corner.x * edge.normal_x + corner.y * edge.normal_y > edge.distance) {
-          return false;
-        }
       }
     }
   }
@@ -44,6 +55,12 @@ bool is_inside(const AssemblyRules& rules, const Placed& p) {
 bool is_clear(const AssemblyRules& rules, const Placed& p, const double* start, int placed) {
   for (int b = 0; b < placed; ++b, start += 3) {
     const Vec2 between = Vec2{start[0], start[1]} - p.at;
+    if (rules.round) {
+      if (dot(between, between) <= rules.side * rules.side) {
+        return false;
+      }
+      continue;
+    }
     if (dot(between, between) < 2 * rules.side * rules.side &&
         overlap_depth(rules.side / 2, between, p.axis, {std::cos(start[2]), std::sin(start[2])}) >=
             0) {

@@ -21,11 +21,19 @@ struct Manifold {
   int count;
 };
 
-// The corners of the second square's face that looks at the reference face, cut to its width.
+// The corners of the second square's face that looks at the reference face, cut to its width; of
+// discs the middle between their centres.
 Manifold manifold_of(const AssemblyRules& rules, const Scene& scene, BlockPair pair,
                      const Overlap& overlap) {
   const double half_side = rules.side / 2;
   Manifold found{overlap.normal, {}, 0};
+  const SceneAssembly& a = assembly_of(scene, pair.first);
+  const SceneAssembly& b = assembly_of(scene, pair.second);
+  if (rules.round) {
+    const Vec2 at = (centre(scene, pair.first) + centre(scene, pair.second)) * 0.5;
+    found.touch[found.count++] = {at - Vec2{a.x, a.y}, at - Vec2{b.x, b.y}, overlap.depth};
+    return found;
+  }
   const int reference = overlap.reference_is_first ? pair.first : pair.second;
   const int incident = overlap.reference_is_first ? pair.second : pair.first;
   const Vec2 out = overlap.normal * (overlap.reference_is_first ? 1.0 : -1.0);
@@ -48,8 +56,6 @@ Manifold manifold_of(const AssemblyRules& rules, const Scene& scene, BlockPair p
       end = end + (opposite - end) * ((bound - here) / (there - here));
     }
   }
-  const SceneAssembly& a = assembly_of(scene, pair.first);
-  const SceneAssembly& b = assembly_of(scene, pair.second);
   for (const Vec2& end : ends) {
     const double depth = half_side - dot(end, out);
     if (depth > 0) {

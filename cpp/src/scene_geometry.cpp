@@ -24,6 +24,10 @@ double overlap_depth(double half_side, Vec2 between, Vec2 axis_first, Vec2 axis_
 
 Overlap overlap_of(const AssemblyRules& rules, const Scene& scene, int first, int second) {
   const Vec2 between = centre(scene, second) - centre(scene, first);
+  if (rules.round) {
+    const double apart = std::sqrt(dot(between, between));
+    return {rules.side - apart, between * (1 / std::max(apart, 1e-9)), true};
+  }
   const SceneAssembly& a = assembly_of(scene, first);
   const SceneAssembly& b = assembly_of(scene, second);
   const Vec2 axes[4] = {face_normal(a, 0), face_normal(a, 1), face_normal(b, 0), face_normal(b, 1)};
@@ -76,11 +80,32 @@ void link_members(Scene& scene, int assembly) {
     }
   }
 }
+
+// Of discs from where they are.
+void measure_discs(const AssemblyRules& rules, Scene& scene, SceneAssembly& a) {
+  Vec2 sum{0, 0};
+  for (int b = a.first; b >= 0; b = scene.block[b].next) {
+    sum = sum + centre(scene, b);
+  }
+  a.x = sum.x / a.blocks;
+  a.y = sum.y / a.blocks;
+  a.inertia = 0;
+  for (int b = a.first; b >= 0; b = scene.block[b].next) {
+    const Vec2 arm = centre(scene, b) - Vec2{a.x, a.y};
+    scene.block[b].offset_x = dot(face_normal(a, 0), arm);
+    scene.block[b].offset_y = dot(face_normal(a, 1), arm);
+    a.inertia += rules.inertia + rules.mass * dot(arm, arm);
+  }
+}
 } // namespace
 
 void measure_assembly(const AssemblyRules& rules, Scene& scene, int assembly) {
   link_members(scene, assembly);
   SceneAssembly& a = scene.assembly[assembly];
+  if (rules.round) {
+    measure_discs(rules, scene, a);
+    return;
+  }
   int sum_x = 0, sum_y = 0;
   for (int b = a.first; b >= 0; b = scene.block[b].next) {
     sum_x += scene.block[b].cell_x;
@@ -108,16 +133,16 @@ void extend(Beyond& most, double depth, Vec2 inward) {
   }
 }
 
-// How far a corner is beyond the wall.
-void measure_corner(const AssemblyRules& rules, Vec2 corner, Beyond& most) {
+// How far a corner, or a disc about it, is beyond the wall.
+void measure_corner(const AssemblyRules& rules, Vec2 corner, double radius, Beyond& most) {
   if (rules.radius > 0) {
     const double distance = std::sqrt(dot(corner, corner));
-    extend(most, distance - rules.radius, corner * (-1.0 / std::max(distance, 1e-9)));
+    extend(most, distance - rules.radius + radius, corner * (-1.0 / std::max(distance, 1e-9)));
     return;
   }
   for (int e = 0; e < rules.edge_count; ++e) {
     const PreparedEdge<double>& edge = rules.edges[e];
-    extend(most, corner.x * edge.normal_x + corner.y * edge.normal_y - edge.distance,
+    extend(most, corner.x * edge.normal_x + corner.y * edge.normal_y - edge.distance + radius,
            {-edge.normal_x, -edge.normal_y});
   }
 }
@@ -139,9 +164,13 @@ Beyond beyond_wall(const AssemblyRules& rules, const Scene& scene, int assembly)
     if (is_clear_of_wall(rules, middle)) {
       continue;
     }
+    if (rules.round) {
+      measure_corner(rules, middle, rules.side / 2, most);
+      continue;
+    }
     for (const Vec2& corner : {along + across, along - across, across - along,
                                Vec2{-along.x - across.x, -along.y - across.y}}) {
-      measure_corner(rules, middle + corner, most);
+      measure_corner(rules, middle + corner, 0, most);
     }
   }
   return most;

@@ -1,14 +1,16 @@
-// Latching: two faces that meet make two assemblies one, on the lattice of the heavier.
+// Latching: two faces that meet make two assemblies one, on the lattice of the heavier. Discs that
+// meet do so as they lie.
 #include "driftwalk/assembly/settle_parts.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace driftwalk {
 
 namespace {
 struct Candidate {
-  int first, face, second, peer; // faces in the frames of their assemblies
-  double squared;                // distance of the face centres [m^2]
+  int first, face, second, peer; // faces in the frames of their assemblies; 0 of discs
+  double squared;                // distance of the face centres, or of the discs' [m^2]
 };
 
 bool comes_before(const Candidate& a, const Candidate& b) {
@@ -31,6 +33,10 @@ bool is_free(const Scene& scene, int block, int face) {
 // Whether two free faces can latch, by the rule in force.
 bool can_latch(const AssemblyRules& rules, const Scene& scene, Candidate& c) {
   const Vec2 between = centre(scene, c.second) - centre(scene, c.first);
+  if (rules.round) {
+    c.squared = dot(between, between);
+    return c.face == 0 && c.peer == 0;
+  }
   const Vec2 n = face_normal(assembly_of(scene, c.first), c.face);
   const Vec2 m = face_normal(assembly_of(scene, c.second), c.peer);
   const Vec2 gap = between + (m - n) * (rules.side / 2);
@@ -162,27 +168,57 @@ void align(Scene& scene, const Merge& merge, int joint) {
   }
 }
 
+// Discs stay as they lie, but for their overlap: both move apart, in inverse proportion to their
+// masses.
+void join_discs(const AssemblyRules& rules, Scene& scene, const Merge& merge, int joint) {
+  constexpr double full_turn = 2 * 3.141592653589793;
+  SceneAssembly &stays = scene.assembly[merge.stays], &moves = scene.assembly[merge.moves];
+  const Overlap overlap = overlap_of(rules, scene, merge.anchor, merge.guest);
+  const Vec2 share = overlap.normal * (overlap.depth / (stays.blocks + moves.blocks));
+  const double turned = moves.theta - stays.theta;
+  for (int b = 0; b < scene.blocks; ++b) {
+    SceneBlock& block = scene.block[b];
+    if (block.assembly == merge.stays) {
+      block.x -= share.x * moves.blocks;
+      block.y -= share.y * moves.blocks;
+      block.assembly = joint;
+    } else if (block.assembly == merge.moves) {
+      block.x += share.x * stays.blocks;
+      block.y += share.y * stays.blocks;
+      block.assembly = joint;
+      block.turn += turned;
+      block.turn -= full_turn * std::floor(block.turn / full_turn);
+    }
+  }
+}
+
 // Moves the guests' assembly onto the other's lattice. False, and nothing changed, when the two
-// would overlap each other or a third, or cannot both be inside the tank.
+// would overlap each other or a third, or cannot both be inside the tank. What discs would overlap
+// latches next.
 bool try_merge(const AssemblyRules& rules, Scene& scene, const Merge& merge) {
-  if (!cells_are_free(scene, merge)) {
+  if (!rules.round && !cells_are_free(scene, merge)) {
     return false;
   }
   constexpr int most_rounds = 64;
   const SceneAssembly kept = scene.assembly[merge.stays], moved = scene.assembly[merge.moves];
   const int joint = std::min(merge.stays, merge.moves);
-  const Vec2 anchor = centre(scene, merge.anchor);
   const int own_faces[2] = {(merge.anchor_face - scene.block[merge.anchor].quarter) & 3,
                             (merge.guest_face - scene.block[merge.guest].quarter) & 3};
   std::copy_n(scene.block, scene.blocks, scene.blocks_before);
-  align(scene, merge, joint);
+  if (rules.round) {
+    join_discs(rules, scene, merge, joint);
+  } else {
+    align(scene, merge, joint);
+  }
+  const Vec2 anchor = centre(scene, merge.anchor);
   scene.assembly[std::max(merge.stays, merge.moves)].blocks = 0;
   SceneAssembly& body = scene.assembly[joint];
   body = kept;
   measure_assembly(rules, scene, joint);
   conserve_momentum(kept, moved, rules.mass, body);
   place_by(scene, joint, merge.anchor, anchor);
-  if (!push_inside(rules, scene, joint, most_rounds) || !is_clear_of_others(rules, scene, joint)) {
+  if (!push_inside(rules, scene, joint, most_rounds) ||
+      (!rules.round && !is_clear_of_others(rules, scene, joint))) {
     std::copy_n(scene.blocks_before, scene.blocks, scene.block);
     scene.assembly[merge.stays] = kept;
     scene.assembly[merge.moves] = moved;

@@ -21,13 +21,17 @@ void cut_loose(const AssemblyRules& rules, Scene& scene, const SceneAssembly& fr
   body.touched = true;
 }
 
-bool are_neighbours(const SceneBlock& a, const SceneBlock& b) {
+bool are_neighbours(const AssemblyRules& rules, const Scene& scene, int first, int second) {
+  const SceneBlock &a = scene.block[first], &b = scene.block[second];
+  if (rules.round) {
+    return overlap_of(rules, scene, first, second).depth >= -contact_gap * rules.side;
+  }
   return std::abs(a.cell_x - b.cell_x) + std::abs(a.cell_y - b.cell_y) == 1;
 }
 
 // Labels members of an assembly, from one to before another, with the lowest of them that each
 // hangs together with.
-void label_connected(Scene& scene, int first, int end) {
+void label_connected(const AssemblyRules& rules, Scene& scene, int first, int end) {
   for (int b = first; b != end; b = scene.block[b].next) {
     scene.block[b].assembly = b;
   }
@@ -36,7 +40,7 @@ void label_connected(Scene& scene, int first, int end) {
     for (int b = first; b != end; b = scene.block[b].next) {
       for (int c = scene.block[b].next; c != end; c = scene.block[c].next) {
         SceneBlock &one = scene.block[b], &other = scene.block[c];
-        if (one.assembly != other.assembly && are_neighbours(one, other)) {
+        if (one.assembly != other.assembly && are_neighbours(rules, scene, b, c)) {
           one.assembly = other.assembly = std::min(one.assembly, other.assembly);
           changed = true;
         }
@@ -69,7 +73,7 @@ void keep_first_blocks(const AssemblyRules& rules, Scene& scene, int blocks) {
       while (end >= 0 && end < blocks) {
         end = scene.block[end].next;
       }
-      label_connected(scene, from.first, end);
+      label_connected(rules, scene, from.first, end);
       std::copy_n(scene.block, blocks, scene.blocks_before);
       for (int b = from.first; b != end; b = scene.blocks_before[b].next) {
         if (scene.block[b].assembly == b) {

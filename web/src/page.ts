@@ -17,6 +17,7 @@ import {
   text,
   withDefault,
 } from "./check";
+import type { Square } from "./polyomino";
 
 const FORMAT = "driftwalk page";
 const VERSION = 1;
@@ -27,8 +28,18 @@ const pair: Check<[number, number]> = (value, where) => {
   return ends as [number, number];
 };
 
-/** The sketch of an outcome class: lower left corners of its squares, y upwards, in sides of a block. */
-const squares = list(pair);
+/**
+ * The sketch of an outcome class: lower left corners of its squares, y upwards, in sides of a block. A third number, 1,
+ * makes a disc of it.
+ */
+const square: Check<Square> = (value, where) => {
+  const numbers = list(number)(value, where);
+  if (numbers.length !== 2 && numbers.length !== 3) {
+    throw new PageError(`'${where}' has ${numbers.length} numbers, expected 2 or 3`);
+  }
+  return numbers as unknown as Square;
+};
+const squares = list(square);
 
 const arena = object({
   shape: oneOf("circle", "rectangle", "polygon"),
@@ -257,7 +268,7 @@ const replay = object({
       classes: withDefault(list(object({ time: number, class: text })), []),
     }),
   ),
-  cells: withDefault(record(squares), new Map<string, [number, number][]>()),
+  cells: withDefault(record(squares), new Map<string, Square[]>()),
 });
 
 const table = object({ ...base, columns: list(text), rows: list(list(anything)) });

@@ -1,9 +1,9 @@
-/** Sketches of outcome classes: their shapes as small squares. */
+/** Sketches of outcome classes: their shapes as small squares, or discs. */
 
 import { svg } from "./dom";
 
-/** Lower left corner of a square, y upwards, in sides of a block. */
-export type Square = readonly [x: number, y: number];
+/** Lower left corner of a square, y upwards, in sides of a block; with a third number, 1, that of a disc. */
+export type Square = readonly [x: number, y: number, disc?: number];
 
 /** Rows from top to bottom, as seen from above; larger shapes are named by theirs. */
 const SHAPES: Readonly<Record<string, string>> = {
@@ -58,13 +58,14 @@ export function drawSketch(
   const gap = Math.min(1, 0.12 * side);
   const group = svg("g", { class: "sketch" });
   if (colour !== undefined) group.style.setProperty("fill", colour);
-  for (const [left, bottom] of squares) {
+  for (const [left, bottom, disc] of squares) {
     group.append(
       svg("rect", {
         x: x + left * side + gap / 2,
         y: y + (height - bottom - 1) * side + gap / 2,
         width: side - gap,
         height: side - gap,
+        rx: disc === 1 ? (side - gap) / 2 : 0,
       }),
     );
   }

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from driftwalk import _core
 from driftwalk.assembly.lattice.join_history import LatticeWorld
 from driftwalk.assembly.lattice.joined_faces import ROUNDING
+from driftwalk.assembly.outcomes.disc_contacts import disc_class
 from driftwalk.assembly.runs.dataset import times_of
 from driftwalk.assembly.runs.plan import MOST_STEPS, make_plan, start_poses
 from driftwalk.assembly.runs.start import require_room
@@ -45,9 +46,13 @@ class _Moment:
         self.state: dict[str, npt.NDArray[Any]] = world.state()
         self.time = float(times_of(np.array(world.step), time_step=study.time_step_s))
         self._chirality = study.assembly.chirality
+        self._diameter = study.block.side_m if study.block.is_round else 0.0
 
     @cached_property
     def outcome(self) -> str:
+        if self._diameter:
+            pose, labels = self.state["pose"], self.state["assembly"]
+            return disc_class(pose, labels, diameter=self._diameter)
         return LatticeWorld.of(self.state).outcome(self._chirality)
 
 
@@ -281,6 +286,11 @@ class LiveTank:
         return self._wishes.study
 
     @property
+    def is_round(self) -> bool:
+        """Whether the blocks are discs."""
+        return self._wishes.study.block.is_round
+
+    @property
     def flow_scale(self) -> float:
         """The factor on the velocity of the water wanted last."""
         return self._wishes.flow_scale
@@ -393,8 +403,14 @@ class LiveTank:
         study = self._active.study
         lattice = LatticeWorld.of(self._world.state())
         found = self._world.advance(steps)
+        pose, diameter = self._world.state()["pose"], study.block.side_m
         times = times_of(found["step"], time_step=study.time_step_s).tolist()
         pairs, faces = (map(tuple, found[name].tolist()) for name in ("block", "face"))
         for time, blocks, joined in zip(times, pairs, faces, strict=True):
-            lattice.join(blocks, joined)
-            self._events.append(LiveEvent(time, blocks, lattice.outcome(study.assembly.chirality)))
+            if self.is_round:
+                lattice.partition.unite(blocks)
+                outcome = disc_class(pose, lattice.partition.labels, diameter=diameter)
+            else:
+                lattice.join(blocks, joined)
+                outcome = lattice.outcome(study.assembly.chirality)
+            self._events.append(LiveEvent(time, blocks, outcome))

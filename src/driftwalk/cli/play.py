@@ -27,7 +27,10 @@ FLOW_SEED = 1
 BLOCKS = 4
 
 
-@with_study_options(ASSEMBLY_KEYS, "tank_diameter", "blocks", "seed", "flow_repeat")
+@with_study_options(
+    ASSEMBLY_KEYS,
+    *("body_shape", "side", "mass", "depth", "tank_diameter", "blocks", "seed", "flow_repeat"),
+)
 def play(
     given: StudyOptions,
     run: Run = None,

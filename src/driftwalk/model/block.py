@@ -120,10 +120,15 @@ class Block(Section):
         )
 
     @property
+    def is_round(self) -> bool:
+        """Whether the body is a disc: without heading, faces and lattice."""
+        return self.shape == "disc"
+
+    @property
     def described(self) -> str:
         """The body in words, such as "block of side 3 cm"."""
         side = f"{100 * self.side_m:.4g}"
-        if self.shape == "disc":
+        if self.is_round:
             return f"disc of diameter {side} cm"
         if self.width_m is not None:
             return f"rectangle of {side} x {100 * self.width_m:.4g} cm"

@@ -138,6 +138,8 @@ def _scene(motion: xr.Dataset, run: int) -> _Scene:
     place = np.stack([one[name].values for name in "xy"], axis=-1, dtype=np.float64)
     if not np.isfinite(place).all(axis=-1).any():
         raise InputError("no sample holds a position: there is nothing to film")
+    if motion.attrs.get("block_shape") == "disc":
+        one = one.assign(theta=one["theta"] * np.nan)
     color = one["assembly"].values if "assembly" in one else np.arange(one.sizes[bodies])
     color = np.broadcast_to(color, place.shape[:2])
     side = motion.attrs.get("block_side_m")

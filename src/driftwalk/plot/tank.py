@@ -222,7 +222,8 @@ def block_corners(dataset: xr.Dataset) -> Floats:
     Returns
     -------
     numpy.ndarray, shape (..., block, 4, 2)
-        Corners [cm], counter-clockwise from the one between the faces -x and -y.
+        Corners [cm], counter-clockwise from the one between the faces -x and -y; of discs 48 points
+        of the outline.
 
     Raises
     ------
@@ -239,6 +240,9 @@ def block_corners(dataset: xr.Dataset) -> Floats:
         for name in POSES[:3]
     )
     own = half * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    if dataset.attrs.get("block_shape") == "disc":
+        angle = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
+        own = half * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     cos, sin = np.cos(theta)[..., None], np.sin(theta)[..., None]
     corner_x = CM_PER_M * x[..., None] + cos * own[:, 0] - sin * own[:, 1]
     corner_y = CM_PER_M * y[..., None] + sin * own[:, 0] + cos * own[:, 1]

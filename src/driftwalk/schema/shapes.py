@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import Final
 
+from driftwalk.schema.contact_graphs import discs_of
+
 Cell = tuple[int, int]
 Cells = tuple[Cell, ...]
 
@@ -48,7 +50,9 @@ def short_class(name: str) -> str:
     """
     if len(name) <= LONGEST_CLASS:
         return name
-    sizes = [NAMED_SHAPES.get(shape, shape).count("x") for shape in name.split("+")]
+    sizes = [
+        discs_of(shape) or NAMED_SHAPES.get(shape, shape).count("x") for shape in name.split("+")
+    ]
     times = {size: sizes.count(size) for size in sizes}
     return "sizes " + "+".join(f"{n}×{size}" if n > 1 else f"{size}" for size, n in times.items())
 

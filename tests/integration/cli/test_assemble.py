@@ -157,6 +157,19 @@ def test_from_a_flow_field(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_discs_assemble_and_have_a_page(tmp_path: Path) -> None:
+    words = ["--flow", FLOW, "--body-shape", "disc:4cm", "--mass", "24g", *SIZE]
+    done = here("assemble", *words, "--json", "-o", tmp_path / "discs")
+    assert done.code == 0, done.err
+    printed = json.loads(done.out)
+    assert printed["hidden_face_drag"] == "full"
+    classes = set(printed["proportions"])
+    assert classes & {"chain3", "chain4", "chain3+1", "star4"}
+    assert not classes & {"I", "L3", "T", "L3+1"}
+    assert here("report", tmp_path / "discs", "-o", tmp_path / "page.html").code == 0
+
+
+@pytest.mark.slow
 def test_the_answer_for_people_stands_side_by_side(calibrated: Path, tmp_path: Path) -> None:
     done = here("assemble", calibrated, *SIZE, "-o", tmp_path / "run")
     assert done.code == 0, done.err
@@ -264,6 +277,8 @@ def test_a_calibration_without_bootstrap_gives_one_distribution(
         (["--hidden-face-drag", "2"], "--hidden-face-drag over"),
         (["--confidence", "1"], "--confidence over"),
         (["--side", "40cm"], "the block does not fit"),
+        (["--body-shape", "disc:3cm", "--latching", "connector"], "discs have no faces"),
+        (["--body-shape", "rectangle:4x2cm"], "squares and discs assemble"),
         (["--seed=-1"], "--seed"),
     ],
 )

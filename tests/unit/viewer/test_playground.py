@@ -59,6 +59,25 @@ def test_values_that_a_knob_takes(name: str, value: Any, read: Any) -> None:
     assert (found, type(found)) == (read, type(read))
 
 
+def test_a_tank_of_discs_has_no_faces_and_no_headings() -> None:
+    study = dw.apply_overrides(Study(), {"block.shape": "disc:4cm", "block.mass_kg": 0.024})
+    source = PlaySource(study, dw.tank30_flow(), blocks=6)
+    message = source.greeting()[0]
+    source.tank.advance(60.0)
+    controls = next(one for one in message["page"]["sections"] if one["kind"] == "controls")
+    items = {item["name"]: item for item in controls["items"]}
+    assert "hidden_face_drag" not in items
+    assert items["latching"]["choices"] == ["collision", "none"]
+    now = source._tank_message()
+    assert now["theta"] == [None] * 6
+    assert now["outcome"] == source.tank.outcome
+    line = frame_line(source.tank, 0, source.tank.events())
+    assert line["joined"] == []
+    assert {body["theta_rad"] for body in line["bodies"]} == {None}
+    assert line["events"][-1]["outcome"] == source.tank.outcome
+    json.dumps(line, allow_nan=False)
+
+
 @pytest.mark.parametrize(
     ("name", "value"),
     [

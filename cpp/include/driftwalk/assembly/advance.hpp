@@ -5,6 +5,7 @@
 
 #include "driftwalk/assembly/member.hpp"
 #include "driftwalk/physics/drag.hpp"
+#include "driftwalk/physics/panels.hpp"
 #include "driftwalk/physics/physics.hpp"
 #include "driftwalk/physics/water.hpp"
 
@@ -93,7 +94,9 @@ inline void sum_noise(const Physics<Real, T, Law>& physics, int half, Member<Rea
 template <class Real, class T, class Law>
 inline void add_water(const Physics<Real, T, Law>& physics, Real x, Real y, const Axes<Real>& axes,
                       const Arm<Real>& arm, Sums<Real>& sums) {
-  const Motion<Real> water = water_acceleration(physics.water, physics.block, x, y, axes);
+  const Motion<Real> water = physics.shape.panel_count > 0
+                                 ? water_acceleration(physics.water, physics.shape, axes, x, y)
+                                 : water_acceleration(physics.water, physics.block, x, y, axes);
   const Real per_mass = physics.world.drag_per_mass, per_inertia = physics.world.drag_per_inertia;
   sums.part[0] = sums.part[0] * per_mass + water.vx;
   sums.part[1] = sums.part[1] * per_mass + water.vy;
@@ -122,6 +125,31 @@ inline void blend_hidden(const Physics<Real, T, Law>& physics, Real x, Real y,
   drag.conductance = drag.conductance + (full.conductance - drag.conductance) * share;
 }
 
+// Drag of a block in its assembly, about its own centre. Of discs none hides another: the sum over
+// the panels of each is that of a disc alone, not inlined for the squares' sake.
+template <class Real, class T, class Law>
+[[gnu::noinline]] DragSums<Real> drag_of_disc(const Physics<Real, T, Law>& physics, Real x, Real y,
+                                              const Axes<Real>& axes, const Motion<Real>& own) {
+  return panel_sums(physics.law, physics.shape, physics.flow, x, y, axes, own);
+}
+
+template <class Real, class T, class Law>
+inline DragSums<Real> drag_of_member(const Physics<Real, T, Law>& physics, Real x, Real y,
+                                     const Axes<Real>& axes, const Motion<Real>& own,
+                                     const Member<Real>& m) {
+  if (physics.shape.panel_count > 0) {
+    return drag_of_disc(physics, x, y, axes, own);
+  }
+  const Real covered{static_cast<T>(closing_where_covered)};
+  DragSums<Real> drag =
+      drag_sums(physics.law, physics.block, physics.flow, x, y, axes, own,
+                [&](int face, Real closing) { return select(m.covered[face], covered, closing); });
+  if (physics.hidden_share > T(0)) {
+    blend_hidden(physics, x, y, axes, own, m, drag);
+  }
+  return drag;
+}
+
 // Drag of a block half a step ahead, about its assembly's centre of mass.
 template <class Real, class T, class Law>
 inline void feel_drag(const Physics<Real, T, Law>& physics, Member<Real>& m, Sums<Real>& sums) {
@@ -132,13 +160,8 @@ inline void feel_drag(const Physics<Real, T, Law>& physics, Member<Real>& m, Sum
   const Real arm_y = m.offset_x * axes.sine + m.offset_y * axes.cosine;
   const Motion<Real> own{m.ahead.vx - m.ahead.omega * arm_y, m.ahead.vy + m.ahead.omega * arm_x,
                          m.ahead.omega};
-  const Real covered{static_cast<T>(closing_where_covered)};
-  DragSums<Real> drag = drag_sums(
-      physics.law, physics.block, physics.flow, ahead.pose.x + arm_x, ahead.pose.y + arm_y, axes,
-      own, [&](int face, Real closing) { return select(m.covered[face], covered, closing); });
-  if (physics.hidden_share > T(0)) {
-    blend_hidden(physics, ahead.pose.x + arm_x, ahead.pose.y + arm_y, axes, own, m, drag);
-  }
+  const DragSums<Real> drag =
+      drag_of_member(physics, ahead.pose.x + arm_x, ahead.pose.y + arm_y, axes, own, m);
   sums.part[0] = drag.force_x;
   sums.part[1] = drag.force_y;
   sums.part[2] = drag.torque + (arm_x * drag.force_y - arm_y * drag.force_x);
@@ -160,7 +183,10 @@ inline void find_arm(Member<Real>& m) {
 template <class Real, class T, class Law>
 inline void finish_member(const Physics<Real, T, Law>& physics, const Real* total,
                           Member<Real>& m) {
-  const T half = T(0.5) * physics.step.dt, turning = turning_share(physics.block) * half;
+  const T half = T(0.5) * physics.step.dt;
+  const T turning =
+      (physics.shape.panel_count > 0 ? physics.shape.turning_share : turning_share(physics.block)) *
+      half;
   const Real per_mass = physics.world.drag_per_mass, per_inertia = physics.world.drag_per_inertia;
   // Where the water pushes, the sums are accelerations.
   const bool done = physics.water.count > 0;

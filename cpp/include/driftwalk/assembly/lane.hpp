@@ -121,6 +121,7 @@ inline void fill_scene(const AssemblyRules& rules, const PackMemory<Real>& pack,
     block.cell_y = book.cell_y;
     block.quarter = book.quarter;
     block.joined = book.joined;
+    block.turn = book.turn;
     block.offset_x = get(m.offset_x, lane);
     block.offset_y = get(m.offset_y, lane);
     assembly.blocks = 0;
@@ -186,9 +187,10 @@ inline void read_block(const AssemblyRules& rules, const Scene& scene, const Pac
   put(m.arm.y, lane, block.y - body.y);
   put(m.x, lane, block.x);
   put(m.y, lane, block.y);
-  pack.book(b, lane) = {
-      static_cast<std::int16_t>(block.cell_x), static_cast<std::int16_t>(block.cell_y),
-      static_cast<std::uint8_t>(block.quarter), static_cast<std::uint8_t>(block.joined)};
+  pack.book(b, lane) = {static_cast<std::int16_t>(block.cell_x),
+                        static_cast<std::int16_t>(block.cell_y),
+                        static_cast<std::uint8_t>(block.quarter),
+                        static_cast<std::uint8_t>(block.joined), block.turn};
   cover_faces(rules, pack, b, lane);
 }
 
@@ -204,7 +206,8 @@ inline void read_scene(const AssemblyRules& rules, const Scene& scene, const Pac
 template <class Real, class T>
 inline T own_angle(const PackMemory<Real>& pack, int block, int lane) {
   const T turned = get(pack.members[block].pose.theta, lane) +
-                   T(pack.book(block, lane).quarter) * static_cast<T>(pi_value / 2);
+                   T(pack.book(block, lane).quarter) * static_cast<T>(pi_value / 2) +
+                   static_cast<T>(pack.book(block, lane).turn);
   const T turn = static_cast<T>(2 * pi_value), half = static_cast<T>(pi_value);
   return turned > half ? turned - turn : turned;
 }

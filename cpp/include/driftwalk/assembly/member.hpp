@@ -48,6 +48,7 @@ struct Sums {
 struct BlockBook {
   std::int16_t cell_x, cell_y;
   std::uint8_t quarter, joined;
+  double turn = 0;
 };
 
 // Where the world of a lane is in its run.

@@ -9,14 +9,15 @@ DRIFTWALK_LANES_BEGIN
 template <class T>
 struct NearRules {
   T half_side;
+  bool round;
   T reach;          // no pair farther apart than this touches or latches [m]
   bool connectors;  // whether faces latch at a distance
   T connector_sine; // of the largest angle between two faces that latch
   T connector_gap;  // square of the largest distance between their centres [m^2]
 
   explicit NearRules(const AssemblyRules& rules)
-      : half_side(static_cast<T>(rules.side / 2)),
-        reach(static_cast<T>(rules.side * 1.4142135623730951)),
+      : half_side(static_cast<T>(rules.side / 2)), round(rules.round),
+        reach(static_cast<T>(rules.round ? rules.side + 1e-7 : rules.side * 1.4142135623730951)),
         connectors(rules.latching == Latching::connector), connector_sine(1), connector_gap(0) {
     if (!connectors) {
       return;
@@ -38,6 +39,9 @@ struct NearRules {
 template <class Real, class T>
 inline auto may_meet(const NearRules<T>& rules, Real dx, Real dy, const Axes<Real>& a,
                      const Axes<Real>& b) -> typename Numbers<Real>::Bool {
+  if (rules.round) {
+    return dx * dx + dy * dy < Real(rules.reach * rules.reach);
+  }
   const T h = rules.half_side;
   const Real across_a = abs(dx * a.cosine + dy * a.sine);
   const Real up_a = abs(dy * a.cosine - dx * a.sine);

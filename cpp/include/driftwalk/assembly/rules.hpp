@@ -15,6 +15,7 @@ enum class Latching : int { none = 0, collision = 1, connector = 2 };
 struct AssemblyRules {
   int blocks = 1;
   double side = 0, mass = 0, inertia = 0; // of one block
+  bool round = false;                     // discs of this diameter instead of squares
   // wall, as in BatchModel
   double radius = 0;
   const PreparedEdge<double>* edges = nullptr;

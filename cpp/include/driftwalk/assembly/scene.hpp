@@ -17,6 +17,7 @@ struct SceneBlock {
   int cell_x, cell_y;        // on the assembly's lattice
   int quarter;               // its own frame is the assembly's turned by this many quarter turns
   unsigned joined;           // bit f: face f (of the assembly's frame) has a neighbour
+  double turn;               // of a disc, in place of the quarter turns [rad], 0 to 2 pi
   double offset_x, offset_y; // from the centre of mass, in the assembly's frame [m]
   double x, y;               // position [m]
 };
@@ -74,6 +75,9 @@ struct Scene {
 inline constexpr int most_cells_per_side = 64;
 // Lists of near pairs reach this many sides farther than what touches or latches.
 inline constexpr double pair_skin_sides = 0.7;
+// Discs of one assembly are in contact up to this gap, in diameters; chosen by hand: it is what two
+// of them move in a time step.
+inline constexpr double contact_gap = 0.01;
 // Up to this many blocks every pair is looked at; beyond, lists of near pairs.
 inline constexpr int most_blocks_all_pairs = 24;
 

@@ -48,8 +48,8 @@ inline auto push_corner(const Contact<Real>& corner, T tolerance,
 }
 
 // The same for the corners of one of its blocks, each seen from where the last one has led.
-template <class Real, class T>
-inline auto push_member(const WallView<T>& wall, T h, T tolerance,
+template <class Real, class T, class Half>
+inline auto push_member(const WallView<T>& wall, Half h, T tolerance,
                         typename Numbers<Real>::Bool lanes, const Axes<Real>& axes,
                         const Arm<Real>& arm, Pose<Real>& pose) -> typename Numbers<Real>::Bool {
   Contact<Real> first, second;
@@ -96,8 +96,8 @@ inline void take_back(Member<Real>* members, int blocks, int block, int lane) {
 
 // What spans the tank and has turned into its walls cannot be pushed inside: it has not moved in
 // this step.
-template <class Real, class T>
-inline void take_back_jammed(const WallView<T>& wall, T h, typename Numbers<Real>::Bool lanes,
+template <class Real, class T, class Half>
+inline void take_back_jammed(const WallView<T>& wall, Half h, typename Numbers<Real>::Bool lanes,
                              Member<Real>* members, int blocks) {
   constexpr T tolerance = T(1e-4);
   for (int b = 0; b < blocks; ++b) {
@@ -114,8 +114,8 @@ inline void take_back_jammed(const WallView<T>& wall, T h, typename Numbers<Real
 
 // One corner's way inward can lead another block of the assembly outward: go round until none is
 // outside. Only the given lanes move, so that no lane depends on its neighbours.
-template <class Real, class T>
-inline void push_members_inside(const WallView<T>& wall, T h, typename Numbers<Real>::Bool lanes,
+template <class Real, class T, class Half>
+inline void push_members_inside(const WallView<T>& wall, Half h, typename Numbers<Real>::Bool lanes,
                                 Member<Real>* members, int blocks) {
   constexpr int most_rounds = 16;
   constexpr T tolerance = T(1e-6);
@@ -137,10 +137,9 @@ inline void push_members_inside(const WallView<T>& wall, T h, typename Numbers<R
   take_back_jammed(wall, h, lanes, members, blocks);
 }
 
-template <class Real, class T, class Law>
-inline void meet_walls(const Physics<Real, T, Law>& physics, Member<Real>* members, int blocks) {
-  const WallView<T>& wall = physics.wall;
-  const T h = physics.block.half_side;
+// `h` is half the side of a block, or its disc.
+template <class Real, class T, class Half>
+inline void meet_walls(const WallView<T>& wall, Half h, Member<Real>* members, int blocks) {
   const Real zero{T(0)};
   auto in_assemblies = zero > zero;
   for (int b = 0; b < blocks; ++b) {
@@ -163,6 +162,15 @@ inline void meet_walls(const Physics<Real, T, Law>& physics, Member<Real>* membe
   for (int b = 0; b < blocks; ++b) {
     members[b].x = members[b].pose.x + members[b].arm.x;
     members[b].y = members[b].pose.y + members[b].arm.y;
+  }
+}
+
+template <class Real, class T, class Law>
+inline void meet_walls(const Physics<Real, T, Law>& physics, Member<Real>* members, int blocks) {
+  if (physics.shape.disc_radius > T(0)) {
+    meet_walls(physics.wall, Disc<T>{physics.shape.disc_radius}, members, blocks);
+  } else {
+    meet_walls(physics.wall, physics.block.half_side, members, blocks);
   }
 }
 

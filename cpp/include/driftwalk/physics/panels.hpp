@@ -70,8 +70,8 @@ inline DragSums<Real> panel_sums(const Law& law, const BodyShape<T>& shape, cons
   return sums;
 }
 
-// As water_acceleration of a block: the mean of Du/Dt at four points with the second moments of the
-// body's area, and its mean moment about the centre over their mean squared distance.
+// As water_acceleration of a block: the weighted mean of Du/Dt at the body's points, and its mean
+// moment about the centre over their mean squared distance.
 template <class Real, class T>
 inline Motion<Real> water_acceleration(const WaterView<T>& water, const BodyShape<T>& shape,
                                        const Axes<Real>& axes, Real x, Real y) {
@@ -86,15 +86,17 @@ inline Motion<Real> water_acceleration(const WaterView<T>& water, const BodyShap
       nodes.lanes = &water.lanes->table[k];
       load_lanes(water.lanes->part[k], part);
     }
-    for (const Corner<T>& point : shape.points) {
+    for (int p = 0; p < shape.point_count; ++p) {
+      const WaterPoint<T>& point = shape.points[p];
       const Arm<Real> r = turned(point.x, point.y, axes);
       const Arm<Real> at = flow_at(nodes, centre_x + r.x, centre_y + r.y);
-      sums.vx = sums.vx + at.x * part;
-      sums.vy = sums.vy + at.y * part;
-      sums.omega = sums.omega + (r.x * at.y - r.y * at.x) * part;
+      const Real counts = part * point.weight;
+      sums.vx = sums.vx + at.x * counts;
+      sums.vy = sums.vy + at.y * counts;
+      sums.omega = sums.omega + (r.x * at.y - r.y * at.x) * counts;
     }
   }
-  const T mean = T(0.25) * nodes.unit;
+  const T mean = nodes.unit;
   return {sums.vx * (mean * water.push), sums.vy * (mean * water.push),
           sums.omega * (mean * shape.per_radius_square * water.spin)};
 }
@@ -154,8 +156,9 @@ inline auto leave_wall(const WallView<T>& wall, const BodyShape<T>& shape, Real 
 template <class Real, class T>
 inline auto meet_wall(const WallView<T>& wall, const BodyShape<T>& shape, Real per_inertia,
                       Pose<Real>& pose, Motion<Real>& motion) -> typename Numbers<Real>::Bool {
+  const T reach = shape.reach * T(reach_margin);
   if (wall.radius > T(0)) {
-    const T inner = max(wall.radius - shape.reach, T(0));
+    const T inner = max(wall.radius - reach, T(0));
     const Real square = pose.x * pose.x + pose.y * pose.y;
     const auto near = square > Real(inner * inner);
     if (!any(near)) {
@@ -174,7 +177,7 @@ inline auto meet_wall(const WallView<T>& wall, const BodyShape<T>& shape, Real p
     for (int e = 0; e < wall.edge_count; ++e) {
       const PreparedEdge<T>& edge = wall.edges[e];
       const Real along = pose.x * edge.normal_x + pose.y * edge.normal_y;
-      if (any(along > Real(edge.distance - shape.reach))) {
+      if (any(along > Real(edge.distance - reach))) {
         const auto measure = [&](Contact<Real>& c) { measure_edge(c, edge, pose.x, pose.y); };
         now = now | leave_wall(wall, shape, per_inertia, Real(edge.normal_x), Real(edge.normal_y),
                                measure, pose, motion);

@@ -162,6 +162,24 @@ inline Real arm_y(Real y, const Arm<Real>& arm) {
   return y + arm.y;
 }
 
+// A round block: it touches a wall at one point.
+template <class T>
+struct Disc {
+  T radius;
+};
+
+// How far a block reaches from its centre, from half its side; of a disc a little more. Rounding
+// must not decide whether a lane that touches is looked at: that would depend on its neighbours.
+inline constexpr double reach_margin = 1.001;
+template <class T>
+inline T reach_of(T h) {
+  return h * T(root_two);
+}
+template <class T>
+inline T reach_of(const Disc<T>& disc) {
+  return disc.radius * T(reach_margin);
+}
+
 // The two corners that can touch, given the direction (nx, ny) of the wall seen from the block's
 // centre; from the centre of mass.
 template <class Real, class T, class Lever>
@@ -176,6 +194,17 @@ inline void leading_corners(Real nx, Real ny, T h, const Axes<Real>& axes, const
   first.ry = arm_y(s1 * axes.sine + s2 * axes.cosine, arm);
   second.rx = arm_x(f1 * axes.cosine - f2 * axes.sine, arm);
   second.ry = arm_y(f1 * axes.sine + f2 * axes.cosine, arm);
+}
+
+// Of a disc the one point, and the one across, which is clear of the wall.
+template <class Real, class T, class Lever>
+inline void leading_corners(Real nx, Real ny, const Disc<T>& disc, const Axes<Real>&,
+                            const Lever& arm, Contact<Real>& first, Contact<Real>& second) {
+  const Real scale = Real(disc.radius) / max(sqrt(nx * nx + ny * ny), Real(T(1e-9)));
+  first.rx = arm_x(nx * scale, arm);
+  first.ry = arm_y(ny * scale, arm);
+  second.rx = arm_x(-nx * scale, arm);
+  second.ry = arm_y(-ny * scale, arm);
 }
 
 template <class Real, class T>
@@ -204,8 +233,8 @@ inline void push_out(const Contact<Real>& c, Pose<Real>& pose) {
 
 // Between edges that meet at less than a right angle, leaving one can mean entering the next: go
 // round until all are clear. Lanes that are clear stay as they are, bit for bit.
-template <class Real, class T, class Lever>
-inline void push_inside_edges(const WallView<T>& wall, T h, const Axes<Real>& axes,
+template <class Real, class T, class Half, class Lever>
+inline void push_inside_edges(const WallView<T>& wall, Half h, const Axes<Real>& axes,
                               const Lever& arm, Pose<Real>& pose) {
   constexpr int most_rounds = 16;
   Contact<Real> first, second;
@@ -225,8 +254,8 @@ inline void push_inside_edges(const WallView<T>& wall, T h, const Axes<Real>& ax
 }
 
 // Of the circle, both corners; returns where one was farther outside than `tolerance`.
-template <class Real, class T, class Lever>
-inline auto push_inside_circle(const WallView<T>& wall, T h, const Axes<Real>& axes,
+template <class Real, class T, class Half, class Lever>
+inline auto push_inside_circle(const WallView<T>& wall, Half h, const Axes<Real>& axes,
                                const Lever& arm, T tolerance, Pose<Real>& pose) ->
     typename Numbers<Real>::Bool {
   Contact<Real> first, second;
@@ -250,10 +279,10 @@ struct CircleContacts {
 
 // The second corner is measured later, where the first touches. `axes_of(angle)` gives the block's
 // axes.
-template <class Real, class T, class Lever, class AxesOf>
-inline void find_circle(const WallView<T>& wall, T h, const Lever& arm, const AxesOf& axes_of,
+template <class Real, class T, class Half, class Lever, class AxesOf>
+inline void find_circle(const WallView<T>& wall, Half h, const Lever& arm, const AxesOf& axes_of,
                         const Pose<Real>& pose, CircleContacts<Real>& found) {
-  const T inner = max(wall.radius - h * T(root_two), T(0));
+  const T inner = max(wall.radius - reach_of(h), T(0));
   const Real x = arm_x(pose.x, arm), y = arm_y(pose.y, arm);
   found.touched = x * x + y * y > Real(inner * inner);
   if (any(found.touched)) {
@@ -281,12 +310,12 @@ inline void leave_circle(const WallView<T>& wall, Real per_inertia, CircleContac
 }
 
 // Returns where an edge of a polygon touched the block.
-template <class Real, class T, class Lever, class AxesOf>
-inline auto meet_edges(const WallView<T>& wall, T h, Real per_inertia, const Lever& arm,
+template <class Real, class T, class Half, class Lever, class AxesOf>
+inline auto meet_edges(const WallView<T>& wall, Half h, Real per_inertia, const Lever& arm,
                        const AxesOf& axes_of, Pose<Real>& pose, Motion<Real>& motion) ->
     typename Numbers<Real>::Bool {
   const Real zero{T(0)};
-  const T reach = h * T(root_two);
+  const T reach = reach_of(h);
   Contact<Real> first, second;
   auto touched = zero > zero;
   for (int e = 0; e < wall.edge_count; ++e) {
@@ -314,8 +343,8 @@ inline auto meet_edges(const WallView<T>& wall, T h, Real per_inertia, const Lev
 
 // Returns where a wall touched the block. `pose` and `motion` are those of the body that the block
 // is part of, `per_inertia` its mass / moment of inertia; `axes_of(angle)` gives the block's axes.
-template <class Real, class T, class Lever, class AxesOf>
-inline auto meet_wall(const WallView<T>& wall, T h, Real per_inertia, const Lever& arm,
+template <class Real, class T, class Half, class Lever, class AxesOf>
+inline auto meet_wall(const WallView<T>& wall, Half h, Real per_inertia, const Lever& arm,
                       const AxesOf& axes_of, Pose<Real>& pose, Motion<Real>& motion) ->
     typename Numbers<Real>::Bool {
   if (wall.radius > T(0)) {

@@ -18,7 +18,8 @@ from driftwalk.assembly.outcomes.class_names import (
     listed_classes,
     listed_shapes,
 )
-from driftwalk.core.arrays import Bools, Integers
+from driftwalk.assembly.outcomes.disc_contacts import disc_shape, touching
+from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.schema.shapes import moved_to_origin
 
@@ -100,6 +101,48 @@ def replay_events(
     return replay.result()
 
 
+def replay_contacts(
+    event_count: npt.ArrayLike,
+    event_block: npt.ArrayLike,
+    *,
+    pose: Floats,
+    assembly: npt.ArrayLike,
+    diameter: float,
+) -> ReplayedEvents:
+    """Replay the events of simulated runs of discs, which have no lattice and no faces.
+
+    Parameters
+    ----------
+    event_count, event_block, assembly
+        As in `replay_events`.
+    pose : ndarray, shape (runs, blocks, 2 or more)
+        Columns x and y of the discs at the end [m].
+    diameter : float
+        Of a disc [m].
+
+    Raises
+    ------
+    InputError
+        As `replay_events`.
+
+    Examples
+    --------
+    >>> row = np.array([[[0.0, 0.0], [0.04, 0.0], [0.08, 0.0]]])
+    >>> made = replay_contacts([2], [[[0, 1], [0, 2]]], pose=row, assembly=[[0] * 3], diameter=0.04)
+    >>> made.classes[made.outcome[0]], [made.shapes[part] for part in made.event_shape[0, 1]]
+    ('chain3', ['2', '1', 'chain3'])
+    """
+    block, labels = _whole(event_block), _whole(assembly)
+    events = _Events(_whole(event_count), block, np.zeros_like(block))
+    end = _Lattice(np.zeros((*labels.shape, 2), np.int64), np.zeros_like(labels), labels)
+    _check_arrays(events, end)
+    replay = _DiscReplay(pose, slots=block.shape[1], diameter=diameter)
+    for event in range(int(events.number.max(initial=0))):
+        replay.apply(event, np.flatnonzero(events.number > event), events)
+    _check_end(replay.lattice, end)
+    return replay.result()
+
+
 class _Events(NamedTuple):
     number: Integers
     block: Integers
@@ -132,7 +175,7 @@ class _Names:
 class _Replay:
     """The state of all runs while their events are applied."""
 
-    def __init__(self, runs: int, blocks: int, *, slots: int, chirality: Chirality) -> None:
+    def __init__(self, runs: int, blocks: int, *, slots: int, chirality: Chirality | None) -> None:
         self.chirality = chirality
         self.blocks = blocks
         self.lattice = _Lattice(
@@ -204,7 +247,8 @@ class _Replay:
         numbers = []
         for row in codes:
             cells = tuple(divmod(code, far) for code in row[row < far * far].tolist())
-            numbers.append(self.shapes.number(name_of(moved_to_origin(cells), self.chirality)))
+            name = name_of(moved_to_origin(cells), self.chirality or "merged")
+            numbers.append(self.shapes.number(name))
         return np.array(numbers, dtype=np.int64)[inverse.reshape(-1)]
 
     def _class_numbers(self, at: Integers) -> npt.NDArray[np.int32]:
@@ -217,6 +261,24 @@ class _Replay:
             for row in worlds
         ]
         return np.array(numbers, dtype=np.int32)[inverse.reshape(-1)]
+
+
+class _DiscReplay(_Replay):
+    """The same of discs, which stay as they lie."""
+
+    def __init__(self, pose: Floats, *, slots: int, diameter: float) -> None:
+        super().__init__(*pose.shape[:2], slots=slots, chirality=None)
+        self.touch = np.array([touching(one, diameter=diameter) for one in pose])
+
+    def _align(self, at: Integers, block: Integers, face: Integers) -> None:
+        pass
+
+    def _shape_numbers(self, at: Integers, event: int, member: Bools) -> Integers:  # noqa: ARG002
+        names = [
+            disc_shape(self.touch[run][np.ix_(own, own)])
+            for run, own in zip(at, member, strict=True)
+        ]
+        return np.array([self.shapes.number(name) for name in names], dtype=np.int64)
 
 
 def rotate(cell: Integers, turn: Integers) -> Integers:

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
+from driftwalk.schema.contact_graphs import discs_of, graph_order
 from driftwalk.schema.shapes import NAMED_SHAPES, Cell, Cells, cells_of_shape, moved_to_origin
 
 Chirality = Literal["merged", "distinct"]
@@ -149,20 +150,22 @@ def shape_order(name: str) -> tuple[int, int, str, str]:
     """Return what shapes are sorted by: their size, then their place among those of that size."""
     if name in NAMED_SHAPES:
         return shape_size(name), list(NAMED_SHAPES).index(name), "", ""
+    if discs_of(name):
+        return graph_order(name)
     both = merged_shape(name), name
     merged, own = (code.translate(_BY_CELLS) for code in both)
     return shape_size(name), name.count("/"), merged, own
 
 
 def shape_size(name: str) -> int:
-    """Return the number of cells of a shape."""
-    return NAMED_SHAPES.get(name, name).count("x")
+    """Return the number of cells of a shape, or of discs of a contact graph."""
+    return discs_of(name) or NAMED_SHAPES.get(name, name).count("x")
 
 
 @lru_cache(maxsize=1 << 16)
 def merged_shape(name: str) -> str:
-    """Return the name of a shape when mirror images count as one."""
-    return name_of(cells_of_shape(name), "merged")
+    """Return the name of a shape when mirror images count as one; of discs they do anyway."""
+    return name if discs_of(name) else name_of(cells_of_shape(name), "merged")
 
 
 @lru_cache(maxsize=1 << 16)

@@ -2,7 +2,7 @@
 
 A class is the multiset of the shapes, written with the larger ones first: ``I3+1`` is a row of
 three and a single block. Classes are listed by the sizes of their shapes, the largest first, and
-then by the shapes.
+then by the shapes. Of discs a shape is a contact graph (`driftwalk.schema.contact_graphs`).
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from driftwalk.assembly.lattice.polyomino import (
     shape_size,
 )
 from driftwalk.core.errors import InputError
+from driftwalk.schema.contact_graphs import discs_of
 
 MOST_BLOCKS = 8
 """Blocks up to which all classes are listed; of more, those that occur. Chosen by hand."""
@@ -121,7 +122,8 @@ def class_shapes(name: str) -> tuple[str, ...]:
     """
     shapes = tuple(name.split("+"))
     for shape in set(shapes):
-        polyomino_cells(shape)
+        if not discs_of(shape):
+            polyomino_cells(shape)
     return shapes
 
 
@@ -234,17 +236,22 @@ def sort_classes(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def listed_classes(
-    occurred: Iterable[str], blocks: int, *, chirality: Chirality
+    occurred: Iterable[str], blocks: int, *, chirality: Chirality | None
 ) -> tuple[str, ...]:
-    """Return the classes that a dataset lists: all up to 8 blocks, else those that occurred."""
-    if blocks <= MOST_BLOCKS:
+    """Return the classes that a dataset lists: all up to 8 blocks, else those that occurred.
+
+    Those that occurred too where there is no chirality, of discs.
+    """
+    if blocks <= MOST_BLOCKS and chirality is not None:
         return outcome_classes(blocks, chirality=chirality)
     return sort_classes(occurred)
 
 
-def listed_shapes(occurred: Iterable[str], blocks: int, *, chirality: Chirality) -> tuple[str, ...]:
+def listed_shapes(
+    occurred: Iterable[str], blocks: int, *, chirality: Chirality | None
+) -> tuple[str, ...]:
     """Return the shapes that a dataset lists, the smallest first, by the same rule."""
-    if blocks <= MOST_BLOCKS:
+    if blocks <= MOST_BLOCKS and chirality is not None:
         sizes = range(1, blocks + 1)
         return tuple(name for size in sizes for name in polyominoes(size, chirality=chirality))
     return tuple(sorted(set(occurred), key=shape_order))

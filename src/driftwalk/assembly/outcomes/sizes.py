@@ -23,6 +23,7 @@ from driftwalk.assembly.outcomes.distribution import (
 from driftwalk.assembly.outcomes.survival import checked_times
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.schema.check import build_dataset
+from driftwalk.schema.contact_graphs import discs_of
 from driftwalk.schema.shapes import cells_of_shape
 
 if TYPE_CHECKING:
@@ -198,9 +199,10 @@ def _courses(
 
 def _compactness_of_runs(event_shape: Integers, shapes: list[str], size: Integers) -> Floats:
     """Return the compactness of each run that has one."""
-    # Up to three blocks, all shapes are equally compact.
-    shaped = np.where(size >= 4, size, 0)
-    weighted = shaped * np.array([compactness(name) for name in shapes])
+    # Up to three blocks, all shapes are equally compact; contact graphs have no perimeter.
+    graphs = np.array([discs_of(name) > 0 for name in shapes])
+    shaped = np.where((size >= 4) & ~graphs, size, 0)
+    weighted = np.array([n and n * compactness(one) for n, one in zip(shaped, shapes, strict=True)])
     real = event_shape[..., 2] >= 0
     total, blocks = (
         ((one[event_shape] * (-1, -1, 1)).sum(axis=2) * real).sum(axis=1)

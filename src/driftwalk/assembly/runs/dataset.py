@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.lattice.events import ReplayedEvents, replay_events
+from driftwalk.assembly.lattice.events import ReplayedEvents, replay_contacts, replay_events
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
@@ -61,7 +61,6 @@ def build_assembly(plan: Plan, arrays: Arrays, *, attrs: dict[str, Any]) -> xr.D
         "event_count": ("run", whole["event_count"]),
         "event_time": (by_event, times_of(whole["event_step"], time_step=step)),
         "event_block": (by_side, whole["event_block"]),
-        "event_face": (by_side, whole["event_face"]),
         "event_assembly": (by_side, replayed.event_assembly),
         "event_shape": ((*by_event, "part"), replayed.event_shape),
         "event_class": (by_event, replayed.event_class),
@@ -69,12 +68,14 @@ def build_assembly(plan: Plan, arrays: Arrays, *, attrs: dict[str, Any]) -> xr.D
         "completion_time": ("run", times_of(completion_step(arrays), time_step=step)),
         "end_time": ("run", times_of(whole["end_step"], time_step=step)),
         **_poses(arrays["pose"], by_block),
-        "cell": ((*by_block, "axis"), whole["cell"]),
-        "quarter": (by_block, whole["quarter"]),
         "assembly": (by_block, whole["assembly"]),
         "drag_coefficient": ("run", plan.drag_coefficient),
         "force_std": ("run", plan.force_std),
     }
+    if not plan.is_round:
+        data["event_face"] = (by_side, whole["event_face"])
+        data["cell"] = ((*by_block, "axis"), whole["cell"])
+        data["quarter"] = (by_block, whole["quarter"])
     if plan.flow_draw is not None:
         data["flow_draw"] = ("run", plan.flow_draw.astype(np.int32))
     if plan.flow_start is not None:
@@ -95,7 +96,15 @@ def build_assembly(plan: Plan, arrays: Arrays, *, attrs: dict[str, Any]) -> xr.D
 
 
 def replay_of(plan: Plan, arrays: Arrays) -> ReplayedEvents:
-    """Return what the events of runs of the native core did on the lattice."""
+    """Return what the events of runs of the native core did on the lattice, or among discs."""
+    if plan.is_round:
+        return replay_contacts(
+            arrays["event_count"],
+            arrays["event_block"],
+            pose=arrays["pose"],
+            assembly=arrays["assembly"],
+            diameter=plan.study.block.side_m,
+        )
     return replay_events(
         *(arrays[f"event_{name}"] for name in ("count", "block", "face")),
         **{name: arrays[name] for name in ("cell", "quarter", "assembly")},
@@ -152,10 +161,11 @@ def assembly_attrs(plan: Plan) -> dict[str, Any]:
         "chirality": settings.chirality,
         "latching": settings.latching,
         **(connector if settings.latching == "connector" else {}),
-        "hidden_face_drag": str(settings.hidden_face_drag),
+        "hidden_face_drag": "full" if plan.is_round else str(settings.hidden_face_drag),
         "block_restitution": settings.block_restitution,
         "block_friction": settings.block_friction,
         "block_side_m": study.block.side_m,
+        **({"block_shape": "disc"} if plan.is_round else {}),
         "arena": study.tank.to_arena_json(),
         "force_interval_s": forces.force_interval_s,
         "time_step_s": study.time_step_s,

@@ -24,6 +24,7 @@ from driftwalk.simulation.series import continued_flow, flow_starts
 if TYPE_CHECKING:
     import xarray as xr
 
+    from driftwalk.assembly.lattice.polyomino import Chirality
     from driftwalk.model import Study
 
 Backend = Literal["cpu", "reference"]
@@ -55,6 +56,16 @@ class Plan:
     law: Mapping[str, Floats] = field(default_factory=dict)
     """Drawn numbers of the force law by their keys in [forces]; the study has the others."""
 
+    @property
+    def is_round(self) -> bool:
+        """Whether the blocks are discs: they have contacts, no faces and no lattice."""
+        return self.study.block.is_round
+
+    @property
+    def chirality(self) -> Chirality | None:
+        """Whether mirror images are one class or two; None of discs, which have one."""
+        return chirality_of(self.study)
+
     def model(self) -> _core.Model:
         """Return the native core's form of the model in this flow."""
         return native_model(self.study, self.flow, np.zeros(1), Camera())
@@ -72,6 +83,11 @@ class Plan:
             "block_restitution": rules.block_restitution,
             "block_friction": rules.block_friction,
         }
+
+
+def chirality_of(study: Study) -> Chirality | None:
+    """Return whether mirror images are one class or two; None of discs, which have one."""
+    return None if study.block.is_round else study.assembly.chirality
 
 
 def make_plan(

@@ -25,24 +25,29 @@ TOUCHING_M = 1e-9
 
 
 def require_room(study: Study) -> None:
-    """Refuse blocks that are not square, and more than the tank has room for by area alone.
+    """Refuse blocks that do not assemble, and more than the tank has room for by area alone.
 
     Raises
     ------
     InputError
         Names both areas, or the shape.
     """
-    if study.block.shape != "square":
+    if study.block.shape not in ("square", "disc"):
         raise InputError(
-            f"square blocks assemble, and the body is '{study.block.shape}' (`block.shape`): start "
-            "from the fit of one square block"
+            f"squares and discs assemble, and the body is '{study.block.shape}' (`block.shape`): "
+            "start from the fit of one square block, or of a disc"
+        )
+    if study.block.is_round and study.assembly.latching == "connector":
+        raise InputError(
+            "connectors latch face to face, and discs have no faces: latching is 'collision' or "
+            "'none' for them (`assembly.latching`)"
         )
     count, side, tank = study.assembly.blocks, study.block.side_m, study.tank
     room = tank_area(tank)
-    if count * side**2 > room:
+    if count * study.block.area_m2 > room:
         raise InputError(
             f"{count} blocks of {side:g} m do not fit into the tank, a {tank.describe()}: they "
-            f"cover {count * side**2:.4g} m2, the tank {room:.4g} m2; use fewer blocks "
+            f"cover {count * study.block.area_m2:.4g} m2, the tank {room:.4g} m2; use fewer blocks "
             "(`assembly.blocks`) or a larger tank"
         )
 
@@ -112,13 +117,16 @@ def given_start(study: Study, start: npt.ArrayLike, *, runs: int) -> Floats:
 
 
 def _require_inside(study: Study, poses: Floats) -> None:
-    angle = poses[..., 2, None] + np.pi * (0.25 + 0.5 * np.arange(4))
-    reach = study.block.side_m / math.sqrt(2.0)
-    depth = inward_depth(
-        study.tank,
-        poses[..., 0, None] + reach * np.cos(angle),
-        poses[..., 1, None] + reach * np.sin(angle),
-    ).min(axis=-1)
+    if study.block.is_round:
+        depth = inward_depth(study.tank, poses[..., 0], poses[..., 1]) - study.block.side_m / 2.0
+    else:
+        angle = poses[..., 2, None] + np.pi * (0.25 + 0.5 * np.arange(4))
+        reach = study.block.side_m / math.sqrt(2.0)
+        depth = inward_depth(
+            study.tank,
+            poses[..., 0, None] + reach * np.cos(angle),
+            poses[..., 1, None] + reach * np.sin(angle),
+        ).min(axis=-1)
     beyond = np.argwhere(depth < -TOUCHING_M)
     if beyond.size:
         run, block = beyond[0]
@@ -131,7 +139,11 @@ def _require_inside(study: Study, poses: Floats) -> None:
 def _require_apart(study: Study, poses: Floats) -> None:
     for first in range(poses.shape[1]):
         for second in range(first + 1, poses.shape[1]):
-            depth = overlap_depth(poses[:, first], poses[:, second], side=study.block.side_m)
+            pair, side = (poses[:, first], poses[:, second]), study.block.side_m
+            if study.block.is_round:
+                depth = side - np.hypot(*(pair[1] - pair[0])[:, :2].T)
+            else:
+                depth = overlap_depth(*pair, side=side)
             overlapping = np.flatnonzero(depth > TOUCHING_M)
             if overlapping.size:
                 run = overlapping[0]

@@ -40,7 +40,7 @@ NOT_COMMON: Final[dict[str, tuple[str, ...]]] = {
 def reference_dataset(plan: Plan, outcomes: Outcomes) -> xr.Dataset:
     """Return the `outcome_distribution` of all realisations, with that of each."""
     assembly = plan.study.assembly
-    names = listed_classes(outcomes.occurred(), assembly.blocks, chirality=assembly.chirality)
+    names = listed_classes(outcomes.occurred(), assembly.blocks, chirality=plan.chirality)
     count = outcomes.table(names)
     runs = count.sum(axis=1)
     if not runs.all():
@@ -143,7 +143,7 @@ def _map_classes(settings: Settings, outcomes: Outcomes, reference: xr.Dataset) 
         name
         for blocks in {world.study.assembly.blocks for world in settings.worlds}
         # Beyond 8 blocks those that occurred are all there is to list.
-        for name in listed_classes((), blocks, chirality=first.chirality)
+        for name in listed_classes((), blocks, chirality=settings.worlds[0].chirality)
     ]
     return sort_classes([*listed, *outcomes.occurred(), *map(str, reference["class"].values)])
 

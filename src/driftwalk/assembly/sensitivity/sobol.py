@@ -22,6 +22,7 @@ from driftwalk.assembly.outcomes.distribution import (
     is_complete,
     sampling_variance,
 )
+from driftwalk.assembly.runs.plan import chirality_of
 from driftwalk.assembly.sensitivity.settings import (
     FIRST_TRIALS,
     KEYS,
@@ -445,7 +446,7 @@ def _indices(study: Study, design: xr.Dataset, outcomes: Outcomes) -> xr.Dataset
     import xarray as xr
 
     assembly = study.assembly
-    names = listed_classes(outcomes.occurred(), assembly.blocks, chirality=assembly.chirality)
+    names = listed_classes(outcomes.occurred(), assembly.blocks, chirality=chirality_of(study))
     count = outcomes.table(names)
     runs = count.sum(axis=1)
     short = np.flatnonzero(runs < 2)

@@ -27,7 +27,7 @@ FOUND_BY_A_RUN: Final = (*SEARCHED, "forces.force_interval_s")
 CONNECTOR: Final = ("assembly.connector_distance_m", "assembly.connector_axis_rad")
 """Parameters of the latching rule "connector" alone."""
 RUN_NAMES: Final = (
-    *("blocks", "duration", "tank_diameter", "side", "mass", "depth"),
+    *("blocks", "duration", "tank_diameter", "body_shape", "side", "mass", "depth"),
     *("drag_coefficient", "force_std", "force_interval"),
     *("wall_friction", "wall_restitution", "time_step"),
     *("latching", "connector_distance", "connector_axis", "hidden_face_drag", "chirality"),

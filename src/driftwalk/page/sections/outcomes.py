@@ -21,23 +21,25 @@ from driftwalk.page.parts import (
     value_of,
 )
 from driftwalk.plot.parts.assembly_labels import OTHER, class_names, classes_to_show, with_rest
-from driftwalk.plot.parts.polyomino_sketch import class_cells, is_class
+from driftwalk.plot.parts.polyomino_sketch import are_discs, class_cells, is_class
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
 @functools.cache
-def cells_of(name: str) -> list[list[float]]:
+def cells_of(name: str, *, discs: bool = False) -> list[list[float]]:
     """Return the squares in the sketch of a class, see `class_cells`; none of anything else.
+
+    A disc has a third number, 1. A class may be of discs without saying so in its name.
 
     Examples
     --------
-    >>> cells_of("2+1"), cells_of("other")
-    ([[0.0, 1.6], [1.0, 1.6], [0.0, 0.0]], [])
+    >>> cells_of("2+1"), cells_of("other"), cells_of("1", discs=True)
+    ([[0.0, 1.6], [1.0, 1.6], [0.0, 0.0]], [], [[0.0, 0.0, 1.0]])
     """
-    found: list[list[float]] = class_cells(name).tolist() if is_class(name) else []
-    return found
+    found: list[list[float]] = class_cells(name).round(3).tolist() if is_class(name) else []
+    return [[*cell, 1.0] for cell in found] if discs or are_discs(name) else found
 
 
 def classes_section(
@@ -97,9 +99,12 @@ def class_times_section(times: xr.Dataset) -> Section:
     ends = [f"proportion_{end}" for end in ("low", "high")]
     bands = [thin[end].transpose("class", "time").values if end in thin else None for end in ends]
     classes = [
-        _class_course(names[i], share[i], *(None if band is None else band[i] for band in bands))
+        _class_course(
+            names[i], share[i], *(None if band is None else band[i] for band in bands),
+            discs=any(map(are_discs, names)),
+        )
         for i in shown
-    ]
+    ]  # fmt: skip
     if len(shown) < len(names):
         classes.append(_class_course(OTHER, with_rest(share, shown)[-1], None, None))
     return section(
@@ -109,11 +114,11 @@ def class_times_section(times: xr.Dataset) -> Section:
 
 
 def _class_course(
-    name: str, share: Floats, low: Floats | None, high: Floats | None
+    name: str, share: Floats, low: Floats | None, high: Floats | None, *, discs: bool = False
 ) -> dict[str, Any]:
     return {
         "class": name,
-        "cells": cells_of(name),
+        "cells": cells_of(name, discs=discs),
         "share": numbers(share),
         "low": None if low is None else numbers(low),
         "high": None if high is None else numbers(high),
@@ -134,7 +139,7 @@ def class_items(found: xr.Dataset, names: list[str], shown: list[str]) -> list[d
 
     items = [
         {
-            "class": name, "cells": cells_of(name),
+            "class": name, "cells": cells_of(name, discs=any(map(are_discs, names))),
             "count": None if (n := column("count", name)) is None else int(n),
             "share": column("proportion", name),
             "low": column("interval_low", name), "high": column("interval_high", name),

@@ -11,6 +11,7 @@ from driftwalk.page.arrays import binary_step, encode_array
 from driftwalk.page.number_words import count, quantity
 from driftwalk.page.parts import Section, arena_part, require, required, section
 from driftwalk.page.sections.outcomes import cells_of
+from driftwalk.plot.parts.polyomino_sketch import are_discs
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -44,6 +45,8 @@ def replay_section(path: xr.Dataset, assembly: xr.Dataset | None = None) -> Sect
     note = f"{count(runs, 'run')}, a position every {_interval(thin)}, to {known_to}."
     if runs < path.sizes["run"]:
         note += f" {count(path.sizes['run'] - runs, 'more run')} in the file."
+    if path.attrs.get("block_shape") == "disc":
+        thin = thin.assign(theta=thin["theta"] * np.nan)  # drawn as discs
     made = [_run(thin.isel(run=index), index, assembly, step) for index in range(runs)]
     names = {change["class"] for run in made for change in run["classes"]}
     return section(
@@ -52,7 +55,7 @@ def replay_section(path: xr.Dataset, assembly: xr.Dataset | None = None) -> Sect
         side=side,
         time=encode_array(thin["time"].values, step=2.0**-14),
         runs=made,
-        cells={name: cells_of(name) for name in sorted(names)},
+        cells={name: cells_of(name, discs=any(map(are_discs, names))) for name in sorted(names)},
     )  # fmt: skip
 
 

@@ -1,8 +1,9 @@
-"""Sketches of outcome classes: the shapes of a class as small squares, from its name alone."""
+"""Sketches of outcome classes: their shapes as small squares or discs, from the name alone."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.plot.parts.style import BLUE, INK, axes_points
+from driftwalk.schema.contact_graphs import contacts_of, discs_of
 from driftwalk.schema.shapes import NAMED_SHAPES, cells_of_shape
 
 if TYPE_CHECKING:
@@ -26,6 +28,8 @@ LETTER_PT: Final = 0.74 * NAME_SIZE_PT
 # Space between a sketch and its name [pt].
 NAME_GAP_PT: Final = 2.0
 MAX_CELL_PT: Final = 6.0
+# Random starts from which a contact graph is laid out; with 8, all of up to 5 discs lie open.
+SKETCH_STARTS: Final = 8
 
 
 def shape_cells(shape: str) -> Integers:
@@ -61,6 +65,49 @@ def shape_cells(shape: str) -> Integers:
     return np.array(cells, dtype=np.int64)
 
 
+@lru_cache(maxsize=1024)
+def disc_places(shape: str) -> Floats:
+    """Return places for the discs of a contact graph, in diameters: those that touch are 1 apart.
+
+    The others keep away from each other as far as they can.
+
+    Parameters
+    ----------
+    shape : str
+        Name of a graph, such as ``"star4"``.
+
+    Returns
+    -------
+    numpy.ndarray, shape (discs, 2)
+        Lower left corners of the squares about the discs; the longer side lies.
+
+    Examples
+    --------
+    >>> disc_places("chain3").round(1).tolist()
+    [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]
+    """
+    from scipy.optimize import minimize
+
+    discs, contacts = discs_of(shape), contacts_of(shape)
+    first, second = np.triu_indices(discs, 1)
+    pairs = zip(first.tolist(), second.tolist(), strict=True)
+    touch = np.array([pair in contacts for pair in pairs])
+
+    def tension(flat: Floats) -> float:
+        places = flat.reshape(-1, 2)
+        apart = np.hypot(*(places[first] - places[second]).T)
+        return float((100.0 * (apart[touch] - 1.0) ** 2).sum() + (0.3 / apart[~touch]).sum())
+
+    # Of several starts the best end: from some, discs are folded over others.
+    starts = np.random.default_rng(1).normal(0.0, 1.5, (SKETCH_STARTS, 2 * discs))
+    ends = [minimize(tension, start) for start in starts]
+    places = min(ends, key=lambda end: float(end.fun)).x.reshape(-1, 2)
+    places -= places.mean(axis=0)
+    lying = places @ np.linalg.svd(places, full_matrices=False)[2].T
+    lying *= np.where(lying[-1] < 0.0, -1.0, 1.0)
+    return np.asarray(lying - lying.min(axis=0))
+
+
 def class_cells(name: str, *, orientation: Orientation = "wide") -> Floats:
     """Return the positions of the squares in the sketch of an outcome class, in sides of a block.
 
@@ -89,7 +136,10 @@ def class_cells(name: str, *, orientation: Orientation = "wide") -> Floats:
     >>> class_cells("2+1").tolist()
     [[0.0, 1.6], [1.0, 1.6], [0.0, 0.0]]
     """
-    shapes = [_turned(shape_cells(shape), orientation) for shape in name.split("+")]
+    shapes = [
+        _turned(disc_places(shape) if contacts_of(shape) else shape_cells(shape), orientation)
+        for shape in name.split("+")
+    ]
     sizes = np.array([cells.max(axis=0) + 1 for cells in shapes], dtype=np.float64)
     # Shelves that stand are the same packing with the axes exchanged.
     along = slice(None, None, -1 if orientation == "tall" else 1)
@@ -115,6 +165,7 @@ def sketch_box(
     color: Any = BLUE,
     orientation: Orientation = "wide",
     height_pt: float | None = None,
+    discs: bool | None = None,
 ) -> DrawingArea:
     """Return the sketch of a class as a box of fixed size, to be placed by an offset box.
 
@@ -130,11 +181,13 @@ def sketch_box(
         See `class_cells`.
     height_pt : float, optional
         Height of the box [pt], the sketch at its top; default: that of the sketch.
+    discs : bool, optional
+        Whether the blocks are discs; default: whether the name says so.
 
     Returns
     -------
     matplotlib.offsetbox.DrawingArea
-        The box; its artists are one square per block.
+        The box; its artists are one square or disc per block.
 
     Examples
     --------
@@ -142,19 +195,18 @@ def sketch_box(
     4
     """
     from matplotlib.offsetbox import DrawingArea
-    from matplotlib.patches import Rectangle
+    from matplotlib.patches import Circle, Rectangle
 
     cells = class_cells(name, orientation=orientation)
     width, height = sketch_size(cells) * cell_pt
     total = height if height_pt is None else height_pt
     box = DrawingArea(width, total, clip=False)
-    for x, y in cells * cell_pt:
-        box.add_artist(
-            Rectangle(
-                (x, y + total - height), cell_pt, cell_pt, facecolor=color, edgecolor="white",
-                linewidth=min(0.5, 0.12 * cell_pt),
-            )
-        )  # fmt: skip
+    style = {"facecolor": color, "edgecolor": "white", "linewidth": min(0.5, 0.12 * cell_pt)}
+    for x, y in cells * cell_pt + (0.0, total - height):
+        if are_discs(name) if discs is None else discs:
+            box.add_artist(Circle((x + cell_pt / 2, y + cell_pt / 2), cell_pt / 2, **style))
+        else:
+            box.add_artist(Rectangle((x, y), cell_pt, cell_pt, **style))
     return box
 
 
@@ -168,6 +220,7 @@ def place_sketch(
     cell_pt: float = 3.0,
     color: Any = BLUE,
     shift_pt: tuple[float, float] = (0.0, 0.0),
+    discs: bool | None = None,
 ) -> AnnotationBbox:
     """Put the sketch of a class on axes, also outside of their frame.
 
@@ -189,6 +242,8 @@ def place_sketch(
         Colour of the squares.
     shift_pt : tuple of float
         How far it lies from there, to the right and up [pt].
+    discs : bool, optional
+        See `sketch_box`.
 
     Returns
     -------
@@ -199,7 +254,7 @@ def place_sketch(
     --------
     ``place_sketch(ax, "T", (0.5, 1.05), transform="axes fraction")``
     """
-    box = sketch_box(name, cell_pt=cell_pt, color=color)
+    box = sketch_box(name, cell_pt=cell_pt, color=color, discs=discs)
     return _pinned(ax, box, xy, transform=transform, alignment=alignment, shift_pt=shift_pt)
 
 
@@ -240,6 +295,7 @@ def draw_sketches_below(ax: Axes, positions: Sequence[float], names: Sequence[st
     sizes = {
         name: sketch_size(class_cells(name, orientation="tall")) for name in names if is_class(name)
     }
+    discs = any(map(are_discs, names))
     largest = np.max([*sizes.values(), np.ones(2)], axis=0)
     side = min(MAX_CELL_PT, 0.72 * slot_pt / largest[0])
     ax.set_xticks(list(positions), labels=[""] * len(positions))
@@ -253,8 +309,11 @@ def draw_sketches_below(ax: Axes, positions: Sequence[float], names: Sequence[st
         if name in sizes:
             depth = side * float(largest[1])
             parts.append(
-                sketch_box(name, cell_pt=side, color=INK, orientation="tall", height_pt=depth)
-            )
+                sketch_box(
+                    name, cell_pt=side, color=INK, orientation="tall", height_pt=depth,
+                    discs=discs,
+                )
+            )  # fmt: skip
         if text:
             depth += NAME_GAP_PT + (len(text) * LETTER_PT if upright else NAME_SIZE_PT)
             style = {"size": NAME_SIZE_PT, "color": INK, "rotation": 90.0 if upright else 0.0}
@@ -288,10 +347,21 @@ def is_class(name: str) -> bool:
     >>> is_class("I3+1"), is_class("other")
     (True, False)
     """
-    return all(cells_of_shape(shape) for shape in name.split("+"))
+    return all(cells_of_shape(shape) or contacts_of(shape) for shape in name.split("+"))
 
 
-def _turned(cells: Integers, orientation: Orientation) -> Integers:
+def are_discs(name: str) -> bool:
+    """Return whether a class is of discs, as far as its name says so.
+
+    Examples
+    --------
+    >>> are_discs("chain3+1"), are_discs("I3+1"), are_discs("1+1")
+    (True, False, False)
+    """
+    return any(map(contacts_of, name.split("+")))
+
+
+def _turned(cells: Floats | Integers, orientation: Orientation) -> Floats | Integers:
     """Turn a shape by a quarter when its longer side does not lie as asked."""
     width, height = cells.max(axis=0) + 1
     if (width >= height) if orientation == "wide" else (height >= width):

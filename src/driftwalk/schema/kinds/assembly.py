@@ -20,12 +20,14 @@ SETTINGS: Final = (
     hidden_face_drag text: drag on joined faces
     block_restitution number: of collisions
     block_friction number: of collisions
-    block_side_m number: side of a block
+    block_side_m number: side of a block, diameter of a disc
     arena
     force_interval_s number: how long a force lasts
     time_step_s number: step of the integrator
     backend text: what computed it
     study
+attributes (blocks that are no squares):
+    block_shape text: their shape
 attributes (latching by a connector):
     connector_distance_m number: tolerance of the connector
     connector_axis_rad number: tolerance of the connector
@@ -52,14 +54,13 @@ dimensions:
     part: stayed, moved, became
     block: blocks
     axis: x, y
-    class: every class up to 8 blocks, beyond that those that occurred
-    shape: polyominoes
+    class: every class up to 8 squares; beyond that, and of discs, those that occurred
+    shape: polyominoes; contact graphs of discs
 variables:
     outcome(run) int: outcome class at the end, -1 for none: index into 'class'
     event_count(run) [1] int: number of joinings
     event_time(run event) [s]: time of the joining; end of the step; NaN where there is none
     event_block(run event side) int: blocks whose faces joined, {_ORDER}; {_NOWHERE}
-    event_face(run event side) int: {_FACES}; {_NOWHERE}
     event_assembly(run event side) int: lowest block of the assemblies that joined, {_ORDER}; \
         {_NOWHERE}
     event_shape(run event part) int: shapes of the assembly that stayed, of the one moved, of both \
@@ -73,8 +74,6 @@ variables:
     x(run block) [m]: position x of the block's centre; at the end
     y(run block) [m]: position y of the block's centre; at the end
     theta(run block) [rad]: orientation of the block, counter-clockwise from x; at the end
-    cell(run block axis) int: cell of the block on its assembly's lattice, x and y
-    quarter(run block) int: quarter turns of the block against its assembly
     assembly(run block) int: {_LOWEST}
     drag_coefficient(run) [1]: drag coefficient
     force_std(run) [N]: standard deviation of the force
@@ -83,6 +82,10 @@ variables:
     block int
     {_CLASS}
     shape(shape) text: shape of an assembly
+variables (blocks that are squares):
+    event_face(run event side) int: {_FACES}; {_NOWHERE}
+    cell(run block axis) int: cell of the block on its assembly's lattice, x and y
+    quarter(run block) int: quarter turns of the block against its assembly
 variables (drawn from a fit whose force law has it):
     linear_drag(run) [kg s-1]: linear drag of the block
     drag_power(run) [1]: power of the speed in the drag

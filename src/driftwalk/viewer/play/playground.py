@@ -12,7 +12,7 @@ from driftwalk.assembly import LiveTank
 from driftwalk.core.arrays import Floats
 from driftwalk.viewer.play.playground_base import Playground
 from driftwalk.viewer.play.settings import knobs_for, most_blocks_in, values_of
-from driftwalk.viewer.play.stream import frame_line
+from driftwalk.viewer.play.stream import frame_line, shown_angles
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -168,7 +168,7 @@ class PlaySource(Playground):
         return self._tank_now(
             tank.x,
             tank.y,
-            tank.theta,
+            shown_angles(tank),
             assembly=tank.assembly.tolist(),
             waiting=tank.waiting,
             outcome=outcome,
@@ -181,7 +181,8 @@ class PlaySource(Playground):
 
     def _subtitle(self) -> str:
         study = self.tank.study
-        return f"{study.tank.describe()}, blocks of {100.0 * study.block.side_m:g} cm"
+        body = "discs" if study.block.is_round else "blocks"
+        return f"{study.tank.describe()}, {body} of {100.0 * study.block.side_m:g} cm"
 
     def _bodies(self) -> dict[str, Any]:
         study = self.tank.study

@@ -120,6 +120,10 @@ def knobs_for(tank: LiveTank, *, most_blocks: int) -> dict[str, Knob]:
     """
     values = values_of(tank, speed=1.0)
     knobs = {knob.name: knob.reaching(values[knob.name]) for knob in KNOBS}
+    if tank.is_round:
+        # Discs have no faces.
+        del knobs["hidden_face_drag"]
+        knobs["latching"] = replace(knobs["latching"], choices=("collision", "none"))
     return knobs | {"blocks": replace(knobs["blocks"], most=most_blocks)}
 
 

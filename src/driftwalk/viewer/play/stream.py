@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -58,7 +59,7 @@ def frame_line(tank: LiveTank, number: int, events: Sequence[LiveEvent]) -> dict
     events : sequence of LiveEvent
         Joins since the last frame.
     """
-    x, y, theta, assembly = tank.x, tank.y, tank.theta, tank.assembly
+    x, y, theta, assembly = tank.x, tank.y, shown_angles(tank), tank.assembly
     columns = (x, y, theta, tank.vx, tank.vy, tank.omega)
     bodies = [
         {
@@ -66,7 +67,7 @@ def frame_line(tank: LiveTank, number: int, events: Sequence[LiveEvent]) -> dict
             "seen": True,
             "x_m": values[0],
             "y_m": values[1],
-            "theta_rad": values[2],
+            "theta_rad": values[2] if math.isfinite(values[2]) else None,
             "column_px": None,
             "row_px": None,
             "vx_m_s": values[3],
@@ -77,7 +78,8 @@ def frame_line(tank: LiveTank, number: int, events: Sequence[LiveEvent]) -> dict
         for block, values in enumerate(zip(*(c.tolist() for c in columns), strict=True))
     ]
     outcome = tank.outcome
-    joined = joined_faces(x, y, theta, assembly, side=tank.study.block.side_m)
+    side = tank.study.block.side_m
+    joined = [] if tank.is_round else joined_faces(x, y, theta, assembly, side=side)
     return {
         "type": "frame",
         "frame": number,
@@ -91,6 +93,11 @@ def frame_line(tank: LiveTank, number: int, events: Sequence[LiveEvent]) -> dict
         "dropped_frames": 0,
         "latency_s": 0.0,
     }
+
+
+def shown_angles(tank: LiveTank) -> Floats:
+    """Return the orientations of the blocks [rad]; NaN of discs, which have none and no faces."""
+    return np.full(tank.blocks, np.nan) if tank.is_round else tank.theta
 
 
 def joined_faces(

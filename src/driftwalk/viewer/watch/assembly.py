@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.assembly import outcome_distribution, world_class
+from driftwalk.assembly.outcomes.disc_contacts import disc_class
 from driftwalk.page.parts import section
 from driftwalk.page.sections.outcomes import class_items
 from driftwalk.plot.parts.assembly_labels import class_names
@@ -83,7 +84,13 @@ class RunningAssembly(Running):
     def _take(self, name: str, unit: FinishedUnit) -> None:
         sound = (unit.arrays["status"].astype(np.int64) & BROKEN) == 0
         self._runs[name] += unit.stop - unit.start
-        chirality = self._study.assembly.chirality
+        chirality, block = self._study.assembly.chirality, self._study.block
+        if block.is_round:
+            for pose, assembly in zip(
+                unit.arrays["pose"][sound], unit.arrays["assembly"][sound], strict=True
+            ):
+                self._count[name][disc_class(pose, assembly, diameter=block.side_m)] += 1
+            return
         for cell, assembly in zip(
             unit.arrays["cell"][sound], unit.arrays["assembly"][sound], strict=True
         ):

@@ -171,9 +171,9 @@ def _shares(count: Mapping[str, int]) -> dict[str, float]:
 
 def _blocks(count: Mapping[str, int]) -> int:
     """Return the number of blocks of the classes that were counted."""
-    from driftwalk.assembly import class_cells
+    from driftwalk.assembly.lattice.polyomino import shape_size
 
-    return sum(len(cells) for cells in class_cells(next(iter(count)))) if count else 0
+    return sum(map(shape_size, next(iter(count)).split("+"))) if count else 0
 
 
 def _axis(name: str, values: tuple[Any, ...]) -> dict[str, Any]:
