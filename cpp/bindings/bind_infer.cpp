@@ -33,7 +33,7 @@ driftwalk::Angle angle_of(const std::string& orientation) {
 
 // A body that is no single square block; empty for the block.
 struct BodyArrays {
-  std::optional<In<double, 2>> panels, water_points;
+  std::optional<In<double, 2>> panels, moment_points;
   double mass_by_inertia = 0;
   int symmetry = 4;
   bool round = false;
@@ -42,16 +42,15 @@ struct BodyArrays {
 driftwalk::FloatingBlock floating_block(double side, double mass, double depth, int strips,
                                         double water_density, const BodyArrays& body) {
   driftwalk::FloatingBlock block{side, mass, depth, strips, water_density};
-  if (body.panels.has_value() != body.water_points.has_value() ||
+  if (body.panels.has_value() != body.moment_points.has_value() ||
       (body.panels && (body.panels->shape(0) == 0 || body.panels->shape(1) != 5 ||
-                       !are_water_points(*body.water_points)))) {
-    throw std::invalid_argument("panels must have shape (n, 5) and water_points (1 to 9, 3)");
+                       body.moment_points->shape(0) != 4 || body.moment_points->shape(1) != 2))) {
+    throw std::invalid_argument("panels must have shape (n, 5) and moment_points (4, 2)");
   }
   if (body.panels) {
     block.panels = body.panels->data();
     block.panel_count = static_cast<int>(body.panels->shape(0));
-    block.water_points = body.water_points->data();
-    block.water_point_count = static_cast<int>(body.water_points->shape(0));
+    block.moment_points = body.moment_points->data();
     block.mass_by_inertia = body.mass_by_inertia;
     block.symmetry = body.symmetry;
     block.round = body.round;
@@ -213,13 +212,13 @@ nb::dict expected_drag(double side, double mass, double depth, int strips, doubl
                        double omega, const In<double, 2>& covariance, double quadratic,
                        double linear, double water_acceleration, double water_spin,
                        double drag_power, double drag_speed, std::optional<In<double, 2>> panels,
-                       std::optional<In<double, 2>> water_points, double mass_by_inertia,
+                       std::optional<In<double, 2>> moment_points, double mass_by_inertia,
                        int symmetry, bool round) {
   const DragModel model =
       drag_model(side, mass, depth, strips, water_density, origin_x, origin_y, spacing, columns,
                  rows, coefficients, drag_coefficient, orientation,
                  {quadratic, linear, water_acceleration, water_spin, {drag_power, drag_speed}},
-                 {std::move(panels), std::move(water_points), mass_by_inertia, symmetry, round});
+                 {std::move(panels), std::move(moment_points), mass_by_inertia, symmetry, round});
   return model.angle() == driftwalk::Angle::state
              ? response_of<3>(model, coefficients, mean, theta, omega, covariance)
              : response_of<2>(model, coefficients, mean, theta, omega, covariance);
@@ -242,7 +241,7 @@ void register_infer(nb::module_& module) {
              const std::optional<In<double, 2>>& strength, double quadratic, double linear,
              double water_acceleration, double water_spin, double drag_power, double drag_speed,
              double time_noise, double force_memory, std::optional<In<double, 2>> panels,
-             std::optional<In<double, 2>> water_points, double mass_by_inertia, int symmetry,
+             std::optional<In<double, 2>> moment_points, double mass_by_inertia, int symmetry,
              bool round) {
             const std::size_t n = time.size();
             if (x.size() != n || y.size() != n || theta.size() != n || omega.size() != n ||
@@ -261,7 +260,8 @@ void register_infer(nb::module_& module) {
                     side, mass, depth, strips, water_density, origin_x, origin_y, spacing, columns,
                     rows, coefficients, drag_coefficient, orientation,
                     {quadratic, linear, water_acceleration, water_spin, {drag_power, drag_speed}},
-                    {std::move(panels), std::move(water_points), mass_by_inertia, symmetry, round}),
+                    {std::move(panels), std::move(moment_points), mass_by_inertia, symmetry,
+                     round}),
                 {noise_intensity, position_noise, force_lever, angle_noise, largest_step,
                  longest_gap, time_noise, force_memory},
                 sensitivities);
@@ -274,7 +274,7 @@ void register_infer(nb::module_& module) {
           "sensitivities"_a = false, "strength"_a = nb::none(), "quadratic"_a = 1.0,
           "linear"_a = 0.0, "water_acceleration"_a = 0.0, "water_spin"_a = 0.0,
           "drag_power"_a = 2.0, "drag_speed"_a = 0.03, "time_noise"_a = 0.0, "force_memory"_a = 0.0,
-          "panels"_a = nb::none(), "water_points"_a = nb::none(), "mass_by_inertia"_a = 0.0,
+          "panels"_a = nb::none(), "moment_points"_a = nb::none(), "mass_by_inertia"_a = 0.0,
           "symmetry"_a = 4, "round"_a = false)
       .def_prop_ro("samples", &InnovationsFilter::samples)
       .def_prop_ro("remaining", &InnovationsFilter::remaining)
@@ -288,6 +288,6 @@ void register_infer(nb::module_& module) {
              "rows"_a, "coefficients"_a, "drag_coefficient"_a, "orientation"_a, "mean"_a, "theta"_a,
              "omega"_a, "covariance"_a, "quadratic"_a = 1.0, "linear"_a = 0.0,
              "water_acceleration"_a = 0.0, "water_spin"_a = 0.0, "drag_power"_a = 2.0,
-             "drag_speed"_a = 0.03, "panels"_a = nb::none(), "water_points"_a = nb::none(),
+             "drag_speed"_a = 0.03, "panels"_a = nb::none(), "moment_points"_a = nb::none(),
              "mass_by_inertia"_a = 0.0, "symmetry"_a = 4, "round"_a = false);
 }

@@ -284,15 +284,15 @@ void register_simulate(nb::module_& module) {
           [](Model* self, In<double, 2> edges, In<double, 3> u, In<double, 3> v,
              In<double, 1> frame_time, In<double, 1> sample_time, In<double, 2> view_edges,
              const std::string& flow_repeat, std::optional<In<double, 2>> panels,
-             std::optional<In<double, 2>> corners, std::optional<In<double, 2>> water_points,
+             std::optional<In<double, 2>> corners, std::optional<In<double, 2>> moment_points,
              const nb::kwargs& numbers) {
             new (self) Model(numbers_of(numbers), {edges, u, v, frame_time, sample_time, view_edges,
                                                    repeat_of(flow_repeat), std::move(panels),
-                                                   std::move(corners), std::move(water_points)});
+                                                   std::move(corners), std::move(moment_points)});
           },
           nb::kw_only(), "edges"_a, "u"_a, "v"_a, "frame_time"_a, "sample_time"_a, "view_edges"_a,
           "flow_repeat"_a = "hold", "panels"_a = nb::none(), "corners"_a = nb::none(),
-          "water_points"_a = nb::none(), "numbers"_a)
+          "moment_points"_a = nb::none(), "numbers"_a)
       .def_prop_ro("samples", &Model::samples);
   driftwalk::each_model_number([&](const char* name, const char*, driftwalk::Range, auto field) {
     model.def_prop_ro(name, [field](const Model& self) { return self.numbers().*field; });

@@ -52,7 +52,7 @@ struct ModelArrays {
   In<double, 1> frame_time, sample_time;
   In<double, 2> view_edges;
   driftwalk::FlowRepeat repeat;
-  std::optional<In<double, 2>> panels, corners, water_points; // of a body that is no block
+  std::optional<In<double, 2>> panels, corners, moment_points; // of a body that is no block
 };
 
 inline driftwalk::FlowRepeat repeat_of(const std::string& name) {
@@ -79,11 +79,6 @@ inline const double* starts_of(const std::optional<In<double, 1>>& start, std::s
   return start->data();
 }
 
-inline bool are_water_points(const In<double, 2>& points) {
-  return points.shape(0) > 0 && points.shape(0) <= driftwalk::most_water_points &&
-         points.shape(1) == 3;
-}
-
 inline void check(const ModelArrays& arrays) {
   const auto& u = arrays.u;
   const auto& v = arrays.v;
@@ -96,13 +91,14 @@ inline void check(const ModelArrays& arrays) {
                                 "frame_time one time per frame");
   }
   if (arrays.panels.has_value() != arrays.corners.has_value() ||
-      arrays.panels.has_value() != arrays.water_points.has_value()) {
-    throw std::invalid_argument("panels, corners and water_points go together");
+      arrays.panels.has_value() != arrays.moment_points.has_value()) {
+    throw std::invalid_argument("panels, corners and moment_points go together");
   }
   if (arrays.panels && (arrays.panels->shape(0) == 0 || arrays.panels->shape(1) != 5 ||
-                        arrays.corners->shape(1) != 2 || !are_water_points(*arrays.water_points))) {
+                        arrays.corners->shape(1) != 2 || arrays.moment_points->shape(0) != 4 ||
+                        arrays.moment_points->shape(1) != 2)) {
     throw std::invalid_argument(
-        "panels must have shape (n, 5), corners (n, 2) and water_points (1 to 9, 3)");
+        "panels must have shape (n, 5), corners (n, 2) and moment_points (4, 2)");
   }
   if (arrays.sample_time.size() == 0) {
     throw std::invalid_argument("a model has at least one sample");
@@ -124,8 +120,7 @@ public:
       model.panel_count = static_cast<int>(arrays.panels->shape(0));
       model.corners = arrays.corners->data();
       model.corner_count = static_cast<int>(arrays.corners->shape(0));
-      model.water_points = arrays.water_points->data();
-      model.water_point_count = static_cast<int>(arrays.water_points->shape(0));
+      model.moment_points = arrays.moment_points->data();
     }
     model.flow_u = arrays.u.data();
     model.flow_v = arrays.v.data();

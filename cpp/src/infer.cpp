@@ -131,7 +131,7 @@ void DragModel::make_panels(const FloatingBlock& block) {
           "mass over inertia and the symmetry of the body must be positive");
   require(!block.round || angle_ == Angle::none, "a disc has no angle");
   require(all_finite(block.panels, 5 * std::int64_t(block.panel_count)) &&
-              all_finite(block.water_points, 3 * std::int64_t(block.water_point_count)),
+              all_finite(block.moment_points, 8),
           "the panels of the body and its points must be finite");
   const int rows = (block.panel_count + 7) / 8;
   panels_.assign(std::size_t(48 * rows), 0.0);
@@ -153,19 +153,17 @@ void DragModel::make_panels(const FloatingBlock& block) {
   block_.strip_width = width;
   block_.mass_by_inertia = block.mass_by_inertia;
   block_.reach = 1.1 * reach;
-  block_.points = block.water_point_count;
+  // Where the angle is not known, points with the mean second moment of both axes.
   double square = 0;
-  for (int k = 0; k < block_.points; ++k) {
-    const double* const point = block.water_points + 3 * k;
-    std::copy_n(point, 3, block_.point[k]);
-    square += point[2] * (point[0] * point[0] + point[1] * point[1]) / 2;
+  for (int k = 0; k < 8; ++k) {
+    square += block.moment_points[k] * block.moment_points[k] / 8;
   }
-  // Where the angle is not known, four points with the mean second moment of both axes.
-  for (int k = 0; angle_ == Angle::none && !block.round && k < 4; ++k) {
-    const double reached = std::sqrt(square);
-    block_.points = 4;
-    block_.point[k][0] = k % 2 == 0 ? -reached : reached;
-    block_.point[k][1] = k < 2 ? -reached : reached;
+  block_.points = 4;
+  for (int k = 0; k < block_.points; ++k) {
+    for (int axis = 0; axis < 2; ++axis) {
+      const double even = (k >> axis & 1) != 0 ? std::sqrt(square) : -std::sqrt(square);
+      block_.point[k][axis] = angle_ == Angle::none ? even : block.moment_points[2 * k + axis];
+    }
     block_.point[k][2] = 0.25;
   }
 }

@@ -57,7 +57,7 @@ class Model:
         # of a body that is no square block: (n, 5) x, y, nx, ny, width; (n, 2); (4, 2)
         panels: _Floats | None = None,
         corners: _Floats | None = None,
-        water_points: _Floats | None = None,
+        moment_points: _Floats | None = None,
         **numbers: float,
     ) -> None: ...
     def __getattr__(self, number: str) -> float: ...

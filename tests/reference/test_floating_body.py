@@ -24,8 +24,6 @@ from single_block import (
     wrapped,
 )
 
-from driftwalk.model.bodies import Measures, rigid_body
-
 DRAG, LINEAR = 0.45, 5e-3
 BOTH = pytest.mark.parametrize(("precision", "exact"), [("double", 1.0), ("single", 10.0)])
 ADDED = pytest.mark.parametrize("added", [0.0, 0.5])
@@ -327,56 +325,3 @@ def test_joined_faces_feel_no_linear_drag(precision: str) -> None:
         way = speed * (time + np.expm1(-rate * time) / rate)
         moved = found["sample_pose"][0, -1, 0, 0] - found["sample_pose"][0, 0, 0, 0]
         assert moved == pytest.approx(way, rel=2e-3)
-
-
-def eddies(x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """Eddies of 6 x 8 cm."""
-    k, q = np.pi / 0.06, np.pi / 0.08
-    return 0.05 * np.sin(k * x) * np.cos(q * y), -0.05 * k / q * np.cos(k * x) * np.sin(q * y)
-
-
-def area_of(shape: str, size: float, width: float | None, count: int = 200) -> Any:
-    """Places of a fine grid over a body, about its centre of mass, as complex numbers."""
-    axis = ((np.arange(count) + 0.5) / count - 0.5) * size
-    grid = axis + 1j * axis[:, None]
-    if shape == "disc":
-        return grid[np.abs(grid) < size / 2]
-    if shape == "rectangle":
-        return (grid.real + 1j * grid.imag * (width or 0.0) / size).ravel()
-    return np.concatenate([grid - size / 2, grid + size / 2]).ravel()
-
-
-@pytest.mark.parametrize("theta", [0.0, 0.7])
-@pytest.mark.parametrize(
-    ("shape", "size", "width"),
-    [("disc", 0.04, None), ("rectangle", 0.04, 0.02), ("xx", 0.02, None)],
-)
-def test_water_pushes_a_body_by_the_mean_over_its_area(
-    shape: str, size: float, width: float | None, theta: float
-) -> None:
-    """Also in eddies that are hardly larger: within 1 % of the largest push."""
-    body = rigid_body(shape, Measures(size, width, 8))
-    time, place = np.array([0.0, 0.02]), 0.013 + 0.017j
-    native = model(
-        eddies, times=time, nodes=np.arange(-90, 91) * 2e-3, displaced_mass=MASS,
-        inertia=MASS * body.moment_m2, disc_radius=body.disc_radius_m, **body.arrays(),
-    )  # fmt: skip
-    start = one_world(place.real, y=place.imag, theta=theta, drag=0.0)
-    x, y, angle, _ = run(native, start)
-    # Nearly at rest, it has moved by half the acceleration times the square of the time.
-    found = 2 * (x[0, 1] - x[0, 0] + 1j * (y[0, 1] - y[0, 0])) / time[1] ** 2
-    turned = 2 * (angle[0, 1] - angle[0, 0]) / time[1] ** 2
-
-    def velocity(z: Any) -> Any:
-        u, v = eddies(z.real, z.imag)
-        return u + 1j * v
-
-    arm = area_of(shape, size, width) * np.exp(1j * theta)
-    at, h = place + arm, 1e-6
-    w = velocity(at)
-    push = w.real * (velocity(at + h) - velocity(at - h)) / (2 * h)
-    push += w.imag * (velocity(at + 1j * h) - velocity(at - 1j * h)) / (2 * h)
-    largest = np.abs(push).max()
-    assert abs(found - push.mean()) < 0.01 * largest
-    want = (arm.conj() * push).imag.mean() / (np.abs(arm) ** 2).mean()
-    assert abs(turned - want) < 0.01 * largest / np.abs(arm).mean()

@@ -213,7 +213,7 @@ def expected(
         side=0.04, mass=MASS, depth=0.04, strips=8, water_density=DENSITY, **GRID,
         coefficients=np.ascontiguousarray(coefficients), drag_coefficient=DRAG,
         orientation=orientation, mean=np.ascontiguousarray(mean), theta=0.0, omega=0.0,
-        covariance=covariance, panels=body.panels, water_points=body.water_points,
+        covariance=covariance, panels=body.panels, moment_points=body.moment_points,
         mass_by_inertia=1.0 / body.moment_m2, symmetry=max(body.symmetry, 1),
         round=shape == "disc", **given,
     )  # fmt: skip

@@ -69,31 +69,6 @@ def test_four_points_have_the_second_moments_of_the_area(shape: str, width: floa
     assert body.moment_points.mean(axis=0) == pytest.approx([0, 0], abs=1e-15)
 
 
-@pytest.mark.parametrize(("shape", "width"), [("disc", None), ("rectangle", 0.01), ("xx", None)])
-def test_means_at_the_points_of_the_water_are_exact_to_the_fifth_degree(
-    shape: str, width: float | None
-) -> None:
-    """Against moments by hand: of a disc 2 / (p + q + 2) times the mean over the angle."""
-    body = made(shape, width)
-    x, y, weight = body.water_points.T
-    half = np.array([2 * A if shape == "xx" else A, width or A]) / 2
-    angle = 2 * np.pi * (np.arange(64) + 0.5) / 64
-    for p in range(6):
-        for q in range(6 - p):
-            even = 0.0 if p % 2 or q % 2 else half[0] ** p * half[1] ** q / ((p + 1) * (q + 1))
-            if shape == "disc":
-                even = (np.cos(angle) ** p * np.sin(angle) ** q).mean() * 2 / (p + q + 2)
-                even *= (A / 2) ** (p + q)
-            assert (weight * x**p * y**q).sum() == pytest.approx(even, rel=1e-12, abs=1e-18)
-
-
-def test_points_of_the_water_have_the_second_moments_of_glued_blocks() -> None:
-    body = made("x./xx")
-    places, weight = body.water_points[:, :2], body.water_points[:, 2]
-    want = body.moment_points.T @ body.moment_points / 4
-    assert (places.T * weight) @ places == pytest.approx(want, rel=1e-12)
-
-
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
 def test_panels_close_the_outline_and_count_hidden_faces_by_their_share(share: float) -> None:
     """Of the L of three blocks eight faces are free and four are hidden."""

@@ -20,8 +20,7 @@ struct FloatingBlock {
   // size, and it looks the same after a turn by 2 pi / symmetry.
   const double* panels = nullptr;
   int panel_count = 0;
-  const double* water_points = nullptr;
-  int water_point_count = 0;
+  const double* moment_points = nullptr;
   double mass_by_inertia = 0; // [1/m^2]
   int symmetry = 4;
   bool round = false;

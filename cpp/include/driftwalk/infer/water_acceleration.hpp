@@ -5,8 +5,8 @@
 // mean over the 3 x 3 Gauss points of the square, which turn with it, and its spin 6/a^2 times the
 // mean moment about the centre. The mean is exact for polynomials of the fifth degree, the moment
 // for those of the fourth. In eddies as small as the block the moment of 2 x 2 points is 5 to 20 %
-// off, and 10 to 60 % if they do not turn (docs/explanation/likelihood.md). Another body has
-// points of its own: exact as well for a rectangle and a disc.
+// off, and 10 to 60 % if they do not turn (docs/explanation/likelihood.md). Another body has four
+// points with the second moments of its area.
 //
 // With the flow s(t) u(x, y),
 //     Du/Dt = s^2 (u . grad) u + s' u

@@ -70,8 +70,8 @@ inline DragSums<Real> panel_sums(const Law& law, const BodyShape<T>& shape, cons
   return sums;
 }
 
-// As water_acceleration of a block: the weighted mean of Du/Dt at the body's points, and its mean
-// moment about the centre over their mean squared distance.
+// As water_acceleration of a block: the mean of Du/Dt at four points with the second moments of the
+// body's area, and its mean moment about the centre over their mean squared distance.
 template <class Real, class T>
 inline Motion<Real> water_acceleration(const WaterView<T>& water, const BodyShape<T>& shape,
                                        const Axes<Real>& axes, Real x, Real y) {
@@ -86,17 +86,15 @@ inline Motion<Real> water_acceleration(const WaterView<T>& water, const BodyShap
       nodes.lanes = &water.lanes->table[k];
       load_lanes(water.lanes->part[k], part);
     }
-    for (int p = 0; p < shape.point_count; ++p) {
-      const WaterPoint<T>& point = shape.points[p];
+    for (const Corner<T>& point : shape.points) {
       const Arm<Real> r = turned(point.x, point.y, axes);
       const Arm<Real> at = flow_at(nodes, centre_x + r.x, centre_y + r.y);
-      const Real counts = part * point.weight;
-      sums.vx = sums.vx + at.x * counts;
-      sums.vy = sums.vy + at.y * counts;
-      sums.omega = sums.omega + (r.x * at.y - r.y * at.x) * counts;
+      sums.vx = sums.vx + at.x * part;
+      sums.vy = sums.vy + at.y * part;
+      sums.omega = sums.omega + (r.x * at.y - r.y * at.x) * part;
     }
   }
-  const T mean = nodes.unit;
+  const T mean = T(0.25) * nodes.unit;
   return {sums.vx * (mean * water.push), sums.vy * (mean * water.push),
           sums.omega * (mean * shape.per_radius_square * water.spin)};
 }

@@ -28,14 +28,13 @@ struct BatchModel : ModelNumbers {
   int edge_count = 0;
   // A body that is no single square block: panels (x, y, nx, ny, width) x count, of which the last
   // counts its share where the water does not quite reach; corners (x, y) x count, none of a disc;
-  // points (x, y, weight) x count at which it takes the water's acceleration. All from its centre
-  // of mass. None of them: the square block.
+  // four points (x, y) with the second moments of its area. All from its centre of mass. None of
+  // them: the square block.
   const double* panels = nullptr;
   int panel_count = 0;
   const double* corners = nullptr;
   int corner_count = 0;
-  const double* water_points = nullptr;
-  int water_point_count = 0;
+  const double* moment_points = nullptr;
   // flow on nodes [frames][rows][columns]; frame_time is increasing, one frame means steady
   const double* flow_u = nullptr;
   const double* flow_v = nullptr;

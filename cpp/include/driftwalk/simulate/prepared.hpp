@@ -35,12 +35,6 @@ struct Corner {
   T x, y; // from the centre of mass [m]
 };
 
-inline constexpr int most_water_points = 9;
-template <class T>
-struct WaterPoint {
-  T x, y, weight; // from the centre of mass [m]; of all 1
-};
-
 // A rigid body that is no single square block. Plain pointers, as in Prepared.
 template <class T>
 struct BodyShape {
@@ -48,11 +42,10 @@ struct BodyShape {
   int panel_count;          // 0: the square block
   const Corner<T>* corners; // that may touch a wall
   int corner_count;
-  T disc_radius;                           // [m]; 0: a body with corners
-  T reach;                                 // of its farthest point from the centre of mass [m]
-  T turning_share;                         // conductance for turning over that for moving [m^2]
-  WaterPoint<T> points[most_water_points]; // at which it takes the water's acceleration
-  int point_count;
+  T disc_radius;       // [m]; 0: a body with corners
+  T reach;             // of its farthest point from the centre of mass [m]
+  T turning_share;     // conductance for turning over that for moving [m^2]
+  Corner<T> points[4]; // with the second moments of its area, for the water's acceleration
   T per_radius_square; // m/I of an even body: 1 / mean squared distance of the points [1/m^2]
 };
 

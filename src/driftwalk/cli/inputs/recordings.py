@@ -182,8 +182,6 @@ def opening_note(
 
     def stated(key: str, text: str) -> str:
         same = ("block.depth", "block.depth_m") if key == "block.depth_m" else (key,)
-        if key == "block.side_m" and study.block.shape != "square":
-            same = (key, "block.shape")  # which may hold the size
         option = next((one for one in same if one in given.overrides), None)
         if key == TANK and how is not None and how.tank is not None:
             source = "--tank"

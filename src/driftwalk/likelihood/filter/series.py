@@ -151,7 +151,7 @@ class Body:
         return {
             **numbers,
             "panels": outline.panels,
-            "water_points": outline.water_points,
+            "moment_points": outline.moment_points,
             "mass_by_inertia": 1.0 / outline.moment_m2,
             "symmetry": max(outline.symmetry, 1),
             "round": outline.disc_radius_m > 0.0,

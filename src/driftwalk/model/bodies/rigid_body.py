@@ -81,35 +81,11 @@ class RigidBody:
         torque = (self.correlation(stirring_length) * (self.cells @ self.cells.T)).sum()
         return float(np.sqrt(max(torque, 0.0))) / self.force_share(stirring_length)
 
-    @property
-    def water_points(self) -> Floats:
-        """Where the body takes the water's acceleration, and weights, shape (n, 3) [m, m, 1].
-
-        A disc has seven, a rectangle nine: means over the area are exact for polynomials of the
-        fifth degree. Glued blocks have those of the rectangle with the same second moments.
-        """
-        if self.disc_radius_m:
-            # Radon's rule: the centre, and a ring at sqrt(2/3) of the radius.
-            angle = np.arange(6) * (np.pi / 3.0)
-            ring = (
-                np.sqrt(2.0 / 3.0) * self.disc_radius_m * np.array([np.cos(angle), np.sin(angle)])
-            )
-            return np.column_stack([np.insert(ring, 0, 0.0, axis=1).T, [0.25] + [0.125] * 6])
-        across = (self.moment_points[1] - self.moment_points[0]) / 2.0
-        up = -self.moment_points[0] - across
-        # Gauss' three places, in standard deviations of an even distribution.
-        places, weights = (
-            np.sqrt(1.8) * np.array([-1.0, 0.0, 1.0]),
-            np.array([5.0, 8.0, 5.0]) / 18.0,
-        )
-        points = [i * across + j * up for j in places for i in places]
-        return np.column_stack([points, np.outer(weights, weights).ravel()])
-
     def arrays(self) -> dict[str, Any]:
         """Return what the native core takes of a body that is no single square."""
         if self.is_square:
             return {}
-        names = ("panels", "corners", "water_points")
+        names = ("panels", "corners", "moment_points")
         return {name: np.ascontiguousarray(getattr(self, name)) for name in names}
 
 
