@@ -35,7 +35,7 @@ from driftwalk.assembly.outcomes.sizes import assembly_sizes
 from driftwalk.assembly.outcomes.survival import SurvivalCurve, class_times, survival_curve
 from driftwalk.assembly.recordings import classify
 from driftwalk.assembly.runs.dataset import path_recording
-from driftwalk.assembly.runs.draws import draw_parameters, has_uncertainty
+from driftwalk.assembly.runs.draws import draw_parameters, glued_quantiles, has_uncertainty
 from driftwalk.assembly.runs.run import assemble, assemble_drawn, assembly_path, check_assembly
 from driftwalk.assembly.sensitivity.run import (
     check_sensitivity,
@@ -72,6 +72,7 @@ __all__ = [
     "classify",
     "disconnected_alignment",
     "draw_parameters",
+    "glued_quantiles",
     "has_uncertainty",
     "l1_distance",
     "l1_in_floors",

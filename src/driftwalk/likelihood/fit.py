@@ -23,7 +23,7 @@ from driftwalk.likelihood.glued import (
     estimate_before,
     first_glued_point,
     glued_study,
-    stirring_facts,
+    shared_stirring,
 )
 from driftwalk.likelihood.interval_inflation import (
     open_where_undetermined,
@@ -203,13 +203,14 @@ def fit_motion(
         for rival in law.rivals:
             parameters = _with_rival(parameters, search, rival, ready)
         shape = laws.alternatives.shape_change(law.mode)
+    stirring = shared_stirring(ready, law.mode, restricted.point, before, earlier)
     facts = {
         **parameters,
         **law_facts(law, assumptions),
         **shape_facts(shape, law.tests),
         **({"flow_modes_unsettled": modes.unsettled} if modes.unsettled else {}),
         **turning,
-        **stirring_facts(ready, law.mode, restricted.point, before, earlier),
+        **stirring.facts,
         **whiteness_of(counted)._asdict(),
         **ready.facts,
         **_search_facts(law, restricted),
@@ -231,7 +232,7 @@ def fit_motion(
         beside = " and ".join(law.left_out)
         warnings.append(f"the search for {beside} has no solution and was left out")
     return described(
-        fit.assign(visited_share=((), min(shares))).assign_coords(
+        fit.assign(visited_share=((), min(shares)), **stirring.variables).assign_coords(
             warning=("warning", texts(warnings))
         )
     )

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any, Final
 from driftwalk.cli.options.study import StudyOptions, option_name
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import print_note
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.likelihood import EarlierFit
     from driftwalk.model import Study
     from driftwalk.motion import MotionModel
     from driftwalk.runs import FoundRun
@@ -152,27 +152,6 @@ def _source_from_run(folder: Path, flow_file: Path | None, given: StudyOptions) 
     return Source(chosen, field, found.uncertainty, inputs, warnings, found.not_drawn)
 
 
-def read_earlier_fit(folder: Path) -> EarlierFit:
-    """Return a finished fit with its recordings.
-
-    Raises
-    ------
-    InputError
-        When the folder holds none.
-    """
-    from driftwalk.likelihood import EarlierFit
-    from driftwalk.schema.runs import open_run_folder
-
-    run = open_run_folder(folder)
-    found, recordings = run.dataset("fit.nc"), run.recordings()
-    if found is None or not recordings:
-        raise InputError(
-            f"{folder} is no finished fit with its recording (fit.nc, recording.nc): make one with "
-            f"driftwalk fit RECORDING -o {folder}"
-        )
-    return EarlierFit(found, recordings)
-
-
 GLUED: Final = {
     "hidden_face_drag_share": "assembly.hidden_face_drag",
     "stirring_length": "forces.stirring_length_m",
@@ -180,8 +159,10 @@ GLUED: Final = {
 """Parameters of a fit of glued blocks, and the keys of a study that they are."""
 
 
-def with_glued(given: StudyOptions, folder: Path | None) -> StudyOptions:
+def with_glued(given: StudyOptions, folder: Path | None) -> tuple[StudyOptions, dict[str, Floats]]:
     """Return the options with what a fit of glued blocks says, where they do not say it.
+
+    The quantiles of these numbers come second, by their keys.
 
     Raises
     ------
@@ -189,18 +170,17 @@ def with_glued(given: StudyOptions, folder: Path | None) -> StudyOptions:
         When the run is not one of glued blocks after a fit of one block.
     """
     if folder is None:
-        return given
+        return given, {}
+    from driftwalk.assembly import glued_quantiles
+    from driftwalk.runs import read_earlier_fit
     from driftwalk.schema.answers.facts import fitted_value
     from driftwalk.schema.kinds.fit import PARAMETERS
 
     found = read_earlier_fit(folder).fit
-    known = {str(name) for name in found["parameter"].values}
-    if not set(GLUED) <= known:
-        raise InputError(
-            f"{folder} does not say what hidden faces and neighbours feel: it has to be a fit of "
-            "glued blocks after one of a single block (driftwalk fit DIMER --body-shape xx --from "
-            "FIT)"
-        )
+    try:
+        quantiles = glued_quantiles(found)
+    except InputError as error:
+        raise InputError(f"{folder}: {error}") from None
     values = {key: fitted_value(found, name) for name, key in GLUED.items()}
     said = [
         f"{PARAMETERS[name].words} {value:.2g} ({low:.2g} to {high:.2g})"
@@ -212,7 +192,8 @@ def with_glued(given: StudyOptions, folder: Path | None) -> StudyOptions:
     ]
     print_note(f"{'; '.join(said)}: from {folder}")
     kept = {key: value for key, value in values.items() if key not in given.overrides}
-    return given.and_also(kept, keys=given.keys)
+    drawn = {key: values for key, values in quantiles.items() if key in kept}
+    return given.and_also(kept, keys=given.keys), drawn
 
 
 def load_flow_for(path: Path, study: Study) -> xr.Dataset:

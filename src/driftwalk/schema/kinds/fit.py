@@ -43,6 +43,7 @@ dimensions:
     departure: numbers of departures that were tested, by name
     measured_y: nodes of a measured flow
     measured_x: nodes of a measured flow
+    stirring_quantile: equal shares of a posterior
 variables:
     estimate(parameter): estimates of the parameters; drag_coefficient C_d, force_std σ_F, \
         force_noise_intensity σ_F² times the force interval, tracking_noise; with the angle in the \
@@ -152,6 +153,8 @@ variables (a measured flow was given, and its scale is not exact):
 variables (glued blocks, after a fit of one block):
     stirring_misfit_std [1]: by how much force and torque of the body disagree on the correlation, \
         in standard deviations
+    stirring_length_quantile(stirring_quantile) [m]: length of the stirring at the middles of \
+        equal shares of its posterior
 variables (with orientations, in one flow):
     spin_correlation [1]: correlation of the block's spin with the vorticity of a first estimate \
         of the flow
