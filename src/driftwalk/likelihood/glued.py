@@ -9,8 +9,8 @@ normal law of flow and ln C_d, is the prior:
   at a distance r, the force on the body has the variance sigma² sum rho_ij, and its torque has
   sigma² sum rho_ij r_i·r_j. Noise intensity and lever of the body, against the intensity of one
   block, give rho of two blocks side by side: of a dimer q_2 / q_1 = (1 + rho) / 2 and
-  lever² = (a²/4) (1 - rho) / (1 + rho). rho has a uniform prior, and an interval of highest
-  density.
+  lever² = (a²/4) (1 - rho) / (1 + rho). Their errors go together: too strong a force comes with
+  too short a lever. rho has a uniform prior, and an interval of highest density.
 
 See docs/how-to/dimer.md.
 """
@@ -28,6 +28,7 @@ from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError, argument_text
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import Body
+from driftwalk.likelihood.interval_inflation import INFLATION
 from driftwalk.likelihood.newton import Mode
 from driftwalk.likelihood.preparation import Estimate, PreparedRecordings, estimate_of
 from driftwalk.likelihood.prior import Earlier, usual_lever
@@ -183,16 +184,18 @@ def shared_stirring(
     if before is None or earlier is None:
         return SharedStirring()
     body = ready.passes.body
+    names = ["log_intensity", *(["log_lever"] if point.log_lever is not None else [])]
+    observed = np.array([getattr(point, name) for name in names])
+    observed[0] -= before.point.log_intensity
+    # A lever of forces on each block is known as well as they are, and its error goes with theirs.
+    factors = INFLATION.without_angle if point.log_lever is None else INFLATION.with_angle
+    covariance = factors[1] ** 2 * mode.values_of(names)[1]
     # Of ln C_d, ln q, ln r, ...
-    of_one = float(earlier.fit["covariance"][1, 1])
-    observed = [point.log_intensity - before.point.log_intensity]
-    variances = [mode.value_of("log_intensity")[1] ** 2 + of_one]
-    if point.log_lever is not None:
-        observed.append(point.log_lever)
-        variances.append(mode.value_of("log_lever")[1] ** 2)
+    covariance[0, 0] += float(earlier.fit["covariance"][1, 1])
     nodes = np.linspace(0.0, GLUED.most_correlation, GLUED.nodes)
     expected = np.array([_expected(float(rho), body) for rho in nodes])[:, : len(observed)]
-    squares = ((expected - observed) ** 2 / variances).sum(axis=1)
+    off = expected - observed
+    squares = np.einsum("na,ab,nb->n", off, np.linalg.inv(covariance), off)
     rho = _most_likely(nodes, -0.5 * squares, ready.study.fit.confidence)
     facts: dict[str, Any] = {}
     for name, of in (("stirring_correlation", float), ("stirring_length_m", _length_of(body))):
