@@ -23,10 +23,14 @@ def disc(diameter: float = SIDE_M, mass: float = MASS_KG) -> Body:
     radius = 0.5 * diameter
     rim = np.exp(2j * np.pi * (np.arange(RIM_POINTS) + 0.5) / RIM_POINTS)
     widths = np.full(RIM_POINTS, 2.0 * np.pi * radius / RIM_POINTS)
-    # The mean of x^2 over the disc is R^2 / 4.
-    inner = radius / np.sqrt(2.0) * np.array([1.0, 1.0j, -1.0, -1.0j])
+    # Centre and hexagon: means over the disc to the fifth degree.
+    hexagon = np.exp(1j * np.pi / 3.0 * np.arange(6))
+    inner = radius * np.sqrt(2.0 / 3.0) * np.concatenate([[0.0], hexagon])
     none = np.zeros(0, dtype=np.complex128)
-    return Body(radius * rim, rim, widths, none, inner, radius, radius**2, 2.0, mass, radius)
+    return Body(
+        radius * rim, rim, widths, none, inner, radius, radius**2, 2.0, mass, radius,
+        shares=np.array([0.25, *[0.125] * 6]),
+    )  # fmt: skip
 
 
 def dimer(hidden_share: npt.ArrayLike) -> Body:
