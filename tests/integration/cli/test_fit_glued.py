@@ -73,8 +73,7 @@ def test_a_dimer_tells_hidden_drag_and_shared_stirring(tmp_path: Path) -> None:
     predicted = answer(here("assemble", fit, "--from", dimer, *few, "-o", tmp_path / "four"))
     assert float(predicted["hidden_face_drag"]) == found["hidden_face_drag_share"]
     assert {"hidden_face_drag_share", "stirring_length"} <= {*predicted["drawn"]["parameters"]}
-    # From Python it is the same run: nothing is computed again.
-    again = dw.fit(dw.load(two), body_shape="xx", earlier=fit, check=False, folder=dimer)
+    again = dw.fit(dw.load(two), body_shape="xx", earlier=fit, check=False)
     share = float(again["estimate"].sel(parameter="hidden_face_drag_share"))
     assert share == found["hidden_face_drag_share"]
     assert again["stirring_length_quantile"].values[[0, -1]] == pytest.approx(LENGTH, rel=0.6)
