@@ -44,13 +44,14 @@ driftwalk::FloatingBlock floating_block(double side, double mass, double depth, 
   driftwalk::FloatingBlock block{side, mass, depth, strips, water_density};
   if (body.panels.has_value() != body.moment_points.has_value() ||
       (body.panels && (body.panels->shape(0) == 0 || body.panels->shape(1) != 5 ||
-                       body.moment_points->shape(0) != 4 || body.moment_points->shape(1) != 2))) {
-    throw std::invalid_argument("panels must have shape (n, 5) and moment_points (4, 2)");
+                       body.moment_points->shape(0) == 0 || body.moment_points->shape(1) != 3))) {
+    throw std::invalid_argument("panels must have shape (n, 5) and moment_points (n, 3)");
   }
   if (body.panels) {
     block.panels = body.panels->data();
     block.panel_count = static_cast<int>(body.panels->shape(0));
     block.moment_points = body.moment_points->data();
+    block.moment_point_count = static_cast<int>(body.moment_points->shape(0));
     block.mass_by_inertia = body.mass_by_inertia;
     block.symmetry = body.symmetry;
     block.round = body.round;

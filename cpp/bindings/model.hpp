@@ -95,10 +95,10 @@ inline void check(const ModelArrays& arrays) {
     throw std::invalid_argument("panels, corners and moment_points go together");
   }
   if (arrays.panels && (arrays.panels->shape(0) == 0 || arrays.panels->shape(1) != 5 ||
-                        arrays.corners->shape(1) != 2 || arrays.moment_points->shape(0) != 4 ||
-                        arrays.moment_points->shape(1) != 2)) {
+                        arrays.corners->shape(1) != 2 || arrays.moment_points->shape(0) == 0 ||
+                        arrays.moment_points->shape(1) != 3)) {
     throw std::invalid_argument(
-        "panels must have shape (n, 5), corners (n, 2) and moment_points (4, 2)");
+        "panels must have shape (n, 5), corners (n, 2) and moment_points (n, 3)");
   }
   if (arrays.sample_time.size() == 0) {
     throw std::invalid_argument("a model has at least one sample");
@@ -121,6 +121,7 @@ public:
       model.corners = arrays.corners->data();
       model.corner_count = static_cast<int>(arrays.corners->shape(0));
       model.moment_points = arrays.moment_points->data();
+      model.moment_point_count = static_cast<int>(arrays.moment_points->shape(0));
     }
     model.flow_u = arrays.u.data();
     model.flow_v = arrays.v.data();

@@ -106,16 +106,15 @@ DragModel::DragModel(const FloatingBlock& block, const SplineView& flow, const d
   // The 3 x 3 Gauss points of the square.
   constexpr double place[3] = {-0.77459666924148338, 0, 0.77459666924148338};
   constexpr double weight[3] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
-  block_.points = water_points;
-  for (int k = 0; k < water_points; ++k) {
-    block_.point[k][0] = block_.half_side * place[k % 3];
-    block_.point[k][1] = block_.half_side * place[k / 3];
-    block_.point[k][2] = weight[k % 3] * weight[k / 3];
+  for (int k = 0; k < 9; ++k) {
+    points_.insert(points_.end(), {block_.half_side * place[k % 3], block_.half_side * place[k / 3],
+                                   weight[k % 3] * weight[k / 3]});
   }
   orientations_ = block.round ? 1 : orientations;
   if (block.panel_count > 0) {
     make_panels(block);
   }
+  block_.points = int(points_.size() / 3);
   block_.drag_scale =
       0.5 * block.water_density * drag_coefficient * block_.strip_width * block.depth / block.mass;
   for (std::size_t k = 0; k < orientations; ++k) {
@@ -131,7 +130,7 @@ void DragModel::make_panels(const FloatingBlock& block) {
           "mass over inertia and the symmetry of the body must be positive");
   require(!block.round || angle_ == Angle::none, "a disc has no angle");
   require(all_finite(block.panels, 5 * std::int64_t(block.panel_count)) &&
-              all_finite(block.moment_points, 8),
+              all_finite(block.moment_points, 3 * std::int64_t(block.moment_point_count)),
           "the panels of the body and its points must be finite");
   const int rows = (block.panel_count + 7) / 8;
   panels_.assign(std::size_t(48 * rows), 0.0);
@@ -153,19 +152,17 @@ void DragModel::make_panels(const FloatingBlock& block) {
   block_.strip_width = width;
   block_.mass_by_inertia = block.mass_by_inertia;
   block_.reach = 1.1 * reach;
+  points_.assign(block.moment_points, block.moment_points + 3 * block.moment_point_count);
+  if (angle_ != Angle::none || block.round) {
+    return;
+  }
   // Where the angle is not known, points with the mean second moment of both axes.
   double square = 0;
-  for (int k = 0; k < 8; ++k) {
-    square += block.moment_points[k] * block.moment_points[k] / 8;
+  for (std::size_t k = 0; k < points_.size(); k += 3) {
+    square += points_[k + 2] * (points_[k] * points_[k] + points_[k + 1] * points_[k + 1]) / 2;
   }
-  block_.points = 4;
-  for (int k = 0; k < block_.points; ++k) {
-    for (int axis = 0; axis < 2; ++axis) {
-      const double even = (k >> axis & 1) != 0 ? std::sqrt(square) : -std::sqrt(square);
-      block_.point[k][axis] = angle_ == Angle::none ? even : block.moment_points[2 * k + axis];
-    }
-    block_.point[k][2] = 0.25;
-  }
+  const double even = std::sqrt(square);
+  points_ = {-even, -even, 0.25, even, -even, 0.25, -even, even, 0.25, even, even, 0.25};
 }
 
 FilterProblem DragModel::problem() const {
@@ -174,6 +171,7 @@ FilterProblem DragModel::problem() const {
   problem.flow.nodes = nodes_.data();
   problem.block = block_;
   problem.block.panels.rows = panels_.data();
+  problem.block.point = points_.data();
   problem.law = law_;
   problem.orientations = {cosine_.data(), sine_.data(), angle_ == Angle::none ? orientations_ : 0};
   return problem;
@@ -200,7 +198,7 @@ DragResponse<D> DragModel::drag(double theta, double omega, const double* mean,
                                 const double (*covariance)[2 * D], double* by_coefficients) const {
   require(flow_.layers == 1, "the drag alone is that of a flow of one layer");
   std::vector<StripShare<D>> room(by_coefficients == nullptr ? 0 : std::size_t(shares()));
-  std::vector<PointShare<D>> points(room.empty() ? 0 : std::size_t(water_points));
+  std::vector<PointShare<D>> points(room.empty() ? 0 : std::size_t(block_.points));
   const InferKernel kernel = chosen_infer_kernel();
   return kernel_of<D>(kernel).drag(problem(), theta, omega, mean, covariance,
                                    room.empty() ? nullptr : room.data(),
@@ -277,7 +275,7 @@ void InnovationsFilter::make_memory() {
   if (sensitivities_) {
     memory.shares.resize(std::size_t(model_.shares()));
     memory.scratch.shares = memory.shares.data();
-    memory.points.resize(std::size_t(water_points));
+    memory.points.resize(std::size_t(model_.problem().block.points));
     memory.scratch.points = memory.points.data();
     memory.scratch.parameters = parameters();
     memory.scratch.stride = (parameters() + 7) / 8 * 8;

@@ -139,11 +139,14 @@ void PreparedRun<T>::prepare_shape(const BatchModel& model) {
     reach = std::max(reach, std::hypot(x, y));
   }
   double radius_square = 0;
-  for (int k = 0; k < 4; ++k) {
-    const double x = model.moment_points[2 * k], y = model.moment_points[2 * k + 1];
-    shape.points[k] = {static_cast<T>(x), static_cast<T>(y)};
-    radius_square += (x * x + y * y) / 4;
+  for (int k = 0; k < model.moment_point_count; ++k) {
+    const double* const point = model.moment_points + 3 * k;
+    points_.push_back(
+        {static_cast<T>(point[0]), static_cast<T>(point[1]), static_cast<T>(point[2])});
+    radius_square += point[2] * (point[0] * point[0] + point[1] * point[1]);
   }
+  shape.points = points_.data();
+  shape.point_count = model.moment_point_count;
   shape.panels = panels_.data();
   shape.panel_count = model.panel_count;
   shape.corners = corners_.data();

@@ -127,7 +127,7 @@ def _acceleration(one: Tanks, motion: Motion, weights: Floats) -> npt.NDArray[np
     water.base = np.zeros((1, 1), dtype=np.intp)
     arms = first.body.inner * np.exp(1j * motion.angle)[:, np.newaxis]
     layers = water.layers(motion.place[:, np.newaxis] + arms)
-    return water.acceleration(layers, weights[:, 0], weights[:, 1]) @ blocks.SHARES
+    return water.acceleration(layers, weights[:, 0], weights[:, 1]) @ one.body.shares
 
 
 def _knots(place: npt.NDArray[np.complex128]) -> sparse.csr_matrix:

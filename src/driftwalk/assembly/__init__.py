@@ -35,7 +35,7 @@ from driftwalk.assembly.outcomes.sizes import assembly_sizes
 from driftwalk.assembly.outcomes.survival import SurvivalCurve, class_times, survival_curve
 from driftwalk.assembly.recordings import classify
 from driftwalk.assembly.runs.dataset import path_recording
-from driftwalk.assembly.runs.draws import draw_parameters, has_uncertainty
+from driftwalk.assembly.runs.draws import draw_parameters, has_uncertainty, interaction_quantiles
 from driftwalk.assembly.runs.run import assemble, assemble_drawn, assembly_path, check_assembly
 from driftwalk.assembly.sensitivity.run import (
     check_sensitivity,
@@ -73,6 +73,7 @@ __all__ = [
     "disconnected_alignment",
     "draw_parameters",
     "has_uncertainty",
+    "interaction_quantiles",
     "l1_distance",
     "l1_in_floors",
     "l1_noise_floor",

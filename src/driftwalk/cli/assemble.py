@@ -50,11 +50,17 @@ def assemble(
     from driftwalk.runs import AssemblyWork
 
     _check_film(film)
-    given = with_glued(given, glued)
+    given, quantiles = with_glued(given, glued)
     refused = [] if given.file is None else ["--study"]
     source = assembly_source(run, flow, given, refused=refused)
     work = AssemblyWork(
-        source.study, source.flow, source.uncertainty, source.inputs, options.threads, film
+        source.study,
+        source.flow,
+        source.uncertainty,
+        source.inputs if glued is None else {**source.inputs, "glued": glued / "fit.nc"},
+        options.threads,
+        film,
+        quantiles,
     )
     begun = opening_note(source.study, given, about="simulation", otherwise=str(run))
     result = options.run(work, "assemble", begun=begun)

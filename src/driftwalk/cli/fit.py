@@ -6,7 +6,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated, Any
 
-from driftwalk.cli.inputs.model_source import load_flow_for, read_earlier_fit
+from driftwalk.cli.inputs.model_source import load_flow_for
 from driftwalk.cli.inputs.recordings import opening_note, read_for_run
 from driftwalk.cli.options.flatten_options import with_options
 from driftwalk.cli.options.recording import RecordingOptions
@@ -96,7 +96,7 @@ def fit(
     of the model (check.nc), figures and manifest.json.
     """
     from driftwalk.likelihood import describe_measured, fit_work
-    from driftwalk.runs import FitWork, run_work
+    from driftwalk.runs import FitWork, read_earlier_fit, run_work
     from driftwalk.schema.answers.facts import sentences
     from driftwalk.schema.answers.fit import checked_parts, fitted_parts
 

@@ -51,10 +51,12 @@ WORK: Final[dict[str, int]] = {
     # the second stage of an estimation: its boxes, and worlds by which both stages are judged
     "estimation": 13,
     "weighed": 14,
-    # self-assembly: its runs, the parameters drawn for them, the flows drawn for them
+    # self-assembly: its runs, the parameters drawn for them, the flows drawn for them, and what a
+    # fit of glued blocks says
     "run": 32,
     "parameters": 33,
     "flow": 34,
+    "glued": 35,
 }
 """Work that worlds are simulated for: the part of their trial from bit 40 on."""
 

@@ -22,8 +22,8 @@ from driftwalk.likelihood.interaction.glued import (
     earlier_prior,
     estimate_before,
     first_glued_point,
+    glued_stirring,
     glued_study,
-    stirring_facts,
 )
 from driftwalk.likelihood.interaction.shared_stirring import shared_stirring
 from driftwalk.likelihood.interval_inflation import (
@@ -206,26 +206,29 @@ def fit_motion(
             parameters = _with_rival(parameters, search, rival, ready)
         shape = laws.alternatives.shape_change(law.mode)
     with solved(reason):
-        shared = shared_stirring(ready, restricted.point, course)
+        stirring = (
+            shared_stirring(ready, restricted.point, course)
+            if before is None or earlier is None
+            else glued_stirring(ready, law.mode, restricted.point, before, earlier)
+        )
     facts = {
         **parameters,
         **law_facts(law, assumptions),
         **shape_facts(shape, law.tests),
         **({"flow_modes_unsettled": modes.unsettled} if modes.unsettled else {}),
         **turning,
-        **stirring_facts(ready, law.mode, restricted.point, before, earlier),
-        **shared.facts,
+        **stirring.facts,
         **whiteness_of(counted)._asdict(),
         **ready.facts,
         **_search_facts(law, restricted),
         **_agreement(ready, law.mode, restricted),
         "wetted_depth_m": chosen.wetted_depth_m,
     }
-    fit = build_fit(ready, law, restricted, facts).assign(shared.by_distance)
+    fit = build_fit(ready, law, restricted, facts)
     shares = visited_shares(fit)
     unstated = unstated_warning(chosen, about="block")
     warnings = [] if unstated is None else [unstated]
-    warnings += shared.warnings
+    warnings += stirring.warnings
     for recording, track in zip(ready.recordings, ready.tracks, strict=True):
         warnings += jump_warnings(recording, body, track=track)
     warnings += warnings_of(facts, shares, ready.intervals, block=chosen.block)
@@ -237,7 +240,7 @@ def fit_motion(
         beside = " and ".join(law.left_out)
         warnings.append(f"the search for {beside} has no solution and was left out")
     return described(
-        fit.assign(visited_share=((), min(shares))).assign_coords(
+        fit.assign(visited_share=((), min(shares)), **stirring.variables).assign_coords(
             warning=("warning", texts(warnings))
         )
     )

@@ -33,6 +33,9 @@ class WarningPolicy(NamedTuple):
     disagreement_stds: float = 3.0
     """Combined standard deviations between the two estimates of C_d, with the angle in the state
     and as an input, beyond which they do not agree: chance exceeds it once in 370."""
+    hidden_drag_width: float = 0.1
+    """Half of the interval of the share of hidden drag beyond which a longer recording is asked
+    for. Chosen by hand: a tenth of a free face's drag."""
     mirrored_correlation: float = -0.35
     """Correlation of the block's spin with the vorticity of the water below which the fit is
     tried with orientations negated. Chosen by hand: a block turns with the water around it."""
@@ -61,6 +64,7 @@ def warnings_of(
         *_on_the_search(facts),
         *_on_the_model(facts),
         *_on_the_turning(facts),
+        *_on_glued_blocks(facts),
     ]
 
 
@@ -173,6 +177,25 @@ def _on_the_data(
                 f"{name}the block has been over {share:.0%} of the tank only: elsewhere the flow "
                 "is continued smoothly and not measured (flag filled)"
             )
+
+
+def _on_glued_blocks(facts: Mapping[str, Any]) -> Iterator[str]:
+    width, most = facts.get("hidden_face_drag_half_width", 0.0), WARNING.hidden_drag_width
+    if width > most:
+        needed = needed_duration(facts["duration_s"], width, most)
+        length = f"about {in_words(needed)}" if math.isfinite(needed) else "another recording"
+        yield (
+            f"the drag of hidden faces is known to within {width:.2g} only from "
+            f"{in_words(facts['duration_s'])}: for {most:.2g} {length} like this would be needed, "
+            "or a faster flow along the body"
+        )
+    apart = facts.get("stirring_misfit_std", 0.0)
+    if apart > WARNING.disagreement_stds:
+        yield (
+            "force and torque on the glued blocks say two things of the stirring that they share, "
+            f"{apart:.1f} standard deviations apart: the forces on them are of another kind, or "
+            "one of the two fits is wrong; correlation and length may mean nothing"
+        )
 
 
 def _on_the_search(facts: Mapping[str, Any]) -> Iterator[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Unpack
 
 from driftwalk.conditions import one_body_each, require_motion, study_for
@@ -21,6 +22,7 @@ from driftwalk.notebook.simulating import flow_field_of
 if TYPE_CHECKING:
     import xarray as xr
 
+    from driftwalk.likelihood import EarlierFit
     from driftwalk.model import Study
     from driftwalk.motion import MotionModel
     from driftwalk.runs import Progress
@@ -31,6 +33,7 @@ def fit(
     study: Study | None = None,
     *,
     flow: xr.Dataset | None = None,
+    earlier: str | PathLike[str] | xr.Dataset | EarlierFit | None = None,
     body: str | None = None,
     folder: str | PathLike[str] | None = None,
     check: bool = True,
@@ -50,6 +53,11 @@ def fit(
     flow : xarray.Dataset, optional
         A steady flow that was measured, a `flow_field`; with its errors it is the prior of the
         fitted flow.
+    earlier : path-like, xarray.Dataset or EarlierFit, optional
+        Of glued blocks, ``body_shape="xx"``: a finished fit of one block in the same water, by its
+        run directory, as a `fit` that was read from one or made with `folder`, or with its
+        recordings, ``dw.likelihood.EarlierFit(fit, [recording])``. Tank, side, water and law are
+        those of that fit.
     body : str, optional
         The body, where a recording has several; ``interaction=True`` takes all of them.
     folder : path-like, optional
@@ -75,7 +83,8 @@ def fit(
     Raises
     ------
     InputError
-        When a recording cannot be fitted, or recording and study state two tanks or two blocks.
+        When a recording cannot be fitted, recording and study state two tanks or two blocks, or
+        the earlier fit is not one of a single block with its recordings.
     RunDirectoryError
         When the directory is in use, holds another run, or cannot be written.
 
@@ -83,13 +92,14 @@ def fit(
     --------
     >>> import driftwalk as dw
     >>> found = dw.fit(dw.tank30_recording(), force_interval="16ms")  # doctest: +SKIP
+    >>> pair = dw.fit(dw.load("dimer.csv"), body_shape="xx", earlier="fit")  # doctest: +SKIP
     """
     import xarray as xr
 
-    from driftwalk.likelihood import fit_motion, judge_fit
+    from driftwalk.likelihood import EarlierFit, fit_motion, glued_study, judge_fit
     from driftwalk.model import Study, apply_overrides
     from driftwalk.notebook.result import as_result, run_in_folder
-    from driftwalk.runs import FitWork
+    from driftwalk.runs import FitWork, read_earlier_fit
     from driftwalk.runs.resumable_run import silent
 
     many = [recordings] if isinstance(recordings, xr.Dataset) else list(recordings)
@@ -97,11 +107,17 @@ def fit(
     many = one_body_each(many, apply_overrides(study or Study(), overrides))
     for one in many:
         require_motion(one, body=body)
+    if earlier is not None:
+        if not isinstance(earlier, EarlierFit):
+            known = earlier if isinstance(earlier, xr.Dataset) else Path(earlier)
+            earlier = read_earlier_fit(known)
+        study = glued_study(apply_overrides(study or Study(), overrides), earlier.fit)
+        overrides = {}
     chosen = study_for(many, study, overrides, body=body)
     if folder is not None:
-        work = FitWork(many, chosen, body, {}, check=check, flow=flow)
+        work = FitWork(many, chosen, body, {}, check=check, flow=flow, earlier=earlier)
         return as_result(run_in_folder(folder, "fit", work, overwrite, progress or silent).fit)
-    found = fit_motion(many, chosen, body=body, flow=flow, tell=progress)
+    found = fit_motion(many, chosen, body=body, flow=flow, earlier=earlier, tell=progress)
     return as_result(judge_fit(found, many, body=body).fit if check else found)
 
 

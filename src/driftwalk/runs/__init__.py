@@ -3,7 +3,7 @@
 from driftwalk.runs.assembly import AssemblyResult, AssemblyWork, SensitivityResult, SensitivityWork
 from driftwalk.runs.calibration import CalibrationWork, ModelComparisonWork
 from driftwalk.runs.finished_run import FoundRun, flow_of_result, read_found, run_folder
-from driftwalk.runs.fit import Fitted, FitWork
+from driftwalk.runs.fit import Fitted, FitWork, read_earlier_fit
 from driftwalk.runs.recovery import RecoveryWork
 from driftwalk.runs.resumable_run import Progress, Run, Work, run_work
 from driftwalk.schema.stores.netcdf import netcdf_bytes
@@ -24,6 +24,7 @@ __all__ = [
     "Work",
     "flow_of_result",
     "netcdf_bytes",
+    "read_earlier_fit",
     "read_found",
     "run_folder",
     "run_work",

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Self
 
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.runs.resumable_run import dataset_hash
 
@@ -72,6 +73,8 @@ class AssemblyWork:
         Threads; the result does not depend on them.
     film : {"gif", "mp4", "none"}
         Format of a film of the first run, or none.
+    quantiles : mapping of str to ndarray
+        Further numbers to draw, see `driftwalk.assembly.assemble_drawn`.
     """
 
     study: Study
@@ -80,6 +83,7 @@ class AssemblyWork:
     inputs: Mapping[str, Path]
     threads: int | None = None
     film: str = "none"
+    quantiles: Mapping[str, Floats] = field(default_factory=dict)
 
     kind: ClassVar = "assembly"
 
@@ -108,6 +112,7 @@ class AssemblyWork:
             "study": self.study.to_dict(),
             "flow_sha256": dataset_hash(self.flow, tuple(n for n in names if n in self.flow)),
             "calibration_sha256": dataset_hash(found, drawn_from),
+            **({"quantiles": drawn} if (drawn := _lists(self.quantiles)) else {}),
         }
 
     def compute(self, run: Run) -> AssemblyResult:
@@ -134,6 +139,7 @@ class AssemblyWork:
                 self.study,
                 self.flow,
                 self.calibration,
+                quantiles=self.quantiles,
                 trial=DRAWN_TRIAL,
                 store=run.store("drawn"),
                 progress=course.stage("runs, drawn parameters"),
@@ -184,6 +190,10 @@ class AssemblyWork:
             "figures": 1.0,
             **({} if self.film == "none" else {"film": 1.0}),
         }
+
+
+def _lists(quantiles: Mapping[str, Floats]) -> dict[str, list[float]]:
+    return {key: values.tolist() for key, values in quantiles.items()}
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
+from driftwalk.core.errors import InputError
 from driftwalk.core.run_stages import tell_nobody
+from driftwalk.runs.finished_run import run_folder
 from driftwalk.runs.resumable_run import dataset_hash
 
 if TYPE_CHECKING:
@@ -150,6 +152,43 @@ class FitWork:
             **({"check": 2.2 + 2.2e-4 * samples} if self.check else {}),
             "figures": 6.7 if self.check else 3.8,
         }
+
+
+def read_earlier_fit(source: Path | xr.Dataset) -> EarlierFit:
+    """Return a finished fit with its recordings, as the start of a fit of glued blocks.
+
+    Parameters
+    ----------
+    source : Path or xarray.Dataset
+        The run directory of a fit, or a `fit` that was read from one.
+
+    Raises
+    ------
+    InputError
+        When there is no directory, or it holds no fit with its recordings.
+
+    Examples
+    --------
+    >>> len(read_earlier_fit(Path("fit")).recordings)  # doctest: +SKIP
+    1
+    """
+    from driftwalk.likelihood import EarlierFit
+    from driftwalk.schema.runs import open_run_folder
+
+    folder = source if isinstance(source, Path) else run_folder(source)
+    if folder is None:
+        raise InputError(
+            "a fit in memory does not hold its recordings: give the run directory that "
+            "`driftwalk.fit` made with `folder`, or EarlierFit(fit, recordings)"
+        )
+    run = open_run_folder(folder)
+    found, recordings = run.dataset("fit.nc"), run.recordings()
+    if found is None or not recordings:
+        raise InputError(
+            f"{folder} is no finished fit with its recording (fit.nc, recording.nc): make one with "
+            f"driftwalk fit RECORDING -o {folder}"
+        )
+    return EarlierFit(found, recordings)
 
 
 def _hash_of(flow: xr.Dataset) -> str | None:

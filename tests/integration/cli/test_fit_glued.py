@@ -10,6 +10,7 @@ import pytest
 import xarray as xr
 from command_line import FLOW, answer, here
 from euler_blocks import stirred
+from made_up_fit import made_up_fit
 
 import driftwalk as dw
 from driftwalk.flow.analytic import flow_from_function
@@ -71,6 +72,11 @@ def test_a_dimer_tells_hidden_drag_and_shared_stirring(tmp_path: Path) -> None:
     few = ("--runs", "40", "--duration", "20s", "--film", "none", "--json")
     predicted = answer(here("assemble", fit, "--from", dimer, *few, "-o", tmp_path / "four"))
     assert float(predicted["hidden_face_drag"]) == found["hidden_face_drag_share"]
+    assert {"hidden_face_drag_share", "stirring_length"} <= {*predicted["drawn"]["parameters"]}
+    again = dw.fit(dw.load(two), body_shape="xx", earlier=fit, check=False)
+    share = float(again["estimate"].sel(parameter="hidden_face_drag_share"))
+    assert share == found["hidden_face_drag_share"]
+    assert again["stirring_length_quantile"].values[[0, -1]] == pytest.approx(LENGTH, rel=0.6)
     refused = here("assemble", dimer, "-o", tmp_path / "five")
     assert refused.code == 2
     assert "square blocks assemble, and the body is 'xx'" in refused.err
@@ -86,6 +92,11 @@ def test_shares_of_hidden_drag_and_lengths_are_axes(tmp_path: Path) -> None:
     found = xr.open_dataset(tmp_path / "map" / "sensitivity.nc")
     assert list(found["hidden_face_drag"].values) == ["none", "0.5", "1"]
     assert found["stirring_length"].values == pytest.approx([0.0, 0.06])
+
+
+def test_a_fit_in_memory_does_not_hold_its_recordings() -> None:
+    with pytest.raises(dw.InputError, match="in memory does not hold its recordings"):
+        dw.fit(dw.tank30_recording(), body_shape="xx", earlier=made_up_fit())
 
 
 def test_what_cannot_be_glued_is_refused(tmp_path: Path) -> None:

@@ -9,12 +9,22 @@ import pytest
 import xarray as xr
 from fit_worlds import coarse_study, recording
 from made_up_fit import made_up_fit
-from scipy.special import ndtri
+from scipy.special import ndtr, ndtri
 from scipy.stats import kstest
 
 import driftwalk as dw
-from driftwalk.assembly import assemble_drawn, draw_parameters, has_uncertainty
-from driftwalk.assembly.runs.draws import RUNS_PER_FLOW, draw_flow, draw_posterior
+from driftwalk.assembly import (
+    assemble_drawn,
+    draw_parameters,
+    has_uncertainty,
+    interaction_quantiles,
+)
+from driftwalk.assembly.runs.draws import (
+    RUNS_PER_FLOW,
+    draw_flow,
+    draw_posterior,
+    draw_quantiles,
+)
 from driftwalk.core.errors import InputError
 from driftwalk.schema.kinds.fit import FIT
 
@@ -131,6 +141,65 @@ def test_every_run_has_its_drawn_law() -> None:
     )
     np.testing.assert_array_equal(found["x"][RUNS_PER_FLOW:], again["x"][RUNS_PER_FLOW:])
     assert (found["x"][:RUNS_PER_FLOW].values != again["x"][:RUNS_PER_FLOW].values).any()
+
+
+def glued_fit(share: float, lengths: list[float]) -> xr.Dataset:
+    """Return a made-up fit of glued blocks: its share is known to a tenth."""
+    found = fit({"hidden_share": share})
+    return found.assign(stirring_length_quantile=("stirring_quantile", lengths))
+
+
+def test_quantiles_of_glued_blocks_are_those_of_their_posteriors() -> None:
+    """Of a normal law at the middles of equal shares, cut where no share is: 0 to 1."""
+    lengths = list(np.linspace(0.0, 0.1, 50))
+    found = interaction_quantiles(glued_fit(0.5, lengths))
+    middles = (np.arange(50) + 0.5) / 50
+    expected = np.clip(0.5 + 0.1 * ndtri(middles), 0.0, 1.0)
+    np.testing.assert_allclose(found["assembly.hidden_face_drag"], expected, atol=1e-12)
+    assert found["forces.stirring_length_m"].tolist() == lengths
+    beyond = interaction_quantiles(glued_fit(-0.05, lengths))["assembly.hidden_face_drag"]
+    assert (beyond == 0.0).sum() == round(50 * ndtr(0.5))
+    with pytest.raises(InputError, match="does not say what hidden faces and neighbours feel"):
+        interaction_quantiles(fit())
+
+
+@pytest.mark.false_alarm(1e-4)
+def test_quantiles_are_drawn_alike(fresh_seed: Callable[[int], int]) -> None:
+    """Each of four values as often: chi-squared of three degrees of freedom at 1e-4 is 21.1."""
+    runs = 400 * RUNS_PER_FLOW
+    drawn = draw_quantiles({"one": [1, 2, 3, 4]}, runs=runs, seed=fresh_seed(3), trial=1)["one"]
+    assert drawn.size == runs
+    assert all(np.unique(part).size == 1 for part in np.split(drawn, 400))
+    counts = np.unique(drawn, return_counts=True)[1] / RUNS_PER_FLOW
+    assert ((counts - 100.0) ** 2 / 100.0).sum() < 21.1
+
+
+def test_every_run_has_its_drawn_share_and_length() -> None:
+    """Runs of a draw are those of `assemble` with its numbers in the study."""
+    study = dw.apply_overrides(dw.Study(), {"assembly.blocks": 3, "assembly.duration_s": 4.0})
+    still = dw.uniform_flow(0.02, 0.0)
+    quantiles = {
+        "assembly.hidden_face_drag": [0.2, 0.4, 0.6, 0.8],
+        "forces.stirring_length_m": [0.0, 0.02, 0.05, 0.1],
+    }
+    how = {"runs": 30, "trial": 1, "flow_draws": "none"}
+    found = assemble_drawn(study, still, fit(), quantiles=quantiles, **how)
+    drawn = "drag_coefficient force_std hidden_face_drag_share stirring_length"
+    assert found.attrs["drawn"] == drawn
+    last = dw.apply_overrides(
+        study,
+        {
+            "assembly.hidden_face_drag": float(found["hidden_face_drag_share"][-1]),
+            "forces.stirring_length_m": float(found["stirring_length"][-1]),
+        },
+    )
+    given = {name: found[name].values for name in ("drag_coefficient", "force_std")}
+    again = dw.assembly.assemble(last, still, runs=30, trial=1, **given)
+    np.testing.assert_array_equal(found["x"][RUNS_PER_FLOW:], again["x"][RUNS_PER_FLOW:])
+    assert (found["x"][:RUNS_PER_FLOW].values != again["x"][:RUNS_PER_FLOW].values).any()
+    # The other draws are those of a prediction without a fit of glued blocks.
+    plain = assemble_drawn(study, still, fit(), **how)
+    np.testing.assert_array_equal(plain["force_std"], found["force_std"])
 
 
 def test_a_simulation_depends_on_drag_and_force_over_the_mass() -> None:

@@ -395,6 +395,16 @@ def test_a_vague_answer_says_how_long_to_record(
     assert words is None or re.search(words, found[0])
 
 
+def test_a_vague_dimer_says_how_long_to_record() -> None:
+    """Twice as narrow takes four times as long."""
+    given = {"hidden_face_drag_half_width": 0.2, "stirring_misfit_std": 5.0}
+    vague, contradicted = warnings_of(
+        {**facts(0.06, 600.0, {}), **given}, [0.5], Intervals((), (0,), ("A",)), block=Block()
+    )
+    assert "within 0.2 only from 10 min: for 0.1 about 40 min like this" in vague
+    assert "5.0 standard deviations apart" in contradicted
+
+
 @pytest.mark.slow
 def test_a_region_never_visited_is_filled_and_warned_of() -> None:
     """The block goes round one circle of 4 cm: it sees a ring, 9 to 25 % of the tank."""

@@ -48,8 +48,8 @@ def test_area_moment_symmetry_and_reach(
 
 
 @pytest.mark.parametrize(("shape", "width"), [("disc", None), ("rectangle", 0.01), ("x./xx", None)])
-def test_four_points_have_the_second_moments_of_the_area(shape: str, width: float | None) -> None:
-    """By a fine grid over the body; the points are about the centre of mass."""
+def test_points_have_the_moments_of_the_area(shape: str, width: float | None) -> None:
+    """To the fourth degree, by a fine grid over the body; they are about the centre of mass."""
     body = made(shape, width)
     axis = (np.arange(1500) + 0.5) / 1500 * 0.1 - 0.05
     x, y = np.meshgrid(axis, axis)
@@ -61,12 +61,15 @@ def test_four_points_have_the_second_moments_of_the_area(shape: str, width: floa
         inside = np.zeros(x.shape, dtype=bool)
         for cell in body.cells:
             inside |= (abs(x - cell[0]) < A / 2) & (abs(y - cell[1]) < A / 2)
-    points = np.stack([x[inside], y[inside]])
-    assert points.mean(axis=1) == pytest.approx([0, 0], abs=1e-4)
-    want = points @ points.T / points.shape[1]
-    found = body.moment_points.T @ body.moment_points / 4
-    assert found == pytest.approx(want, rel=5e-3, abs=5e-3 * want.max())
-    assert body.moment_points.mean(axis=0) == pytest.approx([0, 0], abs=1e-15)
+    across, along = x[inside], y[inside]
+    near, far, share = body.moment_points.T
+    assert share.sum() == pytest.approx(1.0, rel=1e-12)
+    assert [share @ near, share @ far] == pytest.approx([0, 0], abs=1e-15)
+    for degree in (2, 3, 4):
+        for power in range(degree + 1):
+            want = (across**power * along ** (degree - power)).mean()
+            found = share @ (near**power * far ** (degree - power))
+            assert found == pytest.approx(want, rel=5e-3, abs=5e-3 * (0.5 * A) ** degree)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])

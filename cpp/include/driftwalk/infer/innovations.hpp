@@ -21,6 +21,7 @@ struct FloatingBlock {
   const double* panels = nullptr;
   int panel_count = 0;
   const double* moment_points = nullptr;
+  int moment_point_count = 0;
   double mass_by_inertia = 0; // [1/m^2]
   int symmetry = 4;
   bool round = false;
@@ -71,7 +72,7 @@ private:
   StripBlock block_;
   ForceLaw law_;
   Angle angle_;
-  std::vector<double> nodes_, panels_;
+  std::vector<double> nodes_, panels_, points_;
   int orientations_; // that are used, where the angle is not known
   std::array<double, orientations> cosine_, sine_;
 };

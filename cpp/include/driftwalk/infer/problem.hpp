@@ -35,7 +35,7 @@ struct StripBlock {
   double drag_scale; // acceleration by a strip's squared closing speed, 1/2 rho C_d (a/N) d/m [1/m]
   double mass_by_inertia; // m/I [1/m^2]
   // Points at which the water's acceleration pushes it, in its frame, and what each counts.
-  double point[9][3]; // [m, m, 1]
+  const double* point; // [points][3]: x, y, share of the area [m, m, 1]
   int points;
   double reach; // how far from its centre the flow matters [m]
   PanelRows panels{};
@@ -130,7 +130,6 @@ struct PointShare {
   double slope_x[4], slope_y[4];   // its derivatives [1/m]
   std::int32_t node;               // as of a StripShare
 };
-inline constexpr int water_points = 9;
 
 // Memory of a filter, made once.
 template <int D>
@@ -140,7 +139,7 @@ struct FilterScratch {
   double *sum, *sum_rate;       // [rows][columns][2]
   double *weight, *weight_rate; // [layers]
   StripShare<D>* shares; // one for each strip of each orientation; null without sensitivities
-  PointShare<D>* points; // [water_points]; null without sensitivities
+  PointShare<D>* points; // one for each point of the area; null without sensitivities
   double* sensitivity;   // [2 D + F][stride]: d(state)/d(parameters)
   double* row;           // [D][stride]
   std::uint8_t* touched; // [stride / 8]: whether eight columns are not zero

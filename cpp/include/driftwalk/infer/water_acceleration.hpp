@@ -5,8 +5,8 @@
 // mean over the 3 x 3 Gauss points of the square, which turn with it, and its spin 6/a^2 times the
 // mean moment about the centre. The mean is exact for polynomials of the fifth degree, the moment
 // for those of the fourth. In eddies as small as the block the moment of 2 x 2 points is 5 to 20 %
-// off, and 10 to 60 % if they do not turn (docs/explanation/likelihood.md). Another body has four
-// points with the second moments of its area.
+// off, and 10 to 60 % if they do not turn (docs/explanation/likelihood.md). Glued blocks have the
+// points of each.
 //
 // With the flow s(t) u(x, y),
 //     Du/Dt = s^2 (u . grad) u + s' u
@@ -136,7 +136,7 @@ inline void add_water_acceleration(const SplineView& flow, const double* rate_no
     return;
   }
   for (int k = 0; k < block.points; ++k) {
-    const double *const point = block.point[k], across = point[0], along = point[1];
+    const double *const point = block.point + 3 * k, across = point[0], along = point[1];
     const double arm_x = cosine * across - sine * along, arm_y = sine * across + cosine * along;
     const double share = law.water_acceleration * point[2];
     const double spin = law.water_spin * point[2] * block.mass_by_inertia;

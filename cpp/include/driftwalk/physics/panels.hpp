@@ -70,8 +70,8 @@ inline DragSums<Real> panel_sums(const Law& law, const BodyShape<T>& shape, cons
   return sums;
 }
 
-// As water_acceleration of a block: the mean of Du/Dt at four points with the second moments of the
-// body's area, and its mean moment about the centre over their mean squared distance.
+// As water_acceleration of a block: the mean of Du/Dt over points of the body's area, and its mean
+// moment about the centre over their mean squared distance.
 template <class Real, class T>
 inline Motion<Real> water_acceleration(const WaterView<T>& water, const BodyShape<T>& shape,
                                        const Axes<Real>& axes, Real x, Real y) {
@@ -86,15 +86,17 @@ inline Motion<Real> water_acceleration(const WaterView<T>& water, const BodyShap
       nodes.lanes = &water.lanes->table[k];
       load_lanes(water.lanes->part[k], part);
     }
-    for (const Corner<T>& point : shape.points) {
+    for (int j = 0; j < shape.point_count; ++j) {
+      const AreaPoint<T>& point = shape.points[j];
       const Arm<Real> r = turned(point.x, point.y, axes);
       const Arm<Real> at = flow_at(nodes, centre_x + r.x, centre_y + r.y);
-      sums.vx = sums.vx + at.x * part;
-      sums.vy = sums.vy + at.y * part;
-      sums.omega = sums.omega + (r.x * at.y - r.y * at.x) * part;
+      const Real share = part * point.share;
+      sums.vx = sums.vx + at.x * share;
+      sums.vy = sums.vy + at.y * share;
+      sums.omega = sums.omega + (r.x * at.y - r.y * at.x) * share;
     }
   }
-  const T mean = T(0.25) * nodes.unit;
+  const T mean = nodes.unit;
   return {sums.vx * (mean * water.push), sums.vy * (mean * water.push),
           sums.omega * (mean * shape.per_radius_square * water.spin)};
 }

@@ -28,13 +28,14 @@ struct BatchModel : ModelNumbers {
   int edge_count = 0;
   // A body that is no single square block: panels (x, y, nx, ny, width) x count, of which the last
   // counts its share where the water does not quite reach; corners (x, y) x count, none of a disc;
-  // four points (x, y) with the second moments of its area. All from its centre of mass. None of
+  // points (x, y, share) x count for means over its area. All from its centre of mass. None of
   // them: the square block.
   const double* panels = nullptr;
   int panel_count = 0;
   const double* corners = nullptr;
   int corner_count = 0;
   const double* moment_points = nullptr;
+  int moment_point_count = 0;
   // flow on nodes [frames][rows][columns]; frame_time is increasing, one frame means steady
   const double* flow_u = nullptr;
   const double* flow_v = nullptr;

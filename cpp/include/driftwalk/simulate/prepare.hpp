@@ -48,6 +48,7 @@ private:
 
   Prepared<T> view_{};
   std::vector<Panel<T>> panels_;
+  std::vector<AreaPoint<T>> points_;
   std::vector<Corner<T>> corners_;
   std::vector<PreparedEdge<T>> edges_;
   std::vector<PreparedEdge<T>> view_edges_;

@@ -35,6 +35,12 @@ struct Corner {
   T x, y; // from the centre of mass [m]
 };
 
+// A point of a body's area, and the share of the area that it counts.
+template <class T>
+struct AreaPoint {
+  T x, y, share;
+};
+
 // A rigid body that is no single square block. Plain pointers, as in Prepared.
 template <class T>
 struct BodyShape {
@@ -42,10 +48,11 @@ struct BodyShape {
   int panel_count;          // 0: the square block
   const Corner<T>* corners; // that may touch a wall
   int corner_count;
-  T disc_radius;       // [m]; 0: a body with corners
-  T reach;             // of its farthest point from the centre of mass [m]
-  T turning_share;     // conductance for turning over that for moving [m^2]
-  Corner<T> points[4]; // with the second moments of its area, for the water's acceleration
+  T disc_radius;              // [m]; 0: a body with corners
+  T reach;                    // of its farthest point from the centre of mass [m]
+  T turning_share;            // conductance for turning over that for moving [m^2]
+  const AreaPoint<T>* points; // for means of the water's acceleration over its area
+  int point_count;
   T per_radius_square; // m/I of an even body: 1 / mean squared distance of the points [1/m^2]
 };
 

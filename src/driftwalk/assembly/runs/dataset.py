@@ -29,11 +29,13 @@ if TYPE_CHECKING:
 
 
 LAW_NAMES: Final = {
-    "linear_drag_kg_s": "linear_drag",
-    "drag_power": "drag_power",
-    "force_memory_s": "force_memory",
+    "forces.linear_drag_kg_s": "linear_drag",
+    "forces.drag_power": "drag_power",
+    "forces.force_memory_s": "force_memory",
+    "assembly.hidden_face_drag": "hidden_face_drag_share",
+    "forces.stirring_length_m": "stirring_length",
 }
-"""Names of the drawn numbers of a force law, by their keys in [forces]."""
+"""Names of drawn numbers of the law, by their keys in the study."""
 DECIMALS: Final = 9
 """Times are kept to a nanosecond."""
 

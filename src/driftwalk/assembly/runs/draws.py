@@ -14,13 +14,18 @@ intensity and in the numbers of the force law, with the covariance that the fit 
 the camera are left out. It holds for the block's mass, added mass and side as they are stated: a
 recording tells C_d and sigma_F over the mass, a simulation depends on nothing else, and so what the
 mass leaves open of the two changes no motion and is not drawn.
+
+A fit of several bodies adds the stirring length, and of glued blocks the share of hidden drag. They
+are drawn from the quantiles of its posterior, each on its own and independent of the other draws.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from driftwalk.assembly.runs.plan import stream_keys
 from driftwalk.core.arrays import Bools, Floats, Keys
@@ -289,6 +294,84 @@ def draw_posterior(fit: xr.Dataset, *, runs: int, seed: int, trial: int) -> dict
         if name in change:
             drawn[key] = _number(fit, name) + change[name]
     return {key: np.repeat(_within(key, values), shared)[:runs] for key, values in drawn.items()}
+
+
+def interaction_quantiles(fit: xr.Dataset) -> dict[str, Floats]:
+    """Return what a fit of several bodies knows of hidden faces and of the stirring.
+
+    Parameters
+    ----------
+    fit : xarray.Dataset
+        A `fit` of glued blocks after one of a single block, or of free bodies in one recording.
+
+    Returns
+    -------
+    dict
+        By their keys in the study the share of hidden drag, 0 to 1, of glued blocks, and the
+        stirring length [m], where it is known, each at the middles of equal shares of its
+        posterior: a normal law for the first.
+
+    Raises
+    ------
+    InputError
+        When the fit knows neither, or has no covariance.
+
+    Examples
+    --------
+    >>> interaction_quantiles(fit)["assembly.hidden_face_drag"].round(2)  # doctest: +SKIP
+    array([0.29, 0.32, ..., 0.63, 0.66])
+    """
+    from scipy.special import ndtri
+
+    fit = refuse_other_version(fit)
+    if "stirring_length_quantile" not in fit:
+        raise InputError(
+            "the fit does not say what hidden faces and neighbours feel: it has to be one of glued "
+            "blocks after one of a single block (driftwalk fit DIMER --body-shape xx --from FIT), "
+            "or one of free bodies in one recording (--interaction) that can tell"
+        )
+    if not has_covariance(fit):
+        raise InputError("the fit has no covariance to draw parameters from: fit again")
+    length = np.asarray(fit["stirring_length_quantile"].values, dtype=np.float64)
+    found = {"forces.stirring_length_m": length}
+    names = [str(name) for name in fit["log_parameter"].values]
+    if "hidden_share" in names:
+        at = names.index("hidden_share")
+        normal = ndtri((np.arange(length.size) + 0.5) / length.size)
+        share = _number(fit, "hidden_share") + float(fit["covariance"][at, at]) ** 0.5 * normal
+        found["assembly.hidden_face_drag"] = np.clip(share, 0.0, 1.0)
+    return found
+
+
+def draw_quantiles(
+    quantiles: Mapping[str, npt.ArrayLike], *, runs: int, seed: int, trial: int
+) -> dict[str, Floats]:
+    """Return a value of each number for each run, drawn from its quantiles; 25 runs share one.
+
+    Parameters
+    ----------
+    quantiles : mapping
+        Values for equal shares of probability, by a key.
+    runs : int
+        How many runs.
+    seed, trial : int
+        Address of the draws, as in `draw_parameters`.
+
+    Examples
+    --------
+    >>> draw_quantiles({"length": [0.03, 0.03]}, runs=2, seed=1, trial=0)["length"]
+    array([0.03, 0.03])
+    """
+    index = np.arange(-(-runs // RUNS_PER_FLOW))
+    keys = stream_keys("glued", seed=seed, trial=trial, index=index)
+    streams = (np.random.Generator(np.random.Philox(key=int(key))) for key in keys)
+    uniform = np.stack([stream.random(len(quantiles)) for stream in streams])
+    drawn = {}
+    for (key, values), one in zip(quantiles.items(), uniform.T, strict=True):
+        known = np.asarray(values, dtype=np.float64)
+        chosen = known[(one * known.size).astype(np.intp)]
+        drawn[key] = np.repeat(chosen, RUNS_PER_FLOW)[:runs]
+    return drawn
 
 
 def _within(key: str, values: Floats) -> Floats:

@@ -54,7 +54,7 @@ class Plan:
     flow_correlated_over: float | None = None
     """Distance over which the errors of a drawn flow go together [m]; None: each node alone."""
     law: Mapping[str, Floats] = field(default_factory=dict)
-    """Drawn numbers of the force law by their keys in [forces]; the study has the others."""
+    """Drawn numbers of the law by their keys in the study, which has the others."""
 
     @property
     def is_round(self) -> bool:
@@ -202,7 +202,7 @@ def simulate_rows(
     return {name: values for name, values in found.items() if isinstance(values, np.ndarray)}
 
 
-Stream = Literal["run", "parameters", "flow"]
+Stream = Literal["run", "parameters", "flow", "glued"]
 
 
 def stream_keys(stream: Stream, *, seed: int, trial: int, index: npt.ArrayLike) -> Keys:
@@ -210,7 +210,7 @@ def stream_keys(stream: Stream, *, seed: int, trial: int, index: npt.ArrayLike) 
 
     Parameters
     ----------
-    stream : {"run", "parameters", "flow"}
+    stream : {"run", "parameters", "flow", "glued"}
         Purpose of the numbers; streams of two kinds never meet.
     seed : int
         Seed of the whole work.

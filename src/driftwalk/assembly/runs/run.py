@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
@@ -18,6 +18,7 @@ from driftwalk.assembly.runs.draws import (
     draw_flow,
     draw_parameters,
     draw_posterior,
+    draw_quantiles,
     has_standard_error,
 )
 from driftwalk.assembly.runs.plan import Backend, Plan, make_plan, simulate_rows, start_poses
@@ -131,6 +132,7 @@ def assemble_drawn(
     flow: xr.Dataset,
     calibration: xr.Dataset,
     *,
+    quantiles: Mapping[str, npt.ArrayLike] | None = None,
     blocks: int | None = None,
     runs: int | None = None,
     duration: float | None = None,
@@ -147,9 +149,10 @@ def assemble_drawn(
 
     Every run has its own drag coefficient and stochastic force, drawn from the calibration's joint
     region or from the fit's posterior (`draw_parameters`); with a fit whose force law has further
-    uncertain numbers, every 25 runs share a draw of all of them. Where the flow field states
-    standard errors, every 25 runs have their own flow field too: its measured nodes are moved at
-    random by them, each on its own, those of a fit's own flow smoothly over its knots.
+    uncertain numbers, every 25 runs share a draw of all of them, as they do of `quantiles`. Where
+    the flow field states standard errors, every 25 runs have their own flow field too: its measured
+    nodes are moved at random by them, each on its own, those of a fit's own flow smoothly over its
+    knots.
 
     Parameters
     ----------
@@ -157,6 +160,9 @@ def assemble_drawn(
         As in `assemble`.
     calibration : xarray.Dataset
         A `calibration` with its joint region, or a `fit`.
+    quantiles : mapping, optional
+        Further numbers that are drawn, by their keys in the study: values for equal shares of what
+        is known of each. `interaction_quantiles` makes them of a fit of glued blocks.
     trial : int
         As in `assemble`; 1, so that these runs are independent of those of `assemble`.
     flow_draws : {"standard_error", "none"}
@@ -196,7 +202,9 @@ def assemble_drawn(
     drawn = draw_parameters(calibration, **address)
     is_fit = kind_name(calibration) == "fit"
     numbers = draw_posterior(calibration, **address) if is_fit else {}
-    law = {key: values for key, values in numbers.items() if key in LAW_NAMES}
+    law = {f"forces.{key}": values for key, values in numbers.items()}
+    law = {key: values for key, values in law.items() if key in LAW_NAMES}
+    law |= draw_quantiles(quantiles or {}, **address)
     moves = flow_draws == "standard_error" and has_standard_error(flow)
     plan = replace(
         plan,
@@ -359,7 +367,7 @@ def _drawn(plan: Plan, row: int) -> Plan:
     """Return the plan with the drawn flow and the drawn force law of a row."""
     from driftwalk.model import apply_overrides
 
-    law = {f"forces.{key}": float(values[row]) for key, values in plan.law.items()}
+    law = {key: float(values[row]) for key, values in plan.law.items()}
     study, flow = apply_overrides(plan.study, law) if law else plan.study, plan.flow
     if plan.flow_draw is not None:
         flow = draw_flow(

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any, Final
 from driftwalk.cli.options.study import StudyOptions, option_name
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import print_note
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from driftwalk.likelihood import EarlierFit
     from driftwalk.model import Study
     from driftwalk.motion import MotionModel
     from driftwalk.runs import FoundRun
@@ -152,27 +152,6 @@ def _source_from_run(folder: Path, flow_file: Path | None, given: StudyOptions) 
     return Source(chosen, field, found.uncertainty, inputs, warnings, found.not_drawn)
 
 
-def read_earlier_fit(folder: Path) -> EarlierFit:
-    """Return a finished fit with its recordings.
-
-    Raises
-    ------
-    InputError
-        When the folder holds none.
-    """
-    from driftwalk.likelihood import EarlierFit
-    from driftwalk.schema.runs import open_run_folder
-
-    run = open_run_folder(folder)
-    found, recordings = run.dataset("fit.nc"), run.recordings()
-    if found is None or not recordings:
-        raise InputError(
-            f"{folder} is no finished fit with its recording (fit.nc, recording.nc): make one with "
-            f"driftwalk fit RECORDING -o {folder}"
-        )
-    return EarlierFit(found, recordings)
-
-
 GLUED: Final = {
     "hidden_face_drag_share": "assembly.hidden_face_drag",
     "stirring_length": "forces.stirring_length_m",
@@ -180,8 +159,10 @@ GLUED: Final = {
 """Parameters of a fit of glued blocks, and the keys of a study that they are."""
 
 
-def with_glued(given: StudyOptions, folder: Path | None) -> StudyOptions:
+def with_glued(given: StudyOptions, folder: Path | None) -> tuple[StudyOptions, dict[str, Floats]]:
     """Return the options with what a fit of glued blocks says, where they do not say it.
+
+    The quantiles of these numbers come second, by their keys.
 
     Raises
     ------
@@ -189,20 +170,18 @@ def with_glued(given: StudyOptions, folder: Path | None) -> StudyOptions:
         When the run is not one of glued blocks after a fit of one block.
     """
     if folder is None:
-        return given
-    from driftwalk.schema.answers.facts import facts_of, fitted_value, is_open
+        return given, {}
+    from driftwalk.assembly import interaction_quantiles
+    from driftwalk.runs import read_earlier_fit
+    from driftwalk.schema.answers.facts import fitted_value
     from driftwalk.schema.kinds.fit import PARAMETERS
 
     found = read_earlier_fit(folder).fit
-    known = {str(name) for name in found["parameter"].values}
-    facts = facts_of(found)
-    named = [one for one in GLUED if one in known and not is_open(facts, PARAMETERS[one].key)]
-    if not named:
-        raise InputError(
-            f"{folder} does not say what hidden faces and neighbours feel: it has to be a fit of "
-            "glued blocks after one of a single block (driftwalk fit DIMER --body-shape xx --from "
-            "FIT), or of free bodies in one recording (--interaction)"
-        )
+    try:
+        quantiles = interaction_quantiles(found)
+    except InputError as error:
+        raise InputError(f"{folder}: {error}") from None
+    named = [name for name, key in GLUED.items() if key in quantiles]
     values = {GLUED[name]: fitted_value(found, name) for name in named}
     said = [
         f"{PARAMETERS[name].words} {value:.2g} ({low:.2g} to {high:.2g})"
@@ -214,7 +193,8 @@ def with_glued(given: StudyOptions, folder: Path | None) -> StudyOptions:
     ]
     print_note(f"{'; '.join(said)}: from {folder}")
     kept = {key: value for key, value in values.items() if key not in given.overrides}
-    return given.and_also(kept, keys=given.keys)
+    drawn = {key: values for key, values in quantiles.items() if key in kept}
+    return given.and_also(kept, keys=given.keys), drawn
 
 
 def load_flow_for(path: Path, study: Study) -> xr.Dataset:

@@ -28,7 +28,12 @@ from driftwalk.likelihood.filter.difference_pairs import unpacked
 from driftwalk.likelihood.filter.filter_pass import Passes
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import FILTER, Series
-from driftwalk.likelihood.interaction.glued import length_of, most_likely
+from driftwalk.likelihood.interaction.glued import (
+    SharedStirring,
+    length_of,
+    length_quantiles,
+    most_likely,
+)
 from driftwalk.likelihood.newton import thinned
 from driftwalk.likelihood.preparation import PreparedRecordings
 
@@ -207,16 +212,6 @@ def _block_diagonal(blocks: Floats) -> Floats:
     return whole.reshape(count * size, count * size)
 
 
-class SharedStirring(NamedTuple):
-    """The forces that the bodies of a recording share."""
-
-    facts: dict[str, Any]
-    """Correlation at one side, length, and the farthest departure of the kernel."""
-    by_distance: dict[str, Any]
-    """Variables: the correlation of the forces at distances, with intervals."""
-    warnings: list[str]
-
-
 def shared_stirring(ready: PreparedRecordings, point: Point, course: Course) -> SharedStirring:
     """Return the length over which the bodies of a recording share the stirring.
 
@@ -232,7 +227,7 @@ def shared_stirring(ready: PreparedRecordings, point: Point, course: Course) -> 
         The progress of the fit.
     """
     if not ready.study.fit.interaction:
-        return SharedStirring({}, {}, [])
+        return SharedStirring()
     course.begin("shared stirring")
     from scipy.interpolate import CubicSpline
     from scipy.stats import norm
@@ -246,7 +241,9 @@ def shared_stirring(ready: PreparedRecordings, point: Point, course: Course) -> 
     apart = np.concatenate([one.apart[one.telling] for one in filters])
     if len(alike) > 1 or apart.size < SHARED.distances:
         why = "their clocks differ" if len(alike) > 1 else "no samples of two bodies at one time"
-        return SharedStirring({}, {}, [f"cannot tell whether the bodies share the stirring: {why}"])
+        return SharedStirring(
+            warnings=[f"cannot tell whether the bodies share the stirring: {why}"]
+        )
     side, confidence = ready.passes.body.side, ready.study.fit.confidence
     to_length = length_of(ready.passes.body)
     ends = [math.log(SHARED.shortest_sides * side), math.log(to_length(SHARED.most_correlation))]
@@ -275,9 +272,11 @@ def shared_stirring(ready: PreparedRecordings, point: Point, course: Course) -> 
             f"{100 * distance[np.abs(away).argmax()]:.3g} cm"
         )
     half = norm.ppf(0.5 + 0.5 * confidence) * std
+    quantiles = length_quantiles(nodes, density, ready.passes.body)
     return SharedStirring(
         facts,
         {
+            **(quantiles if rho[1] > 0.0 else {}),
             "force_correlation": ("body_distance", value),
             "force_correlation_interval": (
                 ("body_distance", "bound"),

@@ -189,6 +189,8 @@ def number_facts(point: Point, covariance: Floats, study: Study) -> dict[str, An
         if name in widths or name in point.fixed:
             state(key, point.number(name), widths.get(name, 0.0))
     if "hidden_share" in widths:
+        low, high = facts["hidden_face_drag_share_interval"]
+        facts["hidden_face_drag_half_width"] = 0.5 * (high - low)
         # The water may seem to pull at a hidden face, or to push more than at a free one.
         for key in ("hidden_face_drag_share", "hidden_face_drag_share_interval"):
             clipped = np.clip(facts[key], 0.0, 1.0)

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from driftwalk.core.arrays import Floats
 from driftwalk.model.bodies.rigid_body import Measures, RigidBody
 
 
@@ -32,8 +33,15 @@ def disc(measures: Measures) -> RigidBody:
         area_m2=math.pi * radius**2,
         panels=np.stack([radius * nx, radius * ny, nx, ny, width], axis=1),
         corners=np.zeros((0, 2)),
-        # The mean of x² over a disc is R² / 4.
-        moment_points=0.5 * radius * np.array([[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]]),
+        moment_points=_seven_points(radius),
         symmetry=0,
         disc_radius_m=radius,
     )
+
+
+def _seven_points(radius: float) -> Floats:
+    """Return the centre and a hexagon: means are exact for the fifth degree (Radon 1948)."""
+    angle = np.arange(6) * (math.pi / 3.0)
+    rim = math.sqrt(2.0 / 3.0) * radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    places = np.concatenate([np.zeros((1, 2)), rim])
+    return np.column_stack([places, [0.25, *[0.125] * 6]])

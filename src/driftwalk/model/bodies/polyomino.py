@@ -8,7 +8,7 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import ConfigurationError
-from driftwalk.model.bodies.rigid_body import Measures, RigidBody, face
+from driftwalk.model.bodies.rigid_body import Measures, RigidBody, face, gauss_points
 from driftwalk.schema.shapes import Cells, cells_of_shape
 
 MOST_CELLS = 64
@@ -46,14 +46,11 @@ def _glued(cells: Cells, measures: Measures) -> RigidBody:
             middle = (x + nx * side / 2, y + ny * side / 2)
             if share:
                 faces.append(face(middle, (float(nx), float(ny)), side, measures.strips, share))
-    spread = centres.T @ centres / len(cells) + np.eye(2) * side**2 / 12.0
-    variances, axes = np.linalg.eigh(spread)
-    signs = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     return RigidBody(
         area_m2=len(cells) * side**2,
         panels=np.concatenate(faces),
         corners=_hull(centres, side),
-        moment_points=(signs * np.sqrt(variances)) @ axes.T,
+        moment_points=gauss_points(side, side, centres),
         symmetry=_symmetry(centres),
         cells=centres,
     )

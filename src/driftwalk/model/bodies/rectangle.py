@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
 
 from driftwalk.core.errors import ConfigurationError
-from driftwalk.model.bodies.rigid_body import Measures, RigidBody, face
+from driftwalk.model.bodies.rigid_body import Measures, RigidBody, face, gauss_points
 
 
 def rectangle(measures: Measures) -> RigidBody:
@@ -44,6 +43,6 @@ def _rectangle(length: float, width: float, strips: int) -> RigidBody:
         area_m2=length * width,
         panels=np.concatenate(faces),
         corners=signs * half,
-        moment_points=signs * half / math.sqrt(3.0),
+        moment_points=gauss_points(length, width),
         symmetry=4 if length == width else 2,
     )

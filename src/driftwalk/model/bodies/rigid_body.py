@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from driftwalk.core.arrays import Floats
 
@@ -41,7 +42,7 @@ class RigidBody:
     corners: Floats
     """Corners that may touch a wall, shape (n, 2) [m]; none of a disc."""
     moment_points: Floats
-    """Four points with the second moments of the area, shape (4, 2) [m]."""
+    """Points for means over the area, shape (n, 3): x, y [m], share of the area [1]."""
     symmetry: int
     """Turns by 2 pi / symmetry leave it as it is; 0 for a disc, which has no heading."""
     disc_radius_m: float = 0.0
@@ -53,7 +54,7 @@ class RigidBody:
     @property
     def moment_m2(self) -> float:
         """Moment of inertia over mass, I / m, of a body of even density [m²]."""
-        return float((self.moment_points**2).sum(axis=1).mean())
+        return float((self.moment_points[:, :2] ** 2).sum(axis=1) @ self.moment_points[:, 2])
 
     @property
     def reach_m(self) -> float:
@@ -87,6 +88,22 @@ class RigidBody:
             return {}
         names = ("panels", "corners", "moment_points")
         return {name: np.ascontiguousarray(getattr(self, name)) for name in names}
+
+
+def gauss_points(length: float, width: float, middles: npt.ArrayLike = ((0.0, 0.0),)) -> Floats:
+    """Return 3 x 3 Gauss points of rectangles of one size, shape (9 n, 3): x, y, share.
+
+    Of fewer the moment of the water's acceleration is 5 to 40 % off in eddies as small as a block
+    (docs/explanation/likelihood.md).
+    """
+    place, weight = np.polynomial.legendre.leggauss(3)
+    x, y = np.meshgrid(0.5 * length * place, 0.5 * width * place)
+    share = np.outer(weight, weight) / 4.0
+    one = np.stack([x, y, share], axis=-1).reshape(-1, 3)
+    centres = np.asarray(middles, dtype=np.float64)
+    shifts = np.concatenate([centres, np.zeros((len(centres), 1))], axis=1)
+    every = (one + shifts[:, np.newaxis]).reshape(-1, 3)
+    return np.asarray(every * [1.0, 1.0, 1.0 / len(centres)])
 
 
 def face(middle: tuple[float, float], normal: tuple[float, float], length: float, strips: int,

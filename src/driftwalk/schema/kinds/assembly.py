@@ -90,6 +90,9 @@ variables (drawn from a fit whose force law has it):
     linear_drag(run) [kg s-1]: linear drag of the block
     drag_power(run) [1]: power of the speed in the drag
     force_memory(run) [s]: correlation time of the force
+variables (drawn from a fit of glued blocks):
+    hidden_face_drag_share(run) [1]: drag of a hidden face over that of a free one
+    stirring_length(run) [m]: distance over which blocks share the stochastic force
 variables (flow fields were drawn):
     flow_draw(run) int: which drawn flow field the run had
 attributes (made by a run):

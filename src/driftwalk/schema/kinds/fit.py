@@ -44,6 +44,7 @@ dimensions:
     measured_y: nodes of a measured flow
     measured_x: nodes of a measured flow
     body_distance: ranges of the distance of two bodies
+    stirring_quantile: equal shares of a posterior
 variables:
     estimate(parameter): estimates of the parameters; drag_coefficient C_d, force_std σ_F, \
         force_noise_intensity σ_F² times the force interval, tracking_noise; with the angle in the \
@@ -154,6 +155,8 @@ variables (glued blocks, after a fit of one block; or free bodies in one recordi
     stirring_misfit_std [1]: by how much force and torque of a glued body disagree on the \
         correlation, or how far the correlation of the forces on free bodies is from its kernel at \
         one of the distances, in standard deviations
+    stirring_length_quantile(stirring_quantile) [m]: length of the stirring at the middles of \
+        equal shares of its posterior
 variables (free bodies in one recording):
     force_correlation(body_distance) [1]: correlation of the stochastic forces on two bodies
     force_correlation_interval(body_distance bound) [1]: its interval
