@@ -327,7 +327,7 @@ def glued_quantiles(fit: xr.Dataset) -> dict[str, Floats]:
     if not {"hidden_share", "stirring_length_quantile"} <= {*names, *fit.variables}:
         raise InputError(
             "the fit does not say what hidden faces and neighbours feel: it has to be one of glued "
-            "blocks after one of a single block (driftwalk fit DIMER --body-shape xx --from FIT)"
+            "blocks after one of a single block"
         )
     if not has_covariance(fit):
         raise InputError("the fit has no covariance to draw parameters from: fit again")

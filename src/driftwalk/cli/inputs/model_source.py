@@ -180,7 +180,8 @@ def with_glued(given: StudyOptions, folder: Path | None) -> tuple[StudyOptions, 
     try:
         quantiles = glued_quantiles(found)
     except InputError as error:
-        raise InputError(f"{folder}: {error}") from None
+        how = "driftwalk fit DIMER --body-shape xx --from FIT"
+        raise InputError(f"{folder}: {error} ({how})") from None
     values = {key: fitted_value(found, name) for name, key in GLUED.items()}
     said = [
         f"{PARAMETERS[name].words} {value:.2g} ({low:.2g} to {high:.2g})"
