@@ -178,8 +178,8 @@ def read_earlier_fit(source: Path | xr.Dataset) -> EarlierFit:
     folder = source if isinstance(source, Path) else run_folder(source)
     if folder is None:
         raise InputError(
-            "a fit in memory does not hold its recordings: give the run directory that "
-            "`driftwalk.fit` made with `folder`, or EarlierFit(fit, recordings)"
+            "a fit in memory does not hold its recordings: give the run directory that it was made "
+            "in, or EarlierFit(fit, recordings)"
         )
     run = open_run_folder(folder)
     found, recordings = run.dataset("fit.nc"), run.recordings()

@@ -327,8 +327,7 @@ def interaction_quantiles(fit: xr.Dataset) -> dict[str, Floats]:
     if "stirring_length_quantile" not in fit:
         raise InputError(
             "the fit does not say what hidden faces and neighbours feel: it has to be one of glued "
-            "blocks after one of a single block (driftwalk fit DIMER --body-shape xx --from FIT), "
-            "or one of free bodies in one recording (--interaction) that can tell"
+            "blocks after one of a single block, or of free bodies in one recording that can tell"
         )
     if not has_covariance(fit):
         raise InputError("the fit has no covariance to draw parameters from: fit again")

@@ -180,7 +180,8 @@ def with_glued(given: StudyOptions, folder: Path | None) -> tuple[StudyOptions, 
     try:
         quantiles = interaction_quantiles(found)
     except InputError as error:
-        raise InputError(f"{folder}: {error}") from None
+        how = "driftwalk fit DIMER --body-shape xx --from FIT, driftwalk fit PAIR --interaction"
+        raise InputError(f"{folder}: {error} ({how})") from None
     named = [name for name, key in GLUED.items() if key in quantiles]
     values = {GLUED[name]: fitted_value(found, name) for name in named}
     said = [
