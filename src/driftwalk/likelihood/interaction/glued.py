@@ -177,7 +177,7 @@ def stirring_facts(
     squares = ((expected - observed) ** 2 / variances).sum(axis=1)
     rho = most_likely(nodes, -0.5 * squares, ready.study.fit.confidence)
     facts: dict[str, Any] = {}
-    for name, of in (("stirring_correlation", float), ("stirring_length_m", length_of(body))):
+    for name, of in (("stirring_correlation", float), ("stirring_length_m", _length_of(body))):
         value, *ends = (of(one) for one in rho)
         facts |= {name: value, f"{name}_interval": ends}
     if len(observed) > 1:
@@ -187,12 +187,12 @@ def stirring_facts(
 
 def _expected(rho: float, body: Body) -> tuple[float, float]:
     """Return the logarithms of the intensity over that of one block, and of the lever [m]."""
-    length, outline = length_of(body)(rho), body.outline
+    length, outline = _length_of(body)(rho), body.outline
     ratio = 2.0 * math.log(outline.force_share(length) / len(outline.cells))
     return ratio, math.log(max(outline.force_lever_m(length), 1e-12))
 
 
-def length_of(body: Body) -> Callable[[float], float]:
+def _length_of(body: Body) -> Callable[[float], float]:
     """Return the function from the correlation at one side to the length [m]; 0 for none."""
     return lambda rho: 0.0 if rho <= 0.0 else body.side / math.sqrt(-2.0 * math.log(rho))
 
