@@ -185,31 +185,31 @@ def glued_stirring(
     squares = np.einsum("na,ab,nb->n", off, np.linalg.inv(covariance), off)
     rho = most_likely(nodes, -0.5 * squares, ready.study.fit.confidence)
     facts: dict[str, Any] = {}
-    for name, of in (("stirring_correlation", float), ("stirring_length_m", length_of(body))):
+    for name, of in (("stirring_correlation", float), ("stirring_length_m", _length_of(body))):
         value, *ends = (of(one) for one in rho)
         facts |= {name: value, f"{name}_interval": ends}
     if len(observed) > 1:
         facts["stirring_misfit_std"] = math.sqrt(float(squares.min()))
-    return SharedStirring(facts, length_quantiles(nodes, -0.5 * squares, body))
+    lengths = np.array([length_of(body)(float(one)) for one in nodes])
+    return SharedStirring(facts, length_quantiles(lengths, -0.5 * squares))
 
 
-def length_quantiles(nodes: Floats, log_density: Floats, body: Body) -> dict[str, Any]:
+def length_quantiles(lengths: Floats, log_density: Floats) -> dict[str, Any]:
     """Return the variable with the length at the middles of equal shares of its posterior [m]."""
     share = np.cumsum(np.exp(log_density - log_density.max()))
     middles = (np.arange(GLUED.quantiles) + 0.5) / GLUED.quantiles
-    drawn = nodes[np.searchsorted(share, middles * share[-1])]
-    lengths = np.array([length_of(body)(float(one)) for one in drawn])
-    return {"stirring_length_quantile": ("stirring_quantile", lengths)}
+    drawn = lengths[np.searchsorted(share, middles * share[-1])]
+    return {"stirring_length_quantile": ("stirring_quantile", drawn)}
 
 
 def _expected(rho: float, body: Body) -> tuple[float, float]:
     """Return the logarithms of the intensity over that of one block, and of the lever [m]."""
-    length, outline = length_of(body)(rho), body.outline
+    length, outline = _length_of(body)(rho), body.outline
     ratio = 2.0 * math.log(outline.force_share(length) / len(outline.cells))
     return ratio, math.log(max(outline.force_lever_m(length), 1e-12))
 
 
-def length_of(body: Body) -> Callable[[float], float]:
+def _length_of(body: Body) -> Callable[[float], float]:
     """Return the function from the correlation at one side to the length [m]; 0 for none."""
     return lambda rho: 0.0 if rho <= 0.0 else body.side / math.sqrt(-2.0 * math.log(rho))
 

@@ -5,8 +5,8 @@ does not show. Each body's filter, linear about the track it followed, has the e
 = F (d - K e) + w, and innovations e = H d + v. With the forces shared, the w of two bodies have the
 covariance rho(r) G_1 G_2', with G the part of a Cholesky factor of a body's own Q = G G' that the
 force on its centre drives. One Kalman filter of the errors of all bodies together then gives the
-exact likelihood of all innovations for every L. The other numbers stay as fitted. rho at a distance
-of one side has a uniform prior, as for glued blocks, and an interval of highest density.
+exact likelihood of all innovations for every L. The other numbers stay as fitted. The length has a
+uniform prior from zero to the width of the tank, and an interval of highest density.
 
 See docs/how-to/dimer.md.
 """
@@ -30,7 +30,6 @@ from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import FILTER, Series
 from driftwalk.likelihood.interaction.glued import (
     SharedStirring,
-    length_of,
     length_quantiles,
     most_likely,
 )
@@ -49,10 +48,8 @@ class SharedPolicy(NamedTuple):
     times as many moved no end of an interval by more than 0.04 %."""
     shortest_sides: float = 0.3
     """Shortest length above zero [sides]: the correlation at one side is 0.004."""
-    most_correlation: float = 0.9995
-    """Largest correlation at one side: a length of 32 sides."""
     nodes: int = 4001
-    """Of the posterior of the correlation."""
+    """Of the posterior of the length, from zero to the width of the tank."""
     least_evidence: float = 3.0
     """Log likelihood ratio to independent forces below which no length is stated: chance exceeds it
     in one recording of 140."""
@@ -245,19 +242,21 @@ def shared_stirring(ready: PreparedRecordings, point: Point, course: Course) -> 
             warnings=[f"cannot tell whether the bodies share the stirring: {why}"]
         )
     side, confidence = ready.passes.body.side, ready.study.fit.confidence
-    to_length = length_of(ready.passes.body)
-    ends = [math.log(SHARED.shortest_sides * side), math.log(to_length(SHARED.most_correlation))]
-    logs = np.linspace(ends[0], ends[1], SHARED.trials - 1)
+    widest = max(ready.study.tank.extent_m)
+    logs = np.linspace(math.log(SHARED.shortest_sides * side), math.log(widest), SHARED.trials - 1)
     lengths = np.append(1e-3 * side, np.exp(logs))
     like = _summed(filters, lambda one: _kernel(one, lengths), SHARED.trials)
-    nodes = np.linspace(0.0, SHARED.most_correlation, SHARED.nodes)
+    nodes = np.linspace(0.0, widest, SHARED.nodes)
     # Below the shortest length the bodies do not know it from zero.
-    at = np.log(np.maximum([to_length(rho) for rho in nodes], math.exp(logs[0])))
+    at = np.log(np.maximum(nodes, lengths[1]))
     density = np.where(nodes > 0.0, CubicSpline(logs, like[1:])(at), like[0])
-    rho = most_likely(nodes, density, confidence)
-    if rho[1] == 0.0 or like.max() - like[0] < SHARED.least_evidence:
-        rho = (0.0, 0.0, rho[2])
-    facts, warnings = _answer(rho, to_length, confidence, nodes[-1])
+    best, low, high = most_likely(nodes, density, confidence)
+    enough = 0.5 * norm.ppf(0.5 + 0.5 * confidence) ** 2
+    if like[-1] > like.max() - enough:
+        high = math.inf
+    if low == 0.0 or like.max() - like[0] < SHARED.least_evidence:
+        best = low = 0.0
+    facts, warnings = _answer((best, low, high), side, confidence)
     length = np.array([max(facts["stirring_length_m"], 1e-3 * side)])
     found = _by_distance(
         filters, np.quantile(apart, np.linspace(0, 1, SHARED.distances + 1)), length
@@ -272,11 +271,11 @@ def shared_stirring(ready: PreparedRecordings, point: Point, course: Course) -> 
             f"{100 * distance[np.abs(away).argmax()]:.3g} cm"
         )
     half = norm.ppf(0.5 + 0.5 * confidence) * std
-    quantiles = length_quantiles(nodes, density, ready.passes.body)
+    quantiles = length_quantiles(nodes, density)
     return SharedStirring(
         facts,
         {
-            **(quantiles if rho[1] > 0.0 else {}),
+            **(quantiles if low > 0.0 else {}),
             "force_correlation": ("body_distance", value),
             "force_correlation_interval": (
                 ("body_distance", "bound"),
@@ -289,21 +288,21 @@ def shared_stirring(ready: PreparedRecordings, point: Point, course: Course) -> 
 
 
 def _answer(
-    rho: tuple[float, ...], to_length: Callable[[float], float], confidence: float, most: float
+    length: tuple[float, float, float], side: float, confidence: float
 ) -> tuple[dict[str, Any], list[str]]:
-    """Return correlation and length with intervals; without a lower end both are 0."""
-    value, low, high = rho
-    top = to_length(high) if high < most else math.inf
+    """Return the length [m] and the correlation at one side with intervals; a warning for none."""
+    value, low, high = length
+    rho = [float(_rho(side, max(one, 1e-3 * side))) for one in length]
     facts = {
-        "stirring_correlation": value,
-        "stirring_correlation_interval": [low, high],
-        "stirring_length_m": to_length(value),
-        "stirring_length_m_interval": [to_length(low), top],
+        "stirring_correlation": rho[0],
+        "stirring_correlation_interval": rho[1:],
+        "stirring_length_m": value,
+        "stirring_length_m_interval": [low, high],
     }
     if low > 0.0:
         return facts, []
-    most_of = f": at most {1e3 * top:.3g} mm ({confidence:.0%})" if math.isfinite(top) else ""
-    return facts, [f"cannot tell a length of the stirring from none{most_of}"]
+    most = f": at most {1e3 * high:.3g} mm ({confidence:.0%})" if math.isfinite(high) else ""
+    return facts, [f"cannot tell a length of the stirring from none{most}"]
 
 
 def _rho(distance: npt.ArrayLike, length: npt.ArrayLike) -> Floats:
