@@ -50,6 +50,11 @@ class Member:
     exchanged: tuple[tuple[str, str], ...] = ()
 
 
+def _none(_: Numbers) -> Sequence[State]:
+    # No lambda: models travel to other processes.
+    return ()
+
+
 def _state(given: Mapping[str, Any], names: str, **others: str) -> State:
     """Return a state: numbers that have its own names, and those that have others."""
     sources = {**{name: name for name in names.split()}, **others}
@@ -110,7 +115,7 @@ MEMBERS: Final[Mapping[str, Member]] = {
                 *parameters("speed_std memory_time"),
                 replace(PARAMETERS["turn_rate"], meaning="Rate at which the velocity turns."),
             ),
-            lambda _: (),
+            _none,
             "inertial",
         ),
         Member(
