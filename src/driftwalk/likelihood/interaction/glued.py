@@ -190,7 +190,7 @@ def glued_stirring(
         facts |= {name: value, f"{name}_interval": ends}
     if len(observed) > 1:
         facts["stirring_misfit_std"] = math.sqrt(float(squares.min()))
-    lengths = np.array([length_of(body)(float(one)) for one in nodes])
+    lengths = np.array([_length_of(body)(float(one)) for one in nodes])
     return SharedStirring(facts, length_quantiles(lengths, -0.5 * squares))
 
 
