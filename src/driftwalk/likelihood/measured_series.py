@@ -150,7 +150,7 @@ class _Regression(NamedTuple):
     counts: Floats
     """Frames that would tell the mean as well, shape (layers, y, x)."""
     rest: Floats
-    """What is left of the frames, shape (2, frames, y, x)."""
+    """Rest of the frames, shape (2, frames, y, x)."""
     modes: Floats
     """Amplitudes, shape (modes, frames)."""
 
