@@ -20,10 +20,9 @@ from driftwalk.core.errors import InputError, argument_text
 from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.check.power import POWER, detectable_sigmas
 from driftwalk.likelihood.filter.parameters import Amplitudes
-from driftwalk.likelihood.fitted_modes import stored_amplitudes
-from driftwalk.likelihood.measured_series import amplitudes_in, compressed, with_modes
+from driftwalk.likelihood.measured_series import amplitudes_in, compressed
 from driftwalk.likelihood.spline import Spline, products
-from driftwalk.schema import FLAGS, build_flow_field
+from driftwalk.schema import FLAGS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -452,29 +451,3 @@ def agreement_tests(facts: Mapping[str, Any]) -> list[Agreement]:
 def contradictions(facts: Mapping[str, Any]) -> list[str]:
     """Return what in a measured flow contradicts the motion, in sentences."""
     return [one.sentence for one in agreement_tests(facts) if one.p_value < MEASURED.level]
-
-
-def stored_flow(fit: xr.Dataset) -> xr.Dataset | None:
-    """Return the measured flow that a fit was made with, as a flow field with its errors."""
-    if "measured_u" not in fit:
-        return None
-    names = ("measured_u", "measured_v", "measured_u_error", "measured_v_error")
-    u, v, u_error, v_error = (fit[name].values for name in names)
-    x, y = fit["measured_x"].values, fit["measured_y"].values
-    flag = np.where(np.isfinite(u), FLAGS["measured"], FLAGS["outside"])
-    field = build_flow_field(
-        x, y, u=np.nan_to_num(u), v=np.nan_to_num(v), flag=flag,
-        u_standard_error=u_error, v_standard_error=v_error,
-        attrs={
-            "method": "file", "cell_size_m": float(x[1] - x[0]),
-            "source": fit.attrs["measured_flow"], "errors": fit.attrs["measured_flow_errors"],
-        },
-    )  # fmt: skip
-    known = stored_amplitudes(fit)
-    if known is None:
-        return field
-    velocity, error = (
-        np.stack([fit[f"measured_{name}_mode{end}"].values for name in NAMES])
-        for end in ("", "_error")
-    )
-    return with_modes(field, known, np.nan_to_num(velocity), error)

@@ -16,7 +16,7 @@ import numpy as np
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
 from driftwalk.likelihood.filter.parameters import Amplitudes
-from driftwalk.likelihood.fitted_modes import FRAMES
+from driftwalk.likelihood.fitted_modes import FRAMES, stored_amplitudes
 from driftwalk.schema import FLAGS, build_flow_field
 from driftwalk.simulation.series import continued_flow, series_of
 
@@ -106,6 +106,32 @@ def amplitudes_in(field: xr.Dataset) -> Amplitudes | None:
     if "amplitude" not in field:
         return None
     return Amplitudes(field["frame"].values, field["amplitude"].values, field.attrs["repeat"])
+
+
+def stored_flow(fit: xr.Dataset) -> xr.Dataset | None:
+    """Return the measured flow that a fit was made with, as a flow field with its errors."""
+    if "measured_u" not in fit:
+        return None
+    names = ("measured_u", "measured_v", "measured_u_error", "measured_v_error")
+    u, v, u_error, v_error = (fit[name].values for name in names)
+    x, y = fit["measured_x"].values, fit["measured_y"].values
+    flag = np.where(np.isfinite(u), FLAGS["measured"], FLAGS["outside"])
+    field = build_flow_field(
+        x, y, u=np.nan_to_num(u), v=np.nan_to_num(v), flag=flag,
+        u_standard_error=u_error, v_standard_error=v_error,
+        attrs={
+            "method": "file", "cell_size_m": float(x[1] - x[0]),
+            "source": fit.attrs["measured_flow"], "errors": fit.attrs["measured_flow_errors"],
+        },
+    )  # fmt: skip
+    known = stored_amplitudes(fit)
+    if known is None:
+        return field
+    velocity, error = (
+        np.stack([fit[f"measured_{name}_mode{end}"].values for name in "uv"])
+        for end in ("", "_error")
+    )
+    return with_modes(field, known, np.nan_to_num(velocity), error)
 
 
 def _principal(off: Floats, mean: Floats) -> Floats:

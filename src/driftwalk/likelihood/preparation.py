@@ -29,7 +29,8 @@ from driftwalk.likelihood.filter.series import (
 from driftwalk.likelihood.fitted_modes import stored_coefficients
 from driftwalk.likelihood.flow_intervals import Intervals, cut_track, intervals_of, require_fit
 from driftwalk.likelihood.law.force_law import effective_logs, stored_numbers
-from driftwalk.likelihood.measured_flow import MeasuredFlow, measured_flow, stored_flow
+from driftwalk.likelihood.measured_flow import MeasuredFlow, measured_flow
+from driftwalk.likelihood.measured_series import stored_flow
 from driftwalk.likelihood.prior import Earlier, Prior, Weights
 from driftwalk.likelihood.refuse import (
     LIMIT,

@@ -28,7 +28,8 @@ from driftwalk.core.errors import InputError
 from driftwalk.likelihood.check import replicates
 from driftwalk.likelihood.filter.parameters import Amplitudes
 from driftwalk.likelihood.fitted_modes import stored_coefficients
-from driftwalk.likelihood.measured_flow import MEASURED, MeasuredFlow, measured_flow, stored_flow
+from driftwalk.likelihood.measured_flow import MEASURED, MeasuredFlow, measured_flow
+from driftwalk.likelihood.measured_series import stored_flow
 from driftwalk.likelihood.preparation import estimate_of, prepare, spline_of
 from driftwalk.model import Study, apply_overrides
 from driftwalk.schema import build_flow_field
