@@ -50,7 +50,8 @@ SERIES: Final = SeriesPolicy()
 def compressed(field: xr.Dataset, study: Study, *, duration: float = 0.0) -> xr.Dataset:
     """Return the mean of the frames, and with it the modes of a flow that changes.
 
-    Nodes that were measured in half of the frames count. Time 0 of the series is the first sample
+    Nodes that were measured in half of the frames count; of a flow that changes, frames in which
+    half of those were. Time 0 of the series is the first sample
     of a recording of that duration [s]; refuses one that goes beyond the frames of a flow that
     changes, unless it is known how the flow goes on.
     """
@@ -66,6 +67,9 @@ def compressed(field: xr.Dataset, study: Study, *, duration: float = 0.0) -> xr.
     off = np.where(seen, velocity - mean[:, None], 0.0)
     layers, counts = mean[np.newaxis], count[np.newaxis].astype(np.float64)
     modes = _principal(off[:, :, there], mean[:, there])
+    whole = seen[:, there].mean(axis=1) >= 0.5
+    if len(modes) and not whole.all():
+        return compressed(field.isel(time=whole), study, duration=duration)
     if len(modes):
         layers, counts, off, modes = _regressed(modes, off, seen & there, mean)
     squares = (off**2).sum(axis=(0, 1)) / 2.0

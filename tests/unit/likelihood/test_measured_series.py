@@ -95,9 +95,13 @@ def read(field: xr.Dataset, *, duration: float = 0.0, **more: Any) -> MeasuredFl
 @pytest.mark.slow
 def test_mean_and_modes_are_those_of_the_flow_within_their_errors() -> None:
     time = np.arange(0.0, 200.0, 2.0)
-    one = read(frames_of(alternating(0.3), time))
+    field = frames_of(alternating(0.3), time)
+    # A frame without vectors is no frame.
+    field["flag"][7] = 2
+    one, time = read(field), np.delete(time, 7)
     assert one.amplitudes is not None
     assert one.layers == 2
+    np.testing.assert_array_equal(one.amplitudes.time, time)
     want = wave(time)
     found = one.amplitudes.at(time)[0]
     sign = math.copysign(1.0, float(found @ want))
@@ -169,6 +173,7 @@ def test_many_frames_become_means_of_a_few() -> None:
     assert abs(found) / 450.0 == pytest.approx(1.0, abs=0.02)
 
 
+@pytest.mark.slow
 def test_what_a_fit_cannot_take_is_refused_with_the_way() -> None:
     time = np.arange(0.0, 60.0)
     field = frames_of(alternating(0.3), time)
@@ -252,7 +257,7 @@ def test_a_stored_fit_and_its_replicates_have_the_same_flow(made: Any) -> None:
     first = prepare([seen], study_with(), None, None, flow).measured
     assert again is not None
     assert first is not None
-    for name in ("normal", "right", "own"):
+    for name in ("normal", "right"):
         one, other = getattr(again, name), getattr(first, name)
         np.testing.assert_allclose(one, other, rtol=1e-5, atol=1e-9 * abs(other).max())
     np.testing.assert_array_equal(estimate.point.coefficients, stored_coefficients(fit))
@@ -282,8 +287,8 @@ def test_a_series_that_is_another_one_contradicts_the_motion(made: Any, wrong: s
                                         v=flow["v"].copy(data=-flow["v"].values[:, ::-1])),
     }[wrong]()  # fmt: skip
     fit = dw.fit_motion(seen, study_with(), flow=other)
-    judged = dw.likelihood.judge_fit(fit, [seen]).fit
-    assert judged["verdict"] == "does not explain"
+    assert float(fit["measured_flow_p_value"]) < MEASURED.level
+    assert any("measured flow is not the one" in text for text in fit["warning"].values)
 
 
 def test_amplitudes_are_linear_between_frames() -> None:
