@@ -116,7 +116,7 @@ def fit_motion(
     flow : xarray.Dataset, optional
         A flow that was measured, a `flow_field` as `load_flow` returns it: its *measured* nodes,
         with their errors, become the prior of the fitted flow. Of a series that changes in time,
-        time 0 is the recording's first sample; the fitted flow is its mean and up to three modes.
+        time 0 is the recording's first sample; the fitted flow is its mean and up to five modes.
     earlier : EarlierFit, optional
         Of glued blocks, ``shape = "xx"``: a fit of one block in the same water, with its
         recordings. The fit then says how much drag the hidden faces feel, and over which length

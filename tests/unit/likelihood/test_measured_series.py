@@ -186,11 +186,11 @@ def test_what_a_fit_cannot_take_is_refused_with_the_way() -> None:
 
     def restless(x: np.ndarray, y: np.ndarray, time: float) -> tuple[np.ndarray, np.ndarray]:
         u, v = stirred(x, y)
-        for k in range(4):
+        for k in range(7):
             u = u + 0.01 * math.sin((k + 1) * 0.3 * time) * np.sin((k + 1) * 20.0 * y)
         return u, v
 
-    with pytest.raises(InputError, match=r"in 4 modes, and the fit takes 3: the next one is \d+%"):
+    with pytest.raises(InputError, match=r"in 7 modes, and the fit takes 5: the next one is \d+%"):
         read(frames_of(restless, time))
     study = coarse_study()
     many = [recording(50.0), recording(50.0, "second")]
