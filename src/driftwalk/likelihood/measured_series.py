@@ -38,8 +38,8 @@ class SeriesPolicy(NamedTuple):
     """With the mean, in the usual tank, they are as many coefficients as a fit of several flows may
     have (`LimitPolicy.most_coefficients`)."""
     most_left: float = 0.03
-    """Largest mode that may be left out. Of jets that turn, one of 3.3 % made C_d 3 % too small, one
-    of 4.8 % 7 %, one of 8 % 12 %; when they were taken it was 1 to 3 %."""
+    """Largest mode that may be left out. Of jets that turn, one of 3.3 % made C_d 3 % too small,
+    one of 4.8 % 7 %, one of 8 % 12 %; when they were taken it was 1 to 3 %."""
     above_noise: float = 2.0
     """Its singular value over the largest of independent errors, from which on it is no noise.
     Windows that overlap by half share their errors and double it."""
