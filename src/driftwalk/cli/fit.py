@@ -39,7 +39,7 @@ RecordingFiles = Annotated[
     *("body_shape", "side", "mass", "depth", "force_interval"),
     *("angle", "spline_spacing", "confidence", "switching_times", "flow_labels", "precision"),
     *("law", "pressure_gradient", "added_mass", "force_memory", "flow_strength"),
-    *("flow_modes", "camera"),
+    *("flow_modes", "flow_repeat", "camera"),
     *("added_mass_std", "mass_std", "side_std", "flow_error", "flow_scale_error"),
 )
 def fit(
@@ -51,7 +51,7 @@ def fit(
         Path | None,
         option(
             "--flow FILE",
-            "Steady flow that was measured, as by PIV: the prior of the fitted flow.",
+            "Flow that was measured, as by PIV, steady or a series: the prior of the fitted flow.",
             callback=flow_of_run,
             show_default=False,
         ),

@@ -116,8 +116,9 @@ def fit_motion(
         The body, where a recording has several; without one the study's ``fit.interaction`` fits
         all of them, and says over which length they share the stirring.
     flow : xarray.Dataset, optional
-        A steady flow that was measured, a `flow_field` as `load_flow` returns it: its *measured*
-        nodes, with their errors, become the prior of the fitted flow.
+        A flow that was measured, a `flow_field` as `load_flow` returns it: its *measured* nodes,
+        with their errors, become the prior of the fitted flow. Of a series that changes in time,
+        time 0 is the recording's first sample; the fitted flow is its mean and up to five modes.
     earlier : EarlierFit, optional
         Of glued blocks, ``shape = "xx"``: a fit of one block in the same water, with its
         recordings. The fit then says how much drag the hidden faces feel, and over which length
@@ -154,8 +155,8 @@ def fit_motion(
     if earlier is not None:
         chosen = glued_study(chosen, earlier.fit)
     ready = prepare(as_list(recordings), chosen, angle, body, flow)
-    require_one_flow(ready)
     before = None if earlier is None else estimate_before(earlier)
+    require_one_flow(ready, before)
     if before is not None:
         ready = replace(ready, earlier=earlier_prior(ready, before))
     passes = ready.passes
@@ -195,7 +196,8 @@ def fit_motion(
     turning: dict[str, Any] = {}
     # How the block's spin goes with the water's, where orientations and one flow are.
     if ready.angle != "none" and ready.intervals.steady:
-        turning["spin_correlation"] = spin_correlation(start.coefficients, thinned(ready.passes))
+        mean = start.mean_coefficients
+        turning["spin_correlation"] = spin_correlation(mean, thinned(ready.passes))
     if ready.angle == "state":
         course.begin("angle as given")
         given = replace(thinned(ready.with_angle("given").passes), layers=passes.layers)
@@ -346,6 +348,7 @@ def _agreement(ready: PreparedRecordings, mode: Mode, restricted: Restricted) ->
         restricted.point.coefficients,
         sums.information[:-1, :-1] - np.outer(across, across) / own,
         smoothness=ready.prior.matrix(mode.weights),
+        factors=ready.prior.factors(mode.weights, len(ready.measured.own)),
         determined=mode.weights.determined,
         confidence=ready.study.fit.confidence,
     )

@@ -12,7 +12,7 @@ import numpy as np
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.flow.grid import Grid
-from driftwalk.likelihood.filter.parameters import PULSES, STRENGTHS, Point
+from driftwalk.likelihood.filter.parameters import PULSES, STRENGTHS, Amplitudes, Point
 from driftwalk.likelihood.filter.series import Series, layer_strengths, mode_amplitudes
 from driftwalk.likelihood.spline import Spline
 
@@ -57,15 +57,21 @@ def flow_frames(series: Series, point: Point) -> Frames | None:
         When it changes so fast that there would be too many.
     """
     first, end = float(series.time[0]), float(series.time[-1] - series.time[0])
-    if layer_strengths(series, point) is None:
+    known, strength = point.amplitudes, layer_strengths(series, point)
+    if strength is None:
         return None
+    grows = any(point.number(name) for name in STRENGTHS)
+    if known is not None and not (grows or any(point.number(name) for name in PULSES)):
+        strength = layer_strengths(replace(series, time=known.time), point)
+        assert strength is not None
+        return Frames(known.time - first, strength, known.repeat)
     steps = [series.span / (FRAMES.per_half_wave * len(STRENGTHS))]
     repeat = "hold"
     frequencies = _frequencies(point)
     if frequencies:
         period = 1.0 / max(*frequencies, 1e-300)
         steps.append(period / FRAMES.per_period)
-        if len(frequencies) == 1 and not any(point.number(name) for name in STRENGTHS):
+        if known is None and len(frequencies) == 1 and not grows:
             repeat, end = "loop", period
     count = math.ceil(end / min(steps)) + 1
     if count > FRAMES.most:
@@ -82,6 +88,9 @@ def flow_frames(series: Series, point: Point) -> Frames | None:
 def _frequencies(point: Point) -> list[float]:
     """Return the frequencies of the pulses and of the modes of a flow [Hz]."""
     pulses = [point.number("pulse_frequency")] if any(point.number(one) for one in PULSES) else []
+    if point.amplitudes is not None:
+        step = float(np.median(np.diff(point.amplitudes.time)))
+        return [*pulses, 1.0 / (FRAMES.per_period * step)]
     return [*pulses, *([point.number("mode_frequency")] if point.layers > 1 else [])]
 
 
@@ -123,7 +132,11 @@ def mode_variables(
     fields = np.stack([spline.values(one, grid.x, grid.y) for one in point.coefficients])
     seen = count >= 3
     speeds = np.sqrt((fields**2).sum(axis=1)[:, seen].mean(axis=-1))
-    time = np.linspace(0.0, 1.0 / point.number("mode_frequency"), FRAMES_PER_PERIOD + 1)
+    amplitudes = point.amplitudes
+    if amplitudes is None:
+        time = np.linspace(0.0, 1.0 / point.number("mode_frequency"), FRAMES_PER_PERIOD + 1)
+        found = mode_amplitudes(float(series.time[0]) + time, point)
+        amplitudes = Amplitudes(time, found, "loop")
     plane = ("flow_mode", "y", "x")
     data = {
         "mode_coefficient": (
@@ -132,13 +145,10 @@ def mode_variables(
         ),
         "u_mode": (plane, fields[1:, 0]),
         "v_mode": (plane, fields[1:, 1]),
-        "mode_amplitude": (
-            ("flow_mode", "mode_time"),
-            mode_amplitudes(float(series.time[0]) + time, point),
-        ),
+        "mode_amplitude": (("flow_mode", "mode_time"), amplitudes.value),
         "mode_share": ("flow_mode", speeds[1:] / speeds[0]),
     }
-    return data, {"mode_time": ("mode_time", time)}
+    return data, {"mode_time": ("mode_time", amplitudes.time)}
 
 
 def stored_coefficients(fit: xr.Dataset) -> Floats:
@@ -147,6 +157,14 @@ def stored_coefficients(fit: xr.Dataset) -> Floats:
     if "flow_mode" not in fit.dims:
         return mean
     return np.concatenate([mean[np.newaxis], fit["mode_coefficient"].values])
+
+
+def stored_amplitudes(fit: xr.Dataset) -> Amplitudes | None:
+    """Return the amplitudes of the modes of a stored fit; None without modes."""
+    if "flow_mode" not in fit.dims:
+        return None
+    repeat = str(fit.attrs.get("mode_repeat", "loop"))
+    return Amplitudes(fit["mode_time"].values, fit["mode_amplitude"].values, repeat)
 
 
 class StoredFrames(NamedTuple):
@@ -161,19 +179,16 @@ class StoredFrames(NamedTuple):
 
 def stored_frames(fit: xr.Dataset) -> StoredFrames | None:
     """Return when the flow of a fit is given, and how strong it is then; None of a steady one."""
-    moves, changes = "flow_mode" in fit.dims, "flow_strength" in fit
-    if not (moves or changes):
+    modes, changes = stored_amplitudes(fit), "flow_strength" in fit
+    if modes is None and not changes:
         return None
-    if not changes:
-        time = fit["mode_time"].values
-        return StoredFrames(time, np.ones(time.size), fit["mode_amplitude"].values, "loop")
+    if modes is not None and not changes:
+        return StoredFrames(modes.time, np.ones(modes.time.size), modes.value, modes.repeat)
     time, strength = fit["strength_time"].values, fit["flow_strength"].values
     amplitude = np.zeros((0, time.size))
-    if moves:
-        period = fit["mode_time"].values
-        during = [np.interp(time % period[-1], period, one) for one in fit["mode_amplitude"].values]
+    if modes is not None:
         # The last frame is that of the mean flow: see `strength_variables`.
-        amplitude = np.stack(during) * (time < time[-1])
+        amplitude = modes.at(time) * (time < time[-1])
     return StoredFrames(time, strength, amplitude, str(fit.attrs["flow_strength_repeat"]))
 
 

@@ -203,7 +203,7 @@ def fitted_flow(fit: xr.Dataset, *, interval: int | None = None) -> xr.Dataset:
     x, y = fit["x"].values, fit["y"].values
     moving = stored_frames(fit) if interval is None else None
     if intervals.steady and moving is not None:
-        attrs["repeat"] = moving.repeat
+        attrs |= {"repeat": moving.repeat} if moving.repeat != "none" else {}
         fields_in_time = moving_fields(fit, moving, _field_variables(fit))
         return build_flow_field(x, y, time=moving.time, attrs=attrs, **fields_in_time)
     if intervals.steady:

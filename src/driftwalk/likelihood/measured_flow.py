@@ -19,9 +19,10 @@ from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError, argument_text
 from driftwalk.flow.arena import outline_of
 from driftwalk.likelihood.check.power import POWER, detectable_sigmas
-from driftwalk.likelihood.measured_series import averaged
+from driftwalk.likelihood.filter.parameters import Amplitudes
+from driftwalk.likelihood.measured_series import amplitudes_in, compressed
 from driftwalk.likelihood.spline import Spline, products
-from driftwalk.schema import FLAGS, build_flow_field
+from driftwalk.schema import FLAGS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -54,7 +55,7 @@ class MeasuredFlow:
     x: Floats
     y: Floats
     velocity: Floats
-    """Shape (2, y, x); NaN where nothing was measured."""
+    """Shape (2 layers, y, x), the mean and the modes; NaN where nothing was measured."""
     error: Floats
     """Standard deviations, same shape, as the fit takes them."""
     spline: Spline
@@ -64,13 +65,21 @@ class MeasuredFlow:
     errors: str
     """Where the errors are from, in words."""
     normal: Floats
-    """``B' W B`` of either component, shape (2, n, n)."""
+    """``B' W B`` of every component, shape (2 layers, n, n)."""
     right: Floats
-    """``B' W m``, shape (2, n)."""
+    """``B' W m``, shape (2 layers, n)."""
     own: Floats
-    """Coefficients of the least squares, shape (2, n); the smallest where they are not unique."""
+    """Coefficients of the least squares, shape (2 layers, n); the smallest where they are not
+    unique."""
     rank: int
     """Coefficients that the vectors determine."""
+    amplitudes: Amplitudes | None = None
+    """Those of the modes in time; None of a steady flow."""
+
+    @property
+    def layers(self) -> int:
+        """The mean, and the modes in time."""
+        return len(self.velocity) // 2
 
     @property
     def count(self) -> int:
@@ -82,10 +91,12 @@ class MeasuredFlow:
         """The vectors and their errors, for the user."""
         size = float(np.sqrt(np.nanmean(self.error**2)))
         known = f"scale known to {self.scale_std:.2g}" if self.scale_std > 0.0 else "scale exact"
-        return (
-            f"{self.source}: {self.count} vectors, errors of {1e3 * size:.2g} mm/s {self.errors}; "
-            f"{known}"
-        )
+        said = f"{self.source}: {self.count} vectors, errors of {1e3 * size:.2g} mm/s {self.errors}"
+        if self.amplitudes is not None:
+            speed = np.sqrt(np.nanmean(self.velocity.reshape(self.layers, -1) ** 2, axis=1))
+            shares = ", ".join(f"{one:.0%}" for one in speed[1:] / speed[0])
+            said += f"; it changes in time, in modes of {shares} of the mean"
+        return f"{said}; {known}"
 
     def scale(self, coefficients: Floats, determined: float) -> tuple[float, float]:
         """Return the best scale k for a flow, and the precision of k.
@@ -96,7 +107,7 @@ class MeasuredFlow:
         """
         if self.scale_std == 0.0:
             return 1.0, math.inf
-        flow, weight = coefficients.reshape(2, -1), 1.0 / self.scale_std**2
+        flow, weight = coefficients.reshape(len(self.own), -1), 1.0 / self.scale_std**2
         power = float(np.einsum("ka,kab,kb->", flow, self.normal, flow)) + weight
         middle = 0.5 * (float((flow * self.right).sum()) + weight) / power
         k = middle + math.sqrt(max(middle**2 - determined / power, 0.0))
@@ -108,7 +119,7 @@ class MeasuredFlow:
         The best k is a function of the coefficients, so their curvature is that with k projected
         out. The least squares' own sum, which no flow changes, is left out.
         """
-        flow = coefficients.reshape(2, -1)
+        flow = coefficients.reshape(len(self.own), -1)
         k, precision = self.scale(coefficients, determined)
         off = self.own - k * flow
         pull = np.einsum("kab,kb->ka", self.normal, off)
@@ -129,8 +140,8 @@ class MeasuredFlow:
 
     def _curvature(self, flow: Floats, k: float, precision: float) -> Floats:
         size = self.spline.size
-        found = np.zeros((2 * size, 2 * size))
-        for component in range(2):
+        found = np.zeros((flow.size, flow.size))
+        for component in range(len(flow)):
             part = slice(component * size, (component + 1) * size)
             found[part, part] = k**2 * self.normal[component]
         along = np.einsum("kab,kb->ka", self.normal, flow).ravel()
@@ -139,33 +150,47 @@ class MeasuredFlow:
     def stored(self) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
         """Return the variables, coordinates and attributes with which a fit holds it."""
         on = ("measured_y", "measured_x")
-        data = {f"measured_{name}": (on, self.velocity[k]) for k, name in enumerate(NAMES)}
+        data: dict[str, Any] = {
+            f"measured_{name}": (on, self.velocity[k]) for k, name in enumerate(NAMES)
+        }
         data |= {f"measured_{name}_error": (on, self.error[k]) for k, name in enumerate(NAMES)}
         coords = {"measured_y": ("measured_y", self.y), "measured_x": ("measured_x", self.x)}
         words = {"measured_flow": self.source, "measured_flow_errors": self.errors}
+        if self.amplitudes is not None:
+            for k, name in enumerate(NAMES):
+                for end, values in (("", self.velocity), ("_error", self.error)):
+                    data[f"measured_{name}_mode{end}"] = (("flow_mode", *on), values[k + 2 :: 2])
+            words["mode_repeat"] = self.amplitudes.repeat
         return data, coords, words
 
 
 def measured_flow(
-    field: xr.Dataset, study: Study, spline: Spline, *, sources: tuple[str, ...] = ()
+    field: xr.Dataset,
+    study: Study,
+    spline: Spline,
+    *,
+    sources: tuple[str, ...] = (),
+    duration: float = 0.0,
 ) -> MeasuredFlow:
     """Return a flow field as prior of the fit; refuse one that is no measurement.
 
-    `sources` are those of the recordings: a flow that was taken from one of them is none.
+    `sources` are those of the recordings: a flow that was taken from one of them is none. The
+    frames of a flow that changes in time have to cover the `duration` of the recording [s].
     """
     _require_measurement(field, study, sources)
-    field = averaged(field)
+    field = compressed(field, study, duration=duration)
+    amplitudes = amplitudes_in(field)
     x, y = (field[axis].values.astype(np.float64) for axis in "xy")
     at_x, at_y = (axis.ravel() for axis in np.meshgrid(x, y))
     inside = outline_of(study.tank.to_arena()).depth(at_x, at_y).reshape(y.size, x.size) >= 0.0
     there = inside & (field["flag"].values == FLAGS["measured"])
-    velocity = np.stack([np.where(there, field[name].values, np.nan) for name in NAMES])
+    velocity = np.where(there, _layers(field, "{}", "{}_mode"), np.nan)
     stated = study.fit.flow_error_m_s
     error, words = None, ""
     if stated != "auto":
-        error, words = np.where(there, stated, np.nan)[None].repeat(2, axis=0), "as stated"
+        error, words = np.where(there, np.full_like(velocity, stated), np.nan), "as stated"
     elif all(f"{name}_standard_error" in field for name in NAMES):
-        found = np.stack([field[f"{name}_standard_error"].values for name in NAMES])
+        found = _layers(field, "{}_standard_error", "{}_mode_error")
         known = there & np.isfinite(found).all(axis=0) & (found > 0.0).all(axis=0)
         if known.any():
             there = known
@@ -177,31 +202,48 @@ def measured_flow(
             "no vector of the measured flow lies in the tank: is its origin the centre of the "
             "tank, and its scale right?"
         )
-    unit = np.where(there, 1.0, np.nan)[None].repeat(2, axis=0)
-    normal, right, own, rank, squares = _least_squares(
-        spline, x, y, velocity, unit if error is None else error
-    )
-    surplus = 2 * int(there.sum()) - rank
+    unit = np.where(there, np.ones_like(velocity), np.nan)
+    taken = unit if error is None else error
+    solved = [
+        _least_squares(spline, x, y, velocity[k : k + 2], taken[k : k + 2])
+        for k in range(0, len(velocity), 2)
+    ]
+    surplus = 2 * int(there.sum()) - max(one.rank for one in solved)
     if error is None and surplus < MEASURED.fewest_surplus:
         raise InputError(
             f"the measured flow has {int(there.sum())} vectors in the tank, too few to tell their "
             f"errors from their scatter: state them with {argument_text('flow_error', '2mm/s')}"
         )
-    factor = math.sqrt(squares / surplus) if surplus >= MEASURED.fewest_surplus else 1.0
+    factors = [1.0] * len(solved)
+    if surplus >= MEASURED.fewest_surplus:
+        factors = [math.sqrt(one.squares / surplus) for one in solved]
     if error is None:
-        error, words = factor * unit, "estimated from their scatter around smooth flow"
-    elif factor > 1.001:
-        # The flow has details that the knots are too far apart for; the fit cannot follow them.
-        error = factor * error
-        words += f", times {factor:.2g} as they scatter more around smooth flow"
+        error, words = factors[0] * unit, "estimated from their scatter around smooth flow"
     else:
-        factor = 1.0
-    size = factor if factor > 0.0 else 1.0
+        # The flow has details that the knots are too far apart for; the fit cannot follow them.
+        factors = [one if one > 1.001 else 1.0 for one in factors]
+        error = np.repeat(factors, 2)[:, None, None] * error
+        if max(factors) > 1.0:
+            words += f", times {max(factors):.2g} as they scatter more around smooth flow"
+    sizes = [one if one > 0.0 else 1.0 for one in factors]
+    normal, right = (
+        np.concatenate([one[k] / size**2 for one, size in zip(solved, sizes, strict=True)])
+        for k in (0, 1)
+    )
     return MeasuredFlow(
         x, y, velocity, error, spline, study.fit.flow_scale_std,
-        str(field.attrs.get("source", "flow")), words,
-        normal / size**2, right / size**2, own, rank,
+        str(field.attrs.get("source", "flow")), words, normal, right,
+        np.concatenate([one.own for one in solved]), sum(one.rank for one in solved), amplitudes,
     )  # fmt: skip
+
+
+def _layers(field: xr.Dataset, mean: str, mode: str) -> Floats:
+    """Return variables of the mean and of the modes, u and v in turn, shape (2 layers, y, x)."""
+    found = np.stack([field[mean.format(name)].values for name in NAMES])
+    if "amplitude" not in field:
+        return found
+    modes = np.stack([field[mode.format(name)].values for name in NAMES], axis=1)
+    return np.concatenate([found, modes.reshape(-1, *found.shape[1:])])
 
 
 def _require_measurement(field: xr.Dataset, study: Study, sources: tuple[str, ...]) -> None:
@@ -262,6 +304,7 @@ def agreement_facts(
     information: Floats,
     *,
     smoothness: Floats,
+    factors: Floats,
     determined: float,
     confidence: float,
 ) -> dict[str, Any]:
@@ -269,18 +312,18 @@ def agreement_facts(
 
     The fitted flow is compared with that of the vectors and the prior of smoothness alone, in
     errors of the vectors. `information` is that of the motion on the coefficients, `smoothness` the
-    precision of one component under its prior.
+    precision of one component under its prior, times one of the `factors` for each component.
     """
     from scipy.linalg import block_diag
     from scipy.optimize import brentq
     from scipy.special import ndtri
     from scipy.stats import norm
 
-    flow = coefficients.reshape(2, -1)
+    flow = coefficients.reshape(len(measured.own), -1)
     k, precision = measured.scale(coefficients, determined)
     _, score, precise = measured.deviance(coefficients, determined)
-    score = score - (flow @ smoothness).ravel()
-    precise = precise + block_diag(smoothness, smoothness)
+    score = score - ((factors[:, None] * flow) @ smoothness).ravel()
+    precise = precise + block_diag(*(factor * smoothness for factor in factors))
     alone, covariance = np.linalg.inv(precise), np.linalg.inv(precise + information)
     off = -alone @ score
     form = _of_difference(measured, flow, k, precision)
@@ -354,8 +397,9 @@ def _of_difference(measured: MeasuredFlow, flow: Floats, k: float, precision: fl
 def _farthest(measured: MeasuredFlow, off: Floats) -> tuple[float, float, float]:
     """Return where two flows differ most among the measured nodes, and by how much."""
     spline = measured.spline
-    values = spline.values(off.reshape(2, spline.rows, spline.columns), measured.x, measured.y)
-    size = np.where(np.isfinite(measured.velocity[0]), np.hypot(*values), -1.0)
+    values = spline.values(off.reshape(-1, spline.rows, spline.columns), measured.x, measured.y)
+    # Of a flow that changes, the rms over time: the modes have amplitudes of unit rms.
+    size = np.where(np.isfinite(measured.velocity[0]), np.hypot.reduce(values), -1.0)
     row, column = np.unravel_index(int(size.argmax()), size.shape)
     return float(measured.x[column]), float(measured.y[row]), float(size[row, column])
 
@@ -407,21 +451,3 @@ def agreement_tests(facts: Mapping[str, Any]) -> list[Agreement]:
 def contradictions(facts: Mapping[str, Any]) -> list[str]:
     """Return what in a measured flow contradicts the motion, in sentences."""
     return [one.sentence for one in agreement_tests(facts) if one.p_value < MEASURED.level]
-
-
-def stored_flow(fit: xr.Dataset) -> xr.Dataset | None:
-    """Return the measured flow that a fit was made with, as a flow field with its errors."""
-    if "measured_u" not in fit:
-        return None
-    names = ("measured_u", "measured_v", "measured_u_error", "measured_v_error")
-    u, v, u_error, v_error = (fit[name].values for name in names)
-    x, y = fit["measured_x"].values, fit["measured_y"].values
-    flag = np.where(np.isfinite(u), FLAGS["measured"], FLAGS["outside"])
-    return build_flow_field(
-        x, y, u=np.nan_to_num(u), v=np.nan_to_num(v), flag=flag,
-        u_standard_error=u_error, v_standard_error=v_error,
-        attrs={
-            "method": "file", "cell_size_m": float(x[1] - x[0]),
-            "source": fit.attrs["measured_flow"], "errors": fit.attrs["measured_flow_errors"],
-        },
-    )  # fmt: skip

@@ -29,7 +29,8 @@ from driftwalk.likelihood.filter.series import (
 from driftwalk.likelihood.fitted_modes import stored_coefficients
 from driftwalk.likelihood.flow_intervals import Intervals, cut_track, intervals_of, require_fit
 from driftwalk.likelihood.law.force_law import effective_logs, stored_numbers
-from driftwalk.likelihood.measured_flow import MeasuredFlow, measured_flow, stored_flow
+from driftwalk.likelihood.measured_flow import MeasuredFlow, measured_flow
+from driftwalk.likelihood.measured_series import stored_flow
 from driftwalk.likelihood.prior import Earlier, Prior, Weights
 from driftwalk.likelihood.refuse import (
     LIMIT,
@@ -121,7 +122,8 @@ class PreparedRecordings:
     def passes(self) -> Passes:
         """The filter over these recordings."""
         body, spline = body_of(self.study, self.angle), spline_of(self.study)
-        return Passes(self.series, body, spline, len(self.intervals.labels))
+        layers = 1 if self.measured is None else self.measured.layers
+        return Passes(self.series, body, spline, len(self.intervals.labels), layers)
 
     def undisturbed(self) -> list[Series]:
         """Return the series without what near the wall, or after a mistake, is no free motion.
@@ -188,8 +190,6 @@ def prepare(
     many = one_body_each(many, study)
     sources = tuple(str(one.attrs.get("source", "")) for one in many)
     measured = None
-    if flow is not None:
-        measured = measured_flow(flow, study, spline_of(study), sources=sources)
     # The cheap refusals come first: memory and size need no track to be read.
     require_memory(sum(one.sizes["time"] for one in many))
     intervals = intervals_of(study)
@@ -214,6 +214,14 @@ def prepare(
         tracks.append(track)
         parts += cut
         places += [(flow, index) for flow in intervals.flows]
+    if flow is not None:
+        lasts = max(float(one.time[-1] - one.time[0]) for one in tracks)
+        measured = measured_flow(flow, study, spline_of(study), sources=sources, duration=lasts)
+        if measured.layers > 1 and len(many) > 1:
+            raise InputError(
+                "a measured flow that changes in time is on the clock of one recording: fit the "
+                "recordings one by one"
+            )
     # One use of the angle for all recordings, as they share the noise of the angle.
     wanted = study.fit.angle if angle is None else angle
     used_angle = use_angle(many, tracks, wanted) if has_heading(study, wanted) else "none"
@@ -254,7 +262,7 @@ def describe_measured(flow: xr.Dataset, study: Study) -> str:
     Raises
     ------
     InputError
-        When the flow is no measurement of a steady flow in the tank.
+        When the flow is no measurement of the water in the tank.
 
     Examples
     --------
@@ -351,7 +359,9 @@ def estimate_of(fit: xr.Dataset, recordings: Sequence[xr.Dataset], *, body: str 
     spline = Spline(float(x), float(y), float(fit["spline_spacing"]), *coefficients.shape[:-3:-1])
     opened, fixed = stored_numbers(fit)
     noise = math.log(fitted_value(fit, "tracking_noise"))
-    point = Point(coefficients, *effective_logs(fit, study), noise, opened=opened, fixed=fixed)
+    known = None if ready.measured is None else ready.measured.amplitudes
+    logs = effective_logs(fit, study)
+    point = Point(coefficients, *logs, noise, opened=opened, fixed=fixed, amplitudes=known)
     if ready.angle == "state":
         lever, turning = (
             math.log(fitted_value(fit, name)) for name in ("force_lever", "orientation_noise")

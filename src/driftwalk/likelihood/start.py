@@ -36,6 +36,13 @@ def first_point(ready: PreparedRecordings, spline: Spline) -> Point:
     unrest = 0.1 * typical_speed(tracks) ** 3 / study.block.side_m
     if ready.intervals.steady:
         coefficients = _flow_coefficients(tracks[0], study, spline, ready.measured)
+        if ready.measured is not None and ready.measured.layers > 1:
+            normal, right = ready.measured.normal, ready.measured.right
+            modes = [
+                _smooth(normal[k : k + 2].mean(axis=0), right[k : k + 2], spline)
+                for k in range(2, len(normal), 2)
+            ]
+            coefficients = np.stack([coefficients, *modes])
     else:
         # Each flow begins with the longest stretch that was recorded in it.
         longest: dict[int, Track] = {}
@@ -49,6 +56,7 @@ def first_point(ready: PreparedRecordings, spline: Spline) -> Point:
         log_drag=math.log(PRIOR.drag),
         log_intensity=math.log(unrest),
         log_noise=_log_noise([camera.position_noise for camera in cameras], least),
+        amplitudes=None if ready.measured is None else ready.measured.amplitudes,
     )
     if ready.angle != "state":
         return point
@@ -80,13 +88,17 @@ def _flow_coefficients(
     found = _field_sums(track, study, spline)
     if measured is not None:
         # Where vectors were measured they count a thousand times as much as those of Eq. 4.
-        own = measured.normal.mean(axis=0)
+        own = measured.normal[:2].mean(axis=0)
         weight = 1e3 * float(np.trace(found[0])) / float(np.trace(own)) if found is not None else 1
-        normal, right = weight * own, weight * measured.right
+        normal, right = weight * own, weight * measured.right[:2]
         found = (normal, right) if found is None else (normal + found[0], right + found[1])
     if found is None:
         return np.zeros((2, spline.rows, spline.columns))
-    normal, right = found
+    return _smooth(*found, spline)
+
+
+def _smooth(normal: Floats, right: Floats, spline: Spline) -> Floats:
+    """Return the coefficients of a smooth flow from sums of products, (2, rows, columns)."""
     roughness, size = penalties(spline)
     share = float(np.trace(normal)) / float(np.trace(roughness))
     # Little smoothing: the roughness has a thousandth of the weight of the data.

@@ -249,6 +249,14 @@ def frames_of(flow: xr.Dataset) -> tuple[Floats, Floats, Floats, str]:
     )
 
 
+def within_frames(time: Floats, clock: Floats, repeat: str) -> Floats:
+    """Return the moments between the first frame and the last that repeat at times [s]."""
+    span = clock[-1] - clock[0]
+    turn, within = np.divmod(time - clock[0], span)
+    backwards = (turn % 2 == 1) & (repeat == "mirror")
+    return np.asarray(clock[0] + np.where(backwards, span - within, within))
+
+
 def velocity_at(
     flow: xr.Dataset, x: npt.ArrayLike, y: npt.ArrayLike, time: npt.ArrayLike = 0.0
 ) -> tuple[Floats, Floats]:
@@ -265,10 +273,7 @@ def velocity_at(
     if clock.size == 1:
         values, clock = [np.repeat(one, 2, axis=0) for one in values], np.array([0.0, 1.0])
     elif repeat != "hold":
-        span = clock[-1] - clock[0]
-        turn, within = np.divmod(when - clock[0], span)
-        backwards = (turn % 2 == 1) & (repeat == "mirror")
-        when = clock[0] + np.where(backwards, span - within, within)
+        when = within_frames(when, clock, repeat)
     axes = (clock, *nodes)
     places = [np.clip(one, axis[0], axis[-1]) for one, axis in zip((when, *at), axes, strict=True)]
     u, v = (RegularGridInterpolator(axes, one)(np.stack(places, axis=-1)) for one in values)

@@ -59,7 +59,7 @@ def best_placement(measured: MeasuredFlow, free: xr.Dataset) -> Placement:
 def _moved(measured: MeasuredFlow, x: Floats, y: Floats) -> Iterator[tuple[str, Floats, Bools]]:
     """Yield the flow turned, mirrored and shifted: words, velocities, where it was measured."""
     spline = measured.spline
-    own = measured.own.reshape(2, spline.rows, spline.columns)
+    own = measured.own[:2].reshape(2, spline.rows, spline.columns)
     count = round(PLACEMENT.farthest_m / PLACEMENT.step_m)
     shifts = PLACEMENT.step_m * np.arange(-count, count + 1)
     known = np.pad(np.isfinite(measured.velocity[0]), 1)

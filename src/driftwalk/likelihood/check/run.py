@@ -38,7 +38,8 @@ from driftwalk.likelihood.check.scan import scan_of
 from driftwalk.likelihood.check.verdict import verdict_on
 from driftwalk.likelihood.fit import fit_motion
 from driftwalk.likelihood.flow_intervals import require_fit
-from driftwalk.likelihood.measured_flow import measured_flow, stored_flow
+from driftwalk.likelihood.measured_flow import measured_flow
+from driftwalk.likelihood.measured_series import stored_flow
 from driftwalk.likelihood.preparation import as_list, estimate_of, spline_of
 from driftwalk.likelihood.refuse import BREAKDOWN
 from driftwalk.likelihood.warnings import against_water, is_against_water

@@ -14,6 +14,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from driftwalk.core.arrays import Floats
+from driftwalk.simulation.series import within_frames
 
 
 class Number(NamedTuple):
@@ -95,6 +96,23 @@ NUMBERS: Final[Mapping[str, Number]] = {
 }
 
 
+class Amplitudes(NamedTuple):
+    """Amplitudes of the flow's modes that are known from measured frames, of unit rms."""
+
+    time: Floats
+    """Of the frames, from the first sample of the recording on [s]."""
+    value: Floats
+    """Shape (modes, frames); linear in between."""
+    repeat: str
+    """How they go on beyond the frames: "loop", "mirror", or else as in the last one."""
+
+    def at(self, time: Floats) -> Floats:
+        """Return the amplitudes at times [s], shape (modes, n)."""
+        if self.repeat in ("loop", "mirror"):
+            time = within_frames(time, self.time, self.repeat)
+        return np.stack([np.interp(time, self.time, one) for one in self.value])
+
+
 @dataclass(frozen=True, eq=False)
 class Point:
     """Values of everything that is estimated."""
@@ -117,6 +135,8 @@ class Point:
     """Numbers of departures from the model that are estimated too (`NUMBERS`)."""
     fixed: Mapping[str, float] = field(default_factory=dict)
     """Those that have a known value other than the model's."""
+    amplitudes: Amplitudes | None = None
+    """Those of the modes of a measured flow; else the modes, if there are any, are periodic."""
 
     @property
     def noises(self) -> dict[str, float]:
@@ -144,7 +164,8 @@ class Point:
     @property
     def layers(self) -> int:
         """Number of layers of the flow: its mean, and its modes in time."""
-        return len(self.coefficients) if self.number("mode_frequency") else 1
+        known = self.amplitudes is not None or self.number("mode_frequency")
+        return len(self.coefficients) if known else 1
 
     @property
     def mean_coefficients(self) -> Floats:

@@ -196,6 +196,8 @@ def layer_strengths(series: Series, point: Point) -> Floats | None:
 
 def mode_amplitudes(time: Floats, point: Point) -> Floats:
     """Return the amplitude of each mode, of unit rms, shape (modes, n)."""
+    if point.amplitudes is not None:
+        return point.amplitudes.at(time)
     turned = 2.0 * np.pi * point.number("mode_frequency") * time + point.number("mode_phase")
     return math.sqrt(2.0) * np.stack([np.cos(turned), np.sin(turned)])[: point.layers - 1]
 

@@ -24,7 +24,7 @@ from driftwalk.likelihood.law.score_tests import StrengthScores
 from driftwalk.likelihood.law.search import evidence_of
 from driftwalk.likelihood.law.shape_changes import ShapeChange, find_shape_change
 from driftwalk.likelihood.newton import FROM_NEAR, Mode, ModeSearch, thinned
-from driftwalk.likelihood.preparation import PreparedRecordings
+from driftwalk.likelihood.preparation import Estimate, PreparedRecordings
 from driftwalk.likelihood.prior import Prior, Weights
 from driftwalk.schema.answers.force_law import LEAST_EVIDENCE
 
@@ -69,8 +69,16 @@ class FlowModes(NamedTuple):
     """Why modes were looked for in vain, in a sentence."""
 
 
-def require_one_flow(ready: PreparedRecordings) -> None:
-    """Refuse modes in time of several recordings or flows, or in a flow that was measured."""
+def require_one_flow(ready: PreparedRecordings, before: Estimate | None = None) -> None:
+    """Refuse modes in time of several recordings or flows, or in a flow that was measured.
+
+    `before` is the earlier fit of glued blocks, which have no modes at all.
+    """
+    if before is not None and max(before.point.layers, ready.passes.layers) > 1:
+        raise InputError(
+            "glued blocks are fitted in a steady flow, and this one changes in time: leave out the "
+            "measured flow, or take an earlier fit without modes"
+        )
     if ready.study.fit.flow_modes == "none":
         return
     if len(ready.tracks) > 1 or not ready.intervals.steady:
@@ -81,7 +89,7 @@ def require_one_flow(ready: PreparedRecordings) -> None:
     if ready.measured is not None:
         raise InputError(
             f"{argument_text('flow_modes', ready.study.fit.flow_modes)} does not go with a "
-            "measured flow, which is steady: leave one of them out"
+            "measured flow, which says itself how it changes: leave one of them out"
         )
 
 

@@ -108,6 +108,10 @@ def flow_in_time(fit: xr.Dataset) -> str | None:
     if "flow_strength" not in fit:
         left_out = fit.attrs.get("flow_strength_left_out")
         modes = [] if "mode_time" not in fit.coords else [_period(fit["mode_time"].values)]
+        if "mode_repeat" in fit.attrs:
+            time, repeat = fit["mode_time"].values, fit.attrs["mode_repeat"]
+            modes = [f"{time.size} frames, those of the measured flow"]
+            modes[0] += "" if repeat == "none" else f"; beyond them: {repeat}"
         return "; ".join([*modes, *([str(left_out)] if left_out else [])]) or None
     time, strength = fit["strength_time"].values, fit["flow_strength"].values
     low, high = float(strength.min()), float(strength.max())

@@ -36,7 +36,7 @@ dimensions:
     flow_interval: between the switching times
     compared_law: force laws that were compared, by name
     flow_mode: modes of the flow in time
-    mode_time: times in a period of the modes
+    mode_time: times in a period of the modes, or of the measured frames
     strength_time: frames of the strength of the flow
     number: numbers of departures from the model, by name
     law: force laws that were fitted, by name
@@ -147,6 +147,13 @@ variables (a measured flow was given):
     measured_flow_difference [m s-1]: by how much, there
     measured_x(measured_x) [m]: x
     measured_y(measured_y) [m]: y
+variables (a measured flow was given that changes in time):
+    measured_u_mode(flow_mode measured_y measured_x) [m s-1]: measured velocity x of the modes; \
+        NaN where nothing was measured
+    measured_v_mode(flow_mode measured_y measured_x) [m s-1]: measured velocity y of the modes
+    measured_u_mode_error(flow_mode measured_y measured_x) [m s-1]: its standard deviation, as the \
+        fit takes it
+    measured_v_mode_error(flow_mode measured_y measured_x) [m s-1]: the same of y
 variables (a measured flow was given, and its scale is not exact):
     measured_flow_scale_std [1]: standard deviation of its scale
     measured_flow_scale_p_value [1]: chance of a scale so far from 1
@@ -186,9 +193,9 @@ variables (modes of the flow in time were fitted):
         amplitudes of unit rms
     u_mode(flow_mode y x) [m s-1]: velocity x of the modes
     v_mode(flow_mode y x) [m s-1]: velocity y of the modes
-    mode_amplitude(flow_mode mode_time) [1]: amplitudes of the modes; over one period, from the \
-        first sample on
-    mode_time(mode_time) [s]
+    mode_amplitude(flow_mode mode_time) [1]: amplitudes of the modes, of unit rms; over one \
+        period, or in the measured frames
+    mode_time(mode_time) [s]: from the first sample on
     mode_share(flow_mode) [1]: speed of the mode over that of the mean flow, both as rms where the \
         block has been
     mode_weight [1]: factor of the two weights for the modes
@@ -241,6 +248,8 @@ attributes:
 attributes (a measured flow was given):
     measured_flow text: its source
     measured_flow_errors text: where its errors are from
+attributes (a measured flow was given that changes in time):
+    mode_repeat text: how it goes on beyond its frames: none, loop, mirror or hold
 attributes (the shape of the flow changes):
     flow_shape_change text: how, in a sentence
 attributes (the strength of the flow changes, or has pulses):
