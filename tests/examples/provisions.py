@@ -21,6 +21,7 @@ import xarray as xr
 from command_line import FLOW, GRID, RECORDING, here
 from drifting_tracers import seeded_tank
 from finished_run import write_finished_run
+from glued_recordings import recordings
 from made_once import made_once_in
 from self_propelled import moving
 
@@ -77,6 +78,12 @@ def _files(*provisions: Callable[[Path], Names]) -> Callable[[Path], Names]:
         return names
 
     return provide
+
+
+def _block_and_dimer(folder: Path) -> Names:
+    """Provide five minutes of a block and of a dimer."""
+    recordings(folder, minutes=5.0)
+    return {}
 
 
 def _recording(seconds: float | None = None, name: str = "recording.csv") -> Callable:
@@ -508,6 +515,13 @@ PAGES: dict[str, Page] = {
             "'duration' in found['coverage'].dims",
             "recovered.attrs['kind'] == 'model_recovery'",
         ),
+        draws=False,
+        slow=True,
+    ),
+    "docs/how-to/dimer.md": Page(
+        provide=_block_and_dimer,
+        instead={'tank="30cm"': 'tank="32cm"'},
+        holds=("len(known) == 2",),
         draws=False,
         slow=True,
     ),

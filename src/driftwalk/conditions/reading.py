@@ -134,12 +134,12 @@ def one_body_each(recordings: Sequence[xr.Dataset], study: Study) -> list[xr.Dat
     if not 2 <= len(parts) <= MOST_BODIES:
         raise InputError(
             f"{prefix_of(recordings[0])}the forces of 2 to {MOST_BODIES} bodies can be compared, "
-            f"and the recording has {len(parts)}: leave out `interaction`, and name one with "
+            f"and the recording has {len(parts)}: leave out `fit.interaction`, and name one with "
             "`body`"
         )
     if len(study.block.body().cells) > 1:
         raise InputError(
-            f"`interaction` is for free single bodies, and {study.block.shape} is glued"
+            f"`fit.interaction` is for free single bodies, and {study.block.shape} is glued"
         )
     return parts
 

@@ -2,55 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
-import numpy as np
 import pytest
 import xarray as xr
 from command_line import FLOW, answer, here
-from euler_blocks import stirred
+from glued_recordings import HIDDEN, LENGTH, RHO, recordings
 from made_up_fit import made_up_fit
 
 import driftwalk as dw
-from driftwalk.flow.analytic import flow_from_function
-
-MINUTES, SIDE, MASS, HIDDEN, RHO = 10.0, 0.03, 0.0116, 0.5, 0.6
-ARENA = dw.Study(tank={"diameter_m": 0.32}).tank.to_arena()
-LENGTH = SIDE / math.sqrt(-2.0 * math.log(RHO))
-
-
-def recorded(folder: Path, name: str, study: dw.Study, flow: xr.Dataset) -> Path:
-    """Write a simulated recording as a tracker does."""
-    motion = dw.simulate(study, flow).isel(replicate=0, body=0)
-    path = folder / f"{name}.csv"
-    columns = [motion[key].values for key in ("time", "x", "y", "theta")]
-    np.savetxt(path, np.stack(columns, axis=1), delimiter=",", comments="",
-               header="t_s,x_m,y_m,theta_rad", fmt="%.6f")  # fmt: skip
-    return path
-
-
-def recordings(folder: Path) -> tuple[Path, Path]:
-    """Return simulated recordings of one block and of two that are glued, in the same water."""
-    flow = flow_from_function(lambda x, y: stirred(x, y, 1.0), arena=ARENA)
-    one = dw.Study(
-        tank={"diameter_m": 0.32},
-        simulation={"duration_s": 60.0 * MINUTES, "sample_rate_Hz": 10.0, "seed": 4},
-        observation={"position_noise_m": 2e-4, "orientation_noise_rad": 0.006},
-    )
-    glued = dw.apply_overrides(
-        one,
-        {
-            "block.shape": "xx",
-            "block.mass_kg": 2 * MASS,
-            "assembly.hidden_face_drag": HIDDEN,
-            "forces.stirring_length_m": LENGTH,
-            # Of the sum of two forces with the correlation rho.
-            "forces.force_std_N": one.forces.force_std_N * math.sqrt(2.0 * (1.0 + RHO)),
-            "simulation.seed": 5,
-        },
-    )
-    return recorded(folder, "one", one, flow), recorded(folder, "two", glued, flow)
 
 
 @pytest.mark.slow

@@ -18,7 +18,7 @@ from driftwalk.core.study_keys import (
     Number,
     StudySettings,
 )
-from driftwalk.model import declared
+from driftwalk.model import Study, declared
 
 
 @pytest.mark.parametrize(
@@ -40,6 +40,9 @@ def test_names_and_types_are_those_that_the_study_declares(
 def type_of(key: str) -> Any:
     """Return the type of the argument for a key of a study."""
     of_key = declared(key)
+    section, _, name = key.partition(".")
+    if Study.model_fields[section].annotation.model_fields[name].annotation is bool:
+        return bool
     item: Any = str
     if of_key.quantity is not None:
         item = int if of_key.quantity.whole else Number

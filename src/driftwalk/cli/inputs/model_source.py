@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any, Final
 from driftwalk.cli.options.study import StudyOptions, option_name
 from driftwalk.cli.terminal.argument_names import to_options
 from driftwalk.cli.terminal.output import print_note
-from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from driftwalk.core.arrays import Floats
     from driftwalk.model import Study
     from driftwalk.motion import MotionModel
     from driftwalk.runs import FoundRun

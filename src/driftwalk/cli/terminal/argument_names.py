@@ -28,7 +28,7 @@ def option_of(name: str) -> str:
 
 _SAME: Final = (
     "angle backend body box cell_size cells columns delimiter flow format frame_interval "
-    "header_line heading host inertia interaction keypoint length_unit mass max_speed "
+    "header_line heading host inertia keypoint length_unit mass max_speed "
     "min_confidence min_count missing port position_noise replicate seed sheet side step_interval "
     "study tank theta topic up window x y y_axis"
 )

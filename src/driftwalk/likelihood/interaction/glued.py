@@ -161,8 +161,8 @@ class SharedStirring(NamedTuple):
     facts: Mapping[str, Any] = {}
     """Correlation at one side, length, and how far the data depart from the kernel."""
     variables: Mapping[str, Any] = {}
-    """Of a fit: quantiles of the length; of free bodies the correlation of the forces at distances,
-    with intervals."""
+    """Variables of the fit: quantiles of the length, and for free bodies the correlation of the
+    forces at distances, with intervals."""
     warnings: Sequence[str] = ()
 
 
