@@ -24,6 +24,7 @@ AXES: Final = {
     "force_std": ("stochastic force σ_F", "N", "_N"),
     "tank_diameter": ("tank diameter", "m", "_m"),
     "blocks": ("number of blocks", "1", ""),
+    "stirring_length": ("length of the stirring", "m", "_m"),
 }
 """Label, unit, and what an attribute's name has more, in the order from x to y."""
 MAP_AXES: Final = 2
