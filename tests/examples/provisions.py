@@ -520,7 +520,7 @@ PAGES: dict[str, Page] = {
     ),
     "docs/how-to/dimer.md": Page(
         provide=_block_and_dimer,
-        instead={'tank="30cm"': 'tank="32cm"'},
+        instead={"circle:30cm": "circle:32cm"},
         holds=("len(known) == 2",),
         draws=False,
         slow=True,
