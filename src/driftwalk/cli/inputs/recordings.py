@@ -179,10 +179,10 @@ def opening_note(
     from driftwalk.model import Study, load_study
 
     file = Study() if given.file is None else load_study(given.file)
+    also = {"block.depth_m": "block.depth", "block.side_m": "block.shape"}
 
     def stated(key: str, text: str) -> str:
-        same = ("block.depth", "block.depth_m") if key == "block.depth_m" else (key,)
-        option = next((one for one in same if one in given.overrides), None)
+        option = next((one for one in (key, also.get(key)) if one in given.overrides), None)
         if key == TANK and how is not None and how.tank is not None:
             source = "--tank"
         elif option is not None:
