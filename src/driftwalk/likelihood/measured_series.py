@@ -54,9 +54,9 @@ def compressed(field: xr.Dataset, study: Study, *, duration: float = 0.0) -> xr.
     """Return the mean of the frames, and with it the modes of a flow that changes.
 
     Nodes that were measured in half of the frames count; of a flow that changes, frames in which
-    half of those were. Time 0 of the series is the first sample
-    of a recording of that duration [s]; refuses one that goes beyond the frames of a flow that
-    changes, unless it is known how the flow goes on.
+    half of those were. Time 0 of the series is the first sample of a recording of that duration
+    [s]; refuses one that goes beyond the frames of a flow that changes, unless it is known how the
+    flow goes on.
     """
     if "time" not in field.dims:
         return field

@@ -202,7 +202,7 @@ def _label_right(ax: Axes, names: list[str], height: Floats, colors: dict[str, s
             place_sketch(
                 ax, name, (1.0, at), transform="axes fraction", alignment=(0.0, 0.5),
                 cell_pt=cell_pt, color=colors[name], shift_pt=(10.0, 0.0),
-                discs=any(map(are_discs, names)),
+                discs=are_discs(*names),
             )  # fmt: skip
         ax.annotate(
             name_text(name), (1.0, at), xytext=(13.0 + wide * cell_pt, 0.0),

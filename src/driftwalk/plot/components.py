@@ -13,7 +13,9 @@ from driftwalk.plot.parts.assembly_labels import check_kind, class_names
 from driftwalk.plot.parts.polyomino_sketch import (
     LETTER_PT,
     NAME_SIZE_PT,
+    are_discs,
     class_cells,
+    is_class,
     name_text,
     sketch_box,
     sketch_size,
@@ -188,21 +190,23 @@ def _draw_arrows(ax: Axes, tips: Floats, names: list[str], points: Floats) -> No
         dots=(points[np.isfinite(points).all(axis=1)] - low) / per_point,
     )  # fmt: skip
     for index, place in zip(labelled, places, strict=True):
-        _draw_label(ax, names[index], tips[index], low + place * per_point)
+        _draw_label(ax, names[index], tips[index], low + place * per_point, discs=are_discs(*names))
 
 
 def _label_size(name: str) -> Floats:
     """Return width and height of the label of a class [pt]."""
-    size = sketch_size(class_cells(name)) * SKETCH_CELL_PT
+    size = sketch_size(class_cells(name)) * SKETCH_CELL_PT if is_class(name) else np.zeros(2)
     if name_text(name):
         size = np.array([max(size[0], len(name) * LETTER_PT), size[1] + NAME_SIZE_PT + 3.0])
     return size
 
 
-def _draw_label(ax: Axes, name: str, tip: Floats, place: Floats) -> None:
+def _draw_label(ax: Axes, name: str, tip: Floats, place: Floats, *, discs: bool) -> None:
     from matplotlib.offsetbox import AnnotationBbox, TextArea, VPacker
 
-    parts: list[Any] = [sketch_box(name, cell_pt=SKETCH_CELL_PT, color=style.INK)]
+    parts: list[Any] = []
+    if is_class(name):
+        parts.append(sketch_box(name, cell_pt=SKETCH_CELL_PT, color=style.INK, discs=discs))
     if name_text(name):
         parts.append(TextArea(name, textprops={"size": NAME_SIZE_PT, "color": style.INK}))
     ax.add_artist(

@@ -26,7 +26,9 @@ from driftwalk.plot.parts.polyomino_sketch import (
     MAX_CELL_PT,
     NAME_GAP_PT,
     NAME_SIZE_PT,
+    are_discs,
     class_cells,
+    is_class,
     name_text,
     place_sketch,
     sketch_size,
@@ -172,7 +174,7 @@ def plot_class_panels(
             _mark_on_line(ax, sensitivity, sweep)
             ax.set(ylim=(0.0, 1.05 * top), ylabel="proportion")
             _turn_words(ax, sweep)
-        _title_panel(ax, name)
+        _title_panel(ax, name, discs=are_discs(*class_names(sensitivity)))
     if axes is None:
         _label_outside(panels, columns)
         handles, labels = panels[0].get_legend_handles_labels()
@@ -216,7 +218,9 @@ def plot_class_key(
     ax.set_axis_off()
     ax.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
     columns = -(-len(names) // rows)
-    sizes = np.array([sketch_size(class_cells(name)) for name in names])
+    sizes = np.array(
+        [sketch_size(class_cells(name)) if is_class(name) else (1.0, 1.0) for name in names]
+    )
     written = any(name_text(name) for name in names)
     free = style.axes_points(ax) / np.array([columns, rows])
     free -= np.array([0.0, NAME_SIZE_PT + 4.0 if written else 2.0])
@@ -224,9 +228,11 @@ def plot_class_key(
     for index, name in enumerate(names):
         row, column = divmod(index, columns)
         x = (column + 0.5) / columns
-        place_sketch(
-            ax, name, (x, 1.0 - row / rows), alignment=(0.5, 1.0), cell_pt=side, color=style.INK
-        )
+        if is_class(name):
+            place_sketch(
+                ax, name, (x, 1.0 - row / rows), alignment=(0.5, 1.0), cell_pt=side,
+                color=style.INK, discs=are_discs(*names),
+            )  # fmt: skip
         ax.annotate(
             name_text(name), (x, 1.0 - row / rows), size=NAME_SIZE_PT, ha="center", va="top",
             xytext=(0.0, -side * float(sizes[:, 1].max()) - NAME_GAP_PT),
@@ -357,15 +363,15 @@ def _label_outside(panels: list[Axes], columns: int) -> None:
             ax.set_ylabel("")
 
 
-def _title_panel(ax: Axes, name: str) -> None:
+def _title_panel(ax: Axes, name: str, *, discs: bool) -> None:
     """Write the name of a class above the left edge and draw its sketch above the right one."""
-    cells = class_cells(name)
-    side = min(4.0, 10.0 / float(sketch_size(cells)[1]))
     ax.set_title(name_text(name), loc="left", color=style.MUTED)
-    place_sketch(
-        ax, name, (1.0, 1.03), transform="axes fraction", alignment=(1.0, 0.0), cell_pt=side,
-        color=style.INK,
-    )  # fmt: skip
+    if is_class(name):
+        side = min(4.0, 10.0 / float(sketch_size(class_cells(name))[1]))
+        place_sketch(
+            ax, name, (1.0, 1.03), transform="axes fraction", alignment=(1.0, 0.0), cell_pt=side,
+            color=style.INK, discs=discs,
+        )  # fmt: skip
 
 
 def _turn_words(ax: Axes, sweep: list[SweepAxis]) -> None:

@@ -109,10 +109,9 @@ def discs_of(name: str) -> int:
     >>> discs_of("ring5"), discs_of("ab.ac.ad.be"), discs_of("9 discs, 10 contacts"), discs_of("T")
     (5, 5, 9, 0)
     """
-    counts = _COUNTS.fullmatch(name)
-    return (
-        int(counts[1]) if counts else 1 + max((max(pair) for pair in contacts_of(name)), default=-1)
-    )
+    if counts := _COUNTS.fullmatch(name):
+        return int(counts[1])
+    return 1 + max((max(pair) for pair in contacts_of(name)), default=-1)
 
 
 def graph_order(name: str) -> tuple[int, int, str, str]:

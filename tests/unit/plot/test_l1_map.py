@@ -7,6 +7,7 @@ import pytest
 from matplotlib.collections import QuadMesh
 from matplotlib.contour import ContourSet
 from matplotlib.offsetbox import AnnotationBbox
+from matplotlib.patches import Circle
 from synthetic_assembly import one_axis, outcome_classes, sensitivity
 
 from driftwalk.core.errors import InputError
@@ -186,3 +187,12 @@ def test_key_shows_every_class_once_and_none_on_another(blocks, chirality) -> No
     assert len(boxes) == len(names) + len(written)
     for index, box in enumerate(boxes):
         assert not any(box.overlaps(other) for other in boxes[:index])
+
+
+def test_classes_of_discs_are_discs_and_counts_are_written() -> None:
+    """A class such as 2+2 does not say of what; of more than eight discs there is no sketch."""
+    ax = plot_class_key(["chain4", "2+2", "9 discs, 9 contacts"])
+    sketches = [a.offsetbox for a in ax.artists if isinstance(a, AnnotationBbox)]
+    shapes = [{type(one) for one in sketch.get_children()} for sketch in sketches]
+    assert shapes == [{Circle}, {Circle}]
+    assert ax.texts[2].get_text() == "9 discs, 9 contacts"

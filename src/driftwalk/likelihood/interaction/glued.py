@@ -18,7 +18,7 @@ See docs/how-to/dimer.md.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -185,12 +185,12 @@ def glued_stirring(
     squares = np.einsum("na,ab,nb->n", off, np.linalg.inv(covariance), off)
     rho = most_likely(nodes, -0.5 * squares, ready.study.fit.confidence)
     facts: dict[str, Any] = {}
-    for name, of in (("stirring_correlation", float), ("stirring_length_m", _length_of(body))):
-        value, *ends = (of(one) for one in rho)
+    length = [_length_of(one, body.side) for one in rho]
+    for name, (value, *ends) in (("stirring_correlation", rho), ("stirring_length_m", length)):
         facts |= {name: value, f"{name}_interval": ends}
     if len(observed) > 1:
         facts["stirring_misfit_std"] = math.sqrt(float(squares.min()))
-    lengths = np.array([_length_of(body)(float(one)) for one in nodes])
+    lengths = np.array([_length_of(float(one), body.side) for one in nodes])
     return SharedStirring(facts, length_quantiles(lengths, -0.5 * squares))
 
 
@@ -204,14 +204,14 @@ def length_quantiles(lengths: Floats, log_density: Floats) -> dict[str, Any]:
 
 def _expected(rho: float, body: Body) -> tuple[float, float]:
     """Return the logarithms of the intensity over that of one block, and of the lever [m]."""
-    length, outline = _length_of(body)(rho), body.outline
+    length, outline = _length_of(rho, body.side), body.outline
     ratio = 2.0 * math.log(outline.force_share(length) / len(outline.cells))
     return ratio, math.log(max(outline.force_lever_m(length), 1e-12))
 
 
-def _length_of(body: Body) -> Callable[[float], float]:
-    """Return the function from the correlation at one side to the length [m]; 0 for none."""
-    return lambda rho: 0.0 if rho <= 0.0 else body.side / math.sqrt(-2.0 * math.log(rho))
+def _length_of(rho: float, side: float) -> float:
+    """Return the length [m] for a correlation at a distance of one side [m]; 0 for none."""
+    return 0.0 if rho <= 0.0 else side / math.sqrt(-2.0 * math.log(rho))
 
 
 def most_likely(nodes: Floats, log_density: Floats, confidence: float) -> tuple[float, ...]:

@@ -101,7 +101,7 @@ def class_times_section(times: xr.Dataset) -> Section:
     classes = [
         _class_course(
             names[i], share[i], *(None if band is None else band[i] for band in bands),
-            discs=any(map(are_discs, names)),
+            discs=are_discs(*names),
         )
         for i in shown
     ]  # fmt: skip
@@ -139,7 +139,7 @@ def class_items(found: xr.Dataset, names: list[str], shown: list[str]) -> list[d
 
     items = [
         {
-            "class": name, "cells": cells_of(name, discs=any(map(are_discs, names))),
+            "class": name, "cells": cells_of(name, discs=are_discs(*names)),
             "count": None if (n := column("count", name)) is None else int(n),
             "share": column("proportion", name),
             "low": column("interval_low", name), "high": column("interval_high", name),

@@ -55,7 +55,7 @@ def replay_section(path: xr.Dataset, assembly: xr.Dataset | None = None) -> Sect
         side=side,
         time=encode_array(thin["time"].values, step=2.0**-14),
         runs=made,
-        cells={name: cells_of(name, discs=any(map(are_discs, names))) for name in sorted(names)},
+        cells={name: cells_of(name, discs=are_discs(*names)) for name in sorted(names)},
     )  # fmt: skip
 
 

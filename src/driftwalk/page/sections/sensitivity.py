@@ -32,6 +32,7 @@ from driftwalk.page.sections.sensitivity_maps import (
     value_words,
 )
 from driftwalk.plot.components import biplot_of
+from driftwalk.plot.parts.polyomino_sketch import are_discs
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -181,7 +182,7 @@ def biplot_section(components: xr.Dataset, sensitivity: xr.Dataset) -> Section:
         arrows=[
             {
                 "name": found.names[k], "x": float(found.tips[k, 0]), "y": float(found.tips[k, 1]),
-                "cells": cells_of(found.names[k]),
+                "cells": cells_of(found.names[k], discs=are_discs(*found.names)),
             }
             for k in sorted(order.tolist())
         ],

@@ -15,6 +15,7 @@ from driftwalk.page.number_words import quantity
 from driftwalk.page.parts import Section, axis, require, section, settings_of, value_of
 from driftwalk.page.sections.outcomes import cells_of
 from driftwalk.plot.parts.assembly_labels import OTHER, class_names, classes_to_show, with_rest
+from driftwalk.plot.parts.polyomino_sketch import are_discs
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -184,7 +185,7 @@ def _l1_map(part: xr.Dataset, x: str, y: str, id: str, title: str) -> Section:
         noise=floor,
         label="l1 distance",
         classes=shown,
-        cells=[cells_of(name) for name in shown],
+        cells=[cells_of(name, discs=are_discs(*shown)) for name in shown],
         shares=shares,
         over_time=over_time_part(part, x, y),
     )  # fmt: skip
@@ -276,7 +277,7 @@ def over_time_part(part: xr.Dataset, x: str, y: str) -> dict[str, Any]:
     return {
         "time": numbers(part["time"].values),
         "classes": listed,
-        "cells": [cells_of(name) for name in listed],
+        "cells": [cells_of(name, discs=are_discs(*names)) for name in listed],
         "count": encode_array(with_rest(count, shown, axis=2)),
         "runs": numbers(runs),
         "reference": None if known is None else encode_array(with_rest(known, shown)),

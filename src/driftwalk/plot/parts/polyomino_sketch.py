@@ -295,7 +295,7 @@ def draw_sketches_below(ax: Axes, positions: Sequence[float], names: Sequence[st
     sizes = {
         name: sketch_size(class_cells(name, orientation="tall")) for name in names if is_class(name)
     }
-    discs = any(map(are_discs, names))
+    discs = are_discs(*names)
     largest = np.max([*sizes.values(), np.ones(2)], axis=0)
     side = min(MAX_CELL_PT, 0.72 * slot_pt / largest[0])
     ax.set_xticks(list(positions), labels=[""] * len(positions))
@@ -333,10 +333,10 @@ def name_text(name: str) -> str:
 
     Examples
     --------
-    >>> name_text("L3+1"), name_text("xxx/x.x")
-    ('L3+1', '')
+    >>> name_text("L3+1"), name_text("xxx/x.x"), name_text("ab.ac.ad.be")
+    ('L3+1', '', '')
     """
-    return "" if "x" in name else name
+    return "" if "x" in name or "." in name else name
 
 
 def is_class(name: str) -> bool:
@@ -350,15 +350,15 @@ def is_class(name: str) -> bool:
     return all(cells_of_shape(shape) or contacts_of(shape) for shape in name.split("+"))
 
 
-def are_discs(name: str) -> bool:
-    """Return whether a class is of discs, as far as its name says so.
+def are_discs(*names: str) -> bool:
+    """Return whether classes are of discs, as far as the name of one of them says so.
 
     Examples
     --------
-    >>> are_discs("chain3+1"), are_discs("I3+1"), are_discs("1+1")
-    (True, False, False)
+    >>> are_discs("chain3+1"), are_discs("I3+1"), are_discs("1+1"), are_discs("1+1", "star4")
+    (True, False, False, True)
     """
-    return any(map(contacts_of, name.split("+")))
+    return any(contacts_of(shape) for name in names for shape in name.split("+"))
 
 
 def _turned(cells: Floats | Integers, orientation: Orientation) -> Floats | Integers:

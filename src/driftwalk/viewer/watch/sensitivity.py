@@ -24,6 +24,7 @@ from driftwalk.page.parts import axis, section
 from driftwalk.page.sections.outcomes import cells_of
 from driftwalk.page.sections.sensitivity_maps import AXES, axis_words, over_time_part, ranked_axes
 from driftwalk.plot.parts.assembly_labels import classes_to_show
+from driftwalk.plot.parts.polyomino_sketch import are_discs
 from driftwalk.viewer.watch.run_page import NO_CELL, Running, Section
 
 if TYPE_CHECKING:
@@ -146,7 +147,7 @@ class RunningSensitivity(Running):
         shown = classes_to_show(list(names), share)
         return {
             "classes": [names[index] for index in shown],
-            "cells": [cells_of(names[index]) for index in shown],
+            "cells": [cells_of(names[index], discs=are_discs(*names)) for index in shown],
             "shares": encode_array(share[settings][..., shown]) if shown else None,
         }
 
