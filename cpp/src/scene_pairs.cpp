@@ -14,12 +14,20 @@ double list_reach(const AssemblyRules& rules) {
   return std::max(touching, latching) + pair_skin_sides * rules.side;
 }
 
+// Of two assemblies: what one holds does not touch.
 bool are_near(const Scene& scene, int a, int b, double reach) {
+  if (scene.block[a].assembly == scene.block[b].assembly) {
+    return false;
+  }
   const Vec2 between = centre(scene, b) - centre(scene, a);
   return dot(between, between) < reach * reach;
 }
 
 void add_pair(PairList& pairs, int a, int b) {
+  if (pairs.count == pairs.room) {
+    pairs.room *= 2;
+    pairs.pair = pairs.grow(pairs.owner, pairs.room);
+  }
   pairs.pair[pairs.count++] = {std::min(a, b), std::max(a, b)};
 }
 

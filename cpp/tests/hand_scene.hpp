@@ -60,7 +60,7 @@ struct HandScene {
     scene.block = block.data();
     scene.blocks_before = blocks_before.data();
     scene.assembly = assembly.data();
-    scene.pairs = {pairs.data(), 0};
+    scene.pairs = {pairs.data(), 0, static_cast<int>(pairs.size()), nullptr, nullptr};
     scene.cell_head = heads.data();
     scene.cell_next = next.data();
     scene.step = 7;

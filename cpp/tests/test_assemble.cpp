@@ -465,7 +465,7 @@ public:
     scene_.block = blocks_.data();
     scene_.blocks_before = before_.data();
     scene_.assembly = assemblies_.data();
-    scene_.pairs = {pairs_.data(), 0};
+    scene_.pairs = {pairs_.data(), 0, static_cast<int>(pairs_.size()), nullptr, nullptr};
     scene_.cell_head = heads_.data();
     scene_.cell_next = next_.data();
     for (int b = 0; b < rules.blocks; ++b) {

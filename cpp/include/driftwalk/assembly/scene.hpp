@@ -45,10 +45,13 @@ struct BlockPair {
   std::int32_t first, second;
 };
 
-// Pairs of blocks that may touch, with room for all pairs that there are.
+// Pairs of blocks that may touch.
 struct PairList {
   BlockPair* pair;
-  int count;
+  int count, room;
+  // Makes room for twice as many, in what owns them; none where there is room for all pairs.
+  BlockPair* (*grow)(void* owner, int room);
+  void* owner;
 };
 
 struct Scene {
@@ -91,8 +94,9 @@ void keep_first_blocks(const AssemblyRules& rules, Scene& scene, int blocks);
 // Makes every block an assembly of its own, which moves as the block did, with its own frame.
 void part_blocks(const AssemblyRules& rules, Scene& scene);
 
-// Fills the list with the pairs whose centres are closer than a diagonal (or the connectors' reach)
-// and a skin, ordered by first and second block.
+// Fills the list with the pairs of different assemblies whose centres are closer than a diagonal (or
+// the connectors' reach) and a skin, ordered by first and second block. It has to be made anew where
+// an assembly has come apart.
 void find_pairs(const AssemblyRules& rules, Scene& scene);
 
 } // namespace driftwalk
