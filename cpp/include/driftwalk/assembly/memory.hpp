@@ -18,8 +18,9 @@ public:
   AssemblyMemory(int blocks, std::size_t lane_bytes)
       : blocks_(static_cast<std::size_t>(blocks)), before_(blocks_.size()),
         assemblies_(blocks_.size()), next_(blocks_.size()),
-        heads_(most_cells_per_side * most_cells_per_side),
+        heads_(cell_heads),
         pairs_(static_cast<std::size_t>(std::min(pair_capacity(blocks), pairs_per_block * blocks))),
+        close_(pairs_.size()),
         lanes_(static_cast<char*>(::operator new(lane_bytes, lane_alignment))) {
     scratch_.lanes = lanes_.get();
     Scene& scene = scratch_.scene;
@@ -27,7 +28,8 @@ public:
     scene.block = blocks_.data();
     scene.blocks_before = before_.data();
     scene.assembly = assemblies_.data();
-    scene.pairs = {pairs_.data(), 0, static_cast<int>(pairs_.size()), grow_pairs, &pairs_};
+    scene.pairs = list_in(pairs_);
+    scene.close = list_in(close_);
     scene.cell_head = heads_.data();
     scene.cell_next = next_.data();
   }
@@ -39,6 +41,9 @@ public:
 private:
   // About twice what squares side by side have of a list: the room that a world begins with.
   static constexpr int pairs_per_block = 16;
+  static PairList list_in(std::vector<BlockPair>& pairs) {
+    return {pairs.data(), 0, static_cast<int>(pairs.size()), grow_pairs, &pairs};
+  }
   static BlockPair* grow_pairs(void* owner, int room) {
     auto& pairs = *static_cast<std::vector<BlockPair>*>(owner);
     pairs.resize(static_cast<std::size_t>(room));
@@ -53,7 +58,7 @@ private:
   std::vector<SceneBlock> blocks_, before_;
   std::vector<SceneAssembly> assemblies_;
   std::vector<std::int32_t> next_, heads_;
-  std::vector<BlockPair> pairs_;
+  std::vector<BlockPair> pairs_, close_;
   std::unique_ptr<char, DeleteLanes> lanes_;
   AssemblyScratch scratch_;
 };
