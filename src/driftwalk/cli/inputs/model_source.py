@@ -105,7 +105,7 @@ def _source_from_flow(given: StudyOptions, flow_file: Path | None) -> Source:
 
 
 def _in_tank(field: xr.Dataset, given: StudyOptions, study: Study) -> tuple[xr.Dataset, list[str]]:
-    """Return a field stretched to a larger tank that an option states, and a warning that says so."""
+    """Return a field, stretched to a larger tank that an option states, and a warning of it."""
     from driftwalk.flow import stretch_flow
 
     wanted = study.tank.diameter_m
