@@ -354,7 +354,10 @@ def plot_growth(
         for (name, words), dashes in zip(
             curves.items(), ("-", (0, (5, 2)), (0, (1, 1.5))), strict=False
         ):
-            text = ", ".join(part for part in (words if len(curves) > 1 else "", label) if part)
+            # Dashes are named once, and then the colour of the second one.
+            named = words if len(curves) > 1 and one is sizes else ""
+            first = name == next(iter(curves))
+            text = named or (label if first else "")
             ax.plot(one["time"], one[name], color=color, ls=dashes, lw=1.3, label=text or None)
             ends = (one[f"{name}_low"].values, one[f"{name}_high"].values)
             ax.fill_between(one["time"].values, *ends, color=color, alpha=0.2, lw=0)
