@@ -11,7 +11,8 @@ double list_reach(const AssemblyRules& rules) {
   const double touching = rules.side * std::sqrt(2.0);
   const double latching =
       rules.latching == Latching::connector ? rules.side + rules.connector_distance : 0.0;
-  return std::max(touching, latching) + pair_skin_sides * rules.side;
+  return std::max({touching, latching, rules.pull.on ? rules.pull.reach : 0.0}) +
+         pair_skin_sides * rules.side;
 }
 
 bool are_near(const Scene& scene, int a, int b, double reach) {

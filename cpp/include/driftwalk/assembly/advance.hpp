@@ -188,8 +188,8 @@ inline void finish_member(const Physics<Real, T, Law>& physics, const Real* tota
       (physics.shape.panel_count > 0 ? physics.shape.turning_share : turning_share(physics.block)) *
       half;
   const Real per_mass = physics.world.drag_per_mass, per_inertia = physics.world.drag_per_inertia;
-  // Where the water pushes, the sums are accelerations.
-  const bool done = physics.water.count > 0;
+  // Where the water pushes, or another block, the sums are accelerations.
+  const bool done = physics.water.count > 0 || physics.pulled;
   const Real by_mass = done ? Real(T(1)) : per_mass, by_inertia = done ? Real(T(1)) : per_inertia;
   WaterPush<Real> push;
   push.acceleration = {total[0] * by_mass * m.per_count, total[1] * by_mass * m.per_count,
@@ -203,13 +203,15 @@ inline void finish_member(const Physics<Real, T, Law>& physics, const Real* tota
   find_arm(m);
 }
 
-template <class Real, class T, class Law>
+// `pull` adds what blocks do to each other to the sums of each.
+template <class Real, class T, class Law, class Pull>
 inline void advance(const Physics<Real, T, Law>& physics, int half, Member<Real>* members,
-                    Sums<Real>* sums, int blocks) {
+                    Sums<Real>* sums, int blocks, const Pull& pull) {
   sum_noise(physics, half, members, sums, blocks);
   for (int b = 0; b < blocks; ++b) {
     feel_drag(physics, members[b], sums[b]);
   }
+  pull();
   sum_members<drag_sums_kept>(members, sums, blocks);
   for (int b = 0; b < blocks; ++b) {
     finish_member(physics, sums[b].total, members[b]);

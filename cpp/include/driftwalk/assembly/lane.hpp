@@ -2,6 +2,7 @@
 #pragma once
 
 #include "driftwalk/assembly/advance.hpp"
+#include "driftwalk/assembly/pull.hpp"
 #include "driftwalk/random/philox.hpp"
 
 DRIFTWALK_LANES_BEGIN
@@ -12,6 +13,8 @@ struct PackMemory {
   static constexpr int lanes = Numbers<Real>::lanes;
   Member<Real>* members;
   Sums<Real>* sums;
+  Pulled<Real>* pulled;
+  Pulled<typename Numbers<Real>::Scalar>* alone; // of one lane
   Real* listed_x; // where the blocks were when their lane's list of near pairs was made [m]
   Real* listed_y;
   BlockBook* books; // [block][lane]
@@ -38,6 +41,8 @@ private:
     const bool listed = blocks > most_blocks_all_pairs;
     take(members, count);
     take(sums, count);
+    take(pulled, count);
+    take(alone, listed ? count : 0);
     take(listed_x, count);
     take(listed_y, count);
     take(books, count * lanes);
@@ -45,6 +50,18 @@ private:
     return size;
   }
 };
+
+// Of the faces of the block's assembly: a joined face neither pulls nor is pulled.
+template <class Real>
+inline void set_poles(const AssemblyRules& rules, const PackMemory<Real>& pack, int block,
+                      int lane) {
+  const BlockBook& book = pack.book(block, lane);
+  for (int face = 0; face < 4; ++face) {
+    const bool joined = (book.joined >> face & 1) != 0;
+    put(pack.pulled[block].pole[face], lane,
+        joined ? 0.0 : rules.pull.pole[(face - book.quarter) & 3]);
+  }
+}
 
 template <class Real>
 inline void put_before(Member<Real>& m, int lane) {
@@ -86,6 +103,7 @@ inline void load_block(const AssemblyRules& rules, const double* pose, const Pac
     put(normal, lane, T(0));
   }
   pack.book(block, lane) = {0, 0, 0, 0};
+  set_poles(rules, pack, block, lane);
 }
 
 template <class Real, class T>
@@ -158,6 +176,7 @@ inline void cover_faces(const AssemblyRules& rules, const PackMemory<Real>& pack
     put(pack.members[block].covered[face], lane,
         rules.hidden_share < 1 && (joined >> face & 1u) != 0);
   }
+  set_poles(rules, pack, block, lane);
 }
 
 template <class Real>

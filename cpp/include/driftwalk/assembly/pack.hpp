@@ -32,7 +32,8 @@ public:
                  run.wall,
                  run.step,
                  {Real(T(0)), Real(T(0)), Real(T(0))},
-                 static_cast<T>(rules.hidden_share)} {
+                 static_cast<T>(rules.hidden_share),
+                 rules.pull.on} {
     const bool has_lists = capacity > most_blocks_all_pairs;
     for (int lane = 0; lane < lanes; ++lane) {
       load_lane<Real, T>(rules_, start, memory_, lane);
@@ -98,6 +99,7 @@ public:
   void renew() {
     near_ = NearRules<T>(rules_);
     physics_.hidden_share = static_cast<T>(rules_.hidden_share);
+    physics_.pulled = rules_.pull.on;
     blocks_ = rules_.blocks;
     listed_ = blocks_ > most_blocks_all_pairs;
     for (int lane = 0; lane < lanes && listed_; ++lane) {
@@ -126,12 +128,34 @@ public:
       look_at_flow(step);
     }
     advance(physics_, phase < run_.steps_per_interval ? 0 : 1, memory_.members, memory_.sums,
-            blocks_);
+            blocks_, [this] { feel_pull(); });
     meet_walls(physics_, memory_.members, blocks_);
     return settle_lanes(step);
   }
 
 private:
+  void feel_pull() {
+    if (!rules_.pull.on) {
+      return;
+    }
+    const Member<Real>* const members = memory_.members;
+    Pulled<Real>* const pulled = memory_.pulled;
+    for (int b = 0; b < blocks_; ++b) {
+      look_at(physics_, members[b], pulled[b]);
+    }
+    if (!listed_) {
+      pull_all(rules_.pull, members, pulled, blocks_);
+    }
+    for (int lane = 0; lane < lanes && listed_; ++lane) {
+      if (books_[lane].running) {
+        pull_listed(rules_.pull, members, pulled, memory_.alone, blocks_, books_[lane].pairs, lane);
+      }
+    }
+    for (int b = 0; b < blocks_; ++b) {
+      add_pull(physics_, run_, members[b], pulled[b], memory_.sums[b]);
+    }
+  }
+
   // The first force of a world has no last one to remember, and the spread of all that follow.
   void begin_force(int lane) {
     put(kept_, lane, 0);
