@@ -20,12 +20,17 @@ from driftwalk.model.interaction import Magnet
 MU_0: Final = 1.25663706127e-6
 """Permeability of the vacuum [N/A²], CODATA 2022."""
 NODES: Final = 12
-"""Points of the quadrature along an edge of a pole face; 24 change no force by 1e-3 as close as
-half the thickness."""
+"""Points of the quadrature along an edge of a pole face, of magnets that are close; 24 change no
+force by 1e-3 as close as half the thickness."""
 
 
 def magnet_energy(
-    magnet: Magnet, x: npt.ArrayLike, y: npt.ArrayLike, angle: npt.ArrayLike
+    magnet: Magnet,
+    x: npt.ArrayLike,
+    y: npt.ArrayLike,
+    angle: npt.ArrayLike,
+    *,
+    nodes: int = NODES,
 ) -> Floats:
     """Return the energy of two equal magnets [J], 0 when they are far apart.
 
@@ -37,6 +42,8 @@ def magnet_energy(
         Place of the second's centre [m]; the first is at the origin, its moment along x.
     angle : array_like
         Of the second's moment against the first's, about the upright axis [rad].
+    nodes : int
+        Points of the quadrature along an edge of a pole face.
 
     Examples
     --------
@@ -45,7 +52,7 @@ def magnet_energy(
     -1331
     """
     x, y, angle = np.broadcast_arrays(*(np.asarray(one, dtype=np.float64) for one in (x, y, angle)))
-    across, up, weight = _pole_points(magnet)
+    across, up, weight = _pole_points(magnet, nodes)
     cosine, sine = np.cos(angle)[..., None], np.sin(angle)[..., None]
     total = np.zeros(x.shape)
     for own, other in product((-1.0, 1.0), repeat=2):
@@ -74,7 +81,7 @@ def coaxial_force(magnet: Magnet, distance: npt.ArrayLike) -> Floats:
     [501.0, 53.0]
     """
     distance = np.asarray(distance, dtype=np.float64)[..., None]
-    across, up, weight = _pole_points(magnet)
+    across, up, weight = _pole_points(magnet, NODES)
     total = np.zeros(distance.shape[:-1])
     for own, other in product((-1.0, 1.0), repeat=2):
         apart = distance + (other - own) * magnet.thickness_m / 2.0
@@ -83,9 +90,9 @@ def coaxial_force(magnet: Magnet, distance: npt.ArrayLike) -> Floats:
     return np.asarray(total * magnet.remanence_T**2 / (4.0 * np.pi * MU_0))
 
 
-def _pole_points(magnet: Magnet) -> tuple[Floats, Floats, Floats]:
+def _pole_points(magnet: Magnet, nodes: int) -> tuple[Floats, Floats, Floats]:
     """Return points of a pole face, across and up [m], and their areas [m²]."""
-    node, weight = np.polynomial.legendre.leggauss(NODES)
+    node, weight = np.polynomial.legendre.leggauss(nodes)
     across, up = np.meshgrid(node * magnet.width_m / 2.0, node * magnet.height_m / 2.0)
     area = np.outer(weight, weight) * magnet.width_m * magnet.height_m / 4.0
     return across.ravel(), up.ravel(), area.ravel()

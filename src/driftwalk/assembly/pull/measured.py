@@ -57,7 +57,7 @@ class MeasuredAttraction:
     def at_gap(self, gap: npt.ArrayLike) -> Floats:
         """Return the attraction of faces opposite each other [N] at gaps [m]."""
         offset, angle = (int(np.argmin(np.abs(axis))) for axis in self.axes[1:])
-        return np.asarray(np.interp(gap, self.axes[0], self._values()[:, offset, angle]))
+        return np.asarray(np.interp(gap, self.axes[0], self._values()[:, offset, angle], right=0.0))
 
     def energies(self) -> Floats:
         """Return the energy at the nodes [J]: the force integrated from the largest gap inward."""
