@@ -114,7 +114,7 @@ def _potential(magnet: Magnet, z: Floats, across: Floats, up: Floats) -> Floats:
         total += sign * (
             u * np.arcsinh(v / np.maximum(np.hypot(u, z), 1e-30))
             + v * np.arcsinh(u / np.maximum(np.hypot(v, z), 1e-30))
-            - z * np.arctan2(u * v, z * r)
+            - np.abs(z) * np.arctan2(u * v, np.abs(z) * r)
         )
     return np.asarray(total)
 

@@ -40,9 +40,10 @@ class PullPolicy(NamedTuple):
     at a quarter of that first contacts are within 1 % of those of a small step."""
     resistance: float = 0.25
     """Most of k dt / (gap m) of the resistance at close approach; stable below 1."""
-    angles: int = 24
-    """Directions and angles of a table of oriented faces; 72 change no force at 10 mm by 1 %."""
-    distance_step: float = 0.05
+    angles: int = 36
+    """Directions and angles of a table of oriented faces, a multiple of 4: of magnets of 5 mm, 9 mm
+    apart, forces and torques are within 0.2 % (rms) of the largest."""
+    distance_step: float = 0.07
     """Step of the logarithm of its distance; chosen by the same comparison."""
 
 
@@ -115,6 +116,8 @@ class BlockPull:
         Of the points that attract, from the centre of the block [m].
     centres : RadialForce or None
         Attraction of two centres, of the menisci.
+    resistance : RadialForce or None
+        Of the water between two centres, per closing speed and distance [N s/m²].
     native : driftwalk._core.Pull
         Their tables.
     """
@@ -122,6 +125,7 @@ class BlockPull:
     faces: RadialForce | None
     lever: float
     centres: RadialForce | None
+    resistance: RadialForce | None
     native: _core.Pull
 
 
@@ -204,7 +208,7 @@ def _block_pull(
         native.set_radial("centres", *centres.cells())
     if resistance is not None:
         native.set_radial("resistance", *resistance.cells())
-    return BlockPull(faces, lever, centres, native)
+    return BlockPull(faces, lever, centres, resistance, native)
 
 
 def _require_room(magnet: Magnet, inset: float, side: float) -> None:
@@ -300,12 +304,13 @@ def _set_oriented(
     log_distance = math.log(low) + step * np.arange(math.ceil(math.log(faces.cutoff / low) / step))
     r = np.exp(log_distance)
     turn = 2.0 * np.pi * np.arange(n) / n
-    grid = np.meshgrid(r, turn[: n // 2] if symmetric else turn, turn, indexing="ij")
+    grid = np.meshgrid(r, turn[: n // 4 + 1] if symmetric else turn, turn, indexing="ij")
     found = np.concatenate(
         [energy(d * np.cos(a), d * np.sin(a), b) for d, a, b in zip(*grid, strict=True)]
     ).reshape(grid[0].shape)
-    if symmetric:  # a magnet has the same energy before and behind another
-        found = np.concatenate([found, found], axis=1)
+    if symmetric:  # magnets have the same energy in a mirror, and before and behind each other
+        mirrored = found[:, n // 4 - 1 : 0 : -1, -np.arange(n)]
+        found = np.concatenate([found, mirrored] * 2, axis=1)
     found *= _taper(r, r[-1])[:, None, None]
     spline = spline_filter1d(found, order=2, axis=0, mode="mirror")
     for axis in (1, 2):
