@@ -14,9 +14,9 @@ from driftwalk import _core
 from driftwalk.assembly.lattice.join_history import LatticeWorld
 from driftwalk.assembly.lattice.joined_faces import ROUNDING
 from driftwalk.assembly.outcomes.disc_contacts import disc_class
+from driftwalk.assembly.pull.tables import block_pull
 from driftwalk.assembly.runs.dataset import times_of
 from driftwalk.assembly.runs.plan import MOST_STEPS, make_plan, start_poses
-from driftwalk.assembly.pull.tables import block_pull
 from driftwalk.assembly.runs.start import require_room
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError

@@ -52,15 +52,15 @@ def parse_magnet(text: str) -> Magnet | None:
             f"expected width x height x thickness and remanence such as 5x5x2mm,1.3T, got '{text}'"
         )
     *sizes, unit, remanence, tesla = match.groups()
-    numbers = [parse_quantity(f"{size}{unit}", "m") for size in sizes]
+    width, height, thickness = (parse_quantity(f"{size}{unit}", "m") for size in sizes)
     field = parse_quantity(remanence, "1") * (1e-3 if tesla == "mT" else 1.0)
-    if min(*numbers, field) <= 0.0:
+    if min(width, height, thickness, field) <= 0.0:
         raise ConfigurationError(f"a magnet has sizes and a remanence above 0, got '{text}'")
-    if max(numbers) > 1.0 or field > 3.0:
+    if max(width, height, thickness) > 1.0 or field > 3.0:
         raise ConfigurationError(
             f"a magnet is at most 1 m and 3 T, got '{text}'; a bare size is in m: write 5x5x2mm"
         )
-    return Magnet(*numbers, field)
+    return Magnet(width, height, thickness, field)
 
 
 class Interaction(Section):
@@ -108,9 +108,9 @@ class Interaction(Section):
     Resistance k of the water between two blocks, 0 for none: a force k times their closing speed
     over the gap between them.
     """
-    cutoff_m: Annotated[
-        float | Literal["auto"], Quantity("m", gt=0, le=10, words=("auto",))
-    ] = "auto"
+    cutoff_m: Annotated[float | Literal["auto"], Quantity("m", gt=0, le=10, words=("auto",))] = (
+        "auto"
+    )
     """Distance of two faces beyond which they feel nothing; "auto": where the force is 0.01 mN."""
 
     @field_validator("magnets")

@@ -17,7 +17,10 @@ from driftwalk.assembly.pull.tables import block_pull
 from driftwalk.model.interaction import Magnet
 
 SIDE, MASS = 0.03, 0.0116
-MAGNETS = {"3x3x1mm,1.2T": Magnet(3e-3, 3e-3, 1e-3, 1.2), "5x5x2mm,1.3T": Magnet(5e-3, 5e-3, 2e-3, 1.3)}  # fmt: skip
+MAGNETS = {
+    "3x3x1mm,1.2T": Magnet(3e-3, 3e-3, 1e-3, 1.2),
+    "5x5x2mm,1.3T": Magnet(5e-3, 5e-3, 2e-3, 1.3),
+}
 
 
 def magpylib_pull(magnet: Magnet, x: float, y: float, angle: float) -> tuple[float, float, float]:
@@ -35,7 +38,12 @@ def still_pair(start: Any, **sections: Any) -> dict[str, Any]:
     forces = {"drag_coefficient": 0.0, "force_std_N": 0.0}
     study = dw.Study(tank={"diameter_m": 2.0}, forces=forces, **sections)
     start = np.asarray(start, dtype=np.float64)
-    return {"study": study, "flow": dw.uniform_flow(0.0, 0.0, arena=study.tank.to_arena()), "start": start, "blocks": len(start)}
+    return {
+        "study": study,
+        "flow": dw.uniform_flow(0.0, 0.0, arena=study.tank.to_arena()),
+        "start": start,
+        "blocks": len(start),
+    }
 
 
 @pytest.mark.parametrize("text", MAGNETS)
@@ -100,18 +108,19 @@ def test_two_magnets_meet_when_the_quadrature_says() -> None:
     text, magnet, gap = "3x3x1mm,1.2T", MAGNETS["3x3x1mm,1.2T"], 0.015
     lever, square = SIDE / 2 - 1.5e-3, np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])
     distances = np.linspace(SIDE, SIDE + gap, 4000)
-    ways = (
-        distances[:, None, None, None] * np.array([1.0, 0.0])
-        + lever * (square[None, :, :] - square[:, None, :])
+    ways = distances[:, None, None, None] * np.array([1.0, 0.0]) + lever * (
+        square[None, :, :] - square[:, None, :]
     )
     length = np.hypot(ways[..., 0], ways[..., 1])
     force = (coaxial_force(magnet, length) * ways[..., 0] / length).sum(axis=(1, 2))
     work = np.append(np.cumsum(((force[1:] + force[:-1]) / 2 * np.diff(distances))[::-1])[::-1], 0)
-    speed = np.sqrt(4.0 * work / MASS)  # of closing: the energy is half the mass, speed squared, over 2
+    speed = np.sqrt(
+        4.0 * work / MASS
+    )  # of closing: the energy is half the mass, speed squared, over 2
     # Near rest the distance falls as a t² / 2 of the relative motion.
     last = 40
     time = np.sqrt(2 * (distances[-1] - distances[-last]) / (2 * force[-1] / MASS))
-    expected = time + np.trapezoid(1 / speed[:-last + 1], distances[:-last + 1])
+    expected = time + np.trapezoid(1 / speed[: -last + 1], distances[: -last + 1])
     for step in (1e-3, 1e-2):
         pair = still_pair(
             [[0.0, 0.0, 0.0], [SIDE + gap, 0.0, 0.0]],
@@ -136,7 +145,8 @@ def test_a_conservative_pair_keeps_energy_and_momentum(tmp_path: Path) -> None:
         interaction={"attraction": str(table)}, assembly={"latching": "none"},
     )  # fmt: skip
     tank, pull = dw.LiveTank(**pair), block_pull(pair["study"])
-    assert pull is not None and pull.faces is not None
+    assert pull is not None
+    assert pull.faces is not None
 
     def potential() -> float:
         turn = tank.theta[:, None] + np.arange(4) * np.pi / 2
@@ -162,7 +172,8 @@ def test_a_conservative_pair_keeps_energy_and_momentum(tmp_path: Path) -> None:
 
 def test_menisci_attract_by_the_closed_form() -> None:
     pull = block_pull(dw.Study(interaction={"capillary": "on", "meniscus_height_m": 1.5e-3}))
-    assert pull is not None and pull.centres is not None
+    assert pull is not None
+    assert pull.centres is not None
     # Kralchevsky and Nagayama (2000): 2 pi gamma q Q² K1(q L), with the slope's charge
     # Q = H / K0(q R).
     q, radius = np.sqrt(998.0 * 9.81 / 0.072), SIDE / 2
@@ -175,7 +186,8 @@ def test_menisci_attract_by_the_closed_form() -> None:
 
 def test_the_resistance_is_the_factor_over_the_gap() -> None:
     pull = block_pull(dw.Study(interaction={"approach_resistance_N_s": 1e-5}))
-    assert pull is not None and pull.resistance is not None
+    assert pull is not None
+    assert pull.resistance is not None
     np.testing.assert_allclose(pull.resistance(0.035) * 0.035, 1e-5 / 0.005)
 
 
@@ -203,9 +215,7 @@ def test_many_blocks_are_the_same_by_lists_as_by_all_pairs() -> None:
         for start in (near, np.concatenate([near, far]))
     ]
     for name in ("x", "y", "theta"):
-        np.testing.assert_allclose(
-            paths[0][name], paths[1][name].isel(block=slice(20)), atol=1e-7
-        )
+        np.testing.assert_allclose(paths[0][name], paths[1][name].isel(block=slice(20)), atol=1e-7)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import FormatError
@@ -54,7 +53,7 @@ class MeasuredAttraction:
     def _values(self) -> Floats:
         return np.reshape(self.force, [len(axis) for axis in self.axes])
 
-    def at_gap(self, gap: npt.ArrayLike) -> Floats:
+    def at_gap(self, gap: Floats) -> Floats:
         """Return the attraction of faces opposite each other [N] at gaps [m]."""
         offset, angle = (int(np.argmin(np.abs(axis))) for axis in self.axes[1:])
         return np.asarray(np.interp(gap, self.axes[0], self._values()[:, offset, angle], right=0.0))
@@ -115,7 +114,9 @@ def read_attraction(path: str | Path) -> MeasuredAttraction:
         with Path(path).open(newline="", encoding="utf-8-sig") as file:
             rows = list(csv.reader(file))
     except (OSError, UnicodeDecodeError) as error:
-        raise FormatError(f"cannot be read as a table of attractions: {error}", path=path) from error
+        raise FormatError(
+            f"cannot be read as a table of attractions: {error}", path=path
+        ) from error
     if not rows:
         raise FormatError("is empty; expected columns such as gap_mm, force_mN", path=path)
     columns = _columns(path, [head.strip() for head in rows[0]])

@@ -188,7 +188,7 @@ def _block_pull(
         centres = _meniscus(given, side, density)
     if given.approach_resistance_N_s > 0.0:
         resistance = _approach(given.approach_resistance_N_s, side, mass, step)
-    oriented = None
+    oriented: Energy | None = None
     if faces is not None and measured is not None and measured.is_oriented:
         oriented = measured.energy
     elif faces is not None and magnet is not None and given.poles == "fixed":
