@@ -64,7 +64,7 @@ def parse_magnet(text: str) -> Magnet | None:
 
 
 class Interaction(Section):
-    """What blocks do to each other before they touch: nothing, unless a key says so.
+    """Forces between blocks before they touch: none, unless a key says so.
 
     Examples
     --------

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 GRAVITY: Final = 9.81
 """[m/s²]"""
 CELL_BITS: Final = 17
-"""Of a float that the number of its cell leaves out: 64 cells in an octave of the squared distance,
+"""Bits of a float that the number of its cell leaves out: 64 cells in an octave of the squared distance,
 within which a force of r⁻⁵ is straight to 3e-4."""
 
 
@@ -106,7 +106,7 @@ def _taper(distance: Floats, cutoff: float) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class BlockPull:
-    """What the blocks of a study do to each other at a distance.
+    """Forces between the blocks of a study at a distance.
 
     Attributes
     ----------
