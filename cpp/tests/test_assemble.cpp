@@ -445,8 +445,8 @@ public:
   FreeWorld(Tank& tank, const AssemblyRules& rules, const Crowd& crowd, double drag = 0,
             double noise_scale = 0)
       : rules_(rules), memory_(driftwalk::PackMemory<double>::bytes(rules.blocks) + 64),
-        pack_(aligned(), rules.blocks), blocks_(std::size_t(rules.blocks)), before_(blocks_.size()),
-        assemblies_(blocks_.size()), pairs_(std::size_t(driftwalk::pair_capacity(rules.blocks))), close_(pairs_.size()),
+        pack_(aligned(), rules.blocks, true), blocks_(std::size_t(rules.blocks)), before_(blocks_.size()),
+        assemblies_(blocks_.size()), pairs_(std::size_t(driftwalk::pair_capacity(rules.blocks))), close_(pairs_.size()), by_cell_(blocks_.size()),
         heads_(driftwalk::cell_heads),
         next_(blocks_.size()), run_(tank.finished()) {
     const driftwalk::Prepared<double>& run = run_.view();
@@ -466,6 +466,7 @@ public:
     scene_.blocks_before = before_.data();
     scene_.assembly = assemblies_.data();
     scene_.pairs = {pairs_.data(), 0, static_cast<int>(pairs_.size()), nullptr, nullptr};
+    scene_.by_cell = by_cell_.data();
     scene_.close = {close_.data(), 0, static_cast<int>(close_.size()), nullptr, nullptr};
     scene_.cell_head = heads_.data();
     scene_.cell_next = next_.data();
@@ -505,6 +506,7 @@ private:
   std::vector<driftwalk::SceneBlock> blocks_, before_;
   std::vector<driftwalk::SceneAssembly> assemblies_;
   std::vector<driftwalk::BlockPair> pairs_, close_;
+  std::vector<driftwalk::PlacedBlock> by_cell_;
   std::vector<std::int32_t> heads_, next_;
   driftwalk::PreparedRun<double> run_;
   driftwalk::Physics<double, double, driftwalk::QuadraticDrag> physics_{};

@@ -21,12 +21,15 @@ struct PackMemory {
   static constexpr bool is_one_world(int blocks) {
     return lanes == 1 || blocks > most_blocks_all_pairs;
   }
-  static std::size_t bytes(int blocks) {
+  static std::size_t bytes(int blocks) { return bytes_of(blocks, is_one_world(blocks)); }
+  static std::size_t bytes_of(int blocks, bool one_world) {
     PackMemory layout;
-    return layout.place(nullptr, blocks);
+    return layout.place(nullptr, blocks, one_world);
   }
   PackMemory() = default;
-  PackMemory(void* memory, int blocks) { place(static_cast<char*>(memory), blocks); }
+  PackMemory(void* memory, int blocks, bool holds_one_world) {
+    place(static_cast<char*>(memory), blocks, holds_one_world);
+  }
 
   int rows(int blocks) const { return one_world ? (blocks + lanes - 1) / lanes : blocks; }
   // The row and the lane of a block of a world.
@@ -37,14 +40,14 @@ struct PackMemory {
   }
 
 private:
-  std::size_t place(char* memory, int blocks) {
+  std::size_t place(char* memory, int blocks, bool holds_one_world) {
     std::size_t size = 0;
     const auto take = [&](auto*& pointer, std::size_t count) {
       using Item = std::remove_reference_t<decltype(*pointer)>;
       pointer = memory == nullptr ? nullptr : reinterpret_cast<Item*>(memory + size);
       size = (size + count * sizeof(Item) + 63) / 64 * 64;
     };
-    one_world = is_one_world(blocks);
+    one_world = holds_one_world;
     const std::size_t count = static_cast<std::size_t>(rows(blocks));
     take(members, count);
     take(sums, count);

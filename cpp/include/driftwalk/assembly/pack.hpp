@@ -23,9 +23,9 @@ public:
   // memory holds worlds of up to `capacity` blocks. Events go to `out`.
   WorldPack(const Prepared<T>& run, const AssemblyRules& rules, const double* start,
             const AssemblyOutputs& out, AssemblyScratch& scratch, int capacity)
-      : run_(run), rules_(rules), out_(out), scratch_(scratch), memory_(scratch.lanes, capacity),
+      : run_(run), rules_(rules), out_(out), scratch_(scratch), memory_(scratch.lanes, capacity, Crowded),
         near_(rules), blocks_(rules.blocks), rows_(memory_.rows(rules.blocks)),
-        listed_(rules.blocks > most_blocks_all_pairs),
+        listed_(Crowded && rules.blocks > most_blocks_all_pairs),
         physics_{Law::of(Real(T(0)), run.drag),
                  run.block,
                  run.shape,
@@ -103,7 +103,7 @@ public:
     physics_.hidden_share = static_cast<T>(rules_.hidden_share);
     blocks_ = rules_.blocks;
     rows_ = memory_.rows(blocks_);
-    listed_ = blocks_ > most_blocks_all_pairs;
+    listed_ = Crowded && blocks_ > most_blocks_all_pairs;
     list_crowd();
   }
 
