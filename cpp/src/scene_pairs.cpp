@@ -107,9 +107,9 @@ void find_in_cells(const Cells& cells, double reach, Scene& scene, PairList& pai
   };
   for (int row = 0; row < cells.rows; ++row) {
     for (int column = 0; column < cells.columns; ++column) {
+      const PlacedBlock *one = begin_of(row, column), *const end = begin_of(row, column + 1);
       const int left = std::max(column - 1, 0), right = std::min(column + 1, cells.columns - 1);
-      const PlacedBlock* const end = begin_of(row, column + 1);
-      for (const PlacedBlock* one = begin_of(row, column); one < end; ++one) {
+      for (; one < end; ++one) {
         // Neighbouring cells of a row follow each other.
         pair_with(*one, one + 1, begin_of(row, right + 1), reach * reach, pairs);
         if (row + 1 < cells.rows) {

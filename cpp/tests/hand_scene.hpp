@@ -50,9 +50,9 @@ struct HandScene {
 
   explicit HandScene(const driftwalk::AssemblyRules& given)
       : rules(given), block(std::size_t(given.blocks)), blocks_before(block.size()),
-        assembly(block.size()), pairs(std::size_t(driftwalk::pair_capacity(given.blocks)) + 1), close(pairs.size()), by_cell(block.size()),
-        heads(driftwalk::cell_heads), next(block.size()),
-        event_step(block.size(), -1), event_block(2 * block.size(), -1),
+        assembly(block.size()), pairs(std::size_t(driftwalk::pair_capacity(given.blocks)) + 1),
+        close(pairs.size()), by_cell(block.size()), heads(driftwalk::cell_heads),
+        next(block.size()), event_step(block.size(), -1), event_block(2 * block.size(), -1),
         event_face(2 * block.size(), -1) {
     for (driftwalk::SceneBlock& b : block) {
       b.assembly = -1; // none yet

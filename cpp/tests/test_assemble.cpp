@@ -445,10 +445,11 @@ public:
   FreeWorld(Tank& tank, const AssemblyRules& rules, const Crowd& crowd, double drag = 0,
             double noise_scale = 0)
       : rules_(rules), memory_(driftwalk::PackMemory<double>::bytes(rules.blocks) + 64),
-        pack_(aligned(), rules.blocks, true), blocks_(std::size_t(rules.blocks)), before_(blocks_.size()),
-        assemblies_(blocks_.size()), pairs_(std::size_t(driftwalk::pair_capacity(rules.blocks))), close_(pairs_.size()), by_cell_(blocks_.size()),
-        heads_(driftwalk::cell_heads),
-        next_(blocks_.size()), run_(tank.finished()) {
+        pack_(aligned(), rules.blocks, true), blocks_(std::size_t(rules.blocks)),
+        before_(blocks_.size()), assemblies_(blocks_.size()),
+        pairs_(std::size_t(driftwalk::pair_capacity(rules.blocks))), close_(pairs_.size()),
+        by_cell_(blocks_.size()), heads_(driftwalk::cell_heads), next_(blocks_.size()),
+        run_(tank.finished()) {
     const driftwalk::Prepared<double>& run = run_.view();
     physics_ = {
         {},

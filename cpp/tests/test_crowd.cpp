@@ -85,8 +85,8 @@ Found run(Tank& tank, const AssemblyRules& rules, const Crowd& crowd, std::int64
   std::int64_t next = 0;
   const driftwalk::WorldQueue queue{
       [](void* self) { return (*static_cast<std::int64_t*>(self))++; }, &next};
-  driftwalk::AssemblyMemory memory(
-      rules.blocks, driftwalk::PackMemory<Real>::bytes_of(rules.blocks, Crowded));
+  driftwalk::AssemblyMemory memory(rules.blocks,
+                                   driftwalk::PackMemory<Real>::bytes_of(rules.blocks, Crowded));
   driftwalk::AssemblyPack<Real, float, QuadraticDrag, Crowded>(prepared.view(), rules, input, out,
                                                                queue, memory.scratch())
       .run();

@@ -147,6 +147,7 @@ inline void fill_scene(const AssemblyRules& rules, const PackMemory<Real>& pack,
     assembly.blocks = 0;
     assembly.touched = false;
     if (block.assembly == b) {
+      assembly.moved = 0;
       assembly.x = get(m.pose.x, lane);
       assembly.y = get(m.pose.y, lane);
       assembly.theta = get(m.pose.theta, lane);
@@ -188,6 +189,18 @@ inline void read_block(const AssemblyRules& rules, const Scene& scene, const Pac
   const int lane = pack.lane(b, world);
   const SceneBlock& block = scene.block[b];
   const SceneAssembly& body = scene.assembly[block.assembly];
+  // What the scene rounds otherwise than the lanes, whether it has changed or not.
+  put(m.axes.cosine, lane, body.cosine);
+  put(m.axes.sine, lane, body.sine);
+  put(m.per_inertia, lane, rules.mass * body.blocks / body.inertia);
+  put(m.lightness, lane, rules.inertia / body.inertia);
+  put(m.arm.x, lane, block.x - body.x);
+  put(m.arm.y, lane, block.y - body.y);
+  put(m.x, lane, block.x);
+  put(m.y, lane, block.y);
+  if (!body.touched && body.moved == 0) {
+    return;
+  }
   put(m.pose.x, lane, body.x);
   put(m.pose.y, lane, body.y);
   put(m.pose.theta, lane, body.theta);
@@ -197,18 +210,10 @@ inline void read_block(const AssemblyRules& rules, const Scene& scene, const Pac
   if (body.touched) {
     put_rest(m.drag, lane);
   }
-  put(m.axes.cosine, lane, body.cosine);
-  put(m.axes.sine, lane, body.sine);
   put(m.root, lane, block.assembly);
   put(m.per_count, lane, 1.0 / body.blocks);
-  put(m.per_inertia, lane, rules.mass * body.blocks / body.inertia);
-  put(m.lightness, lane, rules.inertia / body.inertia);
   put(m.offset_x, lane, block.offset_x);
   put(m.offset_y, lane, block.offset_y);
-  put(m.arm.x, lane, block.x - body.x);
-  put(m.arm.y, lane, block.y - body.y);
-  put(m.x, lane, block.x);
-  put(m.y, lane, block.y);
   pack.book(b, lane) = {static_cast<std::int16_t>(block.cell_x),
                         static_cast<std::int16_t>(block.cell_y),
                         static_cast<std::uint8_t>(block.quarter),

@@ -103,9 +103,9 @@ void keep_first_blocks(const AssemblyRules& rules, Scene& scene, int blocks);
 // Makes every block an assembly of its own, which moves as the block did, with its own frame.
 void part_blocks(const AssemblyRules& rules, Scene& scene);
 
-// Fills the list with the pairs of different assemblies whose centres are closer than a diagonal (or
-// the connectors' reach) and a skin, ordered by first and second block. It has to be made anew where
-// an assembly has come apart. The list of close pairs is then void.
+// Fills the list with the pairs of different assemblies whose centres are closer than a diagonal
+// (or the connectors' reach) and a skin, ordered by first and second block. It has to be made anew
+// where an assembly has come apart. The list of close pairs is then void.
 void find_pairs(const AssemblyRules& rules, Scene& scene);
 // Fills the list of close pairs from that of near ones, in their order.
 void find_close_pairs(const AssemblyRules& rules, Scene& scene);
