@@ -146,7 +146,8 @@ void sort_pairs(const PairList& from, Scene& scene, PairList& to) {
 } // namespace
 
 void find_pairs(const AssemblyRules& rules, Scene& scene) {
-  const double reach = touching_reach(rules) + pair_skin_sides * rules.side;
+  const double pulling = rules.pull.on ? rules.pull.reach : 0.0;
+  const double reach = std::max(touching_reach(rules), pulling) + pair_skin_sides * rules.side;
   PairList& pairs = scene.pairs;
   pairs.count = 0;
   if (scene.blocks <= most_blocks_all_pairs) {

@@ -477,7 +477,7 @@ public:
   }
   Member& member(int b) { return pack_.members[b]; }
   void step() {
-    driftwalk::advance(physics_, 0, pack_.members, pack_.sums, rules_.blocks);
+    driftwalk::advance(physics_, 0, pack_.members, pack_.sums, rules_.blocks, [] {});
     driftwalk::meet_walls(physics_, pack_.members, rules_.blocks);
     driftwalk::fill_scene(rules_, pack_, 0, assemblies_left_, scene_);
     driftwalk::find_pairs(rules_, scene_);

@@ -117,6 +117,49 @@ def plot_class_times(
     return ax
 
 
+def plot_attraction(attraction: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw the force between two blocks against the gap between them.
+
+    Parameters
+    ----------
+    attraction : xarray.Dataset
+        An `attraction`.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure when left out.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+
+    Raises
+    ------
+    InputError
+        When the dataset is of another kind.
+
+    Examples
+    --------
+    ``plot_attraction(dw.assembly.attraction(study)).figure.savefig("attraction.png")``
+    """
+    check_kind(attraction, "attraction", "gap", "force", "simulated_force")
+    ax = style.axes_or_new(ax, height_mm=65.0)
+    gap = 1e3 * np.asarray(attraction["gap"].values, dtype=np.float64)
+    for name, text, color, dashes in (
+        ("force", "measured by a balance", style.BLUE, "-"),
+        ("simulated_force", "in the simulation", style.ORANGE, (0, (5, 2))),
+    ):
+        force = 1e3 * np.asarray(attraction[name].values, dtype=np.float64)
+        ax.plot(gap, np.where(force > 0.0, force, np.nan), color=color, ls=dashes, label=text)
+    ax.set(
+        xlabel="gap between the faces (mm)", ylabel="attraction (mN)", yscale="log",
+        xlim=(0.0, gap[-1]),
+    )  # fmt: skip
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.legend(frameon=False)
+    ax.set_title(str(attraction.attrs["between"]), loc="left")
+    return ax
+
+
 def plot_survival(times: xr.Dataset, ax: Axes | None = None) -> Axes:
     """Draw the shares of runs without contact yet, and without completion yet, with their bands.
 

@@ -153,8 +153,8 @@ inline void finish_member(const Physics<Real, T, Law>& physics, const Real* tota
       (physics.shape.panel_count > 0 ? physics.shape.turning_share : turning_share(physics.block)) *
       half;
   const Real per_mass = physics.world.drag_per_mass, per_inertia = physics.world.drag_per_inertia;
-  // Where the water pushes, the sums are accelerations.
-  const bool done = physics.water.count > 0;
+  // Where the water pushes, or another block, the sums are accelerations.
+  const bool done = physics.water.count > 0 || physics.pulled;
   const Real by_mass = done ? Real(T(1)) : per_mass, by_inertia = done ? Real(T(1)) : per_inertia;
   WaterPush<Real> push;
   push.acceleration = {total[0] * by_mass * m.per_count, total[1] * by_mass * m.per_count,
@@ -168,25 +168,20 @@ inline void finish_member(const Physics<Real, T, Law>& physics, const Real* tota
   find_arm(m);
 }
 
-// Rows of lanes: blocks of a pack of worlds, or those of one world.
-template <class Real, class T, class Law, class Sum>
+// Rows of lanes: blocks of a pack of worlds, or those of one world. `pull` adds what blocks do to each
+// other to the sums of each.
+template <class Real, class T, class Law, class Sum, class Pull>
 inline void advance(const Physics<Real, T, Law>& physics, int half, Member<Real>* members,
-                    Sums<Real>* sums, int rows, const Sum& sum) {
+                    Sums<Real>* sums, int rows, const Sum& sum, const Pull& pull) {
   sum_noise(physics, half, members, sums, rows, sum);
   for (int row = 0; row < rows; ++row) {
     feel_drag(physics, members[row], sums[row]);
   }
+  pull();
   sum.template operator()<drag_sums_kept>();
   for (int row = 0; row < rows; ++row) {
     finish_member(physics, sums[row].total, members[row]);
   }
-}
-
-template <class Real, class T, class Law>
-inline void advance(const Physics<Real, T, Law>& physics, int half, Member<Real>* members,
-                    Sums<Real>* sums, int blocks) {
-  advance(physics, half, members, sums, blocks,
-          [&]<int Count>() { sum_masked<Count>(members, sums, blocks); });
 }
 
 DRIFTWALK_LANES_END

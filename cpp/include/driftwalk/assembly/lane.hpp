@@ -2,6 +2,7 @@
 #pragma once
 
 #include "driftwalk/assembly/crowd.hpp"
+#include "driftwalk/assembly/pull.hpp"
 #include "driftwalk/random/philox.hpp"
 
 DRIFTWALK_LANES_BEGIN
@@ -14,8 +15,10 @@ struct PackMemory {
   bool one_world;
   Member<Real>* members; // [row]
   Sums<Real>* sums;      // [row]
-  BlockBook* books;      // [block][lane], of one world [block]
-  Crowd<Real> crowd;     // of one world
+  Pulled<Real>* pulled;  // [row]
+  Pulled<typename Numbers<Real>::Scalar>* alone; // [block] of one world
+  BlockBook* books;                              // [block][lane], of one world [block]
+  Crowd<Real> crowd;                             // of one world
 
   // Whether a pack with room for this many blocks holds one world.
   static constexpr bool is_one_world(int blocks) {
@@ -51,13 +54,28 @@ private:
     const std::size_t count = static_cast<std::size_t>(rows(blocks));
     take(members, count);
     take(sums, count);
+    take(pulled, count);
     take(books, count * lanes);
     if (one_world) {
+      take(alone, count * lanes);
       crowd.place(take, count);
     }
     return size;
   }
 };
+
+// Of the faces of the block's assembly: a joined face neither pulls nor is pulled.
+template <class Real>
+inline void set_poles(const AssemblyRules& rules, const PackMemory<Real>& pack, int block,
+                      int world) {
+  const int lane = pack.lane(block, world);
+  const BlockBook& book = pack.book(block, lane);
+  for (int face = 0; face < 4; ++face) {
+    const bool joined = (book.joined >> face & 1) != 0;
+    put(pack.pulled[pack.one_world ? block / PackMemory<Real>::lanes : block].pole[face], lane,
+        joined ? 0.0 : rules.pull.pole[(face - book.quarter) & 3]);
+  }
+}
 
 template <class Real>
 inline void put_before(Member<Real>& m, int lane) {
@@ -100,6 +118,7 @@ inline void load_block(const AssemblyRules& rules, const double* pose, const Pac
     put(normal, lane, T(0));
   }
   pack.book(block, lane) = {0, 0, 0, 0};
+  set_poles(rules, pack, block, lane);
 }
 
 template <class Real, class T>
@@ -180,6 +199,7 @@ inline void cover_faces(const AssemblyRules& rules, const PackMemory<Real>& pack
     put(pack.member(block).covered[face], lane,
         rules.hidden_share < 1 && (joined >> face & 1u) != 0);
   }
+  set_poles(rules, pack, block, lane);
 }
 
 template <class Real>

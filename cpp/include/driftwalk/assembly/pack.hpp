@@ -34,7 +34,8 @@ public:
                  run.wall,
                  run.step,
                  {Real(T(0)), Real(T(0)), Real(T(0))},
-                 static_cast<T>(rules.hidden_share)} {
+                 static_cast<T>(rules.hidden_share),
+                 rules.pull.on} {
     for (int lane = 0; lane < lanes; ++lane) {
       if (lane < worlds) {
         load_lane<Real, T>(rules_, start, memory_, lane);
@@ -101,6 +102,7 @@ public:
   void renew() {
     near_ = NearRules<T>(rules_);
     physics_.hidden_share = static_cast<T>(rules_.hidden_share);
+    physics_.pulled = rules_.pull.on;
     blocks_ = rules_.blocks;
     rows_ = memory_.rows(blocks_);
     listed_ = Crowded && blocks_ > most_blocks_all_pairs;
@@ -126,18 +128,42 @@ public:
       look_at_flow(step);
     }
     const int half = phase < run_.steps_per_interval ? 0 : 1;
+    const auto pull = [this] { feel_pull(); };
     if constexpr (Crowded) {
-      advance(physics_, half, memory_.members, memory_.sums, rows_,
-              [&]<int Count>() { sum_crowd<Count>(memory_.crowd, memory_.sums, rows_); });
+      const auto sum = [&]<int Count>() { sum_crowd<Count>(memory_.crowd, memory_.sums, rows_); };
+      advance(physics_, half, memory_.members, memory_.sums, rows_, sum, pull);
       meet_walls(physics_, memory_.members, memory_.crowd, rows_);
     } else {
-      advance(physics_, half, memory_.members, memory_.sums, blocks_);
+      const auto sum = [&]<int Count>() {
+        sum_masked<Count>(memory_.members, memory_.sums, blocks_);
+      };
+      advance(physics_, half, memory_.members, memory_.sums, blocks_, sum, pull);
       meet_walls(physics_, memory_.members, blocks_);
     }
     return settle_lanes(step);
   }
 
 private:
+  void feel_pull() {
+    if (!rules_.pull.on) {
+      return;
+    }
+    const Member<Real>* const members = memory_.members;
+    Pulled<Real>* const pulled = memory_.pulled;
+    for (int row = 0; row < rows_; ++row) {
+      look_at(physics_, members[row], pulled[row]);
+    }
+    if constexpr (Crowded) {
+      pull_crowd(rules_.pull, members, pulled, memory_.alone, blocks_,
+                 listed_ ? &scratch_.scene.pairs : nullptr);
+    } else {
+      pull_all(rules_.pull, members, pulled, blocks_);
+    }
+    for (int row = 0; row < rows_; ++row) {
+      add_pull(physics_, run_, members[row], pulled[row], memory_.sums[row]);
+    }
+  }
+
   // The first force of a world has no last one to remember, and the spread of all that follow.
   void begin_force(int lane) {
     put(kept_, lane, 0);

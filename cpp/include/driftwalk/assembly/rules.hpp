@@ -1,6 +1,7 @@
 // What a batch of worlds with several blocks is: plain data, no logic.
 #pragma once
 
+#include "driftwalk/assembly/pull_rules.hpp"
 #include "driftwalk/simulate/prepared.hpp"
 
 #include <cstdint>
@@ -33,6 +34,7 @@ struct AssemblyRules {
   // it is divergence-free.
   double stirring_length = 0;
   bool incompressible = false;
+  PullRules pull;
 };
 
 struct AssemblyWorlds {

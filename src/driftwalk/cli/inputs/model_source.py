@@ -34,6 +34,8 @@ RUN_NAMES: Final = (
     *("wall_friction", "wall_restitution", "time_step"),
     *("latching", "connector_distance", "connector_axis", "hidden_face_drag", "chirality"),
     *("stirring_length", "stirring"),
+    *("magnets", "magnet_inset", "poles", "attraction", "capillary", "meniscus_height"),
+    "approach_resistance",
     *("block_restitution", "block_friction", "confidence", "seed", "flow_repeat", "flow_start"),
 )
 """Options for keys of a study that every command on self-assembly takes."""

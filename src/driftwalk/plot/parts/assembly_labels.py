@@ -49,6 +49,7 @@ _WORDS: Final[dict[str, str]] = {
     "flow": "flow",
     "latching": "latching",
     "hidden_face_drag": "drag on hidden faces",
+    "magnets": "magnets",
 }
 
 
