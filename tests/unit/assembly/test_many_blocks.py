@@ -14,10 +14,10 @@ import driftwalk as dw
 from driftwalk.assembly import assembly_sizes, replay_events
 from driftwalk.assembly.lattice import events as module
 from driftwalk.assembly.lattice.polyomino import shape_size
-from driftwalk.assembly.outcomes.class_names import all_single, world_class
+from driftwalk.assembly.outcomes.class_names import world_class
 from driftwalk.assembly.outcomes.sizes import compactness
 from driftwalk.core.errors import InputError
-from driftwalk.schema.shapes import counts_of_shape, is_one_assembly
+from driftwalk.schema.shapes import all_single, counts_of_shape, is_one_assembly
 
 BLOCKS = 40
 
