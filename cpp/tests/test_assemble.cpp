@@ -477,7 +477,10 @@ public:
   }
   Member& member(int b) { return pack_.members[b]; }
   void step() {
-    driftwalk::advance(physics_, 0, pack_.members, pack_.sums, rules_.blocks, [] {});
+    const auto sum = [&]<int Count>() {
+      driftwalk::sum_masked<Count>(pack_.members, pack_.sums, rules_.blocks);
+    };
+    driftwalk::advance(physics_, 0, pack_.members, pack_.sums, rules_.blocks, sum, [] {});
     driftwalk::meet_walls(physics_, pack_.members, rules_.blocks);
     driftwalk::fill_scene(rules_, pack_, 0, assemblies_left_, scene_);
     driftwalk::find_pairs(rules_, scene_);

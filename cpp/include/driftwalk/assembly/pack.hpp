@@ -251,7 +251,7 @@ private:
     }
     const Bool unsettled = lanes_to_settle(near_, memory_.members, blocks_);
     if (any(unsettled)) {
-      for (int lane = 0; lane < lanes; ++lane) {
+      for (int lane = 0; lane < worlds; ++lane) {
         if (books_[lane].running && lane_of(unsettled, lane)) {
           complete = settle_lane(step, lane) || complete;
         }
