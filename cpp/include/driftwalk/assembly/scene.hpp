@@ -54,6 +54,12 @@ struct PairList {
   void* owner;
 };
 
+// What the pair search reads of a block.
+struct PlacedBlock {
+  double x, y;
+  std::int32_t assembly, block;
+};
+
 struct Scene {
   int blocks;
   int assemblies;
@@ -65,6 +71,7 @@ struct Scene {
   // scratch of the pair search and of lattices: first block of every cell, next in the same cell
   std::int32_t* cell_head;
   std::int32_t* cell_next;
+  PlacedBlock* by_cell; // scratch: the blocks, cell by cell
   // what happened, written by settle
   bool contact; // two blocks of different assemblies overlapped or latched
   bool rebuilt; // a merge moved blocks: lists of near pairs are out of date
@@ -96,9 +103,9 @@ void keep_first_blocks(const AssemblyRules& rules, Scene& scene, int blocks);
 // Makes every block an assembly of its own, which moves as the block did, with its own frame.
 void part_blocks(const AssemblyRules& rules, Scene& scene);
 
-// Fills the list with the pairs of different assemblies whose centres are closer than a diagonal (or
-// the connectors' reach) and a skin, ordered by first and second block. It has to be made anew where
-// an assembly has come apart.
+// Fills the list with the pairs of different assemblies whose centres are closer than a diagonal
+// (or the connectors' reach) and a skin, ordered by first and second block. It has to be made anew
+// where an assembly has come apart. The list of close pairs is then void.
 void find_pairs(const AssemblyRules& rules, Scene& scene);
 // Fills the list of close pairs from that of near ones, in their order.
 void find_close_pairs(const AssemblyRules& rules, Scene& scene);
