@@ -77,6 +77,10 @@ def test_the_kernel_accelerates_two_blocks_by_these_forces(poles: str) -> None:
     tank = dw.LiveTank(**pair)
     tank.advance(1e-3)
     found = np.stack([MASS * tank.vx, MASS * tank.vy, MASS * SIDE**2 / 6 * tank.omega]) / 1e-3
+    np.testing.assert_allclose(found[:2].sum(axis=1), 0.0, atol=1e-15)
+    centres = np.stack([tank.x, tank.y])
+    turning = centres[0] * found[1] - centres[1] * found[0] + found[2]
+    np.testing.assert_allclose(turning.sum(), 0.0, atol=1e-9)
     lever = SIDE / 2 - 2e-3
 
     def energy(poses: Any) -> float:

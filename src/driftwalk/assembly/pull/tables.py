@@ -190,7 +190,7 @@ def _block_pull(
         resistance = _approach(given.approach_resistance_N_s, side, mass, step)
     oriented: Energy | None = None
     if faces is not None and measured is not None and measured.is_oriented:
-        oriented = measured.energy
+        oriented = measured.flat_below(faces.capped_at).energy
     elif faces is not None and magnet is not None and given.poles == "fixed":
         oriented = _fixed_poles(magnet, faces)
     reach = max(
