@@ -45,7 +45,11 @@ SURVIVAL: Final = {
 BAR_WIDTH: Final = 0.76
 GROWTH: Final = {
     "mean size": {"mean_size": "mean size"},
-    "shares": {"largest_share": "in the largest assembly", "free_share": "alone"},
+    "shares": {
+        "largest_share": "in the largest assembly",
+        "free_share": "alone",
+        "compactness": "compactness",
+    },
 }
 
 
@@ -365,7 +369,7 @@ def plot_growth(
         Names of the first and the second, for the legend.
     what : {"mean size", "shares"}
         The mean size of the assemblies, or the shares of the blocks that are in the largest
-        assembly and alone.
+        assembly and alone, with the compactness.
 
     Returns
     -------
@@ -390,8 +394,13 @@ def plot_growth(
     ax = style.axes_or_new(ax, height_mm=65.0)
     time = sizes["time"].values
     for one, color, label in zip(both, (style.BLUE, style.ORANGE), labels, strict=False):
-        for (name, words), dashes in zip(curves.items(), ("-", (0, (5, 2))), strict=False):
-            text = ", ".join(part for part in (words if len(curves) > 1 else "", label) if part)
+        for (name, words), dashes in zip(
+            curves.items(), ("-", (0, (5, 2)), (0, (1, 1.5))), strict=False
+        ):
+            # Dashes are named once, and then the colour of the second one.
+            named = words if len(curves) > 1 and one is sizes else ""
+            first = name == next(iter(curves))
+            text = named or (label if first else "")
             ax.plot(one["time"], one[name], color=color, ls=dashes, lw=1.3, label=text or None)
             ends = (one[f"{name}_low"].values, one[f"{name}_high"].values)
             ax.fill_between(one["time"].values, *ends, color=color, alpha=0.2, lw=0)

@@ -309,21 +309,30 @@ inline void pull_all(const PullRules& rules, const Member<Real>* members, Pulled
   }
 }
 
-// The same in one lane, from its list of near pairs.
+// The same in one world whose blocks are in the lanes, from its list of near pairs; of no list all.
 template <class Real, class T>
-inline void pull_listed(const PullRules& rules, const Member<Real>* members, Pulled<Real>* pulled,
-                        Pulled<T>* alone, int blocks, const PairList& pairs, int lane) {
+inline void pull_crowd(const PullRules& rules, const Member<Real>* members, Pulled<Real>* pulled,
+                       Pulled<T>* alone, int blocks, const PairList* pairs) {
+  constexpr int lanes = Numbers<Real>::lanes;
   for (int b = 0; b < blocks; ++b) {
-    alone[b] = lane_of_pulled(pulled[b], lane);
+    alone[b] = lane_of_pulled(pulled[b / lanes], b % lanes);
   }
-  for (int k = 0; k < pairs.count; ++k) {
-    const int a = pairs.pair[k].first, b = pairs.pair[k].second;
-    if (get(members[a].root, lane) != get(members[b].root, lane)) {
+  const auto root = [&](int b) { return get(members[b / lanes].root, b % lanes); };
+  const auto pull = [&](int a, int b) {
+    if (root(a) != root(b)) {
       pull_pair<T>(rules, true, alone[a], alone[b]);
+    }
+  };
+  for (int k = 0; pairs != nullptr && k < pairs->count; ++k) {
+    pull(pairs->pair[k].first, pairs->pair[k].second);
+  }
+  for (int a = 0; pairs == nullptr && a < blocks; ++a) {
+    for (int b = a + 1; b < blocks; ++b) {
+      pull(a, b);
     }
   }
   for (int b = 0; b < blocks; ++b) {
-    add_lane(alone[b], lane, pulled[b]);
+    add_lane(alone[b], b % lanes, pulled[b / lanes]);
   }
 }
 

@@ -8,7 +8,7 @@
 
 namespace driftwalk {
 
-inline constexpr int most_blocks = 256; // of a world
+inline constexpr int most_blocks = 2000; // of a world
 
 enum class Latching : int { none = 0, collision = 1, connector = 2 };
 

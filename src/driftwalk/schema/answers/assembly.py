@@ -20,6 +20,7 @@ _OVER_TIME: Final = {
     "mean_size": "mean_size_blocks",
     "largest_share": "largest_share",
     "free_share": "free_share",
+    "compactness": "compactness",
 }
 """Variables over time, and their keys in JSON."""
 _SETTINGS: Final = (
@@ -231,7 +232,9 @@ def _sizes(distribution: xr.Dataset, sizes: xr.Dataset, what: str) -> list[Part]
         [f"{float(one['time']):.4g}", *(c for name in _OVER_TIME for c in _size_cells(one, name))]
         for one in chosen
     ]
-    over_time = [head for name in ("mean size", "in largest", "free") for head in (name, interval)]
+    over_time = [
+        head for name in ("mean size", "in largest", "free", "compact") for head in (name, interval)
+    ]
     parts: list[Part] = [Table(rows, heads, what), Table(course, ["time [s]", *over_time])]
     if facts["compactness_runs"]:
         ends = _range(facts["compactness_low"], facts["compactness_high"])

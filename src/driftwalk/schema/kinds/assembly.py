@@ -282,6 +282,7 @@ attributes ({_OF_RUNS}):
     *_mean("mean_size", "time", "blocks over assemblies"),
     *_mean("largest_share", "time", "share of the blocks in the largest assembly"),
     *_mean("free_share", "time", "share of the blocks that are alone"),
+    *_mean("compactness", "time", "compactness, as at the end", "; NaN where no run has one"),
     *_SETTINGS_OF_RUNS,
 )
 

@@ -8,8 +8,8 @@ from typing import Any, Final, Literal, Self
 from driftwalk.assembly import LiveTank
 from driftwalk.assembly.runs.start import tank_area
 from driftwalk.core.errors import InputError
+from driftwalk.model.assembly import MOST_BLOCKS
 
-MOST_BLOCKS: Final = 256
 FILLED: Final = 0.4
 """Share of the tank that blocks may cover; squares placed at random jam at about half."""
 
