@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 GRAVITY: Final = 9.81
 """[m/s²]"""
 CELL_BITS: Final = 17
-"""Bits of a float that the number of its cell leaves out: 64 cells in an octave of the squared distance,
-within which a force of r⁻⁵ is straight to 3e-4."""
+"""Bits of a float that the number of its cell leaves out: 64 cells in an octave of the squared
+distance, within which a force of r⁻⁵ is straight to 3e-4."""
 
 
 class PullPolicy(NamedTuple):
