@@ -72,6 +72,10 @@ class AssemblySettings(ModelSettings, total=False):
     chirality: Annotated[str, "assembly.chirality"]
     block_restitution: Annotated[Number, "assembly.block_restitution"]
     block_friction: Annotated[Number, "assembly.block_friction"]
+    bond_rate: Annotated[Number, "assembly.bond_rate_per_s"]
+    bond_force: Annotated[Number, "assembly.bond_force_N"]
+    bond_strength: Annotated[Number, "assembly.bond_strength_N"]
+    relatch_clearance: Annotated[Number, "assembly.relatch_clearance"]
     confidence: Annotated[Number, "assembly.confidence"]
 
 
@@ -182,6 +186,9 @@ def study_overrides(*, keys: Mapping[str, str] = STUDY_KEYS, **options: Any) -> 
 
 def _stated(name: str, value: Any, keys: Mapping[str, str]) -> dict[str, Any]:
     """Return the keys that one argument sets, with that of its standard deviation."""
+    if name == "bond_rate" and isinstance(value, str) and "," in value:
+        rate, force = value.split(",", 1)
+        return {keys[name]: rate, keys["bond_force"]: force}
     both = split_uncertain(value) if isinstance(value, str) else value
     if not isinstance(both, Uncertain):
         return {} if value is None else {keys[name]: value}

@@ -16,6 +16,7 @@ struct PackMemory {
   Real* listed_y;
   BlockBook* books; // [block][lane]
   BlockPair* pairs; // [lane][pair_capacity]
+  Bond* bonds;      // [lane][bond_room]
 
   static std::size_t bytes(int blocks) {
     PackMemory layout;
@@ -42,6 +43,7 @@ private:
     take(listed_y, count);
     take(books, count * lanes);
     take(pairs, listed ? static_cast<std::size_t>(pair_capacity(blocks)) * lanes : 0);
+    take(bonds, static_cast<std::size_t>(bond_room(blocks)) * lanes);
     return size;
   }
 };

@@ -2,6 +2,7 @@
 // or its neighbours.
 #pragma once
 
+#include "driftwalk/assembly/bond_load.hpp"
 #include "driftwalk/assembly/correlate.hpp"
 #include "driftwalk/assembly/lane.hpp"
 #include "driftwalk/assembly/near.hpp"
@@ -37,6 +38,8 @@ public:
     for (int lane = 0; lane < lanes; ++lane) {
       load_lane<Real, T>(rules_, start, memory_, lane);
       books_[lane].pairs.pair = memory_.pairs + (has_lists ? pair_capacity(capacity) * lane : 0);
+      const int bonds = bond_room(capacity);
+      books_[lane].bonds = {memory_.bonds + bonds * lane, 0, bonds};
       put(stream_.key0, lane, 0);
       put(stream_.key1, lane, 0);
       put(draw_, lane, 0);
@@ -67,6 +70,8 @@ public:
     book.first_contact = -1;
     book.assemblies = blocks_;
     book.running = true;
+    book.key = key;
+    book.bonds.count = 0;
     load_lane<Real, T>(rules_, start, memory_, lane);
     put(stream_.key0, lane, static_cast<UInt32>(key));
     put(stream_.key1, lane, static_cast<UInt32>(key >> 32));
@@ -107,6 +112,12 @@ public:
     }
   }
 
+  // Bonds all neighbours of a lane anew, when they begin to break or blocks have come or gone.
+  void bond_anew(std::int64_t step, int lane) {
+    bond_all(rules_, open_scene(step, lane));
+    books_[lane].bonds = scratch_.scene.bonds;
+  }
+
   // The normal numbers that a block has in the period under way. A force that remembers begins
   // anew.
   void draw_again(int block) {
@@ -128,6 +139,9 @@ public:
     advance(physics_, phase < run_.steps_per_interval ? 0 : 1, memory_.members, memory_.sums,
             blocks_);
     meet_walls(physics_, memory_.members, blocks_);
+    if (rules_.bonds_break) {
+      break_lanes(step, phase < run_.steps_per_interval ? 0 : 1);
+    }
     return settle_lanes(step);
   }
 
@@ -263,18 +277,49 @@ private:
     }
   }
 
-  // Returns whether the world is one assembly now.
-  bool settle_lane(std::int64_t step, int lane) {
-    LaneBook& book = books_[lane];
+  void break_lanes(std::int64_t step, int half) {
+    for (int lane = 0; lane < lanes; ++lane) {
+      if (books_[lane].running &&
+          wear_bonds(rules_, physics_, run_.mass, half, memory_, lane, books_[lane].bonds,
+                     scratch_.scene.cell_next)) {
+        Scene& scene = open_scene(step, lane);
+        driftwalk::break_bonds(rules_, scene);
+        close_scene(lane);
+      }
+    }
+  }
+
+  // The lane's world in plain numbers, and where its events go.
+  Scene& open_scene(std::int64_t step, int lane) {
+    const LaneBook& book = books_[lane];
     Scene& scene = scratch_.scene;
     fill_scene(rules_, memory_, lane, book.assemblies, scene);
     const std::int64_t row = book.world * out_.event_rows;
     scene.step = static_cast<std::int32_t>(step + 1 - book.first_step);
+    scene.key = book.key;
+    scene.bonds = book.bonds;
     scene.event_rows = out_.event_rows;
     scene.event_count = book.event_count;
     scene.event_step = out_.event_step + row;
+    scene.event_kind = rules_.bonds_break ? out_.event_kind + row : nullptr;
     scene.event_block = out_.event_block + 2 * row;
     scene.event_face = out_.event_face + 2 * row;
+    return scene;
+  }
+
+  void close_scene(int lane) {
+    LaneBook& book = books_[lane];
+    const Scene& scene = scratch_.scene;
+    read_scene(rules_, scene, memory_, lane);
+    book.bonds = scene.bonds;
+    book.event_count = scene.event_count;
+    book.assemblies = scene.assemblies;
+  }
+
+  // Returns whether the world is one assembly now.
+  bool settle_lane(std::int64_t step, int lane) {
+    LaneBook& book = books_[lane];
+    Scene& scene = open_scene(step, lane);
     const PairList own = scene.pairs;
     if (listed_) {
       scene.pairs = book.pairs;
@@ -282,9 +327,7 @@ private:
       find_pairs(rules_, scene);
     }
     settle(rules_, scene);
-    read_scene(rules_, scene, memory_, lane);
-    book.event_count = scene.event_count;
-    book.assemblies = scene.assemblies;
+    close_scene(lane);
     if (scene.contact && book.first_contact < 0) {
       book.first_contact = scene.step;
     }

@@ -28,6 +28,11 @@ SETTINGS: Final = (
     study
 attributes (blocks that are no squares):
     block_shape text: their shape
+attributes (bonds break):
+    bond_rate_per_s number: rate at which a bond breaks without load
+    bond_force_N number: tension that multiplies the rate by e; 0: the rate is constant
+    bond_strength_N number: tension that breaks a bond at once; 0: none
+    relatch_clearance number: distance of centres in sides from which parted blocks latch again
 attributes (latching by a connector):
     connector_distance_m number: tolerance of the connector
     connector_axis_rad number: tolerance of the connector
@@ -49,7 +54,8 @@ kind: assembly
 version: 1
 dimensions:
     run: simulated worlds
-    event: joinings in a run, in order; one less than there are blocks, at least one
+    event: joinings in a run, in order; one less than there are blocks, at least one; where bonds \
+        break, joinings, partings and bonds of loops
     side: of the assembly that stayed, of the one that was moved
     part: stayed, moved, became
     block: blocks
@@ -86,6 +92,10 @@ variables (blocks that are squares):
     event_face(run event side) int: {_FACES}; {_NOWHERE}
     cell(run block axis) int: cell of the block on its assembly's lattice, x and y
     quarter(run block) int: quarter turns of the block against its assembly
+variables (bonds break):
+    event_kind(run event) int: what an event is, of which not all are joinings: 0 joining, 1 \
+        parting (first the part with more blocks; the third shape is what they were), 2 a bond of \
+        a loop broke, 3 one formed; {_NOWHERE}
 variables (drawn from a fit whose force law has it):
     linear_drag(run) [kg s-1]: linear drag of the block
     drag_power(run) [1]: power of the speed in the drag
