@@ -73,8 +73,9 @@ nb::dict assemble(const Model& model, In<double, 3> start, In<std::uint64_t, 1> 
   std::vector<std::uint32_t> status(worlds);
   std::vector<std::int32_t> event_count(worlds), event_step(worlds * events, -1),
       event_block(worlds * events * 2, -1), event_face(worlds * events * 2, -1),
-      event_kind(rules.bonds_break ? worlds * events : 0, -1), first_contact(worlds), end_step(worlds), cell(worlds * blocks * 2), quarter(worlds * blocks),
-      root(worlds * blocks), sample_assembly(worlds * samples * blocks);
+      event_kind(rules.bonds_break ? worlds * events : 0, -1), first_contact(worlds),
+      end_step(worlds), cell(worlds * blocks * 2), quarter(worlds * blocks), root(worlds * blocks),
+      sample_assembly(worlds * samples * blocks);
   std::vector<double> pose(worlds * blocks * 3);
   std::vector<float> sample_pose(worlds * samples * blocks * 3);
   driftwalk::AssemblyOutputs out;

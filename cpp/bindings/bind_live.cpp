@@ -55,9 +55,8 @@ nb::dict advance(LiveWorld& world, std::int64_t steps) {
   };
   nb::dict out;
   out["step"] = hand_out(rows(events.step, 1), {count});
-  out["kind"] = hand_out(events.kind == nullptr ? std::vector<std::int32_t>(count)
-                                                : rows(events.kind, 1),
-                         {count});
+  out["kind"] = hand_out(
+      events.kind == nullptr ? std::vector<std::int32_t>(count) : rows(events.kind, 1), {count});
   out["block"] = hand_out(rows(events.block, 2), {count, 2});
   out["face"] = hand_out(rows(events.face, 2), {count, 2});
   return out;
@@ -74,6 +73,15 @@ nb::dict state(const LiveWorld& world) {
   out["assembly"] = hand_out(std::move(assembly), {blocks});
   out["cell"] = hand_out(std::move(cell), {blocks, 2});
   out["quarter"] = hand_out(std::move(quarter), {blocks});
+  std::vector<std::int32_t> pairs;
+  const driftwalk::BondList& bonds = world.bonds();
+  for (int k = 0; k < bonds.count; ++k) {
+    if (bonds.bond[k].state == driftwalk::BondState::whole) {
+      pairs.insert(pairs.end(), {bonds.bond[k].first, bonds.bond[k].second});
+    }
+  }
+  const std::size_t count = pairs.size() / 2;
+  out["bond"] = hand_out(std::move(pairs), {count, 2});
   return out;
 }
 
@@ -91,7 +99,8 @@ void register_live(nb::module_& module) {
       .def("__init__", &start_world, nb::keep_alive<1, 2>(), "model"_a, nb::kw_only(), "start"_a,
            "key"_a, "drag_coefficient"_a, "force_std"_a, "latching"_a, "connector_distance"_a,
            "connector_axis"_a, "hidden_share"_a, "stirring_length"_a, "incompressible"_a,
-           "block_restitution"_a, "block_friction"_a, "flow_start"_a = 0.0, "bonds"_a = BondNumbers{0, 0, 0, 1.25})
+           "block_restitution"_a, "block_friction"_a, "flow_start"_a = 0.0,
+           "bonds"_a = BondNumbers{0, 0, 0, 1.25})
       .def("advance", &advance, "steps"_a)
       .def("state", &state)
       .def(

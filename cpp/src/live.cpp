@@ -74,7 +74,9 @@ struct LiveWorld::Inside {
     }
     pack.book(0).assemblies = scene.assemblies;
     pack.renew();
-    pack.bond_anew(step, 0);
+    if (rules.bonds_break) {
+      pack.bond_anew(step, 0);
+    }
   }
 
   void add_blocks(int wanted) {
@@ -154,6 +156,8 @@ void LiveWorld::set_bonds(double rate, double relatch_clearance) {
   rules.bonds_break = rate > 0 || rules.bond_strength > 0;
   if (began) {
     inside_->pack.bond_anew(inside_->step, 0);
+  } else if (!rules.bonds_break) {
+    inside_->pack.book(0).bonds.count = 0;
   }
 }
 
@@ -207,6 +211,10 @@ void LiveWorld::read(const LiveBlocks& out) const {
     out.cell[2 * b + 1] = book.cell_y;
     out.quarter[b] = book.quarter;
   }
+}
+
+const BondList& LiveWorld::bonds() const {
+  return inside_->pack.book(0).bonds;
 }
 
 } // namespace driftwalk

@@ -10,8 +10,7 @@ namespace driftwalk {
 namespace {
 // Hazard of a bond that forms now: from the exponential law of mean 1.
 double drawn_hazard(const Scene& scene, int first, int second) {
-  const Philox<UInt32> stream{static_cast<UInt32>(scene.key),
-                              static_cast<UInt32>(scene.key >> 32)};
+  const Philox<UInt32> stream{static_cast<UInt32>(scene.key), static_cast<UInt32>(scene.key >> 32)};
   UInt32 words[4];
   stream(static_cast<UInt32>(scene.step), static_cast<UInt32>(first), static_cast<UInt32>(second),
          static_cast<UInt32>(Purpose::bond), words);
@@ -62,9 +61,8 @@ int face_at(const AssemblyRules& rules, const Scene& scene, int block, int neigh
 }
 
 void record_of(const AssemblyRules& rules, Scene& scene, EventKind kind, int first, int second) {
-  record_event(
-      scene, kind, {first, second},
-      {face_at(rules, scene, first, second), face_at(rules, scene, second, first)});
+  record_event(scene, kind, {first, second},
+               {face_at(rules, scene, first, second), face_at(rules, scene, second, first)});
 }
 
 // Moves a body's cells so that its lowest block is at the origin: they never leave their range.

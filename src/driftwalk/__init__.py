@@ -50,6 +50,7 @@ _NAMES = {
         "sensitivity_indices",
         "sensitivity_map",
         "sensitivity_reference",
+        "steady_state",
     ),
     "driftwalk.calibration": ("recover_model",),
     "driftwalk.comparison": (

@@ -195,7 +195,7 @@ class LiveWorld:
     # steps when there are too many events.
     def advance(self, steps: int) -> dict[str, npt.NDArray[np.int32]]: ...
     # pose (blocks, 3) [m, m, rad], velocity (blocks, 3) [m/s, m/s, rad/s], assembly (blocks,),
-    # cell (blocks, 2), quarter (blocks,).
+    # cell (blocks, 2), quarter (blocks,); where bonds break bond (n, 2), those that are whole.
     def state(self) -> dict[str, npt.NDArray[Any]]: ...
     def set_forces(
         self, *, drag_coefficient: float, force_std: float, flow_scale: float

@@ -21,6 +21,7 @@ AXES: Final[dict[str, str]] = {
     "latching": "latching",
     "hidden_face_drag": "hidden_face_drag",
     "stirring_length": "stirring_length_m",
+    "bond_rate": "bond_rate_per_s",
     "drag_coefficient": "drag_coefficient",
     "force_std": "force_std_N",
 }
@@ -76,6 +77,10 @@ class Sensitivity(ForceGrid):
         default=None, examples=["[0.0, 0.03, 0.1]"]
     )
     """Lengths over which blocks share the stochastic force to compare, an axis of the map."""
+    bond_rate_per_s: tuple[Annotated[float, Quantity("1/s", ge=0, le=1e6)], ...] | None = Field(
+        default=None, examples=["[0.0, 0.001, 0.01]"]
+    )
+    """Rates at which bonds break to compare, an axis of the map."""
     drag_coefficient: tuple[DragCoefficient, ...] | None = Field(
         default=None, examples=["[0.2, 0.45, 1.0]"]
     )

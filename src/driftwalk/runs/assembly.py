@@ -45,6 +45,8 @@ class AssemblyResult:
         Kind "outcome_distribution", of runs with drawn parameters.
     sizes, sizes_drawn : xarray.Dataset or None
         Kind "assembly_sizes", of the same two sets of runs; beyond 8 blocks only.
+    steady : xarray.Dataset or None
+        Kind "steady_state", of the runs with the study's parameters; where bonds break only.
     """
 
     assembly: xr.Dataset
@@ -53,6 +55,7 @@ class AssemblyResult:
     drawn: xr.Dataset | None
     sizes: xr.Dataset | None = None
     sizes_drawn: xr.Dataset | None = None
+    steady: xr.Dataset | None = None
 
 
 @dataclass(frozen=True)
@@ -117,7 +120,13 @@ class AssemblyWork:
 
     def compute(self, run: Run) -> AssemblyResult:
         """Simulate with the parameters found and, where they can be drawn, with drawn ones."""
-        from driftwalk.assembly import assemble, assemble_drawn, assembly_path, class_times
+        from driftwalk.assembly import (
+            assemble,
+            assemble_drawn,
+            assembly_path,
+            class_times,
+            steady_state,
+        )
 
         settings = self.study.assembly
         drawn = sizes_drawn = None
@@ -134,6 +143,10 @@ class AssemblyWork:
         assembly = run.keep("assembly.nc", assembly)
         distribution, sizes = self._outcomes(assembly, run, "")
         times = run.keep("class_times.nc", class_times(assembly, confidence=settings.confidence))
+        steady = None
+        if settings.bonds_break:
+            steady = steady_state(assembly, confidence=settings.confidence)
+            steady = run.keep("steady_state.nc", steady)
         if self.calibration is not None:
             assembly_drawn = assemble_drawn(
                 self.study,
@@ -165,7 +178,7 @@ class AssemblyWork:
             course.begin("film")
             film = run.directory.folder("figures") / f"run.{self.film}"
             driftwalk.plot.write_animation(path, film)
-        return AssemblyResult(assembly, distribution, times, drawn, sizes, sizes_drawn)
+        return AssemblyResult(assembly, distribution, times, drawn, sizes, sizes_drawn, steady)
 
     def _outcomes(
         self, assembly: xr.Dataset, run: Run, ending: str

@@ -53,10 +53,8 @@ inline double tension(const Physics<Real, T, Law>& physics, int half,
   const Member<Real>&first = memory.members[bond.first], &second = memory.members[bond.second];
   const double spin = get(first.motion.omega, lane);
   const double turning = all.torque * get(first.per_inertia, lane) / count;
-  const double pull_x =
-      own_count * all.x / count - turning * arm_y - spin * spin * arm_x - own.x;
-  const double pull_y =
-      own_count * all.y / count + turning * arm_x - spin * spin * arm_y - own.y;
+  const double pull_x = own_count * all.x / count - turning * arm_y - spin * spin * arm_x - own.x;
+  const double pull_y = own_count * all.y / count + turning * arm_x - spin * spin * arm_y - own.y;
   const double dx = get(second.x, lane) - get(first.x, lane);
   const double dy = get(second.y, lane) - get(first.y, lane);
   return (pull_x * dx + pull_y * dy) / __builtin_sqrt(dx * dx + dy * dy);

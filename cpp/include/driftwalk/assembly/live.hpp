@@ -2,6 +2,7 @@
 // runs: the kernel of assembly/pack.hpp in double precision.
 #pragma once
 
+#include "driftwalk/assembly/bonds.hpp"
 #include "driftwalk/assembly/rules.hpp"
 #include "driftwalk/simulate/prepare.hpp"
 
@@ -63,6 +64,7 @@ public:
   std::uint32_t status() const;
   LiveEvents events() const;
   void read(const LiveBlocks& out) const;
+  const BondList& bonds() const; // empty where none break
 
 private:
   struct Inside;

@@ -279,9 +279,8 @@ private:
 
   void break_lanes(std::int64_t step, int half) {
     for (int lane = 0; lane < lanes; ++lane) {
-      if (books_[lane].running &&
-          wear_bonds(rules_, physics_, run_.mass, half, memory_, lane, books_[lane].bonds,
-                     scratch_.scene.cell_next)) {
+      if (books_[lane].running && wear_bonds(rules_, physics_, run_.mass, half, memory_, lane,
+                                             books_[lane].bonds, scratch_.scene.cell_next)) {
         Scene& scene = open_scene(step, lane);
         driftwalk::break_bonds(rules_, scene);
         close_scene(lane);

@@ -104,10 +104,12 @@ def replay_events(
     '2'
     """
     require_chirality(chirality)
-    events = _Events(*map(_whole, (event_count, event_block, event_face)), _kinds(event_kind))
+    events = _Events(
+        _whole(event_count), _whole(event_block), _whole(event_face), _kinds(event_kind)
+    )
     end = _Lattice(*map(_whole, (cell, quarter, assembly)))
     _check_arrays(events, end)
-    replay = _Replay(*end.assembly.shape, events, chirality=chirality)
+    replay = _Replay(end.assembly.shape, events, chirality=chirality)
     for event in range(int(events.number.max(initial=0))):
         replay.apply(event, np.flatnonzero(events.number > event), events)
     _check_end(replay.lattice, end)
@@ -192,8 +194,9 @@ class _Replay:
     """The state of all runs while their events are applied."""
 
     def __init__(
-        self, runs: int, blocks: int, events: _Events, *, chirality: Chirality | None
+        self, shape: tuple[int, ...], events: _Events, *, chirality: Chirality | None
     ) -> None:
+        runs, blocks = shape
         slots = events.block.shape[1]
         self.bonds = None if events.kind is None else BondGraph(runs, blocks)
         self.chirality = chirality
@@ -330,7 +333,7 @@ class _DiscReplay(_Replay):
     """The same of discs, which stay as they lie."""
 
     def __init__(self, pose: Floats, events: _Events, *, diameter: float) -> None:
-        super().__init__(*pose.shape[:2], events, chirality=None)
+        super().__init__(pose.shape[:2], events, chirality=None)
         self.touch = np.array([touching(one, diameter=diameter) for one in pose])
         if events.kind is not None:
             self.touch[:] = False

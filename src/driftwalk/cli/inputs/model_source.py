@@ -32,6 +32,7 @@ RUN_NAMES: Final = (
     *("wall_friction", "wall_restitution", "time_step"),
     *("latching", "connector_distance", "connector_axis", "hidden_face_drag", "chirality"),
     *("stirring_length", "stirring"),
+    *("bond_rate", "bond_strength", "relatch_clearance"),
     *("block_restitution", "block_friction", "confidence", "seed", "flow_repeat", "flow_start"),
 )
 """Options for keys of a study that every command on self-assembly takes."""

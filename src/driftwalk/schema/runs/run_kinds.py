@@ -150,6 +150,7 @@ BUILT_IN: Final = (
             "class_times",
             "path",
             "sizes",
+            "steady_state",
             "assembly_drawn",
             "distribution_drawn",
             "sizes_drawn",
