@@ -284,7 +284,7 @@ class LiveTank:
             self._look()
 
     def events(self) -> list[LiveEvent]:
-        """Return the joinings since the last call: time [s], the two blocks, the class after it."""
+        """Return joinings and partings since the last call: time [s], blocks, class after it."""
         with self._lock:
             events, self._events = self._events, []
         return events

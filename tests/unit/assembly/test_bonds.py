@@ -126,18 +126,18 @@ def test_a_ring_is_held_until_two_of_its_bonds_are_broken() -> None:
     assert (opened == 1).all()
 
 
-def crowded(**assembly: Any) -> xr.Dataset:
-    small = dw.Study(tank={"diameter_m": 0.12}, forces={"force_std_N": 1.5e-3}, assembly=assembly)
-    flow = dw.vortex_flow(angular_velocity=1.0, core_radius=0.04, arena=small.tank.to_arena())
-    return dw.assemble(small, flow, blocks=2, runs=150, duration=120.0)
-
-
 @pytest.mark.slow
 def test_two_blocks_reach_the_markov_solution() -> None:
     # Two states: the share of time bound is r / (r + k), with the model's own rate of latching r.
-    # Bound for 1/k on average: 2 %, three standard errors of some 20,000 partings.
-    rate = 2.0
-    found = dw.steady_state(crowded(bond_rate_per_s=rate, relatch_clearance=1.1))
+    # 2 % are three standard errors of 19,000 partings.
+    rate = 1.0
+    small = dw.Study(
+        tank={"diameter_m": 0.09},
+        forces={"force_std_N": 6e-3},
+        assembly={"bond_rate_per_s": rate, "relatch_clearance": 1.1},
+    )
+    flow = dw.vortex_flow(angular_velocity=0.3, core_radius=0.04, arena=small.tank.to_arena())
+    found = dw.steady_state(dw.assemble(small, flow, blocks=2, runs=300, duration=120.0))
     one = found.sel({"class": "2"})
     other = found.sel({"class": "1+1"})
     assert int(one["parting_count"]) > 10_000
@@ -183,6 +183,25 @@ def test_events_tell_a_run_to_its_end(four: xr.Dataset) -> None:
         threads=2,
     )  # fmt: skip
     xr.testing.assert_identical(four, threads)
+
+
+def test_sizes_and_classes_over_time_follow_partings(four: xr.Dataset) -> None:
+    sizes = dw.assembly_sizes(four, times=[60.0])
+    labels = four["assembly"].values.tolist()
+    found = [sorted(row.count(label) for label in set(row)) for row in labels]
+    number = [np.mean([one.count(size) for one in found]) for size in range(1, 5)]
+    assert sizes["number"].values.tolist() == pytest.approx(number)
+    assert float(sizes["largest_share"][0]) == pytest.approx(
+        np.mean([one[-1] for one in found]) / 4
+    )
+    assert float(sizes["free_share"][0]) == pytest.approx(number[0] / 4)
+    times = dw.class_times(four, times=[60.0])
+    end = dw.outcome_distribution(four)
+    np.testing.assert_allclose(times["proportion"].values[0], end["proportion"].values)
+    # Whether all blocks had been one assembly once is not undone by a parting.
+    complete = [name for name in end["class"].values if "+" not in name]
+    at_end = float(end["proportion"].sel({"class": complete}).sum())
+    assert float(1 - times["completion"][0]) > at_end
 
 
 def test_permanent_bonds_have_no_kinds_of_events() -> None:

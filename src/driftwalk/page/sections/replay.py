@@ -93,8 +93,11 @@ def _run(path: xr.Dataset, index: int, assembly: xr.Dataset | None, step: float)
 
 
 def _events(assembly: xr.Dataset, run: int) -> list[dict[str, Any]]:
-    """Return what joined in a run, in the order of time."""
-    require(assembly, "event_count", "event_time", "event_block", "event_class", "class")
+    """Return what joined and parted in a run, in the order of time."""
+    require(
+        assembly,
+        *("event_count", "event_time", "event_block", "event_class", "event_shape", "class"),
+    )
     if run not in assembly["run"].values:
         return []
     found = assembly.sel(run=run)
@@ -105,6 +108,8 @@ def _events(assembly: xr.Dataset, run: int) -> list[dict[str, Any]]:
             "class": _class(assembly, int(found["event_class"].values[event])),
         }
         for event in range(int(found["event_count"]))
+        # What happens to a bond of a loop changes no assembly.
+        if int(found["event_shape"].values[event, 2]) >= 0
     ]
 
 
