@@ -78,8 +78,11 @@ class Assembly(Section):
     Tension of a bond that multiplies its rate by e (Bell); 0: the rate is constant.
     """
     bond_strength_N: Annotated[float, Quantity("N", ge=0, le=1e6)] = 0.0
-    """Tension that breaks a bond at once; 0: none does. It takes a force that has memory and length
-    (`forces.force_memory_s`, `forces.stirring_length_m`)."""
+    """Tension that breaks a bond at once; 0: none does.
+
+    Tension that breaks a bond at once; 0: none does. It takes a force that has memory and length
+    (`forces.force_memory_s`, `forces.stirring_length_m`).
+    """
     relatch_clearance: Annotated[float, Quantity("1", ge=1, le=2)] = 1.25
     """Distance of the centres of blocks that parted, in sides, from which they may latch again."""
     confidence: Annotated[float, Quantity("1", gt=0, lt=1)] = 0.9

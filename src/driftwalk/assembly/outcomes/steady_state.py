@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 class SteadyPolicy(NamedTuple):
-    """What is taken for the steady state, and how its test is made."""
+    """The part of a run that counts as the steady state, and the test of it."""
 
     first_share: float = 0.5
     """Share of a run that is left out as its approach; chosen by hand."""

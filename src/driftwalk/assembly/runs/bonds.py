@@ -28,7 +28,7 @@ def require_bonds(study: Study) -> None:
         raise InputError(
             "a threshold on a white force depends on the time step: a strength of bonds "
             "(`assembly.bond_strength_N`) needs a force with memory and length "
-            "(`forces.force_memory_s` and `forces.stirring_length_m`, both more than 0); or give "
+            "([forces] force_memory_s and `forces.stirring_length_m`, both more than 0); or give "
             "a rate (`assembly.bond_rate_per_s`)"
         )
     if rules.bond_force_N > 0 and not rules.bond_rate_per_s > 0:

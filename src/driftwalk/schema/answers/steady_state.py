@@ -82,7 +82,7 @@ def steady_words(steady: xr.Dataset) -> str:
         )
     return (
         "no steady state yet: the third and the fourth quarter of the runs differ "
-        f"(p = {facts['steady_p']:.2g}; {alarms}); the shares need longer runs (--duration)"
+        f"(p = {facts['steady_p']:.2g}; {alarms}); the shares need longer runs"
     )
 
 
