@@ -68,7 +68,8 @@ class Assembly(Section):
     block_friction: Annotated[float, Quantity("1", ge=0, le=100)] = 0.0
     """Coulomb friction between two blocks; 0 for wet faces."""
     bond_rate_per_s: Annotated[float, Quantity("1/s", ge=0, le=1e6)] = 0.0
-    """Rate at which each bond breaks; 0: bonds are permanent.
+    """Rate at which each bond breaks, 0: never; as an option also 0.01/s,2mN, with the tension that
+    multiplies it by e.
 
     Rate at which the bond of two joined faces breaks when it carries no load; 0: never.
     """

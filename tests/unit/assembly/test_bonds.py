@@ -250,3 +250,25 @@ def test_a_live_tank_tells_of_partings() -> None:
     tank.events()
     tank.advance(20.0)
     assert not any(event.is_parting for event in tank.events())
+
+
+@pytest.mark.slow
+def test_classify_reads_joinings_and_partings_of_a_simulated_recording() -> None:
+    # Blocks that have parted and stay within the tolerances of a join for half a second count as
+    # joined again: a tenth more at most.
+    rule = dw.Study(assembly={"bond_rate_per_s": 0.02})
+    runs, flow = 6, dw.tank30_flow()
+    path = dw.assembly_path(rule, flow, runs=range(runs), duration=300.0)
+    truth = dw.assemble(rule, flow, runs=runs, duration=300.0)
+    seen = [dw.classify(dw.path_recording(path, run=run), side=0.03) for run in range(runs)]
+    for name, number in (("joining", 0), ("parting", 1)):
+        happened = int((truth["event_kind"] == number).sum())
+        found = sum(int(one[f"{name}_count"].sum()) for one in seen)
+        assert happened <= found <= 1.1 * happened + 1
+    one = seen[0]
+    time = one["proportion"] * one.attrs["known_s"]
+    came = time.values > 0
+    np.testing.assert_allclose(
+        one["parting_rate"].values[came], (one["parting_count"] / time).values[came]
+    )
+    assert np.isnan(one["parting_rate"].values[~came]).all()
