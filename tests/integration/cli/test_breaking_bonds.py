@@ -32,12 +32,13 @@ def test_the_answer_tells_the_steady_state(tmp_path: Path) -> None:
     with xr.open_dataset(folder / "assembly.nc", engine="h5netcdf") as stored:
         assert {0, 1} <= set(stored["event_kind"].values.ravel().tolist())
         assert (stored["end_time"] == 60.0).all()
-    sections = {one["id"]: one for one in report_page([folder])["sections"]}
+    sections = {one["id"]: one for one in report_page(folder)["sections"]}
     assert "1/s" in " ".join(sections["steady-state"]["columns"])
     assert sections["lifetimes"]["x"]["unit"] == "s"
-    path = here("classify", folder / "path.nc", "--json")
-    rates = json.loads(path.out)["rates"]
-    assert rates["1+1+1"]["joining"]["per_s"] > 0
+    seen = json.loads(here("classify", folder / "path.nc", "--replicate", "1", "--json").out)
+    for kind, word in (("joining", "join"), ("parting", "split")):
+        told = [event["kind"] for event in seen["events"]].count(word)
+        assert sum(one[kind]["count"] for one in seen["rates"].values()) == told
 
 
 def test_permanent_bonds_leave_no_steady_state(tmp_path: Path) -> None:
