@@ -162,7 +162,7 @@ def _signs(assembly: xr.Dataset, sound: Bools) -> Integers:
     if "event_kind" not in assembly:
         return (assembly["event_shape"].values[sound][..., 2] >= 0).astype(np.int64)
     kind = assembly["event_kind"].values[sound]
-    return (kind == JOINING).astype(np.int64) - (kind == PARTING)
+    return np.asarray((kind == JOINING).astype(np.int64) - (kind == PARTING), dtype=np.int64)
 
 
 def _numbers_at_end(event_shape: Integers, sign: Integers, size: Integers, blocks: int) -> Integers:
