@@ -1,5 +1,6 @@
 // Bindings of the self-assembly core.
 #include "assembly_rules.hpp"
+#include "pull.hpp"
 
 #include "driftwalk/assembly/assemble.hpp"
 #include "driftwalk/simulate/threads.hpp"
@@ -40,7 +41,7 @@ nb::dict assemble(const Model& model, In<double, 3> start, In<std::uint64_t, 1> 
                   double hidden_share, double stirring_length, bool incompressible,
                   double block_restitution, double block_friction, int sample_every, int threads,
                   const std::string& precision, std::optional<In<double, 1>> flow_start,
-                  const BondNumbers& bonds, std::size_t event_rows) {
+                  const Pull* pull, const BondNumbers& bonds, std::size_t event_rows) {
   const std::size_t worlds = start.shape(0), blocks = start.shape(1);
   require_blocks(blocks);
   if (start.shape(2) != 3 || key.size() != worlds || drag_coefficient.size() != worlds ||
@@ -59,6 +60,9 @@ nb::dict assemble(const Model& model, In<double, 3> start, In<std::uint64_t, 1> 
   set_bonds(rules, bonds);
   rules.restitution = block_restitution;
   rules.friction = block_friction;
+  if (pull != nullptr) {
+    rules.pull = pull->rules();
+  }
   const driftwalk::AssemblyWorlds batch{static_cast<std::int64_t>(worlds),
                                         steps,
                                         start.data(),
@@ -130,12 +134,13 @@ nb::dict assemble(const Model& model, In<double, 3> start, In<std::uint64_t, 1> 
 
 void register_assemble(nb::module_& module);
 void register_assemble(nb::module_& module) {
+  register_pull(module);
   module.def("place_blocks", &place_blocks, "model"_a, nb::kw_only(), "blocks"_a, "key"_a,
              "threads"_a);
   module.def("assemble", &assemble, "model"_a, nb::kw_only(), "start"_a, "key"_a,
              "drag_coefficient"_a, "force_std"_a, "steps"_a, "latching"_a, "connector_distance"_a,
              "connector_axis"_a, "hidden_share"_a, "stirring_length"_a, "incompressible"_a,
              "block_restitution"_a, "block_friction"_a, "sample_every"_a, "threads"_a,
-             "precision"_a, "flow_start"_a = nb::none(), "bonds"_a = BondNumbers{0, 0, 0, 1.25},
-             "event_rows"_a = 0);
+             "precision"_a, "flow_start"_a = nb::none(), "pull"_a = nb::none(),
+             "bonds"_a = BondNumbers{0, 0, 0, 1.25}, "event_rows"_a = 0);
 }

@@ -94,6 +94,7 @@ def assembled(study: Study, result: AssemblyResult) -> Answer:
         sizes_drawn=result.sizes_drawn,
         steady=result.steady,
         apart=_difference(result),
+        attraction=result.attraction,
     )
 
 

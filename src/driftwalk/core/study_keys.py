@@ -76,6 +76,13 @@ class AssemblySettings(ModelSettings, total=False):
     bond_strength: Annotated[Number, "assembly.bond_strength_N"]
     relatch_clearance: Annotated[Number, "assembly.relatch_clearance"]
     confidence: Annotated[Number, "assembly.confidence"]
+    magnets: Annotated[str, "interaction.magnets"]
+    magnet_inset: Annotated[Number, "interaction.magnet_inset_m"]
+    poles: Annotated[str, "interaction.poles"]
+    attraction: Annotated[str, "interaction.attraction"]
+    capillary: Annotated[str, "interaction.capillary"]
+    meniscus_height: Annotated[Number, "interaction.meniscus_height_m"]
+    approach_resistance: Annotated[Number, "interaction.approach_resistance_N_s"]
 
 
 class FitSettings(StudySettings, total=False):

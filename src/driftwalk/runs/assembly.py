@@ -47,6 +47,8 @@ class AssemblyResult:
         Kind "assembly_sizes", of the same two sets of runs; beyond 8 blocks only.
     steady : xarray.Dataset or None
         Kind "steady_state", of the runs with the study's parameters; where bonds break only.
+    attraction : xarray.Dataset or None
+        Kind "attraction", where blocks feel each other at a distance.
     """
 
     assembly: xr.Dataset
@@ -56,6 +58,7 @@ class AssemblyResult:
     sizes: xr.Dataset | None = None
     sizes_drawn: xr.Dataset | None = None
     steady: xr.Dataset | None = None
+    attraction: xr.Dataset | None = None
 
 
 @dataclass(frozen=True)
@@ -124,6 +127,7 @@ class AssemblyWork:
             assemble,
             assemble_drawn,
             assembly_path,
+            attraction,
             class_times,
             steady_state,
         )
@@ -142,6 +146,9 @@ class AssemblyWork:
         )
         assembly = run.keep("assembly.nc", assembly)
         distribution, sizes = self._outcomes(assembly, run, "")
+        pull = attraction(self.study)
+        if pull is not None:
+            pull = run.keep("attraction.nc", pull)
         times = run.keep("class_times.nc", class_times(assembly, confidence=settings.confidence))
         steady = None
         if settings.bonds_break:
@@ -178,7 +185,9 @@ class AssemblyWork:
             course.begin("film")
             film = run.directory.folder("figures") / f"run.{self.film}"
             driftwalk.plot.write_animation(path, film)
-        return AssemblyResult(assembly, distribution, times, drawn, sizes, sizes_drawn, steady)
+        return AssemblyResult(
+            assembly, distribution, times, drawn, sizes, sizes_drawn, steady, pull
+        )
 
     def _outcomes(
         self, assembly: xr.Dataset, run: Run, ending: str

@@ -6,6 +6,18 @@
 
 DRIFTWALK_LANES_BEGIN
 
+struct Between {
+  double x, y;
+};
+// From the centre of the first block of a bond to that of the second [m].
+template <class Real>
+inline Between between_blocks(const PackMemory<Real>& memory, int world, const Bond& bond) {
+  const Member<Real>&first = memory.member(bond.first), &second = memory.member(bond.second);
+  const int one = memory.lane(bond.first, world), other = memory.lane(bond.second, world);
+  return {double(get(second.x, other)) - get(first.x, one),
+          double(get(second.y, other)) - get(first.y, one)};
+}
+
 // Force on each block over its mass, and torque about the assembly's centre over the same [m/s^2,
 // m^2/s^2], of the step that is just over.
 struct BlockPush {
@@ -13,10 +25,13 @@ struct BlockPush {
 };
 
 template <class Real, class T, class Law>
-inline BlockPush push_on(const Physics<Real, T, Law>& physics, int half, const Member<Real>& m,
-                         const Sums<Real>& sums, int lane) {
-  // Where the water pushes, the sums are accelerations.
-  const bool done = physics.water.count > 0;
+inline BlockPush push_on(const Physics<Real, T, Law>& physics, int half,
+                         const PackMemory<Real>& memory, int block, int world) {
+  const Member<Real>& m = memory.member(block);
+  const Sums<Real>& sums = memory.sums[&m - memory.members];
+  const int lane = memory.lane(block, world);
+  // Where the water or other blocks push, the sums are accelerations.
+  const bool done = physics.water.count > 0 || physics.pulled;
   const double per_mass = done ? 1.0 : get(physics.world.drag_per_mass, lane);
   const double per_torque = done ? 1.0 / physics.step.per_inertia : per_mass;
   const double noise = get(physics.world.noise_scale, lane);
@@ -30,17 +45,19 @@ inline BlockPush push_on(const Physics<Real, T, Law>& physics, int half, const M
 // which the side of its second block draws that of its first, so that both go on as one rigid body.
 template <class Real, class T, class Law>
 inline double tension(const Physics<Real, T, Law>& physics, int half,
-                      const PackMemory<Real>& memory, int blocks, int lane, const Bond& bond,
+                      const PackMemory<Real>& memory, int blocks, int world, const Bond& bond,
                       const std::int32_t* side) {
-  const int root = get(memory.members[bond.first].root, lane);
+  const Member<Real>& first = memory.member(bond.first);
+  const int at = memory.lane(bond.first, world), root = get(first.root, at);
   BlockPush all{0, 0, 0}, own{0, 0, 0};
   double count = 0, own_count = 0, arm_x = 0, arm_y = 0;
   for (int b = root; b < blocks; ++b) {
-    const Member<Real>& m = memory.members[b];
+    const Member<Real>& m = memory.member(b);
+    const int lane = memory.lane(b, world);
     if (get(m.root, lane) != root) {
       continue;
     }
-    const BlockPush push = push_on(physics, half, m, memory.sums[b], lane);
+    const BlockPush push = push_on(physics, half, memory, b, world);
     all = {all.x + push.x, all.y + push.y, all.torque + push.torque};
     ++count;
     if (side[b] == 1) {
@@ -50,21 +67,20 @@ inline double tension(const Physics<Real, T, Law>& physics, int half,
       arm_y += get(m.arm.y, lane);
     }
   }
-  const Member<Real>&first = memory.members[bond.first], &second = memory.members[bond.second];
-  const double spin = get(first.motion.omega, lane);
-  const double turning = all.torque * get(first.per_inertia, lane) / count;
+  const double spin = get(first.motion.omega, at);
+  const double turning = all.torque * get(first.per_inertia, at) / count;
   const double pull_x = own_count * all.x / count - turning * arm_y - spin * spin * arm_x - own.x;
   const double pull_y = own_count * all.y / count + turning * arm_x - spin * spin * arm_y - own.y;
-  const double dx = get(second.x, lane) - get(first.x, lane);
-  const double dy = get(second.y, lane) - get(first.y, lane);
-  return (pull_x * dx + pull_y * dy) / __builtin_sqrt(dx * dx + dy * dy);
+  const Between to_second = between_blocks(memory, world, bond);
+  return (pull_x * to_second.x + pull_y * to_second.y) /
+         __builtin_sqrt(to_second.x * to_second.x + to_second.y * to_second.y);
 }
 
 // Takes the hazard of a step from the bonds of a lane, and forgets what has become clear; returns
 // whether a bond has come to its end. `side` is scratch for a number per block.
 template <class Real, class T, class Law>
 inline bool wear_bonds(const AssemblyRules& rules, const Physics<Real, T, Law>& physics,
-                       double block_mass, int half, const PackMemory<Real>& memory, int lane,
+                       double block_mass, int half, const PackMemory<Real>& memory, int world,
                        BondList& bonds, std::int32_t* side) {
   const double hazard = rules.bond_rate * physics.step.dt;
   const double clear = rules.relatch_clearance * rules.side;
@@ -74,10 +90,8 @@ inline bool wear_bonds(const AssemblyRules& rules, const Physics<Real, T, Law>& 
   for (int k = 0; k < bonds.count; ++k) {
     Bond& bond = bonds.bond[k];
     if (bond.state == BondState::parted) {
-      const Member<Real>&first = memory.members[bond.first], &second = memory.members[bond.second];
-      const double dx = get(second.x, lane) - get(first.x, lane);
-      const double dy = get(second.y, lane) - get(first.y, lane);
-      if (dx * dx + dy * dy >= clear * clear) {
+      const Between apart = between_blocks(memory, world, bond);
+      if (apart.x * apart.x + apart.y * apart.y >= clear * clear) {
         bond.first = -1; // to be forgotten
         forgets = true;
       }
@@ -90,7 +104,7 @@ inline bool wear_bonds(const AssemblyRules& rules, const Physics<Real, T, Law>& 
     // What a loop carries is not determined: its bonds break as without load.
     if (loaded && find_side(bonds, rules.blocks, bond, side)) {
       const double pull =
-          block_mass * tension(physics, half, memory, rules.blocks, lane, bond, side);
+          block_mass * tension(physics, half, memory, rules.blocks, world, bond, side);
       if (rules.bond_force > 0 && pull > 0 && hazard > 0) {
         worn *= __builtin_exp(pull / rules.bond_force);
       }

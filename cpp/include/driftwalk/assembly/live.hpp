@@ -53,6 +53,8 @@ public:
   void set_rules(Latching latching, double hidden_share, double stirring_length);
   // The rate at which bonds break [1/s], and how far apart what has parted has to be [side].
   void set_bonds(double rate, double relatch_clearance);
+  // The tables have to outlive the world.
+  void set_pull(const PullRules& pull);
   // Removes the last blocks, or adds blocks at random free places, at rest, as long as there are
   // any. Returns the number of blocks, 1 to most_blocks.
   int set_blocks(int blocks);

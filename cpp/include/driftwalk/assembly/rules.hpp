@@ -1,13 +1,14 @@
 // What a batch of worlds with several blocks is: plain data, no logic.
 #pragma once
 
+#include "driftwalk/assembly/pull_rules.hpp"
 #include "driftwalk/simulate/prepared.hpp"
 
 #include <cstdint>
 
 namespace driftwalk {
 
-inline constexpr int most_blocks = 256; // of a world
+inline constexpr int most_blocks = 2000; // of a world
 
 enum class Latching : int { none = 0, collision = 1, connector = 2 };
 
@@ -38,6 +39,7 @@ struct AssemblyRules {
   // far apart the centres of what has parted have to be before it latches again [side].
   bool bonds_break = false;
   double bond_rate = 0, bond_force = 0, bond_strength = 0, relatch_clearance = 1.25;
+  PullRules pull;
 };
 
 struct AssemblyWorlds {

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
+from driftwalk.assembly.pull.tables import block_pull
 from driftwalk.assembly.runs.bonds import event_rows, require_bonds
 from driftwalk.assembly.runs.start import given_start, place_blocks, require_cover, require_room
 from driftwalk.core.arrays import Floats, Integers, Keys
@@ -141,6 +142,7 @@ def make_plan(
     require_room(chosen)
     require_bonds(chosen)
     require_cover(flow, chosen.tank)
+    block_pull(chosen)  # its errors come before any run
     runs = np.arange(chosen.assembly.runs) if index is None else index
     forces, steps = chosen.forces, whole_steps(chosen)
     keys = stream_keys("run", seed=chosen.assembly.seed, trial=trial, index=runs)
@@ -202,6 +204,7 @@ def simulate_rows(
 
 def _simulate(plan: Plan, start: Floats, rows: slice, every: int, event_rows: int) -> Arrays:
     """Return what the native core gives for some runs; events beyond `event_rows` are counted."""
+    pull = block_pull(plan.study)
     found = _core.assemble(
         plan.model(),
         start=np.ascontiguousarray(start[rows]),
@@ -210,6 +213,7 @@ def _simulate(plan: Plan, start: Floats, rows: slice, every: int, event_rows: in
         force_std=np.ascontiguousarray(plan.force_std[rows]),
         steps=plan.steps,
         **plan.rules(),
+        pull=None if pull is None else pull.native,
         sample_every=every,
         event_rows=event_rows,
         threads=plan.threads,

@@ -20,6 +20,7 @@ variables (an axis):
         face's
     stirring_length(stirring_length) [m]: distance over which blocks share the stochastic force
     bond_rate(bond_rate) [s-1]: rate at which bonds break
+    magnets(magnets) text: magnet at the centre of each face
 """)
 """Quantities that may vary over a map."""
 _DIMENSIONS: Final = "\n".join(f"{one.name}: settings, where it varies" for one in AXES)

@@ -149,6 +149,7 @@ BUILT_IN: Final = (
             "distribution",
             "class_times",
             "path",
+            "attraction",
             "sizes",
             "steady_state",
             "assembly_drawn",
