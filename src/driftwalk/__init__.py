@@ -51,6 +51,7 @@ _NAMES = {
         "sensitivity_indices",
         "sensitivity_map",
         "sensitivity_reference",
+        "steady_state",
     ),
     "driftwalk.calibration": ("recover_model",),
     "driftwalk.comparison": (

@@ -150,6 +150,10 @@ FORMS: dict[str, Callable[[], xr.Dataset]] = {
     "recovery": recovery,
     "model_recovery": model_recovery,
     "assembly": lambda: assemble(small(), FLOW, runs=12, seed=5),
+    "assembly whose bonds break": lambda: assemble(
+        small(assembly={"bond_rate_per_s": 0.5}), FLOW, runs=12, seed=5
+    ),
+    "steady_state": lambda: dw.steady_state(every_kind("assembly whose bonds break")),
     "assembly_path": lambda: dw.assembly_path(small(), FLOW, runs=[0], seed=5),
     "outcome_distribution": lambda: dw.outcome_distribution(every_kind("assembly")),
     "outcome_distribution of realisations": lambda: dw.sensitivity_reference(small(), FLOW),

@@ -23,6 +23,7 @@ from driftwalk.assembly.outcomes.distribution import (
     proportion_interval,
     sampling_variance,
 )
+from driftwalk.assembly.outcomes.event_rates import rate_interval
 from driftwalk.assembly.outcomes.l1 import (
     L1NoiseFloor,
     PairwiseL1,
@@ -32,6 +33,7 @@ from driftwalk.assembly.outcomes.l1 import (
     pairwise_l1,
 )
 from driftwalk.assembly.outcomes.sizes import assembly_sizes
+from driftwalk.assembly.outcomes.steady_state import steady_state
 from driftwalk.assembly.outcomes.survival import SurvivalCurve, class_times, survival_curve
 from driftwalk.assembly.pull.attraction import attraction
 from driftwalk.assembly.recordings import classify
@@ -89,6 +91,7 @@ __all__ = [
     "polyominoes",
     "principal_components",
     "proportion_interval",
+    "rate_interval",
     "replay_events",
     "sampling_variance",
     "sensitivity_indices",
@@ -97,6 +100,7 @@ __all__ = [
     "sobol_design",
     "sobol_indices",
     "sort_classes",
+    "steady_state",
     "survival_curve",
     "world_class",
 ]

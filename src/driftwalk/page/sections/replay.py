@@ -94,7 +94,7 @@ def _run(path: xr.Dataset, index: int, assembly: xr.Dataset | None, step: float)
 
 
 def _events(assembly: xr.Dataset, run: int) -> list[dict[str, Any]]:
-    """Return what joined in a run, in the order of time."""
+    """Return what joined and parted in a run, in the order of time."""
     require(assembly, "event_count", "event_time", "event_block", "event_class", "class")
     if run not in assembly["run"].values:
         return []
@@ -106,6 +106,8 @@ def _events(assembly: xr.Dataset, run: int) -> list[dict[str, Any]]:
             "class": _class(assembly, int(found["event_class"].values[event])),
         }
         for event in range(int(found["event_count"]))
+        # Kinds 2 and 3: what happens to a bond of a loop changes no assembly.
+        if "event_kind" not in found or int(found["event_kind"].values[event]) < 2
     ]
 
 

@@ -15,6 +15,7 @@ from driftwalk.schema.kinds import (
     motion,
     recovery,
     sensitivity,
+    steady_state,
 )
 from driftwalk.schema.parameters import is_block, stored_parameters
 
@@ -22,7 +23,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _FILES: Final = (
-    motion, flow, calibration, models, fit, recovery, model_check, assembly, sensitivity
+    motion, flow, calibration, models, fit, recovery, model_check, assembly, steady_state,
+    sensitivity,
 )  # fmt: skip
 
 KINDS: Final[dict[str, Kind]] = {kind.name: kind for file in _FILES for kind in file.KINDS}

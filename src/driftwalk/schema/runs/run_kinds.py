@@ -151,6 +151,7 @@ BUILT_IN: Final = (
             "path",
             "attraction",
             "sizes",
+            "steady_state",
             "assembly_drawn",
             "distribution_drawn",
             "sizes_drawn",
