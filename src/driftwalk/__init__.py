@@ -105,6 +105,7 @@ _NAMES = {
         "compare",
         "compare_models",
         "fit",
+        "kinetics",
         "report",
         "simulate",
     ),

@@ -10,6 +10,7 @@ from driftwalk.schema.kinds import (
     calibration,
     fit,
     flow,
+    kinetics,
     model_check,
     models,
     motion,
@@ -22,7 +23,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _FILES: Final = (
-    motion, flow, calibration, models, fit, recovery, model_check, assembly, sensitivity
+    motion, flow, calibration, models, fit, recovery, model_check, assembly, sensitivity,
+    kinetics,
 )  # fmt: skip
 
 KINDS: Final[dict[str, Kind]] = {kind.name: kind for file in _FILES for kind in file.KINDS}
