@@ -441,14 +441,15 @@ def kinetics(
     True
     """
     from driftwalk.assembly import kinetics as estimate
+    from driftwalk.assembly.chains.histories import datasets_of
     from driftwalk.notebook.result import as_result, run_in_folder
     from driftwalk.runs import KineticsWork
     from driftwalk.runs.resumable_run import silent
 
     say = progress or silent
     if folder is not None:
-        given = [[one] if hasattr(one, "attrs") else list(one) for one in (runs, other or [])]
-        work = KineticsWork(given[: 1 if other is None else 2], target, blocks, seed)
+        given = [datasets_of(one) for one in (runs, other) if one is not None]
+        work = KineticsWork(given, target, blocks, seed)
         return as_result(run_in_folder(folder, "kinetics", work, overwrite, say))
     return as_result(
         estimate(

@@ -72,10 +72,12 @@ def plot_class_graph(kinetics: xr.Dataset, ax: Axes | None = None) -> Axes:
             "", xy=tuple(first + 0.8 * (last - first)), xytext=tuple(first + 0.2 * (last - first)),
             arrowprops={"arrowstyle": "-|>", "lw": 0.4 + 2.6 * share, "color": style.MUTED},
         )  # fmt: skip
-        # Half-way labels of a fan would lie on each other: they stand near the end of the arrow.
-        at = first + 0.6 * (last - first)
-        ax.text(*at, f"{1e3 * rate:.2g}", fontsize=6.0, ha="center", va="center",
-                bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none"})  # fmt: skip
+        # Half-way labels of several fans would lie on each other: higher classes have them nearer.
+        at = first + (0.7 - 0.4 * first[1]) * (last - first)
+        ax.text(
+            float(at[0]), float(at[1]), f"{1e3 * rate:.2g}", fontsize=6.0, ha="center", va="center",
+            bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none"},
+        )  # fmt: skip
     colors = class_colors(list(place))
     for name, at in place.items():
         ax.plot(*at, "o", ms=28, color="white", mec=colors[name], mew=0.8)

@@ -16,7 +16,12 @@ from driftwalk.assembly.chains.hidden import (
     fit,
     log_likelihood,
 )
-from driftwalk.assembly.chains.histories import Histories, blocks_of, histories
+from driftwalk.assembly.chains.histories import (
+    Histories,
+    blocks_of,
+    datasets_of,
+    histories,
+)
 from driftwalk.assembly.chains.mixing import (
     WELL_MIXED,
     equal_rates,
@@ -113,7 +118,7 @@ def kinetics(
     >>> found["transition"].values.tolist()
     ['1+1 -> 2']
     """
-    given = [_listed(runs), *([] if other is None else [_listed(other)])]
+    given = [datasets_of(runs), *([] if other is None else [datasets_of(other)])]
     sets, own_target = check_kinetics(*given, target=target, blocks=blocks)
     found = sets[0]
     say = progress or _silent
@@ -207,10 +212,6 @@ def check_kinetics(
 
 def _silent(done: int, total: int) -> None:
     """Tell nobody."""
-
-
-def _listed(given: xr.Dataset | Sequence[xr.Dataset]) -> list[xr.Dataset]:
-    return [given] if hasattr(given, "attrs") else list(given)
 
 
 def _target(target: str | None, found: Histories) -> int | None:
@@ -361,9 +362,10 @@ def empirical_shares(found: Histories, time: Floats) -> Floats:
     # A run is still watched at its very end.
     end[found.target < 0] *= 1.0 + 1e-9
     count = np.empty((time.size, len(found.classes)))
-    for at, moment in enumerate(time):
-        inside = (entry <= moment) & (moment < end)
-        count[at] = np.bincount(found.state[inside], minlength=len(found.classes))
+    for state in range(len(found.classes)):
+        own = found.state == state
+        count[:, state] = np.searchsorted(np.sort(entry[own]), time, side="right")
+        count[:, state] -= np.searchsorted(np.sort(end[own]), time, side="right")
     total = count.sum(axis=1, keepdims=True)
     return np.where(total > 0, count / np.maximum(total, 1.0), np.nan)
 

@@ -123,7 +123,8 @@ def counts_and_times(found: Histories, weight: Floats | None = None) -> tuple[Fl
     size, gone = len(found.classes), found.target >= 0
     counts = np.zeros((size, size))
     np.add.at(counts, (found.state[gone], found.target[gone]), each[gone])
-    return counts, np.bincount(found.state, each * found.duration, size)
+    times: Floats = np.bincount(found.state, each * found.duration, size).astype(np.float64)
+    return counts, times
 
 
 def fit(
@@ -217,7 +218,7 @@ def _expected(
         backward[rows - 1] = np.einsum("nzy,ny->nz", step, after)
     first = data.ranks[0]
     share = model.start[found.state[first]].sum(axis=1)
-    score = np.bincount(found.run, np.log(scale) + top[:, 0], found.runs)
+    score: Floats = np.bincount(found.run, np.log(scale) + top[:, 0], found.runs).astype(np.float64)
     # Of the class in which a run begins nothing is asked.
     score[found.run[first]] -= np.log(np.maximum(share, 1e-300))
     return forward * backward, switches, score

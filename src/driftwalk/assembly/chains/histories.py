@@ -106,6 +106,13 @@ def histories(datasets: Sequence[xr.Dataset], *, classes: Sequence[str] | None =
     return _listed(rows, names)
 
 
+def datasets_of(given: xr.Dataset | Sequence[xr.Dataset]) -> list[xr.Dataset]:
+    """Return one or several datasets as a list."""
+    import xarray as xr
+
+    return [given] if isinstance(given, xr.Dataset) else list(given)
+
+
 def blocks_of(name: str) -> int:
     """Return the number of blocks of an outcome class; of discs those of its contact graphs.
 
@@ -147,11 +154,12 @@ def _of_runs(assembly: xr.Dataset) -> list[tuple[list[str], Floats, float]]:
     after = np.concatenate([assembly[f"{one}_class"].values for one in kinds], axis=1)
     order = np.argsort(np.where(np.isfinite(time), time, np.inf), axis=1, kind="stable")
     time, after = (np.take_along_axis(one, order, axis=1) for one in (time, after))
+    end = assembly["end_time"].values
     rows = []
     for at in np.flatnonzero(assembly["outcome"].values >= 0):
         real = np.isfinite(time[at]) & (after[at] >= 0)
         passed = [start, *(names[index] for index in after[at][real])]
-        rows.append(_merged(passed, np.r_[0.0, time[at][real]], float(assembly["end_time"][at])))
+        rows.append(_merged(passed, np.r_[0.0, time[at][real]], float(end[at])))
     return rows
 
 

@@ -33,7 +33,7 @@ class MixingPolicy(NamedTuple):
 MIXING_POLICY = MixingPolicy()
 
 
-class Test(NamedTuple):
+class MixingTest(NamedTuple):
     """One test."""
 
     name: str
@@ -48,7 +48,7 @@ class Test(NamedTuple):
     p: float
 
 
-def mixing_tests(found: Histories) -> list[Test]:
+def mixing_tests(found: Histories) -> list[MixingTest]:
     """Return the tests of exponential sojourns per class, and of memory per pair of sojourns."""
     made = []
     for state, name in enumerate(found.classes):
@@ -66,7 +66,7 @@ def mixing_tests(found: Histories) -> list[Test]:
     return made
 
 
-def _exponential(name: str, duration: Floats, ended: Bools) -> Test:
+def _exponential(name: str, duration: Floats, ended: Bools) -> MixingTest:
     """Return the likelihood-ratio test of Weibull's shape k = 1, right-censored, and k."""
     from scipy.optimize import brentq, minimize_scalar
     from scipy.stats import chi2
@@ -81,17 +81,19 @@ def _exponential(name: str, duration: Floats, ended: Bools) -> Test:
 
     best = minimize_scalar(deviance, bounds=(-4.0, 4.0), method="bounded")
     limit = best.fun + float(chi2.ppf(0.9, 1))
-    ends = [
-        math.exp(brentq(lambda at: deviance(at) - limit, *sorted((best.x, side))))
-        if deviance(side) > limit
-        else math.exp(side)
+    low, high = (
+        math.exp(
+            brentq(lambda at: deviance(at) - limit, min(best.x, side), max(best.x, side))
+            if deviance(side) > limit
+            else side
+        )
         for side in (best.x - 3.0, best.x + 3.0)
-    ]
+    )
     p = float(chi2.sf(max(deviance(0.0) - best.fun, 0.0), 1))
-    return Test(f"sojourn in {name}", NOT_EXPONENTIAL, math.exp(best.x), *ends, events, p)
+    return MixingTest(f"sojourn in {name}", NOT_EXPONENTIAL, math.exp(best.x), low, high, events, p)
 
 
-def _memory(name: str, before: Floats, duration: Floats, ended: Bools) -> Test:
+def _memory(name: str, before: Floats, duration: Floats, ended: Bools) -> MixingTest:
     """Return the score test of Cox for the rank of the sojourn before, and Spearman of the two.
 
     Pairs that were both seen to end are a biased sample: the score test allows for the others.
@@ -106,7 +108,7 @@ def _memory(name: str, before: Floats, duration: Floats, ended: Bools) -> Test:
     # Fisher's transform, with the variance of Fieller, Hartley and Pearson (1957).
     wide = 1.645 * math.sqrt(1.06 / max(events - 3, 1))
     middle = math.atanh(min(max(rho, -0.999), 0.999))
-    return Test(
+    return MixingTest(
         f"waits {name}", MEMORY, rho, math.tanh(middle - wide), math.tanh(middle + wide),
         events, float(p),
     )  # fmt: skip
@@ -161,7 +163,7 @@ class Mixing(NamedTuple):
 
     word: str
     reasons: list[str]
-    tests: list[Test]
+    tests: list[MixingTest]
     corrected: Floats
     """p-values, corrected for the number of tests."""
 

@@ -36,7 +36,8 @@ def shares(model: Model, duration: float, *, steps: int = STEPS) -> tuple[Floats
         Shares of the runs.
     """
     step = duration / steps
-    whole = _steps_of(model, np.arange(steps + 1) * step)
+    time: Floats = np.arange(steps + 1, dtype=np.float64) * step
+    whole = _steps_of(model, time)
     # What enters in a step has the age of half a step at its end, and leaves from age 0 on.
     half = _steps_of(model, np.r_[0.0, (np.arange(steps) + 1.5) * step])
     begun, held = model.start.copy(), np.zeros((*model.start.shape, steps + 1))
@@ -49,7 +50,7 @@ def shares(model: Model, duration: float, *, steps: int = STEPS) -> tuple[Floats
         held[:, :, 1 : k + 1] = held[:, :, :k] * np.moveaxis(half[0][:, :k], 1, 2)
         held[:, :, 0] = np.einsum("jz,jzy->jy", out, model.switch)
         course[k + 1] = held[:, :, : k + 1].sum(axis=(1, 2)) + begun.sum(axis=1)
-    return np.arange(steps + 1) * step, course
+    return time, course
 
 
 def _steps_of(model: Model, ages: Floats) -> tuple[Floats, Floats]:
