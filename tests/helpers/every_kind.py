@@ -7,6 +7,7 @@ from functools import cache
 
 import pytest
 import xarray as xr
+from chain_runs import chain_runs
 from drifting_tracers import seeded_tank
 from few_simulations import simulate_little
 from fit_worlds import coarse_study, recording
@@ -150,6 +151,7 @@ FORMS: dict[str, Callable[[], xr.Dataset]] = {
     "recovery": recovery,
     "model_recovery": model_recovery,
     "assembly": lambda: assemble(small(), FLOW, runs=12, seed=5),
+    "kinetics": lambda: dw.kinetics(chain_runs(60, 1), chain_runs(30, 2), target="T", blocks=3),
     "assembly_path": lambda: dw.assembly_path(small(), FLOW, runs=[0], seed=5),
     "outcome_distribution": lambda: dw.outcome_distribution(every_kind("assembly")),
     "outcome_distribution of realisations": lambda: dw.sensitivity_reference(small(), FLOW),

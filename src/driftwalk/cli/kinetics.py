@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from driftwalk.cli.options.run import RunOptions, with_run_options
-from driftwalk.cli.options.shared_types import argument, option
+from driftwalk.cli.options.shared_types import PANEL, argument, option
 from driftwalk.cli.terminal.output import print_result
 from driftwalk.core.errors import InputError
 
@@ -31,7 +31,7 @@ def kinetics(
         int | None,
         option("--blocks N", "Extrapolate the rate of the first join to another number.", min=2),
     ] = None,
-    seed: Annotated[int, option("--seed N", "Seed of the bootstrap.", min=0)] = 1,
+    seed: Annotated[int, option("--seed N", "Seed of the bootstrap.", panel=PANEL, min=0)] = 1,
     *,
     options: RunOptions,
 ) -> None:

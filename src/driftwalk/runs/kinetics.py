@@ -73,7 +73,7 @@ class KineticsWork:
         }
 
     def compute(self, run: Run) -> xr.Dataset:
-        """Fit the chains, choose one and keep it; a stop loses the few seconds that it takes."""
+        """Fit the chains, choose one and keep it."""
         from driftwalk.assembly import kinetics
 
         found = kinetics(
@@ -81,6 +81,8 @@ class KineticsWork:
             target=self.target,
             blocks=self.blocks,
             seed=self.seed,
+            store=run.store,
+            executor=run.executor,
             progress=lambda done, total: run.progress(done, total, "models"),
         )
         return run.keep("kinetics.nc", found)

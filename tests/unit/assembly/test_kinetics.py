@@ -120,9 +120,9 @@ def test_committor_and_passage_time_solve_the_linear_equations() -> None:
     assert way.committor[CLASSES.index("1+1+1+1")] == pytest.approx(ways, rel=1e-9)
     assert way.committor[CLASSES.index("O")] == 0.0
     assert way.committor[target] == pytest.approx(1.0)
-    assert way.time[target] == 0.0
+    assert way.passage_time[target] == 0.0
     expected = 1 / 0.03 + 1 / 0.018 + 1 / 0.028
-    assert way.time[CLASSES.index("1+1+1+1")] == pytest.approx(expected, rel=1e-9)
+    assert way.passage_time[CLASSES.index("1+1+1+1")] == pytest.approx(expected, rel=1e-9)
 
 
 def test_passage_with_partings_and_hidden_states_solves_the_generator() -> None:
@@ -141,7 +141,7 @@ def test_passage_with_partings_and_hidden_states_solves_the_generator() -> None:
     # Both hidden states are as likely at the start.
     first = slice(2 * at, 2 * at + 2)
     assert way.committor[at] == pytest.approx(reach[first].mean(), rel=1e-9)
-    assert way.time[at] == pytest.approx(time[first].mean() / reach[first].mean(), rel=1e-9)
+    assert way.passage_time[at] == pytest.approx(time[first].mean() / reach[first].mean(), rel=1e-9)
 
 
 def test_score_is_that_of_the_log_rank_test() -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -25,7 +27,6 @@ from driftwalk.assembly.chains.histories import (
 from driftwalk.assembly.chains.mixing import (
     WELL_MIXED,
     equal_rates,
-    holm,
     judge_mixing,
     needed_events,
 )
@@ -35,9 +36,12 @@ from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.schema.answers.facts import texts
 from driftwalk.schema.check import build_dataset
+from driftwalk.sweep import WorkUnit, grid, run_sweep
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from driftwalk.sweep import Store
 
 
 class KineticsPolicy(NamedTuple):
@@ -54,6 +58,7 @@ class KineticsPolicy(NamedTuple):
     stored: int = 120
     """Steps of the stored curves."""
     confidence: float = 0.9
+    """Of the intervals and bands; that of the rest of driftwalk."""
 
 
 KINETICS_POLICY = KineticsPolicy()
@@ -67,6 +72,8 @@ def kinetics(
     target: str | None = None,
     blocks: int | None = None,
     seed: int = 1,
+    store: Callable[[str], Store] | None = None,
+    executor: Executor | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> xr.Dataset:
     """Return how fast blocks assemble and by which steps: rates between the outcome classes.
@@ -87,6 +94,10 @@ def kinetics(
         tank is well mixed; at least 2.
     seed : int
         Seed of the bootstrap, at least 0.
+    store : callable, optional
+        Returns the store of a sweep by its name, such as that of a run directory, to be continued.
+    executor : concurrent.futures.Executor, optional
+        Computes work units elsewhere; the result does not depend on it.
     progress : callable, optional
         Called as ``progress(done, total)``.
 
@@ -121,20 +132,33 @@ def kinetics(
     given = [datasets_of(runs), *([] if other is None else [datasets_of(other)])]
     sets, own_target = check_kinetics(*given, target=target, blocks=blocks)
     found = sets[0]
-    say = progress or _silent
-    total = len(FORMS) * KINETICS_POLICY.folds + KINETICS_POLICY.replicates
     mixing = judge_mixing(found)
-    scores = _held_out(found, lambda done: say(done, total))
+    folds, replicates = KINETICS_POLICY.folds, KINETICS_POLICY.replicates
+    whole = len(FORMS) * folds + replicates
+    how: dict[str, Any] = {"executor": executor}
+    scored = run_sweep(
+        HeldOut(found),
+        grid(model=np.arange(len(FORMS)), fold=np.arange(folds)).units(1),
+        store=None if store is None else store("held_out"),
+        progress=None if progress is None else lambda done, _: progress(done, whole),
+        **how,
+    )
+    scores = np.nansum(scored["score"].reshape(len(FORMS), folds, -1), axis=1)
     best = int(scores.mean(axis=1).argmax())
     behind = scores - scores[best]
     error = behind.std(axis=1, ddof=1) / np.sqrt(found.runs)
     chosen = int(np.flatnonzero(behind.mean(axis=1) >= -error)[0])
     model = fit(found, FORMS[chosen])
-    bands = _bands(
-        found, model, own_target, seed,
-        lambda done: say(len(FORMS) * KINETICS_POLICY.folds + done, total),
-    )  # fmt: skip
-    data, coords, attrs = _rates(sets)
+    bands = run_sweep(
+        Replicate(found, model, own_target, seed),
+        grid(replicate=np.arange(replicates)).units(1),
+        store=None if store is None else store("bootstrap"),
+        progress=None
+        if progress is None
+        else lambda done, _: progress(whole - replicates + done, whole),
+        **how,
+    )
+    data, coords, attrs = _rates(sets, seed)
     data |= {
         "score": ("model", scores.mean(axis=1)),
         "score_behind": ("model", behind.mean(axis=1)),
@@ -150,7 +174,7 @@ def kinetics(
     }
     if own_target is not None:
         way = passage(model, own_target)
-        for name, value in zip(("committor", "passage_time"), way, strict=True):
+        for name, value in way._asdict().items():
             data[name] = ("class", value)
             data[f"{name}_standard_error"] = ("class", bands[name].std(axis=0, ddof=1))
         attrs["target"] = str(target)
@@ -190,10 +214,23 @@ def check_kinetics(
     blocks : int or None
         Another number of blocks.
 
+    Returns
+    -------
+    list of Histories
+        One for each data set.
+    int or None
+        Index of the target.
+
     Raises
     ------
     InputError
         As `kinetics` does.
+
+    Examples
+    --------
+    >>> check_kinetics([], target=None, blocks=1)
+    Traceback (most recent call last):
+    driftwalk.core.errors.InputError: blocks must be at least 2 to join, got 1
     """
     if blocks is not None and blocks < 2:
         raise InputError(f"blocks must be at least 2 to join, got {blocks}")
@@ -208,10 +245,6 @@ def check_kinetics(
     sets = [histories(one, classes=known) for one in given]
     _enough(sets[0])
     return sets, _target(target, sets[0])
-
-
-def _silent(done: int, total: int) -> None:
-    """Tell nobody."""
 
 
 def _target(target: str | None, found: Histories) -> int | None:
@@ -243,16 +276,20 @@ def _enough(found: Histories) -> None:
     )
 
 
-def _held_out(found: Histories, say: Callable[[int], None]) -> Floats:
-    """Return the log likelihood of each run under models fitted without it, (model, run)."""
-    scores = np.empty((len(FORMS), found.runs))
-    part = np.arange(found.runs) % KINETICS_POLICY.folds
-    for at, form in enumerate(FORMS):
-        for fold in range(KINETICS_POLICY.folds):
-            out = part == fold
-            scores[at, out] = log_likelihood(found.of(out), _trained(found, form, ~out))
-            say(at * KINETICS_POLICY.folds + fold + 1)
-    return scores
+@dataclass(frozen=True)
+class HeldOut:
+    """Held-out log likelihoods, NaN of the runs of other folds; a work unit is a model and fold."""
+
+    found: Histories
+
+    def __call__(self, unit: WorkUnit) -> dict[str, Floats]:
+        """Return the scores of a unit, shape (1, run)."""
+        [at], [fold] = (unit.settings[name] for name in ("model", "fold"))
+        out = np.arange(self.found.runs) % KINETICS_POLICY.folds == int(fold)
+        score = np.full((1, self.found.runs), np.nan)
+        model = _trained(self.found, FORMS[int(at)], ~out)
+        score[0, out] = log_likelihood(self.found.of(out), model)
+        return {"score": score}
 
 
 def _trained(found: Histories, form: Form, kept: Any) -> Model:
@@ -264,34 +301,34 @@ def _trained(found: Histories, form: Form, kept: Any) -> Model:
     return model._replace(hazard=model.hazard + rate[:, None, :, None])
 
 
-def _bands(
-    found: Histories,
-    model: Model,
-    target: int | None,
-    seed: int,
-    say: Callable[[int], None],
-) -> dict[str, Floats]:
-    """Return what bootstrap samples of the runs predict: shares, committors, passage times."""
-    random = np.random.default_rng([seed, 39])
-    made: dict[str, list[Floats]] = {"share": [], "committor": [], "passage_time": []}
-    each = np.full(found.runs, 1.0 / found.runs)
-    for done in range(KINETICS_POLICY.replicates):
-        weight = random.multinomial(found.runs, each).astype(np.float64)
+@dataclass(frozen=True)
+class Replicate:
+    """The predictions of a model fitted again to a bootstrap sample of the runs."""
+
+    found: Histories
+    model: Model
+    target: int | None
+    seed: int
+
+    def __call__(self, unit: WorkUnit) -> dict[str, Floats]:
+        """Return shares, committors and passage times of a unit, of one replicate."""
+        [number] = unit.settings["replicate"]
+        random = np.random.default_rng([self.seed, int(number)])
+        runs = self.found.runs
         again = fit(
-            found, model.form, edges=model.edges, weight=weight, begin=model,
+            self.found, self.model.form, edges=self.model.edges, begin=self.model,
+            weight=random.multinomial(runs, np.full(runs, 1.0 / runs)).astype(np.float64),
             iterations=KINETICS_POLICY.iterations,
         )  # fmt: skip
-        stored = KINETICS_POLICY.stored
-        made["share"].append(shares(again, found.recorded_s(), steps=stored)[1])
-        if target is not None:
-            way = passage(again, target)
-            made["committor"].append(way.committor)
-            made["passage_time"].append(way.time)
-        say(done + 1)
-    return {name: np.array(values) for name, values in made.items()}
+        made = {"share": shares(again, self.found.recorded_s(), steps=KINETICS_POLICY.stored)[1]}
+        if self.target is not None:
+            made |= passage(again, self.target)._asdict()
+        return {name: values[None] for name, values in made.items()}
 
 
-def _rates(sets: Sequence[Histories]) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
+def _rates(
+    sets: Sequence[Histories], seed: int
+) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
     """Return N_ij, T_i, q_ij with exact Poisson intervals, and whether two sets have equal ones."""
     from scipy.stats import chi2
 
@@ -323,12 +360,9 @@ def _rates(sets: Sequence[Histories]) -> tuple[dict[str, Any], dict[str, Any], d
     }  # fmt: skip
     attrs: dict[str, Any] = {}
     if len(sets) > 1:
-        p = equal_rates(sets[0], sets[1], pairs)
-        tested = np.isfinite(p)
-        corrected = np.full(p.size, np.nan)
-        corrected[tested] = holm(p[tested].tolist())
+        p, corrected = equal_rates(sets[0], sets[1], pairs, seed=seed)
         data |= {"equal_p": ("transition", p), "equal_p_corrected": ("transition", corrected)}
-        joint = float(np.min(corrected[tested])) if tested.any() else np.nan
+        joint = float(np.nanmin(corrected)) if np.isfinite(p).any() else np.nan
         attrs = {"equal_p": joint, "other_runs": sets[1].runs}
     return data, coords, attrs
 
@@ -355,7 +389,7 @@ def empirical_shares(found: Histories, time: Floats) -> Floats:
 
     A run that ended in a class that no run ever left stays in it. NaN where no run is watched.
     """
-    entry = _entries(found)
+    entry = found.entry
     left = np.bincount(found.state[found.target >= 0], minlength=len(found.classes)) > 0
     end = entry + found.duration
     end[(found.target < 0) & ~left[found.state]] = np.inf
@@ -370,18 +404,11 @@ def empirical_shares(found: Histories, time: Floats) -> Floats:
     return np.where(total > 0, count / np.maximum(total, 1.0), np.nan)
 
 
-def _entries(found: Histories) -> Floats:
-    """Return when each sojourn began, from the start of its run [s]."""
-    after = np.cumsum(found.duration)
-    before = after - found.duration
-    return before - np.maximum.accumulate(np.where(found.first, before, 0.0))
-
-
 def _completion(found: Histories, model: Model) -> dict[str, Any]:
     """Return the KS distance of the completion times and its 95 % floor, where runs complete."""
     whole = np.array(["+" not in name for name in found.classes])
     first = whole[found.state] & np.r_[False, ~whole[found.state[:-1]]] & ~found.first
-    happened = np.sort(_entries(found)[first])
+    happened = np.sort(found.entry[first])
     if not happened.size:
         return {}
     time, course = shares(model, found.recorded_s())

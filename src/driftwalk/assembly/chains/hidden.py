@@ -42,7 +42,7 @@ class EmPolicy(NamedTuple):
     events_per_bin: int = 20
     """Fewer events of a class than ten bins of these give it fewer bins."""
     weight: float = 1.0
-    """Events of the class's mean rate that are added to each bin: none is empty."""
+    """Events at the mean rate of the class, added to each bin so that none is empty; by hand."""
     switch_weight: float = 0.5
     """Runs that are added to each change of hidden state."""
     spread: float = 6.0
@@ -50,8 +50,9 @@ class EmPolicy(NamedTuple):
     sticky: float = 0.7
     """Probability to keep the hidden state at the start."""
     iterations: int = 400
+    """Iterations at most; the settings of the study took up to 300."""
     tolerance: float = 1e-2
-    """Gain of the log likelihood below which the iterations end."""
+    """Gain of the log likelihood below which the iterations end; chosen by hand."""
 
 
 EM_POLICY = EmPolicy()
@@ -72,7 +73,7 @@ class Model(NamedTuple):
 
 
 class _Data(NamedTuple):
-    """What the likelihood needs of the sojourns."""
+    """The sojourns in the form of the likelihood."""
 
     exposure: Any
     """Time in each bin of each class, sparse, shape (sojourn, class x bin)."""

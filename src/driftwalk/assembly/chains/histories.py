@@ -49,7 +49,7 @@ class Histories(NamedTuple):
         return int((self.target >= 0).sum())
 
     def of(self, chosen: Bools) -> Histories:
-        """Return the histories of chosen runs, shape (run,), numbered anew."""
+        """Return the histories of chosen runs, shape (run,), numbered from 0."""
         kept = chosen[self.run]
         number = np.cumsum(chosen) - 1
         return self._replace(
@@ -58,6 +58,25 @@ class Histories(NamedTuple):
             duration=self.duration[kept],
             target=self.target[kept],
             runs=int(chosen.sum()),
+        )
+
+    @property
+    def entry(self) -> Floats:
+        """When each sojourn began, from the start of its run [s]."""
+        before = np.cumsum(self.duration) - self.duration
+        entry: Floats = before - np.maximum.accumulate(np.where(self.first, before, 0.0))
+        return entry
+
+    def until(self, end: float) -> Histories:
+        """Return what is seen of the histories up to a time from the start of their runs [s]."""
+        begun = self.entry < end
+        left = np.minimum(self.duration, end - self.entry)
+        target = np.where(left < self.duration, OPEN, self.target)
+        return self._replace(
+            run=self.run[begun],
+            state=self.state[begun],
+            duration=left[begun],
+            target=target[begun],
         )
 
     def recorded_s(self) -> float:

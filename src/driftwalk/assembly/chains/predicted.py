@@ -1,4 +1,4 @@
-"""What a fitted chain predicts: shares over time, and the way to a target class."""
+"""Predictions of a fitted chain: shares over time, committors and first-passage times."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ STEPS = 600
 def shares(model: Model, duration: float, *, steps: int = STEPS) -> tuple[Floats, Floats]:
     """Return the shares of the classes over time by convolution on a grid.
 
-    The mass in a class and hidden state is kept by its age. What enters during a step has spent
-    half of it there.
+    The mass in a class and hidden state is kept by its age. Mass that enters during a step has
+    spent half of the step there.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class Passage(NamedTuple):
 
     committor: Floats
     """Probability to reach the target at all, from each class as it is entered."""
-    time: Floats
+    passage_time: Floats
     """Mean first-passage time of those that reach it [s]; NaN where none does."""
 
 
@@ -81,7 +81,7 @@ def passage(model: Model, target: int) -> Passage:
     """Return committor and mean first-passage time to a class from every class.
 
     Solves q = P q with q = 1 in the target, and the equation of first moments, with P the
-    probabilities of the jumps; the last bin's hazard goes on for ever. A class is entered with the
+    probabilities of the jumps; the last bin's hazard is extrapolated. A class is entered with the
     hidden states in which it is entered over all runs.
     """
     size, states = model.start.shape

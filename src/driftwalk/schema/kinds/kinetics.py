@@ -43,9 +43,9 @@ variables:
     share_low(time class) [1]: lower limit of the predicted share
     share_high(time class) [1]: upper limit of the predicted share; by a bootstrap over runs
     empirical(source time class) [1]: share of the runs still watched; NaN where none is
-    statistic(test): Weibull shape of a sojourn, or Spearman's coefficient of two
-    statistic_low(test): lower end of its 90 % interval
-    statistic_high(test): upper end of its 90 % interval
+    statistic(test) [1]: Weibull shape of a sojourn, or Spearman's coefficient of two
+    statistic_low(test) [1]: lower end of its 90 % interval
+    statistic_high(test) [1]: upper end of its 90 % interval
     events(test) [1] int: sojourns that ended
     p(test) [1]: p-value; likelihood ratio of a shape, Cox's score of a memory
     p_corrected(test) [1]: p-value, corrected for the number of tests (Holm)
@@ -57,8 +57,9 @@ variables:
     test text
     reason text
 variables (two data sets):
-    equal_p(transition) [1]: log-rank p-value of equal rates; NaN below five events
-    equal_p_corrected(transition) [1]: p-value of equal rates, corrected (Holm)
+    equal_p(transition) [1]: p-value of equal rates; log-rank of permuted runs, NaN below five \
+        events
+    equal_p_corrected(transition) [1]: p-value of equal rates, corrected for their number
 attributes:
     verdict text: well mixed, what refuses it, or cannot tell
     chosen text: name of the chosen model
