@@ -31,7 +31,10 @@ def kinetics(
         int | None,
         option("--blocks N", "Extrapolate the rate of the first join to another number.", min=2),
     ] = None,
-    seed: Annotated[int, option("--seed N", "Seed of the bootstrap.", panel=PANEL, min=0)] = 1,
+    seed: Annotated[
+        int,
+        option("--seed N", "Seed of the bootstrap and of the permutations.", panel=PANEL, min=0),
+    ] = 1,
     *,
     options: RunOptions,
 ) -> None:
