@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from driftwalk.assembly.chains.hidden import Model
-from driftwalk.core.arrays import Floats
+from driftwalk.core.arrays import Floats, Integers
 
 STEPS = 600
 """Steps of the grid; twice as many change no share by .002 (`studies/kinetics`)."""
@@ -36,36 +36,41 @@ def shares(model: Model, duration: float, *, steps: int = STEPS) -> tuple[Floats
         Shares of the runs.
     """
     step = duration / steps
+    pairs = np.argwhere(model.hazard.any(axis=(1, 3)))
+    start, end = pairs.T
     time: Floats = np.arange(steps + 1, dtype=np.float64) * step
-    whole = _steps_of(model, time)
+    whole = _steps_of(model, pairs, time)
     # What enters in a step has the age of half a step at its end, and leaves from age 0 on.
-    half = _steps_of(model, np.r_[0.0, (np.arange(steps) + 1.5) * step])
+    half = _steps_of(model, pairs, np.r_[0.0, (np.arange(steps) + 1.5) * step])
     begun, held = model.start.copy(), np.zeros((*model.start.shape, steps + 1))
     course = np.empty((steps + 1, model.start.shape[0]))
     course[0] = begun.sum(axis=1)
     for k in range(steps):
-        out = np.einsum("iza,iajz->jz", held[:, :, :k], half[1][:, :k])
-        out += np.einsum("iz,ijz->jz", begun, whole[1][:, k])
-        begun = begun * whole[0][:, k]
-        held[:, :, 1 : k + 1] = held[:, :, :k] * np.moveaxis(half[0][:, :k], 1, 2)
-        held[:, :, 0] = np.einsum("jz,jzy->jy", out, model.switch)
+        out = np.einsum("pza,pza->pz", held[start, :, :k], half[1][:, :, :k])
+        out += begun[start] * whole[1][:, :, k]
+        begun = begun * whole[0][:, :, k]
+        held[:, :, 1 : k + 1] = held[:, :, :k] * half[0][:, :, :k]
+        held[:, :, 0] = 0.0
+        np.add.at(held[:, :, 0], end, np.einsum("pz,pzy->py", out, model.switch[end]))
         course[k + 1] = held[:, :, : k + 1].sum(axis=(1, 2)) + begun.sum(axis=1)
     return time, course
 
 
-def _steps_of(model: Model, ages: Floats) -> tuple[Floats, Floats]:
-    """Return what stays from one age to the next, and what leaves to each class.
+def _steps_of(model: Model, pairs: Integers, ages: Floats) -> tuple[Floats, Floats]:
+    """Return what stays from one age to the next, and what leaves by each transition.
 
-    Shapes (class, age, hidden) and (class, age, next class, hidden).
+    Shapes (class, hidden, age) and (transition, hidden, age).
     """
-    low = np.pad(model.edges, ((0, 0), (1, 0)))[:, None, :]
-    high = np.pad(model.edges, ((0, 0), (0, 1)), constant_values=np.inf)[:, None, :]
+    start, end = pairs.T
+    low = np.pad(model.edges, ((0, 0), (1, 0)))[start, None, :]
+    high = np.pad(model.edges, ((0, 0), (0, 1)), constant_values=np.inf)[start, None, :]
     at = ages[None, :, None]
     inside = np.minimum(at, high) - np.minimum(at, low)
-    risen = np.diff(np.einsum("iab,ibjz->iajz", inside, model.hazard), axis=1)
-    total = risen.sum(axis=2)
+    risen = np.diff(np.einsum("pab,pbz->pza", inside, model.hazard[start, :, end]), axis=2)
+    total = np.zeros((*model.start.shape, ages.size - 1))
+    np.add.at(total, start, risen)
     share = np.divide(-np.expm1(-total), total, out=np.ones_like(total), where=total > 0)
-    return np.exp(-total), share[:, :, None, :] * risen
+    return np.exp(-total), share[start] * risen
 
 
 class Passage(NamedTuple):
@@ -111,10 +116,10 @@ def passage(model: Model, target: int) -> Passage:
     ]
     own = np.repeat(np.arange(size) == target, states)
     matrix, moments = (np.where(own[:, None], 0.0, one) for one in full)
-    # Classes without a way out have rows of zeros; one that cannot end has no inverse.
-    inverse = np.linalg.pinv(np.eye(size * states) - matrix)
-    reach = np.clip(inverse @ own.astype(np.float64), 0.0, 1.0)
-    time = np.where(own, 0.0, inverse @ (moments @ reach))
+    # Without a chance to leave a ring of classes, rounding keeps the equations solvable.
+    equations = (1.0 + 1e-12) * np.eye(size * states) - matrix
+    reach = np.clip(np.linalg.solve(equations, own.astype(np.float64)), 0.0, 1.0)
+    time = np.where(own, 0.0, np.linalg.solve(equations, moments @ reach))
     weight = _entered(model, jump).reshape(size, states)
     of = [(weight * one.reshape(size, states)).sum(axis=1) for one in (reach, time)]
     return Passage(of[0], np.where(of[0] > 1e-9, of[1] / np.maximum(of[0], 1e-9), np.nan))
