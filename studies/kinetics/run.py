@@ -88,9 +88,8 @@ def first_joins() -> list[dict[str, Any]]:
             dw.Study(), flow, blocks=blocks, runs=1000, duration=DURATION, drag_coefficient=0.45,
             force_std=5.5e-4, latching="collision", hidden_face_drag="none", seed=3,
         )  # fmt: skip
-        own = histories([found])
-        first = own.first
-        rate = (own.target[first] >= 0).sum() / own.duration[first].sum()
+        first = found["event_time"].values[:, 0]
+        rate = np.isfinite(first).sum() / np.nan_to_num(first, nan=DURATION).sum()
         rows.append({
             "flow_scale": scale, "blocks": blocks,
             "rate_per_pair_per_s": float(rate / (blocks * (blocks - 1) / 2)),
