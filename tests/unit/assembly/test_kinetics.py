@@ -190,6 +190,7 @@ def test_recordings_are_histories() -> None:
     assert found.runs == 2
 
 
+@pytest.mark.slow
 def test_bad_data_say_what_is_wrong() -> None:
     runs = chain_runs(60, 1)
     with pytest.raises(InputError, match="target 2 has 2 blocks, and the runs have 4"):
@@ -225,3 +226,25 @@ def test_a_mixed_tank_is_extrapolated_and_another_one_is_not() -> None:
     assert other.attrs["verdict"] == "waiting times are not exponential, memory across states"
     assert other.attrs["other_blocks_refused"].startswith("no rate for 6 blocks is extrapolated")
     assert "hidden" in other.attrs["chosen"]
+
+
+def test_histories_go_back_where_blocks_part() -> None:
+    """A joining, a parting, and an event that leaves the class as it was."""
+    names = ["2", "1+1"]
+    runs = xr.Dataset(
+        {
+            "outcome": ("run", [0, -1]),
+            "event_time": (("run", "event"), [[2.0, 5.0, 6.0, 9.0], [1.0, 2.0, np.nan, np.nan]]),
+            "event_class": (("run", "event"), [[0, 1, 1, 0], [0, 1, -1, -1]]),
+            "end_time": ("run", [10.0, 10.0]),
+        },
+        {"class": names},
+        {"kind": "assembly", "blocks": 2},
+    )
+    found = histories([runs], classes=names)
+    assert found.state.tolist() == [1, 0, 1, 0]
+    assert found.duration.tolist() == [2.0, 3.0, 4.0, 1.0]
+    assert found.target.tolist() == [0, 1, 0, -1]
+    cut = found.until(6.0)
+    assert cut.duration.tolist() == [2.0, 3.0, 1.0]
+    assert cut.target.tolist() == [0, 1, -1]
