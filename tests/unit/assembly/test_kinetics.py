@@ -54,6 +54,8 @@ def test_rates_are_counts_over_times() -> None:
     assert int(one["count"]) == joined
     assert float(one["rate"]) == pytest.approx(joined / apart.sum(), rel=1e-12)
     assert float(one["rate_standard_error"]) == pytest.approx(joined**0.5 / apart.sum())
+    if found.attrs["chosen"] == "Markov chain":
+        assert one["hazard"].item() == pytest.approx(float(one["rate"]), rel=1e-9)
     low, high = (float(one[name]) * apart.sum() for name in ("rate_low", "rate_high"))
     assert scipy.stats.poisson.sf(joined - 1, low) == pytest.approx(0.05)
     assert scipy.stats.poisson.cdf(joined, high) == pytest.approx(0.05)

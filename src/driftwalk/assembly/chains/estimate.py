@@ -32,7 +32,7 @@ from driftwalk.assembly.chains.mixing import (
 )
 from driftwalk.assembly.chains.predicted import passage, shares
 from driftwalk.assembly.outcomes.class_names import sort_classes
-from driftwalk.core.arrays import Floats
+from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.schema.answers.facts import texts
 from driftwalk.schema.check import build_dataset
@@ -149,8 +149,9 @@ def kinetics(
     error = behind.std(axis=1, ddof=1) / np.sqrt(found.runs)
     chosen = int(np.flatnonzero(behind.mean(axis=1) >= -error)[0])
     model = fit(found, FORMS[chosen])
+    pairs = np.argwhere(np.sum([counts_and_times(one)[0] for one in sets], axis=0) > 0)
     bands = run_sweep(
-        Replicate(found, model, own_target, seed),
+        Replicate(found, model, pairs, own_target, seed),
         grid(replicate=np.arange(replicates)).units(1),
         store=None if store is None else store("bootstrap"),
         progress=None
@@ -158,12 +159,13 @@ def kinetics(
         else lambda done, _: progress(whole - replicates + done, whole),
         **how,
     )
-    data, coords, attrs = _rates(sets, seed)
+    data, coords, attrs = _rates(sets, pairs, seed)
     data |= {
         "score": ("model", scores.mean(axis=1)),
         "score_behind": ("model", behind.mean(axis=1)),
         "score_behind_standard_error": ("model", error),
         **_over_time(sets, model, bands["share"]),
+        **_chosen(model, pairs, bands["hazard"]),
         "statistic": ("test", np.array([one.statistic for one in mixing.tests])),
         "statistic_low": ("test", np.array([one.low for one in mixing.tests])),
         "statistic_high": ("test", np.array([one.high for one in mixing.tests])),
@@ -307,11 +309,13 @@ class Replicate:
 
     found: Histories
     model: Model
+    pairs: Integers
+    """Transitions whose hazards are returned, shape (transition, 2)."""
     target: int | None
     seed: int
 
     def __call__(self, unit: WorkUnit) -> dict[str, Floats]:
-        """Return shares, committors and passage times of a unit, of one replicate."""
+        """Return hazards, shares, committors and passage times of a unit, of one replicate."""
         [number] = unit.settings["replicate"]
         random = np.random.default_rng([self.seed, int(number)])
         runs = self.found.runs
@@ -320,22 +324,25 @@ class Replicate:
             weight=random.multinomial(runs, np.full(runs, 1.0 / runs)).astype(np.float64),
             iterations=KINETICS_POLICY.iterations,
         )  # fmt: skip
-        made = {"share": shares(again, self.found.recorded_s(), steps=KINETICS_POLICY.stored)[1]}
+        start, end = self.pairs.T
+        made = {
+            "hazard": again.hazard[start, :, end],
+            "share": shares(again, self.found.recorded_s(), steps=KINETICS_POLICY.stored)[1],
+        }
         if self.target is not None:
             made |= passage(again, self.target)._asdict()
         return {name: values[None] for name, values in made.items()}
 
 
 def _rates(
-    sets: Sequence[Histories], seed: int
+    sets: Sequence[Histories], places: Integers, seed: int
 ) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
     """Return N_ij, T_i, q_ij with exact Poisson intervals, and whether two sets have equal ones."""
     from scipy.stats import chi2
 
     counted = [counts_and_times(one) for one in sets]
     names = sets[0].classes
-    all_counts = np.sum([counts for counts, _ in counted], axis=0)
-    pairs = [(int(i), int(j)) for i, j in np.argwhere(all_counts > 0)]
+    pairs = [(int(i), int(j)) for i, j in places]
     number = np.array([[counts[pair] for pair in pairs] for counts, _ in counted])
     spent = np.array([[times[i] for i, _ in pairs] for _, times in counted])
     alpha = 1.0 - KINETICS_POLICY.confidence
@@ -365,6 +372,20 @@ def _rates(
         joint = float(np.nanmin(corrected)) if np.isfinite(p).any() else np.nan
         attrs = {"equal_p": joint, "other_runs": sets[1].runs}
     return data, coords, attrs
+
+
+def _chosen(model: Model, pairs: Integers, again: Floats) -> dict[str, Any]:
+    """Return the hazards of the chosen model with their errors, and its hidden states."""
+    start, end = pairs.T
+    dims = ("transition", "bin", "hidden")
+    low = np.pad(model.edges, ((0, 0), (1, 0)))
+    return {
+        "hazard": (dims, model.hazard[start, :, end]),
+        "hazard_standard_error": (dims, again.std(axis=0, ddof=1)),
+        "bin_start": (("class", "bin"), np.where(np.isfinite(low), low, np.nan)),
+        "hidden_start": (("class", "hidden"), model.start),
+        "hidden_change": (("class", "hidden", "hidden_after"), model.switch),
+    }
 
 
 def _over_time(sets: Sequence[Histories], model: Model, band: Floats) -> dict[str, Any]:

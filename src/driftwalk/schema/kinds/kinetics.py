@@ -29,6 +29,9 @@ dimensions:
     model: candidates, the simplest first
     test: tests of a well-mixed tank
     reason: reasons of the verdict
+    bin: bins of the time since a class was entered, of the chosen model
+    hidden: hidden states of the chosen model
+    hidden_after: the same, after a change of class
 variables:
     count({_RATE}) [1] int: transitions seen
     time_in_class(source class) [s]: time spent in the class, over all runs
@@ -43,6 +46,12 @@ variables:
     share_low(time class) [1]: lower limit of the predicted share
     share_high(time class) [1]: upper limit of the predicted share; by a bootstrap over runs
     empirical(source time class) [1]: share of the runs still watched; NaN where none is
+    hazard(transition bin hidden) [s-1]: cause-specific hazard of the chosen model
+    hazard_standard_error(transition bin hidden) [s-1]: its standard error; by a bootstrap over runs
+    bin_start(class bin) [s]: time since entry from which a hazard holds; NaN where there is no bin
+    hidden_start(class hidden) [1]: share of runs that begin in a class and a hidden state
+    hidden_change(class hidden hidden_after) [1]: probability of the hidden state after the class \
+        was entered
     statistic(test) [1]: Weibull shape of a sojourn, or Spearman's coefficient of two
     statistic_low(test) [1]: lower end of its 90 % interval
     statistic_high(test) [1]: upper end of its 90 % interval
