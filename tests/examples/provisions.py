@@ -11,7 +11,7 @@ import shlex
 import shutil
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -62,10 +62,19 @@ class Page:
     """Whether the commands draw their figures, which take most of a small run."""
     little: bool = False
     """Whether searches for models simulate little, with every stage of theirs."""
+    daily: Mapping[str, str] = field(default_factory=dict)
+    """As `instead`, for a page that takes more than a minute: the whole of it runs once a week."""
     needs: tuple[str, ...] = ()
     """Packages without which the examples are skipped."""
     slow: bool = False
     """Whether the page takes more than 0.3 s of processor time."""
+
+    def every_day(self) -> Page:
+        """Return how the page runs in every test: it searches little, where that is a study."""
+        if not self.daily:
+            return self
+        instead = {**self.instead, **self.daily}
+        return replace(self, instead=instead, little=True, numbers=Numbers.ANY)
 
 
 def _files(*provisions: Callable[[Path], Names]) -> Callable[[Path], Names]:
@@ -233,11 +242,11 @@ def _tumble_search(_: Path) -> Names:
 
 
 def _robot_in_mujoco(folder: Path) -> Names:
-    """Provide ``recording.csv``: half a minute of the robot that the page simulates."""
+    """Provide ``recording.csv``: ten seconds of the robot that the page simulates."""
     program = ROOT / "docs" / "examples" / "mujoco_robot.py"
     robot = dw.motion_model(f"command:{shlex.quote(sys.executable)} {shlex.quote(str(program))}")
     values = {"speed": 0.05, "turn_noise": 1.0}
-    seen = moving(robot, values, 30.0, seed=1, noise=3e-4)
+    seen = moving(robot, values, 10.0, seed=1, noise=3e-4)
     dw.save_trajectory(seen, folder / "recording.csv")
     return {}
 
@@ -478,6 +487,7 @@ PAGES: dict[str, Page] = {
         },
         makes=("run/model_calibration.nc", "known/model_calibration.nc", "drawn/posterior.csv"),
         draws=False,
+        little=True,
         slow=True,
     ),
     "docs/how-to/calibrate-your-own-model.md": Page(
@@ -505,7 +515,7 @@ PAGES: dict[str, Page] = {
         provide=_files(_flow("flow_true.csv"), _truth),
         instead={
             "recordings = 30": "recordings = 2",
-            '["5min", "10min", "20min", "40min"]': '["1min", "2min"]',
+            '["5min", "10min", "20min", "40min"]': '["40s", "1min"]',
             "--duration 10min": "--duration 40s --bootstrap 10",
             "--recordings 20": "--recordings 2",
             '"recover.recordings": 10': '"recover.recordings": 2, "calibration.bootstrap": 5',
@@ -516,6 +526,7 @@ PAGES: dict[str, Page] = {
             "recovered.attrs['kind'] == 'model_recovery'",
         ),
         draws=False,
+        little=True,
         slow=True,
     ),
     "docs/how-to/dimer.md": Page(
@@ -674,7 +685,7 @@ PAGES: dict[str, Page] = {
     "docs/tutorials/first-calibration.md": Page(
         provide=_search("small.toml"),
         instead={
-            "calibrate recording.csv --study study.toml": "calibrate recording.csv "
+            "calibrate recording.csv --study study.toml": "calibrate recording.csv --to 300s "
             "--study small.toml"
         },
         not_run={"make demo": INSTALLS, ". .venv/bin/activate": INSTALLS},
@@ -686,6 +697,7 @@ PAGES: dict[str, Page] = {
         slow=True,
     ),
     "docs/tutorials/your-own-model.md": Page(
+        daily={"-o run": "--replicates 1 --bootstrap 4 -o run"},
         holds=("len(track) == 2000",),
         makes=("run/calibration.nc", "compare/comparison.nc"),
         numbers=Numbers.CLOSE,
