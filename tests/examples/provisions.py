@@ -228,9 +228,9 @@ def _wide_tank(_: Path) -> Names:
 
 
 def _active_body(folder: Path) -> Names:
-    """Provide ``recording.nc``: three minutes of an active body."""
+    """Provide ``recording.nc``: a minute and a half of an active body."""
     values = {"speed": 0.03, "rotational_diffusion": 0.5, "turn_rate": 0.3}
-    seen = moving(dw.motion_model("active", clearance=0.015), values, 180.0, seed=3, noise=3e-4)
+    seen = moving(dw.motion_model("active", clearance=0.015), values, 90.0, seed=3, noise=3e-4)
     dw.save_trajectory(seen, folder / "recording.nc")
     return {}
 
@@ -487,7 +487,6 @@ PAGES: dict[str, Page] = {
         },
         makes=("run/model_calibration.nc", "known/model_calibration.nc", "drawn/posterior.csv"),
         draws=False,
-        little=True,
         slow=True,
     ),
     "docs/how-to/calibrate-your-own-model.md": Page(
@@ -598,7 +597,7 @@ PAGES: dict[str, Page] = {
             "--force-std 0.55mN -o": f"--force-std 0.55mN {FEW_SETTINGS} "
             "--vary drag-coefficient=0.3:0.6:0.3 -o",
             "sensitivity run/ --vary": f"sensitivity run/ {FEW_SETTINGS} --vary",
-            "--sobol 64": f"--sobol 8 {FEW_SETTINGS}",
+            "--sobol 64": f"--sobol 4 {FEW_SETTINGS}",
         },
         holds=(
             "dw.outcome_distribution(again).attrs['complete'] == float(setting['complete'])",
@@ -685,7 +684,7 @@ PAGES: dict[str, Page] = {
     "docs/tutorials/first-calibration.md": Page(
         provide=_search("small.toml"),
         instead={
-            "calibrate recording.csv --study study.toml": "calibrate recording.csv --to 300s "
+            "calibrate recording.csv --study study.toml": "calibrate recording.csv --to 900s "
             "--study small.toml"
         },
         not_run={"make demo": INSTALLS, ". .venv/bin/activate": INSTALLS},
