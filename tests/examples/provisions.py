@@ -481,7 +481,7 @@ PAGES: dict[str, Page] = {
     "docs/how-to/calibrate-a-moving-body.md": Page(
         provide=_active_body,
         instead={
-            "--model active ": "--model active --parameter clearance=0.015 ",
+            "--model active ": "--model active --parameter clearance=0.015 --bootstrap 20 ",
             "run-tumble+wall --parameter turn_rate=0": "active+diffusion --parameter turn_rate=0.3 "
             "--parameter clearance=0.015 --bootstrap 20",
         },
@@ -547,7 +547,7 @@ PAGES: dict[str, Page] = {
         ),
         instead={
             "assemble ": f"assemble {FEW_RUNS} ",
-            "sensitivity fit/": f"sensitivity fit/ {FEW_SETTINGS}",
+            "sensitivity fit/": "sensitivity fit/ --runs 4 --realisations 2 --duration 20s",
             "fit first.csv": "fit --no-check first.csv",
             "fit disc.csv": "fit --no-check first.csv",
             "fit raft.csv": "fit --no-check first.csv",
@@ -597,7 +597,7 @@ PAGES: dict[str, Page] = {
             "--force-std 0.55mN -o": f"--force-std 0.55mN {FEW_SETTINGS} "
             "--vary drag-coefficient=0.3:0.6:0.3 -o",
             "sensitivity run/ --vary": f"sensitivity run/ {FEW_SETTINGS} --vary",
-            "--sobol 64": f"--sobol 4 {FEW_SETTINGS}",
+            "--sobol 64": "--sobol 8 --runs 4 --realisations 2 --duration 20s",
         },
         holds=(
             "dw.outcome_distribution(again).attrs['complete'] == float(setting['complete'])",

@@ -1,7 +1,8 @@
 """Executors in other processes: of this machine, and on a Dask cluster.
 
-Each worker of a cluster is checked and gets a function once, then units. A unit is a few numbers; the function of a sweep holds a flow, a recording, a model. On a Dask
-cluster the function is therefore a separate object, which a worker fetches with its first unit.
+Each worker of a cluster is checked and gets a function once, then units. A unit is a few numbers;
+the function of a sweep holds a flow, a recording, a model. On a Dask cluster the function is
+therefore a separate object, which a worker fetches with its first unit.
 The scheduling of units: a window of submitted ones, and slow ones submitted again.
 """
 
