@@ -555,9 +555,9 @@ PAGES: dict[str, Page] = {
             "fit recording.csv --flow": "fit --no-check first.csv --flow",
             "fit recording.csv --law": "fit --no-check first.csv --law",
             "fit recording.csv --wall": "fit --no-check first.csv --wall",
-            "fit recording.csv --compare": "fit --no-check first.csv --compare",
-            "fit recording.csv --switching-times 10min,20min": "fit --no-check second.csv "
-            "--switching-times 30s,60s",
+            "fit recording.csv --compare": "fit --no-check first.csv --to 40s --compare",
+            "fit recording.csv --switching-times 10min,20min": "fit --no-check first.csv "
+            "--switching-times 20s,40s",
         },
         numbers_of={"driftwalk fit recording.csv --tank *": Numbers.SAME},
         by_chance={"KS distance": KS_SCATTER},

@@ -58,7 +58,7 @@ def test_examples_of_a_page_run(name: str, tmp_path: Path, monkeypatch: pytest.M
 def test_a_long_page_shows_what_it_prints(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The test above runs less of it: here its numbers are compared."""
+    """Its numbers are compared; `test_examples_of_a_page_run` runs it with short searches."""
     monkeypatch.chdir(tmp_path)
     run_page(name, PAGES[name], monkeypatch)
 
