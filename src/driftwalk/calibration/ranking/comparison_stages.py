@@ -33,9 +33,8 @@ from driftwalk.calibration.ranking.model_evidence import (
     most_settings,
     shortlist_models,
 )
-from driftwalk.core.background_task import CancelOnError
 from driftwalk.core.files.shards import Arrays
-from driftwalk.core.processors import one_blas_thread
+from driftwalk.core.processors import CancelOnError, one_blas_thread
 from driftwalk.core.run_stages import Course, tell_nobody
 from driftwalk.motion import BlockModel, ParticleModel
 from driftwalk.sweep import MemoryStore, Store, WorkUnit, collect, grid, run_sweep
