@@ -46,6 +46,8 @@ class AssemblyResult:
         Kind "outcome_distribution", of runs with drawn parameters.
     sizes, sizes_drawn : xarray.Dataset or None
         Kind "assembly_sizes", of the same two sets of runs; beyond 8 blocks only.
+    steady : xarray.Dataset or None
+        Kind "steady_state", of the runs with the study's parameters; where bonds break only.
     attraction : xarray.Dataset or None
         Kind "attraction", where blocks feel each other at a distance.
     """
@@ -56,6 +58,7 @@ class AssemblyResult:
     drawn: xr.Dataset | None
     sizes: xr.Dataset | None = None
     sizes_drawn: xr.Dataset | None = None
+    steady: xr.Dataset | None = None
     attraction: xr.Dataset | None = None
 
 
@@ -128,6 +131,7 @@ class AssemblyWork:
             assembly_path,
             attraction,
             class_times,
+            steady_state,
         )
 
         settings = self.study.assembly
@@ -148,6 +152,10 @@ class AssemblyWork:
         if pull is not None:
             pull = run.keep("attraction.nc", pull)
         times = run.keep("class_times.nc", class_times(assembly, confidence=settings.confidence))
+        steady = None
+        if settings.bonds_break:
+            steady = steady_state(assembly, confidence=settings.confidence)
+            steady = run.keep("steady_state.nc", steady)
         if self.calibration is not None:
             assembly_drawn = assemble_drawn(
                 self.study,
@@ -179,7 +187,9 @@ class AssemblyWork:
             course.begin("film")
             film = run.directory.folder("figures") / f"run.{self.film}"
             driftwalk.plot.write_animation(path, film)
-        return AssemblyResult(assembly, distribution, times, drawn, sizes, sizes_drawn, pull)
+        return AssemblyResult(
+            assembly, distribution, times, drawn, sizes, sizes_drawn, steady, pull
+        )
 
     def _outcomes(
         self, assembly: xr.Dataset, run: Run, ending: str
