@@ -147,7 +147,7 @@ def block_pull(study: Study) -> BlockPull | None:
     >>> import driftwalk as dw
     >>> pull = block_pull(dw.Study(interaction={"magnets": "5x5x2mm,1.3T"}))
     >>> float((1e3 * pull.faces.force(0.010 + pull.faces.contact)).round(1))
-    36.0
+    35.3
     """
     if not study.interaction.is_on:
         return None
