@@ -21,6 +21,7 @@ from driftwalk.flow.grid import bilinear
 from driftwalk.flow.random_flow import random_tank_flow
 from driftwalk.flow.read import load_flow
 from driftwalk.flow.recognise import flow_format
+from driftwalk.flow.stretch import stretch_flow
 from driftwalk.flow.tracers import flow_from_tracers
 from driftwalk.flow.write import save_flow
 
@@ -38,6 +39,7 @@ __all__ = [
     "save_flow",
     "shear_flow",
     "shear_velocity",
+    "stretch_flow",
     "uniform_flow",
     "uniform_velocity",
     "vortex_flow",

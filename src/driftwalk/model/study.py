@@ -17,6 +17,7 @@ from driftwalk.model.block import Block
 from driftwalk.model.calibration import Calibration
 from driftwalk.model.fit import Fit
 from driftwalk.model.forces import Flow, Forces
+from driftwalk.model.interaction import Interaction
 from driftwalk.model.recording import Observation, Recording, Steps
 from driftwalk.model.recover import Recover
 from driftwalk.model.section import (
@@ -82,6 +83,8 @@ class Study(Section):
     """Recordings of known truth that a recovery study simulates and fits."""
     assembly: Assembly = Field(default_factory=Assembly)
     """Rules of self-assembly, and the number of runs."""
+    interaction: Interaction = Field(default_factory=Interaction)
+    """Forces between blocks at a distance."""
     sensitivity: Sensitivity = Field(default_factory=Sensitivity)
     """Axes and size of a sensitivity analysis."""
 
