@@ -124,6 +124,21 @@ def test_all_far_mistakes_of_a_walker_go_alone_in_pairs_and_beside_missing_frame
     assert np.isin(clean.time[~wrong & kept], left, invert=True).sum() <= 3
 
 
+def test_the_tank_is_placed_without_the_mistakes(tmp_path: Path) -> None:
+    """A body goes round at the wall; one sample in fifty is 3 cm off, half of these beyond it."""
+    rng = np.random.default_rng(6)
+    time = 0.1 * np.arange(6000.0)
+    place = 0.135 * np.exp(0.2j * time) + 3e-4 * (
+        rng.normal(size=6000) + 1j * rng.normal(size=6000)
+    )
+    place[rng.uniform(size=6000) < 0.02] *= 1.2
+    path = tmp_path / "walker.csv"
+    table = np.column_stack([time, place.real, place.imag])
+    np.savetxt(path, table, delimiter=",", header="t,x,y", comments="", fmt="%.6f")
+    read = dw.load(path, tank="circle:0.3", length_unit="m")
+    assert read["x"].values[0, 0] == pytest.approx(place[0].real, abs=1e-6)
+
+
 def test_a_body_that_turns_back_makes_no_mistake() -> None:
     """It goes to and fro within one sample, by its usual step."""
     track = walker()
