@@ -111,6 +111,11 @@ def _off_the_line(track: Track, longest_gap: float) -> Floats:
 def mistakes_warning(mistakes: int, samples: int) -> str:
     """Return what to say of so many samples that were left out.
 
+    Parameters
+    ----------
+    mistakes, samples : int
+        Those that were left out, of how many.
+
     Examples
     --------
     >>> mistakes_warning(3, 6000)[:38]
@@ -123,7 +128,21 @@ def mistakes_warning(mistakes: int, samples: int) -> str:
 
 
 def without_outliers(track: Track) -> Track:
-    """Return a track without the samples that are mistakes of the tracker: they become gaps."""
+    """Return a track without the samples that are mistakes of the tracker: they become gaps.
+
+    Parameters
+    ----------
+    track : Track
+        One body.
+
+    Examples
+    --------
+    >>> time = 0.1 * np.arange(1000.0)
+    >>> noise = np.random.default_rng(1).normal(0.0, 3e-4, (2, 1000))
+    >>> noise[0, 300] += 5e-3
+    >>> without_outliers(Track(time, 0.1 * time + noise[0], noise[1], 0 * time)).time.size
+    999
+    """
     wrong = outliers_in(track)
     if not wrong.any():
         return track
@@ -133,8 +152,13 @@ def without_outliers(track: Track) -> Track:
 def without_far_outliers(track: Track) -> Track:
     """Return a track without the mistakes that are longer than the body's usual steps.
 
-    One that is found lets the next one show. What is left of successive ones is far from the median
-    of five samples.
+    One that is found lets the next one show. Successive ones mask each other's pattern: they are far
+    from the median of five samples.
+
+    Parameters
+    ----------
+    track : Track
+        One body.
 
     Examples
     --------
