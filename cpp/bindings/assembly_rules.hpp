@@ -66,6 +66,6 @@ inline void set_shared(driftwalk::AssemblyRules& rules, double hidden_share, dou
 
 inline void require_blocks(std::size_t blocks) {
   if (blocks < 1 || blocks > driftwalk::most_blocks) {
-    throw std::invalid_argument("a world has 1 to 256 blocks");
+    throw std::invalid_argument("a world has 1 to " + std::to_string(driftwalk::most_blocks) + " blocks");
   }
 }

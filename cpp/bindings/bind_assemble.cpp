@@ -1,5 +1,6 @@
 // Bindings of the self-assembly core.
 #include "assembly_rules.hpp"
+#include "pull.hpp"
 
 #include "driftwalk/assembly/assemble.hpp"
 #include "driftwalk/simulate/threads.hpp"
@@ -39,7 +40,8 @@ nb::dict assemble(const Model& model, In<double, 3> start, In<std::uint64_t, 1> 
                   const std::string& latching, double connector_distance, double connector_axis,
                   double hidden_share, double stirring_length, bool incompressible,
                   double block_restitution, double block_friction, int sample_every, int threads,
-                  const std::string& precision, std::optional<In<double, 1>> flow_start) {
+                  const std::string& precision, std::optional<In<double, 1>> flow_start,
+                  const Pull* pull) {
   const std::size_t worlds = start.shape(0), blocks = start.shape(1);
   require_blocks(blocks);
   if (start.shape(2) != 3 || key.size() != worlds || drag_coefficient.size() != worlds ||
@@ -57,6 +59,9 @@ nb::dict assemble(const Model& model, In<double, 3> start, In<std::uint64_t, 1> 
   set_shared(rules, hidden_share, stirring_length, incompressible);
   rules.restitution = block_restitution;
   rules.friction = block_friction;
+  if (pull != nullptr) {
+    rules.pull = pull->rules();
+  }
   const driftwalk::AssemblyWorlds batch{static_cast<std::int64_t>(worlds),
                                         steps,
                                         start.data(),
@@ -122,11 +127,12 @@ nb::dict assemble(const Model& model, In<double, 3> start, In<std::uint64_t, 1> 
 
 void register_assemble(nb::module_& module);
 void register_assemble(nb::module_& module) {
+  register_pull(module);
   module.def("place_blocks", &place_blocks, "model"_a, nb::kw_only(), "blocks"_a, "key"_a,
              "threads"_a);
   module.def("assemble", &assemble, "model"_a, nb::kw_only(), "start"_a, "key"_a,
              "drag_coefficient"_a, "force_std"_a, "steps"_a, "latching"_a, "connector_distance"_a,
              "connector_axis"_a, "hidden_share"_a, "stirring_length"_a, "incompressible"_a,
              "block_restitution"_a, "block_friction"_a, "sample_every"_a, "threads"_a,
-             "precision"_a, "flow_start"_a = nb::none());
+             "precision"_a, "flow_start"_a = nb::none(), "pull"_a = nb::none());
 }

@@ -141,6 +141,14 @@ void LiveWorld::set_rules(Latching latching, double hidden_share, double stirrin
   inside_->pack.renew();
 }
 
+void LiveWorld::set_pull(const PullRules& pull) {
+  inside_->rules.pull = pull;
+  for (int b = 0; b < inside_->rules.blocks; ++b) {
+    set_poles(inside_->rules, inside_->pack.memory(), b, 0);
+  }
+  inside_->pack.renew();
+}
+
 int LiveWorld::set_blocks(int blocks) {
   blocks = std::clamp(blocks, 1, most_blocks);
   if (blocks < inside_->rules.blocks) {

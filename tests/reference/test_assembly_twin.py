@@ -18,6 +18,7 @@ from twin_assembly import SIDE, Floats, study, swirl
 
 import driftwalk as dw
 from driftwalk import _core
+from driftwalk.assembly.pull.tables import block_pull
 from driftwalk.core.seeds import world_keys
 from driftwalk.simulation.backend import Camera, native_model
 
@@ -55,6 +56,7 @@ def native_row(
         hidden_share=hidden,
         stirring_length=0.0,
         incompressible=False,
+        pull=None if (pull := block_pull(model)) is None else pull.native,
         **alone,
         **arguments,
     )
@@ -105,6 +107,24 @@ def drain(model: dw.Study, *, inflow: float, spin: float) -> xr.Dataset:
     flow["u"] = flow["u"].copy(data=-inflow * x - spin * y)
     flow["v"] = flow["v"].copy(data=-inflow * y + spin * x)
     return flow
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "interaction",
+    [
+        {"magnets": "3x3x1mm,1.2T"},
+        {"capillary": "on", "meniscus_height_m": 2e-3, "approach_resistance_N_s": 1e-4},
+    ],
+)
+@pytest.mark.parametrize("latching", ["collision", "none"])
+def test_blocks_that_feel_each_other_agree(latching: str, interaction: dict[str, Any]) -> None:
+    model = study(0.2, interaction=interaction)
+    start = placed(model, swirl(model), 5, world_key(3))
+    compare(
+        model, swirl(model), start=start, key=world_key(3), force_std=1e-3, steps=100,
+        latching=latching,
+    )  # fmt: skip
 
 
 @pytest.mark.slow

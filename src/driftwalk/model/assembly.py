@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar, Final, Literal
 
 from driftwalk.model.section import Quantity, Section, Seed
 
-MOST_BLOCKS: Final = 256
+MOST_BLOCKS: Final = 2000
 """The most that the native core takes."""
 
 Latching = Literal["collision", "connector", "none"]

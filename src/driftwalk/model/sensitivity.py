@@ -12,6 +12,7 @@ from driftwalk.core.grid import MOST_SETTINGS
 from driftwalk.model.assembly import MOST_BLOCKS, HiddenFaceDrag, Latching
 from driftwalk.model.calibration import ForceGrid
 from driftwalk.model.forces import DragCoefficient, ForceStd
+from driftwalk.model.interaction import MagnetText, parse_magnet
 from driftwalk.model.section import Quantity, Seed
 
 AXES: Final[dict[str, str]] = {
@@ -21,6 +22,7 @@ AXES: Final[dict[str, str]] = {
     "latching": "latching",
     "hidden_face_drag": "hidden_face_drag",
     "stirring_length": "stirring_length_m",
+    "magnets": "magnets",
     "drag_coefficient": "drag_coefficient",
     "force_std": "force_std_N",
 }
@@ -76,6 +78,10 @@ class Sensitivity(ForceGrid):
         default=None, examples=["[0.0, 0.03, 0.1]"]
     )
     """Lengths over which blocks share the stochastic force to compare, an axis of the map."""
+    magnets: tuple[MagnetText, ...] | None = Field(
+        default=None, examples=['["none", "3x3x1mm,1.2T"]']
+    )
+    """Magnets to compare, an axis of the map."""
     drag_coefficient: tuple[DragCoefficient, ...] | None = Field(
         default=None, examples=["[0.2, 0.45, 1.0]"]
     )
@@ -90,6 +96,13 @@ class Sensitivity(ForceGrid):
             raise ConfigurationError("the list is empty; leave the key out or name a value")
         if values is not None and len(set(values)) < len(values):
             raise ConfigurationError(f"the list names a value twice: {list(values)}")
+        return values
+
+    @field_validator("magnets")
+    @classmethod
+    def _are_magnets(cls, values: tuple[str, ...] | None) -> tuple[str, ...] | None:
+        for text in values or ():
+            parse_magnet(text)
         return values
 
     @model_validator(mode="after")

@@ -1,13 +1,14 @@
 // What a batch of worlds with several blocks is: plain data, no logic.
 #pragma once
 
+#include "driftwalk/assembly/pull_rules.hpp"
 #include "driftwalk/simulate/prepared.hpp"
 
 #include <cstdint>
 
 namespace driftwalk {
 
-inline constexpr int most_blocks = 256; // of a world
+inline constexpr int most_blocks = 2000; // of a world
 
 enum class Latching : int { none = 0, collision = 1, connector = 2 };
 
@@ -33,6 +34,7 @@ struct AssemblyRules {
   // it is divergence-free.
   double stirring_length = 0;
   bool incompressible = false;
+  PullRules pull;
 };
 
 struct AssemblyWorlds {

@@ -6,11 +6,13 @@ follows: which assemblies they were, what shapes these had, and the outcome clas
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.assembly.lattice.many_blocks import DiscWorld, SquareWorld, replay_many
 from driftwalk.assembly.lattice.polyomino import STEPS, Chirality, name_of, require_chirality
 from driftwalk.assembly.outcomes.class_names import (
     all_single,
@@ -18,10 +20,10 @@ from driftwalk.assembly.outcomes.class_names import (
     listed_classes,
     listed_shapes,
 )
-from driftwalk.assembly.outcomes.disc_contacts import disc_shape, touching
+from driftwalk.assembly.outcomes.disc_contacts import CONTACT_POLICY, disc_shape, touching
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
-from driftwalk.schema.shapes import moved_to_origin
+from driftwalk.schema.shapes import MOST_NAMED, moved_to_origin
 
 
 class ReplayedEvents(NamedTuple):
@@ -94,6 +96,9 @@ def replay_events(
     events = _Events(*map(_whole, (event_count, event_block, event_face)))
     end = _Lattice(*map(_whole, (cell, quarter, assembly)))
     _check_arrays(events, end)
+    if end.assembly.shape[1] > MOST_NAMED:
+        blocks = end.assembly.shape[1]
+        return _replay_many(events, end, lambda _: SquareWorld(blocks, chirality))
     replay = _Replay(*end.assembly.shape, slots=events.block.shape[1], chirality=chirality)
     for event in range(int(events.number.max(initial=0))):
         replay.apply(event, np.flatnonzero(events.number > event), events)
@@ -136,11 +141,22 @@ def replay_contacts(
     events = _Events(_whole(event_count), block, np.zeros_like(block))
     end = _Lattice(np.zeros((*labels.shape, 2), np.int64), np.zeros_like(labels), labels)
     _check_arrays(events, end)
+    if end.assembly.shape[1] > MOST_NAMED:
+        reach = diameter * (1.0 + CONTACT_POLICY.gap)
+        return _replay_many(events, end, lambda run: DiscWorld(pose[run], reach=reach))
     replay = _DiscReplay(pose, slots=block.shape[1], diameter=diameter)
     for event in range(int(events.number.max(initial=0))):
         replay.apply(event, np.flatnonzero(events.number > event), events)
     _check_end(replay.lattice, end)
     return replay.result()
+
+
+def _replay_many(
+    events: _Events, end: _Lattice, world_of: Callable[[int], SquareWorld]
+) -> ReplayedEvents:
+    found = replay_many(*events, world_of=world_of)
+    _check_end(_Lattice(found.cell, found.quarter, found.assembly), end)
+    return ReplayedEvents(*found[:6])
 
 
 class _Events(NamedTuple):
