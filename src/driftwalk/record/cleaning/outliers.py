@@ -152,8 +152,8 @@ def without_outliers(track: Track) -> Track:
 def without_far_outliers(track: Track) -> Track:
     """Return a track without the mistakes that are longer than the body's usual steps.
 
-    One that is found lets the next one show. Successive ones mask each other's pattern: they are far
-    from the median of five samples.
+    One that is found lets the next one show. Successive ones mask each other's pattern: they are
+    far from the median of five samples.
 
     Parameters
     ----------
