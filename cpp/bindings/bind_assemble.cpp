@@ -39,7 +39,8 @@ nb::dict assemble(const Model& model, In<double, 3> start, In<std::uint64_t, 1> 
                   const std::string& latching, double connector_distance, double connector_axis,
                   double hidden_share, double stirring_length, bool incompressible,
                   double block_restitution, double block_friction, int sample_every, int threads,
-                  const std::string& precision, std::optional<In<double, 1>> flow_start) {
+                  const std::string& precision, const driftwalk::FaceRules* faces,
+                  std::optional<In<double, 1>> flow_start) {
   const std::size_t worlds = start.shape(0), blocks = start.shape(1);
   require_blocks(blocks);
   if (start.shape(2) != 3 || key.size() != worlds || drag_coefficient.size() != worlds ||
@@ -57,6 +58,7 @@ nb::dict assemble(const Model& model, In<double, 3> start, In<std::uint64_t, 1> 
   set_shared(rules, hidden_share, stirring_length, incompressible);
   rules.restitution = block_restitution;
   rules.friction = block_friction;
+  rules.faces = faces;
   const driftwalk::AssemblyWorlds batch{static_cast<std::int64_t>(worlds),
                                         steps,
                                         start.data(),
@@ -128,5 +130,5 @@ void register_assemble(nb::module_& module) {
              "drag_coefficient"_a, "force_std"_a, "steps"_a, "latching"_a, "connector_distance"_a,
              "connector_axis"_a, "hidden_share"_a, "stirring_length"_a, "incompressible"_a,
              "block_restitution"_a, "block_friction"_a, "sample_every"_a, "threads"_a,
-             "precision"_a, "flow_start"_a = nb::none());
+             "precision"_a, "faces"_a.none() = nb::none(), "flow_start"_a = nb::none());
 }

@@ -141,6 +141,13 @@ void LiveWorld::set_rules(Latching latching, double hidden_share, double stirrin
   inside_->pack.renew();
 }
 
+void LiveWorld::set_faces(const FaceRules* faces) {
+  inside_->rules.faces = faces;
+  for (int b = 0; b < inside_->rules.blocks; ++b) {
+    inside_->pack.memory().book(b, 0).kind = first_kind(faces, b);
+  }
+}
+
 int LiveWorld::set_blocks(int blocks) {
   blocks = std::clamp(blocks, 1, most_blocks);
   if (blocks < inside_->rules.blocks) {
@@ -189,6 +196,7 @@ void LiveWorld::read(const LiveBlocks& out) const {
     out.cell[2 * b] = book.cell_x;
     out.cell[2 * b + 1] = book.cell_y;
     out.quarter[b] = book.quarter;
+    out.kind[b] = book.kind;
   }
 }
 

@@ -91,6 +91,7 @@ void part_blocks(const AssemblyRules& rules, Scene& scene) {
     SceneBlock& block = scene.block[b];
     block.assembly = b;
     block.cell_x = block.cell_y = block.quarter = 0;
+    block.kind = first_kind(rules.faces, b);
   }
   for (int a = 0; a < scene.blocks; ++a) {
     const SceneAssembly from = scene.assembly[a];

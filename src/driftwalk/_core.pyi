@@ -142,6 +142,20 @@ def available_instruction_sets() -> list[str]: ...
 def place_blocks(
     model: Model, *, blocks: int, key: _Keys, threads: int
 ) -> tuple[_Floats, npt.NDArray[np.int32]]: ...
+
+# Typed faces. latches (types, types), 0 or 1; of each kind type and pole (kinds, 4), of the faces
+# +x, +y, -x, -y, and count (kinds,) at the start; becomes (kinds * 4, types): the kind after a latch.
+class FaceRules:
+    def __init__(
+        self,
+        *,
+        latches: npt.NDArray[np.int32],
+        type: npt.NDArray[np.int32],
+        pole: npt.NDArray[np.int32],
+        count: npt.NDArray[np.int32],
+        becomes: npt.NDArray[np.int32],
+    ) -> None: ...
+
 def assemble(
     model: Model,
     *,
@@ -161,6 +175,7 @@ def assemble(
     sample_every: int,
     threads: int,
     precision: str,
+    faces: FaceRules | None = None,
     flow_start: _Floats | None = None,
 ) -> dict[str, npt.NDArray[Any] | int]: ...
 
@@ -183,17 +198,20 @@ class LiveWorld:
         incompressible: bool,
         block_restitution: float,
         block_friction: float,
+        faces: FaceRules | None = None,
         flow_start: float = 0.0,
     ) -> None: ...
     # The joinings: step (n,), block (n, 2), face (n, 2), as in `assemble`.
     def advance(self, steps: int) -> dict[str, npt.NDArray[np.int32]]: ...
     # pose (blocks, 3) [m, m, rad], velocity (blocks, 3) [m/s, m/s, rad/s], assembly (blocks,),
-    # cell (blocks, 2), quarter (blocks,).
+    # cell (blocks, 2), quarter and kind (blocks,).
     def state(self) -> dict[str, npt.NDArray[Any]]: ...
     def set_forces(
         self, *, drag_coefficient: float, force_std: float, flow_scale: float
     ) -> None: ...
     def set_rules(self, *, latching: str, hidden_share: float, stirring_length: float) -> None: ...
+    # Blocks are of the kinds at the start again.
+    def set_faces(self, faces: FaceRules | None) -> None: ...
     def set_blocks(self, blocks: int) -> int: ...  # as many as there are then
     def part(self) -> None: ...
     @property

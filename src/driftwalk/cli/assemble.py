@@ -5,10 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from driftwalk.cli.inputs.model_source import RUN_NAMES, assembly_source, with_glued
+from driftwalk.cli.inputs.model_source import (
+    RUN_NAMES,
+    assembly_source,
+    with_binding,
+    with_glued,
+)
 from driftwalk.cli.inputs.recordings import opening_note
 from driftwalk.cli.options.run import RunOptions, with_run_options
-from driftwalk.cli.options.shared_types import FlowFile, Run, option
+from driftwalk.cli.options.shared_types import PANEL, FlowFile, Run, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_prediction
 from driftwalk.core.errors import InputError
@@ -36,6 +41,15 @@ def assemble(
             show_default=False,
         ),
     ] = None,
+    binding: Annotated[
+        Path | None,
+        option(
+            "--binding FILE",
+            "Kinds of blocks, types of their faces, and which of them latch, as a TOML table.",
+            panel=PANEL,
+            show_default=False,
+        ),
+    ] = None,
     film: Annotated[str, option("--film gif|mp4|none", "Film of the first run.")] = "gif",
     *,
     options: RunOptions,
@@ -50,7 +64,7 @@ def assemble(
     from driftwalk.runs import AssemblyWork
 
     _check_film(film)
-    given, quantiles = with_glued(given, glued)
+    given, quantiles = with_glued(with_binding(given, binding), glued)
     refused = [] if given.file is None else ["--study"]
     source = assembly_source(run, flow, given, refused=refused)
     work = AssemblyWork(

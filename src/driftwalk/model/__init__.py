@@ -1,6 +1,7 @@
 """Parameters of a simulation: frozen, with units, read from and written to TOML."""
 
 from driftwalk.model.assembly import Assembly
+from driftwalk.model.binding import Binding, read_binding
 from driftwalk.model.block import Block
 from driftwalk.model.calibration import Calibration
 from driftwalk.model.fit import Fit
@@ -28,6 +29,7 @@ from driftwalk.model.template import (
 
 __all__ = [
     "Assembly",
+    "Binding",
     "Block",
     "Calibration",
     "Columns",
@@ -51,6 +53,7 @@ __all__ = [
     "load_study",
     "parameter_table",
     "parse_study",
+    "read_binding",
     "short_study_template",
     "study_template",
 ]

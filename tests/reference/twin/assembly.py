@@ -42,11 +42,13 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.assembly.lattice.typed_faces import FaceTable
 from driftwalk.core.errors import InputError
 from driftwalk.simulation.backend import wall_edges
 from twin.block import TwinModel, drag, force_normals, next_force, push_of_water
 from twin.body import Assembly, Floats, Square, cross, single_block, wrapped
 from twin.contacts import collide, overlapping_pairs, separate
+from twin.faces import Faces
 from twin.latch import Joined, Latch, Latching, candidates, latch_once
 from twin.wall import Wall, meet_wall
 
@@ -132,6 +134,7 @@ def assemble_reference(
     hidden_face_drag: HiddenFaceDrag,
     block_restitution: float,
     block_friction: float,
+    faces: FaceTable | None = None,
     sample_every: int = 0,
 ) -> dict[str, Any]:
     """Simulate the self-assembly of one world.
@@ -159,6 +162,8 @@ def assemble_reference(
         Whether faces inside an assembly feel the water.
     block_restitution, block_friction : float
         Of collisions between blocks [1].
+    faces : FaceTable, optional
+        Rules of typed faces.
     sample_every : int, optional
         Steps between samples of the path; 0: none, and a complete world ends early.
 
@@ -190,7 +195,12 @@ def assemble_reference(
     rules = make_rules(
         study,
         flow,
-        latch=Latch(latching, connector_distance, connector_axis),
+        latch=Latch(
+            latching,
+            connector_distance,
+            connector_axis,
+            None if faces is None else Faces(faces, faces.first_kinds(len(start)).tolist()),
+        ),
         drag_coefficient=drag_coefficient,
         hidden_face_drag=hidden_face_drag,
         block_restitution=block_restitution,

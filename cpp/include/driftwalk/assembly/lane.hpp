@@ -85,7 +85,7 @@ inline void load_block(const AssemblyRules& rules, const double* pose, const Pac
   for (Real& normal : m.normals) {
     put(normal, lane, T(0));
   }
-  pack.book(block, lane) = {0, 0, 0, 0};
+  pack.book(block, lane) = {0, 0, 0, 0, first_kind(rules.faces, block)};
 }
 
 template <class Real, class T>
@@ -121,6 +121,7 @@ inline void fill_scene(const AssemblyRules& rules, const PackMemory<Real>& pack,
     block.cell_y = book.cell_y;
     block.quarter = book.quarter;
     block.joined = book.joined;
+    block.kind = book.kind;
     block.turn = book.turn;
     block.offset_x = get(m.offset_x, lane);
     block.offset_y = get(m.offset_y, lane);
@@ -190,7 +191,9 @@ inline void read_block(const AssemblyRules& rules, const Scene& scene, const Pac
   pack.book(b, lane) = {static_cast<std::int16_t>(block.cell_x),
                         static_cast<std::int16_t>(block.cell_y),
                         static_cast<std::uint8_t>(block.quarter),
-                        static_cast<std::uint8_t>(block.joined), block.turn};
+                        static_cast<std::uint8_t>(block.joined),
+                        block.kind,
+                        block.turn};
   cover_faces(rules, pack, b, lane);
 }
 

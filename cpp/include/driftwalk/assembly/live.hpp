@@ -23,6 +23,7 @@ struct LiveBlocks {
   std::int32_t* assembly; // lowest block of its assembly
   std::int32_t* cell;     // [x, y] on the assembly's lattice
   std::int32_t* quarter;
+  std::int32_t* kind; // of typed faces
 };
 
 // Joinings of the last `advance`, as in AssemblyOutputs.
@@ -48,6 +49,8 @@ public:
   void set_forces(const LiveForces& forces);
   // What is joined stays so.
   void set_rules(Latching latching, double hidden_share, double stirring_length);
+  // Blocks are of the kinds at the start again; the rules have to outlive the world.
+  void set_faces(const FaceRules* faces);
   // Removes the last blocks, or adds blocks at random free places, at rest, as long as there are
   // any. Returns the number of blocks, 1 to most_blocks.
   int set_blocks(int blocks);

@@ -1,6 +1,7 @@
 // What a batch of worlds with several blocks is: plain data, no logic.
 #pragma once
 
+#include "driftwalk/assembly/face_rules.hpp"
 #include "driftwalk/simulate/prepared.hpp"
 
 #include <cstdint>
@@ -25,7 +26,8 @@ struct AssemblyRules {
   // between blocks
   double restitution = 0, friction = 0;
   Latching latching = Latching::collision;
-  double connector_distance = 0; // largest distance between the centres of two faces that latch
+  const FaceRules* faces = nullptr; // null: any face latches with any
+  double connector_distance = 0;    // largest distance between the centres of two faces that latch
   // Cosine of the largest angle between a face's normal and the other's opposite.
   double connector_cosine = 1;
   double hidden_share = 0; // of the drag of a free face that a joined face feels, 0 to 1

@@ -16,6 +16,7 @@ struct SceneBlock {
   int next;                  // next member of the assembly, -1 after the last
   int cell_x, cell_y;        // on the assembly's lattice
   int quarter;               // its own frame is the assembly's turned by this many quarter turns
+  std::uint8_t kind;         // of typed faces
   unsigned joined;           // bit f: face f (of the assembly's frame) has a neighbour
   double turn;               // of a disc, in place of the quarter turns [rad], 0 to 2 pi
   double offset_x, offset_y; // from the centre of mass, in the assembly's frame [m]

@@ -90,6 +90,15 @@ Beyond beyond_wall(const AssemblyRules& rules, const Scene& scene, int assembly)
 // Shifts an assembly inward, corner by corner, the farthest first; false when it stays outside.
 bool push_inside(const AssemblyRules& rules, Scene& scene, int assembly, int rounds);
 
+// Whether the types of two faces, each in its assembly's frame, latch.
+bool types_latch(const FaceRules& faces, const SceneBlock& block, int face, const SceneBlock& other,
+                 int peer);
+// Whether a merge into `joint`, before which `blocks_before` holds the blocks, brings at least as
+// many pairs of like poles side by side as pairs of faces that latch: it would fall apart.
+bool poles_refuse(const FaceRules& faces, const Scene& scene, int joint, int stayed);
+// Makes two blocks what they become when these faces, in their own frames, have latched.
+void become(const FaceRules& faces, SceneBlock& block, int face, SceneBlock& other, int peer);
+
 // Merges what latches, one pair of faces after the other.
 void latch(const AssemblyRules& rules, Scene& scene);
 

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.lattice.polyomino import STEPS, Chirality, name_of, require_chirality
+from driftwalk.assembly.lattice.typed_faces import FaceTable
 from driftwalk.assembly.outcomes.class_names import (
     all_single,
     class_name,
@@ -39,6 +40,8 @@ class ReplayedEvents(NamedTuple):
     """Names of the classes: all for up to 8 blocks, beyond that those that occurred."""
     shapes: tuple[str, ...]
     """Names of the shapes, by the same rule."""
+    kind: Integers
+    """Kinds of the blocks at the end, (run, block); 0 where faces have no types."""
 
 
 def replay_events(
@@ -50,6 +53,7 @@ def replay_events(
     quarter: npt.ArrayLike,
     assembly: npt.ArrayLike,
     chirality: Chirality = "merged",
+    faces: FaceTable | None = None,
 ) -> ReplayedEvents:
     """Replay the events of simulated runs on the lattice.
 
@@ -69,6 +73,8 @@ def replay_events(
         Lowest block of the assembly of each block at the end.
     chirality : {"merged", "distinct"}
         Whether mirror images are one shape or two.
+    faces : FaceTable, optional
+        Rules of typed faces; default: every face latches with every other.
 
     Returns
     -------
@@ -79,7 +85,8 @@ def replay_events(
     ------
     InputError
         When shapes disagree, an event cannot be (a face of no block, two blocks of one assembly, a
-        cell taken twice), or the events do not lead to the state at the end; names the run.
+        cell taken twice, faces whose types do not latch), or the events do not lead to the state at
+        the end; names the run.
 
     Examples
     --------
@@ -95,6 +102,9 @@ def replay_events(
     end = _Lattice(*map(_whole, (cell, quarter, assembly)))
     _check_arrays(events, end)
     replay = _Replay(*end.assembly.shape, slots=events.block.shape[1], chirality=chirality)
+    if faces is not None:
+        replay.faces = faces
+        replay.kind[:] = faces.first_kinds(replay.blocks)
     for event in range(int(events.number.max(initial=0))):
         replay.apply(event, np.flatnonzero(events.number > event), events)
     _check_end(replay.lattice, end)
@@ -190,6 +200,8 @@ class _Replay:
         self.event_shape = np.full((runs, slots, 3), -1, dtype=np.int32)
         self.event_class = np.full((runs, slots), -1, dtype=np.int32)
         self.outcome = np.zeros(runs, dtype=np.int32)
+        self.faces: FaceTable | None = None
+        self.kind = np.zeros((runs, blocks), dtype=np.int64)
 
     def apply(self, event: int, at: Integers, events: _Events) -> None:
         """Apply the event of this number to the runs that have it."""
@@ -199,6 +211,7 @@ class _Replay:
         self.event_assembly[at, event] = own
         self.event_shape[at, event, :2] = np.take_along_axis(self.shape_of[at], own, axis=1)
         self._align(at, events.block[at, event], events.face[at, event])
+        self._latch(at, event, events)
         low, high = own.min(axis=1), own.max(axis=1)
         member = (labels == low[:, None]) | (labels == high[:, None])
         self.lattice.assembly[at] = np.where(member, low[:, None], labels)
@@ -219,7 +232,16 @@ class _Replay:
             class_index[self.outcome],
             classes,
             shapes,
+            self.kind,
         )
+
+    def _latch(self, at: Integers, event: int, events: _Events) -> None:
+        """Refuse faces that may not latch, and make blocks what they become."""
+        if self.faces is not None:
+            pair = at[:, None], events.block[at, event]
+            holds, became = self.faces.latch(self.kind[pair], events.face[at, event])
+            _refuse(~holds, at, event, "joins two faces whose types do not latch")
+            self.kind[pair] = became
 
     def _align(self, at: Integers, block: Integers, face: Integers) -> None:
         """Turn and shift the assemblies that move so that the two faces of each event coincide."""

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.lattice.events import ReplayedEvents, replay_contacts, replay_events
+from driftwalk.assembly.lattice.typed_faces import face_table
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
@@ -111,6 +112,7 @@ def replay_of(plan: Plan, arrays: Arrays) -> ReplayedEvents:
         *(arrays[f"event_{name}"] for name in ("count", "block", "face")),
         **{name: arrays[name] for name in ("cell", "quarter", "assembly")},
         chirality=plan.study.assembly.chirality,
+        faces=face_table(plan.study.assembly),
     )
 
 
@@ -163,6 +165,7 @@ def assembly_attrs(plan: Plan) -> dict[str, Any]:
         "chirality": settings.chirality,
         "latching": settings.latching,
         **(connector if settings.latching == "connector" else {}),
+        **({} if (faces := settings.typed_faces) is None else {"faces": faces.words}),
         "hidden_face_drag": "full" if plan.is_round else str(settings.hidden_face_drag),
         "block_restitution": settings.block_restitution,
         "block_friction": settings.block_friction,

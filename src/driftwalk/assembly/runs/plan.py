@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
+from driftwalk.assembly.lattice.typed_faces import face_table
 from driftwalk.assembly.runs.start import given_start, place_blocks, require_cover, require_room
 from driftwalk.core.arrays import Floats, Integers, Keys
 from driftwalk.core.errors import InputError
@@ -82,6 +83,7 @@ class Plan:
             "incompressible": self.study.forces.stirring == "incompressible",
             "block_restitution": rules.block_restitution,
             "block_friction": rules.block_friction,
+            "faces": None if (table := face_table(rules)) is None else table.native(),
         }
 
 

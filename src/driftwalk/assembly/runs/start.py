@@ -42,6 +42,11 @@ def require_room(study: Study) -> None:
             "connectors latch face to face, and discs have no faces: latching is 'collision' or "
             "'none' for them (`assembly.latching`)"
         )
+    if study.block.is_round and study.assembly.typed_faces is not None:
+        raise InputError(
+            "discs have no faces: leave out their types (`assembly.faces`, `assembly.binding`), or "
+            "take squares"
+        )
     count, side, tank = study.assembly.blocks, study.block.side_m, study.tank
     room = tank_area(tank)
     if count * study.block.area_m2 > room:

@@ -62,6 +62,8 @@ def assembly_answer(
         f"C_d = {facts['drag_coefficient']:.4g}, σ_F = {1e3 * facts['force_std_N']:.4g} mN redrawn "
         f"every {1e3 * facts['force_interval_s']:g} ms"
     ]
+    if "faces" in facts:
+        parts.append(f"faces: {facts['faces']}")
     if sizes is None:
         parts.append(_classes(found, drawn))
     else:
@@ -82,6 +84,7 @@ def assembly_answer(
     answer = {
         **_json(found, sizes),
         **{key: facts[key] for key in _SETTINGS},
+        **({"faces": facts["faces"]} if "faces" in facts else {}),
         "drawn": None
         if drawn is None
         else {"parameters": _drawn(drawn), **_json(drawn, sizes_drawn)},

@@ -28,6 +28,8 @@ SETTINGS: Final = (
     study
 attributes (blocks that are no squares):
     block_shape text: their shape
+attributes (faces have types):
+    faces text: kinds of blocks, and which types of their faces latch
 attributes (latching by a connector):
     connector_distance_m number: tolerance of the connector
     connector_axis_rad number: tolerance of the connector
