@@ -144,7 +144,7 @@ def place_blocks(
 ) -> tuple[_Floats, npt.NDArray[np.int32]]: ...
 
 # Typed faces. latches (types, types), 0 or 1; of each kind type and pole (kinds, 4), of the faces
-# +x, +y, -x, -y, and count (kinds,) at the start; becomes (kinds * 4, types): the kind after a latch.
+# +x, +y, -x, -y, and count (kinds,) at the start; becomes (kinds * 4, types): kinds after a latch.
 class FaceRules:
     def __init__(
         self,

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from driftwalk import _core
 from driftwalk.assembly.lattice.join_history import LatticeWorld
 from driftwalk.assembly.lattice.joined_faces import ROUNDING
+from driftwalk.assembly.lattice.typed_faces import face_table
 from driftwalk.assembly.outcomes.disc_contacts import disc_class
 from driftwalk.assembly.runs.dataset import times_of
 from driftwalk.assembly.runs.plan import MOST_STEPS, make_plan, start_poses
@@ -211,6 +212,7 @@ class LiveTank:
         force_std: float | None = None,
         flow_scale: float | None = None,
         latching: Latching | None = None,
+        faces: str | None = None,
         hidden_face_drag: HiddenFaceDrag | str | None = None,
         stirring_length: float | None = None,
         blocks: int | None = None,
@@ -229,6 +231,8 @@ class LiveTank:
         latching : {"collision", "connector", "none"}
             How blocks latch from then on. Joined blocks stay joined, even with "none", unless they
             are parted.
+        faces : str
+            Types of the blocks' faces, such as "N,S,N,S", or "any"; what is joined stays so.
         hidden_face_drag : {"none", "full"} or float
             Drag on faces that are joined; a number is its share of a free face's, 0 to 1.
         stirring_length : float
@@ -251,6 +255,7 @@ class LiveTank:
             "forces.drag_coefficient": drag_coefficient,
             "forces.force_std_N": force_std,
             "assembly.latching": latching,
+            "assembly.faces": faces,
             "assembly.hidden_face_drag": hidden_face_drag,
             "forces.stirring_length_m": stirring_length,
             "assembly.blocks": blocks,
@@ -374,6 +379,7 @@ class LiveTank:
         with self._wishes_lock:
             wished = self._wishes
             changed = wished is not self._active
+            before = self._active.study.assembly
             self._wishes = self._active = wished._replace(part=False) if wished.part else wished
         if changed:
             self._set_forces()
@@ -383,6 +389,9 @@ class LiveTank:
                 hidden_share=rules.hidden_share,
                 stirring_length=self._active.study.forces.stirring_length_m,
             )
+            if (rules.faces, rules.binding) != (before.faces, before.binding):
+                table = face_table(rules)
+                self._world.set_faces(None if table is None else table.native())
         if wished.part:
             self._world.part()
             self._look()

@@ -234,9 +234,14 @@ def read_binding(path: str | Path) -> Binding:
 def _place(text: str, message: str) -> str:
     """Return line and column of the last place of the word that a message quotes first."""
     word = re.search(r"'([^']+)'", message)
-    spots = [] if word is None else re.finditer(rf"(?<!\w){re.escape(word[1])}(?!\w)", text)
-    starts = [spot.start() for spot in spots]
-    if not starts:
+    if word is None:
+        return ""
+    # A kind stands where it is named; anything else where it comes last.
+    for place in (rf'(?<=name = "){re.escape(word[1])}"', rf"(?<!\w){re.escape(word[1])}(?!\w)"):
+        starts = [spot.start() for spot in re.finditer(place, text)]
+        if starts:
+            break
+    else:
         return ""
     line = text.count("\n", 0, starts[-1]) + 1
     return f", line {line}, column {starts[-1] - text.rfind(chr(10), 0, starts[-1])}"
