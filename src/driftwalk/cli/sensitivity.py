@@ -43,6 +43,7 @@ AXES: Final = {
     "blocks": "sensitivity.blocks",
     "flow": "sensitivity.flow",
     "latching": "sensitivity.latching",
+    "faces": "sensitivity.faces",
     "hidden-face-drag": "sensitivity.hidden_face_drag",
     "stirring-length": "sensitivity.stirring_length_m",
     "drag-coefficient": "sensitivity.drag_coefficient",

@@ -19,6 +19,7 @@ AXES: Final[dict[str, str]] = {
     "blocks": "blocks",
     "flow": "flow",
     "latching": "latching",
+    "faces": "faces",
     "hidden_face_drag": "hidden_face_drag",
     "stirring_length": "stirring_length_m",
     "drag_coefficient": "drag_coefficient",
@@ -68,6 +69,8 @@ class Sensitivity(ForceGrid):
         default=None, examples=['["collision", "connector"]']
     )
     """Latching rules to compare, an axis of the map."""
+    faces: tuple[str, ...] | None = Field(default=None, examples=['["any", "NSNS"]'])
+    """Types of the blocks' faces to compare, an axis of the map."""
     hidden_face_drag: tuple[HiddenFaceDrag, ...] | None = Field(
         default=None, examples=['["none", "full"]']
     )

@@ -28,6 +28,11 @@ class FaceTable(NamedTuple):
     becomes: npt.NDArray[np.int32]
     """Kind after a face has latched with a type, (kind, face, type)."""
 
+    @property
+    def rewrites(self) -> bool:
+        """Whether a block ever becomes of another kind."""
+        return bool((self.becomes != np.arange(len(self.type))[:, None, None]).any())
+
     def native(self) -> _core.FaceRules:
         """Return the native core's form of the rules."""
         return _core.FaceRules(

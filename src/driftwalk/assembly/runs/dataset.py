@@ -79,6 +79,7 @@ def build_assembly(plan: Plan, arrays: Arrays, *, attrs: dict[str, Any]) -> xr.D
         data["event_face"] = (by_side, whole["event_face"])
         data["cell"] = ((*by_block, "axis"), whole["cell"])
         data["quarter"] = (by_block, whole["quarter"])
+    data |= _poles(plan)
     if plan.flow_draw is not None:
         data["flow_draw"] = ("run", plan.flow_draw.astype(np.int32))
     if plan.flow_start is not None:
@@ -134,7 +135,7 @@ def build_path(plan: Plan, samples: Arrays, *, every: int) -> xr.Dataset:
     assembly = samples["sample_assembly"].astype(np.int32)
     return build_dataset(
         "assembly_path",
-        {**_poses(pose, dims), "assembly": (dims, assembly)},
+        {**_poses(pose, dims), "assembly": (dims, assembly), **_poles(plan)},
         {
             "run": ("run", plan.index),
             "time": ("time", time),
@@ -146,6 +147,15 @@ def build_path(plan: Plan, samples: Arrays, *, every: int) -> xr.Dataset:
             "sample_interval_s": float(np.round(every * step, DECIMALS)),
         },
     )
+
+
+def _poles(plan: Plan) -> dict[str, Any]:
+    """Return the poles of the blocks' faces, where there are any and no block changes them."""
+    table = face_table(plan.study.assembly)
+    if table is None or not table.pole.any() or table.rewrites:
+        return {}
+    kinds = table.first_kinds(plan.study.assembly.blocks)
+    return {"pole": (("block", "face"), table.pole[kinds])}
 
 
 def assembly_attrs(plan: Plan) -> dict[str, Any]:

@@ -42,6 +42,11 @@ _CLASS: Final = (
 )
 _ORDER: Final = "first of the assembly that stayed, then of the one that was moved"
 _FACES: Final = "faces that joined, in the blocks' own frames: 0 +x, 1 +y, 2 -x, 3 -y"
+_POLES: Final = """
+variables (faces are magnets, and stay so):
+    pole(block face) [1] int: pole of the magnet at each face +x, +y, -x, -y of the block: 1 N, \
+        -1 S, 0 none
+"""
 _LOWEST: Final = "assembly of the block, as its lowest block"
 _NOWHERE: Final = "-1 where there is none"
 
@@ -56,6 +61,7 @@ dimensions:
     part: stayed, moved, became
     block: blocks
     axis: x, y
+    face: faces of a block, where they are magnets
     class: every class up to 8 squares; beyond that, and of discs, those that occurred
     shape: polyominoes; contact graphs of discs
 variables:
@@ -97,7 +103,7 @@ variables (drawn from a fit of glued blocks):
     stirring_length(run) [m]: distance over which blocks share the stochastic force
 variables (flow fields were drawn):
     flow_draw(run) int: which drawn flow field the run had
-attributes (made by a run):
+{_POLES}attributes (made by a run):
     drawn text: what was drawn for each run, or "no"
 """,
     began_in_flow("run"),
@@ -117,6 +123,7 @@ dimensions:
     run: chosen runs
     time: samples
     block: blocks
+    face: faces of a block, where they are magnets
 variables:
     x({_PATH}) [m]: position x of the block's centre
     y({_PATH}) [m]: position y of the block's centre
@@ -125,7 +132,7 @@ variables:
     run int
     time(time) [s]: time from the start of the run
     block int
-attributes:
+{_POLES}attributes:
     sample_interval_s number: time between samples
 """,
     *SETTINGS,
