@@ -64,7 +64,7 @@ class Assembly(Section):
         examples=['{ kinds = [{ name = "A", count = 4, faces = ["N", "S", "N", "S"] }] }'],
     )
     """Kinds of blocks, types of their faces, which of them latch, and what blocks become then: the
-    table of `--binding`, in place of `faces`."""
+    table of `driftwalk assemble --binding`, in place of `faces`."""
     hidden_face_drag: HiddenFaceDrag = "none"
     """Drag on faces that are joined.
 

@@ -58,7 +58,7 @@ class Kind(Section):
 
 
 class Rewrite(Section):
-    """What a block becomes after one of its faces has latched."""
+    """The kind that a block is of after one of its faces has latched."""
 
     section_name: ClassVar[str] = "after"
 
@@ -93,7 +93,7 @@ class Binding(Section):
     latches: tuple[tuple[str, ...], ...] = (("N", "S"),)
     """Pairs of types of faces that latch; no others do."""
     after: tuple[Rewrite, ...] = ()
-    """What blocks become."""
+    """Rules of the kinds that blocks are of after a latch."""
 
     @model_validator(mode="after")
     def _known(self) -> Self:
@@ -190,7 +190,7 @@ def face_types(text: str) -> tuple[str, ...] | None:
     wrong = [name for name in found if name not in (*POLES, NO_TYPE)]
     if wrong and "," in text:
         raise ConfigurationError(
-            f"a face is N, S or none, got '{wrong[0]}'; other types stand in a file (--binding)"
+            f"a face is N, S or none, got '{wrong[0]}'; other types stand in a table of kinds"
         )
     if wrong or len(found) != len(SIDES):
         raise ConfigurationError(
@@ -208,6 +208,11 @@ def read_binding(path: str | Path) -> Binding:
     path : path-like
         A TOML file with ``[[kinds]]`` (name, faces, count), ``latches`` (pairs of types) and
         ``[[after]]`` (kind, face, meets, becomes).
+
+    Returns
+    -------
+    Binding
+        The rules, frozen.
 
     Raises
     ------

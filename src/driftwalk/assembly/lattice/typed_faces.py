@@ -20,9 +20,9 @@ class FaceTable(NamedTuple):
     latches: npt.NDArray[np.int32]
     """1 where two types latch, (type, type), symmetric."""
     type: npt.NDArray[np.int32]
-    """Of the faces +x, +y, -x, -y, (kind, face)."""
+    """Type of the faces +x, +y, -x, -y, (kind, face)."""
     pole: npt.NDArray[np.int32]
-    """Of a fixed magnet at a face: +1 N, -1 S, 0 none, (kind, face)."""
+    """Pole of a fixed magnet at a face: +1 N, -1 S, 0 none, (kind, face)."""
     number: npt.NDArray[np.int32]
     """Blocks of the kind at the start, (kind,)."""
     becomes: npt.NDArray[np.int32]

@@ -44,8 +44,7 @@ def require_room(study: Study) -> None:
         )
     if study.block.is_round and study.assembly.typed_faces is not None:
         raise InputError(
-            "discs have no faces: leave out their types (`assembly.faces`, `assembly.binding`), or "
-            "take squares"
+            "discs have no faces: leave out their types (`assembly.faces`), or take squares"
         )
     count, side, tank = study.assembly.blocks, study.block.side_m, study.tank
     room = tank_area(tank)
