@@ -47,6 +47,7 @@ class _Moment:
         self.state: dict[str, npt.NDArray[Any]] = world.state()
         self.time = float(times_of(np.array(world.step), time_step=study.time_step_s))
         self._chirality = study.assembly.chirality
+        self.table = face_table(study.assembly)
         self._diameter = study.block.side_m if study.block.is_round else 0.0
 
     @cached_property
@@ -350,6 +351,17 @@ class LiveTank:
         """Lowest block of each block's assembly: blocks with equal numbers are joined."""
         labels: npt.NDArray[np.int32] = self._moment.state["assembly"].copy()
         return labels
+
+    @property
+    def poles(self) -> npt.NDArray[np.int32]:
+        """Poles of the blocks' faces +x, +y, -x, -y: 1 N, -1 S, 0 none, (block, face).
+
+        No rows where faces have no types.
+        """
+        moment = self._moment
+        if moment.table is None:
+            return np.zeros((0, 4), dtype=np.int32)
+        return moment.table.pole[moment.state["kind"]]
 
     @property
     def outcome(self) -> str:
