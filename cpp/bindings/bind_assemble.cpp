@@ -15,9 +15,10 @@ using namespace nb::literals;
 namespace {
 
 nb::tuple place_blocks(const Model& model, std::size_t blocks, In<std::uint64_t, 1> key,
-                       int threads) {
+                       int threads, Cells glued) {
   require_blocks(blocks);
-  const driftwalk::AssemblyRules rules = rules_of(model, blocks);
+  driftwalk::AssemblyRules rules = rules_of(model, blocks);
+  set_glued(rules, glued);
   const std::size_t worlds = key.size();
   std::vector<double> start(worlds * blocks * 3);
   std::vector<std::int32_t> placed(worlds);
@@ -40,7 +41,7 @@ nb::dict assemble(const Model& model, In<double, 3> start, In<std::uint64_t, 1> 
                   double hidden_share, double stirring_length, bool incompressible,
                   double block_restitution, double block_friction, int sample_every, int threads,
                   const std::string& precision, const driftwalk::FaceRules* faces,
-                  std::optional<In<double, 1>> flow_start) {
+                  std::optional<In<double, 1>> flow_start, Cells glued) {
   const std::size_t worlds = start.shape(0), blocks = start.shape(1);
   require_blocks(blocks);
   if (start.shape(2) != 3 || key.size() != worlds || drag_coefficient.size() != worlds ||
@@ -59,6 +60,7 @@ nb::dict assemble(const Model& model, In<double, 3> start, In<std::uint64_t, 1> 
   rules.restitution = block_restitution;
   rules.friction = block_friction;
   rules.faces = faces;
+  set_glued(rules, glued);
   const driftwalk::AssemblyWorlds batch{static_cast<std::int64_t>(worlds),
                                         steps,
                                         start.data(),
@@ -125,10 +127,11 @@ nb::dict assemble(const Model& model, In<double, 3> start, In<std::uint64_t, 1> 
 void register_assemble(nb::module_& module);
 void register_assemble(nb::module_& module) {
   module.def("place_blocks", &place_blocks, "model"_a, nb::kw_only(), "blocks"_a, "key"_a,
-             "threads"_a);
+             "threads"_a, "glued"_a = nb::none());
   module.def("assemble", &assemble, "model"_a, nb::kw_only(), "start"_a, "key"_a,
              "drag_coefficient"_a, "force_std"_a, "steps"_a, "latching"_a, "connector_distance"_a,
              "connector_axis"_a, "hidden_share"_a, "stirring_length"_a, "incompressible"_a,
              "block_restitution"_a, "block_friction"_a, "sample_every"_a, "threads"_a,
-             "precision"_a, "faces"_a.none() = nb::none(), "flow_start"_a = nb::none());
+             "precision"_a, "faces"_a.none() = nb::none(), "flow_start"_a = nb::none(),
+             "glued"_a = nb::none());
 }

@@ -1,4 +1,4 @@
-// Assemblies that lose blocks, or come apart into them.
+// Assemblies that lose blocks, come apart into them, or are made of them at the start.
 #include "driftwalk/assembly/settle_parts.hpp"
 
 #include <algorithm>
@@ -83,6 +83,23 @@ void keep_first_blocks(const AssemblyRules& rules, Scene& scene, int blocks) {
     }
     scene.assemblies += from.blocks > 0;
   }
+}
+
+void glue_blocks(const AssemblyRules& rules, Scene& scene) {
+  for (int first = 0; first < scene.blocks; first += rules.glued) {
+    const Vec2 at = centre(scene, first);
+    for (int k = 0; k < rules.glued; ++k) {
+      SceneBlock& block = scene.block[first + k];
+      block.assembly = first;
+      block.cell_x = rules.glued_cells[2 * k];
+      block.cell_y = rules.glued_cells[2 * k + 1];
+      scene.assembly[first + k].blocks = 0;
+    }
+    measure_assembly(rules, scene, first);
+    place_by(scene, first, first, at);
+    scene.assembly[first].touched = true;
+  }
+  scene.assemblies = scene.blocks / rules.glued;
 }
 
 void part_blocks(const AssemblyRules& rules, Scene& scene) {

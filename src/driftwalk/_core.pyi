@@ -138,9 +138,14 @@ def available_instruction_sets() -> list[str]: ...
 
 # --- self-assembly ------------------------------------------------------------------------------
 # Start poses [m, m, rad] of shape (worlds, blocks, 3), and how many blocks of each world found a
-# place.
+# place; `glued`: cells (n, 2) of bodies of n blocks each.
 def place_blocks(
-    model: Model, *, blocks: int, key: _Keys, threads: int
+    model: Model,
+    *,
+    blocks: int,
+    key: _Keys,
+    threads: int,
+    glued: npt.NDArray[np.int32] | None = None,
 ) -> tuple[_Floats, npt.NDArray[np.int32]]: ...
 
 # Typed faces. latches (types, types), 0 or 1; of each kind type and pole (kinds, 4), of the faces
@@ -177,6 +182,7 @@ def assemble(
     precision: str,
     faces: FaceRules | None = None,
     flow_start: _Floats | None = None,
+    glued: npt.NDArray[np.int32] | None = None,
 ) -> dict[str, npt.NDArray[Any] | int]: ...
 
 # A world that keeps its state between calls, in double precision. Changes take effect with the next

@@ -16,6 +16,7 @@ from driftwalk.assembly.lattice.joined_faces import ROUNDING
 from driftwalk.assembly.lattice.typed_faces import face_table
 from driftwalk.assembly.outcomes.disc_contacts import disc_class
 from driftwalk.assembly.runs.dataset import times_of
+from driftwalk.assembly.runs.glued import glued_cells
 from driftwalk.assembly.runs.plan import MOST_STEPS, make_plan, start_poses
 from driftwalk.assembly.runs.start import require_room
 from driftwalk.core.arrays import Floats
@@ -122,6 +123,10 @@ class LiveTank:
         plan = make_plan(
             study, flow, settings={"blocks": blocks, "seed": seed}, index=np.arange(1), ends=False
         )
+        if glued_cells(plan.study.assembly) is not None:
+            raise InputError(
+                "a live tank starts with single blocks, not with glued ones (`assembly.glued`)"
+            )
         self._flow = plan.flow
         self._lock = Lock()
         # Never held while the world advances. Where both are held, this one is taken second.
@@ -361,7 +366,7 @@ class LiveTank:
         moment = self._moment
         if moment.table is None:
             return np.zeros((0, 4), dtype=np.int32)
-        return moment.table.pole[moment.state["kind"]]
+        return np.asarray(moment.table.pole[moment.state["kind"]])
 
     @property
     def outcome(self) -> str:

@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar, Final, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from driftwalk.core.errors import ConfigurationError
-from driftwalk.model.binding import Binding, Kind, face_types
+from driftwalk.model.binding import Binding, Kind, face_types, faces_text
 from driftwalk.model.section import Placeholder, Quantity, Section, Seed
 
 MOST_BLOCKS: Final = 256
@@ -65,6 +65,11 @@ class Assembly(Section):
     )
     """Kinds of blocks, types of their faces, which of them latch, and what blocks become then: the
     table of `driftwalk assemble --binding`, in place of `faces`."""
+    glued: Annotated[str, Placeholder("SHAPE")] = "x"
+    """Blocks that start glued together, such as "xx" or "x./xx"; "x": single blocks.
+
+    Rows of the blocks that start glued together, for ever: "xx" are dimers, "x" single blocks.
+    """
     hidden_face_drag: HiddenFaceDrag = "none"
     """Drag on faces that are joined.
 
@@ -94,8 +99,20 @@ class Assembly(Section):
     @field_validator("faces", mode="before")
     @classmethod
     def _four_types(cls, value: Any) -> str:
-        types = face_types(",".join(map(str, value)) if isinstance(value, list) else str(value))
-        return "any" if types is None else ",".join(types)
+        return faces_text(",".join(map(str, value)) if isinstance(value, list) else str(value))
+
+    @field_validator("glued")
+    @classmethod
+    def _glued_shape(cls, value: str) -> str:
+        if value != "x":
+            from driftwalk.model.bodies import Measures, rigid_body
+
+            if not set(value) <= set("x./"):
+                raise ConfigurationError(
+                    f"expected rows of blocks such as xx or x./xx, got '{value}'"
+                )
+            rigid_body(value, Measures(1.0, None, 1, 0.0))
+        return value
 
     @model_validator(mode="after")
     def _one_rule(self) -> Self:

@@ -200,6 +200,12 @@ def face_types(text: str) -> tuple[str, ...] | None:
     return found
 
 
+def faces_text(text: str) -> str:
+    """Return the types of a block's faces as a study has them: "any" or "N,S,N,S"."""
+    types = face_types(text)
+    return "any" if types is None else ",".join(types)
+
+
 def read_binding(path: str | Path) -> Binding:
     """Read a table of the rules of typed faces.
 

@@ -10,6 +10,7 @@ from pydantic import Field, field_validator, model_validator
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.grid import MOST_SETTINGS
 from driftwalk.model.assembly import MOST_BLOCKS, HiddenFaceDrag, Latching
+from driftwalk.model.binding import faces_text
 from driftwalk.model.calibration import ForceGrid
 from driftwalk.model.forces import DragCoefficient, ForceStd
 from driftwalk.model.section import Quantity, Seed
@@ -85,6 +86,11 @@ class Sensitivity(ForceGrid):
     """Drag coefficients to compare, an axis of the map, instead of the range."""
     force_std_N: tuple[ForceStd, ...] | None = Field(default=None, examples=['["0.2mN", "0.55mN"]'])
     """Values of force_std to compare, an axis of the map, instead of the range."""
+
+    @field_validator("faces")
+    @classmethod
+    def _face_types(cls, values: tuple[str, ...] | None) -> tuple[str, ...] | None:
+        return None if values is None else tuple(map(faces_text, values))
 
     @field_validator(*LISTS)
     @classmethod

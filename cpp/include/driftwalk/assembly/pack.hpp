@@ -68,6 +68,9 @@ public:
     book.assemblies = blocks_;
     book.running = true;
     load_lane<Real, T>(rules_, start, memory_, lane);
+    if (rules_.glued > 1) {
+      glue(lane);
+    }
     put(stream_.key0, lane, static_cast<UInt32>(key));
     put(stream_.key1, lane, static_cast<UInt32>(key >> 32));
     put(draw_, lane, 0);
@@ -132,6 +135,14 @@ public:
   }
 
 private:
+  void glue(int lane) {
+    Scene& scene = scratch_.scene;
+    fill_scene(rules_, memory_, lane, blocks_, scene);
+    glue_blocks(rules_, scene);
+    read_scene(rules_, scene, memory_, lane);
+    books_[lane].assemblies = scene.assemblies;
+  }
+
   // The first force of a world has no last one to remember, and the spread of all that follow.
   void begin_force(int lane) {
     put(kept_, lane, 0);

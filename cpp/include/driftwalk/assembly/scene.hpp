@@ -89,6 +89,8 @@ void settle(const AssemblyRules& rules, Scene& scene);
 // some goes on as it was moving; where its blocks no longer hang together it is several assemblies.
 // Those are marked as touched.
 void keep_first_blocks(const AssemblyRules& rules, Scene& scene, int blocks);
+// Glues blocks to the bodies of the start, each where its first block is.
+void glue_blocks(const AssemblyRules& rules, Scene& scene);
 // Makes every block an assembly of its own, which moves as the block did, with its own frame.
 void part_blocks(const AssemblyRules& rules, Scene& scene);
 

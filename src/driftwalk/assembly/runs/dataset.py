@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from driftwalk.assembly.lattice.events import ReplayedEvents, replay_contacts, replay_events
 from driftwalk.assembly.lattice.typed_faces import face_table
+from driftwalk.assembly.runs.glued import glued_cells
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
@@ -181,6 +182,7 @@ def assembly_attrs(plan: Plan) -> dict[str, Any]:
         "block_friction": settings.block_friction,
         "block_side_m": study.block.side_m,
         **({"block_shape": "disc"} if plan.is_round else {}),
+        **({"glued": settings.glued} if glued_cells(settings) is not None else {}),
         "arena": study.tank.to_arena_json(),
         "force_interval_s": forces.force_interval_s,
         "time_step_s": study.time_step_s,

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from driftwalk import _core
 from driftwalk.assembly.lattice.typed_faces import face_table
+from driftwalk.assembly.runs.glued import glued_cells, with_glue_events
 from driftwalk.assembly.runs.start import given_start, place_blocks, require_cover, require_room
 from driftwalk.core.arrays import Floats, Integers, Keys
 from driftwalk.core.errors import InputError
@@ -200,8 +201,10 @@ def simulate_rows(
         threads=plan.threads,
         precision="double" if plan.backend == "reference" else "single",
         flow_start=None if plan.flow_start is None else np.ascontiguousarray(plan.flow_start[rows]),
+        glued=(cells := glued_cells(plan.study.assembly)),
     )
-    return {name: values for name, values in found.items() if isinstance(values, np.ndarray)}
+    arrays = {name: values for name, values in found.items() if isinstance(values, np.ndarray)}
+    return with_glue_events(arrays, cells, plan.study.assembly.blocks)
 
 
 Stream = Literal["run", "parameters", "flow", "glued"]

@@ -30,7 +30,8 @@ RUN_NAMES: Final = (
     *("blocks", "duration", "tank_diameter", "body_shape", "side", "mass", "depth"),
     *("drag_coefficient", "force_std", "force_interval"),
     *("wall_friction", "wall_restitution", "time_step"),
-    *("latching", "connector_distance", "connector_axis", "faces", "hidden_face_drag", "chirality"),
+    *("latching", "connector_distance", "connector_axis", "faces", "glued", "hidden_face_drag"),
+    "chirality",
     *("stirring_length", "stirring"),
     *("block_restitution", "block_friction", "confidence", "seed", "flow_repeat", "flow_start"),
 )

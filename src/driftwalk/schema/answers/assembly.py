@@ -62,6 +62,8 @@ def assembly_answer(
         f"C_d = {facts['drag_coefficient']:.4g}, σ_F = {1e3 * facts['force_std_N']:.4g} mN redrawn "
         f"every {1e3 * facts['force_interval_s']:g} ms"
     ]
+    if "glued" in facts:
+        parts.append(f"blocks start glued: {facts['glued']}")
     if "faces" in facts:
         parts.append(f"faces: {facts['faces']}")
     if sizes is None:

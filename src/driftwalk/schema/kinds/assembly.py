@@ -28,6 +28,8 @@ SETTINGS: Final = (
     study
 attributes (blocks that are no squares):
     block_shape text: their shape
+attributes (blocks start glued to bodies):
+    glued text: rows of the blocks of a body; its joinings are those at time 0
 attributes (faces have types):
     faces text: kinds of blocks, and which types of their faces latch
 attributes (latching by a connector):
