@@ -32,7 +32,7 @@ def assemble(
     given: StudyOptions,
     run: Run = None,
     flow: FlowFile = None,
-    glued: Annotated[
+    earlier: Annotated[
         Path | None,
         option(
             "--from RUN",
@@ -64,14 +64,14 @@ def assemble(
     from driftwalk.runs import AssemblyWork
 
     _check_film(film)
-    given, quantiles = with_glued(with_binding(given, binding), glued)
+    given, quantiles = with_glued(with_binding(given, binding), earlier)
     refused = [] if given.file is None else ["--study"]
     source = assembly_source(run, flow, given, refused=refused)
     work = AssemblyWork(
         source.study,
         source.flow,
         source.uncertainty,
-        source.inputs if glued is None else {**source.inputs, "glued": glued / "fit.nc"},
+        source.inputs if earlier is None else {**source.inputs, "glued": earlier / "fit.nc"},
         options.threads,
         film,
         quantiles,

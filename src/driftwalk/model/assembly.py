@@ -68,7 +68,7 @@ class Assembly(Section):
     glued: Annotated[str, Placeholder("SHAPE")] = "x"
     """Blocks that start glued together, such as "xx" or "x./xx"; "x": single blocks.
 
-    Rows of the blocks that start glued together, for ever: "xx" are dimers, "x" single blocks.
+    Rows of the blocks that start glued together, permanently: "xx" are dimers, "x" single blocks.
     """
     hidden_face_drag: HiddenFaceDrag = "none"
     """Drag on faces that are joined.

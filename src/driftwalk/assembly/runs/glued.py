@@ -1,4 +1,4 @@
-"""Blocks that start glued together: joined at time 0, for ever."""
+"""Blocks that start glued together: joined at time 0, permanently."""
 
 from __future__ import annotations
 
