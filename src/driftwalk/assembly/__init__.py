@@ -23,6 +23,7 @@ from driftwalk.assembly.outcomes.distribution import (
     proportion_interval,
     sampling_variance,
 )
+from driftwalk.assembly.outcomes.kind_classes import kind_classes
 from driftwalk.assembly.outcomes.l1 import (
     L1NoiseFloor,
     PairwiseL1,
@@ -74,6 +75,7 @@ __all__ = [
     "draw_parameters",
     "has_uncertainty",
     "interaction_quantiles",
+    "kind_classes",
     "l1_distance",
     "l1_in_floors",
     "l1_noise_floor",

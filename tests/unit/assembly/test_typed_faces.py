@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,10 @@ import pytest
 import xarray as xr
 
 import driftwalk as dw
-from driftwalk.assembly import assemble
+from driftwalk.assembly import assemble, kind_classes
 from driftwalk.assembly.lattice.events import replay_events
 from driftwalk.assembly.lattice.typed_faces import FaceTable, face_table
+from driftwalk.assembly.outcomes.kind_classes import _coloured
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.model import Assembly, Study, apply_overrides, parse_study, read_binding
 
@@ -256,3 +258,37 @@ def test_discs_have_no_faces() -> None:
     study = Study(block={"shape": "disc"}, assembly={"faces": "NSNS"})
     with pytest.raises(InputError, match="discs have no faces"):
         assemble(study, dw.uniform_flow(0.0, 0.0), runs=1, duration=0.1)
+
+
+def test_classes_with_kinds() -> None:
+    """Two A latch to nobody but one B each: which of the drawn cells are of which kind."""
+    found = shaken(binding=HOOKS)
+    counted = kind_classes(found)
+    assert sum(counted.values()) == 60
+    assert set(counted) <= {
+        *("I3:ABA+1:B", "2:AB+2:AB", "2:AB+1:A+1:B", "1:A+1:A+1:B+1:B"),
+    }
+    assert counted["2:AB+2:AB"] > 5
+    assert list(counted.values()) == sorted(counted.values(), reverse=True)
+    plain = Counter(str(found["class"].values[k]) for k in found["outcome"].values)
+    shapes = Counter[str]()
+    for name, runs in counted.items():
+        shapes["+".join(part.partition(":")[0] for part in name.split("+"))] += runs
+    assert shapes == plain
+    with pytest.raises(InputError, match="all of one kind"):
+        kind_classes(shaken(faces="NSNS"))
+
+
+@pytest.mark.parametrize(
+    ("cells", "kinds", "name"),
+    [
+        ([(0, 0), (1, 0), (2, 0), (1, -1)], "ABAC", "T:ABAC"),
+        ([(0, 0), (0, 1), (0, 2), (1, 1)], "ABCD", "T:ABCD"),
+        ([(0, 0), (1, 0), (1, 1), (0, 1)], "ABBA", "O:AABB"),
+        ([(5, 5), (5, 6)], "BA", "2:AB"),
+    ],
+)
+def test_kinds_are_read_as_the_shape_is_drawn(
+    cells: list[tuple[int, int]], kinds: str, name: str
+) -> None:
+    assert _coloured(tuple(cells), tuple(kinds), "merged") == name

@@ -105,6 +105,8 @@ variables (drawn from a fit of glued blocks):
     stirring_length(run) [m]: distance over which blocks share the stochastic force
 variables (flow fields were drawn):
     flow_draw(run) int: which drawn flow field the run had
+variables (blocks are of several kinds):
+    kind(run block) int: kind of the block at the end, by its place in the table of kinds
 {_POLES}attributes (made by a run):
     drawn text: what was drawn for each run, or "no"
 """,
