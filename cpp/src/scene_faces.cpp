@@ -28,20 +28,18 @@ bool types_latch(const FaceRules& faces, const SceneBlock& block, int face, cons
   return (faces.latches[own] >> their & 1u) != 0;
 }
 
-bool poles_refuse(const FaceRules& faces, const Scene& scene, int joint, int stayed) {
+bool poles_refuse(const FaceRules& faces, const Scene& scene, int stayed, int moved) {
   int like = 0, latching = 0;
-  for (int b = scene.assembly[joint].first; b >= 0; b = scene.block[b].next) {
-    for (int c = scene.assembly[joint].first; c >= 0; c = scene.block[c].next) {
+  for (int b = moved; b >= 0; b = scene.blocks_before[b].next) {
+    for (int c = stayed; c >= 0; c = scene.blocks_before[c].next) {
       const SceneBlock &block = scene.block[b], &other = scene.block[c];
       const int face = face_towards(block, other);
-      if (scene.blocks_before[b].assembly != stayed || scene.blocks_before[c].assembly == stayed ||
-          face < 0) {
-        continue;
+      if (face >= 0) {
+        const int pole = faces.pole[block.kind][own_face(block, face)];
+        const int their = faces.pole[other.kind][own_face(other, face + 2)];
+        like += pole * their > 0;
+        latching += types_latch(faces, block, face, other, face + 2);
       }
-      const int pole = faces.pole[block.kind][own_face(block, face)];
-      const int their = faces.pole[other.kind][own_face(other, face + 2)];
-      like += pole * their > 0;
-      latching += types_latch(faces, block, face, other, face + 2);
     }
   }
   return like > 0 && like >= latching;

@@ -223,7 +223,7 @@ bool try_merge(const AssemblyRules& rules, Scene& scene, const Merge& merge) {
   place_by(scene, joint, merge.anchor, anchor);
   if (!push_inside(rules, scene, joint, most_rounds) ||
       (!rules.round && !is_clear_of_others(rules, scene, joint)) ||
-      (rules.faces != nullptr && poles_refuse(*rules.faces, scene, joint, merge.stays))) {
+      (rules.faces != nullptr && poles_refuse(*rules.faces, scene, kept.first, moved.first))) {
     std::copy_n(scene.blocks_before, scene.blocks, scene.block);
     scene.assembly[merge.stays] = kept;
     scene.assembly[merge.moves] = moved;

@@ -93,9 +93,10 @@ bool push_inside(const AssemblyRules& rules, Scene& scene, int assembly, int rou
 // Whether the types of two faces, each in its assembly's frame, latch.
 bool types_latch(const FaceRules& faces, const SceneBlock& block, int face, const SceneBlock& other,
                  int peer);
-// Whether a merge into `joint`, before which `blocks_before` holds the blocks, brings at least as
-// many pairs of like poles side by side as pairs of faces that latch: it would fall apart.
-bool poles_refuse(const FaceRules& faces, const Scene& scene, int joint, int stayed);
+// Whether a merge brings at least as many pairs of like poles side by side as pairs of faces that
+// latch: it would fall apart. `blocks_before` links the members of the two assemblies, of which
+// these are the first.
+bool poles_refuse(const FaceRules& faces, const Scene& scene, int stayed, int moved);
 // Makes two blocks what they become when these faces, in their own frames, have latched.
 void become(const FaceRules& faces, SceneBlock& block, int face, SceneBlock& other, int peer);
 
