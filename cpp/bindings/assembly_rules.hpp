@@ -80,8 +80,15 @@ inline void set_glued(driftwalk::AssemblyRules& rules, const Cells& cells) {
   rules.glued_cells = cells->data();
 }
 
+// Poles of typed faces are signs: like ones repel.
+inline void set_faces(driftwalk::AssemblyRules& rules, const driftwalk::FaceRules* faces) {
+  rules.faces = faces;
+  rules.pull.like_poles_repel = rules.pull.like_poles_repel || faces != nullptr;
+}
+
 inline void require_blocks(std::size_t blocks) {
   if (blocks < 1 || blocks > driftwalk::most_blocks) {
-    throw std::invalid_argument("a world has 1 to 256 blocks");
+    throw std::invalid_argument("a world has 1 to " + std::to_string(driftwalk::most_blocks) +
+                                " blocks");
   }
 }

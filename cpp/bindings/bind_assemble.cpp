@@ -1,5 +1,6 @@
 // Bindings of the self-assembly core.
 #include "assembly_rules.hpp"
+#include "pull.hpp"
 
 #include "driftwalk/assembly/assemble.hpp"
 #include "driftwalk/simulate/threads.hpp"
@@ -41,7 +42,7 @@ nb::dict assemble(const Model& model, In<double, 3> start, In<std::uint64_t, 1> 
                   double hidden_share, double stirring_length, bool incompressible,
                   double block_restitution, double block_friction, int sample_every, int threads,
                   const std::string& precision, const driftwalk::FaceRules* faces,
-                  std::optional<In<double, 1>> flow_start, Cells glued) {
+                  std::optional<In<double, 1>> flow_start, Cells glued, const Pull* pull) {
   const std::size_t worlds = start.shape(0), blocks = start.shape(1);
   require_blocks(blocks);
   if (start.shape(2) != 3 || key.size() != worlds || drag_coefficient.size() != worlds ||
@@ -59,8 +60,11 @@ nb::dict assemble(const Model& model, In<double, 3> start, In<std::uint64_t, 1> 
   set_shared(rules, hidden_share, stirring_length, incompressible);
   rules.restitution = block_restitution;
   rules.friction = block_friction;
-  rules.faces = faces;
   set_glued(rules, glued);
+  if (pull != nullptr) {
+    rules.pull = pull->rules();
+  }
+  set_faces(rules, faces);
   const driftwalk::AssemblyWorlds batch{static_cast<std::int64_t>(worlds),
                                         steps,
                                         start.data(),
@@ -126,6 +130,7 @@ nb::dict assemble(const Model& model, In<double, 3> start, In<std::uint64_t, 1> 
 
 void register_assemble(nb::module_& module);
 void register_assemble(nb::module_& module) {
+  register_pull(module);
   module.def("place_blocks", &place_blocks, "model"_a, nb::kw_only(), "blocks"_a, "key"_a,
              "threads"_a, "glued"_a = nb::none());
   module.def("assemble", &assemble, "model"_a, nb::kw_only(), "start"_a, "key"_a,
@@ -133,5 +138,5 @@ void register_assemble(nb::module_& module) {
              "connector_axis"_a, "hidden_share"_a, "stirring_length"_a, "incompressible"_a,
              "block_restitution"_a, "block_friction"_a, "sample_every"_a, "threads"_a,
              "precision"_a, "faces"_a.none() = nb::none(), "flow_start"_a = nb::none(),
-             "glued"_a = nb::none());
+             "glued"_a = nb::none(), "pull"_a = nb::none());
 }

@@ -1,5 +1,6 @@
 // Bindings of the live world: a world that keeps its state between calls.
 #include "assembly_rules.hpp"
+#include "pull.hpp"
 
 #include "driftwalk/assembly/live.hpp"
 
@@ -109,6 +110,12 @@ void register_live(nb::module_& module) {
           },
           nb::kw_only(), "latching"_a, "hidden_share"_a, "stirring_length"_a)
       .def("set_faces", &LiveWorld::set_faces, nb::keep_alive<1, 2>(), "faces"_a.none())
+      .def(
+          "set_pull",
+          [](LiveWorld& world, const Pull* pull) {
+            world.set_pull(pull == nullptr ? driftwalk::PullRules{} : pull->rules());
+          },
+          nb::keep_alive<1, 2>(), "pull"_a.none())
       .def("set_blocks", &set_blocks, "blocks"_a)
       .def("part", &LiveWorld::part)
       .def_prop_ro("step", &LiveWorld::step)

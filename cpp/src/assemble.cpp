@@ -50,7 +50,8 @@ std::int64_t run_threads(int blocks, std::int64_t worlds, int lanes, int threads
 std::int64_t assemble_batch(const PreparedRun<float>& run, const AssemblyRules& rules,
                             const AssemblyWorlds& worlds, int threads, const AssemblyOutputs& out) {
   const AssemblyKernel kernel = chosen_assembly_kernel();
-  return run_threads(rules.blocks, worlds.count, kernel.lanes, threads,
+  const int at_once = rules.blocks > most_blocks_all_pairs ? 1 : kernel.lanes;
+  return run_threads(rules.blocks, worlds.count, at_once, threads,
                      kernel.scratch_bytes(rules.blocks),
                      [&](const WorldQueue& queue, AssemblyScratch& scratch) {
                        return kernel.run(run.view(), rules, worlds, out, queue, scratch);

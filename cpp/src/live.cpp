@@ -143,9 +143,20 @@ void LiveWorld::set_rules(Latching latching, double hidden_share, double stirrin
 
 void LiveWorld::set_faces(const FaceRules* faces) {
   inside_->rules.faces = faces;
+  inside_->rules.pull.like_poles_repel = faces != nullptr;
   for (int b = 0; b < inside_->rules.blocks; ++b) {
     inside_->pack.memory().book(b, 0).kind = first_kind(faces, b);
+    set_poles(inside_->rules, inside_->pack.memory(), b, 0);
   }
+}
+
+void LiveWorld::set_pull(const PullRules& pull) {
+  inside_->rules.pull = pull;
+  inside_->rules.pull.like_poles_repel = pull.like_poles_repel || inside_->rules.faces != nullptr;
+  for (int b = 0; b < inside_->rules.blocks; ++b) {
+    set_poles(inside_->rules, inside_->pack.memory(), b, 0);
+  }
+  inside_->pack.renew();
 }
 
 int LiveWorld::set_blocks(int blocks) {

@@ -216,8 +216,8 @@ bool keep_inside(const AssemblyRules& rules, Scene& scene, int assembly) {
 } // namespace
 
 void bounce(const AssemblyRules& rules, Scene& scene) {
-  for (int k = 0; k < scene.pairs.count; ++k) {
-    const BlockPair pair = scene.pairs.pair[k];
+  for (int k = 0; k < scene.close.count; ++k) {
+    const BlockPair pair = scene.close.pair[k];
     if (!may_touch(rules, scene, pair)) {
       continue;
     }
@@ -283,7 +283,13 @@ void separate(const AssemblyRules& rules, Scene& scene) {
   for (int a = 0; a < scene.blocks; ++a) {
     scene.assembly[a].moved = 0;
   }
-  bool moved = true, inside = true;
+  // What is not close moves when something that is has moved.
+  bool moved = false, inside = true;
+  for (int k = 0; k < scene.close.count && !moved; ++k) {
+    const BlockPair pair = scene.close.pair[k];
+    moved = may_touch(rules, scene, pair) &&
+            overlap_of(rules, scene, pair.first, pair.second).depth > tolerance;
+  }
   for (int round = 1; moved && round <= most_rounds; ++round) {
     moved = false;
     for (int k = 0; k < scene.pairs.count; ++k) {

@@ -62,14 +62,6 @@ void place_by(Scene& scene, int assembly, int block, Vec2 at) {
 }
 
 namespace {
-// Bit of the face that looks at a neighbouring cell; none where it is no neighbour.
-unsigned face_towards(int dx, int dy) {
-  if (std::abs(dx) + std::abs(dy) != 1) {
-    return 0;
-  }
-  return 1u << (dx == 1 ? 0 : (dy == 1 ? 1 : (dx == -1 ? 2 : 3)));
-}
-
 void link_members(Scene& scene, int assembly) {
   SceneAssembly& a = scene.assembly[assembly];
   a.blocks = 0;
@@ -77,6 +69,31 @@ void link_members(Scene& scene, int assembly) {
   for (int b = 0; b < scene.blocks; ++b) {
     if (scene.block[b].assembly == assembly) {
       add_member(scene, a, b);
+    }
+  }
+}
+
+// Cells in front of faces 0 .. 3.
+constexpr int step_x[4] = {1, 0, -1, 0}, step_y[4] = {0, 1, 0, -1};
+
+void join_faces(Scene& scene, const SceneAssembly& a) {
+  LatticeTable cells(scene);
+  for (int b = a.first; b >= 0; b = scene.block[b].next) {
+    const SceneBlock& block = scene.block[b];
+    cells.clear(block.cell_x, block.cell_y);
+    for (int face = 0; face < 4; ++face) {
+      cells.clear(block.cell_x + step_x[face], block.cell_y + step_y[face]);
+    }
+  }
+  for (int b = a.first; b >= 0; b = scene.block[b].next) {
+    cells.add(b);
+  }
+  for (int b = a.first; b >= 0; b = scene.block[b].next) {
+    SceneBlock& block = scene.block[b];
+    block.joined = 0;
+    for (int face = 0; face < 4; ++face) {
+      const bool neighbour = cells.has(block.cell_x + step_x[face], block.cell_y + step_y[face]);
+      block.joined |= neighbour ? 1u << face : 0u;
     }
   }
 }
@@ -101,6 +118,10 @@ void measure_discs(const AssemblyRules& rules, Scene& scene, SceneAssembly& a) {
 
 void measure_assembly(const AssemblyRules& rules, Scene& scene, int assembly) {
   link_members(scene, assembly);
+  measure_members(rules, scene, assembly);
+}
+
+void measure_members(const AssemblyRules& rules, Scene& scene, int assembly) {
   SceneAssembly& a = scene.assembly[assembly];
   if (rules.round) {
     measure_discs(rules, scene, a);
@@ -118,12 +139,8 @@ void measure_assembly(const AssemblyRules& rules, Scene& scene, int assembly) {
     block.offset_y = rules.side * (static_cast<double>(block.cell_y * a.blocks - sum_y) / a.blocks);
     a.inertia += rules.inertia +
                  rules.mass * (block.offset_x * block.offset_x + block.offset_y * block.offset_y);
-    block.joined = 0;
-    for (int c = a.first; c >= 0; c = scene.block[c].next) {
-      block.joined |=
-          face_towards(scene.block[c].cell_x - block.cell_x, scene.block[c].cell_y - block.cell_y);
-    }
   }
+  join_faces(scene, a);
 }
 
 namespace {

@@ -95,37 +95,77 @@ Merge plan(const Scene& scene, const Candidate& c) {
   return merge;
 }
 
-bool cells_are_free(const Scene& scene, const Merge& merge) {
-  for (int b = scene.assembly[merge.moves].first; b >= 0; b = scene.block[b].next) {
-    SceneBlock moved = scene.block[b];
-    merge.onto.apply(moved);
-    for (int c = scene.assembly[merge.stays].first; c >= 0; c = scene.block[c].next) {
-      if (scene.block[c].cell_x == moved.cell_x && scene.block[c].cell_y == moved.cell_y) {
-        return false;
-      }
+bool cells_are_free(Scene& scene, const Merge& merge) {
+  const int stays = scene.assembly[merge.stays].first, moves = scene.assembly[merge.moves].first;
+  LatticeTable cells(scene);
+  const auto moved = [&](int block) {
+    SceneBlock copy = scene.block[block];
+    merge.onto.apply(copy);
+    return copy;
+  };
+  for (int b = moves; b >= 0; b = scene.block[b].next) {
+    cells.clear(moved(b).cell_x, moved(b).cell_y);
+  }
+  for (int b = stays; b >= 0; b = scene.block[b].next) {
+    cells.clear(scene.block[b].cell_x, scene.block[b].cell_y);
+  }
+  for (int b = stays; b >= 0; b = scene.block[b].next) {
+    cells.add(b);
+  }
+  for (int b = moves; b >= 0; b = scene.block[b].next) {
+    if (cells.has(moved(b).cell_x, moved(b).cell_y)) {
+      return false;
     }
   }
   return true;
 }
 
-// How deep a block is in one of another assembly, that being where it was before the step.
-double overlap_before(const AssemblyRules& rules, const Scene& scene, int block, int other) {
+// Where a block was before the step, from another one.
+Vec2 before_from(const Scene& scene, int block, int other) {
   const ScenePose& before = assembly_of(scene, other).before;
   const Vec2 axis{before.cosine, before.sine}, across{-before.sine, before.cosine};
   const SceneBlock& o = scene.block[other];
   const Vec2 at = Vec2{before.x, before.y} + axis * o.offset_x + across * o.offset_y;
-  return overlap_depth(rules.side / 2, at - centre(scene, block),
-                       face_normal(assembly_of(scene, block), 0), axis);
+  return at - centre(scene, block);
 }
 
-// Of the others where they are, and where they were: a jam takes them back there.
-bool is_clear_of_others(const AssemblyRules& rules, const Scene& scene, int assembly) {
+// Whether two blocks of different assemblies overlap, as they are or with the other where it was:
+// a jam takes it back there.
+bool overlaps(const AssemblyRules& rules, const Scene& scene, int block, int other) {
   constexpr double tolerance = 1e-4;
-  for (int b = scene.assembly[assembly].first; b >= 0; b = scene.block[b].next) {
-    for (int c = 0; c < scene.blocks; ++c) {
-      if (scene.block[c].assembly != assembly &&
-          (overlap_of(rules, scene, b, c).depth > tolerance ||
-           overlap_before(rules, scene, b, c) > tolerance)) {
+  if (!are_far(rules, scene, block, other) &&
+      overlap_of(rules, scene, block, other).depth > tolerance) {
+    return true;
+  }
+  const Vec2 between = before_from(scene, block, other);
+  const ScenePose& before = assembly_of(scene, other).before;
+  return dot(between, between) < 2 * rules.side * rules.side &&
+         overlap_depth(rules.side / 2, between, face_normal(assembly_of(scene, block), 0),
+                       {before.cosine, before.sine}) > tolerance;
+}
+
+// A block is far from an assembly whose blocks are all within `reach` of its centre.
+bool is_clear_of_others(const AssemblyRules& rules, const Scene& scene, int assembly) {
+  const SceneAssembly& a = scene.assembly[assembly];
+  double farthest = 0;
+  for (int b = a.first; b >= 0; b = scene.block[b].next) {
+    const SceneBlock& block = scene.block[b];
+    farthest =
+        std::max(farthest, block.offset_x * block.offset_x + block.offset_y * block.offset_y);
+  }
+  const double reach = std::sqrt(farthest) + 1.5 * rules.side;
+  const auto is_near = [&](Vec2 from_block) {
+    const Vec2 from_middle = from_block + centre(scene, a.first) - Vec2{a.x, a.y};
+    return dot(from_middle, from_middle) < reach * reach;
+  };
+  for (int c = 0; c < scene.blocks; ++c) {
+    if (scene.block[c].assembly == assembly ||
+        (!is_near(centre(scene, c) - centre(scene, a.first)) &&
+         !is_near(before_from(scene, a.first, c)))) {
+      continue;
+    }
+    for (int b = a.first; b >= 0; b = scene.block[b].next) {
+      if (overlaps(rules, scene, b, c)) {
         return false;
       }
     }
@@ -161,14 +201,12 @@ void record(Scene& scene, const Merge& merge, const int (&own_faces)[2]) {
 }
 
 void align(Scene& scene, const Merge& merge, int joint) {
-  for (int b = 0; b < scene.blocks; ++b) {
-    SceneBlock& block = scene.block[b];
-    if (block.assembly == merge.moves) {
-      merge.onto.apply(block);
-      block.assembly = joint;
-    } else if (block.assembly == merge.stays) {
-      block.assembly = joint;
-    }
+  for (int b = scene.assembly[merge.moves].first; b >= 0; b = scene.block[b].next) {
+    merge.onto.apply(scene.block[b]);
+    scene.block[b].assembly = joint;
+  }
+  for (int b = scene.assembly[merge.stays].first; b >= 0; b = scene.block[b].next) {
+    scene.block[b].assembly = joint;
   }
 }
 
@@ -180,19 +218,39 @@ void join_discs(const AssemblyRules& rules, Scene& scene, const Merge& merge, in
   const Overlap overlap = overlap_of(rules, scene, merge.anchor, merge.guest);
   const Vec2 share = overlap.normal * (overlap.depth / (stays.blocks + moves.blocks));
   const double turned = moves.theta - stays.theta;
-  for (int b = 0; b < scene.blocks; ++b) {
+  for (int b = stays.first; b >= 0; b = scene.block[b].next) {
     SceneBlock& block = scene.block[b];
-    if (block.assembly == merge.stays) {
-      block.x -= share.x * moves.blocks;
-      block.y -= share.y * moves.blocks;
-      block.assembly = joint;
-    } else if (block.assembly == merge.moves) {
-      block.x += share.x * stays.blocks;
-      block.y += share.y * stays.blocks;
-      block.assembly = joint;
-      block.turn += turned;
-      block.turn -= full_turn * std::floor(block.turn / full_turn);
-    }
+    block.x -= share.x * moves.blocks;
+    block.y -= share.y * moves.blocks;
+    block.assembly = joint;
+  }
+  for (int b = moves.first; b >= 0; b = scene.block[b].next) {
+    SceneBlock& block = scene.block[b];
+    block.x += share.x * stays.blocks;
+    block.y += share.y * stays.blocks;
+    block.assembly = joint;
+    block.turn += turned;
+    block.turn -= full_turn * std::floor(block.turn / full_turn);
+  }
+}
+
+// Copies the members of an assembly, as it was, from one array of blocks to another.
+void copy_members(const SceneAssembly& of, const SceneBlock* from, SceneBlock* to) {
+  for (int b = of.first; b >= 0; b = from[b].next) {
+    to[b] = from[b];
+  }
+}
+
+// Links the members of two assemblies, each in order, to one in order.
+void link_both(Scene& scene, const SceneAssembly& a, const SceneAssembly& b, SceneAssembly& joint) {
+  int first = a.first, second = b.first;
+  joint.blocks = 0;
+  joint.first = joint.last = -1;
+  while (first >= 0 || second >= 0) {
+    int& next = second < 0 || (first >= 0 && first < second) ? first : second;
+    const int block = next;
+    next = scene.block[block].next;
+    add_member(scene, joint, block);
   }
 }
 
@@ -208,7 +266,8 @@ bool try_merge(const AssemblyRules& rules, Scene& scene, const Merge& merge) {
   const int joint = std::min(merge.stays, merge.moves);
   const int own_faces[2] = {(merge.anchor_face - scene.block[merge.anchor].quarter) & 3,
                             (merge.guest_face - scene.block[merge.guest].quarter) & 3};
-  std::copy_n(scene.block, scene.blocks, scene.blocks_before);
+  copy_members(kept, scene.block, scene.blocks_before);
+  copy_members(moved, scene.block, scene.blocks_before);
   if (rules.round) {
     join_discs(rules, scene, merge, joint);
   } else {
@@ -218,13 +277,15 @@ bool try_merge(const AssemblyRules& rules, Scene& scene, const Merge& merge) {
   scene.assembly[std::max(merge.stays, merge.moves)].blocks = 0;
   SceneAssembly& body = scene.assembly[joint];
   body = kept;
-  measure_assembly(rules, scene, joint);
+  link_both(scene, kept, moved, body);
+  measure_members(rules, scene, joint);
   conserve_momentum(kept, moved, rules.mass, body);
   place_by(scene, joint, merge.anchor, anchor);
   if (!push_inside(rules, scene, joint, most_rounds) ||
       (!rules.round && !is_clear_of_others(rules, scene, joint)) ||
       (rules.faces != nullptr && poles_refuse(*rules.faces, scene, kept.first, moved.first))) {
-    std::copy_n(scene.blocks_before, scene.blocks, scene.block);
+    copy_members(kept, scene.blocks_before, scene.block);
+    copy_members(moved, scene.blocks_before, scene.block);
     scene.assembly[merge.stays] = kept;
     scene.assembly[merge.moves] = moved;
     return false;
@@ -259,8 +320,8 @@ bool may_latch(const AssemblyRules& rules, const Scene& scene, BlockPair pair) {
 bool next_candidate(const AssemblyRules& rules, const Scene& scene, const Candidate& last,
                     Candidate& best) {
   bool found = false;
-  for (int k = 0; k < scene.pairs.count; ++k) {
-    const BlockPair pair = scene.pairs.pair[k];
+  for (int k = 0; k < scene.close.count; ++k) {
+    const BlockPair pair = scene.close.pair[k];
     if (!may_latch(rules, scene, pair)) {
       continue;
     }
@@ -292,6 +353,7 @@ bool merge_one(const AssemblyRules& rules, Scene& scene) {
 } // namespace
 
 void latch(const AssemblyRules& rules, Scene& scene) {
+  find_close_pairs(rules, scene);
   if (rules.latching == Latching::none) {
     return;
   }
@@ -299,6 +361,7 @@ void latch(const AssemblyRules& rules, Scene& scene) {
     scene.contact = true;
     scene.rebuilt = true;
     find_pairs(rules, scene);
+    find_close_pairs(rules, scene);
   }
 }
 

@@ -40,6 +40,7 @@ _NAMES = {
         "assemble_drawn",
         "assembly_path",
         "assembly_sizes",
+        "attraction",
         "class_times",
         "classify",
         "l1_distance",

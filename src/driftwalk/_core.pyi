@@ -139,6 +139,16 @@ def available_instruction_sets() -> list[str]: ...
 # --- self-assembly ------------------------------------------------------------------------------
 # Start poses [m, m, rad] of shape (worlds, blocks, 3), and how many blocks of each world found a
 # place; `glued`: cells (n, 2) of bodies of n blocks each.
+# Tables of the forces between blocks, see `driftwalk.assembly.pull.tables`.
+class Pull:
+    def __init__(
+        self, *, reach: float, lever: float, pole: _Floats, like_poles_repel: bool
+    ) -> None: ...
+    def set_radial(self, what: str, cells: _Floats, first: int) -> None: ...
+    def set_oriented(
+        self, coefficient: _Floats, *, first: float, per_step: float, low: float, high: float
+    ) -> None: ...
+
 def place_blocks(
     model: Model,
     *,
@@ -183,6 +193,7 @@ def assemble(
     faces: FaceRules | None = None,
     flow_start: _Floats | None = None,
     glued: npt.NDArray[np.int32] | None = None,
+    pull: Pull | None = None,
 ) -> dict[str, npt.NDArray[Any] | int]: ...
 
 # A world that keeps its state between calls, in double precision. Changes take effect with the next
@@ -218,6 +229,7 @@ class LiveWorld:
     def set_rules(self, *, latching: str, hidden_share: float, stirring_length: float) -> None: ...
     # Blocks are of the kinds at the start again.
     def set_faces(self, faces: FaceRules | None) -> None: ...
+    def set_pull(self, pull: Pull | None) -> None: ...
     def set_blocks(self, blocks: int) -> int: ...  # as many as there are then
     def part(self) -> None: ...
     @property

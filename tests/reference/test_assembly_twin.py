@@ -19,6 +19,7 @@ from twin_assembly import SIDE, Floats, study, swirl
 import driftwalk as dw
 from driftwalk import _core
 from driftwalk.assembly.lattice.typed_faces import face_table
+from driftwalk.assembly.pull.tables import block_pull
 from driftwalk.core.seeds import world_keys
 from driftwalk.model import Assembly
 from driftwalk.simulation.backend import Camera, native_model
@@ -59,6 +60,7 @@ def native_row(
         stirring_length=0.0,
         incompressible=False,
         faces=None if faces is None else faces.native(),
+        pull=None if (pull := block_pull(model)) is None else pull.native,
         **alone,
         **arguments,
     )
@@ -109,6 +111,24 @@ def drain(model: dw.Study, *, inflow: float, spin: float) -> xr.Dataset:
     flow["u"] = flow["u"].copy(data=-inflow * x - spin * y)
     flow["v"] = flow["v"].copy(data=-inflow * y + spin * x)
     return flow
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "interaction",
+    [
+        {"magnets": "3x3x1mm,1.2T"},
+        {"capillary": "on", "meniscus_height_m": 2e-3, "approach_resistance_N_s": 1e-4},
+    ],
+)
+@pytest.mark.parametrize("latching", ["collision", "none"])
+def test_blocks_that_feel_each_other_agree(latching: str, interaction: dict[str, Any]) -> None:
+    model = study(0.2, interaction=interaction)
+    start = placed(model, swirl(model), 5, world_key(3))
+    compare(
+        model, swirl(model), start=start, key=world_key(3), force_std=1e-3, steps=100,
+        latching=latching,
+    )  # fmt: skip
 
 
 @pytest.mark.slow
@@ -191,9 +211,11 @@ BINDINGS: dict[str, dict[str, Any]] = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("latching", ["collision", "connector"])
-@pytest.mark.parametrize("binding", BINDINGS)
-def test_typed_faces_agree(binding: str, latching: str) -> None:
-    model = study(0.2)
+@pytest.mark.parametrize(
+    ("binding", "magnets"), [*((name, "none") for name in BINDINGS), ("poles", "3x3x1mm,1.2T")]
+)
+def test_typed_faces_agree(binding: str, magnets: str, latching: str) -> None:
+    model = study(0.2, interaction={"magnets": magnets})
     faces = face_table(Assembly(blocks=6, **BINDINGS[binding]))
     flow = drain(model, inflow=2.0, spin=1.5)
     latched = 0

@@ -19,6 +19,9 @@ std::int64_t assemble(const Prepared<float>& run, const AssemblyRules& rules,
                       const AssemblyWorlds& worlds, const AssemblyOutputs& out,
                       const WorldQueue& queue, AssemblyScratch& scratch) {
   const auto assembled = [&]<class Law>() {
+    if (PackMemory<Real>::is_one_world(rules.blocks)) {
+      return AssemblyPack<Real, float, Law, true>(run, rules, worlds, out, queue, scratch).run();
+    }
     return AssemblyPack<Real, float, Law>(run, rules, worlds, out, queue, scratch).run();
   };
   return !run.drag.is_quadratic ? assembled.template operator()<MixedDrag<Real>>()

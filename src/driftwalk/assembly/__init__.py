@@ -34,6 +34,7 @@ from driftwalk.assembly.outcomes.l1 import (
 )
 from driftwalk.assembly.outcomes.sizes import assembly_sizes
 from driftwalk.assembly.outcomes.survival import SurvivalCurve, class_times, survival_curve
+from driftwalk.assembly.pull.attraction import attraction
 from driftwalk.assembly.recordings import classify
 from driftwalk.assembly.runs.dataset import path_recording
 from driftwalk.assembly.runs.draws import draw_parameters, has_uncertainty, interaction_quantiles
@@ -62,6 +63,7 @@ __all__ = [
     "assemble_drawn",
     "assembly_path",
     "assembly_sizes",
+    "attraction",
     "check_assembly",
     "check_indices",
     "check_sensitivity",

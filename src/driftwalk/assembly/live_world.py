@@ -15,6 +15,7 @@ from driftwalk.assembly.lattice.join_history import LatticeWorld
 from driftwalk.assembly.lattice.joined_faces import ROUNDING
 from driftwalk.assembly.lattice.typed_faces import face_table
 from driftwalk.assembly.outcomes.disc_contacts import disc_class
+from driftwalk.assembly.pull.tables import block_pull
 from driftwalk.assembly.runs.dataset import times_of
 from driftwalk.assembly.runs.glued import glued_cells
 from driftwalk.assembly.runs.plan import MOST_STEPS, make_plan, start_poses
@@ -170,6 +171,7 @@ class LiveTank:
             )
             self._wishes = self._active = _Wishes(plan.study, self._wishes.flow_scale)
             self._set_forces()
+            self._set_pull()
             self._steps_per_interval = round(forces.force_interval_s / plan.study.time_step_s)
             self._due = 0.0
             self._events: list[LiveEvent] = []
@@ -221,6 +223,7 @@ class LiveTank:
         faces: str | None = None,
         hidden_face_drag: HiddenFaceDrag | str | None = None,
         stirring_length: float | None = None,
+        magnets: str | None = None,
         blocks: int | None = None,
         part: bool = False,
     ) -> None:
@@ -243,6 +246,8 @@ class LiveTank:
             Drag on faces that are joined; a number is its share of a free face's, 0 to 1.
         stirring_length : float
             Distance over which blocks share the stochastic force [m]; 0: each has its own.
+        magnets : str
+            Magnet at the centre of each face, such as ``"5x5x2mm,1.3T"``, or ``"none"``.
         blocks : int
             Number of blocks. The last ones are removed; what is left of their assemblies goes on as
             it was moving, as several where it no longer hangs together. New ones come to rest at
@@ -264,6 +269,7 @@ class LiveTank:
             "assembly.faces": faces,
             "assembly.hidden_face_drag": hidden_face_drag,
             "forces.stirring_length_m": stirring_length,
+            "interaction.magnets": magnets,
             "assembly.blocks": blocks,
         }
         overrides = {key: value for key, value in given.items() if value is not None}
@@ -271,6 +277,7 @@ class LiveTank:
             wishes = self._wishes
             study = apply_overrides(wishes.study, overrides)
             require_room(study)
+            block_pull(study)
             scale = wishes.flow_scale if flow_scale is None else flow_scale
             if not 0.0 <= scale < math.inf:
                 raise InputError(f"flow_scale must be a finite number from 0 on, got {scale}")
@@ -400,6 +407,7 @@ class LiveTank:
             self._wishes = self._active = wished._replace(part=False) if wished.part else wished
         if changed:
             self._set_forces()
+            self._set_pull()
             rules = self._active.study.assembly
             self._world.set_rules(
                 latching=rules.latching,
@@ -423,6 +431,10 @@ class LiveTank:
             force_std=forces.force_std_N,
             flow_scale=self._active.flow_scale,
         )
+
+    def _set_pull(self) -> None:
+        pull = block_pull(self._active.study)
+        self._world.set_pull(None if pull is None else pull.native)
 
     def _step(self, steps: int) -> None:
         """Take time steps and note what has joined in them."""

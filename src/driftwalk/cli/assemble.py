@@ -107,6 +107,7 @@ def assembled(study: Study, result: AssemblyResult) -> Answer:
         sizes=result.sizes,
         sizes_drawn=result.sizes_drawn,
         apart=_difference(result),
+        attraction=result.attraction,
     )
 
 

@@ -46,6 +46,7 @@ AXES: Final = {
     "faces": "sensitivity.faces",
     "hidden-face-drag": "sensitivity.hidden_face_drag",
     "stirring-length": "sensitivity.stirring_length_m",
+    "magnets": "sensitivity.magnets",
     "drag-coefficient": "sensitivity.drag_coefficient",
     "force-std": "sensitivity.force_std_N",
 }
@@ -182,7 +183,9 @@ def vary_overrides(given: Sequence[str]) -> dict[str, Any]:
             )
         if key in found:
             raise InputError(f"--vary {text}: {name} is varied twice; name all values at once")
-        words = [word.strip() for word in values.split(",")]
+        # The values of magnets, and of faces, have commas of their own: "none; 3x3x1mm,1.2T".
+        parted = name == "magnets" or ";" in values
+        words = [word.strip() for word in values.split(";" if parted else ",")]
         if not all(words):
             raise InputError(f"--vary {text}: a value is missing after '{name}='")
         try:

@@ -75,6 +75,13 @@ class AssemblySettings(ModelSettings, total=False):
     block_restitution: Annotated[Number, "assembly.block_restitution"]
     block_friction: Annotated[Number, "assembly.block_friction"]
     confidence: Annotated[Number, "assembly.confidence"]
+    magnets: Annotated[str, "interaction.magnets"]
+    magnet_inset: Annotated[Number, "interaction.magnet_inset_m"]
+    poles: Annotated[str, "interaction.poles"]
+    attraction: Annotated[str, "interaction.attraction"]
+    capillary: Annotated[str, "interaction.capillary"]
+    meniscus_height: Annotated[Number, "interaction.meniscus_height_m"]
+    approach_resistance: Annotated[Number, "interaction.approach_resistance_N_s"]
 
 
 class FitSettings(StudySettings, total=False):

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from driftwalk.figures.write import Figures
 from driftwalk.plot.assembly_courses import (
     plot_assembly_sizes,
+    plot_attraction,
     plot_class_times,
     plot_growth,
     plot_survival,
@@ -44,6 +45,7 @@ def assembly_figures(
     path: xr.Dataset | None = None,
     sizes: xr.Dataset | None = None,
     sizes_drawn: xr.Dataset | None = None,
+    attraction: xr.Dataset | None = None,
     *,
     labels: tuple[str, str] = LABELS,
     realisations: xr.Dataset | None = None,
@@ -66,6 +68,8 @@ def assembly_figures(
     sizes, sizes_drawn : xarray.Dataset, optional
         The `assembly_sizes` of both. Where there are many blocks and so too many classes to draw,
         they take the place of the classes.
+    attraction : xarray.Dataset, optional
+        An `attraction`.
     labels : tuple of str
         Names of the first distribution and the second, where there are two.
     realisations : xarray.Dataset, optional
@@ -77,7 +81,7 @@ def assembly_figures(
     -------
     dict of str to callable
         ``outcomes``, with `class_times` also ``class_times``, or with `sizes` ``assembly_sizes`` in
-        their place; with `path` also ``film_strip``.
+        their place; with `path` also ``film_strip``, with `attraction` ``attraction``.
 
     Examples
     --------
@@ -101,6 +105,8 @@ def assembly_figures(
         }
     if path is not None:
         figures["film_strip"] = lambda: style.figure_of(plot_film_strip(path, run=run)[0])
+    if attraction is not None:
+        figures["attraction"] = lambda: style.figure_of(plot_attraction(attraction))
     return figures
 
 

@@ -22,6 +22,7 @@ from driftwalk.flow.inertia import inertia_correction
 from driftwalk.flow.random_flow import random_tank_flow
 from driftwalk.flow.read import load_flow
 from driftwalk.flow.recognise import flow_format
+from driftwalk.flow.stretch import stretch_flow
 from driftwalk.flow.tracers import flow_from_tracers
 from driftwalk.flow.write import save_flow
 
@@ -39,6 +40,7 @@ __all__ = [
     "save_flow",
     "shear_flow",
     "shear_velocity",
+    "stretch_flow",
     "uniform_flow",
     "uniform_velocity",
     "vortex_flow",

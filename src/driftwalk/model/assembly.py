@@ -10,7 +10,7 @@ from driftwalk.core.errors import ConfigurationError
 from driftwalk.model.binding import Binding, Kind, face_types, faces_text
 from driftwalk.model.section import Placeholder, Quantity, Section, Seed
 
-MOST_BLOCKS: Final = 256
+MOST_BLOCKS: Final = 2000
 """The most that the native core takes."""
 
 Latching = Literal["collision", "connector", "none"]

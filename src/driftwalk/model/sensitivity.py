@@ -13,6 +13,7 @@ from driftwalk.model.assembly import MOST_BLOCKS, HiddenFaceDrag, Latching
 from driftwalk.model.binding import faces_text
 from driftwalk.model.calibration import ForceGrid
 from driftwalk.model.forces import DragCoefficient, ForceStd
+from driftwalk.model.interaction import MagnetText, parse_magnet
 from driftwalk.model.section import Quantity, Seed
 
 AXES: Final[dict[str, str]] = {
@@ -23,6 +24,7 @@ AXES: Final[dict[str, str]] = {
     "faces": "faces",
     "hidden_face_drag": "hidden_face_drag",
     "stirring_length": "stirring_length_m",
+    "magnets": "magnets",
     "drag_coefficient": "drag_coefficient",
     "force_std": "force_std_N",
 }
@@ -80,6 +82,10 @@ class Sensitivity(ForceGrid):
         default=None, examples=["[0.0, 0.03, 0.1]"]
     )
     """Lengths over which blocks share the stochastic force to compare, an axis of the map."""
+    magnets: tuple[MagnetText, ...] | None = Field(
+        default=None, examples=['["none", "3x3x1mm,1.2T"]']
+    )
+    """Magnets to compare, an axis of the map."""
     drag_coefficient: tuple[DragCoefficient, ...] | None = Field(
         default=None, examples=["[0.2, 0.45, 1.0]"]
     )
@@ -99,6 +105,13 @@ class Sensitivity(ForceGrid):
             raise ConfigurationError("the list is empty; leave the key out or name a value")
         if values is not None and len(set(values)) < len(values):
             raise ConfigurationError(f"the list names a value twice: {list(values)}")
+        return values
+
+    @field_validator("magnets")
+    @classmethod
+    def _are_magnets(cls, values: tuple[str, ...] | None) -> tuple[str, ...] | None:
+        for text in values or ():
+            parse_magnet(text)
         return values
 
     @model_validator(mode="after")

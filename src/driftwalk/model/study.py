@@ -19,6 +19,7 @@ from driftwalk.model.calibration import Calibration
 from driftwalk.model.fit import Fit
 from driftwalk.model.flow import Flow
 from driftwalk.model.forces import Forces
+from driftwalk.model.interaction import Interaction
 from driftwalk.model.observation import Observation
 from driftwalk.model.recording import Recording, Steps
 from driftwalk.model.recover import Recover
@@ -85,6 +86,8 @@ class Study(Section):
     """Recordings of known truth that a recovery study simulates and fits."""
     assembly: Assembly = Field(default_factory=Assembly)
     """Rules of self-assembly, and the number of runs."""
+    interaction: Interaction = Field(default_factory=Interaction)
+    """Forces between blocks at a distance."""
     sensitivity: Sensitivity = Field(default_factory=Sensitivity)
     """Axes and size of a sensitivity analysis."""
 

@@ -2,6 +2,7 @@
 
 from driftwalk.plot.assembly_courses import (
     plot_assembly_sizes as assembly_sizes,
+    plot_attraction as attraction,
     plot_class_times as class_times,
     plot_growth as growth,
     plot_survival as survival,
@@ -41,6 +42,7 @@ from driftwalk.plot.uncertainty import (
 
 __all__ = [
     "assembly_sizes",
+    "attraction",
     "biplot",
     "blocks",
     "bootstrap",

@@ -45,7 +45,11 @@ SURVIVAL: Final = {
 BAR_WIDTH: Final = 0.76
 GROWTH: Final = {
     "mean size": {"mean_size": "mean size"},
-    "shares": {"largest_share": "in the largest assembly", "free_share": "alone"},
+    "shares": {
+        "largest_share": "in the largest assembly",
+        "free_share": "alone",
+        "compactness": "compactness",
+    },
 }
 
 
@@ -110,6 +114,49 @@ def plot_class_times(
     ax.set(xlabel=TIME_LABEL, ylabel="proportion of runs")
     ax.spines[["top", "right"]].set_visible(False)
     ax.set_title(runs_text(times), loc="left")
+    return ax
+
+
+def plot_attraction(attraction: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw the force between two blocks against the gap between them.
+
+    Parameters
+    ----------
+    attraction : xarray.Dataset
+        An `attraction`.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure when left out.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+
+    Raises
+    ------
+    InputError
+        When the dataset is of another kind.
+
+    Examples
+    --------
+    ``plot_attraction(dw.assembly.attraction(study)).figure.savefig("attraction.png")``
+    """
+    check_kind(attraction, "attraction", "gap", "force", "simulated_force")
+    ax = style.axes_or_new(ax, height_mm=65.0)
+    gap = 1e3 * np.asarray(attraction["gap"].values, dtype=np.float64)
+    for name, text, color, dashes in (
+        ("force", "measured by a balance", style.BLUE, "-"),
+        ("simulated_force", "in the simulation", style.ORANGE, (0, (5, 2))),
+    ):
+        force = 1e3 * np.asarray(attraction[name].values, dtype=np.float64)
+        ax.plot(gap, np.where(force > 0.0, force, np.nan), color=color, ls=dashes, label=text)
+    ax.set(
+        xlabel="gap between the faces (mm)", ylabel="attraction (mN)", yscale="log",
+        xlim=(0.0, gap[-1]),
+    )  # fmt: skip
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.legend(frameon=False)
+    ax.set_title(str(attraction.attrs["between"]), loc="left")
     return ax
 
 
@@ -322,7 +369,7 @@ def plot_growth(
         Names of the first and the second, for the legend.
     what : {"mean size", "shares"}
         The mean size of the assemblies, or the shares of the blocks that are in the largest
-        assembly and alone.
+        assembly and alone, with the compactness.
 
     Returns
     -------
@@ -347,8 +394,13 @@ def plot_growth(
     ax = style.axes_or_new(ax, height_mm=65.0)
     time = sizes["time"].values
     for one, color, label in zip(both, (style.BLUE, style.ORANGE), labels, strict=False):
-        for (name, words), dashes in zip(curves.items(), ("-", (0, (5, 2))), strict=False):
-            text = ", ".join(part for part in (words if len(curves) > 1 else "", label) if part)
+        for (name, words), dashes in zip(
+            curves.items(), ("-", (0, (5, 2)), (0, (1, 1.5))), strict=False
+        ):
+            # Dashes are named once, and then the colour of the second one.
+            named = words if len(curves) > 1 and one is sizes else ""
+            first = name == next(iter(curves))
+            text = named or (label if first else "")
             ax.plot(one["time"], one[name], color=color, ls=dashes, lw=1.3, label=text or None)
             ends = (one[f"{name}_low"].values, one[f"{name}_high"].values)
             ax.fill_between(one["time"].values, *ends, color=color, alpha=0.2, lw=0)

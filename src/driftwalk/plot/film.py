@@ -29,6 +29,8 @@ FILM_MM: Final = 101.6
 DOTS_PER_INCH: Final = {".gif": 100, ".mp4": 200}
 TRAIL_S: Final = 5.0
 """How long the trail behind a body is, in seconds of the film."""
+MOST_TRAILS: Final = 64
+"""Bodies of a film up to which trails and pointers are drawn; chosen by eye."""
 SHORTEST_S: Final = 0.2
 MOST_FRAMES: Final = 15_000
 """Ten minutes of an MP4; a longer film is rather shown faster."""
@@ -65,7 +67,7 @@ def write_animation(
     lies its way of the last 5 s of the film. Faces that are magnets have a bar, red for N and white
     for S. The film has 12.5 frames per second as GIF and 25 as
     MP4; each shows the last sample up to its time, and a body that was not seen for three of its
-    usual intervals is not shown.
+    usual intervals is not shown. More than 64 bodies have no lines and no ways.
 
     Parameters
     ----------
@@ -195,8 +197,10 @@ def _frames(scene: _Scene, moments: Floats, rate: float, dots: int) -> Iterator[
     canvas.draw()
     empty = canvas.copy_from_bbox(figure.bbox)
     trails = LineCollection([], colors=style.MUTED, linewidths=0.8, alpha=0.7, zorder=2)
-    bodies = PolyCollection([], edgecolors=style.INK, linewidths=0.6, zorder=3)
     bars = empty_bars()
+    count = scene.place.shape[1]
+    edge = style.edge_width(count)
+    bodies = PolyCollection([], edgecolors=style.INK, linewidths=edge, zorder=3)
     pointers = LineCollection([], colors=style.INK, linewidths=0.9, zorder=4)
     clock = figure.text(0.04, 0.955, "", size=9.0, va="center")
     artists = (trails, bodies, bars, pointers)
@@ -208,18 +212,20 @@ def _frames(scene: _Scene, moments: Floats, rate: float, dots: int) -> Iterator[
     for moment in moments:
         # A hair of rounding is forgiven.
         until = int(np.searchsorted(scene.time, moment + 1e-9 * max(1.0, abs(moment)), "right"))
-        shown = [(sample, body) for body, sample in enumerate(seen[until - 1]) if sample >= 0]
+        body = np.flatnonzero(seen[until - 1] >= 0)
+        shown = list(zip(seen[until - 1][body].tolist(), body.tolist(), strict=True))
         first = int(np.searchsorted(scene.time, moment - TRAIL_S * rate))
-        # NaN breaks the line.
-        trails.set_segments([scene.place[first:until, body] for _, body in shown])
-        bodies.set_verts([_outline(scene, *one, size) for one in shown])
+        bodies.set_verts(_outlines(scene, seen[until - 1][body], body, size))
         bodies.set_facecolor([PALETTE[scene.color[one] % len(PALETTE)] for one in shown])
         if scene.pole is not None:
             poses = scene.place[until - 1], scene.theta[until - 1]
             corners, colors = pole_bars(poses[0][:, 0], poses[0][:, 1], poses[1], scene.pole, size)
             bars.set_verts(corners)
             bars.set_facecolor(colors)
-        pointers.set_segments([line for one in shown if (line := _pointer(scene, *one, size))])
+        if count <= MOST_TRAILS:
+            # NaN breaks the line.
+            trails.set_segments([scene.place[first:until, body] for _, body in shown])
+            pointers.set_segments([line for one in shown if (line := _pointer(scene, *one, size))])
         clock.set_text(f"t = {moment:.{digits}f} s")
         canvas.restore_region(empty)
         for artist in artists:
@@ -276,15 +282,16 @@ def _last_seen(scene: _Scene) -> Integers:
     return last
 
 
-def _outline(scene: _Scene, sample: int, body: int, size: float) -> Floats:
-    """Return the corners of a block, or a disc where side or orientation are unknown."""
+def _outlines(scene: _Scene, sample: Integers, body: Integers, size: float) -> list[Floats]:
+    """Return the corners of blocks, or discs where side or orientation are unknown."""
     theta = scene.theta[sample, body]
-    square = scene.side is not None and np.isfinite(theta)
-    turn = theta + np.pi / 4.0 if square else 0.0
-    angles = turn + np.linspace(0.0, 2.0 * np.pi, 4 if square else 24, endpoint=False)
-    radius = size * np.sqrt(2.0) if square else size
-    around = np.column_stack([np.cos(angles), np.sin(angles)])
-    return np.asarray(scene.place[sample, body] + radius * around)
+    square = np.isfinite(theta) & (scene.side is not None)
+    place = scene.place[sample, body][:, None]
+    angle = (np.where(square, theta, 0.0) + np.pi / 4.0)[:, None] + np.pi / 2.0 * np.arange(4)
+    corners = place + size * np.sqrt(2.0) * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    round_ = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+    circles = place + size * np.stack([np.cos(round_), np.sin(round_)], axis=-1)
+    return [corners[n] if one else circles[n] for n, one in enumerate(square)]
 
 
 def _pointer(scene: _Scene, sample: int, body: int, size: float) -> list[Floats]:

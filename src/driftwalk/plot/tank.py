@@ -285,7 +285,7 @@ def _draw_blocks(ax: Axes, moment: xr.Dataset) -> None:
         list(block_corners(moment)),
         facecolors=colors,
         edgecolors=style.INK,
-        linewidths=0.6,
+        linewidths=style.edge_width(len(colors)),
         zorder=3,
     )
     ax.add_collection(blocks)

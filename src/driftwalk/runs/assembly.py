@@ -45,6 +45,8 @@ class AssemblyResult:
         Kind "outcome_distribution", of runs with drawn parameters.
     sizes, sizes_drawn : xarray.Dataset or None
         Kind "assembly_sizes", of the same two sets of runs; beyond 8 blocks only.
+    attraction : xarray.Dataset or None
+        Kind "attraction", where blocks feel each other at a distance.
     """
 
     assembly: xr.Dataset
@@ -53,6 +55,7 @@ class AssemblyResult:
     drawn: xr.Dataset | None
     sizes: xr.Dataset | None = None
     sizes_drawn: xr.Dataset | None = None
+    attraction: xr.Dataset | None = None
 
 
 @dataclass(frozen=True)
@@ -117,7 +120,13 @@ class AssemblyWork:
 
     def compute(self, run: Run) -> AssemblyResult:
         """Simulate with the parameters found and, where they can be drawn, with drawn ones."""
-        from driftwalk.assembly import assemble, assemble_drawn, assembly_path, class_times
+        from driftwalk.assembly import (
+            assemble,
+            assemble_drawn,
+            assembly_path,
+            attraction,
+            class_times,
+        )
 
         settings = self.study.assembly
         drawn = sizes_drawn = None
@@ -133,6 +142,9 @@ class AssemblyWork:
         )
         assembly = run.keep("assembly.nc", assembly)
         distribution, sizes = self._outcomes(assembly, run, "")
+        pull = attraction(self.study)
+        if pull is not None:
+            pull = run.keep("attraction.nc", pull)
         times = run.keep("class_times.nc", class_times(assembly, confidence=settings.confidence))
         if self.calibration is not None:
             assembly_drawn = assemble_drawn(
@@ -165,7 +177,7 @@ class AssemblyWork:
             course.begin("film")
             film = run.directory.folder("figures") / f"run.{self.film}"
             driftwalk.plot.write_animation(path, film)
-        return AssemblyResult(assembly, distribution, times, drawn, sizes, sizes_drawn)
+        return AssemblyResult(assembly, distribution, times, drawn, sizes, sizes_drawn, pull)
 
     def _outcomes(
         self, assembly: xr.Dataset, run: Run, ending: str

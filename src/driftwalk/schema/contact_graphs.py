@@ -25,6 +25,11 @@ _COUNTS: Final = re.compile(r"(\d+) discs, (\d+) contacts")
 _CODE: Final = re.compile(r"[a-h]{2}(\.[a-h]{2})+")
 
 
+def counted_graph(discs: int, contacts: int) -> str:
+    """Return the name of a graph of more than 8 discs."""
+    return f"{discs} discs, {contacts} contacts"
+
+
 def graph_name(discs: int, contacts: Iterable[tuple[int, int]]) -> str:
     """Return the name of a connected contact graph, the same however its discs are numbered.
 
@@ -58,7 +63,7 @@ def _name(discs: int, contacts: Contacts) -> str:
     if discs > 3 and set(degrees) == {2}:
         return f"ring{discs}"
     if discs > MOST_DISCS:
-        return f"{discs} discs, {len(contacts)} contacts"
+        return counted_graph(discs, len(contacts))
     first = min(_numberings(discs, contacts))
     code = ".".join(_LETTERS[one] + _LETTERS[other] for one, other in first)
     return _NAMES.get(code, code)

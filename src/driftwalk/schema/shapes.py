@@ -6,6 +6,7 @@ A shape has a short name ("L3") or is called by its rows from the top, as seen f
 
 from __future__ import annotations
 
+import re
 from typing import Final
 
 from driftwalk.schema.contact_graphs import discs_of
@@ -29,8 +30,49 @@ NAMED_SHAPES: Final[dict[str, str]] = {
 """As people draw them. The order is that of all lists."""
 
 
+MOST_NAMED: Final = 64
+"""Blocks up to which the class of a world names its shapes; of more it is their number. Chosen by
+hand: runs of as many hardly ever end in the same shapes."""
+MOST_CELLS_NAMED: Final = 8
+"""Cells up to which a shape of so many blocks has a name of its own; chosen by hand."""
+_SHAPE_COUNTS: Final = re.compile(r"(\d+) blocks, (\d+) joins")
+_ASSEMBLIES: Final = re.compile(r"(\d+) assembl(?:y|ies)")
 LONGEST_CLASS: Final = 40
 """Letters of a class that a line of text has room for: every one of up to 8 blocks has fewer."""
+
+
+def counted_shape(blocks: int, joins: int) -> str:
+    """Return the name of a large shape: its blocks, and how many pairs of them lie side by side."""
+    return f"{blocks} blocks, {joins} joins"
+
+
+def counts_of_shape(name: str) -> tuple[int, int]:
+    """Return blocks and joins of a shape that is named by them, zeros of any other.
+
+    Examples
+    --------
+    >>> counts_of_shape(counted_shape(20, 31)), counts_of_shape("T")
+    ((20, 31), (0, 0))
+    """
+    found = _SHAPE_COUNTS.fullmatch(name)
+    return (int(found[1]), int(found[2])) if found else (0, 0)
+
+
+def counted_class(assemblies: int) -> str:
+    """Return the outcome class of many blocks: how many assemblies they make."""
+    return "1 assembly" if assemblies == 1 else f"{assemblies} assemblies"
+
+
+def is_one_assembly(name: str) -> bool:
+    """Return whether all blocks of an outcome class are in one assembly.
+
+    Examples
+    --------
+    >>> [is_one_assembly(name) for name in ("T", "2+2", "1 assembly", "12 assemblies")]
+    [True, False, True, False]
+    """
+    counted = _ASSEMBLIES.fullmatch(name)
+    return counted[1] == "1" if counted else "+" not in name
 
 
 def short_class(name: str) -> str:

@@ -9,6 +9,7 @@ two agree to rounding until a collision amplifies it, and in distribution after.
     wall      assemblies against the wall
     contacts  blocks against blocks: overlap, impulses, shifts
     latch     which faces join, and the body that they make
+    pull      forces between blocks at a distance
 
 The twin decides cases that the rules leave open:
 
@@ -43,6 +44,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.lattice.typed_faces import FaceTable
+from driftwalk.assembly.pull.tables import BlockPull, block_pull
 from driftwalk.core.errors import InputError
 from driftwalk.simulation.backend import wall_edges
 from twin.block import TwinModel, drag, force_normals, next_force, push_of_water
@@ -50,6 +52,7 @@ from twin.body import Assembly, Floats, Square, cross, single_block, wrapped
 from twin.contacts import collide, overlapping_pairs, separate
 from twin.faces import Faces
 from twin.latch import Joined, Latch, Latching, candidates, latch_once
+from twin.pull import pull_of_blocks
 from twin.wall import Wall, meet_wall
 
 if TYPE_CHECKING:
@@ -72,6 +75,7 @@ class Rules:
     hidden_face_drag: HiddenFaceDrag
     block_restitution: float
     block_friction: float
+    pull: BlockPull | None = None
 
     @property
     def square(self) -> Square:
@@ -142,8 +146,8 @@ def assemble_reference(
     Parameters
     ----------
     study : Study
-        Block, tank, water, the two times, and what [forces] adds to the paper's law; the rest is
-        not read.
+        Block, tank, water, the two times, what [forces] adds to the paper's law, and
+        [interaction], without fixed poles; the rest is not read.
     flow : xarray.Dataset
         A steady `flow_field`.
     start : array_like, shape (blocks, 3)
@@ -278,6 +282,7 @@ def make_rules(
         hidden_face_drag,
         block_restitution,
         block_friction,
+        block_pull(study),
     )
 
 
@@ -357,6 +362,15 @@ def drag_sums(
     )
     pushed = push_of_water(model, members[:3])
     force_x, force_y, torque = force_x + pushed[0], force_y + pushed[1], torque + pushed[2]
+    if rules.pull is not None:
+        sizes = [body.size for body in world.assemblies]
+        owner = np.repeat(np.arange(len(sizes)), sizes)
+        typed = rules.latch.faces
+        pole = None if typed is None else np.concatenate([typed.poles(b) for b in world.assemblies])
+        pulled = pull_of_blocks(
+            rules.pull, members[:3], members[3:], hidden, owner, None if pole is None else pole.T
+        )
+        force_x, force_y, torque = force_x + pulled[0], force_y + pulled[1], torque + pulled[2]
     sums, first = [], 0
     for body, arm in zip(world.assemblies, arms, strict=True):
         own = slice(first, first + body.size)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from driftwalk.assembly.lattice.typed_faces import FaceTable
-from twin.body import NEIGHBOURS, Assembly
+from twin.body import NEIGHBOURS, Assembly, Ints
 
 
 @dataclass
@@ -23,6 +25,15 @@ class Faces:
         """Return whether two faces, each in its block's own frame, may latch."""
         pair = self.type_of(block, own_face), self.type_of(other, other_face)
         return bool(self.table.latches[pair])
+
+    def poles(self, body: Assembly) -> Ints:
+        """Return the poles of the members' faces in the assembly's frame, shape (n, 4)."""
+        return np.array(
+            [
+                [self.table.pole[self.kind[block], (face - quarter) % 4] for face in range(4)]
+                for block, quarter in zip(body.blocks, body.quarters, strict=True)
+            ]
+        )
 
     def refused(self, made: Assembly, stayed: list[int]) -> bool:
         """Return whether a merge brings as many like poles together as faces that latch."""

@@ -292,3 +292,23 @@ def test_kinds_are_read_as_the_shape_is_drawn(
     cells: list[tuple[int, int]], kinds: str, name: str
 ) -> None:
     assert _coloured(tuple(cells), tuple(kinds), "merged") == name
+
+
+@pytest.mark.slow
+def test_many_blocks_have_types_and_start_glued() -> None:
+    """Forty blocks: those of one world lie side by side in the lanes of the kernel."""
+    flow = dw.jets_flow(diameter=0.6, jet_speed=0.15, inclination=0.4, swirl_speed=0.03)
+    study = Study(tank={"diameter_m": 0.6}, forces={"force_std_N": 2e-3}, assembly={"blocks": 40})
+
+    def run(**rules: Any) -> xr.Dataset:
+        changed = apply_overrides(study, {f"assembly.{key}": value for key, value in rules.items()})
+        return assemble(changed, flow, runs=2, duration=3.0)
+
+    assert (run(faces="NNNN")["event_count"] == 0).all()
+    found = run(faces="NSNS")
+    types = np.array([0, 1, 0, 1])[found["event_face"].values[found["event_time"].notnull()]]
+    assert len(types) > 20
+    assert (types.sum(axis=1) == 1).all()
+    glued = run(glued="xx")
+    assert ((glued["event_time"] == 0.0).sum("event") == 20).all()
+    assert (glued["event_count"] > 20).all()

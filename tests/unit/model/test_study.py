@@ -86,7 +86,7 @@ def _companions(section: str, key: str) -> dict[str, object]:
 
 
 def test_every_number_declares_a_unit_that_its_name_repeats() -> None:
-    suffixes = {"m", "kg", "s", "N", "rad", "Hz", "m_s", "kg_m3", "kg_s", "Pa_s"}
+    suffixes = {"m", "kg", "s", "N", "rad", "Hz", "m_s", "kg_m3", "kg_s", "Pa_s", "N_m", "N_s"}
     for name in Study.model_fields:
         kind = type(getattr(Study(), name))
         for key in kind.model_fields:

@@ -11,9 +11,8 @@
 
 DRIFTWALK_LANES_BEGIN
 
-// Up to this many blocks the sums over members are masked vectors, beyond they go lane by lane.
-inline constexpr int most_blocks_masked = 8;
-
+// Adds what the members of each assembly contribute, in the order of the blocks: for a few blocks,
+// one world per lane. Many have crowd.hpp.
 template <int Count, class Real>
 inline void sum_masked(const Member<Real>* members, Sums<Real>* sums, int blocks) {
   using T = typename Numbers<Real>::Scalar;
@@ -34,44 +33,10 @@ inline void sum_masked(const Member<Real>* members, Sums<Real>* sums, int blocks
   }
 }
 
-template <int Count, class Real>
-inline void sum_by_lane(const Member<Real>* members, Sums<Real>* sums, int blocks) {
-  using T = typename Numbers<Real>::Scalar;
-  for (int b = 0; b < blocks; ++b) {
-    for (int k = 0; k < Count; ++k) {
-      sums[b].total[k] = Real(T(0));
-    }
-  }
-  for (int lane = 0; lane < Numbers<Real>::lanes; ++lane) {
-    for (int b = 0; b < blocks; ++b) {
-      Sums<Real>& at = sums[get(members[b].root, lane)];
-      for (int k = 0; k < Count; ++k) {
-        put(at.total[k], lane, get(at.total[k], lane) + get(sums[b].part[k], lane));
-      }
-    }
-    // The lowest block of an assembly has the sum; it comes before the others.
-    for (int b = 0; b < blocks; ++b) {
-      const Sums<Real>& at = sums[get(members[b].root, lane)];
-      for (int k = 0; k < Count; ++k) {
-        put(sums[b].total[k], lane, get(at.total[k], lane));
-      }
-    }
-  }
-}
-
-// Adds what the members of each assembly contribute, in the order of the blocks.
-template <int Count, class Real>
-inline void sum_members(const Member<Real>* members, Sums<Real>* sums, int blocks) {
-  if (blocks <= most_blocks_masked) {
-    sum_masked<Count>(members, sums, blocks);
-  } else {
-    sum_by_lane<Count>(members, sums, blocks);
-  }
-}
-
-template <class Real, class T, class Law>
+// `sum` adds so many parts of each row.
+template <class Real, class T, class Law, class Sum>
 inline void sum_noise(const Physics<Real, T, Law>& physics, int half, Member<Real>* members,
-                      Sums<Real>* sums, int blocks) {
+                      Sums<Real>* sums, int blocks, const Sum& sum) {
   for (int b = 0; b < blocks; ++b) {
     const Member<Real>& m = members[b];
     const Real x = m.normals[2 * half] * physics.world.noise_scale;
@@ -80,7 +45,7 @@ inline void sum_noise(const Physics<Real, T, Law>& physics, int half, Member<Rea
     sums[b].part[1] = y;
     sums[b].part[2] = m.arm.x * y - m.arm.y * x;
   }
-  sum_members<noise_sums>(members, sums, blocks);
+  sum.template operator()<noise_sums>();
   for (int b = 0; b < blocks; ++b) {
     Member<Real>& m = members[b];
     m.noise.vx = sums[b].total[0] * m.per_count;
@@ -188,8 +153,8 @@ inline void finish_member(const Physics<Real, T, Law>& physics, const Real* tota
       (physics.shape.panel_count > 0 ? physics.shape.turning_share : turning_share(physics.block)) *
       half;
   const Real per_mass = physics.world.drag_per_mass, per_inertia = physics.world.drag_per_inertia;
-  // Where the water pushes, the sums are accelerations.
-  const bool done = physics.water.count > 0;
+  // Where the water pushes, or another block, the sums are accelerations.
+  const bool done = physics.water.count > 0 || physics.pulled;
   const Real by_mass = done ? Real(T(1)) : per_mass, by_inertia = done ? Real(T(1)) : per_inertia;
   WaterPush<Real> push;
   push.acceleration = {total[0] * by_mass * m.per_count, total[1] * by_mass * m.per_count,
@@ -203,16 +168,19 @@ inline void finish_member(const Physics<Real, T, Law>& physics, const Real* tota
   find_arm(m);
 }
 
-template <class Real, class T, class Law>
+// Rows of lanes: blocks of a pack of worlds, or those of one world. `pull` adds what blocks do to
+// each other to the sums of each.
+template <class Real, class T, class Law, class Sum, class Pull>
 inline void advance(const Physics<Real, T, Law>& physics, int half, Member<Real>* members,
-                    Sums<Real>* sums, int blocks) {
-  sum_noise(physics, half, members, sums, blocks);
-  for (int b = 0; b < blocks; ++b) {
-    feel_drag(physics, members[b], sums[b]);
+                    Sums<Real>* sums, int rows, const Sum& sum, const Pull& pull) {
+  sum_noise(physics, half, members, sums, rows, sum);
+  for (int row = 0; row < rows; ++row) {
+    feel_drag(physics, members[row], sums[row]);
   }
-  sum_members<drag_sums_kept>(members, sums, blocks);
-  for (int b = 0; b < blocks; ++b) {
-    finish_member(physics, sums[b].total, members[b]);
+  pull();
+  sum.template operator()<drag_sums_kept>();
+  for (int row = 0; row < rows; ++row) {
+    finish_member(physics, sums[row].total, members[row]);
   }
 }
 

@@ -1,22 +1,29 @@
 // One lane of a pack in and out: a world's start, its scene for settle and back, its results.
 #pragma once
 
-#include "driftwalk/assembly/advance.hpp"
+#include "driftwalk/assembly/crowd.hpp"
+#include "driftwalk/assembly/pull.hpp"
 #include "driftwalk/random/philox.hpp"
 
 DRIFTWALK_LANES_BEGIN
 
-// The memory of a pack, laid out in one piece.
+// The memory of a pack, laid out in one piece. A few blocks: a lane is a world, a row of lanes one
+// block of each. Many: all lanes are blocks of one world, rows one after the other.
 template <class Real>
 struct PackMemory {
   static constexpr int lanes = Numbers<Real>::lanes;
-  Member<Real>* members;
-  Sums<Real>* sums;
-  Real* listed_x; // where the blocks were when their lane's list of near pairs was made [m]
-  Real* listed_y;
-  BlockBook* books; // [block][lane]
-  BlockPair* pairs; // [lane][pair_capacity]
+  bool one_world;
+  Member<Real>* members;                         // [row]
+  Sums<Real>* sums;                              // [row]
+  Pulled<Real>* pulled;                          // [row]
+  Pulled<typename Numbers<Real>::Scalar>* alone; // [block] of one world
+  BlockBook* books;                              // [block][lane], of one world [block]
+  Crowd<Real> crowd;                             // of one world
 
+  // Whether a pack with room for this many blocks holds one world.
+  static constexpr bool is_one_world(int blocks) {
+    return lanes == 1 || blocks > most_blocks_all_pairs;
+  }
   static std::size_t bytes(int blocks) {
     PackMemory layout;
     return layout.place(nullptr, blocks);
@@ -24,7 +31,13 @@ struct PackMemory {
   PackMemory() = default;
   PackMemory(void* memory, int blocks) { place(static_cast<char*>(memory), blocks); }
 
-  BlockBook& book(int block, int lane) const { return books[block * lanes + lane]; }
+  int rows(int blocks) const { return one_world ? (blocks + lanes - 1) / lanes : blocks; }
+  // The row and the lane of a block of a world.
+  Member<Real>& member(int block) const { return members[one_world ? block / lanes : block]; }
+  int lane(int block, int world) const { return one_world ? block % lanes : world; }
+  BlockBook& book(int block, int lane) const {
+    return books[one_world ? block : block * lanes + lane];
+  }
 
 private:
   std::size_t place(char* memory, int blocks) {
@@ -34,17 +47,35 @@ private:
       pointer = memory == nullptr ? nullptr : reinterpret_cast<Item*>(memory + size);
       size = (size + count * sizeof(Item) + 63) / 64 * 64;
     };
-    const std::size_t count = static_cast<std::size_t>(blocks);
-    const bool listed = blocks > most_blocks_all_pairs;
+    one_world = is_one_world(blocks);
+    const std::size_t count = static_cast<std::size_t>(rows(blocks));
     take(members, count);
     take(sums, count);
-    take(listed_x, count);
-    take(listed_y, count);
+    take(pulled, count);
     take(books, count * lanes);
-    take(pairs, listed ? static_cast<std::size_t>(pair_capacity(blocks)) * lanes : 0);
+    if (one_world) {
+      take(alone, count * lanes);
+      crowd.place(take, count);
+    }
     return size;
   }
 };
+
+// Of the faces of the block's assembly: a joined face neither pulls nor is pulled.
+template <class Real>
+inline void set_poles(const AssemblyRules& rules, const PackMemory<Real>& pack, int block,
+                      int world) {
+  const int lane = pack.lane(block, world);
+  const BlockBook& book = pack.book(block, lane);
+  for (int face = 0; face < 4; ++face) {
+    const bool joined = (book.joined >> face & 1) != 0;
+    const int own = (face - book.quarter) & 3;
+    const double pole =
+        rules.faces != nullptr ? rules.faces->pole[book.kind][own] : rules.pull.pole[own];
+    put(pack.pulled[pack.one_world ? block / PackMemory<Real>::lanes : block].pole[face], lane,
+        joined ? 0.0 : pole);
+  }
+}
 
 template <class Real>
 inline void put_before(Member<Real>& m, int lane) {
@@ -58,8 +89,9 @@ inline void put_before(Member<Real>& m, int lane) {
 // A block alone, at rest at a pose [x, y, theta].
 template <class Real, class T>
 inline void load_block(const AssemblyRules& rules, const double* pose, const PackMemory<Real>& pack,
-                       int block, int lane) {
-  Member<Real>& m = pack.members[block];
+                       int block, int world) {
+  Member<Real>& m = pack.member(block);
+  const int lane = pack.lane(block, world);
   put(m.pose.x, lane, pose[0]);
   put(m.pose.y, lane, pose[1]);
   put(m.pose.theta, lane, __builtin_remainder(pose[2], 2 * pi_value));
@@ -86,13 +118,19 @@ inline void load_block(const AssemblyRules& rules, const double* pose, const Pac
     put(normal, lane, T(0));
   }
   pack.book(block, lane) = {0, 0, 0, 0, first_kind(rules.faces, block)};
+  set_poles(rules, pack, block, lane);
 }
 
 template <class Real, class T>
 inline void load_lane(const AssemblyRules& rules, const double* start, const PackMemory<Real>& pack,
-                      int lane) {
+                      int world) {
   for (int b = 0; b < rules.blocks; ++b) {
-    load_block<Real, T>(rules, start + 3 * b, pack, b, lane);
+    load_block<Real, T>(rules, start + 3 * b, pack, b, world);
+  }
+  // What fills the last row of one world repeats a block, and touches nothing.
+  const int filled = pack.one_world ? pack.rows(rules.blocks) * PackMemory<Real>::lanes : 0;
+  for (int b = rules.blocks; b < filled; ++b) {
+    load_block<Real, T>(rules, start, pack, b, world);
   }
 }
 
@@ -106,13 +144,14 @@ inline void unit_axes(const Axes<Real>& axes, int lane, double& cosine, double& 
 
 // The lane's world in plain numbers.
 template <class Real>
-inline void fill_scene(const AssemblyRules& rules, const PackMemory<Real>& pack, int lane,
+inline void fill_scene(const AssemblyRules& rules, const PackMemory<Real>& pack, int world,
                        int assemblies, Scene& scene) {
   scene.blocks = rules.blocks;
   scene.assemblies = assemblies;
   scene.contact = scene.rebuilt = false;
   for (int b = 0; b < rules.blocks; ++b) {
-    const Member<Real>& m = pack.members[b];
+    const Member<Real>& m = pack.member(b);
+    const int lane = pack.lane(b, world);
     const BlockBook& book = pack.book(b, lane);
     SceneBlock& block = scene.block[b];
     SceneAssembly& assembly = scene.assembly[b];
@@ -153,18 +192,21 @@ inline void fill_scene(const AssemblyRules& rules, const PackMemory<Real>& pack,
 
 template <class Real>
 inline void cover_faces(const AssemblyRules& rules, const PackMemory<Real>& pack, int block,
-                        int lane) {
+                        int world) {
+  const int lane = pack.lane(block, world);
   const unsigned joined = pack.book(block, lane).joined;
   for (int face = 0; face < 4; ++face) {
-    put(pack.members[block].covered[face], lane,
+    put(pack.member(block).covered[face], lane,
         rules.hidden_share < 1 && (joined >> face & 1u) != 0);
   }
+  set_poles(rules, pack, block, lane);
 }
 
 template <class Real>
 inline void read_block(const AssemblyRules& rules, const Scene& scene, const PackMemory<Real>& pack,
-                       int b, int lane) {
-  Member<Real>& m = pack.members[b];
+                       int b, int world) {
+  Member<Real>& m = pack.member(b);
+  const int lane = pack.lane(b, world);
   const SceneBlock& block = scene.block[b];
   const SceneAssembly& body = scene.assembly[block.assembly];
   put(m.pose.x, lane, body.x);
@@ -199,16 +241,17 @@ inline void read_block(const AssemblyRules& rules, const Scene& scene, const Pac
 
 template <class Real>
 inline void read_scene(const AssemblyRules& rules, const Scene& scene, const PackMemory<Real>& pack,
-                       int lane) {
+                       int world) {
   for (int b = 0; b < rules.blocks; ++b) {
-    read_block(rules, scene, pack, b, lane);
+    read_block(rules, scene, pack, b, world);
   }
 }
 
 // The block's own orientation [rad].
 template <class Real, class T>
-inline T own_angle(const PackMemory<Real>& pack, int block, int lane) {
-  const T turned = get(pack.members[block].pose.theta, lane) +
+inline T own_angle(const PackMemory<Real>& pack, int block, int world) {
+  const int lane = pack.lane(block, world);
+  const T turned = get(pack.member(block).pose.theta, lane) +
                    T(pack.book(block, lane).quarter) * static_cast<T>(pi_value / 2) +
                    static_cast<T>(pack.book(block, lane).turn);
   const T turn = static_cast<T>(2 * pi_value), half = static_cast<T>(pi_value);
@@ -218,10 +261,11 @@ inline T own_angle(const PackMemory<Real>& pack, int block, int lane) {
 // Bits of `Status` of the world in a lane.
 template <class Real, class T>
 inline std::uint32_t lane_status(const Prepared<T>& run, const AssemblyRules& rules,
-                                 const PackMemory<Real>& pack, int lane) {
+                                 const PackMemory<Real>& pack, int world) {
   bool finite = true, inside = true;
   for (int b = 0; b < rules.blocks; ++b) {
-    const Member<Real>& m = pack.members[b];
+    const Member<Real>& m = pack.member(b);
+    const int lane = pack.lane(b, world);
     const T x = get(m.x, lane), y = get(m.y, lane), theta = own_angle<Real, T>(pack, b, lane);
     const T speed = get(m.motion.vx, lane) + get(m.motion.vy, lane) + get(m.motion.omega, lane);
     finite = finite && abs(x + y + theta + speed) < T(1e30);
@@ -234,11 +278,12 @@ inline std::uint32_t lane_status(const Prepared<T>& run, const AssemblyRules& ru
 
 template <class Real, class T>
 inline void write_results(const Prepared<T>& run, const AssemblyRules& rules,
-                          const AssemblyOutputs& out, const PackMemory<Real>& pack, int lane,
+                          const AssemblyOutputs& out, const PackMemory<Real>& pack, int own,
                           const LaneBook& book, std::int64_t steps) {
   const std::int64_t world = book.world;
   for (int b = 0; b < rules.blocks; ++b) {
-    const Member<Real>& m = pack.members[b];
+    const Member<Real>& m = pack.member(b);
+    const int lane = pack.lane(b, own);
     const std::int64_t row = world * rules.blocks + b;
     out.pose[3 * row] = get(m.x, lane);
     out.pose[3 * row + 1] = get(m.y, lane);
@@ -249,7 +294,7 @@ inline void write_results(const Prepared<T>& run, const AssemblyRules& rules,
     out.quarter[row] = block.quarter;
     out.assembly[row] = get(m.root, lane);
   }
-  out.status[world] = lane_status<Real, T>(run, rules, pack, lane);
+  out.status[world] = lane_status<Real, T>(run, rules, pack, own);
   out.event_count[world] = book.event_count;
   out.first_contact_step[world] = book.first_contact;
   out.end_step[world] = static_cast<std::int32_t>(steps);
@@ -257,11 +302,12 @@ inline void write_results(const Prepared<T>& run, const AssemblyRules& rules,
 
 template <class Real, class T>
 inline void write_moment(const AssemblyRules& rules, const AssemblyOutputs& out,
-                         const PackMemory<Real>& pack, int lane, std::int64_t world,
+                         const PackMemory<Real>& pack, int own, std::int64_t world,
                          std::int64_t sample) {
   const std::int64_t first = (world * out.samples + sample) * rules.blocks;
   for (int b = 0; b < rules.blocks; ++b) {
-    const Member<Real>& m = pack.members[b];
+    const Member<Real>& m = pack.member(b);
+    const int lane = pack.lane(b, own);
     float* const pose = out.sample_pose + 3 * (first + b);
     pose[0] = static_cast<float>(get(m.x, lane));
     pose[1] = static_cast<float>(get(m.y, lane));

@@ -51,6 +51,8 @@ public:
   void set_rules(Latching latching, double hidden_share, double stirring_length);
   // Blocks are of the kinds at the start again; the rules have to outlive the world.
   void set_faces(const FaceRules* faces);
+  // The tables have to outlive the world.
+  void set_pull(const PullRules& pull);
   // Removes the last blocks, or adds blocks at random free places, at rest, as long as there are
   // any. Returns the number of blocks, 1 to most_blocks.
   int set_blocks(int blocks);

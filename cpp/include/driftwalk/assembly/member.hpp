@@ -59,7 +59,6 @@ struct LaneBook {
   std::int32_t event_count = 0, first_contact = -1;
   std::int32_t assemblies = 0;
   bool running = false;
-  PairList pairs = {}; // of near pairs, where not all pairs are looked at
 };
 
 // One number of one lane, of a pack or of a single number.
@@ -110,8 +109,10 @@ inline FloatPack<N> keep(Mask<N> mask, FloatPack<N> value) {
   typedef typename IntPack<N>::Vector Bits;
   return (typename FloatPack<N>::Vector)((Bits)value.v & mask.v);
 }
-inline double keep(bool mask, double value) {
-  return mask ? value : 0.0;
+template <class T>
+  requires std::is_floating_point_v<T>
+inline T keep(bool mask, T value) {
+  return mask ? value : T(0);
 }
 template <int N>
 inline Mask<N> equal(IntPack<N> a, IntPack<N> b) {

@@ -3,6 +3,7 @@
 
 #include "driftwalk/assembly/kernel.hpp"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -16,9 +17,9 @@ class AssemblyMemory {
 public:
   AssemblyMemory(int blocks, std::size_t lane_bytes)
       : blocks_(static_cast<std::size_t>(blocks)), before_(blocks_.size()),
-        assemblies_(blocks_.size()), next_(blocks_.size()),
-        heads_(most_cells_per_side * most_cells_per_side),
-        pairs_(static_cast<std::size_t>(pair_capacity(blocks))),
+        assemblies_(blocks_.size()), next_(blocks_.size()), heads_(cell_heads),
+        pairs_(static_cast<std::size_t>(std::min(pair_capacity(blocks), pairs_per_block * blocks))),
+        close_(pairs_.size()),
         lanes_(static_cast<char*>(::operator new(lane_bytes, lane_alignment))) {
     scratch_.lanes = lanes_.get();
     Scene& scene = scratch_.scene;
@@ -26,13 +27,27 @@ public:
     scene.block = blocks_.data();
     scene.blocks_before = before_.data();
     scene.assembly = assemblies_.data();
-    scene.pairs = {pairs_.data(), 0};
+    scene.pairs = list_in(pairs_);
+    scene.close = list_in(close_);
     scene.cell_head = heads_.data();
     scene.cell_next = next_.data();
   }
+  // The scene knows where its pairs are.
+  AssemblyMemory(const AssemblyMemory&) = delete;
+  AssemblyMemory& operator=(const AssemblyMemory&) = delete;
   AssemblyScratch& scratch() { return scratch_; }
 
 private:
+  // About twice what squares side by side have of a list: the room that a world begins with.
+  static constexpr int pairs_per_block = 16;
+  static PairList list_in(std::vector<BlockPair>& pairs) {
+    return {pairs.data(), 0, static_cast<int>(pairs.size()), grow_pairs, &pairs};
+  }
+  static BlockPair* grow_pairs(void* owner, int room) {
+    auto& pairs = *static_cast<std::vector<BlockPair>*>(owner);
+    pairs.resize(static_cast<std::size_t>(room));
+    return pairs.data();
+  }
   // Of the widest registers. Windows has no std::aligned_alloc.
   static constexpr std::align_val_t lane_alignment{64};
   struct DeleteLanes {
@@ -42,7 +57,7 @@ private:
   std::vector<SceneBlock> blocks_, before_;
   std::vector<SceneAssembly> assemblies_;
   std::vector<std::int32_t> next_, heads_;
-  std::vector<BlockPair> pairs_;
+  std::vector<BlockPair> pairs_, close_;
   std::unique_ptr<char, DeleteLanes> lanes_;
   AssemblyScratch scratch_;
 };

@@ -79,25 +79,4 @@ inline auto lanes_to_settle(const NearRules<T>& rules, const Member<Real>* membe
   return unsettled;
 }
 
-// The same from a lane's list of near pairs.
-template <class Real, class T>
-inline bool lane_to_settle(const NearRules<T>& rules, const Member<Real>* members,
-                           const PairList& pairs, int lane) {
-  for (int k = 0; k < pairs.count; ++k) {
-    const Member<Real>& a = members[pairs.pair[k].first];
-    const Member<Real>& b = members[pairs.pair[k].second];
-    const T dx = get(b.x, lane) - get(a.x, lane), dy = get(b.y, lane) - get(a.y, lane);
-    if (!(dx * dx + dy * dy < rules.reach * rules.reach) ||
-        get(a.root, lane) == get(b.root, lane)) {
-      continue;
-    }
-    const Axes<T> first{get(a.axes.cosine, lane), get(a.axes.sine, lane)};
-    const Axes<T> second{get(b.axes.cosine, lane), get(b.axes.sine, lane)};
-    if (may_meet<T, T>(rules, dx, dy, first, second)) {
-      return true;
-    }
-  }
-  return false;
-}
-
 DRIFTWALK_LANES_END

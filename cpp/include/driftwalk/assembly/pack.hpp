@@ -1,5 +1,5 @@
 // The worlds of a pack and one time step of all of them. Nothing a world does depends on its lane
-// or its neighbours.
+// or its neighbours. A pack of many blocks (`Crowded`) is one world.
 #pragma once
 
 #include "driftwalk/assembly/correlate.hpp"
@@ -11,10 +11,11 @@
 
 DRIFTWALK_LANES_BEGIN
 
-template <class Real, class T, class Law>
+template <class Real, class T, class Law, bool Crowded = Numbers<Real>::lanes == 1>
 class WorldPack {
 public:
   static constexpr int lanes = Numbers<Real>::lanes;
+  static constexpr int worlds = Crowded ? 1 : lanes;
   using Bool = typename Numbers<Real>::Bool;
   using UInt = typename Numbers<Real>::UInt;
 
@@ -23,7 +24,8 @@ public:
   WorldPack(const Prepared<T>& run, const AssemblyRules& rules, const double* start,
             const AssemblyOutputs& out, AssemblyScratch& scratch, int capacity)
       : run_(run), rules_(rules), out_(out), scratch_(scratch), memory_(scratch.lanes, capacity),
-        near_(rules), blocks_(rules.blocks), listed_(rules.blocks > most_blocks_all_pairs),
+        near_(rules), blocks_(rules.blocks), rows_(memory_.rows(rules.blocks)),
+        listed_(rules.blocks > most_blocks_all_pairs),
         physics_{Law::of(Real(T(0)), run.drag),
                  run.block,
                  run.shape,
@@ -32,21 +34,20 @@ public:
                  run.wall,
                  run.step,
                  {Real(T(0)), Real(T(0)), Real(T(0))},
-                 static_cast<T>(rules.hidden_share)} {
-    const bool has_lists = capacity > most_blocks_all_pairs;
+                 static_cast<T>(rules.hidden_share),
+                 rules.pull.on} {
     for (int lane = 0; lane < lanes; ++lane) {
-      load_lane<Real, T>(rules_, start, memory_, lane);
-      books_[lane].pairs.pair = memory_.pairs + (has_lists ? pair_capacity(capacity) * lane : 0);
+      if (lane < worlds) {
+        load_lane<Real, T>(rules_, start, memory_, lane);
+      }
       put(stream_.key0, lane, 0);
       put(stream_.key1, lane, 0);
       put(draw_, lane, 0);
+      put(first_numbers_, lane, Crowded ? lane : 0);
       begin_force(lane);
     }
     if (run_.frames > 1) {
       clocks_.show(physics_.flow, physics_.water);
-    }
-    for (int b = 0; b < blocks_; ++b) {
-      memory_.listed_x[b] = memory_.listed_y[b] = Real(T(0));
     }
   }
 
@@ -57,37 +58,40 @@ public:
   // Steps that one block of random numbers serves: two force intervals.
   std::int64_t period() const { return 2 * std::int64_t(run_.steps_per_interval); }
 
-  // Puts a world into a lane, before the pack's step `step`, a whole number of periods.
-  void begin(int lane, std::int64_t world, std::int64_t step, const double* start,
-             std::uint64_t key, double flow_start) {
-    LaneBook& book = books_[lane];
+  // Puts a world into a lane, or one of many blocks into all, before the pack's step `step`, a
+  // whole number of periods.
+  void begin(int own, std::int64_t world, std::int64_t step, const double* start, std::uint64_t key,
+             double flow_start) {
+    LaneBook& book = books_[own];
     book.world = world;
     book.first_step = step;
     book.event_count = 0;
     book.first_contact = -1;
     book.assemblies = blocks_;
     book.running = true;
-    load_lane<Real, T>(rules_, start, memory_, lane);
+    load_lane<Real, T>(rules_, start, memory_, own);
     if (rules_.glued > 1) {
-      glue(lane);
+      glue(own);
     }
-    put(stream_.key0, lane, static_cast<UInt32>(key));
-    put(stream_.key1, lane, static_cast<UInt32>(key >> 32));
-    put(draw_, lane, 0);
-    begin_force(lane);
-    clocks_.begin(lane, flow_start);
-    if (listed_) {
-      list_pairs(lane);
+    for (int lane = own; lane < end_of(own); ++lane) {
+      put(stream_.key0, lane, static_cast<UInt32>(key));
+      put(stream_.key1, lane, static_cast<UInt32>(key >> 32));
+      put(draw_, lane, 0);
+      begin_force(lane);
+      clocks_.begin(lane, flow_start);
     }
+    list_crowd();
   }
 
-  void set_forces(int lane, double drag_coefficient, double force_std) {
-    const WorldConstants<T> own = world_constants(
+  void set_forces(int own, double drag_coefficient, double force_std) {
+    const WorldConstants<T> found = world_constants(
         physics_.law, run_, static_cast<T>(drag_coefficient), static_cast<T>(force_std));
-    put_drag_coefficient(physics_.law, lane, drag_coefficient);
-    put(physics_.world.drag_per_mass, lane, own.drag_per_mass);
-    put(physics_.world.drag_per_inertia, lane, own.drag_per_inertia);
-    put(physics_.world.noise_scale, lane, own.noise_scale);
+    for (int lane = own; lane < end_of(own); ++lane) {
+      put_drag_coefficient(physics_.law, lane, drag_coefficient);
+      put(physics_.world.drag_per_mass, lane, found.drag_per_mass);
+      put(physics_.world.drag_per_inertia, lane, found.drag_per_inertia);
+      put(physics_.world.noise_scale, lane, found.noise_scale);
+    }
   }
 
   // For all worlds: the flow times a factor.
@@ -101,13 +105,11 @@ public:
   void renew() {
     near_ = NearRules<T>(rules_);
     physics_.hidden_share = static_cast<T>(rules_.hidden_share);
+    physics_.pulled = rules_.pull.on;
     blocks_ = rules_.blocks;
+    rows_ = memory_.rows(blocks_);
     listed_ = blocks_ > most_blocks_all_pairs;
-    for (int lane = 0; lane < lanes && listed_; ++lane) {
-      if (books_[lane].running) {
-        list_pairs(lane);
-      }
-    }
+    list_crowd();
   }
 
   // The normal numbers that a block has in the period under way. A force that remembers begins
@@ -128,19 +130,49 @@ public:
     if (run_.frames > 1) {
       look_at_flow(step);
     }
-    advance(physics_, phase < run_.steps_per_interval ? 0 : 1, memory_.members, memory_.sums,
-            blocks_);
-    meet_walls(physics_, memory_.members, blocks_);
+    const int half = phase < run_.steps_per_interval ? 0 : 1;
+    const auto pull = [this] { feel_pull(); };
+    if constexpr (Crowded) {
+      const auto sum = [&]<int Count>() { sum_crowd<Count>(memory_.crowd, memory_.sums, rows_); };
+      advance(physics_, half, memory_.members, memory_.sums, rows_, sum, pull);
+      meet_walls(physics_, memory_.members, memory_.crowd, rows_);
+    } else {
+      const auto sum = [&]<int Count>() {
+        sum_masked<Count>(memory_.members, memory_.sums, blocks_);
+      };
+      advance(physics_, half, memory_.members, memory_.sums, blocks_, sum, pull);
+      meet_walls(physics_, memory_.members, blocks_);
+    }
     return settle_lanes(step);
   }
 
 private:
-  void glue(int lane) {
+  void glue(int own) {
     Scene& scene = scratch_.scene;
-    fill_scene(rules_, memory_, lane, blocks_, scene);
+    fill_scene(rules_, memory_, own, blocks_, scene);
     glue_blocks(rules_, scene);
-    read_scene(rules_, scene, memory_, lane);
-    books_[lane].assemblies = scene.assemblies;
+    read_scene(rules_, scene, memory_, own);
+    books_[own].assemblies = scene.assemblies;
+  }
+
+  void feel_pull() {
+    if (!rules_.pull.on) {
+      return;
+    }
+    const Member<Real>* const members = memory_.members;
+    Pulled<Real>* const pulled = memory_.pulled;
+    for (int row = 0; row < rows_; ++row) {
+      look_at(physics_, members[row], pulled[row]);
+    }
+    if constexpr (Crowded) {
+      pull_crowd(rules_.pull, members, pulled, memory_.alone, blocks_,
+                 listed_ ? &scratch_.scene.pairs : nullptr);
+    } else {
+      pull_all(rules_.pull, members, pulled, blocks_);
+    }
+    for (int row = 0; row < rows_; ++row) {
+      add_pull(physics_, run_, members[row], pulled[row], memory_.sums[row]);
+    }
   }
 
   // The first force of a world has no last one to remember, and the spread of all that follow.
@@ -149,10 +181,13 @@ private:
     put(fresh_, lane, run_.force_first);
   }
 
+  // The lane after the last of a world.
+  static constexpr int end_of(int own) { return Crowded ? lanes : own + 1; }
+
   void draw_all_forces() {
     const bool few = rules_.stirring_length > 0 && blocks_ <= most_blocks_correlated;
     Real last[most_blocks_correlated][2];
-    for (int b = 0; b < blocks_; ++b) {
+    for (int b = 0; b < rows_; ++b) {
       if (few) {
         last[b][0] = memory_.members[b].normals[2];
         last[b][1] = memory_.members[b].normals[3];
@@ -171,10 +206,10 @@ private:
   }
 
   // `kept` and `fresh` are of the first interval of the period.
-  void draw_forces(int block, UInt draw, Real kept, Real fresh) {
-    Real* const normals = memory_.members[block].normals;
+  void draw_forces(int row, UInt draw, Real kept, Real fresh) {
+    Real* const normals = memory_.members[row].normals;
     const Real last[2] = {normals[2], normals[3]};
-    draw_fresh(block, draw);
+    draw_fresh(row, draw);
     remember_forces(last, kept, fresh, normals);
   }
 
@@ -185,9 +220,10 @@ private:
     }
   }
 
-  // The normal numbers of a block in two intervals, without memory.
-  void draw_fresh(int block, UInt draw) {
-    Member<Real>& m = memory_.members[block];
+  // The normal numbers of a row of blocks in two intervals, without memory.
+  void draw_fresh(int row, UInt draw) {
+    const UInt32 first = static_cast<UInt32>(Crowded ? row * lanes : row);
+    Member<Real>& m = memory_.members[row];
     Real* const normals = m.normals;
     if (rules_.stirring_length > 0 && blocks_ > most_blocks_correlated) {
       const T length = static_cast<T>(rules_.stirring_length);
@@ -198,7 +234,7 @@ private:
       }
     } else {
       UInt words[4];
-      stream_(draw, UInt(static_cast<UInt32>(block)), UInt(static_cast<UInt32>(0)),
+      stream_(draw, first_numbers_ + UInt(first), UInt(static_cast<UInt32>(0)),
               UInt(static_cast<UInt32>(Purpose::force)), words);
       normal_pair(words[0], words[1], normals[0], normals[1]);
       normal_pair(words[2], words[3], normals[2], normals[3]);
@@ -207,7 +243,8 @@ private:
 
   void look_at_flow(std::int64_t step) {
     for (int lane = 0; lane < lanes; ++lane) {
-      const std::int64_t own = books_[lane].running ? step - books_[lane].first_step : 0;
+      const LaneBook& book = books_[Crowded ? 0 : lane];
+      const std::int64_t own = book.running ? step - book.first_step : 0;
       const double middle = (static_cast<double>(own) + 0.5) * static_cast<double>(run_.step.dt);
       clocks_.look(run_, lane, middle, physics_.water.strength);
     }
@@ -215,15 +252,13 @@ private:
 
   bool settle_lanes(std::int64_t step) {
     bool complete = false;
-    if (listed_) {
-      renew_lists();
-      for (int lane = 0; lane < lanes; ++lane) {
-        if (books_[lane].running &&
-            lane_to_settle(near_, memory_.members, books_[lane].pairs, lane)) {
-          complete = settle_lane(step, lane) || complete;
-        }
+    if constexpr (Crowded) {
+      if (listed_) {
+        renew_list();
+        return books_[0].running &&
+               is_to_settle(near_, memory_.members, memory_.crowd, scratch_.scene.pairs) &&
+               settle_lane(step, 0);
       }
-      return complete;
     }
     const Bool unsettled = lanes_to_settle(near_, memory_.members, blocks_);
     if (any(unsettled)) {
@@ -236,41 +271,43 @@ private:
     return complete;
   }
 
-  // Lists of near pairs reach half a skin beyond what touches on either side.
-  void renew_lists() {
+  // The list of near pairs reaches half a skin beyond what touches on either side.
+  void renew_list() {
+    const Crowd<Real>& crowd = memory_.crowd;
     const Real limit{
         static_cast<T>(0.25 * pair_skin_sides * pair_skin_sides * rules_.side * rules_.side)};
-    Real farthest{T(0)};
-    for (int b = 0; b < blocks_; ++b) {
-      const Real dx = memory_.members[b].x - memory_.listed_x[b];
-      const Real dy = memory_.members[b].y - memory_.listed_y[b];
-      farthest = max(dx * dx + dy * dy, farthest);
-    }
-    const Bool stale = farthest > limit;
-    if (any(stale)) {
-      for (int lane = 0; lane < lanes; ++lane) {
-        if (books_[lane].running && lane_of(stale, lane)) {
-          list_pairs(lane);
-        }
+    for (int row = 0; row < rows_; ++row) {
+      const Real dx = crowd.x[row] - crowd.listed_x[row];
+      const Real dy = crowd.y[row] - crowd.listed_y[row];
+      // What fills the last row moves too, and does not count.
+      const auto real = as_signed(first_numbers_) < Int32(blocks_ - row * lanes);
+      if (any((dx * dx + dy * dy > limit) & real)) {
+        list_pairs();
+        return;
       }
     }
   }
 
-  void list_pairs(int lane) {
-    Scene& scene = scratch_.scene;
-    fill_scene(rules_, memory_, lane, books_[lane].assemblies, scene);
-    const PairList own = scene.pairs;
-    scene.pairs = books_[lane].pairs;
-    find_pairs(rules_, scene);
-    keep_list(lane);
-    scene.pairs = own;
+  void list_pairs() {
+    fill_scene(rules_, memory_, 0, books_[0].assemblies, scratch_.scene);
+    find_pairs(rules_, scratch_.scene);
+    keep_list();
   }
 
-  void keep_list(int lane) {
-    books_[lane].pairs = scratch_.scene.pairs;
-    for (int b = 0; b < blocks_; ++b) {
-      put(memory_.listed_x[b], lane, get(memory_.members[b].x, lane));
-      put(memory_.listed_y[b], lane, get(memory_.members[b].y, lane));
+  void keep_list() {
+    for (int row = 0; row < rows_; ++row) {
+      memory_.crowd.listed_x[row] = memory_.members[row].x;
+      memory_.crowd.listed_y[row] = memory_.members[row].y;
+    }
+  }
+
+  // To be called when the blocks of a world, or the assemblies that they are part of, have changed.
+  void list_crowd() {
+    if constexpr (Crowded) {
+      memory_.crowd.list_bodies(memory_.members, blocks_);
+      if (listed_) {
+        list_pairs();
+      }
     }
   }
 
@@ -286,23 +323,22 @@ private:
     scene.event_step = out_.event_step + row;
     scene.event_block = out_.event_block + 2 * row;
     scene.event_face = out_.event_face + 2 * row;
-    const PairList own = scene.pairs;
-    if (listed_) {
-      scene.pairs = book.pairs;
-    } else {
+    if (!listed_) {
       find_pairs(rules_, scene);
     }
     settle(rules_, scene);
     read_scene(rules_, scene, memory_, lane);
     book.event_count = scene.event_count;
+    if (Crowded && book.assemblies != scene.assemblies) {
+      memory_.crowd.list_bodies(memory_.members, blocks_);
+    }
     book.assemblies = scene.assemblies;
     if (scene.contact && book.first_contact < 0) {
       book.first_contact = scene.step;
     }
     if (listed_ && scene.rebuilt) {
-      keep_list(lane);
+      keep_list();
     }
-    scene.pairs = own;
     return book.assemblies == 1 && blocks_ > 1;
   }
 
@@ -313,12 +349,14 @@ private:
   PackMemory<Real> memory_;
   NearRules<T> near_;
   int blocks_;
-  bool listed_;
+  int rows_;
+  bool listed_; // there is a list of near pairs
   Physics<Real, T, Law> physics_;
   Philox<UInt> stream_;
   UInt draw_;
-  Real kept_, fresh_; // parts of the last force and of the new numbers in the next force
-  LaneBook books_[lanes];
+  UInt first_numbers_; // of a world's blocks, those of the first row
+  Real kept_, fresh_;  // parts of the last force and of the new numbers in the next force
+  LaneBook books_[worlds];
   FlowClocks<T> clocks_;
 };
 

@@ -2,13 +2,14 @@
 #pragma once
 
 #include "driftwalk/assembly/face_rules.hpp"
+#include "driftwalk/assembly/pull_rules.hpp"
 #include "driftwalk/simulate/prepared.hpp"
 
 #include <cstdint>
 
 namespace driftwalk {
 
-inline constexpr int most_blocks = 256; // of a world
+inline constexpr int most_blocks = 2000; // of a world
 
 enum class Latching : int { none = 0, collision = 1, connector = 2 };
 
@@ -38,6 +39,7 @@ struct AssemblyRules {
   // it is divergence-free.
   double stirring_length = 0;
   bool incompressible = false;
+  PullRules pull;
 };
 
 struct AssemblyWorlds {

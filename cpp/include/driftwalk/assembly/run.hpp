@@ -6,10 +6,10 @@
 
 DRIFTWALK_LANES_BEGIN
 
-template <class Real, class T, class Law>
+template <class Real, class T, class Law, bool Crowded = Numbers<Real>::lanes == 1>
 class AssemblyPack {
 public:
-  static constexpr int lanes = Numbers<Real>::lanes;
+  static constexpr int lanes = WorldPack<Real, T, Law, Crowded>::worlds;
 
   AssemblyPack(const Prepared<T>& run, const AssemblyRules& rules, const AssemblyWorlds& worlds,
                const AssemblyOutputs& out, const WorldQueue& queue, AssemblyScratch& scratch)
@@ -99,7 +99,7 @@ private:
   const AssemblyWorlds& worlds_;
   const AssemblyOutputs& out_;
   const WorldQueue& queue_;
-  WorldPack<Real, T, Law> pack_;
+  WorldPack<Real, T, Law, Crowded> pack_;
   bool empty_ = false;
   std::int64_t block_steps_ = 0;
   std::int64_t next_event_ = INT64_MAX; // no world is over before this many steps of the pack

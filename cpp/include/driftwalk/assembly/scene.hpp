@@ -46,10 +46,13 @@ struct BlockPair {
   std::int32_t first, second;
 };
 
-// Pairs of blocks that may touch, with room for all pairs that there are.
+// Pairs of blocks that may touch.
 struct PairList {
   BlockPair* pair;
-  int count;
+  int count, room;
+  // Makes room for twice as many, in what owns them; none where there is room for all pairs.
+  BlockPair* (*grow)(void* owner, int room);
+  void* owner;
 };
 
 struct Scene {
@@ -59,7 +62,8 @@ struct Scene {
   SceneBlock* blocks_before; // scratch of as many
   SceneAssembly* assembly;
   PairList pairs;
-  // scratch of the pair search: first block of every cell, next block in the same cell
+  PairList close; // those of them that may touch or latch, as the scene is now
+  // scratch of the pair search and of lattices: first block of every cell, next in the same cell
   std::int32_t* cell_head;
   std::int32_t* cell_next;
   // what happened, written by settle
@@ -74,6 +78,7 @@ struct Scene {
 
 // Cells of the pair search are this many a side at most.
 inline constexpr int most_cells_per_side = 64;
+inline constexpr int cell_heads = most_cells_per_side * most_cells_per_side + 2;
 // Lists of near pairs reach this many sides farther than what touches or latches.
 inline constexpr double pair_skin_sides = 0.7;
 // Discs of one assembly are in contact up to this gap, in diameters; chosen by hand: it is what two
@@ -94,9 +99,12 @@ void glue_blocks(const AssemblyRules& rules, Scene& scene);
 // Makes every block an assembly of its own, which moves as the block did, with its own frame.
 void part_blocks(const AssemblyRules& rules, Scene& scene);
 
-// Fills the list with the pairs whose centres are closer than a diagonal (or the connectors' reach)
-// and a skin, ordered by first and second block.
+// Fills the list with the pairs of different assemblies whose centres are closer than a diagonal
+// (or the connectors' reach) and a skin, ordered by first and second block. It has to be made anew
+// where an assembly has come apart.
 void find_pairs(const AssemblyRules& rules, Scene& scene);
+// Fills the list of close pairs from that of near ones, in their order.
+void find_close_pairs(const AssemblyRules& rules, Scene& scene);
 
 } // namespace driftwalk
 

@@ -79,6 +79,35 @@ void place_members(Scene& scene, int assembly);
 void place_by(Scene& scene, int assembly, int block, Vec2 at);
 // Members, offsets, inertia and joined faces of an assembly, from its blocks' cells and labels.
 void measure_assembly(const AssemblyRules& rules, Scene& scene, int assembly);
+// The same of an assembly whose members are linked.
+void measure_members(const AssemblyRules& rules, Scene& scene, int assembly);
+
+// The blocks of an assembly by their cells: a table of buckets in the scene's scratch, in which the
+// lattice wraps around. Has to be cleared wherever it will be looked at.
+class LatticeTable {
+public:
+  explicit LatticeTable(Scene& scene) : scene_(scene) {}
+  void clear(int x, int y) { head(x, y) = -1; }
+  void add(int block) {
+    std::int32_t& first = head(scene_.block[block].cell_x, scene_.block[block].cell_y);
+    scene_.cell_next[block] = first;
+    first = block;
+  }
+  bool has(int x, int y) const {
+    int b = head(x, y);
+    while (b >= 0 && (scene_.block[b].cell_x != x || scene_.block[b].cell_y != y)) {
+      b = scene_.cell_next[b];
+    }
+    return b >= 0;
+  }
+
+private:
+  std::int32_t& head(int x, int y) const {
+    constexpr int wrap = most_cells_per_side - 1;
+    return scene_.cell_head[(x & wrap) * most_cells_per_side + (y & wrap)];
+  }
+  Scene& scene_;
+};
 
 // How far the corner of an assembly that is farthest outside is beyond the wall [m], and the
 // direction in which it has to go; negative when all are inside.
@@ -100,7 +129,8 @@ bool poles_refuse(const FaceRules& faces, const Scene& scene, int stayed, int mo
 // Makes two blocks what they become when these faces, in their own frames, have latched.
 void become(const FaceRules& faces, SceneBlock& block, int face, SceneBlock& other, int peer);
 
-// Merges what latches, one pair of faces after the other.
+// Merges what latches, one pair of faces after the other. Leaves the list of close pairs as it then
+// is.
 void latch(const AssemblyRules& rules, Scene& scene);
 
 // Impulses between blocks that overlap, and positions without overlap.

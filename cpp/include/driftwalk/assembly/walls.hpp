@@ -70,27 +70,33 @@ inline auto push_member(const WallView<T>& wall, Half h, T tolerance,
   return outside;
 }
 
-// Puts a block's assembly, in one lane, back to where it was before the step, at rest.
+// Puts a block, in one lane, back to where it was before the step, at rest.
+template <class Real>
+inline void take_back_member(Member<Real>& m, int lane) {
+  using T = typename Numbers<Real>::Scalar;
+  const T cosine = get(m.axes_before.cosine, lane), sine = get(m.axes_before.sine, lane);
+  const T offset_x = get(m.offset_x, lane), offset_y = get(m.offset_y, lane);
+  put(m.pose.x, lane, get(m.before.x, lane));
+  put(m.pose.y, lane, get(m.before.y, lane));
+  put(m.pose.theta, lane, get(m.before.theta, lane));
+  put(m.axes.cosine, lane, cosine);
+  put(m.axes.sine, lane, sine);
+  put(m.arm.x, lane, offset_x * cosine - offset_y * sine);
+  put(m.arm.y, lane, offset_x * sine + offset_y * cosine);
+  put_rest(m.motion, lane);
+  put_rest(m.drag, lane);
+}
+
+// The same for a block's assembly.
 template <class Real>
 inline void take_back(Member<Real>* members, int blocks, int block, int lane) {
-  using T = typename Numbers<Real>::Scalar;
   const Int32 root = get(members[block].root, lane);
   for (int b = root; b < blocks; ++b) {
     Member<Real>& m = members[b];
     if (get(m.root, lane) != root) {
       continue;
     }
-    const T cosine = get(m.axes_before.cosine, lane), sine = get(m.axes_before.sine, lane);
-    const T offset_x = get(m.offset_x, lane), offset_y = get(m.offset_y, lane);
-    put(m.pose.x, lane, get(m.before.x, lane));
-    put(m.pose.y, lane, get(m.before.y, lane));
-    put(m.pose.theta, lane, get(m.before.theta, lane));
-    put(m.axes.cosine, lane, cosine);
-    put(m.axes.sine, lane, sine);
-    put(m.arm.x, lane, offset_x * cosine - offset_y * sine);
-    put(m.arm.y, lane, offset_x * sine + offset_y * cosine);
-    put_rest(m.motion, lane);
-    put_rest(m.drag, lane);
+    take_back_member(m, lane);
   }
 }
 

@@ -34,6 +34,7 @@ struct Physics {
   StepConstants<T> step;
   WorldConstants<Real> world;
   T hidden_share = T(0); // of the drag of a free face that a joined face feels
+  bool pulled = false;   // whether forces between blocks make the sums accelerations
 };
 
 DRIFTWALK_LANES_END

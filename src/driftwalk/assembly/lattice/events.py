@@ -6,11 +6,13 @@ follows: which assemblies they were, what shapes these had, and the outcome clas
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.assembly.lattice.many_blocks import DiscWorld, SquareWorld, replay_many
 from driftwalk.assembly.lattice.polyomino import STEPS, Chirality, name_of, require_chirality
 from driftwalk.assembly.lattice.typed_faces import FaceTable
 from driftwalk.assembly.outcomes.class_names import (
@@ -19,10 +21,10 @@ from driftwalk.assembly.outcomes.class_names import (
     listed_classes,
     listed_shapes,
 )
-from driftwalk.assembly.outcomes.disc_contacts import disc_shape, touching
+from driftwalk.assembly.outcomes.disc_contacts import CONTACT_POLICY, disc_shape, touching
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
-from driftwalk.schema.shapes import moved_to_origin
+from driftwalk.schema.shapes import MOST_NAMED, moved_to_origin
 
 
 class ReplayedEvents(NamedTuple):
@@ -40,8 +42,8 @@ class ReplayedEvents(NamedTuple):
     """Names of the classes: all for up to 8 blocks, beyond that those that occurred."""
     shapes: tuple[str, ...]
     """Names of the shapes, by the same rule."""
-    kind: Integers
-    """Kinds of the blocks at the end, (run, block); 0 where faces have no types."""
+    kind: Integers | None = None
+    """Kinds of the blocks at the end, (run, block); None where faces have no types."""
 
 
 def replay_events(
@@ -101,14 +103,16 @@ def replay_events(
     events = _Events(*map(_whole, (event_count, event_block, event_face)))
     end = _Lattice(*map(_whole, (cell, quarter, assembly)))
     _check_arrays(events, end)
+    kind = None if faces is None else _follow_kinds(events, faces, end.assembly.shape)
+    if end.assembly.shape[1] > MOST_NAMED:
+        blocks = end.assembly.shape[1]
+        many = _replay_many(events, end, lambda _: SquareWorld(blocks, chirality))
+        return many._replace(kind=kind)
     replay = _Replay(*end.assembly.shape, slots=events.block.shape[1], chirality=chirality)
-    if faces is not None:
-        replay.faces = faces
-        replay.kind[:] = faces.first_kinds(replay.blocks)
     for event in range(int(events.number.max(initial=0))):
         replay.apply(event, np.flatnonzero(events.number > event), events)
     _check_end(replay.lattice, end)
-    return replay.result()
+    return replay.result()._replace(kind=kind)
 
 
 def replay_contacts(
@@ -146,11 +150,34 @@ def replay_contacts(
     events = _Events(_whole(event_count), block, np.zeros_like(block))
     end = _Lattice(np.zeros((*labels.shape, 2), np.int64), np.zeros_like(labels), labels)
     _check_arrays(events, end)
+    if end.assembly.shape[1] > MOST_NAMED:
+        reach = diameter * (1.0 + CONTACT_POLICY.gap)
+        return _replay_many(events, end, lambda run: DiscWorld(pose[run], reach=reach))
     replay = _DiscReplay(pose, slots=block.shape[1], diameter=diameter)
     for event in range(int(events.number.max(initial=0))):
         replay.apply(event, np.flatnonzero(events.number > event), events)
     _check_end(replay.lattice, end)
     return replay.result()
+
+
+def _replay_many(
+    events: _Events, end: _Lattice, world_of: Callable[[int], SquareWorld]
+) -> ReplayedEvents:
+    found = replay_many(*events, world_of=world_of)
+    _check_end(_Lattice(found.cell, found.quarter, found.assembly), end)
+    return ReplayedEvents(*found[:6])
+
+
+def _follow_kinds(events: _Events, faces: FaceTable, shape: tuple[int, ...]) -> Integers:
+    """Return the kinds of the blocks at the end, and refuse faces that may not latch."""
+    kind = np.broadcast_to(faces.first_kinds(shape[1]), shape).copy()
+    for event in range(int(events.number.max(initial=0))):
+        at = np.flatnonzero(events.number > event)
+        pair = at[:, None], events.block[at, event]
+        holds, became = faces.latch(kind[pair], events.face[at, event])
+        _refuse(~holds, at, event, "joins two faces whose types do not latch")
+        kind[pair] = became
+    return kind
 
 
 class _Events(NamedTuple):
@@ -200,8 +227,6 @@ class _Replay:
         self.event_shape = np.full((runs, slots, 3), -1, dtype=np.int32)
         self.event_class = np.full((runs, slots), -1, dtype=np.int32)
         self.outcome = np.zeros(runs, dtype=np.int32)
-        self.faces: FaceTable | None = None
-        self.kind = np.zeros((runs, blocks), dtype=np.int64)
 
     def apply(self, event: int, at: Integers, events: _Events) -> None:
         """Apply the event of this number to the runs that have it."""
@@ -211,7 +236,6 @@ class _Replay:
         self.event_assembly[at, event] = own
         self.event_shape[at, event, :2] = np.take_along_axis(self.shape_of[at], own, axis=1)
         self._align(at, events.block[at, event], events.face[at, event])
-        self._latch(at, event, events)
         low, high = own.min(axis=1), own.max(axis=1)
         member = (labels == low[:, None]) | (labels == high[:, None])
         self.lattice.assembly[at] = np.where(member, low[:, None], labels)
@@ -232,16 +256,7 @@ class _Replay:
             class_index[self.outcome],
             classes,
             shapes,
-            self.kind,
         )
-
-    def _latch(self, at: Integers, event: int, events: _Events) -> None:
-        """Refuse faces that may not latch, and make blocks what they become."""
-        if self.faces is not None:
-            pair = at[:, None], events.block[at, event]
-            holds, became = self.faces.latch(self.kind[pair], events.face[at, event])
-            _refuse(~holds, at, event, "joins two faces whose types do not latch")
-            self.kind[pair] = became
 
     def _align(self, at: Integers, block: Integers, face: Integers) -> None:
         """Turn and shift the assemblies that move so that the two faces of each event coincide."""

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from driftwalk.assembly.lattice.joined_faces import Join
 from driftwalk.assembly.lattice.polyomino import STEPS, Chirality, name_of
 from driftwalk.assembly.outcomes.class_names import class_name
-from driftwalk.schema.shapes import Cell, moved_to_origin
+from driftwalk.schema.shapes import MOST_NAMED, Cell, counted_class, moved_to_origin
 
 
 class Event(NamedTuple):
@@ -177,8 +177,11 @@ class LatticeWorld:
 
     def outcome(self, chirality: Chirality, parts: Partition | None = None) -> str:
         """Name the outcome class of the blocks, parted as they are or as said."""
+        labels = (parts or self.partition).labels
+        if len(labels) > MOST_NAMED:
+            return counted_class(len(set(labels)))
         members: dict[int, list[int]] = {}
-        for block, label in enumerate((parts or self.partition).labels):
+        for block, label in enumerate(labels):
             members.setdefault(label, []).append(block)
         return class_name(self.shape(blocks, chirality) for blocks in members.values())
 

@@ -18,7 +18,14 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
 from driftwalk.schema.contact_graphs import discs_of, graph_order
-from driftwalk.schema.shapes import NAMED_SHAPES, Cell, Cells, cells_of_shape, moved_to_origin
+from driftwalk.schema.shapes import (
+    NAMED_SHAPES,
+    Cell,
+    Cells,
+    cells_of_shape,
+    counts_of_shape,
+    moved_to_origin,
+)
 
 Chirality = Literal["merged", "distinct"]
 
@@ -152,6 +159,8 @@ def shape_order(name: str) -> tuple[int, int, str, str]:
         return shape_size(name), list(NAMED_SHAPES).index(name), "", ""
     if discs_of(name):
         return graph_order(name)
+    if any(counts := counts_of_shape(name)):
+        return *counts, "", ""
     both = merged_shape(name), name
     merged, own = (code.translate(_BY_CELLS) for code in both)
     return shape_size(name), name.count("/"), merged, own
@@ -159,13 +168,15 @@ def shape_order(name: str) -> tuple[int, int, str, str]:
 
 def shape_size(name: str) -> int:
     """Return the number of cells of a shape, or of discs of a contact graph."""
-    return discs_of(name) or NAMED_SHAPES.get(name, name).count("x")
+    return discs_of(name) or counts_of_shape(name)[0] or NAMED_SHAPES.get(name, name).count("x")
 
 
 @lru_cache(maxsize=1 << 16)
 def merged_shape(name: str) -> str:
     """Return the name of a shape when mirror images count as one; of discs they do anyway."""
-    return name if discs_of(name) else name_of(cells_of_shape(name), "merged")
+    if discs_of(name) or any(counts_of_shape(name)):
+        return name
+    return name_of(cells_of_shape(name), "merged")
 
 
 @lru_cache(maxsize=1 << 16)

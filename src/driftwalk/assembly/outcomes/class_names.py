@@ -26,6 +26,7 @@ from driftwalk.assembly.lattice.polyomino import (
 )
 from driftwalk.core.errors import InputError
 from driftwalk.schema.contact_graphs import discs_of
+from driftwalk.schema.shapes import MOST_NAMED, counted_class
 
 MOST_BLOCKS = 8
 """Blocks up to which all classes are listed; of more, those that occur. Chosen by hand."""
@@ -94,12 +95,14 @@ def class_name(shapes: Iterable[str]) -> str:
     >>> class_name(["1", "I3"])
     'I3+1'
     """
-    return "+".join(sorted(shapes, key=lambda one: (-shape_size(one), shape_order(one))))
+    ordered = sorted(shapes, key=lambda one: (-shape_size(one), shape_order(one)))
+    many = sum(map(shape_size, ordered)) > MOST_NAMED
+    return counted_class(len(ordered)) if many else "+".join(ordered)
 
 
 def all_single(blocks: int) -> str:
     """Name the class in which every block is alone."""
-    return "+".join(["1"] * blocks)
+    return counted_class(blocks) if blocks > MOST_NAMED else "+".join(["1"] * blocks)
 
 
 def class_shapes(name: str) -> tuple[str, ...]:
@@ -204,6 +207,8 @@ def world_class(
     'L3+1'
     """
     cells, labels = np.asarray(cell), np.asarray(assembly)
+    if labels.size > MOST_NAMED:
+        return counted_class(np.unique(labels).size)
     if labels.ndim != 1 or cells.shape != (labels.size, 2):
         raise InputError(
             f"a world has cells (blocks, 2) and assemblies (blocks,), got {cells.shape} and "

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from driftwalk.assembly.outcomes.class_names import class_name
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.schema.contact_graphs import graph_name
+from driftwalk.schema.shapes import MOST_NAMED, counted_class
 
 
 class ContactPolicy(NamedTuple):
@@ -74,6 +75,9 @@ def disc_class(
     >>> disc_class(row, [0, 0, 0, 3], diameter=0.04)
     'chain3+1'
     """
-    touch, labels = touching(places, diameter=diameter), np.asarray(assembly)
+    labels = np.asarray(assembly)
+    if labels.size > MOST_NAMED:
+        return counted_class(np.unique(labels).size)
+    touch = touching(places, diameter=diameter)
     members = [np.flatnonzero(labels == label) for label in np.unique(labels)]
     return class_name(disc_shape(touch[np.ix_(own, own)]) for own in members)

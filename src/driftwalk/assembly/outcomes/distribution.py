@@ -17,6 +17,7 @@ from driftwalk.assembly.outcomes.class_names import all_single, class_shapes
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.schema.check import build_dataset, require_kind
+from driftwalk.schema.shapes import is_one_assembly
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -230,7 +231,7 @@ def class_names(assembly: xr.Dataset) -> list[str]:
 
 def is_complete(names: list[str]) -> Bools:
     """Return which classes are one single assembly."""
-    return np.array(["+" not in name for name in names], dtype=bool)
+    return np.array([is_one_assembly(name) for name in names], dtype=bool)
 
 
 def duration(assembly: xr.Dataset) -> float:

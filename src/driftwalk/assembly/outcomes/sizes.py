@@ -24,7 +24,7 @@ from driftwalk.assembly.outcomes.survival import checked_times
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.schema.check import build_dataset
 from driftwalk.schema.contact_graphs import discs_of
-from driftwalk.schema.shapes import cells_of_shape
+from driftwalk.schema.shapes import cells_of_shape, counts_of_shape
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -55,10 +55,10 @@ def assembly_sizes(
         ``block_share``, the share of the blocks that are in them. Each size up to 8 stands alone,
         beyond that come groups that double, from ``size`` to ``size_to`` blocks. Over ``time``:
         ``mean_size`` (blocks over assemblies), ``largest_share`` (share of the blocks that are in
-        the largest assembly) and ``free_share`` (that of the blocks that are alone). ``attrs``:
-        those of the assembly, ``runs``, ``left_out``, ``confidence``, ``method``, ``compactness``
-        at the end, and ``compactness_runs``, the runs that have one. All are means over runs, with
-        ``_low`` and ``_high``.
+        the largest assembly), ``free_share`` (that of the blocks that are alone) and
+        ``compactness``. ``attrs``: those of the assembly, ``runs``, ``left_out``, ``confidence``,
+        ``method``, ``compactness`` at the end, and ``compactness_runs``, the runs that have one.
+        All are means over runs, with ``_low`` and ``_high``.
 
     Raises
     ------
@@ -78,7 +78,8 @@ def assembly_sizes(
 
     It is 1 of the most compact polyominoes; a row has the least, near 2 / sqrt(n). That of a run is
     the mean over its assemblies of at least four blocks, weighted by their blocks: up to three
-    blocks, all shapes have C = 1. A run without such an assembly has none.
+    blocks, all shapes have C = 1. A run without such an assembly has none, and the mean is that
+    of the others.
 
     Examples
     --------
@@ -109,7 +110,9 @@ def assembly_sizes(
     first, last = _groups(blocks)
     grouped = np.add.reduceat(number, first - 1, axis=1)
     share = np.add.reduceat(number * np.arange(1, blocks + 1), first - 1, axis=1) / blocks
-    courses = _courses(assembly["event_time"].values[sound], size[event_shape], time, blocks)
+    event_time = assembly["event_time"].values[sound]
+    courses = _courses(event_time, size[event_shape], time, blocks)
+    compact = _compactness_of_runs(event_time, event_shape, shapes, size, time)
     data: dict[str, Any] = {}
     for name, dim, values, possible in (
         ("number", "size", grouped, (0.0, blocks / first)),
@@ -117,11 +120,12 @@ def assembly_sizes(
         ("mean_size", "time", courses[0], (1.0, blocks)),
         ("largest_share", "time", courses[1], (1.0 / blocks, 1.0)),
         ("free_share", "time", courses[2], (0.0, 1.0)),
+        ("compactness", "time", compact, (0.0, 1.0)),
     ):
         mean, low, high = _over_runs(values, confidence, possible)
         data |= {name: (dim, mean), f"{name}_low": (dim, low), f"{name}_high": (dim, high)}
-    compact = _compactness_of_runs(event_shape, shapes, size)
-    ends = _over_runs(compact[:, np.newaxis], confidence, (0.0, 1.0))
+    at_end = _compactness_of_runs(event_time, event_shape, shapes, size, np.array([np.inf]))
+    ends = _over_runs(at_end, confidence, (0.0, 1.0))
     names = ("compactness", "compactness_low", "compactness_high")
     attrs = {name: float(end[0]) for name, end in zip(names, ends, strict=True)}
     return build_dataset(
@@ -131,7 +135,7 @@ def assembly_sizes(
         {
             **{key: value for key, value in assembly.attrs.items() if key not in NOT_COPIED},
             **attrs,
-            "compactness_runs": compact.size,
+            "compactness_runs": int(np.isfinite(at_end).sum()),
             "runs": int(sound.sum()),
             "left_out": int((~sound).sum()),
             "confidence": confidence,
@@ -148,11 +152,14 @@ def compactness(shape: str) -> float:
     >>> compactness("O"), compactness("I")
     (1.0, 0.8)
     """
-    cells = set(cells_of_shape(shape))
-    beside = sum((x + 1, y) in cells for x, y in cells) + sum((x, y + 1) in cells for x, y in cells)
+    size, joins = counts_of_shape(shape)
+    if not size:
+        cells = set(cells_of_shape(shape))
+        size = len(cells)
+        joins = sum(((x + 1, y) in cells) + ((x, y + 1) in cells) for x, y in cells)
     # ceil(2 sqrt(n)), in whole numbers.
-    least = 2 * (math.isqrt(4 * len(cells) - 1) + 1)
-    return least / (4 * len(cells) - 2 * beside)
+    least = 2 * (math.isqrt(4 * size - 1) + 1)
+    return least / (4 * size - 2 * joins)
 
 
 def _numbers_at_end(event_shape: Integers, size: Integers, blocks: int) -> Integers:
@@ -183,45 +190,53 @@ def _courses(
     joined = real.cumsum(axis=1)
     freed = ((event_size[..., :2] == 1).sum(axis=2) * real).cumsum(axis=1)
     largest = np.maximum.accumulate(np.where(real, event_size[..., 2], 1), axis=1)
-    # The state after a number of events, from none on.
-    start = np.zeros((event_time.shape[0], 1), dtype=np.int64)
     joined, freed, largest = (
-        np.concatenate([before, after], axis=1)
-        for before, after in ((start, joined), (start, freed), (start + 1, largest))
-    )
-    ordered = np.where(real, event_time, np.inf)
-    happened = np.array([np.searchsorted(row, time, side="right") for row in ordered])
-    joined, freed, largest = (
-        np.take_along_axis(one, happened, axis=1) for one in (joined, freed, largest)
+        _at_times(event_time, course, start, time)
+        for course, start in ((joined, 0), (freed, 0), (largest, 1))
     )
     return blocks / (blocks - joined), largest / blocks, 1.0 - freed / blocks
 
 
-def _compactness_of_runs(event_shape: Integers, shapes: list[str], size: Integers) -> Floats:
-    """Return the compactness of each run that has one."""
+def _at_times(
+    event_time: Floats, course: npt.NDArray[Any], start: float, time: Floats
+) -> npt.NDArray[Any]:
+    """Return what a course has come to by the events so far, shape (run, time)."""
+    ordered = [row[np.isfinite(row)] for row in event_time]
+    happened = np.array([np.searchsorted(row, time, side="right") for row in ordered])
+    begin = np.full((len(course), 1), start, dtype=course.dtype)
+    course = np.concatenate([begin, course], axis=1)
+    return np.asarray(np.take_along_axis(course, happened, axis=1))
+
+
+def _compactness_of_runs(
+    event_time: Floats, event_shape: Integers, shapes: list[str], size: Integers, time: Floats
+) -> Floats:
+    """Return the compactness of each run, shape (run, time); NaN where it has none."""
     # Up to three blocks, all shapes are equally compact; contact graphs have no perimeter.
     graphs = np.array([discs_of(name) > 0 for name in shapes])
     shaped = np.where((size >= 4) & ~graphs, size, 0)
     weighted = np.array([n and n * compactness(one) for n, one in zip(shaped, shapes, strict=True)])
     real = event_shape[..., 2] >= 0
-    total, blocks = (
-        ((one[event_shape] * (-1, -1, 1)).sum(axis=2) * real).sum(axis=1)
-        for one in (weighted, shaped)
-    )
-    return np.asarray(total[blocks > 0] / blocks[blocks > 0], dtype=np.float64)
+    changes = (((one[event_shape] * (-1, -1, 1)).sum(axis=2) * real) for one in (weighted, shaped))
+    total, blocks = (_at_times(event_time, one.cumsum(axis=1), 0, time) for one in changes)
+    unknown = np.full(total.shape, np.nan)
+    return np.asarray(np.divide(total, blocks, out=unknown, where=blocks > 0))
 
 
 def _over_runs(
     values: npt.NDArray[Any], confidence: float, possible: tuple[float, float | Floats]
 ) -> tuple[Floats, Floats, Floats]:
-    """Return the mean over runs (the first axis) and its interval, NaN where it has none."""
+    """Return the mean over runs (the first axis) and its interval, NaN where it has none.
+
+    A run whose value is NaN is left out.
+    """
     from scipy.special import stdtrit
 
-    runs = values.shape[0]
-    unknown = np.full(values.shape[1:], np.nan)
-    mean = values.mean(axis=0) if runs else unknown
-    if runs < 2:
-        return mean, unknown, unknown
-    reach = stdtrit(runs - 1, (1 + confidence) / 2) * values.std(axis=0, ddof=1) / math.sqrt(runs)
+    known = np.isfinite(values)
+    runs = known.sum(axis=0)
+    mean = np.where(known, values, 0.0).sum(axis=0) / np.where(runs > 0, runs, np.nan)
+    squares = np.where(known, (values - mean) ** 2, 0.0).sum(axis=0)
+    free = np.where(runs > 1, runs - 1, np.nan)
+    reach = stdtrit(free, (1 + confidence) / 2) * np.sqrt(squares / free / np.maximum(runs, 1))
     least, most = possible
-    return mean, np.maximum(mean - reach, least), np.minimum(mean + reach, most)
+    return np.asarray(mean), np.maximum(mean - reach, least), np.minimum(mean + reach, most)

@@ -81,7 +81,7 @@ def build_assembly(plan: Plan, arrays: Arrays, *, attrs: dict[str, Any]) -> xr.D
         data["cell"] = ((*by_block, "axis"), whole["cell"])
         data["quarter"] = (by_block, whole["quarter"])
     data |= _poles(plan)
-    if study.assembly.binding is not None:
+    if study.assembly.binding is not None and replayed.kind is not None:
         data["kind"] = (by_block, replayed.kind.astype(np.int32))
     if plan.flow_draw is not None:
         data["flow_draw"] = ("run", plan.flow_draw.astype(np.int32))

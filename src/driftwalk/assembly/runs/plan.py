@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from driftwalk import _core
 from driftwalk.assembly.lattice.typed_faces import face_table
+from driftwalk.assembly.pull.tables import block_pull
 from driftwalk.assembly.runs.glued import glued_cells, with_glue_events
 from driftwalk.assembly.runs.start import given_start, place_blocks, require_cover, require_room
 from driftwalk.core.arrays import Floats, Integers, Keys
@@ -138,6 +139,7 @@ def make_plan(
     chosen = apply_overrides(study, given)
     require_room(chosen)
     require_cover(flow, chosen.tank)
+    block_pull(chosen)  # its errors come before any run
     runs = np.arange(chosen.assembly.runs) if index is None else index
     forces, steps = chosen.forces, whole_steps(chosen)
     keys = stream_keys("run", seed=chosen.assembly.seed, trial=trial, index=runs)
@@ -189,6 +191,7 @@ def simulate_rows(
     plan: Plan, start: Floats, rows: slice = slice(None), *, sample_every: int = 0
 ) -> Arrays:
     """Simulate some of the runs; one entry per run in every array."""
+    pull = block_pull(plan.study)
     found = _core.assemble(
         plan.model(),
         start=np.ascontiguousarray(start[rows]),
@@ -197,6 +200,7 @@ def simulate_rows(
         force_std=np.ascontiguousarray(plan.force_std[rows]),
         steps=plan.steps,
         **plan.rules(),
+        pull=None if pull is None else pull.native,
         sample_every=sample_every,
         threads=plan.threads,
         precision="double" if plan.backend == "reference" else "single",

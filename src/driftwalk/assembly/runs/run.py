@@ -317,8 +317,9 @@ def check_assembly(
 
 def _knot_distance(fit: xr.Dataset, flow: xr.Dataset) -> float | None:
     """Return the distance of the knots [m] where a flow is the fit's own."""
-    own = all(np.array_equal(fit[axis].values, flow[axis].values) for axis in ("x", "y"))
-    return float(fit["spline_spacing"]) if own else None
+    stretched = float(flow.attrs.get("stretched_by", 1.0))
+    own = all(np.array_equal(stretched * fit[axis].values, flow[axis].values) for axis in "xy")
+    return stretched * float(fit["spline_spacing"]) if own else None
 
 
 def _run(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 SEARCHED: Final = ("forces.drag_coefficient", "forces.force_std_N")
 """Parameters that a run finds: a study file may hold any value for them."""
 FOUND_BY_A_RUN: Final = (*SEARCHED, "forces.force_interval_s")
+TANK_DIAMETER: Final = "tank.diameter_m"
 CONNECTOR: Final = ("assembly.connector_distance_m", "assembly.connector_axis_rad")
 """Parameters of the latching rule "connector" alone."""
 RUN_NAMES: Final = (
@@ -33,6 +35,8 @@ RUN_NAMES: Final = (
     *("latching", "connector_distance", "connector_axis", "faces", "glued", "hidden_face_drag"),
     "chirality",
     *("stirring_length", "stirring"),
+    *("magnets", "magnet_inset", "poles", "attraction", "capillary", "meniscus_height"),
+    "approach_resistance",
     *("block_restitution", "block_friction", "confidence", "seed", "flow_repeat", "flow_start"),
 )
 """Options for keys of a study that every command on self-assembly takes."""
@@ -99,7 +103,25 @@ def _source_from_flow(given: StudyOptions, flow_file: Path | None) -> Source:
     warning = unstated_warning(chosen, about="simulation")
     field = load_flow_for(flow_file, chosen)
     said = [*([] if warning is None else [warning]), *_without_effect(given, chosen)]
-    return Source(chosen, field, None, inputs, said)
+    field, stretched = _in_tank(field, given, chosen)
+    return Source(chosen, field, None, inputs, [*said, *stretched])
+
+
+def _in_tank(field: xr.Dataset, given: StudyOptions, study: Study) -> tuple[xr.Dataset, list[str]]:
+    """Return a field, stretched to a larger tank that an option states, and a warning of it."""
+    from driftwalk.flow import stretch_flow
+
+    wanted = study.tank.diameter_m
+    arena = json.loads(field.attrs.get("arena", "{}"))
+    own = arena.get("diameter_m") if arena.get("shape") == "circle" else None
+    if TANK_DIAMETER not in given.overrides or wanted is None or own is None or wanted <= own:
+        return field, []
+    said = (
+        f"the flow was measured in a tank of {own:g} m, and is stretched to {wanted:g} m: the same "
+        "speeds at the same shares of the radius, which is an assumption; to state another flow, "
+        "give --flow FILE"
+    )
+    return stretch_flow(field, diameter=wanted), [said]
 
 
 def _without_effect(given: StudyOptions, study: Study) -> list[str]:
@@ -149,7 +171,8 @@ def _source_from_run(folder: Path, flow_file: Path | None, given: StudyOptions) 
         field = found.flow(study)
     else:
         field, inputs["flow"] = load_flow_for(flow_file, chosen), flow_file
-    warnings = [*found.warnings, *_without_effect(given, chosen)]
+    field, stretched = _in_tank(field, given, chosen)
+    warnings = [*found.warnings, *_without_effect(given, chosen), *stretched]
     return Source(chosen, field, found.uncertainty, inputs, warnings, found.not_drawn)
 
 

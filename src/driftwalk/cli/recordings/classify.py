@@ -24,7 +24,7 @@ from driftwalk.cli.terminal.output import (
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.files.run_layout import MANIFEST_FILE
 from driftwalk.core.study_keys import STUDY_KEYS
-from driftwalk.schema.shapes import short_class
+from driftwalk.schema.shapes import is_one_assembly, short_class
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -148,7 +148,7 @@ def summarise(found: xr.Dataset) -> dict[str, Any]:
             if share > 0
         },
         "final": final,
-        "complete": "+" not in final if final else None,
+        "complete": is_one_assembly(final) if final else None,
         "events": _events(found, names),
         "warnings": _warnings(found),
     }

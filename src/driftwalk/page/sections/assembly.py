@@ -27,6 +27,7 @@ from driftwalk.page.sections.outcomes import (
 from driftwalk.page.sections.replay import replay_section
 from driftwalk.page.sections.sensitivity_maps import axis_words
 from driftwalk.plot.parts.assembly_labels import class_names
+from driftwalk.schema.answers.assembly import attraction_words
 from driftwalk.schema.shapes import short_class
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ def assembly_sections(
     path: xr.Dataset | None = None,
     sizes: xr.Dataset | None = None,
     sizes_drawn: xr.Dataset | None = None,
+    attraction: xr.Dataset | None = None,
 ) -> list[Section]:
     """Return the sections of a page on self-assembly.
 
@@ -64,6 +66,8 @@ def assembly_sections(
         An `assembly_path` of sample runs.
     sizes, sizes_drawn : xarray.Dataset, optional
         The `assembly_sizes` of both. They take the place of the classes.
+    attraction : xarray.Dataset, optional
+        The `attraction` of two blocks.
 
     Returns
     -------
@@ -92,6 +96,9 @@ def assembly_sections(
             made += attempt("class-times", title, lambda: class_times_section(class_times))
         title = "Time to contact and completion"
         made += attempt("survival", title, lambda: survival_section(class_times))
+    if attraction is not None:
+        title = "Force between two blocks"
+        made += attempt("attraction", title, lambda: attraction_section(attraction))
     if path is not None:
         made += attempt("replay", "Sample runs", lambda: replay_section(path, assembly))
     if assembly_drawn is not None:
@@ -160,6 +167,23 @@ def survival_section(times: xr.Dataset) -> Section:
         "survival", "Time to contact and completion",
         x=label("time", "s"), y=label("share of runs"), series=drawn,
         marks=[mark("half of the runs", y=0.5)],
+    )  # fmt: skip
+
+
+def attraction_section(attraction: xr.Dataset) -> Section:
+    """Return the force between two blocks against their gap."""
+    require(attraction, "gap", "force", "simulated_force")
+    gap = attraction["gap"].values
+    drawn = [
+        series(words, gap[found > 0.0], found[found > 0.0])
+        for words, found in (
+            ("measured by a balance", attraction["force"].values),
+            ("in the simulation", attraction["simulated_force"].values),
+        )
+    ]
+    return chart(
+        "attraction", "Force between two blocks", f"{attraction_words(attraction)}.",
+        x=label("gap between the faces", "m"), y=label("attraction", "N", log=True), series=drawn,
     )  # fmt: skip
 
 

@@ -167,11 +167,15 @@ def size_sections(found: dict[str, xr.Dataset]) -> list[Section]:
         Each an `assembly_sizes`, by what it is of.
     """
     mean, title = {"mean_size": ""}, "Largest assembly and free blocks"
+    compact = {"compactness": ""}
     shares = {"largest_share": "in the largest assembly", "free_share": "alone"}
     return [
         *attempt("sizes", "Sizes of the assemblies", lambda: sizes_section(found)),
         *_over_time(found, "mean-size", "Mean size over time", "blocks per assembly", mean),
         *_over_time(found, "size-shares", title, "share of the blocks", shares),
+        *_over_time(
+            found, "compactness", "Compactness over time", "least perimeter over perimeter", compact
+        ),
     ]
 
 

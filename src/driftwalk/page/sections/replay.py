@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from driftwalk.assembly.outcomes.class_names import all_single
 from driftwalk.core.errors import InputError
 from driftwalk.page.arrays import binary_step, encode_array
 from driftwalk.page.number_words import count, quantity
@@ -115,7 +116,7 @@ def _classes(
     if assembly is None or run not in assembly["run"].values:
         return []
     blocks = assembly.sizes.get("block", 0)
-    start = {"time": 0.0, "class": "+".join(["1"] * blocks)}
+    start = {"time": 0.0, "class": all_single(blocks)}
     return [start, *({"time": event["time"], "class": event["class"]} for event in events)]
 
 

@@ -12,6 +12,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.plot.parts.labels import DRAG_LABEL, force_interval_text, in_unit
 from driftwalk.plot.parts.style import BLUE, ORANGE
 from driftwalk.schema.check import kind_name
+from driftwalk.schema.shapes import is_one_assembly
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,6 +50,7 @@ _WORDS: Final[dict[str, str]] = {
     "latching": "latching",
     "faces": "faces",
     "hidden_face_drag": "drag on hidden faces",
+    "magnets": "magnets",
 }
 
 
@@ -75,7 +77,7 @@ def is_complete(name: str) -> bool:
     >>> is_complete("T"), is_complete("2+2")
     (True, False)
     """
-    return "+" not in name and name not in ("", OTHER)
+    return is_one_assembly(name) and name not in ("", OTHER)
 
 
 def classes_to_show(names: list[str], share: Floats) -> list[int]:

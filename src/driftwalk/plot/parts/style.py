@@ -189,6 +189,11 @@ def settle_layout(ax: Axes) -> None:
         engine.execute(figure)
 
 
+def edge_width(bodies: int) -> float:
+    """Return the width of the edges of bodies [pt]: thinner where they are many, and so small."""
+    return 0.6 * min(1.0, (16 / max(bodies, 1)) ** 0.5)
+
+
 def outlined(width: float, color: str = "white") -> list[AbstractPathEffect]:
     """Return the effects that draw a line of that width [pt] behind a line."""
     from matplotlib.patheffects import Normal, Stroke

@@ -20,12 +20,18 @@ _OVER_TIME: Final = {
     "mean_size": "mean_size_blocks",
     "largest_share": "largest_share",
     "free_share": "free_share",
+    "compactness": "compactness",
 }
 """Variables over time, and their keys in JSON."""
 _SETTINGS: Final = (
     *("confidence", "blocks", "duration_s", "seed", "latching", "hidden_face_drag", "chirality"),
     *("drag_coefficient", "force_std_N", "force_interval_s"),
     *("first_contact_median_s", "completion_median_s"),
+)
+
+_ATTRACTION: Final = (
+    *("between", "force_at_contact_N", "force_at_10mm_N", "binding_energy_J"),
+    *("most_simulated_N", "capped_below_m"),
 )
 
 
@@ -38,6 +44,7 @@ def assembly_answer(
     sizes: xr.Dataset | None = None,
     sizes_drawn: xr.Dataset | None = None,
     apart: Mapping[str, float] | None = None,
+    attraction: xr.Dataset | None = None,
 ) -> Answer:
     """Return the answer of an assembly run; the caller knows its warnings.
 
@@ -55,6 +62,8 @@ def assembly_answer(
         The `assembly_sizes` of both, where nearly every run is a class of its own.
     apart : mapping, optional
         ``l1_distance`` of the two distributions, ``l1_noise_floor`` and ``l1_noise_floor_95``.
+    attraction : xarray.Dataset, optional
+        The `attraction` of two blocks.
     """
     facts = {**times.attrs, **found.attrs, **settings}
     parts: list[Part] = [
@@ -66,6 +75,8 @@ def assembly_answer(
         parts.append(f"blocks start glued: {facts['glued']}")
     if "faces" in facts:
         parts.append(f"faces: {facts['faces']}")
+    if attraction is not None:
+        parts.append(attraction_words(attraction))
     if sizes is None:
         parts.append(_classes(found, drawn))
     else:
@@ -91,8 +102,29 @@ def assembly_answer(
         if drawn is None
         else {"parameters": _drawn(drawn), **_json(drawn, sizes_drawn)},
         **(apart or {}),
+        **({} if attraction is None else {"attraction": _attraction_json(attraction)}),
     }
     return Answer(parts, answer, [])
+
+
+def attraction_words(attraction: xr.Dataset) -> str:
+    """Return what acts between two blocks, with the numbers that a balance measures."""
+    facts = attraction.attrs
+    cap = ""
+    if facts["capped_below_m"] > 0.0:
+        cap = (
+            f"; simulated with at most {1e3 * facts['most_simulated_N']:.3g} mN, below a gap of "
+            f"{1e3 * facts['capped_below_m']:.2g} mm (time step)"
+        )
+    return (
+        f"between blocks: {facts['between']}: {1e3 * facts['force_at_contact_N']:.4g} mN at "
+        f"contact, {1e3 * facts['force_at_10mm_N']:.3g} mN at 10 mm, binding energy "
+        f"{1e6 * facts['binding_energy_J']:.4g} µJ{cap}"
+    )
+
+
+def _attraction_json(attraction: xr.Dataset) -> dict[str, Any]:
+    return {key: value for key, value in attraction.attrs.items() if key in _ATTRACTION}
 
 
 def _drawn(distribution: xr.Dataset) -> list[str]:
@@ -205,7 +237,9 @@ def _sizes(distribution: xr.Dataset, sizes: xr.Dataset, what: str) -> list[Part]
         [f"{float(one['time']):.4g}", *(c for name in _OVER_TIME for c in _size_cells(one, name))]
         for one in chosen
     ]
-    over_time = [head for name in ("mean size", "in largest", "free") for head in (name, interval)]
+    over_time = [
+        head for name in ("mean size", "in largest", "free", "compact") for head in (name, interval)
+    ]
     parts: list[Part] = [Table(rows, heads, what), Table(course, ["time [s]", *over_time])]
     if facts["compactness_runs"]:
         ends = _range(facts["compactness_low"], facts["compactness_high"])

@@ -235,6 +235,29 @@ attributes ({_OF_RUNS}):
 )
 
 
+ATTRACTION: Final = kind(
+    """
+kind: attraction
+version: 1
+dimensions:
+    gap: gaps between two blocks, face to face
+variables:
+    force(gap) [N]: attraction of the two blocks
+    simulated_force(gap) [N]: the same where the time step caps it
+    energy(gap) [J]: energy, 0 at the largest gap
+    gap(gap) [m]: gap between the faces
+attributes:
+    between text: what acts between the blocks
+    force_at_contact_N number: where the faces touch
+    force_at_10mm_N number: at a gap of 10 mm
+    binding_energy_J number: work that parts two blocks
+    most_simulated_N number: largest force in the simulation
+    capped_below_m number: gap below which the simulated force is smaller; 0 where it is not
+    study
+"""
+)
+
+
 def _mean(name: str, dim: str, words: str, note: str = "") -> tuple[Variable, ...]:
     return variables(f"""
     {name}({dim}) [1]: {words}, mean over runs{note}
@@ -272,6 +295,7 @@ attributes ({_OF_RUNS}):
     *_mean("mean_size", "time", "blocks over assemblies"),
     *_mean("largest_share", "time", "share of the blocks in the largest assembly"),
     *_mean("free_share", "time", "share of the blocks that are alone"),
+    *_mean("compactness", "time", "compactness, as at the end", "; NaN where no run has one"),
     *_SETTINGS_OF_RUNS,
 )
 
@@ -342,6 +366,7 @@ KINDS: Final = (
     ASSEMBLY_PATH,
     OUTCOME_DISTRIBUTION,
     CLASS_TIMES,
+    ATTRACTION,
     ASSEMBLY_SIZES,
     CLASSIFICATION,
 )

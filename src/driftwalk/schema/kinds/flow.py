@@ -83,6 +83,8 @@ attributes (made by a fit):
     {FIT_PREFIX}drag_coefficient numbers: ends of the fit's interval of C_d
     {FIT_PREFIX}force_noise_intensity numbers: ends of its interval of σ_F² times the force \
         interval; in N² s
+attributes (stretched to another tank):
+    stretched_by number: ratio of the diameters
 attributes (with a warning):
     warning text: what to know about the field
 attributes (the flow changes, and its repeat is stated):

@@ -149,6 +149,7 @@ BUILT_IN: Final = (
             "distribution",
             "class_times",
             "path",
+            "attraction",
             "sizes",
             "assembly_drawn",
             "distribution_drawn",

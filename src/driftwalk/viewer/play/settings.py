@@ -8,8 +8,8 @@ from typing import Any, Final, Literal, Self
 from driftwalk.assembly import LiveTank
 from driftwalk.assembly.runs.start import tank_area
 from driftwalk.core.errors import InputError
+from driftwalk.model.assembly import MOST_BLOCKS
 
-MOST_BLOCKS: Final = 256
 FILLED: Final = 0.4
 """Share of the tank that blocks may cover; squares placed at random jam at about half."""
 
@@ -105,6 +105,7 @@ KNOBS: Final = (
     Knob("faces", "poles of the faces", choices=("any", "N,S,N,S", "N,N,S,S", "N,N,N,N")),
     Knob("hidden_face_drag", "drag on joined faces", choices=("none", "full")),
     Knob("stirring_length", "length of the stirring", "m", 0.0, 0.3, 0.005),
+    Knob("magnets", "magnets", choices=("none", "3x3x1mm,1.2T", "5x5x2mm,1.2T")),
     SPEED,
 )
 
@@ -123,7 +124,7 @@ def knobs_for(tank: LiveTank, *, most_blocks: int) -> dict[str, Knob]:
     knobs = {knob.name: knob.reaching(values[knob.name]) for knob in KNOBS}
     if tank.is_round:
         # Discs have no faces.
-        del knobs["hidden_face_drag"], knobs["faces"]
+        del knobs["hidden_face_drag"], knobs["faces"], knobs["magnets"]
         knobs["latching"] = replace(knobs["latching"], choices=("collision", "none"))
     return knobs | {"blocks": replace(knobs["blocks"], most=most_blocks)}
 
@@ -140,6 +141,7 @@ def values_of(tank: LiveTank, *, speed: float) -> dict[str, Any]:
         "faces": rules.faces,
         "hidden_face_drag": str(rules.hidden_face_drag),
         "stirring_length": forces.stirring_length_m,
+        "magnets": tank.study.interaction.magnets,
         "speed": speed,
     }
 

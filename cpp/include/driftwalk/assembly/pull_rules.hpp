@@ -1,0 +1,40 @@
+// How blocks pull at each other from a distance: tables, plain data.
+#pragma once
+
+namespace driftwalk {
+
+// A function of the squared distance, linear within cells of 1/64 of an octave: its value at the
+// lower end of a cell and its slope, one pair after the other. Below the first cell it is constant;
+// the last pair holds for all that lies beyond.
+struct RadialTable {
+  const float* single = nullptr;
+  const double* twice = nullptr; // the same numbers
+  int cells = 0;                 // 0: there is no such function
+  int first = 0;                 // number of the first cell: a float's bits without the lowest 17
+  explicit operator bool() const { return cells > 0; }
+};
+
+// Energy [J] of two faces with an axis each, by the coefficients of a quadratic B-spline: in the
+// logarithm of the distance; in the direction of the second from the first, against the first's
+// normal; in the angle of the second's inward normal against it. Both angles go round.
+struct OrientedTable {
+  const float* coefficient = nullptr; // [distance][direction][angle]
+  int distances = 0, angles = 0;
+  double first = 0, per_step = 0; // logarithm of the first distance; steps per unit of it
+  double low = 0, high = 0;       // distances between which it holds [m]
+  explicit operator bool() const { return distances > 0; }
+};
+
+struct PullRules {
+  bool on = false;
+  double reach = 0;              // blocks whose centres are farther apart feel nothing [m]
+  RadialTable centres;           // attraction between the centres, per distance [N/m]
+  RadialTable resistance;        // to closing or parting speed, per squared distance [N s/m^3]
+  RadialTable faces;             // attraction between points of two faces, per distance [N/m]
+  OrientedTable oriented;        // between the same points
+  double lever = 0;              // of these points, from the centre of the block [m]
+  double pole[4] = {1, 1, 1, 1}; // of the faces, in the block's own frame
+  bool like_poles_repel = false;
+};
+
+} // namespace driftwalk

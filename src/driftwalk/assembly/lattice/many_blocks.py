@@ -1,0 +1,186 @@
+"""Replay the events of worlds of many blocks, run after run.
+
+An event changes two assemblies, and the one that moves is the smaller: all events of a run of n
+blocks together move fewer than n log2(n) of them. Large assemblies are called by two counts, and
+the class of a world by the number of its assemblies: hardly two of them would have the same shape.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.assembly.lattice.polyomino import STEPS, Chirality, name_of, shape_order
+from driftwalk.core.arrays import Floats, Integers
+from driftwalk.core.errors import InputError
+from driftwalk.schema.contact_graphs import MOST_DISCS, counted_graph, graph_name
+from driftwalk.schema.shapes import (
+    MOST_CELLS_NAMED,
+    counted_class,
+    counted_shape,
+    moved_to_origin,
+)
+
+
+class ManyReplayed(NamedTuple):
+    """As `ReplayedEvents`, and the state at the end."""
+
+    event_assembly: npt.NDArray[np.int32]
+    event_shape: npt.NDArray[np.int32]
+    event_class: npt.NDArray[np.int32]
+    outcome: npt.NDArray[np.int32]
+    classes: tuple[str, ...]
+    shapes: tuple[str, ...]
+    cell: Integers
+    quarter: Integers
+    assembly: Integers
+
+
+class SquareWorld:
+    """The squares of one run while its events are applied, each in the body of one of them."""
+
+    def __init__(self, blocks: int, chirality: Chirality) -> None:
+        self.chirality = chirality
+        self.body = list(range(blocks))
+        self.members = [[block] for block in range(blocks)]
+        self.lowest = list(range(blocks))
+        self.joins = [0] * blocks
+        self.cell = [(0, 0)] * blocks
+        self.quarter = [0] * blocks
+        self.taken = [{(0, 0)} for _ in range(blocks)]
+
+    def join(self, block: list[int], face: list[int]) -> tuple[int, int]:
+        """Put the second block's body to that of the first; return the two bodies."""
+        stays, moves = self.body[block[0]], self.body[block[1]]
+        if stays == moves:
+            raise InputError("joins two blocks of one assembly")
+        self.joins[stays] += self.joins[moves] + self._contacts(stays, moves, block, face)
+        for member in self.members[moves]:
+            self.body[member] = stays
+        self.members[stays] += self.members[moves]
+        self.members[moves] = []
+        self.lowest[stays] = min(self.lowest[stays], self.lowest[moves])
+        return stays, moves
+
+    def shape(self, body: int) -> str:
+        """Return the name of the shape of a body."""
+        size = len(self.members[body])
+        if size > MOST_CELLS_NAMED:
+            return counted_shape(size, self.joins[body])
+        cells = tuple(self.cell[member] for member in self.members[body])
+        return name_of(moved_to_origin(cells), self.chirality)
+
+    def _contacts(self, stays: int, moves: int, block: list[int], face: list[int]) -> int:
+        """Put the moved squares on the lattice of the others; return how many faces meet."""
+        outward = (face[0] + self.quarter[block[0]]) % 4
+        turn = (outward + 2 - face[1] - self.quarter[block[1]]) % 4
+        (x0, y0), (x1, y1) = self.cell[block[0]], self.cell[block[1]]
+        east, north = STEPS[outward]
+        cosine, sine = STEPS[turn]
+        taken, there = self.taken[stays], []
+        for member in self.members[moves]:
+            x, y = self.cell[member]
+            x, y = x - x1, y - y1
+            x, y = x0 + east + cosine * x - sine * y, y0 + north + sine * x + cosine * y
+            self.cell[member] = (x, y)
+            self.quarter[member] = (self.quarter[member] + turn) % 4
+            there.append((x, y))
+        if not taken.isdisjoint(there):
+            raise InputError("puts two blocks into one cell")
+        met = sum((x + dx, y + dy) in taken for x, y in there for dx, dy in STEPS)
+        taken.update(there)
+        self.taken[moves] = set()
+        return met
+
+
+class DiscWorld(SquareWorld):
+    """The same of discs, which stay as they lie; what touches at the end did all along."""
+
+    def __init__(self, places: Floats, *, reach: float) -> None:
+        from scipy.spatial import cKDTree
+
+        super().__init__(len(places), "merged")
+        self.near: list[list[int]] = [[] for _ in range(len(places))]
+        for one, other in cKDTree(places[:, :2]).query_pairs(reach):
+            self.near[one].append(other)
+            self.near[other].append(one)
+
+    def shape(self, body: int) -> str:
+        """Return the name of the contact graph of a body."""
+        members = self.members[body]
+        if len(members) > MOST_DISCS:
+            return counted_graph(len(members), self.joins[body])
+        place = {member: index for index, member in enumerate(members)}
+        pairs = [(place[a], place[b]) for a in members for b in self.near[a] if b in place]
+        return graph_name(len(members), pairs)
+
+    def _contacts(self, stays: int, moves: int, block: list[int], face: list[int]) -> int:
+        del block, face
+        return sum(
+            self.body[other] == stays
+            for member in self.members[moves]
+            for other in self.near[member]
+        )
+
+
+def replay_many(
+    number: Integers, block: Integers, face: Integers, *, world_of: Callable[[int], SquareWorld]
+) -> ManyReplayed:
+    """Replay the events of runs of many blocks.
+
+    Parameters
+    ----------
+    number : ndarray of int, shape (runs,)
+        Number of events of each run.
+    block, face : ndarray of int, shape (runs, events, 2)
+        As in `replay_events`.
+    world_of : callable
+        The world of a run at its start.
+
+    Raises
+    ------
+    InputError
+        When an event cannot be; names the run.
+    """
+    runs, slots = block.shape[:2]
+    worlds = [world_of(run) for run in range(runs)]
+    blocks = len(worlds[0].body) if worlds else 0
+    known = {"1": 0}
+    event_assembly = np.full((runs, slots, 2), -1, dtype=np.int32)
+    event_shape = np.full((runs, slots, 3), -1, dtype=np.int32)
+    for run, world in enumerate(worlds):
+        shape_of = [0] * blocks
+        for event in range(number[run]):
+            of, by = block[run, event].tolist(), face[run, event].tolist()
+            lowest = [world.lowest[world.body[one]] for one in of]
+            try:
+                stays, moves = world.join(of, by)
+            except InputError as error:
+                raise InputError(f"run {run}, event {event}: {error}") from None
+            parts = shape_of[stays], shape_of[moves]
+            shape_of[stays] = known.setdefault(world.shape(stays), len(known))
+            event_assembly[run, event] = lowest
+            event_shape[run, event] = *parts, shape_of[stays]
+    # An event leaves one assembly less; the place of a class among those that occurred.
+    happened = np.arange(slots) < number[:, None]
+    left = np.where(happened, blocks - 1 - np.arange(slots), 0)
+    occurred = np.unique(np.concatenate([blocks - number, left[happened]]))
+    place = np.full(blocks + 1, -1, dtype=np.int32)
+    place[occurred] = np.arange(occurred.size)
+    shapes = tuple(sorted(known, key=shape_order))
+    index = {name: at for at, name in enumerate(shapes)}
+    shape_at = np.array([*(index[name] for name in known), -1], dtype=np.int32)
+    return ManyReplayed(
+        event_assembly,
+        shape_at[event_shape],
+        np.where(happened, place[left], np.int32(-1)),
+        place[blocks - number],
+        tuple(counted_class(int(one)) for one in occurred),
+        shapes,
+        np.array([world.cell for world in worlds]).reshape(runs, blocks, 2),
+        np.array([world.quarter for world in worlds]).reshape(runs, blocks),
+        np.array([[world.lowest[body] for body in world.body] for world in worlds]),
+    )

@@ -1,0 +1,1 @@
+"""Forces between blocks at a distance: their tables for the native core."""

@@ -1,0 +1,321 @@
+"""Tables of the forces between blocks for the native core, and what they say in numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk import _core
+from driftwalk.assembly.pull.magnets import coaxial_force, magnet_energy
+from driftwalk.assembly.pull.measured import MeasuredAttraction, read_attraction
+from driftwalk.core.arrays import Floats
+from driftwalk.core.errors import InputError
+from driftwalk.model.interaction import Interaction, Magnet
+
+if TYPE_CHECKING:
+    from driftwalk.model import Study
+
+GRAVITY: Final = 9.81
+"""[m/s²]"""
+CELL_BITS: Final = 17
+"""Bits of a float that the number of its cell leaves out: 64 cells in an octave of the squared distance,
+within which a force of r⁻⁵ is straight to 3e-4."""
+
+
+class PullPolicy(NamedTuple):
+    """Where a table ends, and how steep it may be for the time step."""
+
+    least_force_N: float = 1e-5
+    """Force at the automatic cut-off; a hundredth of the drag at 6 cm/s of slip."""
+    taper: float = 0.8
+    """Share of the cut-off beyond which the force is led to 0; chosen by hand."""
+    stiffness: float = 0.5
+    """Most of 4 F' dt² / m; at 2 two blocks that turn about each other no longer keep an orbit, and
+    at a quarter of that first contacts are within 1 % of those of a small step."""
+    resistance: float = 0.25
+    """Most of k dt / (gap m) of the resistance at close approach; stable below 1."""
+    angles: int = 36
+    """Directions and angles of a table of oriented faces, a multiple of 4: of magnets of 5 mm, 9 mm
+    apart, forces and torques are within 0.2 % (rms) of the largest."""
+    distance_step: float = 0.07
+    """Step of the logarithm of its distance; chosen by the same comparison."""
+
+
+POLICY: Final = PullPolicy()
+
+
+@dataclass(frozen=True, eq=False)
+class RadialForce:
+    """An attraction along the line between two points.
+
+    Attributes
+    ----------
+    force : callable
+        From distances [m] to the attraction [N], as it is measured.
+    contact : float
+        Distance at which two faces touch [m].
+    capped_at : float
+        Distance below which the force no longer grows [m].
+    cutoff : float
+        Distance beyond which it is 0 [m].
+    """
+
+    force: Callable[[Floats], Floats]
+    contact: float
+    capped_at: float
+    cutoff: float
+
+    def __call__(self, distance: npt.ArrayLike) -> Floats:
+        """Return the attraction [N] that simulated blocks feel at distances [m]."""
+        distance = np.asarray(distance, dtype=np.float64)
+        inside = np.clip(distance, self.capped_at, self.cutoff)
+        return np.asarray(self.force(inside) * _taper(distance, self.cutoff))
+
+    def cells(self) -> tuple[npt.NDArray[np.float64], int]:
+        """Return force over distance [N/m] and its slope in cells, and the first cell's number."""
+        # A clamp below the first cell, where two faces that touch never are.
+        low = min(self.contact or 1e-3, self.cutoff) / 8.0
+        first, last = cell_of(low**2), cell_of(self.cutoff**2) + 1
+        edge = cell_start(np.arange(first, last + 1))
+        value = self(np.sqrt(edge)) / np.sqrt(edge)
+        value[-1] = 0.0
+        slope = np.append(np.diff(value) / np.diff(edge), 0.0)
+        return np.stack([value, slope], axis=1), first
+
+
+def cell_of(squared: float) -> int:
+    """Return the number of the cell of a squared distance [m²]."""
+    return int(np.float32(squared).view(np.int32)) >> CELL_BITS
+
+
+def cell_start(cell: npt.NDArray[np.int64]) -> Floats:
+    """Return the least squared distance of cells [m²]."""
+    return (cell.astype(np.int32) << CELL_BITS).view(np.float32).astype(np.float64)
+
+
+def _taper(distance: Floats, cutoff: float) -> Floats:
+    part = np.clip((distance / cutoff - POLICY.taper) / (1.0 - POLICY.taper), 0.0, 1.0)
+    return np.asarray(1.0 - part**2 * (3.0 - 2.0 * part))
+
+
+@dataclass(frozen=True, eq=False)
+class BlockPull:
+    """Forces between the blocks of a study at a distance.
+
+    Attributes
+    ----------
+    faces : RadialForce or None
+        Attraction of two faces, opposite each other on one axis.
+    lever : float
+        Of the points that attract, from the centre of the block [m].
+    centres : RadialForce or None
+        Attraction of two centres, of the menisci.
+    resistance : RadialForce or None
+        Of the water between two centres, per closing speed and distance [N s/m²].
+    native : driftwalk._core.Pull
+        Their tables.
+    """
+
+    faces: RadialForce | None
+    lever: float
+    centres: RadialForce | None
+    resistance: RadialForce | None
+    native: _core.Pull
+
+
+def block_pull(study: Study) -> BlockPull | None:
+    """Return the forces between the blocks of a study; None where they feel none.
+
+    Parameters
+    ----------
+    study : Study
+        Block, water, time step and interaction.
+
+    Raises
+    ------
+    InputError
+        When a magnet has no room in its block, discs have magnets, or a table cannot be read.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> pull = block_pull(dw.Study(interaction={"magnets": "5x5x2mm,1.3T"}))
+    >>> float((1e3 * pull.faces.force(0.010 + pull.faces.contact)).round(1))
+    36.0
+    """
+    if not study.interaction.is_on:
+        return None
+    mass = study.block.mass_kg * (1.0 + study.forces.added_mass_share)
+    text = study.interaction.attraction
+    measured = None if text is None else read_attraction(text)
+    return _block_pull(
+        study.interaction, study.block.side_m, study.block.is_round,
+        mass, study.time_step_s, study.water.density_kg_m3, measured,
+    )  # fmt: skip
+
+
+@lru_cache(maxsize=32)
+def _block_pull(
+    given: Interaction,
+    side: float,
+    is_round: bool,
+    mass: float,
+    step: float,
+    density: float,
+    measured: MeasuredAttraction | None,
+) -> BlockPull:
+    half, faces, centres, resistance = side / 2.0, None, None, None
+    lever = half
+    if is_round and (given.magnet or measured):
+        raise InputError("discs have no faces: [interaction] magnets and attraction are of squares")
+    steepest = POLICY.stiffness * mass / (4.0 * step**2)
+    if magnet := given.magnet:
+        _require_room(magnet, given.magnet_inset_m, side)
+        lever = half - given.magnet_inset_m - magnet.thickness_m / 2.0
+        faces = _limited(
+            lambda r: coaxial_force(magnet, np.maximum(r, 1.001 * magnet.thickness_m)),
+            2.0 * (half - lever), steepest, given.cutoff_m,
+        )  # fmt: skip
+    elif measured is not None:
+        faces = _limited(measured.at_gap, 0.0, steepest, measured.longest_gap)
+    if given.capillary == "on":
+        centres = _meniscus(given, side, density)
+    if given.approach_resistance_N_s > 0.0:
+        resistance = _approach(given.approach_resistance_N_s, side, mass, step)
+    oriented: Energy | None = None
+    if faces is not None and measured is not None and measured.is_oriented:
+        oriented = measured.energy
+    elif faces is not None and magnet is not None and given.poles == "fixed":
+        oriented = _fixed_poles(magnet, faces)
+    reach = max(
+        0.0 if faces is None else faces.cutoff + 2.0 * lever,
+        *(0.0 if force is None else force.cutoff for force in (centres, resistance)),
+    )
+    native = _core.Pull(
+        reach=reach, lever=lever, pole=np.ones(4), like_poles_repel=False
+    )  # fmt: skip
+    if faces is not None and oriented is None:
+        native.set_radial("faces", *faces.cells())
+    elif faces is not None and oriented is not None:
+        _set_oriented(native, oriented, faces, symmetric=measured is None)
+    if centres is not None:
+        native.set_radial("centres", *centres.cells())
+    if resistance is not None:
+        native.set_radial("resistance", *resistance.cells())
+    return BlockPull(faces, lever, centres, resistance, native)
+
+
+def _require_room(magnet: Magnet, inset: float, side: float) -> None:
+    """Refuse magnets that do not fit into the block, or into each other's way at its corners."""
+    deep = inset + magnet.thickness_m
+    if magnet.width_m >= side or deep >= side / 2.0 or magnet.width_m / 2.0 + deep > side / 2.0:
+        raise InputError(
+            f"[interaction] four magnets of {1e3 * magnet.width_m:g} mm by "
+            f"{1e3 * magnet.thickness_m:g} mm, {1e3 * inset:g} mm below the faces, have no room in "
+            f"a block of {1e3 * side:g} mm: take smaller ones"
+        )
+
+
+def _limited(
+    force: Callable[[Floats], Floats],
+    contact: float,
+    steepest: float,
+    cutoff: float | str,
+) -> RadialForce:
+    """Return a force that ends at its cut-off and is nowhere too steep for the time step."""
+    reach = np.geomspace(max(contact, 1e-4), 1.0, 4000)
+    values = np.asarray(force(reach))
+    if cutoff == "auto":
+        felt = reach[np.abs(values) > POLICY.least_force_N]
+        cutoff = float(felt[-1]) if felt.size else contact
+    end = float(cutoff)
+    if end <= contact:
+        raise InputError(
+            f"[interaction] cutoff_m: faces that touch are {1e3 * contact:.3g} mm apart from "
+            f"magnet to magnet; a cut-off of {1e3 * end:.3g} mm leaves no force"
+        )
+    steep = reach[np.abs(np.gradient(values, reach)) > steepest]
+    capped = float(steep[-1]) if steep.size else 0.0
+    return RadialForce(force, contact, min(max(capped, contact / 2.0), end), end)
+
+
+def _meniscus(given: Interaction, side: float, density: float) -> RadialForce:
+    """Return the attraction of two upright cylinders by their menisci.
+
+    The deformation of one cylinder of radius R is H K0(q r) / K0(q R), with 1/q the capillary
+    length; the force on another one is 2 π γ q H² K1(q r) / K0(q R)².
+    """
+    from scipy.special import k0, k1
+
+    per_length = math.sqrt(density * GRAVITY / given.surface_tension_N_m)
+    strength = 2.0 * math.pi * given.surface_tension_N_m * per_length * given.meniscus_height_m**2
+    strength /= float(k0(per_length * side / 2.0)) ** 2
+    return RadialForce(
+        lambda r: np.asarray(strength * k1(per_length * r)), side, 0.7 * side,
+        side + 12.0 / per_length,
+    )  # fmt: skip
+
+
+def _approach(factor: float, side: float, mass: float, step: float) -> RadialForce:
+    """Return resistance per closing speed and distance [N s/m²] between the inscribed circles."""
+    least = factor * step / (POLICY.resistance * mass)
+    return RadialForce(
+        lambda r: factor / (np.maximum(r - side, least) * r), side, 0.5 * side, 2.0 * side
+    )
+
+
+Energy = Callable[[Floats, Floats, Floats], Floats]
+
+
+def _fixed_poles(magnet: Magnet, faces: RadialForce) -> Energy:
+    """Return the energy of two faces with fixed magnets, as flat as the time step needs it."""
+    nearest = max(faces.capped_at, 1.05 * magnet.thickness_m)
+
+    def energy(x: Floats, y: Floats, angle: Floats) -> Floats:
+        r = np.hypot(x, y)
+        sizes = float(r.min()) / max(magnet[:3])
+        nodes = next(n for n, least in ((2, 6.0), (4, 2.5), (8, 0.0)) if sizes >= least)
+        if r.min() >= nearest:
+            return magnet_energy(magnet, x, y, angle, nodes=nodes)
+        # Inside, the force along the line stays what it is at the edge.
+        edge, step = nearest / np.maximum(r, 1e-12), 1e-3 * nearest
+        further = edge * (1.0 + step / nearest)
+        here = magnet_energy(magnet, x * edge, y * edge, angle, nodes=nodes)
+        beyond = magnet_energy(magnet, x * further, y * further, angle, nodes=nodes)
+        return np.asarray(here - (beyond - here) / step * (nearest - r))
+
+    return energy
+
+
+def _set_oriented(
+    native: _core.Pull, energy: Energy, faces: RadialForce, *, symmetric: bool
+) -> None:
+    """Give the core the energy of two faces on (log distance, direction, angle)."""
+    from scipy.ndimage import spline_filter1d
+
+    n, step = POLICY.angles, POLICY.distance_step
+    low = max(faces.contact / 2.0, 5e-4)
+    log_distance = math.log(low) + step * np.arange(math.ceil(math.log(faces.cutoff / low) / step))
+    r = np.exp(log_distance)
+    turn = 2.0 * np.pi * np.arange(n) / n
+    grid = np.meshgrid(r, turn[: n // 4 + 1] if symmetric else turn, turn, indexing="ij")
+    found = np.concatenate(
+        [energy(d * np.cos(a), d * np.sin(a), b) for d, a, b in zip(*grid, strict=True)]
+    ).reshape(grid[0].shape)
+    if symmetric:  # magnets have the same energy in a mirror, and before and behind each other
+        mirrored = found[:, n // 4 - 1 : 0 : -1, -np.arange(n)]
+        found = np.concatenate([found, mirrored] * 2, axis=1)
+    found *= _taper(r, r[-1])[:, None, None]
+    spline = spline_filter1d(found, order=2, axis=0, mode="mirror")
+    for axis in (1, 2):
+        spline = spline_filter1d(spline, order=2, axis=axis, mode="grid-wrap")
+    native.set_oriented(
+        np.ascontiguousarray(spline), first=float(log_distance[0]), per_step=1.0 / step,
+        low=low, high=float(r[-1]),
+    )  # fmt: skip

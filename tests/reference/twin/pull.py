@@ -1,0 +1,67 @@
+"""Forces between blocks at a distance, for the NumPy twin: pair after pair, face after face.
+
+Radial forces are those of the core's tables, linear in the squared distance within their cells.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from driftwalk.assembly.pull.tables import BlockPull, RadialForce, cell_start
+from twin.body import Floats, cross
+
+
+def strength(force: RadialForce, squared: npt.ArrayLike) -> Floats:
+    """Return the attraction over the distance [N/m] at squared distances [m²]."""
+    cells, first = force.cells()
+    return np.interp(squared, cell_start(first + np.arange(len(cells))), cells[:, 0])
+
+
+def pull_of_blocks(
+    pull: BlockPull,
+    members: Floats,
+    motions: Floats,
+    hidden: npt.NDArray[np.bool_],
+    body: Floats,
+    pole: npt.NDArray[np.int_] | None = None,
+) -> Floats:
+    """Return force x, y [N] and torque [N m] on each block, about its centre, shape (3, n).
+
+    Parameters
+    ----------
+    pull : BlockPull
+        Of the study; without fixed poles.
+    members, motions : ndarray, shape (3, n)
+        Pose of the block in the axes of its assembly; velocity.
+    hidden : ndarray of bool, shape (4, n)
+        Joined faces, in the assembly's frame.
+    body : ndarray, shape (n,)
+        The assembly of each block.
+    pole : ndarray of int, shape (4, n), optional
+        Poles of the faces, in the assembly's frame: like ones repel; default: all attract.
+    """
+    found = np.zeros_like(members)
+    centres = members[:2].T
+    turns = members[2] + np.arange(4)[:, None] * np.pi / 2
+    levers = pull.lever * np.stack([np.cos(turns), np.sin(turns)], axis=-1)  # (4, n, 2)
+    for a, b in np.argwhere(np.triu(body[:, None] != body)):
+        way = centres[b] - centres[a]
+        force = np.zeros(2)
+        if pull.centres is not None:
+            force += strength(pull.centres, way @ way) * way
+        if pull.resistance is not None:
+            parting = (motions[:2, b] - motions[:2, a]) @ way
+            force += strength(pull.resistance, way @ way) * parting * way
+        for i in np.flatnonzero(~hidden[:, a]) if pull.faces is not None else ():
+            for j in np.flatnonzero(~hidden[:, b]):
+                apart = way + levers[j, b] - levers[i, a]
+                one = strength(pull.faces, apart @ apart) * apart
+                if pole is not None:
+                    one = -pole[i, a] * pole[j, b] * one
+                force += one
+                found[2, a] += cross(levers[i, a], one)
+                found[2, b] -= cross(levers[j, b], one)
+        found[:2, a] += force
+        found[:2, b] -= force
+    return found

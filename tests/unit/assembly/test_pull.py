@@ -1,0 +1,261 @@
+"""Forces between blocks against magpylib, closed forms and the mechanics of two bodies."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import magpylib
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.special import k0, k1
+
+import driftwalk as dw
+from driftwalk.assembly.pull.magnets import coaxial_force, magnet_energy
+from driftwalk.assembly.pull.tables import block_pull
+from driftwalk.model.interaction import Magnet
+
+SIDE, MASS = 0.03, 0.0116
+MAGNETS = {
+    "3x3x1mm,1.2T": Magnet(3e-3, 3e-3, 1e-3, 1.2),
+    "5x5x2mm,1.3T": Magnet(5e-3, 5e-3, 2e-3, 1.3),
+}
+
+
+def magpylib_pull(magnet: Magnet, x: float, y: float, angle: float) -> tuple[float, float, float]:
+    """Return force x, y [N] and torque [N m] on the second of two magnets, by magpylib."""
+    size = (magnet.thickness_m, magnet.width_m, magnet.height_m)
+    first = magpylib.magnet.Cuboid(dimension=size, polarization=(magnet.remanence_T, 0, 0))
+    second = first.copy().rotate_from_angax(angle, "z", degrees=False)
+    second.position = (x, y, 0.0)
+    force, torque = (np.squeeze(one) for one in magpylib.getFT(first, second, meshing=3000))
+    return float(force[0]), float(force[1]), float(torque[2])
+
+
+def still_pair(start: Any, **sections: Any) -> dict[str, Any]:
+    """Return arguments of worlds without water, force and wall."""
+    forces = {"drag_coefficient": 0.0, "force_std_N": 0.0}
+    study = dw.Study(tank={"diameter_m": 2.0}, forces=forces, **sections)
+    start = np.asarray(start, dtype=np.float64)
+    return {
+        "study": study,
+        "flow": dw.uniform_flow(0.0, 0.0, arena=study.tank.to_arena()),
+        "start": start,
+        "blocks": len(start),
+    }
+
+
+@pytest.mark.parametrize("text", MAGNETS)
+def test_magnets_on_one_axis_attract_as_magpylib_says(text: str) -> None:
+    magnet, distances = MAGNETS[text], [4e-3, 6e-3, 12e-3, 22e-3]
+    expected = [-magpylib_pull(magnet, one, 0.0, 0.0)[0] for one in distances]
+    np.testing.assert_allclose(coaxial_force(magnet, distances), expected, rtol=0.01)
+
+
+@pytest.mark.parametrize("place", [(7e-3, 3e-3, 0.4), (-8e-3, 9e-3, 2.0), (2e-3, 12e-3, -1.0)])
+def test_force_and_torque_are_the_slopes_of_the_energy(place: tuple[float, float, float]) -> None:
+    magnet, step = MAGNETS["5x5x2mm,1.3T"], np.array([1e-6, 1e-6, 1e-4])
+    slopes = [
+        (magnet_energy(magnet, *(place + one)) - magnet_energy(magnet, *(place - one)))
+        for one in np.diag(step)
+    ]
+    np.testing.assert_allclose(
+        -np.ravel(slopes) / (2 * step), magpylib_pull(magnet, *place), rtol=0.01
+    )
+
+
+@pytest.mark.parametrize("poles", ["turning", pytest.param("fixed", marks=pytest.mark.slow)])
+def test_the_kernel_accelerates_two_blocks_by_these_forces(poles: str) -> None:
+    # One step from rest; of fixed poles the energy of all 16 pairs of faces, by differences.
+    text, magnet = "5x5x2mm,1.3T", MAGNETS["5x5x2mm,1.3T"]
+    pair = still_pair(
+        [[0.0, 0.0, 0.2], [0.044, 0.008, -0.3]],
+        interaction={"magnets": text, "poles": poles, "cutoff_m": 0.3},
+        simulation={"time_step_s": 1e-3},
+    )
+    tank = dw.LiveTank(**pair)
+    tank.advance(1e-3)
+    found = np.stack([MASS * tank.vx, MASS * tank.vy, MASS * SIDE**2 / 6 * tank.omega]) / 1e-3
+    lever = SIDE / 2 - 2e-3
+
+    def energy(poses: Any) -> float:
+        total = 0.0
+        turn = poses[:, 2, None] + np.arange(4) * np.pi / 2
+        points = poses[:, None, :2] + lever * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+        for i in range(4):
+            way = points[1] - points[0, i]
+            if poles == "turning":
+                total += float(magnet_energy(magnet, np.hypot(*way.T), 0.0, 0.0).sum())
+            else:
+                away, up = np.cos(turn[0, i]), np.sin(turn[0, i])
+                x, y = way @ [away, up], way @ [-up, away]
+                total += float(magnet_energy(magnet, x, y, turn[1] + np.pi - turn[0, i]).sum())
+        return total
+
+    start = pair["start"]
+    expected = np.zeros((3, 2))
+    for block, part in np.ndindex(2, 3):
+        step = np.zeros_like(start)
+        step[block, part] = 1e-5
+        expected[part, block] = -(energy(start + step) - energy(start - step)) / 2e-5
+    np.testing.assert_allclose(found[:2], expected[:2], atol=0.01 * np.abs(expected[:2]).max())
+    np.testing.assert_allclose(found[2], expected[2], atol=0.01 * np.abs(expected[2]).max())
+
+
+@pytest.mark.slow
+def test_two_magnets_meet_when_the_quadrature_says() -> None:
+    text, magnet, gap = "3x3x1mm,1.2T", MAGNETS["3x3x1mm,1.2T"], 0.015
+    lever, square = SIDE / 2 - 1.5e-3, np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])
+    distances = np.linspace(SIDE, SIDE + gap, 4000)
+    ways = distances[:, None, None, None] * np.array([1.0, 0.0]) + lever * (
+        square[None, :, :] - square[:, None, :]
+    )
+    length = np.hypot(ways[..., 0], ways[..., 1])
+    force = (coaxial_force(magnet, length) * ways[..., 0] / length).sum(axis=(1, 2))
+    work = np.append(np.cumsum(((force[1:] + force[:-1]) / 2 * np.diff(distances))[::-1])[::-1], 0)
+    speed = np.sqrt(
+        4.0 * work / MASS
+    )  # of closing: the energy is half the mass, speed squared, over 2
+    # Near rest the distance falls as a t² / 2 of the relative motion.
+    last = 40
+    time = np.sqrt(2 * (distances[-1] - distances[-last]) / (2 * force[-1] / MASS))
+    expected = time + np.trapezoid(1 / speed[: -last + 1], distances[: -last + 1])
+    for step in (1e-3, 1e-2):
+        pair = still_pair(
+            [[0.0, 0.0, 0.0], [SIDE + gap, 0.0, 0.0]],
+            interaction={"magnets": text, "cutoff_m": 0.4}, simulation={"time_step_s": step},
+        )  # fmt: skip
+        found = dw.assemble(**pair, runs=1, duration=20.0)
+        # The usual step caps the force: convergence in the time step.
+        assert float(found["first_contact_time"][0]) == pytest.approx(
+            expected, rel=0.01, abs=2 * step
+        )
+
+
+@pytest.mark.slow
+def test_a_conservative_pair_keeps_energy_and_momentum(tmp_path: Path) -> None:
+    # A spring between all faces, which pushes near and pulls far: the blocks never touch.
+    gaps = np.linspace(0.0, 0.2, 81)
+    rows = [f"{1e3 * gap:.4f},{40.0 * (gap - 0.06):.9f}" for gap in gaps]
+    table = tmp_path / "spring.csv"
+    table.write_text("\n".join(["gap_mm,force_mN", *rows]))
+    pair = still_pair(
+        [[0.0, 0.0, 0.1], [0.075, 0.02, 0.4]],
+        interaction={"attraction": str(table)}, assembly={"latching": "none"},
+    )  # fmt: skip
+    tank, pull = dw.LiveTank(**pair), block_pull(pair["study"])
+    assert pull is not None
+    assert pull.faces is not None
+
+    def potential() -> float:
+        turn = tank.theta[:, None] + np.arange(4) * np.pi / 2
+        x, y = tank.x[:, None] + SIDE / 2 * np.cos(turn), tank.y[:, None] + SIDE / 2 * np.sin(turn)
+        r = np.hypot(x[1] - x[0, :, None], y[1] - y[0, :, None])
+        grid = np.linspace(0.0, 0.2, 20001)
+        force = pull.faces(grid)
+        work = np.append(0.0, np.cumsum((force[1:] + force[:-1]) / 2 * np.diff(grid)))
+        return float(np.interp(r, grid, work).sum())
+
+    totals, kinetics = [], []
+    for _ in range(200):
+        kinetic = MASS / 2 * (tank.vx**2 + tank.vy**2) + MASS * SIDE**2 / 12 * tank.omega**2
+        kinetics.append(float(kinetic.sum()))
+        totals.append(kinetics[-1] + potential())
+        momentum = MASS * np.array([tank.vx.sum(), tank.vy.sum()])
+        spin = (tank.x * tank.vy - tank.y * tank.vx + SIDE**2 / 6 * tank.omega).sum() * MASS
+        np.testing.assert_allclose([*momentum, spin], 0.0, atol=1e-13)
+        tank.advance(0.5)
+    assert max(kinetics) > 1e-7
+    assert np.ptp(totals) < 1e-3 * max(kinetics)
+
+
+def test_menisci_attract_by_the_closed_form() -> None:
+    pull = block_pull(dw.Study(interaction={"capillary": "on", "meniscus_height_m": 1.5e-3}))
+    assert pull is not None
+    assert pull.centres is not None
+    # Kralchevsky and Nagayama (2000): 2 pi gamma q Q² K1(q L), with the slope's charge
+    # Q = H / K0(q R).
+    q, radius = np.sqrt(998.0 * 9.81 / 0.072), SIDE / 2
+    density = dw.Study().water.density_kg_m3
+    q = np.sqrt(density * 9.81 / 0.072)
+    distance = np.array([0.031, 0.035, 0.04])
+    expected = 2 * np.pi * 0.072 * q * (1.5e-3 / k0(q * radius)) ** 2 * k1(q * distance)
+    np.testing.assert_allclose(pull.centres(distance), expected, rtol=1e-6)
+
+
+def test_the_resistance_is_the_factor_over_the_gap() -> None:
+    pull = block_pull(dw.Study(interaction={"approach_resistance_N_s": 1e-5}))
+    assert pull is not None
+    assert pull.resistance is not None
+    np.testing.assert_allclose(pull.resistance(0.035) * 0.035, 1e-5 / 0.005)
+
+
+def test_the_stated_numbers_are_those_of_a_balance() -> None:
+    found = dw.attraction(dw.Study(interaction={"magnets": "3x3x1mm,1.2T"}))
+    assert found is not None
+    magnet = MAGNETS["3x3x1mm,1.2T"]
+    assert found.attrs["force_at_contact_N"] == pytest.approx(coaxial_force(magnet, 3e-3))
+    assert found.attrs["force_at_10mm_N"] == pytest.approx(coaxial_force(magnet, 13e-3), rel=1e-3)
+    work = quad(lambda r: float(coaxial_force(magnet, r)), 3e-3, 0.5, points=[0.01, 0.03])[0]
+    assert found.attrs["binding_energy_J"] == pytest.approx(work, rel=0.01)
+    assert dw.attraction(dw.Study()) is None
+
+
+@pytest.mark.slow
+def test_many_blocks_are_the_same_by_lists_as_by_all_pairs() -> None:
+    # 30 blocks are listed; 20 of them alone are not, the other ten are far away.
+    near = np.array([[0.036 * i, 0.036 * j, 0.1 * i] for i in range(5) for j in range(4)])
+    far = np.array([[0.8 - 0.05 * i, -0.4, 0.0] for i in range(10)]) - [1.2, 0.2, 0.0]
+    options: dict[str, Any] = {
+        "interaction": {"magnets": "3x3x1mm,1.2T"}, "assembly": {"latching": "none"},
+    }  # fmt: skip
+    paths = [
+        dw.assembly_path(**still_pair(start, **options), duration=0.1, backend="reference")
+        for start in (near, np.concatenate([near, far]))
+    ]
+    for name in ("x", "y", "theta"):
+        np.testing.assert_allclose(paths[0][name], paths[1][name].isel(block=slice(20)), atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "is empty"),
+        ("gap_mm,pull_mN\n1,2", "line 1, column 2: no column is called 'pull_mN'"),
+        ("gap_mm,offset_mm\n1,2", "there is no column force_N"),
+        ("gap_mm,force_mN\n1,2\n2,x", "line 3, column 2: force is no number: 'x'"),
+        ("gap_mm,force_mN\n1,2\n1,3", "line 3: a second row"),
+        ("gap_mm,force_mN\n1,2", "at least two gaps"),
+        ("gap_mm,angle_deg,force_mN\n1,0,2\n2,0,1\n1,9,2", "one for each combination"),
+        (
+            "gap_mm,angle_deg,force_mN,torque_uN_m\n"
+            + "\n".join(f"{g},{a},{g},100" for g in (1, 2) for a in (-9, 0, 9)),
+            "the torque differs",
+        ),
+    ],
+)
+def test_a_wrong_table_is_refused_with_its_place(text: str, words: str, tmp_path: Path) -> None:
+    table = tmp_path / "attraction.csv"
+    table.write_text(text)
+    with pytest.raises(dw.FormatError, match=words):
+        block_pull(dw.Study(interaction={"attraction": str(table)}))
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"magnets": "40x5x2mm,1.3T"}, "have no room in a block of 30 mm"),
+        ({"magnets": "5x5x2mm,1.3T", "magnet_inset_m": 0.014}, "have no room"),
+        ({"magnets": "5x5x2mm,1.3T", "cutoff_m": 0.003}, "leaves no force"),
+    ],
+)
+def test_magnets_without_room_are_refused(given: dict[str, Any], words: str) -> None:
+    with pytest.raises(dw.InputError, match=words):
+        block_pull(dw.Study(interaction=given))
+
+
+def test_discs_have_no_faces() -> None:
+    study = dw.Study(block={"shape": "disc"}, interaction={"magnets": "5x5x2mm,1.3T"})
+    with pytest.raises(dw.InputError, match="discs have no faces"):
+        block_pull(study)
