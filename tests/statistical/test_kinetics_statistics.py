@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from chain_runs import chain_runs
+from chain_runs import CLASSES, chain_runs
 from scipy.stats import binom
 
+from driftwalk.assembly.chains.estimate import Replicate, empirical_shares
+from driftwalk.assembly.chains.hidden import FORMS, Form, fit
 from driftwalk.assembly.chains.histories import histories
 from driftwalk.assembly.chains.mixing import (
     CANNOT_TELL,
@@ -14,6 +16,8 @@ from driftwalk.assembly.chains.mixing import (
     equal_rates,
     judge_mixing,
 )
+from driftwalk.assembly.chains.predicted import passage, shares
+from driftwalk.sweep import grid, run_sweep
 
 pytestmark = pytest.mark.slow
 CHAINS = 400
@@ -52,3 +56,26 @@ def test_equal_rates_are_refused_in_five_percent_at_most(memory: float) -> None:
         corrected = equal_rates(one, other, pairs)[1]
         refused += bool(np.nanmin(corrected) <= 0.05)
     assert refused <= binom.ppf(0.999, sets, 0.05), refused
+
+
+@pytest.mark.parametrize(("form", "memory"), [(FORMS[0], 1.0), (FORMS[2], 0.2)])
+def test_bands_hold_the_truth_as_often_as_they_say(form: Form, memory: float) -> None:
+    """Shares after 60 and 150 s and the committor, of 200 runs; 90 % within binomial chance."""
+    truth = histories([chain_runs(30_000, 9, memory=memory)], classes=CLASSES)
+    times, sets, at = np.array([60.0, 150.0]), 30, CLASSES.index("1+1+1+1")
+    chosen = [CLASSES.index("T"), CLASSES.index("2+1+1")]
+    seen = empirical_shares(truth, times)[:, chosen]
+    held = []
+    for seed in range(sets):
+        found = histories([chain_runs(200, seed, memory=memory)], classes=CLASSES)
+        model = fit(found, form)
+        again = Replicate(found, model, np.zeros((0, 2), int), CLASSES.index("T"), seed)
+        made = run_sweep(again, grid(replicate=np.arange(50)).units(1))
+        course = shares(model, 300.0, steps=600)[1][[120, 300]]
+        wide = 1.645 * made["share"].std(axis=0, ddof=1)[[24, 60]]
+        error = made["committor"].std(axis=0, ddof=1)[at]
+        reach = passage(model, CLASSES.index("T")).committor[at]
+        inside = np.abs(course[:, chosen] - seen) < wide[:, chosen]
+        held.append(np.append(inside.ravel(), abs(reach - 10 / 21) < 1.645 * error))
+    share = np.mean(held, axis=0)
+    assert (share >= binom.ppf(0.001, sets, 0.9) / sets).all(), share

@@ -436,7 +436,7 @@ def kinetics(
     Examples
     --------
     >>> import driftwalk as dw
-    >>> runs = dw.assemble(dw.Study(), dw.tank30_flow(), blocks=2, runs=40, duration="60s")
+    >>> runs = dw.assemble(dw.Study(), dw.tank30_flow(), blocks=2, runs=400, duration="60s")
     >>> dw.kinetics(runs, target="2").attrs["verdict"] != ""
     True
     """

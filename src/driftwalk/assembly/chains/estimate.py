@@ -124,7 +124,7 @@ def kinetics(
     Examples
     --------
     >>> import driftwalk as dw
-    >>> runs = dw.assemble(dw.Study(), dw.tank30_flow(), blocks=2, runs=40, duration="60s")
+    >>> runs = dw.assemble(dw.Study(), dw.tank30_flow(), blocks=2, runs=400, duration="60s")
     >>> found = dw.kinetics(runs, target="2")
     >>> found["transition"].values.tolist()
     ['1+1 -> 2']

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 OPEN = -1
 """In place of the next class where a sojourn was still under way at the end of its run."""
 MOST_CLASSES = 200
-"""Classes that occur, at most: chosen by hand, those of 8 blocks in 1000 runs are some 100."""
+"""Classes that occur, at most: as many as 7 blocks have. Chosen by hand."""
 
 
 class Histories(NamedTuple):

@@ -6,15 +6,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from driftwalk.page.chart import chart, label, series
-from driftwalk.page.number_words import quantity
 from driftwalk.page.parts import (
     Maker,
     Section,
+    chart,
     figure,
+    label,
+    quantity,
     require,
     required,
     sections_of,
+    series,
     summary_section,
     table_section,
     value_of,
@@ -58,7 +60,7 @@ def kinetics_sections(*, kinetics: xr.Dataset | None = None) -> list[Section]:
     parts: list[tuple[str, str, Maker]] = [
         ("shares", "Shares over time", shares_section),
         ("rates", "Rates", rates_sections),
-        ("tests", "Tests of a well-mixed tank", tests_section),
+        ("tests", "Tests of a well-mixed tank", mixing_section),
         ("models", "Models", lambda found: _table("models", "Models", score_table(found))),
     ]
     if kinetics is not None and "target" in kinetics.attrs:
@@ -129,7 +131,7 @@ def rates_sections(kinetics: xr.Dataset) -> list[Section]:
     ]
 
 
-def tests_section(kinetics: xr.Dataset) -> Section:
+def mixing_section(kinetics: xr.Dataset) -> Section:
     """Return Weibull's shapes and Spearman's coefficients with their p-values."""
     require(kinetics, "statistic", "p", "p_corrected")
     names = ("statistic", "statistic_low", "statistic_high", "p", "p_corrected")
