@@ -18,6 +18,7 @@ struct PackMemory {
   Pulled<Real>* pulled;  // [row]
   Pulled<typename Numbers<Real>::Scalar>* alone; // [block] of one world
   BlockBook* books;                              // [block][lane], of one world [block]
+  Bond* bonds;                                   // [world][bond_room]
   Crowd<Real> crowd;                             // of one world
 
   // Whether a pack with room for this many blocks holds one world.
@@ -56,6 +57,7 @@ private:
     take(sums, count);
     take(pulled, count);
     take(books, count * lanes);
+    take(bonds, static_cast<std::size_t>(bond_room(blocks)) * (one_world ? 1 : lanes));
     if (one_world) {
       take(alone, count * lanes);
       crowd.place(take, count);

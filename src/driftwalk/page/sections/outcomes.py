@@ -9,15 +9,18 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.page.arrays import number, numbers
-from driftwalk.page.chart import chart, label, series
-from driftwalk.page.number_words import count, percent
 from driftwalk.page.parts import (
     Section,
     attempt,
+    chart,
+    count,
     figure,
     figure_with_ends,
+    label,
+    percent,
     require,
     section,
+    series,
     value_of,
 )
 from driftwalk.plot.parts.assembly_labels import OTHER, class_names, classes_to_show, with_rest

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.schema.answers.parts import Answer, Part, Table, by_name, each
+from driftwalk.schema.answers.steady_state import steady_json, steady_parts
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -43,6 +44,7 @@ def assembly_answer(
     drawn: xr.Dataset | None = None,
     sizes: xr.Dataset | None = None,
     sizes_drawn: xr.Dataset | None = None,
+    steady: xr.Dataset | None = None,
     apart: Mapping[str, float] | None = None,
     attraction: xr.Dataset | None = None,
 ) -> Answer:
@@ -60,6 +62,8 @@ def assembly_answer(
         The `outcome_distribution` of runs with drawn parameters.
     sizes, sizes_drawn : xarray.Dataset, optional
         The `assembly_sizes` of both, where nearly every run is a class of its own.
+    steady : xarray.Dataset, optional
+        The `steady_state` of the runs, where bonds break.
     apart : mapping, optional
         ``l1_distance`` of the two distributions, ``l1_noise_floor`` and ``l1_noise_floor_95``.
     attraction : xarray.Dataset, optional
@@ -90,8 +94,11 @@ def assembly_answer(
                 f"l1 distance of the two: {apart['l1_distance']:.4f}; by chance "
                 f"{apart['l1_noise_floor']:.4f} (95 %: {apart['l1_noise_floor_95']:.4f})"
             )
+    if steady is not None:
+        parts += steady_parts(steady)
     answer = {
         **_json(found, sizes),
+        **({} if steady is None else {"steady_state": steady_json(steady)}),
         **{key: facts[key] for key in _SETTINGS},
         "drawn": None
         if drawn is None
