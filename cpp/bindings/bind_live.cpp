@@ -5,6 +5,7 @@
 #include "driftwalk/assembly/live.hpp"
 
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 
 #include <cmath>
 #include <cstdint>
@@ -23,7 +24,7 @@ void start_world(LiveWorld* self, const Model& model, In<double, 2> start, std::
                  double drag_coefficient, double force_std, const std::string& latching,
                  double connector_distance, double connector_axis, double hidden_share,
                  double stirring_length, bool incompressible, double block_restitution,
-                 double block_friction, double flow_start) {
+                 double block_friction, double flow_start, const BondNumbers& bonds) {
   require_blocks(start.shape(0));
   if (start.shape(1) != 3) {
     throw std::invalid_argument("start must have shape (blocks, 3)");
@@ -33,6 +34,7 @@ void start_world(LiveWorld* self, const Model& model, In<double, 2> start, std::
   rules.connector_distance = connector_distance;
   rules.connector_cosine = std::cos(connector_axis);
   set_shared(rules, hidden_share, stirring_length, incompressible);
+  set_bonds(rules, bonds);
   rules.restitution = block_restitution;
   rules.friction = block_friction;
   new (self) LiveWorld(model.twice(), rules, {drag_coefficient, force_std, 1.0}, start.data(), key,
@@ -54,6 +56,8 @@ nb::dict advance(LiveWorld& world, std::int64_t steps) {
   };
   nb::dict out;
   out["step"] = hand_out(rows(events.step, 1), {count});
+  out["kind"] = hand_out(
+      events.kind == nullptr ? std::vector<std::int32_t>(count) : rows(events.kind, 1), {count});
   out["block"] = hand_out(rows(events.block, 2), {count, 2});
   out["face"] = hand_out(rows(events.face, 2), {count, 2});
   return out;
@@ -70,6 +74,15 @@ nb::dict state(const LiveWorld& world) {
   out["assembly"] = hand_out(std::move(assembly), {blocks});
   out["cell"] = hand_out(std::move(cell), {blocks, 2});
   out["quarter"] = hand_out(std::move(quarter), {blocks});
+  std::vector<std::int32_t> pairs;
+  const driftwalk::BondList& bonds = world.bonds();
+  for (int k = 0; k < bonds.count; ++k) {
+    if (bonds.bond[k].state == driftwalk::BondState::whole) {
+      pairs.insert(pairs.end(), {bonds.bond[k].first, bonds.bond[k].second});
+    }
+  }
+  const std::size_t count = pairs.size() / 2;
+  out["bond"] = hand_out(std::move(pairs), {count, 2});
   return out;
 }
 
@@ -87,7 +100,8 @@ void register_live(nb::module_& module) {
       .def("__init__", &start_world, nb::keep_alive<1, 2>(), "model"_a, nb::kw_only(), "start"_a,
            "key"_a, "drag_coefficient"_a, "force_std"_a, "latching"_a, "connector_distance"_a,
            "connector_axis"_a, "hidden_share"_a, "stirring_length"_a, "incompressible"_a,
-           "block_restitution"_a, "block_friction"_a, "flow_start"_a = 0.0)
+           "block_restitution"_a, "block_friction"_a, "flow_start"_a = 0.0,
+           "bonds"_a = BondNumbers{0, 0, 0, 1.25})
       .def("advance", &advance, "steps"_a)
       .def("state", &state)
       .def(
@@ -105,6 +119,14 @@ void register_live(nb::module_& module) {
             world.set_rules(latching_of(latching), hidden_share, stirring_length);
           },
           nb::kw_only(), "latching"_a, "hidden_share"_a, "stirring_length"_a)
+      .def(
+          "set_bonds",
+          [](LiveWorld& world, double rate, double relatch_clearance) {
+            driftwalk::AssemblyRules checked;
+            set_bonds(checked, {rate, 0, 0, relatch_clearance});
+            world.set_bonds(rate, relatch_clearance);
+          },
+          nb::kw_only(), "rate"_a, "relatch_clearance"_a)
       .def(
           "set_pull",
           [](LiveWorld& world, const Pull* pull) {

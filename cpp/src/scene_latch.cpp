@@ -146,8 +146,8 @@ bool is_clear_of_others(const AssemblyRules& rules, const Scene& scene, int asse
   double farthest = 0;
   for (int b = a.first; b >= 0; b = scene.block[b].next) {
     const SceneBlock& block = scene.block[b];
-    farthest = std::max(farthest,
-                        block.offset_x * block.offset_x + block.offset_y * block.offset_y);
+    farthest =
+        std::max(farthest, block.offset_x * block.offset_x + block.offset_y * block.offset_y);
   }
   const double reach = std::sqrt(farthest) + 1.5 * rules.side;
   const auto is_near = [&](Vec2 from_block) {
@@ -181,19 +181,6 @@ void conserve_momentum(const SceneAssembly& a, const SceneAssembly& b, double ma
   joint.vx = (ma * a.vx + mb * b.vx) / m;
   joint.vy = (ma * a.vy + mb * b.vy) / m;
   joint.omega = spin / joint.inertia;
-}
-
-// One line of the world's list of events; faces in the blocks' own frames.
-void record(Scene& scene, const Merge& merge, const int (&own_faces)[2]) {
-  if (scene.event_count >= scene.event_rows) {
-    return;
-  }
-  const int e = scene.event_count++;
-  scene.event_step[e] = scene.step;
-  scene.event_block[2 * e] = merge.anchor;
-  scene.event_block[2 * e + 1] = merge.guest;
-  scene.event_face[2 * e] = own_faces[0];
-  scene.event_face[2 * e + 1] = own_faces[1];
 }
 
 void align(Scene& scene, const Merge& merge, int joint) {
@@ -288,13 +275,17 @@ bool try_merge(const AssemblyRules& rules, Scene& scene, const Merge& merge) {
   body.before = {body.x, body.y, body.theta, body.cosine, body.sine};
   body.touched = true;
   --scene.assemblies;
-  record(scene, merge, own_faces);
+  record_event(scene, EventKind::joining, {merge.anchor, merge.guest}, own_faces);
+  if (rules.bonds_break) {
+    bond_assembly(rules, scene, joint, {merge.anchor, merge.guest});
+  }
   return true;
 }
 
 // Whether any faces of two blocks can latch at all.
 bool may_latch(const AssemblyRules& rules, const Scene& scene, BlockPair pair) {
-  if (scene.block[pair.first].assembly == scene.block[pair.second].assembly) {
+  const int own = scene.block[pair.first].assembly, other = scene.block[pair.second].assembly;
+  if (own == other || are_unclear(scene, own, other)) {
     return false;
   }
   if (rules.latching == Latching::collision) {

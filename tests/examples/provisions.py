@@ -18,6 +18,7 @@ from typing import Any
 import h5py
 import numpy as np
 import xarray as xr
+from chain_runs import chain_runs
 from command_line import FLOW, GRID, RECORDING, here
 from drifting_tracers import seeded_tank
 from finished_run import write_finished_run
@@ -299,6 +300,15 @@ def _assembled(folder: Path) -> Names:
     path = dw.assembly_path(dw.Study(), dw.tank30_flow(), runs=[3], duration=120.0)
     blocks = dw.path_recording(path, run=3).assign_coords(body=list("ABCD"))
     dw.save_trajectory(blocks, folder / "blocks.csv")
+    return {}
+
+
+def _chains(folder: Path) -> Names:
+    """Provide ``four/`` and ``real/``: runs of a chain, and as many recordings of another one."""
+    for name, seed, runs in (("four", 1, 40), ("real", 2, 12)):
+        (folder / name).mkdir()
+        found = chain_runs(runs, seed)
+        found.to_netcdf(folder / name / ("assembly.nc" if name == "four" else "tuesday.nc"))
     return {}
 
 
@@ -587,6 +597,13 @@ PAGES: dict[str, Page] = {
     "docs/how-to/take-your-tracks-elsewhere.md": Page(
         provide=_files(_one_recording, _several_worlds, _calibrated),
         makes=("tracks/README.md", "one/replicate_3.csv", "film/recording.gif", "paper/ks_map.pdf"),
+        slow=True,
+    ),
+    "docs/how-to/kinetics.md": Page(
+        provide=_files(_assembled, _chains),
+        holds=("found.attrs['target'] == 'T'", "found.sizes['class'] == 7"),
+        makes=("kinetics/kinetics.nc", "to-T/kinetics.nc", "both.html", "eight/manifest.json"),
+        draws=False,
         slow=True,
     ),
     "docs/how-to/sensitivity.md": Page(

@@ -45,6 +45,7 @@ AXES: Final = {
     "latching": "sensitivity.latching",
     "hidden-face-drag": "sensitivity.hidden_face_drag",
     "stirring-length": "sensitivity.stirring_length_m",
+    "bond-rate": "sensitivity.bond_rate_per_s",
     "magnets": "sensitivity.magnets",
     "drag-coefficient": "sensitivity.drag_coefficient",
     "force-std": "sensitivity.force_std_N",

@@ -35,6 +35,7 @@ class Purpose(IntEnum):
     FLOW = 6
     TORQUE = 7
     STIRRING = 8
+    BOND = 9
 
 
 WORK: Final[dict[str, int]] = {

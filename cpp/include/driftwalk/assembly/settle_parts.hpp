@@ -119,6 +119,19 @@ Beyond beyond_wall(const AssemblyRules& rules, const Scene& scene, int assembly)
 // Shifts an assembly inward, corner by corner, the farthest first; false when it stays outside.
 bool push_inside(const AssemblyRules& rules, Scene& scene, int assembly, int rounds);
 
+// Whether two blocks of one assembly are neighbours: on its lattice, or discs that touch.
+bool are_neighbours(const AssemblyRules& rules, const Scene& scene, int first, int second);
+// Makes the blocks that are labelled with the lowest of them one body, which moves on as they did
+// in the assembly that they come from.
+void cut_loose(const AssemblyRules& rules, Scene& scene, const SceneAssembly& from, int lowest);
+// Bonds the neighbours of an assembly that are not bonded. Other bonds than that of `joined`, two
+// blocks whose joining has been told, are told as events of their own.
+void bond_assembly(const AssemblyRules& rules, Scene& scene, int assembly, BlockPair joined);
+// Whether two assemblies have parted and are not clear of each other yet.
+bool are_unclear(const Scene& scene, int assembly, int other);
+// One line of the world's list of events; faces in the blocks' own frames.
+void record_event(Scene& scene, EventKind kind, const int (&blocks)[2], const int (&faces)[2]);
+
 // Merges what latches, one pair of faces after the other. Leaves the list of close pairs as it then
 // is.
 void latch(const AssemblyRules& rules, Scene& scene);

@@ -147,7 +147,7 @@ def block_pull(study: Study) -> BlockPull | None:
     >>> import driftwalk as dw
     >>> pull = block_pull(dw.Study(interaction={"magnets": "5x5x2mm,1.3T"}))
     >>> float((1e3 * pull.faces.force(0.010 + pull.faces.contact)).round(1))
-    36.0
+    35.3
     """
     if not study.interaction.is_on:
         return None
@@ -190,7 +190,7 @@ def _block_pull(
         resistance = _approach(given.approach_resistance_N_s, side, mass, step)
     oriented: Energy | None = None
     if faces is not None and measured is not None and measured.is_oriented:
-        oriented = measured.energy
+        oriented = measured.flat_below(faces.capped_at).energy
     elif faces is not None and magnet is not None and given.poles == "fixed":
         oriented = _fixed_poles(magnet, faces)
     reach = max(

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from driftwalk import _core
 from driftwalk.assembly.pull.tables import block_pull
+from driftwalk.assembly.runs.bonds import event_rows, require_bonds
 from driftwalk.assembly.runs.start import given_start, place_blocks, require_cover, require_room
 from driftwalk.core.arrays import Floats, Integers, Keys
 from driftwalk.core.errors import InputError
@@ -82,6 +83,10 @@ class Plan:
             "incompressible": self.study.forces.stirring == "incompressible",
             "block_restitution": rules.block_restitution,
             "block_friction": rules.block_friction,
+            "bonds": (
+                *(rules.bond_rate_per_s, rules.bond_force_N, rules.bond_strength_N),
+                rules.relatch_clearance,
+            ),
         }
 
 
@@ -134,6 +139,7 @@ def make_plan(
             given[f"forces.{key}"] = float(np.asarray(value))
     chosen = apply_overrides(study, given)
     require_room(chosen)
+    require_bonds(chosen)
     require_cover(flow, chosen.tank)
     block_pull(chosen)  # its errors come before any run
     runs = np.arange(chosen.assembly.runs) if index is None else index
@@ -186,7 +192,17 @@ def start_poses(plan: Plan, start: npt.ArrayLike | None = None) -> Floats:
 def simulate_rows(
     plan: Plan, start: Floats, rows: slice = slice(None), *, sample_every: int = 0
 ) -> Arrays:
-    """Simulate some of the runs; one entry per run in every array."""
+    """Simulate some of the runs; one entry per run in every array, and room for all events."""
+    rows_of_events = event_rows(plan.study, duration=plan.steps * plan.study.time_step_s)
+    found = _simulate(plan, start, rows, sample_every, rows_of_events)
+    most = int(found["event_count"].max(initial=0))
+    if most > found["event_step"].shape[1]:
+        found = _simulate(plan, start, rows, sample_every, most)
+    return found
+
+
+def _simulate(plan: Plan, start: Floats, rows: slice, every: int, event_rows: int) -> Arrays:
+    """Return what the native core gives for some runs; events beyond `event_rows` are counted."""
     pull = block_pull(plan.study)
     found = _core.assemble(
         plan.model(),
@@ -197,7 +213,8 @@ def simulate_rows(
         steps=plan.steps,
         **plan.rules(),
         pull=None if pull is None else pull.native,
-        sample_every=sample_every,
+        sample_every=every,
+        event_rows=event_rows,
         threads=plan.threads,
         precision="double" if plan.backend == "reference" else "single",
         flow_start=None if plan.flow_start is None else np.ascontiguousarray(plan.flow_start[rows]),

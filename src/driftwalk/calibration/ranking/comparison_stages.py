@@ -213,7 +213,7 @@ class Stages:
         shortlist = shortlist_models(self.work.entries, held_out)
         found: dict[int, Evidence] = {}
         for number, index in enumerate(shortlist.models):
-            if number >= shortlist.tied and any(one.usual for one in found.values()):
+            if number >= shortlist.tied and any(one.misfit.usual for one in found.values()):
                 break
             planned = max(shortlist.tied, 1)
             found[index] = self._matched(number, index, held_out[index].point, planned)
@@ -222,7 +222,7 @@ class Stages:
             for index, entry in enumerate(self.work.entries)
             if entry.baseline and not held_out_differences(held_out[index], self.work.motion)
         ]
-        if any(one.usual for one in found.values()):
+        if any(one.misfit.usual for one in found.values()):
             for index in walks:
                 found[index] = self._matched(len(found), index, np.empty(0), len(found) + 1)
         return found

@@ -170,14 +170,16 @@ def size_sections(found: dict[str, xr.Dataset]) -> list[Section]:
         Each an `assembly_sizes`, by what it is of.
     """
     mean, title = {"mean_size": ""}, "Largest assembly and free blocks"
-    compact = {"compactness": ""}
+    ratio = "least perimeter over perimeter"
     shares = {"largest_share": "in the largest assembly", "free_share": "alone"}
     return [
         *attempt("sizes", "Sizes of the assemblies", lambda: sizes_section(found)),
         *_over_time(found, "mean-size", "Mean size over time", "blocks per assembly", mean),
         *_over_time(found, "size-shares", title, "share of the blocks", shares),
-        *_over_time(
-            found, "compactness", "Compactness over time", "least perimeter over perimeter", compact
+        *(
+            _over_time(found, "compactness", "Compactness over time", ratio, {"compactness": ""})
+            if all("compactness" in one for one in found.values())
+            else []  # older files have none
         ),
     ]
 

@@ -36,6 +36,7 @@ AXES: Final = {
     "tank_diameter": ("tank diameter", "m", "_m"),
     "blocks": ("number of blocks", "1", ""),
     "stirring_length": ("length of the stirring", "m", "_m"),
+    "bond_rate": ("rate at which bonds break", "1/s", "_per_s"),
 }
 """Label, unit, and what an attribute's name has more, in the order from x to y."""
 MAP_AXES: Final = 2

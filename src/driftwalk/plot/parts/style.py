@@ -192,7 +192,7 @@ def settle_layout(ax: Axes) -> None:
 
 def edge_width(bodies: int) -> float:
     """Return the width of the edges of bodies [pt]: thinner where they are many, and so small."""
-    return 0.6 * min(1.0, math.sqrt(16 / max(bodies, 1)))
+    return 0.6 * math.sqrt(min(1.0, 16 / max(bodies, 1)))
 
 
 def outlined(width: float, color: str = "white") -> list[AbstractPathEffect]:

@@ -13,7 +13,7 @@ from hypothesis import given, strategies as st
 
 import driftwalk as dw
 from driftwalk.likelihood.preparation import prepare
-from driftwalk.likelihood.tracker_errors.outliers import OUTLIER, outliers_in, without_outliers
+from driftwalk.record.cleaning.outliers import OUTLIER, outliers_in, without_outliers
 from driftwalk.schema import Track, body_track
 from driftwalk.schema.answers.facts import facts_of
 
@@ -84,7 +84,7 @@ def test_a_recording_of_the_model_has_none(realisation: str) -> None:
 def test_gaps_and_short_tracks_are_left_alone() -> None:
     track = smooth()
     retained = np.ones(SAMPLES, dtype=bool)
-    retained[AT + 1] = retained[AT - 1] = False
+    retained[AT + 1 : AT + 4] = retained[AT - 3 : AT] = False
     track.x[AT] += 0.05
     sparse = Track(*(axis[retained] for axis in track[:4]))
     assert not outliers_in(sparse).any()
