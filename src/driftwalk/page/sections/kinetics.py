@@ -6,15 +6,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from driftwalk.page.chart import chart, label, series
-from driftwalk.page.number_words import quantity
 from driftwalk.page.parts import (
     Maker,
     Section,
+    chart,
     figure,
+    label,
+    quantity,
     require,
     required,
     sections_of,
+    series,
     summary_section,
     table_section,
     value_of,
