@@ -8,10 +8,11 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.lattice.polyomino import shape_size
-from driftwalk.assembly.outcomes.class_names import all_single, class_shapes
+from driftwalk.assembly.outcomes.class_names import class_shapes
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.schema.check import kind_name
+from driftwalk.schema.shapes import all_single
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

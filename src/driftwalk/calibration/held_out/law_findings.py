@@ -1,4 +1,4 @@
-"""What a recording says of a law, whichever command asks: findings against it, and those left open.
+"""Findings of a recording on a law, the same for each command: against it, and those left open.
 
 One law has one verdict: `calibrate` and `compare-models` both ask here. A comparison adds what
 other models say, a calibration what the values of the parameters say.
@@ -70,7 +70,7 @@ class Misfit(NamedTuple):
 
 
 class Findings(NamedTuple):
-    """What a recording says of a law."""
+    """Findings of a recording on a law."""
 
     against: list[str]
     """Where it differs, the worst first."""

@@ -31,9 +31,12 @@ class OutlierPolicy(NamedTuple):
     opposite: float = 0.25
     """Least part of its own distance by which both neighbours lie off to the other side. A mistake
     alone has 0.5. Chosen by hand."""
-    longest_gap: float = 3.5
-    """Usual intervals between neighbours up to which they are neighbours. Chosen by hand: two
-    missing frames make it 3."""
+    longest_gap: float = 1.5
+    """Usual intervals between neighbours up to which they are neighbours. Chosen by hand: a missing
+    frame makes it 2."""
+    longest_far_gap: float = 3.5
+    """The same where a mistake is longer than usual steps. Chosen by hand: two missing frames make
+    it 3."""
     excursion: float = 3.0
     """Usual steps off the median of five samples beyond which one of two successive samples is
     a mistake: a body that turns back is one step off. Chosen by hand."""
@@ -48,10 +51,13 @@ class OutlierPolicy(NamedTuple):
 OUTLIER: Final = OutlierPolicy()
 
 
-def outliers_in(track: Track, *, least: float = 0.0) -> Bools:
+def outliers_in(
+    track: Track, *, least: float = 0.0, longest_gap: float = OUTLIER.longest_gap
+) -> Bools:
     """Return which samples of a track are mistakes of the tracker, shape (n,).
 
-    None is less than `least` [m] off the line between its neighbours.
+    None is less than `least` [m] off the line between its neighbours, which are at most so many
+    usual intervals away.
 
     Examples
     --------
@@ -65,7 +71,7 @@ def outliers_in(track: Track, *, least: float = 0.0) -> Bools:
     found = np.zeros(track.time.size, dtype=bool)
     if track.time.size < OUTLIER.fewest:
         return found
-    off = _off_the_line(track)
+    off = _off_the_line(track, longest_gap)
     known = np.isfinite(off[0])
     if known.sum() < OUTLIER.fewest:
         return found
@@ -86,7 +92,7 @@ def outliers_in(track: Track, *, least: float = 0.0) -> Bools:
     return found
 
 
-def _off_the_line(track: Track) -> Floats:
+def _off_the_line(track: Track, longest_gap: float) -> Floats:
     """Return how far each sample is from the line between its neighbours, shape (2, n) [m].
 
     NaN where a neighbour is missing.
@@ -97,13 +103,18 @@ def _off_the_line(track: Track) -> Floats:
     off = np.full((2, time.size), math.nan)
     for row, axis in zip(off, (track.x, track.y), strict=True):
         row[1:-1] = axis[1:-1] - (axis[:-2] + share * (axis[2:] - axis[:-2]))
-    longest = OUTLIER.longest_gap * float(np.median(interval))
+    longest = longest_gap * float(np.median(interval))
     off[:, 1:-1][:, np.maximum(interval[:-1], interval[1:]) > longest] = math.nan
     return off
 
 
 def mistakes_warning(mistakes: int, samples: int) -> str:
     """Return what to say of so many samples that were left out.
+
+    Parameters
+    ----------
+    mistakes, samples : int
+        Those that were left out, of how many.
 
     Examples
     --------
@@ -116,21 +127,38 @@ def mistakes_warning(mistakes: int, samples: int) -> str:
     )
 
 
-def without_outliers(track: Track, *, least: float = 0.0) -> Track:
+def without_outliers(track: Track) -> Track:
     """Return a track without the samples that are mistakes of the tracker: they become gaps.
 
-    None is less than `least` [m] off the line between its neighbours. Without one, the next may
-    show: so the rest is looked at again.
+    Parameters
+    ----------
+    track : Track
+        One body.
+
+    Examples
+    --------
+    >>> time = 0.1 * np.arange(1000.0)
+    >>> noise = np.random.default_rng(1).normal(0.0, 3e-4, (2, 1000))
+    >>> noise[0, 300] += 5e-3
+    >>> without_outliers(Track(time, 0.1 * time + noise[0], noise[1], 0 * time)).time.size
+    999
     """
-    while (wrong := outliers_in(track, least=least)).any():
-        track = Track(*(column[~wrong] for column in track))
-    return track
+    wrong = outliers_in(track)
+    if not wrong.any():
+        return track
+    return Track(*(column[~wrong] for column in track))
 
 
 def without_far_outliers(track: Track) -> Track:
     """Return a track without the mistakes that are longer than the body's usual steps.
 
-    Two successive ones have no such pattern, but lie far from the median of five samples.
+    One that is found lets the next one show. Successive ones mask each other's pattern: they are
+    far from the median of five samples.
+
+    Parameters
+    ----------
+    track : Track
+        One body.
 
     Examples
     --------
@@ -147,7 +175,9 @@ def without_far_outliers(track: Track) -> Track:
     interval = np.diff(track.time)
     speeds = np.hypot(np.diff(track.x), np.diff(track.y)) / interval
     usual = float(np.median(interval) * np.quantile(speeds, OUTLIER.usual_steps))
-    track = without_outliers(track, least=usual)
+    gap = OUTLIER.longest_far_gap
+    while (wrong := outliers_in(track, least=usual, longest_gap=gap)).any():
+        track = Track(*(column[~wrong] for column in track))
     off = [axis - median_filter(axis, 5, mode="nearest") for axis in (track.x, track.y)]
     near = np.hypot(*off) <= OUTLIER.excursion * usual
     return track if near.all() else Track(*(column[near] for column in track))
