@@ -292,3 +292,23 @@ def test_many_blocks_part_as_few_do(shape: str, monkeypatch: pytest.MonkeyPatch)
     real = few["event_shape"].values >= 0
     np.testing.assert_array_equal(real, many["event_shape"].values >= 0)
     np.testing.assert_array_equal(names[0][real], names[1][real])
+
+
+def test_a_pull_is_the_same_in_a_world_of_many_blocks() -> None:
+    # A dimer in the middle of drawn-out water: alone, and with 24 blocks far from it, which lie in
+    # the lanes of the same world.
+    water = model(
+        strain(0.3), times=[0.0], radius=1.5, nodes=np.arange(-31, 32) * 0.05
+    )  # fmt: skip
+    start = np.zeros((12, 26, 3))
+    start[:, :2] = row(2, 12)
+    other = np.arange(24)
+    start[:, 2:, 0] = 0.5 * np.where(other % 2, 1, -1)
+    start[:, 2:, 1] = 0.08 * (other // 2 - 5.5)
+    parted = []
+    for poses in (start[:, :2], start):
+        run = assemble(water, poses, keys(12), steps=300, bonds=(0.5, 1e-4, 0.0, 1.25), **NEVER)
+        own = (run["event_kind"] == 1) & (run["event_block"] < 2).all(axis=2)
+        parted.append(np.where(own, run["event_step"], -1).max(axis=1).tolist())
+    assert parted[0] == parted[1]
+    assert sum(step > 0 for step in parted[0]) > 5
