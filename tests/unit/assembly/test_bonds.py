@@ -44,6 +44,7 @@ def first_partings(run: dict[str, Any]) -> tuple[Floats, Any]:
     return (step - run["event_step"][:, 0]).astype(float), run["event_block"][at, first]
 
 
+@pytest.mark.slow
 def test_lifetimes_are_exponential() -> None:
     # False alarms: 1 in 1000 seeds. A lifetime ends with a step: half of one is taken off.
     rate, worlds = 2.0, 2000
@@ -57,6 +58,7 @@ def test_lifetimes_are_exponential() -> None:
     assert lifetime.mean() == pytest.approx(1 / rate, rel=0.08)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("load", ["paper", "linear drag"])
 def test_a_constant_pull_shortens_lifetimes_as_bell_says(load: str) -> None:
     # Water that is drawn out holds a dimer in the middle and pulls at its ends. The pull on one is
@@ -156,6 +158,7 @@ def four() -> xr.Dataset:
     )
 
 
+@pytest.mark.slow
 def test_a_run_with_more_events_than_there_was_room_is_simulated_again(
     four: xr.Dataset, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -212,6 +215,7 @@ def test_permanent_bonds_have_no_kinds_of_events() -> None:
         dw.steady_state(found)
 
 
+@pytest.mark.slow
 def test_discs_part_too() -> None:
     discs = dw.Study(block={"shape": "disc"}, assembly={"bond_rate_per_s": 0.2})
     found = dw.assemble(discs, dw.tank30_flow(), blocks=5, runs=30, duration=60.0)
@@ -274,6 +278,7 @@ def test_classify_reads_joinings_and_partings_of_a_simulated_recording() -> None
     assert np.isnan(one["parting_rate"].values[~came]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", ["square", "disc"])
 def test_many_blocks_part_as_few_do(shape: str, monkeypatch: pytest.MonkeyPatch) -> None:
     # Worlds of more than 64 blocks are replayed by other code: it gives the same for fewer.
