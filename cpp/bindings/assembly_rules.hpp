@@ -86,6 +86,7 @@ inline void set_bonds(driftwalk::AssemblyRules& rules, const BondNumbers& bonds)
 
 inline void require_blocks(std::size_t blocks) {
   if (blocks < 1 || blocks > driftwalk::most_blocks) {
-    throw std::invalid_argument("a world has 1 to " + std::to_string(driftwalk::most_blocks) + " blocks");
+    throw std::invalid_argument("a world has 1 to " + std::to_string(driftwalk::most_blocks) +
+                                " blocks");
   }
 }

@@ -146,8 +146,8 @@ bool is_clear_of_others(const AssemblyRules& rules, const Scene& scene, int asse
   double farthest = 0;
   for (int b = a.first; b >= 0; b = scene.block[b].next) {
     const SceneBlock& block = scene.block[b];
-    farthest = std::max(farthest,
-                        block.offset_x * block.offset_x + block.offset_y * block.offset_y);
+    farthest =
+        std::max(farthest, block.offset_x * block.offset_x + block.offset_y * block.offset_y);
   }
   const double reach = std::sqrt(farthest) + 1.5 * rules.side;
   const auto is_near = [&](Vec2 from_block) {

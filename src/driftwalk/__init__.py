@@ -107,6 +107,7 @@ _NAMES = {
         "compare",
         "compare_models",
         "fit",
+        "kinetics",
         "report",
         "simulate",
     ),

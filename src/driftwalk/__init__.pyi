@@ -97,6 +97,7 @@ from driftwalk.notebook import (
     compare as compare,
     compare_models as compare_models,
     fit as fit,
+    kinetics as kinetics,
     report as report,
     simulate as simulate,
 )

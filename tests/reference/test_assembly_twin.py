@@ -19,7 +19,7 @@ from twin_assembly import SIDE, Floats, study, swirl
 import driftwalk as dw
 from driftwalk import _core
 from driftwalk.assembly.pull.tables import block_pull
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.simulation.backend import Camera, native_model
 
 TOLERANCE = 1e-9

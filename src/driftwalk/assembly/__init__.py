@@ -1,5 +1,6 @@
 """Self-assembly of many blocks: outcomes, their uncertainty, and their dependence on the model."""
 
+from driftwalk.assembly.chains.estimate import check_kinetics, kinetics
 from driftwalk.assembly.lattice.events import ReplayedEvents, replay_events
 from driftwalk.assembly.lattice.polyomino import polyomino_cells, polyomino_name, polyominoes
 from driftwalk.assembly.live_world import LiveEvent, LiveTank
@@ -67,6 +68,7 @@ __all__ = [
     "attraction",
     "check_assembly",
     "check_indices",
+    "check_kinetics",
     "check_sensitivity",
     "class_at",
     "class_cells",
@@ -78,6 +80,7 @@ __all__ = [
     "draw_parameters",
     "has_uncertainty",
     "interaction_quantiles",
+    "kinetics",
     "l1_distance",
     "l1_in_floors",
     "l1_noise_floor",

@@ -7,8 +7,7 @@ checker knows (`FitSettings`); the tables from names to keys (`FIT_KEYS`) are ma
 from collections.abc import Mapping
 from typing import Annotated, Any, Final, TypedDict
 
-from driftwalk.core.errors import ConfigurationError
-from driftwalk.core.text.did_you_mean import did_you_mean
+from driftwalk.core.errors import ConfigurationError, did_you_mean
 from driftwalk.core.units import Uncertain, split_uncertain
 
 Number = float | str

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Self
 
@@ -119,6 +120,7 @@ class AssemblyWork:
             "flow_sha256": dataset_hash(self.flow, tuple(n for n in names if n in self.flow)),
             "calibration_sha256": dataset_hash(found, drawn_from),
             **({"quantiles": drawn} if (drawn := _lists(self.quantiles)) else {}),
+            **_table_hash(self.study),
         }
 
     def compute(self, run: Run) -> AssemblyResult:
@@ -214,6 +216,14 @@ class AssemblyWork:
         }
 
 
+def _table_hash(study: Study) -> dict[str, str]:
+    """Return the hash of a table of attractions: a run goes on only with the same one."""
+    table = study.interaction.attraction
+    if table is None:
+        return {}
+    return {"attraction_sha256": sha256(Path(table).read_bytes()).hexdigest()}
+
+
 def _lists(quantiles: Mapping[str, Floats]) -> dict[str, list[float]]:
     return {key: values.tolist() for key, values in quantiles.items()}
 
@@ -304,6 +314,7 @@ class SensitivityWork:
             "flow_sha256": dataset_hash(self.flow, ("u", "v")),
             "flows_sha256": flows,
             "sobol_samples": self.samples,
+            **_table_hash(self.study),
         }
 
     def compute(self, run: Run) -> SensitivityResult:

@@ -369,8 +369,9 @@ def drag_sums(
     if rules.pull is not None:
         sizes = [body.size for body in world.assemblies]
         owner = np.repeat(np.arange(len(sizes)), sizes)
-        pulled = pull_of_blocks(rules.pull, members[:3], members[3:], hidden, owner)
-        force_x, force_y, torque = force_x + pulled[0], force_y + pulled[1], torque + pulled[2]
+        force_x, force_y, torque = np.stack([force_x, force_y, torque]) + pull_of_blocks(
+            rules.pull, *_drifted(world), hidden, owner
+        )
     sums, first = [], 0
     for body, arm in zip(world.assemblies, arms, strict=True):
         own = slice(first, first + body.size)
@@ -382,6 +383,18 @@ def drag_sums(
         acceleration = np.array([*force.sum(axis=0), turning]) * body.inverse_mass
         sums.append((acceleration, damping * body.inverse_mass))
     return sums
+
+
+def _drifted(world: World) -> tuple[Floats, Floats]:
+    """Return pose and velocity of every block, half a step ahead without forces, shape (3, n)."""
+    poses, motions = [], []
+    for body in world.assemblies:
+        x, y, angle = body.pose + world.rules.model.time_step / 2 * body.motion
+        arm, (vx, vy, spin) = body.arms(angle), body.motion
+        one = np.ones(body.size)
+        poses.append([x + arm[:, 0], y + arm[:, 1], angle * one])
+        motions.append([vx - spin * arm[:, 1], vy + spin * arm[:, 0], spin * one])
+    return np.concatenate(poses, axis=1), np.concatenate(motions, axis=1)
 
 
 def settle(world: World) -> None:

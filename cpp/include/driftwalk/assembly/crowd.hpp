@@ -18,10 +18,10 @@ struct Crowd {
   Real *x, *y;               // [row] where the blocks are [m]
   Real *listed_x, *listed_y; // and were when the list of near pairs was made
   std::int32_t bodies;
-  std::int32_t* end;    // [body] its last member in `order`, and one on
-  std::int32_t* order;  // members, body by body
-  std::int32_t* body;   // [lowest block] its body, -1 of a block alone
-  std::uint8_t* meets;  // [body] whether a member is at the wall
+  std::int32_t* end;   // [body] its last member in `order`, and one on
+  std::int32_t* order; // members, body by body
+  std::int32_t* body;  // [lowest block] its body, -1 of a block alone
+  std::uint8_t* meets; // [body] whether a member is at the wall
 
   template <class Take>
   void place(const Take& take, std::size_t rows) {
@@ -67,7 +67,7 @@ struct Crowd {
 template <int Count, class Real>
 inline void sum_crowd(const Crowd<Real>& crowd, Sums<Real>* sums, int rows) {
   using T = typename Numbers<Real>::Scalar;
-  constexpr int lanes = Numbers<Real>::lanes;
+  constexpr unsigned lanes = Numbers<Real>::lanes;
   for (int row = 0; row < rows; ++row) {
     for (int k = 0; k < Count; ++k) {
       sums[row].total[k] = Real(T(0)) + sums[row].part[k];
@@ -77,15 +77,18 @@ inline void sum_crowd(const Crowd<Real>& crowd, Sums<Real>* sums, int rows) {
     const int first = crowd.first(body), end = crowd.end[body];
     T total[Count] = {};
     for (int i = first; i < end; ++i) {
-      const Sums<Real>& at = sums[crowd.order[i] / lanes];
+      // Unsigned, so that to divide is to shift.
+      const unsigned block = static_cast<unsigned>(crowd.order[i]);
+      const Sums<Real>& at = sums[block / lanes];
       for (int k = 0; k < Count; ++k) {
-        total[k] = total[k] + get(at.part[k], crowd.order[i] % lanes);
+        total[k] = total[k] + get(at.part[k], static_cast<int>(block % lanes));
       }
     }
     for (int i = first; i < end; ++i) {
-      Sums<Real>& at = sums[crowd.order[i] / lanes];
+      const unsigned block = static_cast<unsigned>(crowd.order[i]);
+      Sums<Real>& at = sums[block / lanes];
       for (int k = 0; k < Count; ++k) {
-        put(at.total[k], crowd.order[i] % lanes, total[k]);
+        put(at.total[k], static_cast<int>(block % lanes), total[k]);
       }
     }
   }
@@ -171,8 +174,8 @@ private:
     Motion<T> motion = one_lane(own.motion, lane);
     for (int i = crowd_.first(body); i < crowd_.end[body]; ++i) {
       const Arm<T> arm = one_lane(member(i).arm, lane_of_member(i));
-      meet_wall(wall_, h_, T(get(own.per_inertia, lane)), arm, [&](T) { return axes; }, pose,
-                motion);
+      meet_wall(
+          wall_, h_, T(get(own.per_inertia, lane)), arm, [&](T) { return axes; }, pose, motion);
     }
     for (int i = crowd_.first(body); i < crowd_.end[body]; ++i) {
       Member<Real>& m = member(i);

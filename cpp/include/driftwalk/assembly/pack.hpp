@@ -24,9 +24,9 @@ public:
   // memory holds worlds of up to `capacity` blocks. Events go to `out`.
   WorldPack(const Prepared<T>& run, const AssemblyRules& rules, const double* start,
             const AssemblyOutputs& out, AssemblyScratch& scratch, int capacity)
-      : run_(run), rules_(rules), out_(out), scratch_(scratch), memory_(scratch.lanes, capacity),
-        near_(rules), blocks_(rules.blocks), rows_(memory_.rows(rules.blocks)),
-        listed_(rules.blocks > most_blocks_all_pairs),
+      : run_(run), rules_(rules), out_(out), scratch_(scratch),
+        memory_(scratch.lanes, capacity, Crowded), near_(rules), blocks_(rules.blocks),
+        rows_(memory_.rows(rules.blocks)), listed_(Crowded && rules.blocks > most_blocks_all_pairs),
         physics_{Law::of(Real(T(0)), run.drag),
                  run.block,
                  run.shape,
@@ -61,10 +61,10 @@ public:
   // Steps that one block of random numbers serves: two force intervals.
   std::int64_t period() const { return 2 * std::int64_t(run_.steps_per_interval); }
 
-  // Puts a world into a lane, or one of many blocks into all, before the pack's step `step`, a whole
-  // number of periods.
-  void begin(int own, std::int64_t world, std::int64_t step, const double* start,
-             std::uint64_t key, double flow_start) {
+  // Puts a world into a lane, or one of many blocks into all, before the pack's step `step`, a
+  // whole number of periods.
+  void begin(int own, std::int64_t world, std::int64_t step, const double* start, std::uint64_t key,
+             double flow_start) {
     LaneBook& book = books_[own];
     book.world = world;
     book.first_step = step;
@@ -110,7 +110,7 @@ public:
     physics_.pulled = rules_.pull.on;
     blocks_ = rules_.blocks;
     rows_ = memory_.rows(blocks_);
-    listed_ = blocks_ > most_blocks_all_pairs;
+    listed_ = Crowded && blocks_ > most_blocks_all_pairs;
     list_crowd();
   }
 
@@ -265,7 +265,7 @@ private:
     }
     const Bool unsettled = lanes_to_settle(near_, memory_.members, blocks_);
     if (any(unsettled)) {
-      for (int lane = 0; lane < lanes; ++lane) {
+      for (int lane = 0; lane < worlds; ++lane) {
         if (books_[lane].running && lane_of(unsettled, lane)) {
           complete = settle_lane(step, lane) || complete;
         }
@@ -386,7 +386,7 @@ private:
   Philox<UInt> stream_;
   UInt draw_;
   UInt first_numbers_; // of a world's blocks, those of the first row
-  Real kept_, fresh_; // parts of the last force and of the new numbers in the next force
+  Real kept_, fresh_;  // parts of the last force and of the new numbers in the next force
   LaneBook books_[worlds];
   FlowClocks<T> clocks_;
 };

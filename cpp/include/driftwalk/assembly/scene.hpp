@@ -55,6 +55,12 @@ struct PairList {
   void* owner;
 };
 
+// What the pair search reads of a block.
+struct PlacedBlock {
+  double x, y;
+  std::int32_t assembly, block;
+};
+
 struct Scene {
   int blocks;
   int assemblies;
@@ -66,6 +72,7 @@ struct Scene {
   // scratch of the pair search and of lattices: first block of every cell, next in the same cell
   std::int32_t* cell_head;
   std::int32_t* cell_next;
+  PlacedBlock* by_cell; // scratch: the blocks, cell by cell
   // where bonds break
   BondList bonds;
   std::uint64_t key; // of the world's random numbers
@@ -109,9 +116,9 @@ void bond_all(const AssemblyRules& rules, Scene& scene);
 // an entry per block and 0 for all others. Returns whether it is a bridge.
 bool find_side(const BondList& bonds, int blocks, const Bond& bond, std::int32_t* side);
 
-// Fills the list with the pairs of different assemblies whose centres are closer than a diagonal (or
-// the connectors' reach) and a skin, ordered by first and second block. It has to be made anew where
-// an assembly has come apart.
+// Fills the list with the pairs of different assemblies whose centres are closer than a diagonal
+// (or the connectors' reach) and a skin, ordered by first and second block. It has to be made anew
+// where an assembly has come apart. The list of close pairs is then void.
 void find_pairs(const AssemblyRules& rules, Scene& scene);
 // Fills the list of close pairs from that of near ones, in their order.
 void find_close_pairs(const AssemblyRules& rules, Scene& scene);

@@ -22,7 +22,6 @@ from driftwalk.assembly.lattice.bonds import (
 from driftwalk.assembly.lattice.many_blocks import DiscWorld, SquareWorld, replay_many
 from driftwalk.assembly.lattice.polyomino import STEPS, Chirality, name_of, require_chirality
 from driftwalk.assembly.outcomes.class_names import (
-    all_single,
     class_name,
     listed_classes,
     listed_shapes,
@@ -30,7 +29,7 @@ from driftwalk.assembly.outcomes.class_names import (
 from driftwalk.assembly.outcomes.disc_contacts import CONTACT_POLICY, disc_shape, touching
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
-from driftwalk.schema.shapes import MOST_NAMED, moved_to_origin
+from driftwalk.schema.shapes import MOST_NAMED, all_single, moved_to_origin
 
 
 class ReplayedEvents(NamedTuple):

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from driftwalk.assembly.lattice.bonds import JOINING, PARTING
-from driftwalk.assembly.outcomes.class_names import all_single
 from driftwalk.assembly.outcomes.distribution import (
     NOT_COPIED,
     check_confidence,
@@ -25,6 +24,7 @@ from driftwalk.assembly.outcomes.event_rates import rate_variables
 from driftwalk.assembly.outcomes.survival import survival_curve
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.schema.check import build_dataset
+from driftwalk.schema.shapes import all_single
 
 if TYPE_CHECKING:
     import xarray as xr

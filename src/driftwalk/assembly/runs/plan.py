@@ -18,8 +18,7 @@ from driftwalk.core.arrays import Floats, Integers, Keys
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
 from driftwalk.core.processors import default_threads
-from driftwalk.core.random_streams import trial_in
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import trial_in, world_keys
 from driftwalk.simulation.backend import Camera, native_model, require_steps
 from driftwalk.simulation.series import continued_flow, flow_starts
 

@@ -6,15 +6,20 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from driftwalk.page.chart import chart, label, mark, series
-from driftwalk.page.number_words import count, percent, quantity
 from driftwalk.page.parts import (
     Section,
     attempt,
+    chart,
+    count,
     figure_with_ends,
+    label,
+    mark,
+    percent,
+    quantity,
     require,
     required,
     sections_of,
+    series,
     summary_section,
     value_of,
 )

@@ -6,13 +6,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from driftwalk.assembly.outcomes.class_names import all_single
 from driftwalk.core.errors import InputError
 from driftwalk.page.arrays import binary_step, encode_array
-from driftwalk.page.number_words import count, quantity
-from driftwalk.page.parts import Section, arena_part, require, required, section
+from driftwalk.page.parts import Section, arena_part, count, quantity, require, required, section
 from driftwalk.page.sections.outcomes import cells_of
 from driftwalk.plot.parts.polyomino_sketch import are_discs
+from driftwalk.schema.shapes import all_single
 
 if TYPE_CHECKING:
     import xarray as xr

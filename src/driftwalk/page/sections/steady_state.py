@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from driftwalk.page.chart import chart, label, mark, series
-from driftwalk.page.parts import Section, require, table_section
+from driftwalk.page.parts import Section, chart, label, mark, require, series, table_section
 from driftwalk.schema.answers.parts import Table
 from driftwalk.schema.answers.steady_state import steady_parts, steady_words
 from driftwalk.schema.shapes import short_class

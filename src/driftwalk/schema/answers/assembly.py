@@ -18,12 +18,12 @@ MOST_ROWS: Final = 16
 SHOWN_TIMES: Final = 4
 """Times in the table of sizes, equally far apart, the last one the end of the runs."""
 _OVER_TIME: Final = {
-    "mean_size": "mean_size_blocks",
-    "largest_share": "largest_share",
-    "free_share": "free_share",
-    "compactness": "compactness",
+    "mean_size": ("mean_size_blocks", "mean size"),
+    "largest_share": ("largest_share", "in largest"),
+    "free_share": ("free_share", "free"),
+    "compactness": ("compactness", "compact"),
 }
-"""Variables over time, and their keys in JSON."""
+"""Variables over time, their keys in JSON and their headings. Older files have no compactness."""
 _SETTINGS: Final = (
     *("confidence", "blocks", "duration_s", "seed", "latching", "hidden_face_drag", "chirality"),
     *("drag_coefficient", "force_std_N", "force_interval_s"),
@@ -201,7 +201,8 @@ def _between(low: Any, high: Any) -> str:
 def _sizes_json(sizes: xr.Dataset) -> dict[str, Any]:
     """Return the sizes for programs; all are means over runs."""
     facts = sizes.attrs
-    over_time = [_with_interval(sizes, name, key) for name, key in _OVER_TIME.items()]
+    known = {name: key for name, (key, _) in _OVER_TIME.items() if name in sizes}
+    over_time = [_with_interval(sizes, name, key) for name, key in known.items()]
     return {
         "at_end": [
             {
@@ -234,14 +235,13 @@ def _sizes(distribution: xr.Dataset, sizes: xr.Dataset, what: str) -> list[Part]
             rows.append([name, *_size_cells(row, "number"), *_size_cells(row, "block_share")])
     heads = ["blocks in it", "assemblies per run", interval, "share of blocks", interval]
     times = sizes.sizes["time"] - 1
+    known = {name: words for name, (_, words) in _OVER_TIME.items() if name in sizes}
     chosen = [sizes.isel(time=round(times * (n + 1) / SHOWN_TIMES)) for n in range(SHOWN_TIMES)]
     course = [
-        [f"{float(one['time']):.4g}", *(c for name in _OVER_TIME for c in _size_cells(one, name))]
+        [f"{float(one['time']):.4g}", *(c for name in known for c in _size_cells(one, name))]
         for one in chosen
     ]
-    over_time = [
-        head for name in ("mean size", "in largest", "free", "compact") for head in (name, interval)
-    ]
+    over_time = [head for words in known.values() for head in (words, interval)]
     parts: list[Part] = [Table(rows, heads, what), Table(course, ["time [s]", *over_time])]
     if facts["compactness_runs"]:
         ends = _range(facts["compactness_low"], facts["compactness_high"])
@@ -262,7 +262,7 @@ def _with_interval(found: xr.Dataset, name: str, key: str) -> dict[str, Any]:
 
 def _size_cells(found: xr.Dataset, name: str) -> tuple[str, str]:
     value, low, high = (float(found[f"{name}{end}"]) for end in ("", "_low", "_high"))
-    return f"{value:.3g}", _range(low, high)
+    return f"{value:.3g}" if value == value else "", _range(low, high)
 
 
 def _range(low: float, high: float) -> str:

@@ -10,6 +10,7 @@ from driftwalk.schema.kinds import (
     calibration,
     fit,
     flow,
+    kinetics,
     model_check,
     models,
     motion,
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
 _FILES: Final = (
     motion, flow, calibration, models, fit, recovery, model_check, assembly, steady_state,
-    sensitivity,
+    sensitivity, kinetics,
 )  # fmt: skip
 
 KINDS: Final[dict[str, Kind]] = {kind.name: kind for file in _FILES for kind in file.KINDS}

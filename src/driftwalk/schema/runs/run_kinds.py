@@ -174,6 +174,18 @@ BUILT_IN: Final = (
         answer=f"{_ANSWERS}.sensitivity:sensitivity_answer",
     ),
     RunKind(
+        name="kinetics",
+        title="Kinetics of self-assembly",
+        under_way="Kinetics under way",
+        words="kinetics",
+        command="kinetics",
+        file="kinetics.nc",
+        figures="driftwalk.figures.assembly:kinetics_figures",
+        page=f"{_SECTIONS}.kinetics:kinetics_sections",
+        answer=f"{_ANSWERS}.kinetics:kinetics_answer",
+        places={"figures": "figures"},
+    ),
+    RunKind(
         name="recovery",
         title="Recovery study",
         under_way="A recovery study under way",
