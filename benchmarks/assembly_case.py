@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 import driftwalk as dw
 from driftwalk import _core
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.schema import build_flow_field
 from driftwalk.simulation.backend import Camera, native_model
 

@@ -30,7 +30,7 @@ from driftwalk.calibration.problem import prepare_problem
 from driftwalk.cli.demo import demo_study
 from driftwalk.conditions import recorded_camera
 from driftwalk.core.processors import default_threads
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.datasets import tank30_flow, tank30_recording, tank30_truth
 from driftwalk.figures import calibration_figures, write_figures
 from driftwalk.motion import BlockModel

@@ -25,7 +25,7 @@ from timing import Times, interleaved, machine, spread
 import driftwalk as dw
 from driftwalk import _core
 from driftwalk.conditions import Conditions, Neighbours
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.schema import Track
 from driftwalk.simulation.backend import Camera
 from driftwalk.simulation.initial import Start

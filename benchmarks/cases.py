@@ -20,7 +20,7 @@ sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "reference")
 from twin.block import TwinModel
 
 from driftwalk import _core
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.model import Study
 from driftwalk.schema import build_flow_field
 from driftwalk.simulation.backend import Camera, native_model, world_table

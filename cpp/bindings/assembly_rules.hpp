@@ -8,6 +8,7 @@
 #include <cmath>
 #include <stdexcept>
 #include <string>
+#include <tuple>
 
 // What the rules take from the model.
 inline driftwalk::AssemblyRules rules_of(const Model& model, std::size_t blocks) {
@@ -84,6 +85,25 @@ inline void set_glued(driftwalk::AssemblyRules& rules, const Cells& cells) {
 inline void set_faces(driftwalk::AssemblyRules& rules, const driftwalk::FaceRules* faces) {
   rules.faces = faces;
   rules.pull.like_poles_repel = rules.pull.like_poles_repel || faces != nullptr;
+}
+
+// When bonds break, and when what has parted latches again: (rate [1/s], force [N], strength [N],
+// clearance [side]).
+using BondNumbers = std::tuple<double, double, double, double>;
+
+inline void set_bonds(driftwalk::AssemblyRules& rules, const BondNumbers& bonds) {
+  const auto [rate, force, strength, clearance] = bonds;
+  if (!(rate >= 0 && force >= 0 && strength >= 0 && rate + force + strength < 1e12)) {
+    throw std::invalid_argument("rate, force and strength of bonds must be finite, not negative");
+  }
+  if (!(clearance >= 1 && clearance <= 2)) {
+    throw std::invalid_argument("relatch_clearance must be from 1 to 2 sides");
+  }
+  rules.bond_rate = rate;
+  rules.bond_force = force;
+  rules.bond_strength = strength;
+  rules.relatch_clearance = clearance;
+  rules.bonds_break = rate > 0 || strength > 0;
 }
 
 inline void require_blocks(std::size_t blocks) {

@@ -42,7 +42,8 @@ nb::dict assemble(const Model& model, In<double, 3> start, In<std::uint64_t, 1> 
                   double hidden_share, double stirring_length, bool incompressible,
                   double block_restitution, double block_friction, int sample_every, int threads,
                   const std::string& precision, const driftwalk::FaceRules* faces,
-                  std::optional<In<double, 1>> flow_start, Cells glued, const Pull* pull) {
+                  std::optional<In<double, 1>> flow_start, Cells glued, const Pull* pull,
+                  const BondNumbers& bonds, std::size_t event_rows) {
   const std::size_t worlds = start.shape(0), blocks = start.shape(1);
   require_blocks(blocks);
   if (start.shape(2) != 3 || key.size() != worlds || drag_coefficient.size() != worlds ||
@@ -58,6 +59,7 @@ nb::dict assemble(const Model& model, In<double, 3> start, In<std::uint64_t, 1> 
   rules.connector_distance = connector_distance;
   rules.connector_cosine = std::cos(connector_axis);
   set_shared(rules, hidden_share, stirring_length, incompressible);
+  set_bonds(rules, bonds);
   rules.restitution = block_restitution;
   rules.friction = block_friction;
   set_glued(rules, glued);
@@ -72,20 +74,23 @@ nb::dict assemble(const Model& model, In<double, 3> start, In<std::uint64_t, 1> 
                                         force_std.data(),
                                         key.data(),
                                         starts_of(flow_start, worlds)};
-  const std::size_t events = blocks > 1 ? blocks - 1 : 1;
+  const std::size_t least = blocks > 1 ? blocks - 1 : 1;
+  const std::size_t events = rules.bonds_break && event_rows > least ? event_rows : least;
   const std::size_t samples =
       sample_every > 0 ? static_cast<std::size_t>(steps / sample_every + 1) : 0;
   std::vector<std::uint32_t> status(worlds);
   std::vector<std::int32_t> event_count(worlds), event_step(worlds * events, -1),
       event_block(worlds * events * 2, -1), event_face(worlds * events * 2, -1),
-      first_contact(worlds), end_step(worlds), cell(worlds * blocks * 2), quarter(worlds * blocks),
-      root(worlds * blocks), sample_assembly(worlds * samples * blocks);
+      event_kind(rules.bonds_break ? worlds * events : 0, -1), first_contact(worlds),
+      end_step(worlds), cell(worlds * blocks * 2), quarter(worlds * blocks), root(worlds * blocks),
+      sample_assembly(worlds * samples * blocks);
   std::vector<double> pose(worlds * blocks * 3);
   std::vector<float> sample_pose(worlds * samples * blocks * 3);
   driftwalk::AssemblyOutputs out;
   out.status = status.data();
   out.event_count = event_count.data();
   out.event_step = event_step.data();
+  out.event_kind = rules.bonds_break ? event_kind.data() : nullptr;
   out.event_block = event_block.data();
   out.event_face = event_face.data();
   out.first_contact_step = first_contact.data();
@@ -110,6 +115,9 @@ nb::dict assemble(const Model& model, In<double, 3> start, In<std::uint64_t, 1> 
   result["status"] = hand_out(std::move(status), {worlds});
   result["event_count"] = hand_out(std::move(event_count), {worlds});
   result["event_step"] = hand_out(std::move(event_step), {worlds, events});
+  if (rules.bonds_break) {
+    result["event_kind"] = hand_out(std::move(event_kind), {worlds, events});
+  }
   result["event_block"] = hand_out(std::move(event_block), {worlds, events, 2});
   result["event_face"] = hand_out(std::move(event_face), {worlds, events, 2});
   result["first_contact_step"] = hand_out(std::move(first_contact), {worlds});
@@ -138,5 +146,6 @@ void register_assemble(nb::module_& module) {
              "connector_axis"_a, "hidden_share"_a, "stirring_length"_a, "incompressible"_a,
              "block_restitution"_a, "block_friction"_a, "sample_every"_a, "threads"_a,
              "precision"_a, "faces"_a.none() = nb::none(), "flow_start"_a = nb::none(),
-             "glued"_a = nb::none(), "pull"_a = nb::none());
+             "glued"_a = nb::none(), "pull"_a = nb::none(), "bonds"_a = BondNumbers{0, 0, 0, 1.25},
+             "event_rows"_a = 0);
 }

@@ -5,6 +5,7 @@
 #include "driftwalk/assembly/live.hpp"
 
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 
 #include <cmath>
 #include <cstdint>
@@ -23,7 +24,8 @@ void start_world(LiveWorld* self, const Model& model, In<double, 2> start, std::
                  double drag_coefficient, double force_std, const std::string& latching,
                  double connector_distance, double connector_axis, double hidden_share,
                  double stirring_length, bool incompressible, double block_restitution,
-                 double block_friction, const driftwalk::FaceRules* faces, double flow_start) {
+                 double block_friction, const driftwalk::FaceRules* faces, double flow_start,
+                 const BondNumbers& bonds) {
   require_blocks(start.shape(0));
   if (start.shape(1) != 3) {
     throw std::invalid_argument("start must have shape (blocks, 3)");
@@ -33,6 +35,7 @@ void start_world(LiveWorld* self, const Model& model, In<double, 2> start, std::
   rules.connector_distance = connector_distance;
   rules.connector_cosine = std::cos(connector_axis);
   set_shared(rules, hidden_share, stirring_length, incompressible);
+  set_bonds(rules, bonds);
   rules.restitution = block_restitution;
   rules.friction = block_friction;
   rules.faces = faces;
@@ -55,6 +58,8 @@ nb::dict advance(LiveWorld& world, std::int64_t steps) {
   };
   nb::dict out;
   out["step"] = hand_out(rows(events.step, 1), {count});
+  out["kind"] = hand_out(
+      events.kind == nullptr ? std::vector<std::int32_t>(count) : rows(events.kind, 1), {count});
   out["block"] = hand_out(rows(events.block, 2), {count, 2});
   out["face"] = hand_out(rows(events.face, 2), {count, 2});
   return out;
@@ -73,6 +78,15 @@ nb::dict state(const LiveWorld& world) {
   out["cell"] = hand_out(std::move(cell), {blocks, 2});
   out["quarter"] = hand_out(std::move(quarter), {blocks});
   out["kind"] = hand_out(std::move(kind), {blocks});
+  std::vector<std::int32_t> pairs;
+  const driftwalk::BondList& bonds = world.bonds();
+  for (int k = 0; k < bonds.count; ++k) {
+    if (bonds.bond[k].state == driftwalk::BondState::whole) {
+      pairs.insert(pairs.end(), {bonds.bond[k].first, bonds.bond[k].second});
+    }
+  }
+  const std::size_t count = pairs.size() / 2;
+  out["bond"] = hand_out(std::move(pairs), {count, 2});
   return out;
 }
 
@@ -91,7 +105,8 @@ void register_live(nb::module_& module) {
            nb::kw_only(), "start"_a, "key"_a, "drag_coefficient"_a, "force_std"_a, "latching"_a,
            "connector_distance"_a, "connector_axis"_a, "hidden_share"_a, "stirring_length"_a,
            "incompressible"_a, "block_restitution"_a, "block_friction"_a,
-           "faces"_a.none() = nb::none(), "flow_start"_a = 0.0)
+           "faces"_a.none() = nb::none(), "flow_start"_a = 0.0,
+           "bonds"_a = BondNumbers{0, 0, 0, 1.25})
       .def("advance", &advance, "steps"_a)
       .def("state", &state)
       .def(
@@ -110,6 +125,14 @@ void register_live(nb::module_& module) {
           },
           nb::kw_only(), "latching"_a, "hidden_share"_a, "stirring_length"_a)
       .def("set_faces", &LiveWorld::set_faces, nb::keep_alive<1, 2>(), "faces"_a.none())
+      .def(
+          "set_bonds",
+          [](LiveWorld& world, double rate, double relatch_clearance) {
+            driftwalk::AssemblyRules checked;
+            set_bonds(checked, {rate, 0, 0, relatch_clearance});
+            world.set_bonds(rate, relatch_clearance);
+          },
+          nb::kw_only(), "rate"_a, "relatch_clearance"_a)
       .def(
           "set_pull",
           [](LiveWorld& world, const Pull* pull) {

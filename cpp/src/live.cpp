@@ -34,8 +34,9 @@ void put_drag_coefficient(EitherDrag& law, int, double value) {
 
 using OneWorld = WorldPack<double, double, EitherDrag>;
 
-// Between two calls of `advance` no blocks part, so there are no more joinings in one.
-constexpr int most_events = most_blocks - 1;
+// Of one call of `advance`: where the next step might have more, it stops. A block has four bonds.
+constexpr int most_step_events = 8 * most_blocks;
+constexpr int most_events = 2 * most_step_events;
 } // namespace
 
 struct LiveWorld::Inside {
@@ -51,6 +52,7 @@ struct LiveWorld::Inside {
     AssemblyOutputs found;
     found.event_rows = most_events;
     found.event_step = event_step.data();
+    found.event_kind = event_kind.data();
     found.event_block = event_block.data();
     found.event_face = event_face.data();
     return found;
@@ -72,6 +74,9 @@ struct LiveWorld::Inside {
     }
     pack.book(0).assemblies = scene.assemblies;
     pack.renew();
+    if (rules.bonds_break) {
+      pack.bond_anew(step, 0);
+    }
   }
 
   void add_blocks(int wanted) {
@@ -101,7 +106,7 @@ struct LiveWorld::Inside {
   const Prepared<double>& run;
   AssemblyRules rules;
   std::uint64_t key;
-  std::array<std::int32_t, most_events> event_step;
+  std::array<std::int32_t, most_events> event_step, event_kind;
   std::array<std::int32_t, 2 * most_events> event_block, event_face;
   AssemblyMemory memory;
   AssemblyOutputs out;
@@ -120,7 +125,9 @@ LiveWorld::~LiveWorld() = default;
 
 void LiveWorld::advance(std::int64_t steps) {
   inside_->pack.book(0).event_count = 0;
-  for (const std::int64_t end = inside_->step + steps; inside_->step < end; ++inside_->step) {
+  const int most = most_events - most_step_events;
+  for (const std::int64_t end = inside_->step + steps;
+       inside_->step < end && inside_->pack.book(0).event_count <= most; ++inside_->step) {
     inside_->pack.step(inside_->step);
   }
 }
@@ -147,6 +154,19 @@ void LiveWorld::set_faces(const FaceRules* faces) {
   for (int b = 0; b < inside_->rules.blocks; ++b) {
     inside_->pack.memory().book(b, 0).kind = first_kind(faces, b);
     set_poles(inside_->rules, inside_->pack.memory(), b, 0);
+  }
+}
+
+void LiveWorld::set_bonds(double rate, double relatch_clearance) {
+  AssemblyRules& rules = inside_->rules;
+  const bool began = !rules.bonds_break && rate > 0;
+  rules.bond_rate = rate;
+  rules.relatch_clearance = relatch_clearance;
+  rules.bonds_break = rate > 0 || rules.bond_strength > 0;
+  if (began) {
+    inside_->pack.bond_anew(inside_->step, 0);
+  } else if (!rules.bonds_break) {
+    inside_->pack.book(0).bonds.count = 0;
   }
 }
 
@@ -191,6 +211,7 @@ std::uint32_t LiveWorld::status() const {
 
 LiveEvents LiveWorld::events() const {
   return {inside_->pack.book(0).event_count, inside_->event_step.data(),
+          inside_->rules.bonds_break ? inside_->event_kind.data() : nullptr,
           inside_->event_block.data(), inside_->event_face.data()};
 }
 
@@ -209,6 +230,10 @@ void LiveWorld::read(const LiveBlocks& out) const {
     out.quarter[b] = book.quarter;
     out.kind[b] = book.kind;
   }
+}
+
+const BondList& LiveWorld::bonds() const {
+  return inside_->pack.book(0).bonds;
 }
 
 } // namespace driftwalk

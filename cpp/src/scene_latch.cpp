@@ -187,19 +187,6 @@ void conserve_momentum(const SceneAssembly& a, const SceneAssembly& b, double ma
   joint.omega = spin / joint.inertia;
 }
 
-// One line of the world's list of events; faces in the blocks' own frames.
-void record(Scene& scene, const Merge& merge, const int (&own_faces)[2]) {
-  if (scene.event_count >= scene.event_rows) {
-    return;
-  }
-  const int e = scene.event_count++;
-  scene.event_step[e] = scene.step;
-  scene.event_block[2 * e] = merge.anchor;
-  scene.event_block[2 * e + 1] = merge.guest;
-  scene.event_face[2 * e] = own_faces[0];
-  scene.event_face[2 * e + 1] = own_faces[1];
-}
-
 void align(Scene& scene, const Merge& merge, int joint) {
   for (int b = scene.assembly[merge.moves].first; b >= 0; b = scene.block[b].next) {
     merge.onto.apply(scene.block[b]);
@@ -293,7 +280,10 @@ bool try_merge(const AssemblyRules& rules, Scene& scene, const Merge& merge) {
   body.before = {body.x, body.y, body.theta, body.cosine, body.sine};
   body.touched = true;
   --scene.assemblies;
-  record(scene, merge, own_faces);
+  record_event(scene, EventKind::joining, {merge.anchor, merge.guest}, own_faces);
+  if (rules.bonds_break) {
+    bond_assembly(rules, scene, joint, {merge.anchor, merge.guest});
+  }
   if (rules.faces != nullptr) {
     become(*rules.faces, scene.block[merge.anchor], own_faces[0], scene.block[merge.guest],
            own_faces[1]);
@@ -303,7 +293,8 @@ bool try_merge(const AssemblyRules& rules, Scene& scene, const Merge& merge) {
 
 // Whether any faces of two blocks can latch at all.
 bool may_latch(const AssemblyRules& rules, const Scene& scene, BlockPair pair) {
-  if (scene.block[pair.first].assembly == scene.block[pair.second].assembly) {
+  const int own = scene.block[pair.first].assembly, other = scene.block[pair.second].assembly;
+  if (own == other || are_unclear(scene, own, other)) {
     return false;
   }
   if (rules.latching == Latching::collision) {

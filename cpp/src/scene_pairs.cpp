@@ -24,11 +24,15 @@ bool are_near(const Scene& scene, int a, int b, double reach) {
   return dot(between, between) < reach * reach;
 }
 
-void add_pair(PairList& pairs, int a, int b) {
-  if (pairs.count == pairs.room) {
-    pairs.room *= 2;
+void make_room(PairList& pairs, int count) {
+  if (count > pairs.room) {
+    pairs.room = 2 * count;
     pairs.pair = pairs.grow(pairs.owner, pairs.room);
   }
+}
+
+void add_pair(PairList& pairs, int a, int b) {
+  make_room(pairs, pairs.count + 1);
   pairs.pair[pairs.count++] = {std::min(a, b), std::max(a, b)};
 }
 
@@ -65,43 +69,77 @@ struct Cells {
   int of(const SceneBlock& block) const { return row(block.y) * columns + column(block.x); }
 };
 
-// The blocks sorted by cell, and in a cell by index.
+// The blocks, cell by cell: those of cell c from cell_head[c] on, up to cell_head[c + 1].
 void sort_into_cells(const Cells& cells, Scene& scene) {
   const int count = cells.columns * cells.rows;
-  std::fill_n(scene.cell_head, count + 2, 0);
+  std::int32_t* const head = scene.cell_head;
+  std::fill_n(head, count + 2, 0);
   for (int b = 0; b < scene.blocks; ++b) {
-    ++scene.cell_head[cells.of(scene.block[b]) + 1];
+    scene.cell_next[b] = cells.of(scene.block[b]);
+    ++head[scene.cell_next[b] + 2];
   }
-  for (int cell = 0; cell < count; ++cell) {
-    scene.cell_head[cell + 1] += scene.cell_head[cell];
+  for (int cell = 2; cell <= count + 1; ++cell) {
+    head[cell] += head[cell - 1];
   }
-  scene.cell_head[count + 1] = scene.blocks;
-  // From the last one down: of each cell the end, one place on, becomes the beginning.
-  for (int b = scene.blocks - 1; b >= 0; --b) {
-    std::int32_t& end = scene.cell_head[cells.of(scene.block[b]) + 1];
-    scene.cell_next[--end] = b;
+  // A cell's beginning moves to its end, which is the beginning of the next one.
+  for (int b = 0; b < scene.blocks; ++b) {
+    const SceneBlock& block = scene.block[b];
+    scene.by_cell[head[scene.cell_next[b] + 1]++] = {block.x, block.y, block.assembly, b};
   }
 }
 
-void find_in_cells(const AssemblyRules& rules, Scene& scene, double reach) {
-  const Cells cells(rules, reach);
+// Pairs of a block with those of a range of cells, in the order of the cells.
+void pair_with(const PlacedBlock& one, const PlacedBlock* other, const PlacedBlock* end,
+               double squared, PairList& pairs) {
+  for (; other < end; ++other) {
+    const Vec2 between{other->x - one.x, other->y - one.y};
+    if (other->assembly != one.assembly && dot(between, between) < squared) {
+      add_pair(pairs, one.block, other->block);
+    }
+  }
+}
+
+// Each cell with itself and with half of its neighbours, so that every pair comes once.
+void find_in_cells(const Cells& cells, double reach, Scene& scene, PairList& pairs) {
   sort_into_cells(cells, scene);
-  for (int b = 0; b < scene.blocks; ++b) {
-    const int column = cells.column(scene.block[b].x), row = cells.row(scene.block[b].y);
-    const int left = std::max(column - 1, 0), right = std::min(column + 1, cells.columns - 1);
-    const int begin = scene.pairs.count;
-    for (int r = std::max(row - 1, 0); r <= std::min(row + 1, cells.rows - 1); ++r) {
-      // Neighbouring cells of a row follow each other.
-      const int end = scene.cell_head[r * cells.columns + right + 2];
-      for (int k = scene.cell_head[r * cells.columns + left + 1]; k < end; ++k) {
-        const int other = scene.cell_next[k];
-        if (other > b && are_near(scene, b, other, reach)) {
-          add_pair(scene.pairs, b, other);
+  const auto begin_of = [&](int row, int column) {
+    return scene.by_cell + scene.cell_head[row * cells.columns + column];
+  };
+  for (int row = 0; row < cells.rows; ++row) {
+    for (int column = 0; column < cells.columns; ++column) {
+      const PlacedBlock *one = begin_of(row, column), *const end = begin_of(row, column + 1);
+      const int left = std::max(column - 1, 0), right = std::min(column + 1, cells.columns - 1);
+      for (; one < end; ++one) {
+        // Neighbouring cells of a row follow each other.
+        pair_with(*one, one + 1, begin_of(row, right + 1), reach * reach, pairs);
+        if (row + 1 < cells.rows) {
+          pair_with(*one, begin_of(row + 1, left), begin_of(row + 1, right + 1), reach * reach,
+                    pairs);
         }
       }
     }
-    BlockPair* const own = scene.pairs.pair + begin;
-    std::sort(own, scene.pairs.pair + scene.pairs.count,
+  }
+}
+
+// Puts pairs into another list by their first block, and of each by the second.
+void sort_pairs(const PairList& from, Scene& scene, PairList& to) {
+  std::int32_t* const end = scene.cell_next;
+  std::fill_n(end, scene.blocks, 0);
+  for (int k = 0; k < from.count; ++k) {
+    ++end[from.pair[k].first];
+  }
+  int begin = 0;
+  for (int b = 0; b < scene.blocks; ++b) {
+    begin += end[b];
+    end[b] = begin - end[b];
+  }
+  make_room(to, from.count);
+  to.count = from.count;
+  for (int k = 0; k < from.count; ++k) {
+    to.pair[end[from.pair[k].first]++] = from.pair[k];
+  }
+  for (int b = 0; b < scene.blocks; ++b) {
+    std::sort(to.pair + (b == 0 ? 0 : end[b - 1]), to.pair + end[b],
               [](const BlockPair& one, const BlockPair& two) { return one.second < two.second; });
   }
 }
@@ -116,7 +154,9 @@ void find_pairs(const AssemblyRules& rules, Scene& scene) {
     find_among_all(scene, reach);
     return;
   }
-  find_in_cells(rules, scene, reach);
+  scene.close.count = 0; // scratch
+  find_in_cells(Cells(rules, reach), reach, scene, scene.close);
+  sort_pairs(scene.close, scene, pairs);
 }
 
 void find_close_pairs(const AssemblyRules& rules, Scene& scene) {

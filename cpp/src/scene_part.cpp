@@ -6,9 +6,6 @@
 
 namespace driftwalk {
 
-namespace {
-// Makes the blocks that are labelled with the lowest of them one body, which moves on as they did
-// in the assembly that they come from.
 void cut_loose(const AssemblyRules& rules, Scene& scene, const SceneAssembly& from, int lowest) {
   const Vec2 at = centre(scene, lowest);
   SceneAssembly& body = scene.assembly[lowest];
@@ -29,6 +26,7 @@ bool are_neighbours(const AssemblyRules& rules, const Scene& scene, int first, i
   return std::abs(a.cell_x - b.cell_x) + std::abs(a.cell_y - b.cell_y) == 1;
 }
 
+namespace {
 // Labels members of an assembly, from one to before another, with the lowest of them that each
 // hangs together with.
 void label_connected(const AssemblyRules& rules, Scene& scene, int first, int end) {

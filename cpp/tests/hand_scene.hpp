@@ -44,14 +44,15 @@ struct HandScene {
   std::vector<driftwalk::SceneBlock> block, blocks_before;
   std::vector<driftwalk::SceneAssembly> assembly;
   std::vector<driftwalk::BlockPair> pairs, close;
+  std::vector<driftwalk::PlacedBlock> by_cell;
   std::vector<std::int32_t> heads, next, event_step, event_block, event_face;
   driftwalk::Scene scene{};
 
   explicit HandScene(const driftwalk::AssemblyRules& given)
       : rules(given), block(std::size_t(given.blocks)), blocks_before(block.size()),
-        assembly(block.size()), pairs(std::size_t(driftwalk::pair_capacity(given.blocks)) + 1), close(pairs.size()),
-        heads(driftwalk::cell_heads), next(block.size()),
-        event_step(block.size(), -1), event_block(2 * block.size(), -1),
+        assembly(block.size()), pairs(std::size_t(driftwalk::pair_capacity(given.blocks)) + 1),
+        close(pairs.size()), by_cell(block.size()), heads(driftwalk::cell_heads),
+        next(block.size()), event_step(block.size(), -1), event_block(2 * block.size(), -1),
         event_face(2 * block.size(), -1) {
     for (driftwalk::SceneBlock& b : block) {
       b.assembly = -1; // none yet
@@ -61,6 +62,7 @@ struct HandScene {
     scene.blocks_before = blocks_before.data();
     scene.assembly = assembly.data();
     scene.pairs = {pairs.data(), 0, static_cast<int>(pairs.size()), nullptr, nullptr};
+    scene.by_cell = by_cell.data();
     scene.close = {close.data(), 0, static_cast<int>(close.size()), nullptr, nullptr};
     scene.cell_head = heads.data();
     scene.cell_next = next.data();

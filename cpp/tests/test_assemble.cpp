@@ -445,10 +445,11 @@ public:
   FreeWorld(Tank& tank, const AssemblyRules& rules, const Crowd& crowd, double drag = 0,
             double noise_scale = 0)
       : rules_(rules), memory_(driftwalk::PackMemory<double>::bytes(rules.blocks) + 64),
-        pack_(aligned(), rules.blocks), blocks_(std::size_t(rules.blocks)), before_(blocks_.size()),
-        assemblies_(blocks_.size()), pairs_(std::size_t(driftwalk::pair_capacity(rules.blocks))), close_(pairs_.size()),
-        heads_(driftwalk::cell_heads),
-        next_(blocks_.size()), run_(tank.finished()) {
+        pack_(aligned(), rules.blocks, true), blocks_(std::size_t(rules.blocks)),
+        before_(blocks_.size()), assemblies_(blocks_.size()),
+        pairs_(std::size_t(driftwalk::pair_capacity(rules.blocks))), close_(pairs_.size()),
+        by_cell_(blocks_.size()), heads_(driftwalk::cell_heads), next_(blocks_.size()),
+        run_(tank.finished()) {
     const driftwalk::Prepared<double>& run = run_.view();
     physics_ = {
         {},
@@ -466,6 +467,7 @@ public:
     scene_.blocks_before = before_.data();
     scene_.assembly = assemblies_.data();
     scene_.pairs = {pairs_.data(), 0, static_cast<int>(pairs_.size()), nullptr, nullptr};
+    scene_.by_cell = by_cell_.data();
     scene_.close = {close_.data(), 0, static_cast<int>(close_.size()), nullptr, nullptr};
     scene_.cell_head = heads_.data();
     scene_.cell_next = next_.data();
@@ -475,7 +477,10 @@ public:
   }
   Member& member(int b) { return pack_.members[b]; }
   void step() {
-    driftwalk::advance(physics_, 0, pack_.members, pack_.sums, rules_.blocks, [] {});
+    const auto sum = [&]<int Count>() {
+      driftwalk::sum_masked<Count>(pack_.members, pack_.sums, rules_.blocks);
+    };
+    driftwalk::advance(physics_, 0, pack_.members, pack_.sums, rules_.blocks, sum, [] {});
     driftwalk::meet_walls(physics_, pack_.members, rules_.blocks);
     driftwalk::fill_scene(rules_, pack_, 0, assemblies_left_, scene_);
     driftwalk::find_pairs(rules_, scene_);
@@ -505,6 +510,7 @@ private:
   std::vector<driftwalk::SceneBlock> blocks_, before_;
   std::vector<driftwalk::SceneAssembly> assemblies_;
   std::vector<driftwalk::BlockPair> pairs_, close_;
+  std::vector<driftwalk::PlacedBlock> by_cell_;
   std::vector<std::int32_t> heads_, next_;
   driftwalk::PreparedRun<double> run_;
   driftwalk::Physics<double, double, driftwalk::QuadraticDrag> physics_{};

@@ -51,6 +51,7 @@ _NAMES = {
         "sensitivity_indices",
         "sensitivity_map",
         "sensitivity_reference",
+        "steady_state",
     ),
     "driftwalk.calibration": ("recover_model",),
     "driftwalk.comparison": (
@@ -106,6 +107,7 @@ _NAMES = {
         "compare",
         "compare_models",
         "fit",
+        "kinetics",
         "report",
         "simulate",
     ),

@@ -34,6 +34,7 @@ from driftwalk.assembly import (
     sensitivity_indices as sensitivity_indices,
     sensitivity_map as sensitivity_map,
     sensitivity_reference as sensitivity_reference,
+    steady_state as steady_state,
 )
 from driftwalk.calibration import (
     recover_model as recover_model,
@@ -96,6 +97,7 @@ from driftwalk.notebook import (
     compare as compare,
     compare_models as compare_models,
     fit as fit,
+    kinetics as kinetics,
     report as report,
     simulate as simulate,
 )

@@ -193,6 +193,11 @@ def assemble(
     faces: FaceRules | None = None,
     flow_start: _Floats | None = None,
     glued: npt.NDArray[np.int32] | None = None,
+    # rate [1/s] and force [N] (Bell), strength [N], clearance [sides]; with bonds that break the
+    # result has event_kind: 0 joining, 1 parting, 2 opening and 3 closing of a bond of a loop; and
+    # event_count counts events beyond event_rows, which are not written
+    bonds: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.25),
+    event_rows: int = 0,
     pull: Pull | None = None,
 ) -> dict[str, npt.NDArray[Any] | int]: ...
 
@@ -217,11 +222,14 @@ class LiveWorld:
         block_friction: float,
         faces: FaceRules | None = None,
         flow_start: float = 0.0,
+        bonds: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.25),
     ) -> None: ...
-    # The joinings: step (n,), block (n, 2), face (n, 2), as in `assemble`.
+    # The events: step (n,), kind (n,), block (n, 2), face (n, 2), as in `assemble`. It takes fewer
+    # steps when there are too many events.
     def advance(self, steps: int) -> dict[str, npt.NDArray[np.int32]]: ...
     # pose (blocks, 3) [m, m, rad], velocity (blocks, 3) [m/s, m/s, rad/s], assembly (blocks,),
-    # cell (blocks, 2), quarter and kind (blocks,).
+    # cell (blocks, 2), quarter and kind (blocks,); where bonds break bond (n, 2), those that are
+    # whole.
     def state(self) -> dict[str, npt.NDArray[Any]]: ...
     def set_forces(
         self, *, drag_coefficient: float, force_std: float, flow_scale: float
@@ -229,6 +237,7 @@ class LiveWorld:
     def set_rules(self, *, latching: str, hidden_share: float, stirring_length: float) -> None: ...
     # Blocks are of the kinds at the start again.
     def set_faces(self, faces: FaceRules | None) -> None: ...
+    def set_bonds(self, *, rate: float, relatch_clearance: float) -> None: ...
     def set_pull(self, pull: Pull | None) -> None: ...
     def set_blocks(self, blocks: int) -> int: ...  # as many as there are then
     def part(self) -> None: ...

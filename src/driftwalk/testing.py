@@ -18,7 +18,7 @@ import numpy as np
 from driftwalk.comparison import StepDistance, step_table
 from driftwalk.conditions import Conditions
 from driftwalk.core.arrays import Floats, Keys
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.motion import MotionModel, ScoresItself, Worlds, score_worlds
 from driftwalk.schema.trajectory import Track
 from driftwalk.simulation.backend import STATUS, Camera

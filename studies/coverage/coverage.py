@@ -31,7 +31,7 @@ from driftwalk.calibration.grid.grid_map import MapSimulator
 from driftwalk.calibration.grid.grid_refinement import RefinedMap, locate_minimum, refine
 from driftwalk.calibration.problem import Problem, limits_of, prepare_problem
 from driftwalk.conditions import recorded_camera
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.schema import Track, body_track
 
 TRUTHS = ((0.45, 0.55e-3), (0.80, 0.90e-3))

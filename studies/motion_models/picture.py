@@ -17,7 +17,7 @@ from matplotlib.collections import LineCollection
 
 import driftwalk as dw
 from driftwalk.conditions import Conditions, Neighbours
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.model import Tank
 from driftwalk.schema import Track
 from driftwalk.simulation.backend import Camera

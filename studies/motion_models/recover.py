@@ -23,7 +23,7 @@ from recordings import read_lines
 
 import driftwalk as dw
 from driftwalk.conditions import recorded_conditions
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.model import apply_overrides
 from driftwalk.schema import Track, build_trajectory
 from driftwalk.simulation.backend import Camera

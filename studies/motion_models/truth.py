@@ -21,7 +21,7 @@ from run import Prepared
 
 import driftwalk as dw
 from driftwalk.calibration import DEFAULT_MODELS
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.schema import build_trajectory
 
 RESULTS: Final = Path(__file__).resolve().parent / "results" / "models.jsonl"

@@ -11,13 +11,14 @@ import shlex
 import shutil
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 import xarray as xr
+from chain_runs import chain_runs
 from command_line import FLOW, GRID, RECORDING, here
 from drifting_tracers import seeded_tank
 from finished_run import write_finished_run
@@ -62,10 +63,19 @@ class Page:
     """Whether the commands draw their figures, which take most of a small run."""
     little: bool = False
     """Whether searches for models simulate little, with every stage of theirs."""
+    daily: Mapping[str, str] = field(default_factory=dict)
+    """As `instead`, for a page that takes more than a minute: the whole of it runs once a week."""
     needs: tuple[str, ...] = ()
     """Packages without which the examples are skipped."""
     slow: bool = False
     """Whether the page takes more than 0.3 s of processor time."""
+
+    def every_day(self) -> Page:
+        """Return how the page runs in every test: it searches little, where that is a study."""
+        if not self.daily:
+            return self
+        instead = {**self.instead, **self.daily}
+        return replace(self, instead=instead, little=True, numbers=Numbers.ANY)
 
 
 def _files(*provisions: Callable[[Path], Names]) -> Callable[[Path], Names]:
@@ -219,9 +229,9 @@ def _wide_tank(_: Path) -> Names:
 
 
 def _active_body(folder: Path) -> Names:
-    """Provide ``recording.nc``: three minutes of an active body."""
+    """Provide ``recording.nc``: a minute and a half of an active body."""
     values = {"speed": 0.03, "rotational_diffusion": 0.5, "turn_rate": 0.3}
-    seen = moving(dw.motion_model("active", clearance=0.015), values, 180.0, seed=3, noise=3e-4)
+    seen = moving(dw.motion_model("active", clearance=0.015), values, 90.0, seed=3, noise=3e-4)
     dw.save_trajectory(seen, folder / "recording.nc")
     return {}
 
@@ -233,11 +243,11 @@ def _tumble_search(_: Path) -> Names:
 
 
 def _robot_in_mujoco(folder: Path) -> Names:
-    """Provide ``recording.csv``: half a minute of the robot that the page simulates."""
+    """Provide ``recording.csv``: ten seconds of the robot that the page simulates."""
     program = ROOT / "docs" / "examples" / "mujoco_robot.py"
     robot = dw.motion_model(f"command:{shlex.quote(sys.executable)} {shlex.quote(str(program))}")
     values = {"speed": 0.05, "turn_noise": 1.0}
-    seen = moving(robot, values, 30.0, seed=1, noise=3e-4)
+    seen = moving(robot, values, 10.0, seed=1, noise=3e-4)
     dw.save_trajectory(seen, folder / "recording.csv")
     return {}
 
@@ -290,6 +300,15 @@ def _assembled(folder: Path) -> Names:
     path = dw.assembly_path(dw.Study(), dw.tank30_flow(), runs=[3], duration=120.0)
     blocks = dw.path_recording(path, run=3).assign_coords(body=list("ABCD"))
     dw.save_trajectory(blocks, folder / "blocks.csv")
+    return {}
+
+
+def _chains(folder: Path) -> Names:
+    """Provide ``four/`` and ``real/``: runs of a chain, and as many recordings of another one."""
+    for name, seed, runs in (("four", 1, 40), ("real", 2, 12)):
+        (folder / name).mkdir()
+        found = chain_runs(runs, seed)
+        found.to_netcdf(folder / name / ("assembly.nc" if name == "four" else "tuesday.nc"))
     return {}
 
 
@@ -472,7 +491,7 @@ PAGES: dict[str, Page] = {
     "docs/how-to/calibrate-a-moving-body.md": Page(
         provide=_active_body,
         instead={
-            "--model active ": "--model active --parameter clearance=0.015 ",
+            "--model active ": "--model active --parameter clearance=0.015 --bootstrap 20 ",
             "run-tumble+wall --parameter turn_rate=0": "active+diffusion --parameter turn_rate=0.3 "
             "--parameter clearance=0.015 --bootstrap 20",
         },
@@ -505,7 +524,7 @@ PAGES: dict[str, Page] = {
         provide=_files(_flow("flow_true.csv"), _truth),
         instead={
             "recordings = 30": "recordings = 2",
-            '["5min", "10min", "20min", "40min"]': '["1min", "2min"]',
+            '["5min", "10min", "20min", "40min"]': '["40s", "1min"]',
             "--duration 10min": "--duration 40s --bootstrap 10",
             "--recordings 20": "--recordings 2",
             '"recover.recordings": 10': '"recover.recordings": 2, "calibration.bootstrap": 5',
@@ -516,6 +535,7 @@ PAGES: dict[str, Page] = {
             "recovered.attrs['kind'] == 'model_recovery'",
         ),
         draws=False,
+        little=True,
         slow=True,
     ),
     "docs/how-to/dimer.md": Page(
@@ -537,7 +557,7 @@ PAGES: dict[str, Page] = {
         ),
         instead={
             "assemble ": f"assemble {FEW_RUNS} ",
-            "sensitivity fit/": f"sensitivity fit/ {FEW_SETTINGS}",
+            "sensitivity fit/": "sensitivity fit/ --runs 4 --realisations 2 --duration 20s",
             "fit first.csv": "fit --no-check first.csv",
             "fit disc.csv": "fit --no-check first.csv",
             "fit raft.csv": "fit --no-check first.csv",
@@ -545,9 +565,9 @@ PAGES: dict[str, Page] = {
             "fit recording.csv --flow": "fit --no-check first.csv --flow",
             "fit recording.csv --law": "fit --no-check first.csv --law",
             "fit recording.csv --wall": "fit --no-check first.csv --wall",
-            "fit recording.csv --compare": "fit --no-check first.csv --compare",
-            "fit recording.csv --switching-times 10min,20min": "fit --no-check second.csv "
-            "--switching-times 30s,60s",
+            "fit recording.csv --compare": "fit --no-check first.csv --to 40s --compare",
+            "fit recording.csv --switching-times 10min,20min": "fit --no-check first.csv "
+            "--switching-times 20s,40s",
         },
         numbers_of={"driftwalk fit recording.csv --tank *": Numbers.SAME},
         by_chance={"KS distance": KS_SCATTER},
@@ -579,6 +599,13 @@ PAGES: dict[str, Page] = {
         makes=("tracks/README.md", "one/replicate_3.csv", "film/recording.gif", "paper/ks_map.pdf"),
         slow=True,
     ),
+    "docs/how-to/kinetics.md": Page(
+        provide=_files(_assembled, _chains),
+        holds=("found.attrs['target'] == 'T'", "found.sizes['class'] == 7"),
+        makes=("kinetics/kinetics.nc", "to-T/kinetics.nc", "both.html", "eight/manifest.json"),
+        draws=False,
+        slow=True,
+    ),
     "docs/how-to/sensitivity.md": Page(
         provide=_files(_calibrated, _flow("flow_true.csv", "flow.nc", "piv.csv")),
         instead={
@@ -587,7 +614,7 @@ PAGES: dict[str, Page] = {
             "--force-std 0.55mN -o": f"--force-std 0.55mN {FEW_SETTINGS} "
             "--vary drag-coefficient=0.3:0.6:0.3 -o",
             "sensitivity run/ --vary": f"sensitivity run/ {FEW_SETTINGS} --vary",
-            "--sobol 64": f"--sobol 8 {FEW_SETTINGS}",
+            "--sobol 64": "--sobol 8 --runs 4 --realisations 2 --duration 20s",
         },
         holds=(
             "dw.outcome_distribution(again).attrs['complete'] == float(setting['complete'])",
@@ -674,7 +701,7 @@ PAGES: dict[str, Page] = {
     "docs/tutorials/first-calibration.md": Page(
         provide=_search("small.toml"),
         instead={
-            "calibrate recording.csv --study study.toml": "calibrate recording.csv "
+            "calibrate recording.csv --study study.toml": "calibrate recording.csv --to 900s "
             "--study small.toml"
         },
         not_run={"make demo": INSTALLS, ". .venv/bin/activate": INSTALLS},
@@ -686,6 +713,7 @@ PAGES: dict[str, Page] = {
         slow=True,
     ),
     "docs/tutorials/your-own-model.md": Page(
+        daily={"-o run": "--replicates 1 --bootstrap 4 -o run"},
         holds=("len(track) == 2000",),
         makes=("run/calibration.nc", "compare/comparison.nc"),
         numbers=Numbers.CLOSE,

@@ -17,11 +17,31 @@ from ports import held_port
 
 from driftwalk.cli.demo import demo_truth
 from examples.printed import NUMBER, Numbers
-from examples.provisions import ELSEWHERE, NOT_COMPARED, PAGES
+from examples.provisions import ELSEWHERE, NOT_COMPARED, PAGES, Page
 from examples.reading import ROOT, blocks_of, commands_of, pages, read_blocks
 from examples.running import Reader, compared, streaming
 
 TUTORIAL, FIT_PAGE = "docs/tutorials/first-calibration.md", "docs/how-to/fit.md"
+
+
+def run_page(name: str, page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Follow a page in a folder that is empty."""
+    for package in page.needs:
+        pytest.importorskip(package, reason=f"{package} is not installed")
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    if not page.draws:
+        leave_out_figures(monkeypatch)
+    if page.little:
+        simulate_little(monkeypatch)
+        compare_after_little(monkeypatch)
+    with held_port() as port, streaming(port) if page.streams else nullcontext():
+        reader = Reader(page, port)
+        for block in blocks_of(name):
+            reader.follow(block)
+    for expression in page.holds:
+        assert eval(expression, reader.names), expression
+    for made in page.makes:
+        assert Path(made).stat().st_size > 0
 
 
 @pytest.mark.parametrize(
@@ -29,23 +49,18 @@ TUTORIAL, FIT_PAGE = "docs/tutorials/first-calibration.md", "docs/how-to/fit.md"
     [pytest.param(name, marks=[pytest.mark.slow] * page.slow) for name, page in PAGES.items()],
 )
 def test_examples_of_a_page_run(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for package in PAGES[name].needs:
-        pytest.importorskip(package, reason=f"{package} is not installed")
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("MPLBACKEND", "Agg")
-    if not PAGES[name].draws:
-        leave_out_figures(monkeypatch)
-    if PAGES[name].little:
-        simulate_little(monkeypatch)
-        compare_after_little(monkeypatch)
-    with held_port() as port, streaming(port) if PAGES[name].streams else nullcontext():
-        reader = Reader(PAGES[name], port)
-        for block in blocks_of(name):
-            reader.follow(block)
-    for expression in PAGES[name].holds:
-        assert eval(expression, reader.names), expression
-    for made in PAGES[name].makes:
-        assert Path(made).stat().st_size > 0
+    run_page(name, PAGES[name].every_day(), monkeypatch)
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("name", [name for name, page in PAGES.items() if page.daily])
+def test_a_long_page_shows_what_it_prints(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its numbers are compared; `test_examples_of_a_page_run` runs it with short searches."""
+    monkeypatch.chdir(tmp_path)
+    run_page(name, PAGES[name], monkeypatch)
 
 
 def test_every_page_with_examples_is_run() -> None:
@@ -179,7 +194,7 @@ def test_what_is_said_about_a_page_is_on_it(name: str) -> None:
     ]
     for pattern in (*PAGES[name].not_run, *PAGES[name].numbers_of):
         assert fnmatch.filter(commands, pattern), pattern
-    for old in PAGES[name].instead:
+    for old in PAGES[name].every_day().instead:
         assert any(old in block.text for block in blocks), old
 
 

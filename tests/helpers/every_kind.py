@@ -7,6 +7,7 @@ from functools import cache
 
 import pytest
 import xarray as xr
+from chain_runs import chain_runs
 from drifting_tracers import seeded_tank
 from few_simulations import simulate_little
 from fit_worlds import coarse_study, recording
@@ -18,7 +19,7 @@ from switching_worlds import START_S, coarse_study as switched_study, two_flows
 from walkers import diffuse, tumble
 
 import driftwalk as dw
-from driftwalk.assembly import assemble, sobol_design, sobol_indices
+from driftwalk.assembly import assemble, kinetics, sobol_design, sobol_indices
 from driftwalk.calibration import calibrate, compare_models
 from driftwalk.calibration.evolution import Budget
 from driftwalk.comparison import compare
@@ -150,6 +151,11 @@ FORMS: dict[str, Callable[[], xr.Dataset]] = {
     "recovery": recovery,
     "model_recovery": model_recovery,
     "assembly": lambda: assemble(small(), FLOW, runs=12, seed=5),
+    "assembly whose bonds break": lambda: assemble(
+        small(assembly={"bond_rate_per_s": 0.5}), FLOW, runs=12, seed=5
+    ),
+    "steady_state": lambda: dw.steady_state(every_kind("assembly whose bonds break")),
+    "kinetics": lambda: kinetics(chain_runs(60, 1), chain_runs(30, 2), target="T", blocks=3),
     "assembly_path": lambda: dw.assembly_path(small(), FLOW, runs=[0], seed=5),
     "outcome_distribution": lambda: dw.outcome_distribution(every_kind("assembly")),
     "outcome_distribution of realisations": lambda: dw.sensitivity_reference(small(), FLOW),

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from single_block import SIDE, Floats, corner_positions
 
 from driftwalk import _core
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 
 SETTINGS: dict[str, Any] = {
     "latching": "connector",

@@ -7,7 +7,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from driftwalk import _core
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.flow import uniform_flow
 from driftwalk.model import Tank
 from driftwalk.motion.choose import family_model

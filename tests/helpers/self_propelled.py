@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 import driftwalk as dw
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.motion import MotionModel
 from driftwalk.schema import Track, build_trajectory
 

@@ -11,7 +11,7 @@ from twin.block import TwinModel
 
 import driftwalk as dw
 from driftwalk import _core
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 
 Floats = npt.NDArray[np.float64]
 Velocity = Callable[[Floats, Floats], tuple[Any, Any]]

@@ -17,7 +17,7 @@ from walkers import diffuse, tumble
 import driftwalk as dw
 from driftwalk.conditions import Conditions
 from driftwalk.core.errors import ConfigurationError, InputError
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.model import apply_overrides
 from driftwalk.motion import Parameter, motion_model
 from driftwalk.schema import build_trajectory

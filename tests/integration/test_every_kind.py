@@ -16,7 +16,13 @@ COSTLY = (
     *("model_calibration", "calibration", "calibration of one parameter"),
     *("calibration of two parameters", "model_comparison", "model_check", "recovery"),
     *("model_recovery", "fit", "fit of several flows", "fit with the angle in the state"),
-    *("flow_field of a fit", "assembly", "assembly_sizes", "classification with blocks hidden"),
+    *(
+        "flow_field of a fit",
+        "assembly",
+        "assembly_sizes",
+        "kinetics",
+        "classification with blocks hidden",
+    ),
 )
 
 

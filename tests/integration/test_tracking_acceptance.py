@@ -16,7 +16,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import apart
+from command_line import apart, here
 
 import driftwalk as dw
 from driftwalk.record import save_trajectory
@@ -117,8 +117,8 @@ def test_a_mark_while_nothing_is_seen_counts(scores: ModuleType) -> None:
 
 
 def run_driftwalk(*words: object) -> dict:
-    """Run a command with --json in a process of its own."""
-    done = apart(*words, "--json")
+    """Run a command with --json."""
+    done = here(*words, "--json")
     assert done.code == 0, done.err
     return json.loads(done.out)
 
@@ -129,7 +129,7 @@ def filmed(scenes: ModuleType, folder: Path, set_name: str, seed: int, frames: i
     motion = scenes.motion_of(scene).isel(time=slice(0, frames))
     video = dw.write_video(folder / "video.mkv", motion, scene.settings)
     markers = folder / "markers.toml"
-    taught = apart("markers", "teach", video, *TANK, "--side", "3cm", "-o", markers)
+    taught = here("markers", "teach", video, *TANK, "--side", "3cm", "-o", markers)
     assert taught.code == 0, taught.err
     out = folder / "recording.nc"
     words = ("--markers", markers, *TANK, "--bodies", scene.bodies, "-o", out)

@@ -16,7 +16,7 @@ from single_block import (
 )
 
 from driftwalk import _core
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.model import Tank
 from driftwalk.simulation.backend import wall_edges
 

@@ -20,7 +20,7 @@ import driftwalk as dw
 from driftwalk import _core
 from driftwalk.assembly.lattice.typed_faces import face_table
 from driftwalk.assembly.pull.tables import block_pull
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.model import Assembly
 from driftwalk.simulation.backend import Camera, native_model
 

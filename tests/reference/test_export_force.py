@@ -16,7 +16,7 @@ from exported import (
 from single_block import BEYOND_PAPER
 from twin.block import Floats, drag, force_normals, next_force, push_of_water
 
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.export.simulators.block import Block
 from driftwalk.export.simulators.mujoco import write_module
 from driftwalk.export.simulators.parts import Folder

@@ -17,7 +17,7 @@ import pytest
 import driftwalk as dw
 from driftwalk.conditions import Conditions
 from driftwalk.core.errors import InputError
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.model import Tank
 from driftwalk.motion import MotionModel, Worlds, motion_model
 from driftwalk.simulation import Start

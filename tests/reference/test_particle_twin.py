@@ -13,7 +13,7 @@ import xarray as xr
 from twin.particle import Floats, Keys, Path, Scene, simulate_inertial, simulate_switching
 
 from driftwalk import _core
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.flow import flow_from_function, uniform_flow
 from driftwalk.model import Tank
 from driftwalk.motion.family.columns import (

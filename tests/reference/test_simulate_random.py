@@ -11,7 +11,7 @@ from single_block import MASS, model, one_world, run, wrapped
 from twin.block import force_normals, normal_pair, philox
 
 from driftwalk import _core
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 
 # Random123 (Salmon, Moraes, Dror, Shaw, SC 2011), file kat_vectors, philox4x32 of 10 rounds:
 # counter, key, words.

@@ -18,7 +18,7 @@ from single_block import (
 from twin.block import drag, simulate_reference
 
 from driftwalk import _core
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 
 
 @pytest.mark.fast_cases(1)

@@ -11,7 +11,7 @@ from scipy import stats
 from single_block import MASS, SIDE, model, one_world, run, still, study, swirl
 
 import driftwalk as dw
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.simulation import initial
 
 FALSE_ALARM = 1e-5

@@ -32,7 +32,7 @@ DragResponse<D> drag_alone(const FilterProblem& problem, double theta, double om
   const std::int64_t nodes = std::int64_t(problem.flow.rows) * problem.flow.columns;
   double* rows[D];
   for (int a = 0; a < D; ++a) {
-    rows[a] = by_coefficients + 2 * nodes * a;
+    rows[a] = by_coefficients == nullptr ? nullptr : by_coefficients + 2 * nodes * a;
   }
   for (int k = 0; k < drag.shares; ++k) {
     add_share<D>(shares[k], problem.flow.columns, nodes, shares[k].response, -1, rows);

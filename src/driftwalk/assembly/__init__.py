@@ -1,5 +1,6 @@
 """Self-assembly of many blocks: outcomes, their uncertainty, and their dependence on the model."""
 
+from driftwalk.assembly.chains.estimate import check_kinetics, kinetics
 from driftwalk.assembly.lattice.events import ReplayedEvents, replay_events
 from driftwalk.assembly.lattice.polyomino import polyomino_cells, polyomino_name, polyominoes
 from driftwalk.assembly.live_world import LiveEvent, LiveTank
@@ -23,6 +24,7 @@ from driftwalk.assembly.outcomes.distribution import (
     proportion_interval,
     sampling_variance,
 )
+from driftwalk.assembly.outcomes.event_rates import rate_interval
 from driftwalk.assembly.outcomes.kind_classes import kind_classes
 from driftwalk.assembly.outcomes.l1 import (
     L1NoiseFloor,
@@ -33,6 +35,7 @@ from driftwalk.assembly.outcomes.l1 import (
     pairwise_l1,
 )
 from driftwalk.assembly.outcomes.sizes import assembly_sizes
+from driftwalk.assembly.outcomes.steady_state import steady_state
 from driftwalk.assembly.outcomes.survival import SurvivalCurve, class_times, survival_curve
 from driftwalk.assembly.pull.attraction import attraction
 from driftwalk.assembly.recordings import classify
@@ -66,6 +69,7 @@ __all__ = [
     "attraction",
     "check_assembly",
     "check_indices",
+    "check_kinetics",
     "check_sensitivity",
     "class_at",
     "class_cells",
@@ -78,6 +82,7 @@ __all__ = [
     "has_uncertainty",
     "interaction_quantiles",
     "kind_classes",
+    "kinetics",
     "l1_distance",
     "l1_in_floors",
     "l1_noise_floor",
@@ -91,6 +96,7 @@ __all__ = [
     "polyominoes",
     "principal_components",
     "proportion_interval",
+    "rate_interval",
     "replay_events",
     "sampling_variance",
     "sensitivity_indices",
@@ -99,6 +105,7 @@ __all__ = [
     "sobol_design",
     "sobol_indices",
     "sort_classes",
+    "steady_state",
     "survival_curve",
     "world_class",
 ]

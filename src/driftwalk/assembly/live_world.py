@@ -11,11 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
+from driftwalk.assembly.lattice.bonds import CLOSING, JOINING, PARTING, BondGraph
 from driftwalk.assembly.lattice.join_history import LatticeWorld
 from driftwalk.assembly.lattice.joined_faces import ROUNDING
 from driftwalk.assembly.lattice.typed_faces import face_table
 from driftwalk.assembly.outcomes.disc_contacts import disc_class
 from driftwalk.assembly.pull.tables import block_pull
+from driftwalk.assembly.runs.bonds import require_bonds
 from driftwalk.assembly.runs.dataset import times_of
 from driftwalk.assembly.runs.glued import glued_cells
 from driftwalk.assembly.runs.plan import MOST_STEPS, make_plan, start_poses
@@ -40,6 +42,8 @@ class LiveEvent(NamedTuple):
     """First that of the assembly that stayed, then of the one that was moved into line."""
     outcome: str
     """Outcome class of the whole world from then on."""
+    is_parting: bool = False
+    """Whether two blocks parted, whose bond broke, instead of joining."""
 
 
 class _Moment:
@@ -223,6 +227,7 @@ class LiveTank:
         faces: str | None = None,
         hidden_face_drag: HiddenFaceDrag | str | None = None,
         stirring_length: float | None = None,
+        bond_rate: float | None = None,
         magnets: str | None = None,
         blocks: int | None = None,
         part: bool = False,
@@ -246,6 +251,8 @@ class LiveTank:
             Drag on faces that are joined; a number is its share of a free face's, 0 to 1.
         stirring_length : float
             Distance over which blocks share the stochastic force [m]; 0: each has its own.
+        bond_rate : float
+            Rate at which each bond breaks [1/s]; 0: never.
         magnets : str
             Magnet at the centre of each face, such as ``"5x5x2mm,1.3T"``, or ``"none"``.
         blocks : int
@@ -269,6 +276,7 @@ class LiveTank:
             "assembly.faces": faces,
             "assembly.hidden_face_drag": hidden_face_drag,
             "forces.stirring_length_m": stirring_length,
+            "assembly.bond_rate_per_s": bond_rate,
             "interaction.magnets": magnets,
             "assembly.blocks": blocks,
         }
@@ -277,6 +285,7 @@ class LiveTank:
             wishes = self._wishes
             study = apply_overrides(wishes.study, overrides)
             require_room(study)
+            require_bonds(study)
             block_pull(study)
             scale = wishes.flow_scale if flow_scale is None else flow_scale
             if not 0.0 <= scale < math.inf:
@@ -293,7 +302,7 @@ class LiveTank:
             self._look()
 
     def events(self) -> list[LiveEvent]:
-        """Return the joinings since the last call: time [s], the two blocks, the class after it."""
+        """Return joinings and partings since the last call: time [s], blocks, class after it."""
         with self._lock:
             events, self._events = self._events, []
         return events
@@ -417,6 +426,9 @@ class LiveTank:
             if (rules.faces, rules.binding) != (before.faces, before.binding):
                 table = face_table(rules)
                 self._world.set_faces(None if table is None else table.native())
+            self._world.set_bonds(
+                rate=rules.bond_rate_per_s, relatch_clearance=rules.relatch_clearance
+            )
         if wished.part:
             self._world.part()
             self._look()
@@ -437,18 +449,36 @@ class LiveTank:
         self._world.set_pull(None if pull is None else pull.native)
 
     def _step(self, steps: int) -> None:
-        """Take time steps and note what has joined in them."""
+        """Take time steps and note what has joined and parted in them."""
+        end = self._world.step + steps
+        while self._world.step < end:
+            self._step_some(end - self._world.step)
+
+    def _step_some(self, steps: int) -> None:
+        """Take time steps, fewer where there are too many events, and note these."""
         study = self._active.study
-        lattice = LatticeWorld.of(self._world.state())
+        state = self._world.state()
+        lattice = LatticeWorld.of(state)
+        bonds = BondGraph(1, lattice.blocks)
+        bonds.put(np.zeros(len(state["bond"]), dtype=np.int64), state["bond"], True)
         found = self._world.advance(steps)
         pose, diameter = self._world.state()["pose"], study.block.side_m
         times = times_of(found["step"], time_step=study.time_step_s).tolist()
-        pairs, faces = (map(tuple, found[name].tolist()) for name in ("block", "face"))
-        for time, blocks, joined in zip(times, pairs, faces, strict=True):
-            if self.is_round:
+        kinds, pairs, faces = (found[name].tolist() for name in ("kind", "block", "face"))
+        for time, kind, pair, joined in zip(times, kinds, pairs, faces, strict=True):
+            blocks = (pair[0], pair[1])
+            bonds.put(np.zeros(1, dtype=np.int64), np.array([pair]), kind in (JOINING, CLOSING))
+            if kind == JOINING and not self.is_round:
+                lattice.join(blocks, (joined[0], joined[1]))
+            elif kind == JOINING:
                 lattice.partition.unite(blocks)
+            elif kind == PARTING:
+                side = bonds.reached(np.zeros(1, dtype=np.int64), np.array(pair[:1]))[0]
+                lattice.partition.cut(np.flatnonzero(side).tolist())
+            else:
+                continue
+            if self.is_round:
                 outcome = disc_class(pose, lattice.partition.labels, diameter=diameter)
             else:
-                lattice.join(blocks, joined)
                 outcome = lattice.outcome(study.assembly.chirality)
-            self._events.append(LiveEvent(time, blocks, outcome))
+            self._events.append(LiveEvent(time, blocks, outcome, is_parting=kind == PARTING))

@@ -21,6 +21,7 @@ from driftwalk.assembly.lattice.joined_faces import (
 )
 from driftwalk.assembly.lattice.polyomino import Chirality, require_chirality
 from driftwalk.assembly.outcomes.class_names import listed_classes, listed_shapes
+from driftwalk.assembly.outcomes.event_rates import rate_variables
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
 from driftwalk.schema import body_names, check_trajectory
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
 
 
 UNKNOWN: Final = -1
+RATE_CONFIDENCE: Final = 0.9
+"""Probability with which an interval of a rate holds, as elsewhere."""
 
 
 def classify(
@@ -85,8 +88,10 @@ def classify(
         ``event_class``; blocks that came apart: ``split_count``, ``split_time`` [s],
         ``split_block``, ``split_face``, ``split_class``; padded with NaN and -1 to at least one.
         Several at one sample are in order, those that came apart before those that joined.
-        ``attrs``: the tolerances, ``dropped_joins``, ``unknown_samples``, ``known_s`` (time in
-        which the class is known), ``closest_m`` (smallest distance of two centres).
+        ``joining_rate``, ``parting_rate`` (class) [1/s]: events in this class over the time in it,
+        with exact Poisson intervals and counts. ``attrs``: the tolerances, ``dropped_joins``,
+        ``unknown_samples``, ``known_s`` (time in which the class is known), ``closest_m`` (smallest
+        distance of two centres).
 
     Raises
     ------
@@ -180,6 +185,7 @@ def _dataset(
         "outcome": ("time", outcome),
         "assembly": (("time", "body"), assembly),
         "proportion": ("class", _shares(outcome, lasts, len(classes))),
+        **_rates(history, outcome, lasts, classes),
         **_event_variables("event", joined, poses.time, classes),
         **_event_variables("split", history.split, poses.time, classes),
         "event_assembly": (("event", "side"), _padded([one.assemblies for one in joined], 2)),
@@ -212,8 +218,33 @@ def _dataset(
             "closest_m": smallest_distance(poses),
             "unknown_samples": int((~sound).sum()),
             "known_s": float(lasts.sum()),
+            "rate_confidence": RATE_CONFIDENCE,
         },
     )
+
+
+def _rates(
+    history: JoinHistory, outcome: npt.NDArray[np.int32], lasts: Floats, classes: Sequence[str]
+) -> dict[str, Any]:
+    """Return how often blocks joined and parted in each class, over the time in it.
+
+    Events while the class is not known are left out, as that time is.
+    """
+    # What came apart at a sample did so before what joined there.
+    events = [(event, "parting") for event in history.split]
+    events += [(event, "joining") for event in history.joined]
+    events.sort(key=lambda one: one[0].sample)
+    before = _places(history.outcome[:1], classes)[0]
+    count = {kind: np.zeros(len(classes), dtype=np.int64) for kind in ("joining", "parting")}
+    for event, kind in events:
+        count[kind][before] += outcome[max(event.sample - 1, 0)] != UNKNOWN
+        before = _places([event.outcome], classes)[0]
+    known = outcome >= 0
+    time = np.bincount(outcome[known], weights=lasts[known], minlength=len(classes))
+    data: dict[str, Any] = {}
+    for kind, number in count.items():
+        data |= rate_variables(kind, number, time, dim="class", confidence=RATE_CONFIDENCE)
+    return data
 
 
 def _places(names: Iterable[str], listed: Sequence[str]) -> list[int]:

@@ -14,8 +14,7 @@ import numpy as np
 from driftwalk.calibration.estimation.identifiability import DETERMINED
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
-from driftwalk.core.random_streams import RecoveryStream
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import RecoveryStream, world_keys
 from driftwalk.model import Study
 from driftwalk.schema import Parameter
 from driftwalk.schema.kinds.recovery import ESTIMATED, NOT_ESTIMATED, NOT_SIMULATED

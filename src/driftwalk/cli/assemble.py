@@ -106,6 +106,7 @@ def assembled(study: Study, result: AssemblyResult) -> Answer:
         drawn=result.drawn,
         sizes=result.sizes,
         sizes_drawn=result.sizes_drawn,
+        steady=result.steady,
         apart=_difference(result),
         attraction=result.attraction,
     )

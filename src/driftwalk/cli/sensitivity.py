@@ -46,6 +46,7 @@ AXES: Final = {
     "faces": "sensitivity.faces",
     "hidden-face-drag": "sensitivity.hidden_face_drag",
     "stirring-length": "sensitivity.stirring_length_m",
+    "bond-rate": "sensitivity.bond_rate_per_s",
     "magnets": "sensitivity.magnets",
     "drag-coefficient": "sensitivity.drag_coefficient",
     "force-std": "sensitivity.force_std_N",

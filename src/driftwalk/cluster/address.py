@@ -9,8 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from driftwalk.core.errors import ClusterError, ConfigurationError, InputError
-from driftwalk.core.text.did_you_mean import did_you_mean
+from driftwalk.core.errors import ClusterError, ConfigurationError, InputError, did_you_mean
 
 JOB_SYSTEMS: Final = {
     "slurm": "SLURMCluster", "pbs": "PBSCluster", "sge": "SGECluster", "lsf": "LSFCluster",

@@ -26,6 +26,7 @@ from driftwalk.conditions.refuse import (
     require_motion,
     require_positions,
     require_travel,
+    sound_track,
     typical_speed,
 )
 from driftwalk.conditions.study import (
@@ -64,6 +65,7 @@ __all__ = [
     "require_positions",
     "require_travel",
     "simulate_like",
+    "sound_track",
     "study_as_seen",
     "study_for",
     "study_in_arena",

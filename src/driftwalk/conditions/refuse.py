@@ -14,7 +14,13 @@ import numpy as np
 from driftwalk.conditions.camera import recorded_camera
 from driftwalk.core.errors import InputError
 from driftwalk.flow.arena import read_arena
-from driftwalk.record import arena_diagonal, impossible_steps, impossible_warning
+from driftwalk.record import (
+    arena_diagonal,
+    impossible_steps,
+    impossible_warning,
+    mistakes_warning,
+    without_far_outliers,
+)
 from driftwalk.schema import Track, body_names, body_track
 
 if TYPE_CHECKING:
@@ -232,3 +238,27 @@ def jump_warnings(
     steps = impossible_steps(used.time, used.x, used.y, diagonal=arena_diagonal(x, y, arena))
     name = str(recording["body"].values[0]) if body is None else body
     return [] if steps is None else [impossible_warning(name, steps)]
+
+
+def sound_track(recording: xr.Dataset, body: str | None = None) -> tuple[Track, list[str]]:
+    """Return a body's track without the mistakes of its tracker, and what to say of them.
+
+    Parameters
+    ----------
+    recording : xarray.Dataset
+        A `trajectory`.
+    body : str, optional
+        The body, where there are several.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> track, warnings = sound_track(dw.tank30_recording())
+    >>> track.time.size, warnings
+    (18001, [])
+    """
+    seen = body_track(recording, body)
+    track = without_far_outliers(seen)
+    wrong = seen.time.size - track.time.size
+    said = [mistakes_warning(wrong, seen.time.size)] if wrong else []
+    return track, [*said, *jump_warnings(recording, body, track=track)]

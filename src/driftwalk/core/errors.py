@@ -7,9 +7,10 @@ The command line prints it on one line and exits with code 2.
 
 from __future__ import annotations
 
+import difflib
 import json
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import wraps
 from pathlib import Path
@@ -180,3 +181,25 @@ def naming_its_file(
             raise FormatError(reason, path=path) from error
 
     return named
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """Return "; did you mean '…'?" for the closest known word, or nothing.
+
+    A name that lacks only its unit ("diameter" for "diameter_m") counts as close.
+    """
+    names = list(known)
+    found = difflib.get_close_matches(word, names, n=1, cutoff=0.6)
+    found = found or [name for name in names if name.startswith(f"{word}_")]
+    return f"; did you mean '{found[0]}'?" if found else ""
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return the first names, with commas between them.
+
+    Examples
+    --------
+    >>> listed(["nose", "tail"])
+    'nose, tail'
+    """
+    return ", ".join(names[:20]) + (", …" if len(names) > 20 else "")

@@ -1,13 +1,16 @@
-"""How many processors and how much memory there are to use."""
+"""Processors, memory and threads: how many there are to use, and work in the background."""
 
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from threading import Lock
 from typing import Any, TypeVar
+
+from driftwalk.core.run_stages import Progress
 
 ItemT = TypeVar("ItemT")
 FoundT = TypeVar("FoundT")
@@ -103,3 +106,60 @@ def _let_any_thread_limit() -> None:
     clear = getattr(openblas, "clear_controlling_thread", None)
     if clear is not None:
         clear(force=True)
+
+
+Result = TypeVar("Result")
+
+
+class Cancelled(Exception):
+    """Ends work whose result nobody waits for any more."""
+
+
+class CancelOnError:
+    """A block that waits for work of other threads, and ends it when an error or Ctrl-C ends it.
+
+    Examples
+    --------
+    >>> with CancelOnError() as cancellation:
+    ...     cancellation.raise_if_cancelled()
+    """
+
+    def __init__(self) -> None:
+        self._cancelled = threading.Event()
+
+    def __enter__(self) -> CancelOnError:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is not None:
+            self._cancelled.set()
+
+    def raise_if_cancelled(self) -> None:
+        """Raise `Cancelled` where nobody waits any more; the work calls it often."""
+        if self._cancelled.is_set():
+            raise Cancelled
+
+
+def run_in_background(
+    work: Callable[[Progress], Result], meanwhile: Callable[[], object]
+) -> Result:
+    """Return what some work gives; it goes on in another thread during `meanwhile`.
+
+    Parameters
+    ----------
+    work : callable
+        Takes a function that it calls often, with how much is done and the total. That call ends
+        the work when `meanwhile`, or the waiting for the work, was ended by an error or Ctrl-C.
+    meanwhile : callable
+        Called in this thread.
+
+    Examples
+    --------
+    >>> run_in_background(lambda progress: 6 * 7, lambda: print("meanwhile"))
+    meanwhile
+    42
+    """
+    with ThreadPoolExecutor(1) as pool, CancelOnError() as cancellation:
+        future = pool.submit(work, lambda _done, _total: cancellation.raise_if_cancelled())
+        meanwhile()
+        return future.result()

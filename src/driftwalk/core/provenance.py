@@ -14,7 +14,7 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.files.atomic import write_atomic
-from driftwalk.core.files.file_names import text_of_name
+from driftwalk.core.files.bounded import text_of_name
 from driftwalk.core.text.json_text import read_json
 
 MANIFEST_VERSION: Final = 1

@@ -7,8 +7,7 @@ checker knows (`FitSettings`); the tables from names to keys (`FIT_KEYS`) are ma
 from collections.abc import Mapping
 from typing import Annotated, Any, Final, TypedDict
 
-from driftwalk.core.errors import ConfigurationError
-from driftwalk.core.text.did_you_mean import did_you_mean
+from driftwalk.core.errors import ConfigurationError, did_you_mean
 from driftwalk.core.units import Uncertain, split_uncertain
 
 Number = float | str
@@ -74,6 +73,9 @@ class AssemblySettings(ModelSettings, total=False):
     chirality: Annotated[str, "assembly.chirality"]
     block_restitution: Annotated[Number, "assembly.block_restitution"]
     block_friction: Annotated[Number, "assembly.block_friction"]
+    bond_rate: Annotated[Number, "assembly.bond_rate_per_s"]
+    bond_strength: Annotated[Number, "assembly.bond_strength_N"]
+    relatch_clearance: Annotated[Number, "assembly.relatch_clearance"]
     confidence: Annotated[Number, "assembly.confidence"]
     magnets: Annotated[str, "interaction.magnets"]
     magnet_inset: Annotated[Number, "interaction.magnet_inset_m"]
@@ -147,6 +149,9 @@ RECOVER_KEYS: Final[dict[str, str]] = {
 }
 """The same for a recovery study."""
 
+BOND_FORCE: Final = "assembly.bond_force_N"
+"""The key that the second number of ``bond_rate`` sets, as in ``"0.01/s,2mN"``."""
+
 TABLES: Final = (
     *(STUDY_KEYS, CALIBRATION_KEYS, ASSEMBLY_KEYS, SENSITIVITY_KEYS),
     *(FLOW_KEYS, FIT_KEYS, RECOVER_KEYS),
@@ -191,6 +196,9 @@ def study_overrides(*, keys: Mapping[str, str] = STUDY_KEYS, **options: Any) -> 
 
 def _stated(name: str, value: Any, keys: Mapping[str, str]) -> dict[str, Any]:
     """Return the keys that one argument sets, with that of its standard deviation."""
+    if name == "bond_rate" and isinstance(value, str) and "," in value:
+        rate, force = value.split(",", 1)
+        return {keys[name]: rate, BOND_FORCE: force}
     both = split_uncertain(value) if isinstance(value, str) else value
     if not isinstance(both, Uncertain):
         return {} if value is None else {keys[name]: value}

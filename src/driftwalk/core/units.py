@@ -110,6 +110,8 @@ def _parse_text(text: str, unit: str) -> float:
     number, symbol = float(match[1]), match[2]
     if not symbol:
         return number
+    if symbol.startswith("/") and unit.startswith("1/"):
+        symbol = f"1{symbol}"
     given, wanted = _parse_unit(symbol, text, unit), _parse_unit(unit, text, unit)
     if given.dimension != wanted.dimension:
         raise ConfigurationError(
@@ -185,6 +187,7 @@ _EXAMPLES: Final = {
     "rad": "0.5deg",
     "Hz": "10Hz",
     "m/s": "1cm/s",
+    "1/s": "0.01/s",
     "kg/m3": "1g/cm3",
     "Pa s": "0.89mPa s",
 }

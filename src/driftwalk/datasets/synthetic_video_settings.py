@@ -13,8 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from driftwalk.core.arrays import Floats
-from driftwalk.core.errors import InputError
-from driftwalk.core.text.did_you_mean import did_you_mean
+from driftwalk.core.errors import InputError, did_you_mean
 
 Colour = tuple[int, int, int]
 """Red, green, blue, each 0 to 255."""

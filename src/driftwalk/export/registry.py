@@ -10,10 +10,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
 
-from driftwalk.core.errors import InputError
+from driftwalk.core.errors import InputError, did_you_mean
 from driftwalk.core.files.atomic import PARTIAL, rename, storage_error
 from driftwalk.core.files.run_layout import faults_of
-from driftwalk.core.text.did_you_mean import did_you_mean
 from driftwalk.export.data.targets import DATA_TARGETS
 from driftwalk.export.figures import FIGURE_TARGETS
 from driftwalk.export.target import Source, Target

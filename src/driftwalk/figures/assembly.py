@@ -17,6 +17,7 @@ from driftwalk.plot.assembly_courses import (
     plot_survival,
 )
 from driftwalk.plot.components import plot_biplot
+from driftwalk.plot.kinetics import plot_class_graph, plot_predicted_shares
 from driftwalk.plot.outcome_bars import plot_outcomes
 from driftwalk.plot.parts import style
 from driftwalk.plot.sensitivity_maps import (
@@ -220,3 +221,26 @@ def biplot_figure(
 ) -> Figure:
     """Return Fig. 10, coloured by completion or by the distance to the reference."""
     return style.figure_of(plot_biplot(components, sensitivity=sensitivity, color=color))
+
+
+def kinetics_figures(kinetics: xr.Dataset) -> Figures:
+    """Return the figures of kinetics: the graph of classes, and the shares over time.
+
+    Parameters
+    ----------
+    kinetics : xarray.Dataset
+        A `kinetics`.
+
+    Returns
+    -------
+    dict of str to callable
+        ``class_graph`` and ``shares``.
+
+    Examples
+    --------
+    ``write_figures(kinetics_figures(found), "kinetics/figures")``
+    """
+    return {
+        "class_graph": lambda: style.figure_of(plot_class_graph(kinetics)),
+        "shares": lambda: style.figure_of(plot_predicted_shares(kinetics)),
+    }

@@ -16,9 +16,8 @@ from driftwalk.flow.analytic import (
     vortex_flow,
     vortex_velocity,
 )
-from driftwalk.flow.evaluate import bilinear
-from driftwalk.flow.extract import extract_flow
-from driftwalk.flow.inertia import inertia_correction
+from driftwalk.flow.extract import extract_flow, inertia_correction
+from driftwalk.flow.grid import bilinear
 from driftwalk.flow.random_flow import random_tank_flow
 from driftwalk.flow.read import load_flow
 from driftwalk.flow.recognise import flow_format

@@ -12,11 +12,17 @@ import numpy.typing as npt
 
 from driftwalk.core.errors import InputError
 from driftwalk.flow.arena import Outline, outline_of, read_arena
-from driftwalk.flow.cell_means import CellMeans, Samples, average_cells
+from driftwalk.flow.cell_means import (
+    CellMeans,
+    Samples,
+    average_cells,
+    coverage_warnings,
+    flags_of,
+    measured_share,
+)
 from driftwalk.flow.false_links import LINKS, judge_steps
 from driftwalk.flow.fill import fill_velocity
 from driftwalk.flow.grid import Grid, make_grid
-from driftwalk.flow.measured import coverage_warnings, flags_of, measured_share
 from driftwalk.flow.track_steps import Steps, step_noise, track_steps
 from driftwalk.schema import build_flow_field, check_trajectory
 

@@ -47,8 +47,8 @@ from driftwalk.likelihood.tracker_errors.dropped import (
     places_of,
     with_gaps,
 )
-from driftwalk.likelihood.tracker_errors.outliers import without_outliers
 from driftwalk.likelihood.tracker_errors.smoothed import require_raw
+from driftwalk.record import without_outliers
 from driftwalk.schema import Track, body_track
 from driftwalk.schema.answers.facts import fitted_value
 

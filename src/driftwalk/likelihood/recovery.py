@@ -34,7 +34,7 @@ from driftwalk.schema.kinds import KINDS
 from driftwalk.schema.kinds.recovery import ESTIMATED, RECOVERED
 from driftwalk.simulation import simulate
 from driftwalk.sweep import Design, Store, grid
-from driftwalk.sweep.processes import single_threaded_processes
+from driftwalk.sweep.workers import single_threaded_processes
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 from driftwalk.likelihood.flow_intervals import Intervals
 from driftwalk.likelihood.law.search import LAW
 from driftwalk.likelihood.refuse import LENGTH, LIMIT, in_words, needed_duration
+from driftwalk.record import mistakes_warning
 from driftwalk.schema.answers.facts import is_open
 
 if TYPE_CHECKING:
@@ -137,10 +138,7 @@ def _on_the_data(
     facts: Mapping[str, Any], visited: Sequence[float], intervals: Intervals
 ) -> Iterator[str]:
     if facts["mistakes"]:
-        yield (
-            f"{facts['mistakes']} of {facts['samples']} samples were left out: each lies far from "
-            "both of its neighbours, as mistakes of a tracker do"
-        )
+        yield mistakes_warning(facts["mistakes"], facts["samples"])
     if facts["jumps_removed"]:
         yield (
             f"{facts['jumps_removed']} samples were left out when the recording was read: with "

@@ -5,10 +5,8 @@ from driftwalk.model.binding import Binding, read_binding
 from driftwalk.model.block import Block
 from driftwalk.model.calibration import Calibration
 from driftwalk.model.fit import Fit
-from driftwalk.model.flow import Flow
-from driftwalk.model.forces import Forces
-from driftwalk.model.observation import Observation
-from driftwalk.model.recording import Columns, Recording, Steps
+from driftwalk.model.forces import Flow, Forces
+from driftwalk.model.recording import Columns, Observation, Recording, Steps
 from driftwalk.model.recover import Recover
 from driftwalk.model.sensitivity import Sensitivity
 from driftwalk.model.simulation import Pose, Simulation

@@ -88,6 +88,25 @@ class Assembly(Section):
     """
     block_friction: Annotated[float, Quantity("1", ge=0, le=100)] = 0.0
     """Coulomb friction between two blocks; 0 for wet faces."""
+    bond_rate_per_s: Annotated[float, Quantity("1/s", ge=0, le=1e6)] = 0.0
+    """Rate at which each bond breaks, 0: never; as an option also 0.01/s,2mN, with the tension that
+    multiplies it by e.
+
+    Rate at which the bond of two joined faces breaks when it carries no load; 0: never.
+    """
+    bond_force_N: Annotated[float, Quantity("N", ge=0, le=1e6)] = 0.0
+    """Tension that multiplies the rate by e (Bell).
+
+    Tension of a bond that multiplies its rate by e (Bell); 0: the rate is constant.
+    """
+    bond_strength_N: Annotated[float, Quantity("N", ge=0, le=1e6)] = 0.0
+    """Tension that breaks a bond at once; 0: none does.
+
+    Tension that breaks a bond at once; 0: none does. It takes a force that has memory and length
+    (`forces.force_memory_s`, `forces.stirring_length_m`).
+    """
+    relatch_clearance: Annotated[float, Quantity("1", ge=1, le=2)] = 1.25
+    """Distance of the centres of blocks that parted, in sides, from which they may latch again."""
     confidence: Annotated[float, Quantity("1", gt=0, lt=1)] = 0.9
     """Simultaneous confidence of the intervals of the proportions."""
 
@@ -134,6 +153,11 @@ class Assembly(Section):
         if types is None:
             return self.binding
         return Binding(kinds=(Kind(name="block", count=self.blocks, faces=types),))
+
+    @property
+    def bonds_break(self) -> bool:
+        """Whether bonds break, so that assemblies part."""
+        return self.bond_rate_per_s > 0 or self.bond_strength_N > 0
 
     @property
     def hidden_share(self) -> float:

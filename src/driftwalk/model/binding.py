@@ -13,9 +13,8 @@ from typing import Annotated, ClassVar, Final, Literal, Self
 
 from pydantic import model_validator
 
-from driftwalk.core.errors import ConfigurationError, FormatError
+from driftwalk.core.errors import ConfigurationError, FormatError, did_you_mean
 from driftwalk.core.files.bounded import read_bounded
-from driftwalk.core.text.did_you_mean import did_you_mean
 from driftwalk.core.text.toml_text import MOST_BYTES, parse_toml
 from driftwalk.model.section import Quantity, Section
 

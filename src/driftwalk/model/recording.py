@@ -1,4 +1,4 @@
-"""How a recording is read, so that a study file is complete for its file; how steps are formed."""
+"""How a recording is read, so that a study file is complete for its file; the camera's effects."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pydantic import BeforeValidator, Field, model_validator
 
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.model.section import Quantity, Section
+from driftwalk.model.tank import FieldOfView
 
 
 def _number_to_text(column: Any) -> Any:
@@ -202,3 +203,37 @@ class Steps(Section):
         float | Literal["auto"], Quantity("s", gt=0, le=1e5, words=("auto",))
     ] = "auto"
     """Time between the positions of a step; "auto" uses the interval of the recording."""
+
+
+class Observation(Section):
+    """From a pose to a sample: noise, resolution of the file, missed samples."""
+
+    section_name: ClassVar[str] = "observation"
+
+    position_noise_m: Annotated[
+        float | Literal["estimate"], Quantity("m", ge=0, le=1, words=("estimate",))
+    ] = "estimate"
+    """Position noise of the tracker.
+
+    Standard deviation of the position noise of the tracker, per axis; "estimate" takes it from the
+    recording; without a recording there is no noise.
+    """
+    orientation_noise_rad: Annotated[
+        float | Literal["estimate"], Quantity("rad", ge=0, le=3.2, words=("estimate",))
+    ] = "estimate"
+    """Orientation noise of the tracker.
+
+    Standard deviation of the orientation noise of the tracker; "estimate" as for the position.
+    """
+    position_quantum_m: Annotated[
+        float | Literal["recording"], Quantity("m", ge=0, le=1, words=("recording",))
+    ] = "recording"
+    """Resolution to which simulated positions are rounded, 0 for none; "recording" uses the
+    resolution of the recorded file."""
+    gaps: Literal["recording", "none"] = "recording"
+    """Missed samples: "recording" removes the samples that the recording lacks."""
+    field_of_view: FieldOfView | None = Field(
+        default=None, examples=['{ shape = "rectangle", width_m = 0.25, height_m = 0.2 }']
+    )
+    """Field of view of the camera, if smaller than the tank: the keys of [tank] for a shape, and
+    center_m; samples outside are missing."""

@@ -7,8 +7,7 @@ from typing import Annotated, ClassVar, Final, Literal, TypeVar
 
 from pydantic import Field, field_validator
 
-from driftwalk.core.errors import ConfigurationError
-from driftwalk.core.text.did_you_mean import did_you_mean
+from driftwalk.core.errors import ConfigurationError, did_you_mean
 from driftwalk.model.fit import Fit
 from driftwalk.model.section import Placeholder, Quantity, Section, Seed, quoted, words_of
 

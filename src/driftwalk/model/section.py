@@ -22,8 +22,7 @@ from typing import Annotated, Any, ClassVar, Final, get_args
 from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError
 from pydantic_core import CoreSchema, ErrorDetails, core_schema
 
-from driftwalk.core.errors import ConfigurationError
-from driftwalk.core.text.did_you_mean import did_you_mean
+from driftwalk.core.errors import ConfigurationError, did_you_mean
 from driftwalk.core.units import parse_quantity
 
 SMALLEST: Final = 1e-25

@@ -24,6 +24,7 @@ AXES: Final[dict[str, str]] = {
     "faces": "faces",
     "hidden_face_drag": "hidden_face_drag",
     "stirring_length": "stirring_length_m",
+    "bond_rate": "bond_rate_per_s",
     "magnets": "magnets",
     "drag_coefficient": "drag_coefficient",
     "force_std": "force_std_N",
@@ -82,6 +83,10 @@ class Sensitivity(ForceGrid):
         default=None, examples=["[0.0, 0.03, 0.1]"]
     )
     """Lengths over which blocks share the stochastic force to compare, an axis of the map."""
+    bond_rate_per_s: tuple[Annotated[float, Quantity("1/s", ge=0, le=1e6)], ...] | None = Field(
+        default=None, examples=["[0.0, 0.001, 0.01]"]
+    )
+    """Rates at which bonds break to compare, an axis of the map."""
     magnets: tuple[MagnetText, ...] | None = Field(
         default=None, examples=['["none", "3x3x1mm,1.2T"]']
     )

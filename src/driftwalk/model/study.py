@@ -10,18 +10,15 @@ from typing import TYPE_CHECKING, Any, Self
 
 from pydantic import Field, model_validator
 
-from driftwalk.core.errors import ConfigurationError, FormatError
-from driftwalk.core.text.did_you_mean import did_you_mean
+from driftwalk.core.errors import ConfigurationError, FormatError, did_you_mean
 from driftwalk.core.text.toml_text import parse_toml, read_toml
 from driftwalk.model.assembly import Assembly
 from driftwalk.model.block import Block
 from driftwalk.model.calibration import Calibration
 from driftwalk.model.fit import Fit
-from driftwalk.model.flow import Flow
-from driftwalk.model.forces import Forces
+from driftwalk.model.forces import Flow, Forces
 from driftwalk.model.interaction import Interaction
-from driftwalk.model.observation import Observation
-from driftwalk.model.recording import Recording, Steps
+from driftwalk.model.recording import Observation, Recording, Steps
 from driftwalk.model.recover import Recover
 from driftwalk.model.section import (
     OrNumber,

@@ -14,9 +14,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, Final
 
-from driftwalk.core.errors import ConfigurationError, DriftwalkError, InputError
+from driftwalk.core.errors import ConfigurationError, DriftwalkError, InputError, did_you_mean
 from driftwalk.core.extras import show_dask
-from driftwalk.core.text.did_you_mean import did_you_mean
 from driftwalk.motion.function import Settings, function_model
 from driftwalk.motion.protocol import MotionModel, ScoresItself
 from driftwalk.motion.ranges import Range

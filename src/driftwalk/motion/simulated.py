@@ -14,7 +14,7 @@ from driftwalk.conditions.recorded import Conditions, neighbours_of, recorded_co
 from driftwalk.core.arrays import Floats, Keys
 from driftwalk.core.errors import InputError
 from driftwalk.core.processors import default_threads
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.motion.block import BlockModel
 from driftwalk.motion.external_program.program import ProgramModel
 from driftwalk.motion.family import ParticleModel

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from driftwalk.core.errors import ConfigurationError, InputError
-from driftwalk.core.text.did_you_mean import did_you_mean
+from driftwalk.core.errors import ConfigurationError, InputError, did_you_mean
 from driftwalk.motion.choose import is_family_name, motion_model
 from driftwalk.motion.protocol import MotionModel
 from driftwalk.motion.ranges import known_value

@@ -12,8 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.core.arrays import Floats, Keys
-from driftwalk.core.random_streams import MotionStream
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import MotionStream, world_keys
 from driftwalk.simulation.initial import Start, world_orientations
 
 

@@ -6,6 +6,15 @@ loaded; a second, different statement is an error.
 
 from driftwalk.notebook.fitting import calibrate, compare_models, fit
 from driftwalk.notebook.reporting import report
-from driftwalk.notebook.simulating import assemble, compare, simulate
+from driftwalk.notebook.simulating import assemble, compare, kinetics, simulate
 
-__all__ = ["assemble", "calibrate", "compare", "compare_models", "fit", "report", "simulate"]
+__all__ = [
+    "assemble",
+    "calibrate",
+    "compare",
+    "compare_models",
+    "fit",
+    "kinetics",
+    "report",
+    "simulate",
+]

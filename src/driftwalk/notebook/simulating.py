@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from os import PathLike
 from typing import TYPE_CHECKING, Any, NamedTuple, Unpack
@@ -385,3 +385,75 @@ def _flow(flow: xr.Dataset | None) -> xr.Dataset:
     if flow is None:
         raise InputError("a study says nothing of the water: give `flow`, a flow field or a fit")
     return flow_field_of(flow)
+
+
+def kinetics(
+    runs: xr.Dataset | Sequence[xr.Dataset],
+    other: xr.Dataset | Sequence[xr.Dataset] | None = None,
+    *,
+    target: str | None = None,
+    blocks: int | None = None,
+    seed: int = 1,
+    folder: str | PathLike[str] | None = None,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+) -> xr.Dataset:
+    """Return how fast blocks assemble and by which steps: rates between the outcome classes.
+
+    Parameters
+    ----------
+    runs : xarray.Dataset or sequence of xarray.Dataset
+        An `assembly`, a `classification` of a recording, or several of one number of blocks.
+    other : xarray.Dataset or sequence of xarray.Dataset, optional
+        The same of other runs, such as real ones: are the rates equal?
+    target : str, optional
+        Outcome class to be reached, such as "T".
+    blocks : int, optional
+        Another number of blocks, for which the rate of the first joining is extrapolated where the
+        tank is well mixed; at least 2.
+    seed : int
+        Seed of the bootstrap, at least 0.
+    folder : path-like, optional
+        Run directory to make or continue, the same as that of ``driftwalk kinetics``.
+    overwrite : bool
+        Whether a finished run there is moved aside; it is refused otherwise.
+    progress : callable, optional
+        Called as ``progress(done, total, text)`` while the work goes on.
+
+    Returns
+    -------
+    Result
+        Kind "kinetics", see `driftwalk.assembly.kinetics`; its text begins with the verdict.
+
+    Raises
+    ------
+    InputError
+        When a dataset holds no outcome classes, numbers of blocks differ, the target is no class
+        of these blocks, or there are too few runs to tell.
+    RunDirectoryError
+        When the directory is in use, holds another run, or cannot be written.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> runs = dw.assemble(dw.Study(), dw.tank30_flow(), blocks=2, runs=400, duration="60s")
+    >>> dw.kinetics(runs, target="2").attrs["verdict"] != ""
+    True
+    """
+    from driftwalk.assembly import kinetics as estimate
+    from driftwalk.assembly.chains.histories import datasets_of
+    from driftwalk.notebook.result import as_result, run_in_folder
+    from driftwalk.runs import KineticsWork
+    from driftwalk.runs.resumable_run import silent
+
+    say = progress or silent
+    if folder is not None:
+        given = [datasets_of(one) for one in (runs, other) if one is not None]
+        work = KineticsWork(given, target, blocks, seed)
+        return as_result(run_in_folder(folder, "kinetics", work, overwrite, say))
+    return as_result(
+        estimate(
+            runs, other, target=target, blocks=blocks, seed=seed,
+            progress=lambda done, total: say(done, total, "models"),
+        )
+    )  # fmt: skip

@@ -43,12 +43,13 @@ SURVIVAL: Final = {
 }
 
 BAR_WIDTH: Final = 0.76
+COMPACT: Final = "compactness"
 GROWTH: Final = {
     "mean size": {"mean_size": "mean size"},
     "shares": {
         "largest_share": "in the largest assembly",
         "free_share": "alone",
-        "compactness": "compactness",
+        COMPACT: COMPACT,
     },
 }
 
@@ -388,7 +389,10 @@ def plot_growth(
     if what not in GROWTH:
         raise InputError(f"what='{what}': choose {' or '.join(GROWTH)}")
     both = [sizes] if beside is None else [sizes, beside]
-    curves = GROWTH[what]
+    # Older files have no compactness.
+    curves = {
+        name: words for name, words in GROWTH[what].items() if name in sizes or name != COMPACT
+    }
     for one in both:
         check_kind(one, "assembly_sizes", "time", *curves)
     ax = style.axes_or_new(ax, height_mm=65.0)

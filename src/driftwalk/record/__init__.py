@@ -12,6 +12,11 @@ from driftwalk.record.cleaning.jumps import (
     impossible_steps,
     impossible_warning,
 )
+from driftwalk.record.cleaning.outliers import (
+    mistakes_warning,
+    without_far_outliers,
+    without_outliers,
+)
 from driftwalk.record.info import describe
 from driftwalk.record.io import load, readable_formats, save_trajectory
 from driftwalk.record.noise import (
@@ -35,10 +40,13 @@ __all__ = [
     "impossible_steps",
     "impossible_warning",
     "load",
+    "mistakes_warning",
     "noise_bound",
     "noise_reach",
     "place_arena",
     "readable_formats",
     "save_trajectory",
     "tank_radius_bound",
+    "without_far_outliers",
+    "without_outliers",
 ]

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from driftwalk.core.errors import FormatError, InputError
+from driftwalk.core.errors import FormatError, InputError, listed
 from driftwalk.core.files.atomic import atomic_path, require_target, write_atomic
-from driftwalk.core.text.did_you_mean import listed
 from driftwalk.core.text.json_text import parse_json
 from driftwalk.core.units import parse_quantity
 from driftwalk.record.arena import PlacedArena, arena_attributes, place_arena
@@ -22,6 +21,7 @@ from driftwalk.record.cleaning.clean import Counts, clean_body
 from driftwalk.record.cleaning.clock import check_clock, unwrap_counters
 from driftwalk.record.cleaning.jumps import arena_diagonal, impossible_steps, impossible_warning
 from driftwalk.record.cleaning.missing import blank_missing, mark_warnings
+from driftwalk.record.cleaning.outliers import without_far_outliers
 from driftwalk.record.cleaning.warn import (
     angle_warnings,
     plausibility_warnings,
@@ -370,7 +370,9 @@ def _place(tank: str, bodies: list[RawBody], *, block_side: float | None) -> Pla
     def reach(size: float) -> float:
         return max(noise_reach(_track(body), size=size) for body in bodies)
 
-    x, y = (np.concatenate([getattr(body, axis) for body in bodies]) for axis in ("x", "y"))
+    # One sample in a thousand beyond the wall moves the centre: mistakes of a tracker may be more.
+    sound = [without_far_outliers(_track(body)) for body in bodies]
+    x, y = (np.concatenate([getattr(one, axis) for one in sound]) for axis in ("x", "y"))
     return place_arena(tank, x, y, block_side=block_side, reach=reach)
 
 

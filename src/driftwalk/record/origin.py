@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from driftwalk.core.errors import FormatError, InputError, naming_its_file
-from driftwalk.core.files.file_names import text_of_name
+from driftwalk.core.files.bounded import text_of_name
 from driftwalk.record.raw import RawRecording, ReadOptions
 from driftwalk.record.recognise import nearest_table
 from driftwalk.record.registry import PLAIN, find_loader, loaders

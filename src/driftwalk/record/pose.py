@@ -8,8 +8,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from driftwalk.core.errors import InputError
-from driftwalk.core.text.did_you_mean import listed
+from driftwalk.core.errors import InputError, listed
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
 
 

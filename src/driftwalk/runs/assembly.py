@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Final, Self
 
@@ -45,6 +46,8 @@ class AssemblyResult:
         Kind "outcome_distribution", of runs with drawn parameters.
     sizes, sizes_drawn : xarray.Dataset or None
         Kind "assembly_sizes", of the same two sets of runs; beyond 8 blocks only.
+    steady : xarray.Dataset or None
+        Kind "steady_state", of the runs with the study's parameters; where bonds break only.
     attraction : xarray.Dataset or None
         Kind "attraction", where blocks feel each other at a distance.
     """
@@ -55,6 +58,7 @@ class AssemblyResult:
     drawn: xr.Dataset | None
     sizes: xr.Dataset | None = None
     sizes_drawn: xr.Dataset | None = None
+    steady: xr.Dataset | None = None
     attraction: xr.Dataset | None = None
 
 
@@ -116,6 +120,7 @@ class AssemblyWork:
             "flow_sha256": dataset_hash(self.flow, tuple(n for n in names if n in self.flow)),
             "calibration_sha256": dataset_hash(found, drawn_from),
             **({"quantiles": drawn} if (drawn := _lists(self.quantiles)) else {}),
+            **_table_hash(self.study),
         }
 
     def compute(self, run: Run) -> AssemblyResult:
@@ -126,6 +131,7 @@ class AssemblyWork:
             assembly_path,
             attraction,
             class_times,
+            steady_state,
         )
 
         settings = self.study.assembly
@@ -146,6 +152,10 @@ class AssemblyWork:
         if pull is not None:
             pull = run.keep("attraction.nc", pull)
         times = run.keep("class_times.nc", class_times(assembly, confidence=settings.confidence))
+        steady = None
+        if settings.bonds_break:
+            steady = steady_state(assembly, confidence=settings.confidence)
+            steady = run.keep("steady_state.nc", steady)
         if self.calibration is not None:
             assembly_drawn = assemble_drawn(
                 self.study,
@@ -177,7 +187,9 @@ class AssemblyWork:
             course.begin("film")
             film = run.directory.folder("figures") / f"run.{self.film}"
             driftwalk.plot.write_animation(path, film)
-        return AssemblyResult(assembly, distribution, times, drawn, sizes, sizes_drawn, pull)
+        return AssemblyResult(
+            assembly, distribution, times, drawn, sizes, sizes_drawn, steady, pull
+        )
 
     def _outcomes(
         self, assembly: xr.Dataset, run: Run, ending: str
@@ -202,6 +214,14 @@ class AssemblyWork:
             "figures": 1.0,
             **({} if self.film == "none" else {"film": 1.0}),
         }
+
+
+def _table_hash(study: Study) -> dict[str, str]:
+    """Return the hash of a table of attractions: a run goes on only with the same one."""
+    table = study.interaction.attraction
+    if table is None:
+        return {}
+    return {"attraction_sha256": sha256(Path(table).read_bytes()).hexdigest()}
 
 
 def _lists(quantiles: Mapping[str, Floats]) -> dict[str, list[float]]:
@@ -294,6 +314,7 @@ class SensitivityWork:
             "flow_sha256": dataset_hash(self.flow, ("u", "v")),
             "flows_sha256": flows,
             "sobol_samples": self.samples,
+            **_table_hash(self.study),
         }
 
     def compute(self, run: Run) -> SensitivityResult:

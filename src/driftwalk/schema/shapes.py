@@ -63,6 +63,11 @@ def counted_class(assemblies: int) -> str:
     return "1 assembly" if assemblies == 1 else f"{assemblies} assemblies"
 
 
+def all_single(blocks: int) -> str:
+    """Name the class in which every block is alone."""
+    return counted_class(blocks) if blocks > MOST_NAMED else "+".join(["1"] * blocks)
+
+
 def is_one_assembly(name: str) -> bool:
     """Return whether all blocks of an outcome class are in one assembly.
 

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from driftwalk import _core
 from driftwalk.core.errors import InputError
 from driftwalk.core.processors import default_threads
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.schema.check import build_dataset
 from driftwalk.schema.trajectory import POSE
 from driftwalk.simulation.backend import Camera, check_sample_time, native_model, world_table

@@ -1,12 +1,21 @@
-"""Executor on a Dask cluster: each worker is checked and gets a function once, then units.
+"""Executors in other processes: of this machine, and on a Dask cluster.
 
-A unit is a few numbers; the function of a sweep holds a flow, a recording, a model. On a Dask
-cluster the function is therefore a separate object, which a worker fetches with its first unit.
+Each worker of a cluster is checked and gets a function once, then units. A unit is a few numbers;
+the function of a sweep holds a flow, a recording, a model. On a Dask cluster the function is
+therefore a separate object, which a worker fetches with its first unit.
 The scheduling of units: a window of submitted ones, and slow ones submitted again.
 """
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
 import hashlib
 import pickle
 import platform
@@ -18,7 +27,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 from statistics import median
-from typing import Any, Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -366,3 +375,86 @@ def handout(executor: Executor, function: UnitFunction) -> Handout:
     if client is not None and type(executor).__module__.startswith("distributed"):
         return _OnWorkers(WorkerExecutor(client), function)
     return Handout(executor, function)
+
+
+LINEAR_ALGEBRA_THREADS: Final = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+)
+
+
+@contextmanager
+def single_threaded_processes(count: int) -> Iterator[ProcessPoolExecutor]:
+    """Give an executor of `count` processes whose linear algebra has one thread each.
+
+    Results then have the same bits whatever the number of processes. The processes end with the
+    block, also when it is left by an error or when this process is killed; Ctrl-C is for this
+    process alone.
+
+    Parameters
+    ----------
+    count : int
+        Number of processes, at least 1.
+
+    Yields
+    ------
+    concurrent.futures.ProcessPoolExecutor
+        Functions and their arguments must pickle. A script that comes here needs
+        ``if __name__ == "__main__":`` around what it does, as for every use of processes.
+
+    Examples
+    --------
+    >>> with single_threaded_processes(2) as executor:  # doctest: +SKIP
+    ...     list(executor.map(abs, [-1, 2]))
+    [1, 2]
+    """
+    import multiprocessing
+
+    context = multiprocessing.get_context("spawn")
+    reader, writer = context.Pipe(duplex=False)
+    with _environment(dict.fromkeys(LINEAR_ALGEBRA_THREADS, "1")):
+        executor = ProcessPoolExecutor(
+            count, mp_context=context, initializer=_begin, initargs=(reader,)
+        )
+        try:
+            yield executor
+            executor.shutdown()
+        except BaseException:
+            executor.shutdown(wait=False, cancel_futures=True)
+            raise
+        finally:
+            writer.close()
+            reader.close()
+
+
+@contextmanager
+def _environment(values: dict[str, str]) -> Iterator[None]:
+    """Set variables of the environment, which processes inherit; restore them after."""
+    before = {name: os.environ.get(name) for name in values}
+    os.environ.update(values)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+def _begin(alive: Connection) -> None:
+    """Leave Ctrl-C to the parent, and end when its end of the pipe is closed or it is dead."""
+    import signal
+    import threading
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with, args=(alive,), daemon=True).start()
+
+
+def _end_with(alive: Any) -> None:
+    try:
+        alive.poll(None)
+    finally:
+        os._exit(1)

@@ -16,7 +16,7 @@ from command_line import FLOW, RECORDING, here, leave_out_figures
 
 import driftwalk as dw
 from driftwalk.conditions import Conditions
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.motion import BlockModel, MotionModel, motion_model
 from driftwalk.simulation import Start
 from driftwalk.simulation.backend import Camera

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from chain_runs import chain_runs
 from command_line import FLOW, GRID, RECORDING, here, leave_out_figures
 from few_simulations import compare_after_little, simulate_little
 
@@ -50,6 +51,7 @@ RUNS: dict[str, tuple[tuple[object, ...], str]] = {
         ("assemble", "--flow", FLOW, *TANK, *LITTLE, "--runs", "20"),
         "Self-assembly under way",
     ),
+    "kinetics": (("kinetics", "runs.nc"), "Kinetics under way"),
     "sensitivity": (
         ("sensitivity", "--flow", FLOW, *TANK, *LITTLE, *VARIED, "--runs", "5"),
         "A sensitivity analysis under way",
@@ -94,6 +96,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return a folder with the studies, in which the runs are made."""
     for name, text in (("grid", GRID), ("known", KNOWN), ("truth", TRUTH)):
         (tmp_path / f"{name}.toml").write_text(text, encoding="utf-8")
+    chain_runs(60, 1).to_netcdf(tmp_path / "runs.nc")
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

@@ -9,6 +9,7 @@ two agree to rounding until a collision amplifies it, and in distribution after.
     wall      assemblies against the wall
     contacts  blocks against blocks: overlap, impulses, shifts
     latch     which faces join, and the body that they make
+    bonds     which bonds break, and the bodies that they leave
     pull      forces between blocks at a distance
 
 The twin decides cases that the rules leave open:
@@ -49,6 +50,7 @@ from driftwalk.core.errors import InputError
 from driftwalk.simulation.backend import wall_edges
 from twin.block import TwinModel, drag, force_normals, next_force, push_of_water
 from twin.body import Assembly, Floats, Square, cross, single_block, wrapped
+from twin.bonds import CLOSING, JOINING, Bonds, break_bonds, faces_between
 from twin.contacts import collide, overlapping_pairs, separate
 from twin.faces import Faces
 from twin.latch import Joined, Latch, Latching, candidates, latch_once
@@ -89,6 +91,7 @@ class Event(NamedTuple):
     step: int
     blocks: tuple[int, int]
     faces: tuple[int, int]
+    kind: int = JOINING
 
 
 @dataclass
@@ -100,6 +103,7 @@ class World:
     step: int = 0
     events: list[Event] = field(default_factory=list)
     first_contact_step: int = -1
+    bonds: Bonds | None = None
 
     @property
     def blocks(self) -> int:
@@ -109,7 +113,7 @@ class World:
     @property
     def complete(self) -> bool:
         """Whether a merge has left one assembly."""
-        return len(self.assemblies) == 1 and bool(self.events)
+        return len(self.assemblies) == 1 and bool(self.events) and self.bonds is None
 
     def gather(self, name: str) -> npt.NDArray[Any]:
         """Return `pose`, `cell`, `quarter` or `assembly` (lowest block), one entry per block."""
@@ -140,6 +144,8 @@ def assemble_reference(
     block_friction: float,
     faces: FaceTable | None = None,
     sample_every: int = 0,
+    bond_rate: float = 0.0,
+    relatch_clearance: float = 1.25,
 ) -> dict[str, Any]:
     """Simulate the self-assembly of one world.
 
@@ -170,6 +176,9 @@ def assemble_reference(
         Rules of typed faces.
     sample_every : int, optional
         Steps between samples of the path; 0: none, and a complete world ends early.
+    bond_rate, relatch_clearance : float
+        Rate at which each bond breaks [1/s], 0: never, and the distance of the centres of what
+        has parted from which it latches again [side].
 
     Returns
     -------
@@ -211,6 +220,8 @@ def assemble_reference(
         block_friction=block_friction,
     )
     world = start_world(rules, np.asarray(start, dtype=np.float64))
+    if bond_rate > 0:
+        world.bonds = Bonds(key, bond_rate, relatch_clearance)
     samples = [world.gather("pose")]
     sample_assemblies = [world.gather("assembly")]
     force: Floats | None = None
@@ -304,6 +315,9 @@ def advance(world: World, force: Floats) -> None:
     for body in world.assemblies:
         if meet_wall(world.rules.wall, body):
             body.drag = np.zeros(3)
+    if world.bonds is not None:
+        for kind, blocks, faces in break_bonds(world, world.bonds):
+            world.events.append(Event(world.step, blocks, faces, kind))
     settle(world)
 
 
@@ -367,10 +381,9 @@ def drag_sums(
         owner = np.repeat(np.arange(len(sizes)), sizes)
         typed = rules.latch.faces
         pole = None if typed is None else np.concatenate([typed.poles(b) for b in world.assemblies])
-        pulled = pull_of_blocks(
-            rules.pull, members[:3], members[3:], hidden, owner, None if pole is None else pole.T
+        force_x, force_y, torque = np.stack([force_x, force_y, torque]) + pull_of_blocks(
+            rules.pull, *_drifted(world), hidden, owner, None if pole is None else pole.T
         )
-        force_x, force_y, torque = force_x + pulled[0], force_y + pulled[1], torque + pulled[2]
     sums, first = [], 0
     for body, arm in zip(world.assemblies, arms, strict=True):
         own = slice(first, first + body.size)
@@ -384,6 +397,18 @@ def drag_sums(
     return sums
 
 
+def _drifted(world: World) -> tuple[Floats, Floats]:
+    """Return pose and velocity of every block, half a step ahead without forces, shape (3, n)."""
+    poses, motions = [], []
+    for body in world.assemblies:
+        x, y, angle = body.pose + world.rules.model.time_step / 2 * body.motion
+        arm, (vx, vy, spin) = body.arms(angle), body.motion
+        one = np.ones(body.size)
+        poses.append([x + arm[:, 0], y + arm[:, 1], angle * one])
+        motions.append([vx - spin * arm[:, 1], vy + spin * arm[:, 0], spin * one])
+    return np.concatenate(poses, axis=1), np.concatenate(motions, axis=1)
+
+
 def settle(world: World) -> None:
     """Latch, collide and separate what has met."""
     rules = world.rules
@@ -392,7 +417,8 @@ def settle(world: World) -> None:
         return
     met = overlapping
     touched: list[Assembly] = []
-    while joined := latch_once(rules.latch, rules.wall, world.assemblies):
+    bars = None if world.bonds is None else world.bonds.bars
+    while joined := latch_once(rules.latch, rules.wall, world.assemblies, bars):
         met = True
         _join(world, joined)
         touched.append(joined.made)
@@ -415,10 +441,14 @@ def _join(world: World, joined: Joined) -> None:
     kept = [body for body in world.assemblies if body not in joined.removed]
     world.assemblies = sorted([*kept, joined.made], key=lambda body: body.blocks[0])
     world.events.append(Event(world.step, joined.blocks, joined.faces))
+    for pair in [] if world.bonds is None else world.bonds.form(joined.made, world.step):
+        if set(pair) != set(joined.blocks):
+            faces = faces_between(joined.made, pair)
+            world.events.append(Event(world.step, pair, faces, CLOSING))
 
 
 def _row(world: World) -> dict[str, Any]:
-    room = max(world.blocks - 1, 1)
+    room = max(world.blocks - 1, 1, len(world.events))
     row: dict[str, Any] = {
         "event_count": len(world.events),
         "event_step": np.full(room, -1, dtype=np.int32),
@@ -427,6 +457,8 @@ def _row(world: World) -> dict[str, Any]:
         "first_contact_step": world.first_contact_step,
         "end_step": world.step,
     }
+    if world.bonds is not None:
+        row["event_kind"] = np.array([event.kind for event in world.events], dtype=np.int32)
     for k, event in enumerate(world.events):
         row["event_step"][k] = event.step
         row["event_block"][k] = event.blocks

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -55,14 +55,24 @@ class Joined(NamedTuple):
     made: Assembly
 
 
-def latch_once(latch: Latch, wall: Wall, assemblies: list[Assembly]) -> Joined | None:
-    """Return the merge of the first admissible candidate, None when there is none."""
+def latch_once(
+    latch: Latch,
+    wall: Wall,
+    assemblies: list[Assembly],
+    bars: Callable[[Assembly, Assembly], bool] | None = None,
+) -> Joined | None:
+    """Return the merge of the first admissible candidate, None when there is none.
+
+    `bars` says of two assemblies whether they must not latch.
+    """
     home = {block: body for body in assemblies for block in body.blocks}
     for candidate in sorted(candidates(latch, assemblies)):
         ends = [
             (home[candidate.block], candidate.block, candidate.face),
             (home[candidate.other_block], candidate.other_block, candidate.other_face),
         ]
+        if bars is not None and bars(ends[0][0], ends[1][0]):
+            continue
         # More blocks stay; of equal ones the one with the lowest block.
         stayed, moved = sorted(ends, key=lambda end: (-end[0].size, end[0].blocks[0]))
         made = merged(stayed, moved)

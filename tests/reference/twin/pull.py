@@ -5,6 +5,8 @@ Radial forces are those of the core's tables, linear in the squared distance wit
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import numpy.typing as npt
 
@@ -12,10 +14,16 @@ from driftwalk.assembly.pull.tables import BlockPull, RadialForce, cell_start
 from twin.body import Floats, cross
 
 
+@lru_cache
+def nodes(force: RadialForce) -> tuple[Floats, Floats]:
+    """Return squared distances [m²] and the attraction over the distance there [N/m]."""
+    cells, first = force.cells()
+    return cell_start(first + np.arange(len(cells))), cells[:, 0]
+
+
 def strength(force: RadialForce, squared: npt.ArrayLike) -> Floats:
     """Return the attraction over the distance [N/m] at squared distances [m²]."""
-    cells, first = force.cells()
-    return np.interp(squared, cell_start(first + np.arange(len(cells))), cells[:, 0])
+    return np.interp(squared, *nodes(force))
 
 
 def pull_of_blocks(

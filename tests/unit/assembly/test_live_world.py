@@ -64,7 +64,7 @@ def test_events_are_told_once_with_the_class_after_them() -> None:
     assert tank.events() == []
     assert [event.time for event in told] == sorted(event.time for event in told)
     labels = tank.assembly
-    assert all(labels[one] == labels[other] for _, (one, other), _ in told)
+    assert all(labels[one] == labels[other] for _, (one, other), *_ in told)
     assert len(np.unique(labels)) == 8 - len(told) == len(tank.outcome.split("+"))
 
 

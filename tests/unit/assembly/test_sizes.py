@@ -111,23 +111,44 @@ def test_the_growth_is_what_the_worlds_were_at_each_time(runs: list[Run]) -> Non
                 assert float(one[f"{name}_high"]) == pytest.approx(min(high, most))
 
 
-def test_compactness_is_that_of_the_cells(runs: list[Run]) -> None:
+def compactness_of(world: object) -> float:
     """By definition: the least perimeter over that of the cells, of four blocks and more."""
-    per_run = []
-    for run in runs:
-        shapes = [
-            {place for place, _ in members.values()}
-            for members in run.worlds[-1].assemblies.values()
-            if len(members) >= 4
-        ]
-        if shapes:
-            weight = [len(cells) for cells in shapes]
-            ratio = [least_perimeter(len(cells)) / perimeter(cells) for cells in shapes]
-            per_run.append(np.average(ratio, weights=weight))
+    shapes = [
+        {place for place, _ in members.values()}
+        for members in world.assemblies.values()  # type: ignore[attr-defined]
+        if len(members) >= 4
+    ]
+    if not shapes:
+        return float("nan")
+    ratio = [least_perimeter(len(cells)) / perimeter(cells) for cells in shapes]
+    return float(np.average(ratio, weights=[len(cells) for cells in shapes]))
+
+
+def test_compactness_is_that_of_the_cells(runs: list[Run]) -> None:
+    per_run = [one for run in runs if (one := compactness_of(run.worlds[-1])) == one]
     found = assembly_sizes(dataset(runs, 20)).attrs
     assert found["compactness"] == pytest.approx(np.mean(per_run))
     assert found["compactness_runs"] == len(per_run)
     assert found["compactness_low"] < found["compactness"] < found["compactness_high"] <= 1.0
+
+
+def test_compactness_over_time_leaves_out_runs_that_have_none_yet(runs: list[Run]) -> None:
+    times = [0.0, 2.0, 9.5, 12.0, 15.0, 30.0]
+    found = assembly_sizes(dataset(runs, 20), times=times)
+    known = []
+    for at, time in enumerate(times):
+        then = [run.worlds[sum(one <= time for one in times_of(run))] for run in runs]
+        values = np.array([compactness_of(world) for world in then])
+        own = values[np.isfinite(values)]
+        known.append(own.size)
+        one = found.isel(time=at)
+        expected = own.mean() if own.size else np.nan
+        assert float(one["compactness"]) == pytest.approx(expected, nan_ok=True)
+        if own.size > 1 and np.ptp(own) > 0:
+            reach = stats.t.ppf(0.95, own.size - 1) * stats.sem(own)
+            assert float(one["compactness_low"]) == pytest.approx(max(own.mean() - reach, 0.0))
+    assert known[0] == 0
+    assert any(0 < one < len(runs) for one in known)
 
 
 @pytest.mark.parametrize("size", range(4, 8))

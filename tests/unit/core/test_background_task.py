@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from driftwalk.core.background_task import run_in_background
+from driftwalk.core.processors import run_in_background
 
 
 def test_both_are_under_way_at_once() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from driftwalk.core.errors import InputError
 from driftwalk.flow import inertia_correction
-from driftwalk.flow.inertia import cross_section
+from driftwalk.flow.extract import cross_section
 
 BLOCK = {"mass": 0.0116, "area": 9e-4, "water_density": 1000.0, "flow_drag_coefficient": 1.05}
 

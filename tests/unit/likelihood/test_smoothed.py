@@ -117,3 +117,16 @@ def test_a_fit_refuses_smoothed_positions() -> None:
     with pytest.raises(InputError, match=r"look like averages over 3 frames.*export the raw"):
         dw.likelihood.check_fit(film, coarse_study("auto"))
     dw.likelihood.check_fit(raw, coarse_study("auto"))
+
+
+def test_a_quick_orbit_is_no_smoothing() -> None:
+    # Synthetic: round the core of an eddy 0.95 times a second, with the noise of a camera. By the
+    # whole spectrum these were averages over 7 frames.
+    rng = np.random.default_rng(2)
+    steps, noise = rng.normal(size=(2, 6000)), 3e-4 * rng.normal(size=(2, 6000))
+    turn = np.exp(0.1 * (2j * np.pi * 0.95 - 0.1))
+    place = lfilter([1.0], [1.0, -turn], steps[0] + 1j * steps[1])
+    place *= 1e-3 / place.real.std()
+    time = 0.1 * np.arange(6000)
+    track = Track(time, place.real + noise[0], place.imag + noise[1], np.zeros(6000))
+    assert find_smoothing(track) is None

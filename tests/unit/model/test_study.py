@@ -87,13 +87,14 @@ def _companions(section: str, key: str) -> dict[str, object]:
 
 def test_every_number_declares_a_unit_that_its_name_repeats() -> None:
     suffixes = {"m", "kg", "s", "N", "rad", "Hz", "m_s", "kg_m3", "kg_s", "Pa_s", "N_m", "N_s"}
+    suffixes |= {"per_s"}
     for name in Study.model_fields:
         kind = type(getattr(Study(), name))
         for key in kind.model_fields:
             assert description_of(kind, key), key
             quantity = quantity_of(kind, key)
             if quantity is not None and quantity.unit != "1" and key != "metres_per_pixel":
-                suffix = quantity.unit.replace("/", "_").replace(" ", "_")
+                suffix = quantity.unit.replace("1/", "per_").replace("/", "_").replace(" ", "_")
                 assert suffix in suffixes
                 assert key.endswith(f"_{suffix}"), key
 

@@ -11,7 +11,7 @@ import driftwalk as dw
 from driftwalk.comparison import StepDistance
 from driftwalk.conditions import recorded_conditions
 from driftwalk.core.errors import InputError
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.model import apply_overrides
 from driftwalk.motion import BlockModel, score_worlds
 from driftwalk.schema import body_track

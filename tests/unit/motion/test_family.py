@@ -13,7 +13,7 @@ import driftwalk as dw
 from driftwalk import _core
 from driftwalk.conditions import Neighbours
 from driftwalk.core.errors import ConfigurationError, InputError
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.motion.choose import family_model
 from driftwalk.motion.family import MEMBERS, PARTS
 from driftwalk.motion.family.columns import (

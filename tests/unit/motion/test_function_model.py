@@ -10,7 +10,7 @@ import pytest
 import driftwalk as dw
 from driftwalk.conditions import Conditions
 from driftwalk.core.errors import ConfigurationError, InputError
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.motion import motion_model, observe_worlds
 from driftwalk.simulation import Start
 from driftwalk.simulation.backend import STATUS, Camera

@@ -14,7 +14,7 @@ from walkers import tumble
 
 import driftwalk as dw
 from driftwalk.core.errors import ConfigurationError, InputError
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.motion import MotionModel, Parameter, ScoresItself, motion_model
 from driftwalk.testing import MotionModelContract
 

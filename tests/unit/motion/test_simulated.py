@@ -13,7 +13,7 @@ from walkers import diffuse
 
 import driftwalk as dw
 from driftwalk.core.errors import ConfigurationError, InputError
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.model import Study, apply_overrides
 from driftwalk.motion import BlockModel, MotionModel, estimated_values, known_values
 from driftwalk.motion.simulated import simulate_motion

@@ -158,7 +158,7 @@ def test_a_film_is_whole_or_not_there(path, tmp_path, monkeypatch) -> None:
     def stop(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(film, "_outline", stop)
+    monkeypatch.setattr(film, "_outlines", stop)
     with pytest.raises(KeyboardInterrupt):
         write_animation(path, tmp_path / "run.gif", seconds=0.2)
     assert list(tmp_path.iterdir()) == []

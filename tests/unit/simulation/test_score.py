@@ -11,7 +11,7 @@ from single_block import model, random_worlds, run, swirl
 import driftwalk as dw
 from driftwalk import _core
 from driftwalk.comparison import apply_steps, plan_steps
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 
 WORLDS = 21
 TIME = np.delete(np.arange(150) * 0.1, [40, 41, 90])

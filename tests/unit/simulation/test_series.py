@@ -10,7 +10,7 @@ import xarray as xr
 
 import driftwalk as dw
 from driftwalk.core.errors import InputError
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.schema.kinds.flow import flow_series_words
 from driftwalk.simulation import simulate
 from driftwalk.simulation.series import (

@@ -23,7 +23,7 @@ from single_block import (
 import driftwalk as dw
 from driftwalk import _core
 from driftwalk.core.errors import InputError
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.schema import build_flow_field, build_trajectory
 from driftwalk.simulation import Start
 

@@ -10,7 +10,7 @@ import time
 
 import pytest
 
-from driftwalk.sweep.processes import LINEAR_ALGEBRA_THREADS, single_threaded_processes
+from driftwalk.sweep.workers import LINEAR_ALGEBRA_THREADS, single_threaded_processes
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 
@@ -62,7 +62,7 @@ def test_they_end_when_an_error_leaves_the_block() -> None:
 def test_they_end_when_their_parent_is_killed() -> None:
     code = (
         "import os, time\n"
-        "from driftwalk.sweep.processes import single_threaded_processes\n"
+        "from driftwalk.sweep.workers import single_threaded_processes\n"
         "with single_threaded_processes(1) as executor:\n"
         "    print(executor.submit(os.getpid).result(), flush=True)\n"
         "    executor.submit(time.sleep, 600.0).result()\n"

@@ -11,7 +11,7 @@ import pytest
 
 import driftwalk as dw
 from driftwalk.core.errors import InputError
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.model import apply_overrides
 from driftwalk.motion import model_start
 from driftwalk.simulation.backend import Camera

@@ -67,7 +67,7 @@ struct Crowd {
 template <int Count, class Real>
 inline void sum_crowd(const Crowd<Real>& crowd, Sums<Real>* sums, int rows) {
   using T = typename Numbers<Real>::Scalar;
-  constexpr int lanes = Numbers<Real>::lanes;
+  constexpr unsigned lanes = Numbers<Real>::lanes;
   for (int row = 0; row < rows; ++row) {
     for (int k = 0; k < Count; ++k) {
       sums[row].total[k] = Real(T(0)) + sums[row].part[k];
@@ -77,15 +77,18 @@ inline void sum_crowd(const Crowd<Real>& crowd, Sums<Real>* sums, int rows) {
     const int first = crowd.first(body), end = crowd.end[body];
     T total[Count] = {};
     for (int i = first; i < end; ++i) {
-      const Sums<Real>& at = sums[crowd.order[i] / lanes];
+      // Unsigned, so that to divide is to shift.
+      const unsigned block = static_cast<unsigned>(crowd.order[i]);
+      const Sums<Real>& at = sums[block / lanes];
       for (int k = 0; k < Count; ++k) {
-        total[k] = total[k] + get(at.part[k], crowd.order[i] % lanes);
+        total[k] = total[k] + get(at.part[k], static_cast<int>(block % lanes));
       }
     }
     for (int i = first; i < end; ++i) {
-      Sums<Real>& at = sums[crowd.order[i] / lanes];
+      const unsigned block = static_cast<unsigned>(crowd.order[i]);
+      Sums<Real>& at = sums[block / lanes];
       for (int k = 0; k < Count; ++k) {
-        put(at.total[k], crowd.order[i] % lanes, total[k]);
+        put(at.total[k], static_cast<int>(block % lanes), total[k]);
       }
     }
   }

@@ -18,18 +18,22 @@ struct PackMemory {
   Pulled<Real>* pulled;                          // [row]
   Pulled<typename Numbers<Real>::Scalar>* alone; // [block] of one world
   BlockBook* books;                              // [block][lane], of one world [block]
+  Bond* bonds;                                   // [world][bond_room]
   Crowd<Real> crowd;                             // of one world
 
   // Whether a pack with room for this many blocks holds one world.
   static constexpr bool is_one_world(int blocks) {
     return lanes == 1 || blocks > most_blocks_all_pairs;
   }
-  static std::size_t bytes(int blocks) {
+  static std::size_t bytes(int blocks) { return bytes_of(blocks, is_one_world(blocks)); }
+  static std::size_t bytes_of(int blocks, bool one_world) {
     PackMemory layout;
-    return layout.place(nullptr, blocks);
+    return layout.place(nullptr, blocks, one_world);
   }
   PackMemory() = default;
-  PackMemory(void* memory, int blocks) { place(static_cast<char*>(memory), blocks); }
+  PackMemory(void* memory, int blocks, bool holds_one_world) {
+    place(static_cast<char*>(memory), blocks, holds_one_world);
+  }
 
   int rows(int blocks) const { return one_world ? (blocks + lanes - 1) / lanes : blocks; }
   // The row and the lane of a block of a world.
@@ -40,19 +44,20 @@ struct PackMemory {
   }
 
 private:
-  std::size_t place(char* memory, int blocks) {
+  std::size_t place(char* memory, int blocks, bool holds_one_world) {
     std::size_t size = 0;
     const auto take = [&](auto*& pointer, std::size_t count) {
       using Item = std::remove_reference_t<decltype(*pointer)>;
       pointer = memory == nullptr ? nullptr : reinterpret_cast<Item*>(memory + size);
       size = (size + count * sizeof(Item) + 63) / 64 * 64;
     };
-    one_world = is_one_world(blocks);
+    one_world = holds_one_world;
     const std::size_t count = static_cast<std::size_t>(rows(blocks));
     take(members, count);
     take(sums, count);
     take(pulled, count);
     take(books, count * lanes);
+    take(bonds, static_cast<std::size_t>(bond_room(blocks)) * (one_world ? 1 : lanes));
     if (one_world) {
       take(alone, count * lanes);
       crowd.place(take, count);
@@ -167,6 +172,7 @@ inline void fill_scene(const AssemblyRules& rules, const PackMemory<Real>& pack,
     assembly.blocks = 0;
     assembly.touched = false;
     if (block.assembly == b) {
+      assembly.moved = 0;
       assembly.x = get(m.pose.x, lane);
       assembly.y = get(m.pose.y, lane);
       assembly.theta = get(m.pose.theta, lane);
@@ -209,6 +215,18 @@ inline void read_block(const AssemblyRules& rules, const Scene& scene, const Pac
   const int lane = pack.lane(b, world);
   const SceneBlock& block = scene.block[b];
   const SceneAssembly& body = scene.assembly[block.assembly];
+  // What the scene rounds otherwise than the lanes, whether it has changed or not.
+  put(m.axes.cosine, lane, body.cosine);
+  put(m.axes.sine, lane, body.sine);
+  put(m.per_inertia, lane, rules.mass * body.blocks / body.inertia);
+  put(m.lightness, lane, rules.inertia / body.inertia);
+  put(m.arm.x, lane, block.x - body.x);
+  put(m.arm.y, lane, block.y - body.y);
+  put(m.x, lane, block.x);
+  put(m.y, lane, block.y);
+  if (!body.touched && body.moved == 0) {
+    return;
+  }
   put(m.pose.x, lane, body.x);
   put(m.pose.y, lane, body.y);
   put(m.pose.theta, lane, body.theta);
@@ -218,18 +236,10 @@ inline void read_block(const AssemblyRules& rules, const Scene& scene, const Pac
   if (body.touched) {
     put_rest(m.drag, lane);
   }
-  put(m.axes.cosine, lane, body.cosine);
-  put(m.axes.sine, lane, body.sine);
   put(m.root, lane, block.assembly);
   put(m.per_count, lane, 1.0 / body.blocks);
-  put(m.per_inertia, lane, rules.mass * body.blocks / body.inertia);
-  put(m.lightness, lane, rules.inertia / body.inertia);
   put(m.offset_x, lane, block.offset_x);
   put(m.offset_y, lane, block.offset_y);
-  put(m.arm.x, lane, block.x - body.x);
-  put(m.arm.y, lane, block.y - body.y);
-  put(m.x, lane, block.x);
-  put(m.y, lane, block.y);
   pack.book(b, lane) = {static_cast<std::int16_t>(block.cell_x),
                         static_cast<std::int16_t>(block.cell_y),
                         static_cast<std::uint8_t>(block.quarter),

@@ -2,6 +2,7 @@
 // runs: the kernel of assembly/pack.hpp in double precision.
 #pragma once
 
+#include "driftwalk/assembly/bonds.hpp"
 #include "driftwalk/assembly/rules.hpp"
 #include "driftwalk/simulate/prepare.hpp"
 
@@ -26,10 +27,11 @@ struct LiveBlocks {
   std::int32_t* kind; // of typed faces
 };
 
-// Joinings of the last `advance`, as in AssemblyOutputs.
+// Events of the last `advance`, as in AssemblyOutputs.
 struct LiveEvents {
   int count;
   const std::int32_t* step;
+  const std::int32_t* kind;  // null: all are joinings
   const std::int32_t* block; // [stayed, moved]
   const std::int32_t* face;
 };
@@ -45,12 +47,15 @@ public:
   LiveWorld(const LiveWorld&) = delete;
   LiveWorld& operator=(const LiveWorld&) = delete;
 
+  // Fewer steps where events fill their room; `step` says how many.
   void advance(std::int64_t steps);
   void set_forces(const LiveForces& forces);
   // What is joined stays so.
   void set_rules(Latching latching, double hidden_share, double stirring_length);
   // Blocks are of the kinds at the start again; the rules have to outlive the world.
   void set_faces(const FaceRules* faces);
+  // The rate at which bonds break [1/s], and how far apart what has parted has to be [side].
+  void set_bonds(double rate, double relatch_clearance);
   // The tables have to outlive the world.
   void set_pull(const PullRules& pull);
   // Removes the last blocks, or adds blocks at random free places, at rest, as long as there are
@@ -64,6 +69,7 @@ public:
   std::uint32_t status() const;
   LiveEvents events() const;
   void read(const LiveBlocks& out) const;
+  const BondList& bonds() const; // empty where none break
 
 private:
   struct Inside;

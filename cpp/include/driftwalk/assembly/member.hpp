@@ -56,9 +56,11 @@ struct BlockBook {
 struct LaneBook {
   std::int64_t world = -1;
   std::int64_t first_step = 0; // in steps of the pack
+  std::uint64_t key = 0;
   std::int32_t event_count = 0, first_contact = -1;
   std::int32_t assemblies = 0;
   bool running = false;
+  BondList bonds = {};
 };
 
 // One number of one lane, of a pack or of a single number.

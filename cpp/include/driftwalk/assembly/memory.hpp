@@ -17,7 +17,8 @@ class AssemblyMemory {
 public:
   AssemblyMemory(int blocks, std::size_t lane_bytes)
       : blocks_(static_cast<std::size_t>(blocks)), before_(blocks_.size()),
-        assemblies_(blocks_.size()), next_(blocks_.size()), heads_(cell_heads),
+        assemblies_(blocks_.size()), next_(blocks_.size()), by_cell_(blocks_.size()),
+        heads_(cell_heads),
         pairs_(static_cast<std::size_t>(std::min(pair_capacity(blocks), pairs_per_block * blocks))),
         close_(pairs_.size()),
         lanes_(static_cast<char*>(::operator new(lane_bytes, lane_alignment))) {
@@ -31,6 +32,7 @@ public:
     scene.close = list_in(close_);
     scene.cell_head = heads_.data();
     scene.cell_next = next_.data();
+    scene.by_cell = by_cell_.data();
   }
   // The scene knows where its pairs are.
   AssemblyMemory(const AssemblyMemory&) = delete;
@@ -56,7 +58,9 @@ private:
 
   std::vector<SceneBlock> blocks_, before_;
   std::vector<SceneAssembly> assemblies_;
-  std::vector<std::int32_t> next_, heads_;
+  std::vector<std::int32_t> next_;
+  std::vector<PlacedBlock> by_cell_;
+  std::vector<std::int32_t> heads_;
   std::vector<BlockPair> pairs_, close_;
   std::unique_ptr<char, DeleteLanes> lanes_;
   AssemblyScratch scratch_;

@@ -2,6 +2,7 @@
 // or its neighbours. A pack of many blocks (`Crowded`) is one world.
 #pragma once
 
+#include "driftwalk/assembly/bond_load.hpp"
 #include "driftwalk/assembly/correlate.hpp"
 #include "driftwalk/assembly/lane.hpp"
 #include "driftwalk/assembly/near.hpp"
@@ -23,9 +24,9 @@ public:
   // memory holds worlds of up to `capacity` blocks. Events go to `out`.
   WorldPack(const Prepared<T>& run, const AssemblyRules& rules, const double* start,
             const AssemblyOutputs& out, AssemblyScratch& scratch, int capacity)
-      : run_(run), rules_(rules), out_(out), scratch_(scratch), memory_(scratch.lanes, capacity),
-        near_(rules), blocks_(rules.blocks), rows_(memory_.rows(rules.blocks)),
-        listed_(rules.blocks > most_blocks_all_pairs),
+      : run_(run), rules_(rules), out_(out), scratch_(scratch),
+        memory_(scratch.lanes, capacity, Crowded), near_(rules), blocks_(rules.blocks),
+        rows_(memory_.rows(rules.blocks)), listed_(Crowded && rules.blocks > most_blocks_all_pairs),
         physics_{Law::of(Real(T(0)), run.drag),
                  run.block,
                  run.shape,
@@ -39,6 +40,8 @@ public:
     for (int lane = 0; lane < lanes; ++lane) {
       if (lane < worlds) {
         load_lane<Real, T>(rules_, start, memory_, lane);
+        const int bonds = bond_room(capacity);
+        books_[lane].bonds = {memory_.bonds + bonds * lane, 0, bonds};
       }
       put(stream_.key0, lane, 0);
       put(stream_.key1, lane, 0);
@@ -69,6 +72,8 @@ public:
     book.first_contact = -1;
     book.assemblies = blocks_;
     book.running = true;
+    book.key = key;
+    book.bonds.count = 0;
     load_lane<Real, T>(rules_, start, memory_, own);
     if (rules_.glued > 1) {
       glue(own);
@@ -108,8 +113,14 @@ public:
     physics_.pulled = rules_.pull.on;
     blocks_ = rules_.blocks;
     rows_ = memory_.rows(blocks_);
-    listed_ = blocks_ > most_blocks_all_pairs;
+    listed_ = Crowded && blocks_ > most_blocks_all_pairs;
     list_crowd();
+  }
+
+  // Bonds all neighbours of a lane anew, when they begin to break or blocks have come or gone.
+  void bond_anew(std::int64_t step, int lane) {
+    bond_all(rules_, open_scene(step, lane));
+    books_[lane].bonds = scratch_.scene.bonds;
   }
 
   // The normal numbers that a block has in the period under way. A force that remembers begins
@@ -142,6 +153,9 @@ public:
       };
       advance(physics_, half, memory_.members, memory_.sums, blocks_, sum, pull);
       meet_walls(physics_, memory_.members, blocks_);
+    }
+    if (rules_.bonds_break) {
+      break_worlds(step, half);
     }
     return settle_lanes(step);
   }
@@ -262,7 +276,7 @@ private:
     }
     const Bool unsettled = lanes_to_settle(near_, memory_.members, blocks_);
     if (any(unsettled)) {
-      for (int lane = 0; lane < lanes; ++lane) {
+      for (int lane = 0; lane < worlds; ++lane) {
         if (books_[lane].running && lane_of(unsettled, lane)) {
           complete = settle_lane(step, lane) || complete;
         }
@@ -311,28 +325,56 @@ private:
     }
   }
 
-  // Returns whether the world is one assembly now.
-  bool settle_lane(std::int64_t step, int lane) {
-    LaneBook& book = books_[lane];
+  void break_worlds(std::int64_t step, int half) {
+    for (int own = 0; own < worlds; ++own) {
+      if (books_[own].running && wear_bonds(rules_, physics_, run_.mass, half, memory_, own,
+                                            books_[own].bonds, scratch_.scene.cell_next)) {
+        driftwalk::break_bonds(rules_, open_scene(step, own));
+        close_scene(own);
+        list_crowd();
+      }
+    }
+  }
+
+  // The lane's world in plain numbers, and where its events go.
+  Scene& open_scene(std::int64_t step, int lane) {
+    const LaneBook& book = books_[lane];
     Scene& scene = scratch_.scene;
     fill_scene(rules_, memory_, lane, book.assemblies, scene);
     const std::int64_t row = book.world * out_.event_rows;
     scene.step = static_cast<std::int32_t>(step + 1 - book.first_step);
+    scene.key = book.key;
+    scene.bonds = book.bonds;
     scene.event_rows = out_.event_rows;
     scene.event_count = book.event_count;
     scene.event_step = out_.event_step + row;
+    scene.event_kind = rules_.bonds_break ? out_.event_kind + row : nullptr;
     scene.event_block = out_.event_block + 2 * row;
     scene.event_face = out_.event_face + 2 * row;
-    if (!listed_) {
-      find_pairs(rules_, scene);
-    }
-    settle(rules_, scene);
+    return scene;
+  }
+
+  void close_scene(int lane) {
+    LaneBook& book = books_[lane];
+    const Scene& scene = scratch_.scene;
     read_scene(rules_, scene, memory_, lane);
+    book.bonds = scene.bonds;
     book.event_count = scene.event_count;
     if (Crowded && book.assemblies != scene.assemblies) {
       memory_.crowd.list_bodies(memory_.members, blocks_);
     }
     book.assemblies = scene.assemblies;
+  }
+
+  // Returns whether the world is one assembly now.
+  bool settle_lane(std::int64_t step, int lane) {
+    LaneBook& book = books_[lane];
+    Scene& scene = open_scene(step, lane);
+    if (!listed_) {
+      find_pairs(rules_, scene);
+    }
+    settle(rules_, scene);
+    close_scene(lane);
     if (scene.contact && book.first_contact < 0) {
       book.first_contact = scene.step;
     }

@@ -8,7 +8,7 @@
 
 DRIFTWALK_LANES_BEGIN
 
-// A block half a step ahead.
+// A block about half a step ahead.
 template <class Real>
 struct Pulled {
   Real x, y, vx, vy;             // of its centre
@@ -261,18 +261,19 @@ inline void pull_pair(const PullRules& rules, typename Numbers<Real>::Bool apart
   }
 }
 
-// The place and motion of a block at which the drag is found, too.
+// A block where it would be half a step ahead without forces: so the pull by itself keeps energy,
+// but for an error that does not grow, and angular momentum (drift, kick, drift).
 template <class Real, class T, class Law>
 inline void look_at(const Physics<Real, T, Law>& physics, const Member<Real>& m,
                     Pulled<Real>& block) {
-  const Ahead<Real> ahead = look_ahead(physics.step, m, m.noise);
-  block.axes = axes_at(ahead.pose.theta);
+  const T half = T(0.5) * physics.step.dt;
+  block.axes = axes_at(m.pose.theta + m.motion.omega * half);
   const Real arm_x = m.offset_x * block.axes.cosine - m.offset_y * block.axes.sine;
   const Real arm_y = m.offset_x * block.axes.sine + m.offset_y * block.axes.cosine;
-  block.x = ahead.pose.x + arm_x;
-  block.y = ahead.pose.y + arm_y;
-  block.vx = ahead.motion.vx - ahead.motion.omega * arm_y;
-  block.vy = ahead.motion.vy + ahead.motion.omega * arm_x;
+  block.x = m.pose.x + m.motion.vx * half + arm_x;
+  block.y = m.pose.y + m.motion.vy * half + arm_y;
+  block.vx = m.motion.vx - m.motion.omega * arm_y;
+  block.vy = m.motion.vy + m.motion.omega * arm_x;
   block.force_x = block.force_y = block.torque = Real(T(0));
 }
 

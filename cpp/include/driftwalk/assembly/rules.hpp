@@ -39,6 +39,11 @@ struct AssemblyRules {
   // it is divergence-free.
   double stirring_length = 0;
   bool incompressible = false;
+  // Bonds: whether they break at all; the rate of each without load [1/s]; the tension that
+  // multiplies it by e [N], 0: none does; the tension that breaks it at once [N], 0: none; and how
+  // far apart the centres of what has parted have to be before it latches again [side].
+  bool bonds_break = false;
+  double bond_rate = 0, bond_force = 0, bond_strength = 0, relatch_clearance = 1.25;
   PullRules pull;
 };
 
@@ -52,11 +57,13 @@ struct AssemblyWorlds {
   const double* flow_start = nullptr; // as in BatchWorlds
 };
 
-// Outputs, one row per world; events beyond event_count stay as they are.
+// Outputs, one row per world; events beyond event_count stay as they are. Where bonds break,
+// events beyond event_rows are counted and not written.
 struct AssemblyOutputs {
   std::uint32_t* status = nullptr;
   std::int32_t* event_count = nullptr;
   std::int32_t* event_step = nullptr;         // [world][event]
+  std::int32_t* event_kind = nullptr;         // likewise, EventKind; null where no bonds break
   std::int32_t* event_block = nullptr;        // [world][event][stayed, moved]
   std::int32_t* event_face = nullptr;         // likewise, in the blocks' own frames
   std::int32_t* first_contact_step = nullptr; // -1: never

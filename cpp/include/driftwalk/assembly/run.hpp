@@ -14,7 +14,8 @@ public:
   AssemblyPack(const Prepared<T>& run, const AssemblyRules& rules, const AssemblyWorlds& worlds,
                const AssemblyOutputs& out, const WorldQueue& queue, AssemblyScratch& scratch)
       : run_(run), rules_(rules), worlds_(worlds), out_(out), queue_(queue),
-        pack_(run, rules, worlds.start, out, scratch, rules.blocks) {}
+        pack_(run, rules, worlds.start, out, scratch, rules.blocks),
+        ends_(out.sample_every == 0 && !rules.bonds_break) {}
 
   // Returns the number of block-steps of the worlds that were run.
   std::int64_t run() {
@@ -24,7 +25,7 @@ public:
       if (step % period == 0 && !refill(step)) {
         return block_steps_;
       }
-      if (pack_.step(step) && out_.sample_every == 0) {
+      if (pack_.step(step) && ends_) {
         next_event_ = step + 1;
       }
       end_step(step + 1);
@@ -83,7 +84,7 @@ private:
         continue;
       }
       const std::int64_t own = done - book.first_step;
-      const bool complete = book.assemblies == 1 && rules_.blocks > 1 && out_.sample_every == 0;
+      const bool complete = book.assemblies == 1 && rules_.blocks > 1 && ends_;
       if (complete || own == worlds_.steps) {
         write_results<Real, T>(run_, rules_, out_, pack_.memory(), lane, book, own);
         block_steps_ += own * rules_.blocks;
@@ -100,6 +101,7 @@ private:
   const AssemblyOutputs& out_;
   const WorldQueue& queue_;
   WorldPack<Real, T, Law, Crowded> pack_;
+  bool ends_; // whether a world is over when it has become one assembly
   bool empty_ = false;
   std::int64_t block_steps_ = 0;
   std::int64_t next_event_ = INT64_MAX; // no world is over before this many steps of the pack

@@ -4,6 +4,7 @@
 // that each set has of its own.
 #pragma once
 
+#include "driftwalk/assembly/bonds.hpp"
 #include "driftwalk/assembly/rules.hpp"
 #include "driftwalk/config.hpp"
 
@@ -55,6 +56,12 @@ struct PairList {
   void* owner;
 };
 
+// What the pair search reads of a block.
+struct PlacedBlock {
+  double x, y;
+  std::int32_t assembly, block;
+};
+
 struct Scene {
   int blocks;
   int assemblies;
@@ -66,12 +73,17 @@ struct Scene {
   // scratch of the pair search and of lattices: first block of every cell, next in the same cell
   std::int32_t* cell_head;
   std::int32_t* cell_next;
+  PlacedBlock* by_cell; // scratch: the blocks, cell by cell
+  // where bonds break
+  BondList bonds;
+  std::uint64_t key; // of the world's random numbers
   // what happened, written by settle
   bool contact; // two blocks of different assemblies overlapped or latched
   bool rebuilt; // a merge moved blocks: lists of near pairs are out of date
   int event_rows, event_count;
   std::int32_t step; // written into events
   std::int32_t* event_step;
+  std::int32_t* event_kind; // null where no bonds break
   std::int32_t* event_block;
   std::int32_t* event_face;
 };
@@ -99,9 +111,17 @@ void glue_blocks(const AssemblyRules& rules, Scene& scene);
 // Makes every block an assembly of its own, which moves as the block did, with its own frame.
 void part_blocks(const AssemblyRules& rules, Scene& scene);
 
+// Breaks the bonds that have no hazard left; assemblies come apart where one was a bridge.
+void break_bonds(const AssemblyRules& rules, Scene& scene);
+// Bonds all neighbours of all assemblies anew.
+void bond_all(const AssemblyRules& rules, Scene& scene);
+// Marks the blocks on the side of a bond's first block, without crossing it: 1 in `side`, which has
+// an entry per block and 0 for all others. Returns whether it is a bridge.
+bool find_side(const BondList& bonds, int blocks, const Bond& bond, std::int32_t* side);
+
 // Fills the list with the pairs of different assemblies whose centres are closer than a diagonal
 // (or the connectors' reach) and a skin, ordered by first and second block. It has to be made anew
-// where an assembly has come apart.
+// where an assembly has come apart. The list of close pairs is then void.
 void find_pairs(const AssemblyRules& rules, Scene& scene);
 // Fills the list of close pairs from that of near ones, in their order.
 void find_close_pairs(const AssemblyRules& rules, Scene& scene);

@@ -128,6 +128,18 @@ bool types_latch(const FaceRules& faces, const SceneBlock& block, int face, cons
 bool poles_refuse(const FaceRules& faces, const Scene& scene, int stayed, int moved);
 // Makes two blocks what they become when these faces, in their own frames, have latched.
 void become(const FaceRules& faces, SceneBlock& block, int face, SceneBlock& other, int peer);
+// Whether two blocks of one assembly are neighbours: on its lattice, or discs that touch.
+bool are_neighbours(const AssemblyRules& rules, const Scene& scene, int first, int second);
+// Makes the blocks that are labelled with the lowest of them one body, which moves on as they did
+// in the assembly that they come from.
+void cut_loose(const AssemblyRules& rules, Scene& scene, const SceneAssembly& from, int lowest);
+// Bonds the neighbours of an assembly that are not bonded. Other bonds than that of `joined`, two
+// blocks whose joining has been told, are told as events of their own.
+void bond_assembly(const AssemblyRules& rules, Scene& scene, int assembly, BlockPair joined);
+// Whether two assemblies have parted and are not clear of each other yet.
+bool are_unclear(const Scene& scene, int assembly, int other);
+// One line of the world's list of events; faces in the blocks' own frames.
+void record_event(Scene& scene, EventKind kind, const int (&blocks)[2], const int (&faces)[2]);
 
 // Merges what latches, one pair of faces after the other. Leaves the list of close pairs as it then
 // is.

@@ -15,6 +15,7 @@ enum class Purpose : std::uint32_t {
   flow = 6,        // moment of a flow in frames at which a world begins
   torque = 7,      // of the stochastic force, one draw per force interval
   stirring = 8,    // force field at a node of its lattice, one draw per two force intervals
+  bond = 9,        // hazard of a bond, at the step in which it forms
 };
 
 } // namespace driftwalk

@@ -12,11 +12,17 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.assembly.lattice.bonds import (
+    CLOSING,
+    JOINING,
+    OPENING,
+    PARTING,
+    BondGraph,
+)
 from driftwalk.assembly.lattice.many_blocks import DiscWorld, SquareWorld, replay_many
 from driftwalk.assembly.lattice.polyomino import STEPS, Chirality, name_of, require_chirality
 from driftwalk.assembly.lattice.typed_faces import FaceTable
 from driftwalk.assembly.outcomes.class_names import (
-    all_single,
     class_name,
     listed_classes,
     listed_shapes,
@@ -24,16 +30,18 @@ from driftwalk.assembly.outcomes.class_names import (
 from driftwalk.assembly.outcomes.disc_contacts import CONTACT_POLICY, disc_shape, touching
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
-from driftwalk.schema.shapes import MOST_NAMED, moved_to_origin
+from driftwalk.schema.shapes import MOST_NAMED, all_single, moved_to_origin
 
 
 class ReplayedEvents(NamedTuple):
     """Results of the events of some runs; -1 where a run had no such event."""
 
     event_assembly: npt.NDArray[np.int32]
-    """Lowest block of the assembly that stayed and of the one that moved, (run, event, side)."""
+    """Lowest block of the assembly that stayed and of the one that moved, (run, event, side); of a
+    parting of the two parts."""
     event_shape: npt.NDArray[np.int32]
-    """Shapes of the two and of what they became, (run, event, part): indices into `shapes`."""
+    """Shapes of the two and of what they became, (run, event, part): indices into `shapes`. Of a
+    parting those of the two parts and of what they were; -1 where only a bond of a loop changed."""
     event_class: npt.NDArray[np.int32]
     """Outcome class of the world after the event, (run, event): an index into `classes`."""
     outcome: npt.NDArray[np.int32]
@@ -54,6 +62,7 @@ def replay_events(
     cell: npt.ArrayLike,
     quarter: npt.ArrayLike,
     assembly: npt.ArrayLike,
+    event_kind: npt.ArrayLike | None = None,
     chirality: Chirality = "merged",
     faces: FaceTable | None = None,
 ) -> ReplayedEvents:
@@ -73,6 +82,9 @@ def replay_events(
         Quarter turns of the blocks at the end, on the same lattice.
     assembly : array_like of int, shape (runs, blocks)
         Lowest block of the assembly of each block at the end.
+    event_kind : array_like of int, shape (runs, events), optional
+        0 joining; 1 parting, of the two blocks whose bond broke; 2 a bond of a loop broke; 3 one
+        formed. Default: all are joinings.
     chirality : {"merged", "distinct"}
         Whether mirror images are one shape or two.
     faces : FaceTable, optional
@@ -100,15 +112,17 @@ def replay_events(
     '2'
     """
     require_chirality(chirality)
-    events = _Events(*map(_whole, (event_count, event_block, event_face)))
+    events = _Events(
+        _whole(event_count), _whole(event_block), _whole(event_face), _kinds(event_kind)
+    )
     end = _Lattice(*map(_whole, (cell, quarter, assembly)))
     _check_arrays(events, end)
     kind = None if faces is None else _follow_kinds(events, faces, end.assembly.shape)
-    if end.assembly.shape[1] > MOST_NAMED:
-        blocks = end.assembly.shape[1]
+    blocks = end.assembly.shape[1]
+    if blocks > MOST_NAMED:
         many = _replay_many(events, end, lambda _: SquareWorld(blocks, chirality))
         return many._replace(kind=kind)
-    replay = _Replay(*end.assembly.shape, slots=events.block.shape[1], chirality=chirality)
+    replay = _Replay(end.assembly.shape, events, chirality=chirality)
     for event in range(int(events.number.max(initial=0))):
         replay.apply(event, np.flatnonzero(events.number > event), events)
     _check_end(replay.lattice, end)
@@ -122,13 +136,15 @@ def replay_contacts(
     pose: Floats,
     assembly: npt.ArrayLike,
     diameter: float,
+    event_kind: npt.ArrayLike | None = None,
 ) -> ReplayedEvents:
     """Replay the events of simulated runs of discs, which have no lattice and no faces.
 
     Parameters
     ----------
-    event_count, event_block, assembly
-        As in `replay_events`.
+    event_count, event_block, assembly, event_kind
+        As in `replay_events`. Without kinds the contacts are those of the poses at the end, with
+        them those that the events tell.
     pose : ndarray, shape (runs, blocks, 2 or more)
         Columns x and y of the discs at the end [m].
     diameter : float
@@ -147,13 +163,13 @@ def replay_contacts(
     ('chain3', ['2', '1', 'chain3'])
     """
     block, labels = _whole(event_block), _whole(assembly)
-    events = _Events(_whole(event_count), block, np.zeros_like(block))
+    events = _Events(_whole(event_count), block, np.zeros_like(block), _kinds(event_kind))
     end = _Lattice(np.zeros((*labels.shape, 2), np.int64), np.zeros_like(labels), labels)
     _check_arrays(events, end)
     if end.assembly.shape[1] > MOST_NAMED:
-        reach = diameter * (1.0 + CONTACT_POLICY.gap)
+        reach = diameter * (1.0 + CONTACT_POLICY.gap) if events.kind is None else 0.0
         return _replay_many(events, end, lambda run: DiscWorld(pose[run], reach=reach))
-    replay = _DiscReplay(pose, slots=block.shape[1], diameter=diameter)
+    replay = _DiscReplay(pose, events, diameter=diameter)
     for event in range(int(events.number.max(initial=0))):
         replay.apply(event, np.flatnonzero(events.number > event), events)
     _check_end(replay.lattice, end)
@@ -184,6 +200,7 @@ class _Events(NamedTuple):
     number: Integers
     block: Integers
     face: Integers
+    kind: Integers | None
 
 
 class _Lattice(NamedTuple):
@@ -212,7 +229,12 @@ class _Names:
 class _Replay:
     """The state of all runs while their events are applied."""
 
-    def __init__(self, runs: int, blocks: int, *, slots: int, chirality: Chirality | None) -> None:
+    def __init__(
+        self, shape: tuple[int, ...], events: _Events, *, chirality: Chirality | None
+    ) -> None:
+        runs, blocks = shape
+        slots = events.block.shape[1]
+        self.bonds = None if events.kind is None else BondGraph(runs, blocks)
         self.chirality = chirality
         self.blocks = blocks
         self.lattice = _Lattice(
@@ -230,6 +252,25 @@ class _Replay:
 
     def apply(self, event: int, at: Integers, events: _Events) -> None:
         """Apply the event of this number to the runs that have it."""
+        if self.bonds is None or events.kind is None:
+            self._join(event, at, events)
+            return
+        kind = events.kind[at, event]
+        _refuse((kind < JOINING) | (kind > CLOSING), at, event, "is of no kind")
+        for number, change in ((JOINING, self._join), (PARTING, self._part)):
+            if (kind == number).any():
+                change(event, at[kind == number], events)
+        for number in (JOINING, OPENING, CLOSING):
+            own = at[kind == number]
+            self.bonds.put(own, events.block[own, event], number != OPENING)
+        loop = at[kind >= OPENING]
+        labels = self.lattice.assembly[loop]
+        self.event_assembly[loop, event] = np.take_along_axis(
+            labels, events.block[loop, event], axis=1
+        )
+        self.event_class[loop, event] = self.outcome[loop]
+
+    def _join(self, event: int, at: Integers, events: _Events) -> None:
         labels = self.lattice.assembly[at]
         own = np.take_along_axis(labels, events.block[at, event], axis=1)
         _refuse(own[:, 0] == own[:, 1], at, event, "joins two blocks of one assembly")
@@ -244,6 +285,30 @@ class _Replay:
         self.shape_of[at, low] = became
         self.event_shape[at, event, 2] = became
         self.outcome[at] = self.event_class[at, event] = self._class_numbers(at)
+
+    def _part(self, event: int, at: Integers, events: _Events) -> None:
+        """Cut an assembly of each run where a bond of it breaks."""
+        if self.bonds is None:
+            return
+        block, labels = events.block[at, event], self.lattice.assembly[at]
+        own = np.take_along_axis(labels, block, axis=1)
+        self.bonds.put(at, block, False)
+        first = self.bonds.reached(at, block[:, 0])
+        whole = np.take_along_axis(first, block[:, 1:], axis=1)[:, 0] | (own[:, 0] != own[:, 1])
+        _refuse(whole, at, event, "parts two blocks that are not held by that bond alone")
+        self._separate(at, first)
+        self.event_shape[at, event, 2] = self.shape_of[at, own[:, 0]]
+        for side, member in enumerate((first, (labels == own[:, :1]) & ~first)):
+            lowest = member.argmax(axis=1)
+            self.lattice.assembly[at] = np.where(member, lowest[:, None], self.lattice.assembly[at])
+            shape = self._shape_numbers(at, event, member)
+            self.shape_of[at, lowest] = shape
+            self.event_assembly[at, event, side] = lowest
+            self.event_shape[at, event, side] = shape
+        self.outcome[at] = self.event_class[at, event] = self._class_numbers(at)
+
+    def _separate(self, at: Integers, side: Bools) -> None:
+        """Note that what is marked has parted from the others of the run."""
 
     def result(self) -> ReplayedEvents:
         shapes = listed_shapes(self.shapes.known, self.blocks, chirality=self.chirality)
@@ -303,9 +368,25 @@ class _Replay:
 class _DiscReplay(_Replay):
     """The same of discs, which stay as they lie."""
 
-    def __init__(self, pose: Floats, *, slots: int, diameter: float) -> None:
-        super().__init__(*pose.shape[:2], slots=slots, chirality=None)
+    def __init__(self, pose: Floats, events: _Events, *, diameter: float) -> None:
+        super().__init__(pose.shape[:2], events, chirality=None)
         self.touch = np.array([touching(one, diameter=diameter) for one in pose])
+        if events.kind is not None:
+            self.touch[:] = False
+
+    def _join(self, event: int, at: Integers, events: _Events) -> None:
+        # Contacts that close with a joining are told after it.
+        now, own = event, at
+        while events.kind is not None and own.size:
+            first, second = events.block[own, now].T
+            self.touch[own, first, second] = self.touch[own, second, first] = True
+            now += 1
+            own = own[events.number[own] > now]
+            own = own[events.kind[own, now] == CLOSING] if own.size else own
+        super()._join(event, at, events)
+
+    def _separate(self, at: Integers, side: Bools) -> None:
+        self.touch[at] &= side[:, :, None] == side[:, None, :]
 
     def _align(self, at: Integers, block: Integers, face: Integers) -> None:
         pass
@@ -332,14 +413,19 @@ def _whole(values: npt.ArrayLike) -> Integers:
     return array.astype(np.int64)
 
 
+def _kinds(values: npt.ArrayLike | None) -> Integers | None:
+    return None if values is None else _whole(values)
+
+
 def _check_arrays(events: _Events, end: _Lattice) -> None:
     runs, blocks = end.assembly.shape if end.assembly.ndim == 2 else (-1, -1)
     slots = events.block.shape[1] if events.block.ndim == 3 else -1
     wanted = [(runs,), (runs, slots, 2), (runs, slots, 2), (runs, blocks, 2), (runs, blocks)]
-    found = [array.shape for array in (*events, *end)]
-    if found[:-1] != wanted or blocks < 1:
+    found = [array.shape for array in (*events[:3], *end)]
+    kinds = [] if events.kind is None else [events.kind.shape]
+    if found[:-1] != wanted or blocks < 1 or kinds not in ([], [(runs, slots)]):
         raise InputError(f"the events and the cells of runs do not fit together: shapes {found}")
-    most = min(slots, blocks - 1)
+    most = min(slots, blocks - 1) if events.kind is None else slots
     wrong = (events.number < 0) | (events.number > most)
     if wrong.any():
         run = int(np.argmax(wrong))

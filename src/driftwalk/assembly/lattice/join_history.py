@@ -126,6 +126,13 @@ class Partition:
         self.labels = [low if label == high else label for label in self.labels]
         return low != high
 
+    def cut(self, side: list[int]) -> None:
+        """Part some blocks of an assembly from its others."""
+        others = [b for b in self.members(self.labels[side[0]]) if b not in side]
+        for part in (side, others):
+            for block in part:
+                self.labels[block] = min(part)
+
     def members(self, label: int) -> list[int]:
         """Return the blocks of an assembly."""
         return [block for block, own in enumerate(self.labels) if own == label]
@@ -170,6 +177,11 @@ class LatticeWorld:
         world.partition, world.quarter = Partition(labels), state["quarter"].tolist()
         world.cell = [(x, y) for x, y in state["cell"].tolist()]
         return world
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks."""
+        return len(self.quarter)
 
     def shape(self, members: Sequence[int], chirality: Chirality) -> str:
         """Name the shape of some blocks of one assembly."""

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.assembly.lattice.bonds import CLOSING, JOINING, OPENING, PARTING
 from driftwalk.assembly.lattice.polyomino import STEPS, Chirality, name_of, shape_order
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
@@ -51,6 +52,7 @@ class SquareWorld:
         self.cell = [(0, 0)] * blocks
         self.quarter = [0] * blocks
         self.taken = [{(0, 0)} for _ in range(blocks)]
+        self.bonded: list[set[int]] = [set() for _ in range(blocks)]
 
     def join(self, block: list[int], face: list[int]) -> tuple[int, int]:
         """Put the second block's body to that of the first; return the two bodies."""
@@ -64,6 +66,49 @@ class SquareWorld:
         self.members[moves] = []
         self.lowest[stays] = min(self.lowest[stays], self.lowest[moves])
         return stays, moves
+
+    def bond(self, block: list[int], *, whole: bool) -> None:
+        """Make or break the bond of two blocks."""
+        for one, other in (block, block[::-1]):
+            (self.bonded[one].add if whole else self.bonded[one].discard)(other)
+
+    def touch(self, block: list[int]) -> None:
+        """Note that two blocks touch; of squares the lattice tells it."""
+
+    def part(self, block: list[int]) -> tuple[int, int]:
+        """Cut the body of two blocks where their bond breaks; return the bodies of both.
+
+        A body is called by one of its blocks.
+        """
+        self.bond(block, whole=False)
+        was = self.body[block[0]]
+        side = self._reached(block[0])
+        if self.body[block[1]] != was or block[1] in side:
+            raise InputError("parts two blocks that are not held by that bond alone")
+        bodies = []
+        for part in (sorted(side), sorted(set(self.members[was]) - side)):
+            body = was if was in part else part[0]
+            self.lowest[body] = part[0]
+            bodies.append((body, part))
+        for body, part in bodies:
+            self.members[body] = part
+            self.taken[body] = {self.cell[member] for member in part}
+            for member in part:
+                self.body[member] = body
+            self.joins[body] = self._joins_within(body)
+        return bodies[0][0], bodies[1][0]
+
+    def _reached(self, block: int) -> set[int]:
+        found, ahead = {block}, [block]
+        while ahead:
+            new = self.bonded[ahead.pop()] - found
+            found |= new
+            ahead += new
+        return found
+
+    def _joins_within(self, body: int) -> int:
+        taken = self.taken[body]
+        return sum(((x + 1, y) in taken) + ((x, y + 1) in taken) for x, y in taken)
 
     def shape(self, body: int) -> str:
         """Return the name of the shape of a body."""
@@ -97,7 +142,10 @@ class SquareWorld:
 
 
 class DiscWorld(SquareWorld):
-    """The same of discs, which stay as they lie; what touches at the end did all along."""
+    """The same of discs, which stay as they lie.
+
+    All contacts at the end were there all along; with a reach of 0 they come from the events.
+    """
 
     def __init__(self, places: Floats, *, reach: float) -> None:
         from scipy.spatial import cKDTree
@@ -117,6 +165,18 @@ class DiscWorld(SquareWorld):
         pairs = [(place[a], place[b]) for a in members for b in self.near[a] if b in place]
         return graph_name(len(members), pairs)
 
+    def touch(self, block: list[int]) -> None:
+        """Note that two discs touch."""
+        for one, other in (block, block[::-1]):
+            if other not in self.near[one]:
+                self.near[one].append(other)
+
+    def _joins_within(self, body: int) -> int:
+        members = set(self.members[body])
+        for member in members:
+            self.near[member] = [one for one in self.near[member] if one in members]
+        return sum(len(self.near[member]) for member in members) // 2
+
     def _contacts(self, stays: int, moves: int, block: list[int], face: list[int]) -> int:
         del block, face
         return sum(
@@ -127,7 +187,12 @@ class DiscWorld(SquareWorld):
 
 
 def replay_many(
-    number: Integers, block: Integers, face: Integers, *, world_of: Callable[[int], SquareWorld]
+    number: Integers,
+    block: Integers,
+    face: Integers,
+    kind: Integers | None = None,
+    *,
+    world_of: Callable[[int], SquareWorld],
 ) -> ManyReplayed:
     """Replay the events of runs of many blocks.
 
@@ -136,6 +201,8 @@ def replay_many(
     number : ndarray of int, shape (runs,)
         Number of events of each run.
     block, face : ndarray of int, shape (runs, events, 2)
+        As in `replay_events`.
+    kind : ndarray of int, shape (runs, events), optional
         As in `replay_events`.
     world_of : callable
         The world of a run at its start.
@@ -151,23 +218,42 @@ def replay_many(
     known = {"1": 0}
     event_assembly = np.full((runs, slots, 2), -1, dtype=np.int32)
     event_shape = np.full((runs, slots, 3), -1, dtype=np.int32)
+    kinds = np.zeros((runs, slots), dtype=np.int64) if kind is None else kind
     for run, world in enumerate(worlds):
         shape_of = [0] * blocks
-        for event in range(number[run]):
+        last, told = number[run], kinds[run].tolist()
+        for event in range(last):
             of, by = block[run, event].tolist(), face[run, event].tolist()
             lowest = [world.lowest[world.body[one]] for one in of]
+            if told[event] in (OPENING, CLOSING):
+                world.bond(of, whole=told[event] == CLOSING)
+                event_assembly[run, event] = lowest
+                continue
             try:
-                stays, moves = world.join(of, by)
+                if told[event] == JOINING:
+                    parts = tuple(shape_of[world.body[one]] for one in of)
+                    _touch_all(world, block[run], told, event, last)
+                    stays, _ = world.join(of, by)
+                    world.bond(of, whole=True)
+                    became = shape_of[stays] = known.setdefault(world.shape(stays), len(known))
+                else:
+                    became = shape_of[world.body[of[0]]]
+                    two = world.part(of)
+                    lowest = [world.lowest[body] for body in two]
+                    for body in two:
+                        shape_of[body] = known.setdefault(world.shape(body), len(known))
+                    parts = tuple(shape_of[body] for body in two)
             except InputError as error:
                 raise InputError(f"run {run}, event {event}: {error}") from None
-            parts = shape_of[stays], shape_of[moves]
-            shape_of[stays] = known.setdefault(world.shape(stays), len(known))
             event_assembly[run, event] = lowest
-            event_shape[run, event] = *parts, shape_of[stays]
-    # An event leaves one assembly less; the place of a class among those that occurred.
+            event_shape[run, event] = *parts, became
+    # A joining leaves one assembly less, a parting one more; the place of a class among those that
+    # occurred.
     happened = np.arange(slots) < number[:, None]
-    left = np.where(happened, blocks - 1 - np.arange(slots), 0)
-    occurred = np.unique(np.concatenate([blocks - number, left[happened]]))
+    change = happened * ((kinds == PARTING).astype(np.int64) - (kinds == JOINING))
+    left = blocks + change.cumsum(axis=1)
+    at_end = blocks + change.sum(axis=1)
+    occurred = np.unique(np.concatenate([at_end, left[happened]]))
     place = np.full(blocks + 1, -1, dtype=np.int32)
     place[occurred] = np.arange(occurred.size)
     shapes = tuple(sorted(known, key=shape_order))
@@ -177,10 +263,21 @@ def replay_many(
         event_assembly,
         shape_at[event_shape],
         np.where(happened, place[left], np.int32(-1)),
-        place[blocks - number],
+        place[at_end],
         tuple(counted_class(int(one)) for one in occurred),
         shapes,
         np.array([world.cell for world in worlds]).reshape(runs, blocks, 2),
         np.array([world.quarter for world in worlds]).reshape(runs, blocks),
         np.array([[world.lowest[body] for body in world.body] for world in worlds]),
     )
+
+
+def _touch_all(
+    world: SquareWorld, block: Integers, kinds: list[int], event: int, last: int
+) -> None:
+    """Note what touches by a joining: its two blocks, and contacts that come right after it."""
+    world.touch(block[event].tolist())
+    event += 1
+    while event < last and kinds[event] == CLOSING:
+        world.touch(block[event].tolist())
+        event += 1

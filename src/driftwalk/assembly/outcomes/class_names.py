@@ -100,11 +100,6 @@ def class_name(shapes: Iterable[str]) -> str:
     return counted_class(len(ordered)) if many else "+".join(ordered)
 
 
-def all_single(blocks: int) -> str:
-    """Name the class in which every block is alone."""
-    return counted_class(blocks) if blocks > MOST_NAMED else "+".join(["1"] * blocks)
-
-
 def class_shapes(name: str) -> tuple[str, ...]:
     """Return the names of the shapes in a class, the largest first.
 

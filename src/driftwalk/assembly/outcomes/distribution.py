@@ -13,11 +13,11 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk.assembly.lattice.polyomino import shape_size
-from driftwalk.assembly.outcomes.class_names import all_single, class_shapes
+from driftwalk.assembly.outcomes.class_names import class_shapes
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.schema.check import build_dataset, require_kind
-from driftwalk.schema.shapes import is_one_assembly
+from driftwalk.schema.shapes import all_single, is_one_assembly
 
 if TYPE_CHECKING:
     import xarray as xr

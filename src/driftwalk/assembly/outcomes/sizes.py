@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.assembly.lattice.bonds import JOINING, PARTING
 from driftwalk.assembly.lattice.polyomino import shape_size
 from driftwalk.assembly.outcomes.class_names import MOST_BLOCKS
 from driftwalk.assembly.outcomes.distribution import (
@@ -21,7 +22,7 @@ from driftwalk.assembly.outcomes.distribution import (
     runs_with_outcome,
 )
 from driftwalk.assembly.outcomes.survival import checked_times
-from driftwalk.core.arrays import Floats, Integers
+from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.schema.check import build_dataset
 from driftwalk.schema.contact_graphs import discs_of
 from driftwalk.schema.shapes import cells_of_shape, counts_of_shape
@@ -105,14 +106,15 @@ def assembly_sizes(
     shapes = [str(name) for name in assembly["shape"].values]
     size = np.array([shape_size(name) for name in shapes], dtype=np.int64)
     event_shape = assembly["event_shape"].values[sound].astype(np.int64)
-    number = _numbers_at_end(event_shape, size, blocks)
+    sign = _signs(assembly, sound)
+    number = _numbers_at_end(event_shape, sign, size, blocks)
     # Beyond eight blocks in groups whose width doubles, so that each has enough runs.
     first, last = _groups(blocks)
     grouped = np.add.reduceat(number, first - 1, axis=1)
     share = np.add.reduceat(number * np.arange(1, blocks + 1), first - 1, axis=1) / blocks
     event_time = assembly["event_time"].values[sound]
-    courses = _courses(event_time, size[event_shape], time, blocks)
-    compact = _compactness_of_runs(event_time, event_shape, shapes, size, time)
+    courses = _courses(event_time, size[event_shape], sign, time, blocks)
+    compact = _compactness_of_runs(event_time, event_shape, sign, shapes, size, time)
     data: dict[str, Any] = {}
     for name, dim, values, possible in (
         ("number", "size", grouped, (0.0, blocks / first)),
@@ -124,7 +126,8 @@ def assembly_sizes(
     ):
         mean, low, high = _over_runs(values, confidence, possible)
         data |= {name: (dim, mean), f"{name}_low": (dim, low), f"{name}_high": (dim, high)}
-    at_end = _compactness_of_runs(event_time, event_shape, shapes, size, np.array([np.inf]))
+    end = np.array([np.inf])
+    at_end = _compactness_of_runs(event_time, event_shape, sign, shapes, size, end)
     ends = _over_runs(at_end, confidence, (0.0, 1.0))
     names = ("compactness", "compactness_low", "compactness_high")
     attrs = {name: float(end[0]) for name, end in zip(names, ends, strict=True)}
@@ -162,13 +165,21 @@ def compactness(shape: str) -> float:
     return least / (4 * size - 2 * joins)
 
 
-def _numbers_at_end(event_shape: Integers, size: Integers, blocks: int) -> Integers:
+def _signs(assembly: xr.Dataset, sound: Bools) -> Integers:
+    """Return what each event does to the assemblies: 1 joins two, -1 parts one, 0 neither."""
+    if "event_kind" not in assembly:
+        return (assembly["event_shape"].values[sound][..., 2] >= 0).astype(np.int64)
+    kind = assembly["event_kind"].values[sound]
+    return np.asarray((kind == JOINING).astype(np.int64) - (kind == PARTING), dtype=np.int64)
+
+
+def _numbers_at_end(event_shape: Integers, sign: Integers, size: Integers, blocks: int) -> Integers:
     """Return how many assemblies of each size a run ends with, shape (run, size - 1)."""
     number = np.zeros((event_shape.shape[0], blocks), dtype=np.int64)
     number[:, 0] = blocks
-    run, _ = real = np.nonzero(event_shape[..., 2] >= 0)
+    run, _ = real = np.nonzero(sign)
     for part, change in ((0, -1), (1, -1), (2, 1)):
-        np.add.at(number, (run, size[event_shape[real][:, part]] - 1), change)
+        np.add.at(number, (run, size[event_shape[real][:, part]] - 1), change * sign[real])
     return number
 
 
@@ -183,18 +194,36 @@ def _groups(blocks: int) -> tuple[Integers, Integers]:
 
 
 def _courses(
-    event_time: Floats, event_size: Integers, time: Floats, blocks: int
+    event_time: Floats, event_size: Integers, sign: Integers, time: Floats, blocks: int
 ) -> tuple[Floats, Floats, Floats]:
     """Return mean size, share of the largest, share of free blocks, each of shape (run, time)."""
     real = np.isfinite(event_time)
-    joined = real.cumsum(axis=1)
-    freed = ((event_size[..., :2] == 1).sum(axis=2) * real).cumsum(axis=1)
+    joined = sign.cumsum(axis=1)
+    freed = ((event_size[..., :2] == 1).sum(axis=2) * sign).cumsum(axis=1)
     largest = np.maximum.accumulate(np.where(real, event_size[..., 2], 1), axis=1)
+    if (sign < 0).any():
+        largest = _largest(event_size, sign, blocks)
     joined, freed, largest = (
         _at_times(event_time, course, start, time)
         for course, start in ((joined, 0), (freed, 0), (largest, 1))
     )
     return blocks / (blocks - joined), largest / blocks, 1.0 - freed / blocks
+
+
+def _largest(event_size: Integers, sign: Integers, blocks: int) -> Integers:
+    """Return the blocks of the largest assembly after each event, where some part again."""
+    largest = np.ones(sign.shape, dtype=np.int64)
+    for run, signs in enumerate(sign):
+        number = np.zeros(blocks + 1, dtype=np.int64)
+        number[1] = blocks
+        for event, change in enumerate(signs.tolist()):
+            one, other, both = event_size[run, event].tolist()
+            if change:
+                number[one] -= change
+                number[other] -= change
+                number[both] += change
+            largest[run, event] = np.flatnonzero(number)[-1]
+    return largest
 
 
 def _at_times(
@@ -209,15 +238,19 @@ def _at_times(
 
 
 def _compactness_of_runs(
-    event_time: Floats, event_shape: Integers, shapes: list[str], size: Integers, time: Floats
+    event_time: Floats,
+    event_shape: Integers,
+    sign: Integers,
+    shapes: list[str],
+    size: Integers,
+    time: Floats,
 ) -> Floats:
     """Return the compactness of each run, shape (run, time); NaN where it has none."""
     # Up to three blocks, all shapes are equally compact; contact graphs have no perimeter.
     graphs = np.array([discs_of(name) > 0 for name in shapes])
     shaped = np.where((size >= 4) & ~graphs, size, 0)
     weighted = np.array([n and n * compactness(one) for n, one in zip(shaped, shapes, strict=True)])
-    real = event_shape[..., 2] >= 0
-    changes = (((one[event_shape] * (-1, -1, 1)).sum(axis=2) * real) for one in (weighted, shaped))
+    changes = (((one[event_shape] * (-1, -1, 1)).sum(axis=2) * sign) for one in (weighted, shaped))
     total, blocks = (_at_times(event_time, one.cumsum(axis=1), 0, time) for one in changes)
     unknown = np.full(total.shape, np.nan)
     return np.asarray(np.divide(total, blocks, out=unknown, where=blocks > 0))

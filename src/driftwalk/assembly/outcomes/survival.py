@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.outcomes.class_names import all_single
 from driftwalk.assembly.outcomes.distribution import (
     check_times,
     class_names,
@@ -24,6 +23,7 @@ from driftwalk.assembly.outcomes.distribution import (
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.schema.check import build_dataset
+from driftwalk.schema.shapes import all_single
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -57,6 +57,13 @@ class MeasuredAttraction:
         """Return the attraction of faces opposite each other [N] at gaps [m]."""
         offset, angle = (int(np.argmin(np.abs(axis))) for axis in self.axes[1:])
         return np.asarray(np.interp(gap, self.axes[0], self._values()[:, offset, angle], right=0.0))
+
+    def flat_below(self, gap: float) -> MeasuredAttraction:
+        """Return the table with the force of the first gap above this one [m] at all below it."""
+        row = int(np.searchsorted(self.axes[0], gap))
+        values = self._values().copy()
+        values[:row] = values[row]
+        return replace(self, force=tuple(values.ravel().tolist()))
 
     def energies(self) -> Floats:
         """Return the energy at the nodes [J]: the force integrated from the largest gap inward."""

@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.assembly.lattice.bonds import JOINING, PARTING
 from driftwalk.assembly.lattice.events import ReplayedEvents, replay_contacts, replay_events
 from driftwalk.assembly.lattice.typed_faces import face_table
+from driftwalk.assembly.runs.bonds import bond_attrs
 from driftwalk.assembly.runs.glued import glued_cells
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
@@ -87,6 +89,8 @@ def build_assembly(plan: Plan, arrays: Arrays, *, attrs: dict[str, Any]) -> xr.D
         data["flow_draw"] = ("run", plan.flow_draw.astype(np.int32))
     if plan.flow_start is not None:
         data["flow_start"] = ("run", plan.flow_start)
+    if "event_kind" in whole:
+        data["event_kind"] = (by_event, whole["event_kind"])
     data |= {LAW_NAMES[key]: ("run", values) for key, values in plan.law.items()}
     data |= {"outcome": ("run", outcome), "status": ("run", whole["status"])}
     return build_dataset(
@@ -111,10 +115,12 @@ def replay_of(plan: Plan, arrays: Arrays) -> ReplayedEvents:
             pose=arrays["pose"],
             assembly=arrays["assembly"],
             diameter=plan.study.block.side_m,
+            event_kind=arrays.get("event_kind"),
         )
     return replay_events(
         *(arrays[f"event_{name}"] for name in ("count", "block", "face")),
         **{name: arrays[name] for name in ("cell", "quarter", "assembly")},
+        event_kind=arrays.get("event_kind"),
         chirality=plan.study.assembly.chirality,
         faces=face_table(plan.study.assembly),
     )
@@ -182,6 +188,7 @@ def assembly_attrs(plan: Plan) -> dict[str, Any]:
         "hidden_face_drag": "full" if plan.is_round else str(settings.hidden_face_drag),
         "block_restitution": settings.block_restitution,
         "block_friction": settings.block_friction,
+        **bond_attrs(study),
         "block_side_m": study.block.side_m,
         **({"block_shape": "disc"} if plan.is_round else {}),
         **({"glued": settings.glued} if glued_cells(settings) is not None else {}),
@@ -196,19 +203,20 @@ def assembly_attrs(plan: Plan) -> dict[str, Any]:
 
 
 def completion_step(arrays: Arrays) -> npt.NDArray[Any]:
-    """Return the step at which all blocks had become one assembly, -1 in runs where they did not.
+    """Return the step at which all blocks had become one assembly first, -1 in runs without.
 
     Parameters
     ----------
     arrays : dict of ndarray
         As in `build_assembly`.
     """
-    count = arrays["event_count"]
-    complete = count == arrays["assembly"].shape[1] - 1
-    # The last joining made one assembly of all; a single block is complete from the start.
-    last = np.maximum(count.astype(np.int64) - 1, 0)[:, None]
-    joined = np.take_along_axis(arrays["event_step"], last, axis=1)[:, 0]
-    return np.where(complete, np.where(count > 0, joined, 0), -1)
+    step, blocks = arrays["event_step"], arrays["assembly"].shape[1]
+    kind = arrays.get("event_kind", np.where(step < 0, -1, JOINING))
+    parts = blocks - np.cumsum((kind == JOINING).astype(int) - (kind == PARTING), axis=1)
+    # A single block is complete from the start.
+    complete = (parts == 1) & (step >= 0)
+    first = np.take_along_axis(step, complete.argmax(axis=1)[:, None], axis=1)[:, 0]
+    return np.where(complete.any(axis=1), first, 0 if blocks == 1 else -1)
 
 
 def times_of(step: npt.NDArray[Any], *, time_step: float) -> Floats:

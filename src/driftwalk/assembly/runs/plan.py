@@ -13,14 +13,14 @@ import numpy.typing as npt
 from driftwalk import _core
 from driftwalk.assembly.lattice.typed_faces import face_table
 from driftwalk.assembly.pull.tables import block_pull
+from driftwalk.assembly.runs.bonds import event_rows, require_bonds
 from driftwalk.assembly.runs.glued import glued_cells, with_glue_events
 from driftwalk.assembly.runs.start import given_start, place_blocks, require_cover, require_room
 from driftwalk.core.arrays import Floats, Integers, Keys
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
 from driftwalk.core.processors import default_threads
-from driftwalk.core.random_streams import trial_in
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import trial_in, world_keys
 from driftwalk.simulation.backend import Camera, native_model, require_steps
 from driftwalk.simulation.series import continued_flow, flow_starts
 
@@ -86,6 +86,10 @@ class Plan:
             "block_restitution": rules.block_restitution,
             "block_friction": rules.block_friction,
             "faces": None if (table := face_table(rules)) is None else table.native(),
+            "bonds": (
+                *(rules.bond_rate_per_s, rules.bond_force_N, rules.bond_strength_N),
+                rules.relatch_clearance,
+            ),
         }
 
 
@@ -138,6 +142,7 @@ def make_plan(
             given[f"forces.{key}"] = float(np.asarray(value))
     chosen = apply_overrides(study, given)
     require_room(chosen)
+    require_bonds(chosen)
     require_cover(flow, chosen.tank)
     block_pull(chosen)  # its errors come before any run
     runs = np.arange(chosen.assembly.runs) if index is None else index
@@ -190,7 +195,17 @@ def start_poses(plan: Plan, start: npt.ArrayLike | None = None) -> Floats:
 def simulate_rows(
     plan: Plan, start: Floats, rows: slice = slice(None), *, sample_every: int = 0
 ) -> Arrays:
-    """Simulate some of the runs; one entry per run in every array."""
+    """Simulate some of the runs; one entry per run in every array, and room for all events."""
+    rows_of_events = event_rows(plan.study, duration=plan.steps * plan.study.time_step_s)
+    found = _simulate(plan, start, rows, sample_every, rows_of_events)
+    most = int(found["event_count"].max(initial=0))
+    if most > found["event_step"].shape[1]:
+        found = _simulate(plan, start, rows, sample_every, most)
+    return found
+
+
+def _simulate(plan: Plan, start: Floats, rows: slice, every: int, event_rows: int) -> Arrays:
+    """Return what the native core gives for some runs; events beyond `event_rows` are counted."""
     pull = block_pull(plan.study)
     found = _core.assemble(
         plan.model(),
@@ -201,7 +216,8 @@ def simulate_rows(
         steps=plan.steps,
         **plan.rules(),
         pull=None if pull is None else pull.native,
-        sample_every=sample_every,
+        sample_every=every,
+        event_rows=event_rows,
         threads=plan.threads,
         precision="double" if plan.backend == "reference" else "single",
         flow_start=None if plan.flow_start is None else np.ascontiguousarray(plan.flow_start[rows]),

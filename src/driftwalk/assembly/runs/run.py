@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Final, Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.assembly.runs.bonds import event_rows, with_event_rows
 from driftwalk.assembly.runs.dataset import LAW_NAMES, build_assembly, build_path
 from driftwalk.assembly.runs.draws import (
     RUNS_PER_FLOW,
@@ -333,8 +334,11 @@ def _run(
 ) -> xr.Dataset:
     """Simulate the runs unit by unit, and put them into one dataset."""
     units = grid(run=plan.index).units(runs_per_unit(plan))
-    function = partial(_simulate_unit, plan, start_poses(plan, start))
+    poses = start_poses(plan, start)
+    function = partial(_simulate_unit, plan, poses)
     arrays = run_sweep(function, units, store=store, executor=executor, progress=progress)
+    if plan.study.assembly.bonds_break:
+        arrays = _all_events(plan, poses, arrays)
     return build_assembly(plan, arrays, attrs={"drawn": drawn})
 
 
@@ -343,7 +347,28 @@ def _simulate_unit(plan: Plan, poses: Floats, unit: WorkUnit) -> Arrays:
     parts = [
         simulate_rows(drawn, poses, rows) for rows, drawn in _by_draw(plan, unit.start, unit.stop)
     ]
+    rows = _rows(plan)
+    parts = [with_event_rows(part, rows) for part in parts]
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def _rows(plan: Plan) -> int:
+    """Return the rows of events of a unit, the same for all of them."""
+    return event_rows(plan.study, duration=plan.steps * plan.study.time_step_s)
+
+
+def _all_events(plan: Plan, poses: Floats, arrays: Arrays) -> Arrays:
+    """Return the runs with all of their events: those with more than a unit keeps run again."""
+    count = arrays["event_count"]
+    most = int(count.max(initial=0))
+    again = np.flatnonzero(count > arrays["event_step"].shape[1]).tolist()
+    arrays = with_event_rows(arrays, max(most, plan.study.assembly.blocks - 1, 1))
+    for run in again:
+        [(rows, drawn)] = _by_draw(plan, run, run + 1)
+        found = with_event_rows(simulate_rows(drawn, poses, rows), most)
+        for name, values in found.items():
+            arrays[name][run] = values[0]
+    return arrays
 
 
 def runs_per_unit(plan: Plan) -> int:

@@ -39,7 +39,17 @@ def require_room(study: Study) -> None:
             "start from the fit of one square block, or of a disc; squares may start glued "
             "(`assembly.glued`)"
         )
-    if (cells := glued_cells(study.assembly)) is not None:
+    rules = study.assembly
+    glued = glued_cells(rules) is not None
+    if (glued or rules.typed_faces is not None) and (
+        rules.bond_rate_per_s or rules.bond_strength_N
+    ):
+        raise InputError(
+            "bonds that break (`assembly.bond_rate_per_s`, `assembly.bond_strength_N`) are not "
+            f"simulated where {'blocks start glued' if glued else 'faces have types'}: leave one "
+            "out"
+        )
+    if (cells := glued_cells(rules)) is not None:
         _require_glued(study, len(cells))
     if study.block.is_round and study.assembly.latching == "connector":
         raise InputError(
@@ -167,19 +177,25 @@ def _require_inside(study: Study, poses: Floats) -> None:
 
 
 def _require_apart(study: Study, poses: Floats) -> None:
-    for first in range(poses.shape[1]):
-        for second in range(first + 1, poses.shape[1]):
-            pair, side = (poses[:, first], poses[:, second]), study.block.side_m
-            if study.block.is_round:
-                depth = side - np.hypot(*(pair[1] - pair[0])[:, :2].T)
-            else:
-                depth = overlap_depth(*pair, side=side)
-            overlapping = np.flatnonzero(depth > TOUCHING_M)
-            if overlapping.size:
-                run = overlapping[0]
-                raise InputError(
-                    f"start: blocks {first} and {second} of run {run} overlap by {depth[run]:.3g} m"
-                )
+    from scipy.spatial import cKDTree
+
+    side = study.block.side_m
+    for run, placed in enumerate(poses):
+        # What is farther apart than a diagonal does not overlap.
+        pairs = cKDTree(placed[:, :2]).query_pairs(math.sqrt(2.0) * side, output_type="ndarray")
+        pairs = pairs[np.lexsort(pairs.T[::-1])]
+        first, second = placed[pairs[:, 0]], placed[pairs[:, 1]]
+        if study.block.is_round:
+            depth = side - np.hypot(*(second - first)[:, :2].T)
+        else:
+            depth = overlap_depth(first, second, side=side)
+        overlapping = np.flatnonzero(depth > TOUCHING_M)
+        if overlapping.size:
+            one, other = pairs[overlapping[0]]
+            raise InputError(
+                f"start: blocks {one} and {other} of run {run} overlap by "
+                f"{depth[overlapping[0]]:.3g} m"
+            )
 
 
 def overlap_depth(first: Floats, second: Floats, *, side: float) -> Floats:

@@ -355,6 +355,7 @@ KEYS: Final[dict[str, str]] = {
     "faces": "assembly.faces",
     "hidden_face_drag": "assembly.hidden_face_drag",
     "stirring_length": "forces.stirring_length_m",
+    "bond_rate": "assembly.bond_rate_per_s",
     "magnets": "interaction.magnets",
     "drag_coefficient": "forces.drag_coefficient",
     "force_std": "forces.force_std_N",

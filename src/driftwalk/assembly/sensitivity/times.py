@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from driftwalk.assembly.outcomes.class_names import all_single, sort_classes
+from driftwalk.assembly.outcomes.class_names import sort_classes
 from driftwalk.assembly.outcomes.survival import class_counts
 from driftwalk.assembly.runs.dataset import DECIMALS, times_of
 from driftwalk.assembly.runs.plan import Plan, whole_steps
 from driftwalk.core.arrays import Floats, Integers
+from driftwalk.schema.shapes import all_single
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -25,6 +25,7 @@ from driftwalk.calibration.estimation.posterior import (
 )
 from driftwalk.calibration.estimation.regression_abc import REGRESSION, Order, sequential_regression
 from driftwalk.calibration.evolution import distinct
+from driftwalk.calibration.held_out.law_findings import MISFIT, Misfit
 from driftwalk.core.arrays import Bools, Floats
 
 Starts = Callable[[], Floats]
@@ -41,11 +42,6 @@ class MatchingPolicy(NamedTuple):
     """Least root-mean-square distance of two starts, in parts of the ranges. Chosen by hand."""
     hopeless: float = 100.0
     """Discrepancy per summary from which on another start is no use: it is another model."""
-    typical_quantile: float = 0.95
-    """One recording of the model itself in twenty is called unlike it."""
-    against: float = 1.5
-    """Discrepancy, in that quantile, from which the summaries speak against the model: at most 1.23
-    in 160 recordings of the model itself (studies/motion_models), 3.5 and more on wrong models."""
     unsettled: float = 1.0
     """Last move of a mean, in standard deviations, above which it is not determined."""
     unlike: float = 4.0
@@ -96,19 +92,15 @@ class Matched(NamedTuple):
     """and those whose draws still moved when the last simulations were made."""
 
     @property
-    def usual(self) -> bool:
-        """Whether the summaries are like those of the model's own recordings."""
-        return self.discrepancy <= self.upper_discrepancy
-
-    @property
-    def against(self) -> bool:
-        """Whether the summaries speak against the model, and are not just less usual."""
-        return self.discrepancy > MATCHING.against * self.upper_discrepancy
+    def misfit(self) -> Misfit:
+        """How far the summaries are from those of the model's own recordings."""
+        return Misfit(self.discrepancy, self.upper_discrepancy)
 
     @property
     def unlike(self) -> bool:
         """Whether the summaries are so far from the model's that it can determine nothing."""
-        return not self.usual and self.discrepancy > MATCHING.unlike * self.median_discrepancy
+        far = self.discrepancy > MATCHING.unlike * self.median_discrepancy
+        return far and not self.misfit.usual
 
 
 def most_simulations(parameters: int, replicates: int) -> int:
@@ -143,7 +135,7 @@ def match_summaries(
         lambda one: objective(one, parts=1)[:, 0], modes.best, replicates
     )
     best, usual = modes.best, bootstrap.discrepancies
-    middle, most = float(np.median(usual)), float(np.quantile(usual, MATCHING.typical_quantile))
+    middle, most = float(np.median(usual)), float(np.quantile(usual, MISFIT.usual_quantile))
     discrepancy = best.solution.discrepancy
     # What the model leaves unexplained widens the draws, as a reduced chi-square above one does.
     stretch = float(np.sqrt(discrepancy / middle)) if discrepancy > most else 1.0

@@ -11,21 +11,18 @@ import numpy as np
 
 from driftwalk.calibration.estimation.estimate import Matched
 from driftwalk.calibration.estimation.identifiability import Determination
+from driftwalk.calibration.held_out.bouts import BoutDistance
 from driftwalk.calibration.held_out.candidates import Candidate
-from driftwalk.calibration.held_out.held_out_score import (
-    HeldOutScore,
-    held_out_differences,
-    recording_parts,
-)
+from driftwalk.calibration.held_out.held_out_score import HeldOutScore, recording_parts
+from driftwalk.calibration.held_out.law_findings import law_findings
 from driftwalk.calibration.held_out.recorded import RecordedMotion
-from driftwalk.calibration.stationarity import unsteady_motion
 from driftwalk.core.arrays import Floats
 from driftwalk.motion import ParticleModel
 from driftwalk.schema import Parameter
 from driftwalk.schema.answers.facts import BOUNDS, AnswerParts, texts
 from driftwalk.schema.answers.verdict import verdict_of, verdict_variables
 from driftwalk.schema.check import build_dataset
-from driftwalk.simulation.series import is_series, series_warnings
+from driftwalk.simulation.series import series_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,6 +46,8 @@ class Estimation:
         How well the parameters are determined; None where the second stage does not count.
     held_out : HeldOutScore
         The answer for the even blocks, judged on the odd ones.
+    bouts : sequence of BoutDistance
+        How long bouts last at the estimate, against the recording's.
     """
 
     point: Floats
@@ -57,6 +56,7 @@ class Estimation:
     scores: Mapping[str, float]
     known: Determination | None
     held_out: HeldOutScore
+    bouts: Sequence[BoutDistance]
 
 
 def build_model_calibration(
@@ -67,10 +67,11 @@ def build_model_calibration(
 ) -> xr.Dataset:
     """Return the dataset of a calibration of many parameters."""
     ranges, held_out = entry.ranges, found.held_out
-    against, unable = _findings(found, entry)
-    # In a flow that changes the model is not steady either.
-    unable += [] if is_series(motion.like.flow) else unsteady_motion(motion)
-    verdict = verdict_of([*held_out_differences(held_out, motion), *against], unable)
+    misfit = None if found.matched is None else found.matched.misfit
+    against, unable = law_findings(entry, held_out, motion, misfit=misfit, bouts=found.bouts)
+    if (ended := entry.at_range_end(found.point)) is not None:
+        unable.append(ended)
+    verdict = verdict_of(against, unable)
     count = len(ranges)
     # None where the summaries' answer does not count: nothing is known of the intervals then.
     known = found.known
@@ -164,23 +165,6 @@ def _fixed(entry: Candidate) -> dict[str, float]:
     return {**model.fixed, "clearance": model.clearance}
 
 
-def _findings(found: Estimation, entry: Candidate) -> tuple[list[str], list[str]]:
-    """Return what the summaries and the ranges say against the model, and what they leave open."""
-    against: list[str] = []
-    unable: list[str] = []
-    matched = found.matched
-    if matched is not None and not matched.usual:
-        (against if matched.against else unable).append(
-            "the summaries of the motion differ from the model's: a misfit of "
-            f"{matched.discrepancy:.0f} where its own recordings come to "
-            f"{matched.median_discrepancy:.0f} (95 % below {matched.upper_discrepancy:.0f})"
-        )
-    ended = entry.at_range_end(found.point)
-    if ended is not None:
-        unable.append(ended)
-    return against, unable
-
-
 def _said(found: Estimation, entry: Candidate) -> list[str]:
     """Return the warnings of the estimate."""
     said: list[str] = []
@@ -194,7 +178,7 @@ def _said(found: Estimation, entry: Candidate) -> list[str]:
             f"{found.scores['searched']:.2f}; the values are the search's, and none is determined"
         )
         return said
-    if not matched.usual:
+    if not matched.misfit.usual:
         said.append(
             f"the intervals are {matched.stretch:.1f} times as wide as the draws, for what the "
             f"model leaves of the summaries{'; nothing is determined' if matched.unlike else ''}"

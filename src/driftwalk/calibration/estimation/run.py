@@ -18,12 +18,14 @@ from driftwalk.calibration.estimation.label_switching import label_order
 from driftwalk.calibration.estimation.result import Estimation, build_model_calibration
 from driftwalk.calibration.estimation.summary_objective import SummaryObjective
 from driftwalk.calibration.evolution import Budget, CachedObjective, SearchResult, search_minimum
+from driftwalk.calibration.held_out.bouts import bout_distances
 from driftwalk.calibration.held_out.candidates import (
     Candidate,
     prepare_candidates,
     with_contact_clearance,
 )
 from driftwalk.calibration.held_out.held_out_score import (
+    HELD_OUT_REPLICATES,
     even_blocks,
     require_numbers,
     score_setting,
@@ -56,7 +58,7 @@ def estimate(entry: Candidate, motion: RecordedMotion, how: Execution) -> Estima
     require_numbers(stages.even)
     order = stages.order
     matched = stages.matched() if motion.replicates > 1 else None
-    if matched is None or not matched.usual:
+    if matched is None or not matched.misfit.usual:
         stages.optima()
     answers = {
         **({} if stages.best is None else {"searched": order(stages.best[None])[0]}),
@@ -80,13 +82,16 @@ def estimate(entry: Candidate, motion: RecordedMotion, how: Execution) -> Estima
     unseen = [name for name in ("searched", "even")[: 1 + counts] if name in answers]
     best = min(unseen, key=scores.__getitem__)
     how.tell("judged", 0, 1)
+    point = answers["matched" if counts else "searched"]
+    worlds = stages.even.simulated(point[None], HELD_OUT_REPLICATES, stage="judged")
     return Estimation(
-        point=answers["matched" if counts else "searched"],
+        point=point,
         searched=answers.get("searched"),
         matched=matched,
         scores=scores,
         known=known,
         held_out=score_setting(stages.even, motion, answers[best]),
+        bouts=bout_distances(motion, worlds),
     )
 
 
@@ -98,7 +103,7 @@ def _counts(matched: Matched | None, scores: Mapping[str, float]) -> bool:
     """
     if matched is None:
         return False
-    return matched.usual or scores["matched"] <= MATCHING.as_close * scores["searched"]
+    return matched.misfit.usual or scores["matched"] <= MATCHING.as_close * scores["searched"]
 
 
 class _Stages:

@@ -32,16 +32,16 @@ from driftwalk.comparison.aspects import (
 )
 from driftwalk.conditions import (
     Conditions,
-    jump_warnings,
     neighbours_of,
     possible_noises,
     recorded_camera,
     recorded_conditions,
     require_travel,
+    sound_track,
 )
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
-from driftwalk.schema import Parameter, Track, body_track
+from driftwalk.schema import Parameter, Track
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -243,7 +243,7 @@ class RecordedMotion:
     attrs : mapping
         Attributes of each dataset of scores on this recording.
     warnings : list of str
-        Jumps of the body.
+        Mistakes of the tracker that were left out, and jumps of the body.
     """
 
     track: Track
@@ -349,7 +349,7 @@ def body_motion(
     threads: int | None = None,
 ) -> RecordedMotion:
     """Prepare a body of a recording for the comparison of motion models."""
-    track = body_track(recording, body)
+    track, warnings = sound_track(recording, body)
     require_samples(track)
     require_travel(track, study, of_block=False)
     quantum = float(recording.attrs.get("position_quantum_m", 0.0))
@@ -415,5 +415,5 @@ def body_motion(
             "source": str(recording.attrs.get("source", "")),
             "simulated_recording": str(recording.attrs.get("simulated", "no")),
         },
-        warnings=jump_warnings(recording, body),
+        warnings=warnings,
     )

@@ -33,9 +33,8 @@ from driftwalk.calibration.ranking.model_evidence import (
     most_settings,
     shortlist_models,
 )
-from driftwalk.core.background_task import CancelOnError
 from driftwalk.core.files.shards import Arrays
-from driftwalk.core.processors import one_blas_thread
+from driftwalk.core.processors import CancelOnError, one_blas_thread
 from driftwalk.core.run_stages import Course, tell_nobody
 from driftwalk.motion import BlockModel, ParticleModel
 from driftwalk.sweep import MemoryStore, Store, WorkUnit, collect, grid, run_sweep
@@ -214,7 +213,7 @@ class Stages:
         shortlist = shortlist_models(self.work.entries, held_out)
         found: dict[int, Evidence] = {}
         for number, index in enumerate(shortlist.models):
-            if number >= shortlist.tied and any(one.usual for one in found.values()):
+            if number >= shortlist.tied and any(one.misfit.usual for one in found.values()):
                 break
             planned = max(shortlist.tied, 1)
             found[index] = self._matched(number, index, held_out[index].point, planned)
@@ -223,7 +222,7 @@ class Stages:
             for index, entry in enumerate(self.work.entries)
             if entry.baseline and not held_out_differences(held_out[index], self.work.motion)
         ]
-        if any(one.usual for one in found.values()):
+        if any(one.misfit.usual for one in found.values()):
             for index in walks:
                 found[index] = self._matched(len(found), index, np.empty(0), len(found) + 1)
         return found

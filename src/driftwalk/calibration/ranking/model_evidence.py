@@ -27,6 +27,7 @@ from driftwalk.calibration.held_out.held_out_score import (
     held_out_differences,
     score_setting,
 )
+from driftwalk.calibration.held_out.law_findings import MISFIT, Misfit
 from driftwalk.calibration.held_out.recorded import RecordedMotion
 from driftwalk.core.arrays import Floats
 from driftwalk.core.processors import one_blas_thread
@@ -45,8 +46,6 @@ class EvidencePolicy(NamedTuple):
     rival: float = 10.0
     """Difference of deviance below which models are equally likely: a discrepancy of a hundred has
     an error of some 5, from the simulated covariance."""
-    typical_quantile: float = 0.99
-    """One recording of the model itself in a hundred is called unlike it."""
     hopeless: float = 3.0
     """Discrepancy per summary above which a search is given up. The true model has 0.7 to 1.2;
     wrong ones would take three times as long."""
@@ -68,7 +67,7 @@ class Evidence(NamedTuple):
     median_discrepancy: float
     """Its median over simulated recordings of the model,"""
     upper_discrepancy: float
-    """and their 99 % quantile."""
+    """and their 95 % quantile."""
     deviance: float
     """-2 log of the evidence, but for a constant that all models share."""
     matched: HeldOutScore | None = None
@@ -77,9 +76,9 @@ class Evidence(NamedTuple):
     """How long bouts last there, against the model's own recordings."""
 
     @property
-    def usual(self) -> bool:
-        """Whether the summaries are like those of the model's own recordings."""
-        return self.discrepancy <= self.upper_discrepancy
+    def misfit(self) -> Misfit:
+        """How far the summaries are from those of the model's own recordings."""
+        return Misfit(self.discrepancy, self.upper_discrepancy)
 
 
 class EvidenceRanking(NamedTuple):
@@ -136,14 +135,15 @@ def rank_by_evidence(
 ) -> EvidenceRanking:
     """Return which model the summaries speak for.
 
-    Among those whose discrepancy is usual it is the one of the largest evidence, which has a price
-    for each parameter. Where others are equally likely, it is the one with the fewest numbers.
+    Among those that their misfit does not speak against it is the one of the largest evidence,
+    which has a price for each parameter. Where others are equally likely, it is the one with the
+    fewest numbers.
     """
-    usual = [k for k, one in evidence.items() if one.usual and not entries[k].baseline]
-    if not usual:
+    possible = [k for k, one in evidence.items() if not (one.misfit.against or entries[k].baseline)]
+    if not possible:
         return EvidenceRanking(None, ())
-    least = min(evidence[k].deviance for k in usual)
-    left = [k for k in usual if evidence[k].deviance < least + EVIDENCE.rival]
+    least = min(evidence[k].deviance for k in possible)
+    left = [k for k in possible if evidence[k].deviance < least + EVIDENCE.rival]
     best = min(left, key=lambda k: (entries[k].numbers, evidence[k].deviance))
     return EvidenceRanking(best, tuple(k for k in left if k != best))
 
@@ -164,22 +164,6 @@ def with_matched_settings(
                 optimum_scores=held_out[k].optimum_scores, evaluations=held_out[k].evaluations
             )
     return found
-
-
-def discrepancy_sentence(one: Evidence) -> str | None:
-    """Return how far a model's summaries are from the recording's; None where they are like them.
-
-    Examples
-    --------
-    >>> discrepancy_sentence(Evidence(812.3, 101.0, 140.2, 900.0))
-    "summaries of the motion: a misfit of 812, that of the model's own recordings is below 140"
-    """
-    if one.usual:
-        return None
-    return (
-        f"summaries of the motion: a misfit of {one.discrepancy:.0f}, that of the model's own "
-        f"recordings is below {one.upper_discrepancy:.0f}"
-    )
 
 
 def ranking_sentence(
@@ -255,14 +239,14 @@ def estimate_evidence(
     evidence = Evidence(
         discrepancy=found.discrepancy,
         median_discrepancy=float(np.median(found.own_discrepancies)),
-        upper_discrepancy=float(np.quantile(found.own_discrepancies, EVIDENCE.typical_quantile)),
+        upper_discrepancy=float(np.quantile(found.own_discrepancies, MISFIT.usual_quantile)),
         # Laplace's approximation, with a prior that is even over the ranges.
         deviance=found.discrepancy
         + found.log_variance
         - log_volume
         - parameters * float(np.log(2.0 * np.pi)),
     )
-    if entry.baseline or not evidence.usual:
+    if entry.baseline or evidence.misfit.against:
         return evidence
     worlds = objective.worlds.simulated(setting[None], HELD_OUT_REPLICATES, stage="judged")
     return evidence._replace(

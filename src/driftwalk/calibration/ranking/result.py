@@ -66,8 +66,7 @@ def build_comparison(
     if evidence:
         why.insert(0 if answer.best is not None else 1, ranking_sentence(names, evidence, answer))
     first = closest if answer.best is None else answer.best
-    as_good = answer.as_good(entries, evidence)
-    best = answer_sentence(entries, verdicts, first, as_good)
+    best = answer_sentence(entries, verdicts, first)
     findings = [best, *(one for one in why if one != best)]
     about = recording_parts(motion)
     data: dict[str, Any] = {

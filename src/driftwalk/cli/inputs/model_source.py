@@ -35,6 +35,7 @@ RUN_NAMES: Final = (
     *("latching", "connector_distance", "connector_axis", "faces", "glued", "hidden_face_drag"),
     "chirality",
     *("stirring_length", "stirring"),
+    *("bond_rate", "bond_strength", "relatch_clearance"),
     *("magnets", "magnet_inset", "poles", "attraction", "capillary", "meniscus_height"),
     "approach_resistance",
     *("block_restitution", "block_friction", "confidence", "seed", "flow_repeat", "flow_start"),

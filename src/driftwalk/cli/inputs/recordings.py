@@ -13,7 +13,7 @@ from driftwalk.cli.options.recording import RecordingOptions
 from driftwalk.cli.options.study import TANK, StudyOptions, option_name
 from driftwalk.cli.terminal.output import print_note, print_warnings
 from driftwalk.core.errors import InputError
-from driftwalk.core.files.file_names import text_of_name
+from driftwalk.core.files.bounded import text_of_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -93,7 +93,7 @@ def read_for_models(
     InputError
         As `read_for_run`, and when the flow field cannot be read.
     """
-    from driftwalk.conditions import jump_warnings
+    from driftwalk.conditions import sound_track
     from driftwalk.motion import feels_others
 
     others = any(map(feels_others, models))
@@ -101,7 +101,7 @@ def read_for_models(
     recording, study = read.trajectories[0], read.study
     inputs = {"recording": path, "flow": flow, "study": given.file}
     about: About = "block" if "block" in models else "tank"
-    jumps = jump_warnings(recording, read.body)
+    _, warnings = sound_track(recording, read.body)
     work = {
         "recording": recording,
         "study": study,
@@ -109,7 +109,7 @@ def read_for_models(
         "body": read.body if others else how.body,
         "inputs": {role: path for role, path in inputs.items() if path is not None},
     }
-    return work, opening_note(study, given, how=how, about=about, warnings=jumps)
+    return work, opening_note(study, given, how=how, about=about, warnings=warnings)
 
 
 def words_to_fit(trajectory: xr.Dataset, described: Mapping[str, Any] | None = None) -> list[str]:

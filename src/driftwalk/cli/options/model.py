@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final, NamedTuple
 
 from driftwalk.cli.options.shared_types import option
-from driftwalk.core.errors import ConfigurationError, InputError
-from driftwalk.core.text.did_you_mean import did_you_mean
+from driftwalk.core.errors import ConfigurationError, InputError, did_you_mean
 
 if TYPE_CHECKING:
     from driftwalk.motion import MotionModel

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 PANELS: Final = {"flow": "Flow field (over the study file)"}
 """Panels of the help for sections of a study; the other keys stand in `PANEL`."""
 TANK: Final = "tank.diameter_m"
+WITH_SECOND: Final = {"bond_rate": "<1/s[,N]>"}
+"""Options of two numbers, the second of which may be left out, and their placeholders."""
 
 
 @dataclass(frozen=True)
@@ -160,13 +162,14 @@ def study_option(name: str, keys: Mapping[str, str] = STUDY_KEYS) -> Any:
     key = declared(keys[name])
     quantity = None if key.is_list else key.quantity
     is_whole = quantity is not None and quantity.whole
+    plain = quantity is None or is_whole or name in WITH_SECOND
     return typer.Option(
         option_of(name),
-        metavar=_metavar(key),
+        metavar=_metavar(key) if name not in WITH_SECOND else WITH_SECOND[name],
         help=to_options(key.meaning),
         # The largest value is the study's to check: it says nothing to a reader of the help.
         min=quantity.ge if quantity is not None and is_whole else None,
-        parser=None if quantity is None or is_whole else quantity_parser(quantity.unit, *key.words),
+        parser=None if quantity is None or plain else quantity_parser(quantity.unit, *key.words),
         rich_help_panel=PANELS.get(keys[name].partition(".")[0], PANEL),
         show_default=False,
     )
@@ -185,7 +188,7 @@ def _part(name: str, keys: Mapping[str, str]) -> Part:
     kind: Any = str
     if key.is_list:
         kind = list[str]
-    elif key.quantity is not None:
+    elif key.quantity is not None and name not in WITH_SECOND:
         kind = int if key.quantity.whole else Any
     return Part(Annotated[kind | None, study_option(name, keys)], None)
 

@@ -149,6 +149,7 @@ def summarise(found: xr.Dataset) -> dict[str, Any]:
         },
         "final": final,
         "complete": is_one_assembly(final) if final else None,
+        "rates": _rates(found),
         "events": _events(found, names),
         "warnings": _warnings(found),
     }
@@ -209,6 +210,41 @@ def _events(found: xr.Dataset, names: list[str]) -> list[dict[str, Any]]:
     return sorted(events, key=lambda event: float(event["time_s"]))
 
 
+def _rates(found: xr.Dataset) -> dict[str, Any]:
+    """Return how often blocks joined and parted in each class that came, per second in it."""
+    rates: dict[str, Any] = {}
+    for kind in ("joining", "parting"):
+        for place, name in enumerate(str(one) for one in found["class"].values):
+            rate, low, high = (
+                float(found[f"{kind}_rate{end}"][place]) for end in ("", "_low", "_high")
+            )
+            if rate == rate:
+                rates.setdefault(name, {})[kind] = {
+                    "count": int(found[f"{kind}_count"][place]),
+                    "per_s": rate,
+                    "interval_per_s": [low, high],
+                }
+    return rates
+
+
+def _rate_table(summary: dict[str, Any]) -> None:
+    """Print the rates, where anything joined or parted."""
+    if not summary["events"]:
+        return
+    interval = f"{summary['rate_confidence']:.0%} interval"
+    rows = []
+    for name, rates in summary["rates"].items():
+        cells: list[Any] = [short_class(name)]
+        for kind in ("joining", "parting"):
+            one = rates[kind]
+            low, high = one["interval_per_s"]
+            cells += [one["count"], f"{one['per_s']:.3g}", f"{low:.3g} to {high:.3g}"]
+        rows.append(cells)
+    heads = (["joinings", "[1/s]", interval], ["partings", "[1/s]", interval])
+    print_table(rows, columns=["class", *heads[0], *heads[1]])
+    print()
+
+
 def _warnings(found: xr.Dataset) -> list[str]:
     facts = found.attrs
     said = []
@@ -252,4 +288,5 @@ def _print(summary: dict[str, Any]) -> None:
     else:
         print("no blocks joined")
     print()
+    _rate_table(summary)
     print_table([["at the end", short_class(summary["final"]) or "unknown"]])

@@ -26,7 +26,7 @@ from driftwalk.cli.terminal.output import (
 )
 from driftwalk.cli.terminal.progress import ProgressReporter
 from driftwalk.core.errors import InputError
-from driftwalk.core.files.file_names import text_of_name
+from driftwalk.core.files.bounded import text_of_name
 from driftwalk.core.text.json_text import parse_json
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ import shlex
 from collections.abc import Mapping
 from typing import Any, Final
 
-from driftwalk.core.study_keys import TABLES
+from driftwalk.core.study_keys import BOND_FORCE, TABLES
 
 
 def option_of(name: str) -> str:
@@ -50,6 +50,7 @@ OPTIONS: Final[dict[str, str | None]] = {
     "start": "--from",
     "stop": "--to",
     "variables": "--flow-variables",
+    BOND_FORCE: "--bond-rate",
     # The tables have most keys in common, each by the same name in all of them.
     **{key: option_of(name) for table in TABLES for name, key in table.items()},
 }

@@ -19,6 +19,7 @@ MAIN_OPTIONS: Final[dict[str, str]] = {
     "fit": "out study body switching-times wall compare-laws json",
     "flow": "out study body tracers window cells",
     "info": "fps scale columns tank body json",
+    "kinetics": "out target blocks cluster json",
     "play": "flow model parameter recording blocks live",
     "read": "out columns fps scale tank side mass",
     "report": "out fps scale tank overwrite",

@@ -135,7 +135,7 @@ def wall_pieces(tank: Tank) -> list[Piece]:
 
 def start_pose(block: Block, replicate: int = 0) -> tuple[float, float, float]:
     """Return where `driftwalk simulate` lets a replicate start: x, y [m], theta [rad]."""
-    from driftwalk.core.seeds import world_keys
+    from driftwalk.core.random_streams import world_keys
     from driftwalk.model import Pose
     from driftwalk.simulation.initial import random_start
 

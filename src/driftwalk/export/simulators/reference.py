@@ -10,7 +10,7 @@ import numpy as np
 
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.export.simulators.block import Block
 
 if TYPE_CHECKING:

@@ -23,8 +23,7 @@ from driftwalk.conditions import recorded_camera
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.core.processors import map_in_threads
-from driftwalk.core.random_streams import CheckStream
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import CheckStream, world_keys
 from driftwalk.flow.arena import Outline, outline_of
 from driftwalk.likelihood.check.restarts import (
     Sections,

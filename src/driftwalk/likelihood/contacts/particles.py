@@ -18,7 +18,7 @@ import numpy.typing as npt
 from driftwalk import _core
 from driftwalk.core.arrays import Floats
 from driftwalk.core.processors import default_threads
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.likelihood.filter.parameters import Point
 from driftwalk.likelihood.filter.series import Series, corrected
 from driftwalk.likelihood.preparation import Estimate

@@ -53,8 +53,6 @@ OF_PREDICTIONS: Final = ("hidden_share",)
 is wrong to the order in which the filter is. Of a dimer that was slow in the water they said 1
 where the share was 0, by seven standard deviations."""
 PULSES: Final = ("pulse_cosine", "pulse_sine")
-MODES: Final = ("mode_frequency", "mode_phase")
-"""Numbers of the flow's modes in time: their frequency, and the phase of one mode alone."""
 
 
 class Drag(NamedTuple):

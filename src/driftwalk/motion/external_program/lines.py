@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from driftwalk.core.arrays import Floats, Keys
-from driftwalk.core.errors import ConfigurationError, FormatError
+from driftwalk.core.errors import ConfigurationError, FormatError, did_you_mean
 from driftwalk.core.files.bounded import MIB
-from driftwalk.core.text.did_you_mean import did_you_mean
 from driftwalk.core.text.json_text import json_value, parse_json
 from driftwalk.motion.external_program.process import ProgramFault, Request
 from driftwalk.motion.worlds import in_words, world_seeds, world_starts

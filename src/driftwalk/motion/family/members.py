@@ -9,7 +9,7 @@ from typing import Any, Final, Literal
 import numpy.typing as npt
 
 from driftwalk.motion.family.columns import State
-from driftwalk.motion.family.parameters import PARAMETERS, parameters
+from driftwalk.motion.family.parts import PARAMETERS, parameters
 from driftwalk.schema import Parameter
 
 Numbers = Mapping[str, npt.ArrayLike]

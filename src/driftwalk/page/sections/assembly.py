@@ -6,15 +6,20 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from driftwalk.page.chart import chart, label, mark, series
-from driftwalk.page.number_words import count, percent, quantity
 from driftwalk.page.parts import (
     Section,
     attempt,
+    chart,
+    count,
     figure_with_ends,
+    label,
+    mark,
+    percent,
+    quantity,
     require,
     required,
     sections_of,
+    series,
     summary_section,
     value_of,
 )
@@ -26,6 +31,7 @@ from driftwalk.page.sections.outcomes import (
 )
 from driftwalk.page.sections.replay import replay_section
 from driftwalk.page.sections.sensitivity_maps import axis_words
+from driftwalk.page.sections.steady_state import steady_sections
 from driftwalk.plot.parts.assembly_labels import class_names
 from driftwalk.schema.answers.assembly import attraction_words
 from driftwalk.schema.shapes import short_class
@@ -50,6 +56,7 @@ def assembly_sections(
     path: xr.Dataset | None = None,
     sizes: xr.Dataset | None = None,
     sizes_drawn: xr.Dataset | None = None,
+    steady_state: xr.Dataset | None = None,
     attraction: xr.Dataset | None = None,
 ) -> list[Section]:
     """Return the sections of a page on self-assembly.
@@ -66,6 +73,8 @@ def assembly_sections(
         An `assembly_path` of sample runs.
     sizes, sizes_drawn : xarray.Dataset, optional
         The `assembly_sizes` of both. They take the place of the classes.
+    steady_state : xarray.Dataset, optional
+        The `steady_state` of the runs, where bonds break.
     attraction : xarray.Dataset, optional
         The `attraction` of two blocks.
 
@@ -96,6 +105,9 @@ def assembly_sections(
             made += attempt("class-times", title, lambda: class_times_section(class_times))
         title = "Time to contact and completion"
         made += attempt("survival", title, lambda: survival_section(class_times))
+    if steady_state is not None:
+        title = "Steady state"
+        made += attempt("steady-state", title, lambda: steady_sections(steady_state))
     if attraction is not None:
         title = "Force between two blocks"
         made += attempt("attraction", title, lambda: attraction_section(attraction))

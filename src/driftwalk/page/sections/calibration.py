@@ -8,24 +8,29 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from driftwalk.page.arrays import number
-from driftwalk.page.chart import chart, label, mark, series
-from driftwalk.page.number_words import count, quantity, with_interval
 from driftwalk.page.parts import (
     SIMULATED,
     Maker,
     Section,
     attempt,
     card,
+    chart,
+    count,
     empty_section,
     figure,
     is_simulated,
+    label,
+    mark,
+    quantity,
     require,
     required,
     sections_of,
+    series,
     summary_section,
     table_section,
     value_of,
     verdict_paragraphs,
+    with_interval,
 )
 from driftwalk.page.sections.flow import flow_sections
 from driftwalk.page.sections.map import (

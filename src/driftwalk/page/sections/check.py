@@ -9,17 +9,20 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.page.arrays import encode_array, number
-from driftwalk.page.chart import chart, label, mark, series
-from driftwalk.page.number_words import percent
 from driftwalk.page.parts import (
     Maker,
     Section,
     arena_part,
     attempt,
     axis,
+    chart,
     empty_section,
+    label,
+    mark,
+    percent,
     require,
     section,
+    series,
     table_section,
     value_of,
 )

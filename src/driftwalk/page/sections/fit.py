@@ -9,20 +9,25 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.core.errors import InputError
-from driftwalk.page.chart import chart, label, series
-from driftwalk.page.number_words import count, percent, quantity, with_interval
 from driftwalk.page.parts import (
     SIMULATED,
     Section,
     card,
+    chart,
+    count,
     empty_section,
     figure,
     is_simulated,
+    label,
+    percent,
+    quantity,
     sections_of,
+    series,
     summary_section,
     table_section,
     value_of,
     verdict_paragraphs,
+    with_interval,
 )
 from driftwalk.page.sections.check import check_sections
 from driftwalk.page.sections.flow import flow_sections

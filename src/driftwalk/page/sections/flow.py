@@ -9,8 +9,7 @@ import numpy as np
 
 from driftwalk.core.errors import InputError
 from driftwalk.page.arrays import encode_array, plain_list
-from driftwalk.page.number_words import percent, quantity
-from driftwalk.page.parts import Section, arena_part, attempt, require, section
+from driftwalk.page.parts import Section, arena_part, attempt, percent, quantity, require, section
 from driftwalk.schema import FLAGS
 
 if TYPE_CHECKING:

@@ -9,9 +9,17 @@ import numpy as np
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.page.arrays import binary_step, encode_array, numbers, plain_list
-from driftwalk.page.chart import label as chart_label
-from driftwalk.page.number_words import percent, quantity
-from driftwalk.page.parts import Section, arena_part, axis, require, section, value_of
+from driftwalk.page.parts import (
+    Section,
+    arena_part,
+    axis,
+    label as chart_label,
+    percent,
+    quantity,
+    require,
+    section,
+    value_of,
+)
 from driftwalk.plot.distances import CAUSES, UNKNOWN_CAUSE
 from driftwalk.plot.parts.labels import force_interval_text
 from driftwalk.schema import body_track

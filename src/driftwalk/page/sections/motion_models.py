@@ -7,14 +7,18 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.page.arrays import number
-from driftwalk.page.chart import chart, label, mark, series
-from driftwalk.page.number_words import cell, quantity
 from driftwalk.page.parts import (
     Section,
+    cell,
+    chart,
     figure,
+    label,
+    mark,
+    quantity,
     require,
     required,
     sections_of,
+    series,
     stated_warnings,
     summary_section,
     table_section,

@@ -9,15 +9,18 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.page.arrays import number, numbers
-from driftwalk.page.chart import chart, label, series
-from driftwalk.page.number_words import count, percent
 from driftwalk.page.parts import (
     Section,
     attempt,
+    chart,
+    count,
     figure,
     figure_with_ends,
+    label,
+    percent,
     require,
     section,
+    series,
     value_of,
 )
 from driftwalk.plot.parts.assembly_labels import OTHER, class_names, classes_to_show, with_rest
@@ -167,14 +170,16 @@ def size_sections(found: dict[str, xr.Dataset]) -> list[Section]:
         Each an `assembly_sizes`, by what it is of.
     """
     mean, title = {"mean_size": ""}, "Largest assembly and free blocks"
-    compact = {"compactness": ""}
+    ratio = "least perimeter over perimeter"
     shares = {"largest_share": "in the largest assembly", "free_share": "alone"}
     return [
         *attempt("sizes", "Sizes of the assemblies", lambda: sizes_section(found)),
         *_over_time(found, "mean-size", "Mean size over time", "blocks per assembly", mean),
         *_over_time(found, "size-shares", title, "share of the blocks", shares),
-        *_over_time(
-            found, "compactness", "Compactness over time", "least perimeter over perimeter", compact
+        *(
+            _over_time(found, "compactness", "Compactness over time", ratio, {"compactness": ""})
+            if all("compactness" in one for one in found.values())
+            else []  # older files have none
         ),
     ]
 

@@ -11,14 +11,16 @@ import numpy as np
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
 from driftwalk.page.arrays import binary_step, encode_array, number, plain_list
-from driftwalk.page.number_words import count, percent, quantity
 from driftwalk.page.parts import (
     SIMULATED,
     Section,
     arena_part,
     attempt,
+    count,
     figure,
     is_simulated,
+    percent,
+    quantity,
     section,
     summary_section,
 )

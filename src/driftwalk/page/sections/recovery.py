@@ -11,16 +11,21 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.page.arrays import number
-from driftwalk.page.chart import chart, label, mark, series
-from driftwalk.page.number_words import count, percent, quantity
 from driftwalk.page.parts import (
     Maker,
     Section,
     answer_table,
+    chart,
+    count,
     figure,
+    label,
+    mark,
+    percent,
+    quantity,
     require,
     required,
     sections_of,
+    series,
     summary_section,
     table_section,
     value_of,

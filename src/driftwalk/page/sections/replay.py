@@ -6,13 +6,12 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from driftwalk.assembly.outcomes.class_names import all_single
 from driftwalk.core.errors import InputError
 from driftwalk.page.arrays import binary_step, encode_array
-from driftwalk.page.number_words import count, quantity
-from driftwalk.page.parts import Section, arena_part, require, required, section
+from driftwalk.page.parts import Section, arena_part, count, quantity, require, required, section
 from driftwalk.page.sections.outcomes import cells_of
 from driftwalk.plot.parts.polyomino_sketch import are_discs
+from driftwalk.schema.shapes import all_single
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -94,7 +93,7 @@ def _run(path: xr.Dataset, index: int, assembly: xr.Dataset | None, step: float)
 
 
 def _events(assembly: xr.Dataset, run: int) -> list[dict[str, Any]]:
-    """Return what joined in a run, in the order of time."""
+    """Return what joined and parted in a run, in the order of time."""
     require(assembly, "event_count", "event_time", "event_block", "event_class", "class")
     if run not in assembly["run"].values:
         return []
@@ -106,6 +105,8 @@ def _events(assembly: xr.Dataset, run: int) -> list[dict[str, Any]]:
             "class": _class(assembly, int(found["event_class"].values[event])),
         }
         for event in range(int(found["event_count"]))
+        # Kinds 2 and 3: what happens to a bond of a loop changes no assembly.
+        if "event_kind" not in found or int(found["event_kind"].values[event]) < 2
     ]
 
 

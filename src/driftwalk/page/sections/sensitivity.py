@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from driftwalk.page.arrays import number, numbers
-from driftwalk.page.number_words import count, quantity
 from driftwalk.page.parts import (
     Section,
     attempt,
+    count,
     empty_section,
     figure,
+    quantity,
     require,
     section,
     sections_of,

@@ -10,9 +10,19 @@ import numpy.typing as npt
 
 from driftwalk.core.arrays import Floats
 from driftwalk.page.arrays import encode_array, numbers
-from driftwalk.page.chart import chart, label, mark, series
-from driftwalk.page.number_words import quantity
-from driftwalk.page.parts import Section, axis, require, section, settings_of, value_of
+from driftwalk.page.parts import (
+    Section,
+    axis,
+    chart,
+    label,
+    mark,
+    quantity,
+    require,
+    section,
+    series,
+    settings_of,
+    value_of,
+)
 from driftwalk.page.sections.outcomes import cells_of
 from driftwalk.plot.parts.assembly_labels import OTHER, class_names, classes_to_show, with_rest
 from driftwalk.plot.parts.polyomino_sketch import are_discs
@@ -26,6 +36,7 @@ AXES: Final = {
     "tank_diameter": ("tank diameter", "m", "_m"),
     "blocks": ("number of blocks", "1", ""),
     "stirring_length": ("length of the stirring", "m", "_m"),
+    "bond_rate": ("rate at which bonds break", "1/s", "_per_s"),
 }
 """Label, unit, and what an attribute's name has more, in the order from x to y."""
 MAP_AXES: Final = 2

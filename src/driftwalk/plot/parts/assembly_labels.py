@@ -44,6 +44,7 @@ _NUMBERS: Final[dict[str, tuple[str, str, str]]] = {
     "tank_diameter": ("tank diameter (cm)", "cm", "m"),
     "blocks": ("number of blocks", "", ""),
     "stirring_length": ("stirring length (cm)", "cm", "m"),
+    "bond_rate": ("rate at which bonds break (1/s)", "", ""),
 }
 _WORDS: Final[dict[str, str]] = {
     "flow": "flow",

@@ -8,6 +8,7 @@ writers of files apply `print_style`.
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -191,7 +192,7 @@ def settle_layout(ax: Axes) -> None:
 
 def edge_width(bodies: int) -> float:
     """Return the width of the edges of bodies [pt]: thinner where they are many, and so small."""
-    return 0.6 * min(1.0, (16 / max(bodies, 1)) ** 0.5)
+    return 0.6 * math.sqrt(min(1.0, 16 / max(bodies, 1)))
 
 
 def outlined(width: float, color: str = "white") -> list[AbstractPathEffect]:

@@ -12,8 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from driftwalk.core.errors import FormatError
-from driftwalk.core.text.did_you_mean import listed
+from driftwalk.core.errors import FormatError, listed
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
 from driftwalk.record.stores.matlab import Struct, Value, matlab_variables_of
 from driftwalk.record.tables.matlab import matlab_tables, only_matlab

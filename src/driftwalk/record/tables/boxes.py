@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from driftwalk.core.arrays import Codes
-from driftwalk.core.errors import InputError, argument_text
-from driftwalk.core.text.did_you_mean import listed
+from driftwalk.core.errors import InputError, argument_text, listed
 from driftwalk.record.cleaning.several_bodies import rows_of_bodies
 from driftwalk.record.column_names import ColumnMeaning, words_of
 from driftwalk.record.raw import Array, ReadOptions, TableLayout

@@ -7,8 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from driftwalk.core.errors import InputError, argument_text
-from driftwalk.core.text.did_you_mean import listed
+from driftwalk.core.errors import InputError, argument_text, listed
 from driftwalk.record.column_names import OF_BODY, QUATERNION, unit_of_name
 from driftwalk.record.raw import LENGTH_UNITS, MISSING, ReadOptions
 from driftwalk.record.tables.boxes import find_box

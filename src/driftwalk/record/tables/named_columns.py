@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final, NamedTuple
 
-from driftwalk.core.errors import InputError, argument_text
-from driftwalk.core.text.did_you_mean import listed
+from driftwalk.core.errors import InputError, argument_text, listed
 from driftwalk.record.column_names import ColumnMeaning, column_meaning, unit_of_name
 from driftwalk.record.raw import ReadOptions
 from driftwalk.record.tables.column_reading import ColumnReading, TableReading

@@ -9,8 +9,7 @@ from typing import Final
 import numpy as np
 
 from driftwalk.core.arrays import Codes
-from driftwalk.core.errors import FormatError, InputError, argument_text
-from driftwalk.core.text.did_you_mean import listed
+from driftwalk.core.errors import FormatError, InputError, argument_text, listed
 from driftwalk.record.cleaning.several_bodies import order_in_body, split_bodies
 from driftwalk.record.convert_units import scale_wanted
 from driftwalk.record.pose import angle_between

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from driftwalk.schema.answers.parts import Answer, Part, Table, by_name, each
+from driftwalk.schema.answers.steady_state import steady_json, steady_parts
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -17,12 +18,12 @@ MOST_ROWS: Final = 16
 SHOWN_TIMES: Final = 4
 """Times in the table of sizes, equally far apart, the last one the end of the runs."""
 _OVER_TIME: Final = {
-    "mean_size": "mean_size_blocks",
-    "largest_share": "largest_share",
-    "free_share": "free_share",
-    "compactness": "compactness",
+    "mean_size": ("mean_size_blocks", "mean size"),
+    "largest_share": ("largest_share", "in largest"),
+    "free_share": ("free_share", "free"),
+    "compactness": ("compactness", "compact"),
 }
-"""Variables over time, and their keys in JSON."""
+"""Variables over time, their keys in JSON and their headings. Older files have no compactness."""
 _SETTINGS: Final = (
     *("confidence", "blocks", "duration_s", "seed", "latching", "hidden_face_drag", "chirality"),
     *("drag_coefficient", "force_std_N", "force_interval_s"),
@@ -43,6 +44,7 @@ def assembly_answer(
     drawn: xr.Dataset | None = None,
     sizes: xr.Dataset | None = None,
     sizes_drawn: xr.Dataset | None = None,
+    steady: xr.Dataset | None = None,
     apart: Mapping[str, float] | None = None,
     attraction: xr.Dataset | None = None,
 ) -> Answer:
@@ -60,6 +62,8 @@ def assembly_answer(
         The `outcome_distribution` of runs with drawn parameters.
     sizes, sizes_drawn : xarray.Dataset, optional
         The `assembly_sizes` of both, where nearly every run is a class of its own.
+    steady : xarray.Dataset, optional
+        The `steady_state` of the runs, where bonds break.
     apart : mapping, optional
         ``l1_distance`` of the two distributions, ``l1_noise_floor`` and ``l1_noise_floor_95``.
     attraction : xarray.Dataset, optional
@@ -94,8 +98,11 @@ def assembly_answer(
                 f"l1 distance of the two: {apart['l1_distance']:.4f}; by chance "
                 f"{apart['l1_noise_floor']:.4f} (95 %: {apart['l1_noise_floor_95']:.4f})"
             )
+    if steady is not None:
+        parts += steady_parts(steady)
     answer = {
         **_json(found, sizes),
+        **({} if steady is None else {"steady_state": steady_json(steady)}),
         **{key: facts[key] for key in _SETTINGS},
         **({"faces": facts["faces"]} if "faces" in facts else {}),
         "drawn": None
@@ -199,7 +206,8 @@ def _between(low: Any, high: Any) -> str:
 def _sizes_json(sizes: xr.Dataset) -> dict[str, Any]:
     """Return the sizes for programs; all are means over runs."""
     facts = sizes.attrs
-    over_time = [_with_interval(sizes, name, key) for name, key in _OVER_TIME.items()]
+    known = {name: key for name, (key, _) in _OVER_TIME.items() if name in sizes}
+    over_time = [_with_interval(sizes, name, key) for name, key in known.items()]
     return {
         "at_end": [
             {
@@ -232,14 +240,13 @@ def _sizes(distribution: xr.Dataset, sizes: xr.Dataset, what: str) -> list[Part]
             rows.append([name, *_size_cells(row, "number"), *_size_cells(row, "block_share")])
     heads = ["blocks in it", "assemblies per run", interval, "share of blocks", interval]
     times = sizes.sizes["time"] - 1
+    known = {name: words for name, (_, words) in _OVER_TIME.items() if name in sizes}
     chosen = [sizes.isel(time=round(times * (n + 1) / SHOWN_TIMES)) for n in range(SHOWN_TIMES)]
     course = [
-        [f"{float(one['time']):.4g}", *(c for name in _OVER_TIME for c in _size_cells(one, name))]
+        [f"{float(one['time']):.4g}", *(c for name in known for c in _size_cells(one, name))]
         for one in chosen
     ]
-    over_time = [
-        head for name in ("mean size", "in largest", "free", "compact") for head in (name, interval)
-    ]
+    over_time = [head for words in known.values() for head in (words, interval)]
     parts: list[Part] = [Table(rows, heads, what), Table(course, ["time [s]", *over_time])]
     if facts["compactness_runs"]:
         ends = _range(facts["compactness_low"], facts["compactness_high"])
@@ -260,7 +267,7 @@ def _with_interval(found: xr.Dataset, name: str, key: str) -> dict[str, Any]:
 
 def _size_cells(found: xr.Dataset, name: str) -> tuple[str, str]:
     value, low, high = (float(found[f"{name}{end}"]) for end in ("", "_low", "_high"))
-    return f"{value:.3g}", _range(low, high)
+    return f"{value:.3g}" if value == value else "", _range(low, high)
 
 
 def _range(low: float, high: float) -> str:

@@ -10,11 +10,13 @@ from driftwalk.schema.kinds import (
     calibration,
     fit,
     flow,
+    kinetics,
     model_check,
     models,
     motion,
     recovery,
     sensitivity,
+    steady_state,
 )
 from driftwalk.schema.parameters import is_block, stored_parameters
 
@@ -22,7 +24,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _FILES: Final = (
-    motion, flow, calibration, models, fit, recovery, model_check, assembly, sensitivity
+    motion, flow, calibration, models, fit, recovery, model_check, assembly, steady_state,
+    sensitivity, kinetics,
 )  # fmt: skip
 
 KINDS: Final[dict[str, Kind]] = {kind.name: kind for file in _FILES for kind in file.KINDS}

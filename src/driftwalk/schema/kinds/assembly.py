@@ -32,6 +32,11 @@ attributes (blocks start glued to bodies):
     glued text: rows of the blocks of a body; its joinings are those at time 0
 attributes (faces have types):
     faces text: kinds of blocks, and which types of their faces latch
+attributes (bonds break):
+    bond_rate_per_s number: rate at which a bond breaks without load
+    bond_force_N number: tension that multiplies the rate by e; 0: the rate is constant
+    bond_strength_N number: tension that breaks a bond at once; 0: none
+    relatch_clearance number: distance of centres in sides from which parted blocks latch again
 attributes (latching by a connector):
     connector_distance_m number: tolerance of the connector
     connector_axis_rad number: tolerance of the connector
@@ -58,7 +63,8 @@ kind: assembly
 version: 1
 dimensions:
     run: simulated worlds
-    event: joinings in a run, in order; one less than there are blocks, at least one
+    event: joinings in a run, in order; one less than there are blocks, at least one; where bonds \
+        break, joinings, partings and bonds of loops
     side: of the assembly that stayed, of the one that was moved
     part: stayed, moved, became
     block: blocks
@@ -96,6 +102,10 @@ variables (blocks that are squares):
     event_face(run event side) int: {_FACES}; {_NOWHERE}
     cell(run block axis) int: cell of the block on its assembly's lattice, x and y
     quarter(run block) int: quarter turns of the block against its assembly
+variables (bonds break):
+    event_kind(run event) int: what an event is, of which not all are joinings: 0 joining, 1 \
+        parting (first the part with more blocks; the third shape is what they were), 2 a bond of \
+        a loop broke, 3 one formed; {_NOWHERE}
 variables (drawn from a fit whose force law has it):
     linear_drag(run) [kg s-1]: linear drag of the block
     drag_power(run) [1]: power of the speed in the drag
@@ -300,6 +310,22 @@ attributes ({_OF_RUNS}):
 )
 
 
+def _rates(name: str, words: str, note: str) -> tuple[Variable, ...]:
+    return variables(f"""
+    {name}_count(class) [1] int: {words} while the world was of this class
+    {name}_rate(class) [s-1]: {words} over the time in this class; NaN where there is no time
+    {name}_rate_low(class) [s-1]: lower limit of the rate of {note}, exact Poisson
+    {name}_rate_high(class) [s-1]: upper limit of the rate of {note}, exact Poisson
+""")
+
+
+RATES: Final = (
+    *_rates("joining", "joinings", "joining"),
+    *_rates("parting", "partings", "parting"),
+)
+"""Rates of joining and parting per class."""
+
+
 def _joins(name: str, of: str, *, faces: str) -> tuple[Variable, ...]:
     """Return what is known of the joinings, or of what came apart."""
     return variables(f"""
@@ -352,11 +378,13 @@ attributes:
     closest_m number: smallest distance of two centres
     unknown_samples number: samples of unknown class
     known_s number: time in which the class is known
+    rate_confidence number: with which an interval of a rate holds, each on its own
 attributes (the recording says so):
     source
 attributes (the tank is known):
     arena
 """,
+    *RATES,
     *_joins("event", "joinings", faces=_FACES),
     *_joins("split", "partings", faces="faces that came apart, as those that join"),
 )

@@ -131,7 +131,7 @@ variables (of two models or more):
     misfit(model) [1]: sum of squares of the deviations of the summaries; in standard deviations; \
         NaN where it was not asked
     usual_misfit(model) [1]: its median over the model's own recordings
-    most_misfit(model) [1]: its 99 % quantile over them
+    most_misfit(model) [1]: its 95 % quantile over them
     unlikely(model) [1]: -2 log of the evidence of the summaries; but for a constant that all \
         models share
 attributes:

@@ -20,6 +20,7 @@ variables (an axis):
     hidden_face_drag(hidden_face_drag) text: drag on joined faces; a word, or its share of a free \
         face's
     stirring_length(stirring_length) [m]: distance over which blocks share the stochastic force
+    bond_rate(bond_rate) [s-1]: rate at which bonds break
     magnets(magnets) text: magnet at the centre of each face
 """)
 """Quantities that may vary over a map."""

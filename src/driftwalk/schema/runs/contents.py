@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from driftwalk.core.errors import DriftwalkError, FormatError, InputError
-from driftwalk.core.files.file_names import text_of_name
+from driftwalk.core.files.bounded import text_of_name
 from driftwalk.core.files.run_layout import (
     MANIFEST_FILE,
     RECORD_FILE,

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from driftwalk.conditions import Conditions
 from driftwalk.core.errors import InputError
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.motion import MotionModel, ParticleModel, Worlds, model_start
 from driftwalk.simulation.backend import STATUS, Camera
 from driftwalk.simulation.initial import Start

@@ -105,6 +105,7 @@ KNOBS: Final = (
     Knob("faces", "poles of the faces", choices=("any", "N,S,N,S", "N,N,S,S", "N,N,N,N")),
     Knob("hidden_face_drag", "drag on joined faces", choices=("none", "full")),
     Knob("stirring_length", "length of the stirring", "m", 0.0, 0.3, 0.005),
+    Knob("bond_rate", "rate at which bonds break", "1/s", 0.0, 1.0, 0.01),
     Knob("magnets", "magnets", choices=("none", "3x3x1mm,1.2T", "5x5x2mm,1.2T")),
     SPEED,
 )
@@ -141,6 +142,7 @@ def values_of(tank: LiveTank, *, speed: float) -> dict[str, Any]:
         "faces": rules.faces,
         "hidden_face_drag": str(rules.hidden_face_drag),
         "stirring_length": forces.stirring_length_m,
+        "bond_rate": rules.bond_rate_per_s,
         "magnets": tank.study.interaction.magnets,
         "speed": speed,
     }

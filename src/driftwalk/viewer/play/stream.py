@@ -57,7 +57,7 @@ def frame_line(tank: LiveTank, number: int, events: Sequence[LiveEvent]) -> dict
     number : int
         Number of the frame.
     events : sequence of LiveEvent
-        Joins since the last frame.
+        Joinings and partings since the last frame.
     """
     x, y, theta, assembly = tank.x, tank.y, shown_angles(tank), tank.assembly
     columns = (x, y, theta, tank.vx, tank.vy, tank.omega)
@@ -147,7 +147,7 @@ def _event(event: LiveEvent, joined: Sequence[tuple[int, int, int, int]]) -> dic
     faces = pairs.get((first, second)) or pairs.get((second, first), [])[::-1]
     return {
         "time_s": event.time,
-        "kind": "join",
+        "kind": "split" if event.is_parting else "join",
         "bodies": [str(block) for block in event.blocks],
         "faces": faces,
         "outcome": event.outcome,

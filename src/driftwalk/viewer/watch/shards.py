@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from driftwalk.core.errors import DriftwalkError
-from driftwalk.core.files.file_names import path_inside
+from driftwalk.core.files.bounded import path_inside
 from driftwalk.core.files.run_layout import RECORD_FILE, SHARD_FOLDER, run_file
 from driftwalk.core.files.shards import (
     SHARD_SUFFIX,

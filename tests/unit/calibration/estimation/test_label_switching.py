@@ -13,7 +13,7 @@ from driftwalk.calibration.estimation.label_switching import label_order
 from driftwalk.calibration.held_out.candidates import Candidate
 from driftwalk.calibration.held_out.recorded import Scales, recorded_ranges
 from driftwalk.conditions import Conditions
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.model import Tank
 from driftwalk.motion import MotionModel
 from driftwalk.schema import Parameter

@@ -18,7 +18,7 @@ from driftwalk.calibration.held_out.recorded import Scales, recorded_ranges, sca
 from driftwalk.comparison.aspects import aspect_reference, form_aspects, plan_aspects
 from driftwalk.conditions import Conditions
 from driftwalk.core.errors import InputError
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.model import Tank
 from driftwalk.schema import Parameter
 from driftwalk.schema.trajectory import Track

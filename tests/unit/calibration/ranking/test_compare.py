@@ -19,7 +19,7 @@ from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.schema import Parameter
 from driftwalk.schema.check import check_dataset
 from driftwalk.sweep import MemoryStore, SweepError
-from driftwalk.sweep.processes import single_threaded_processes
+from driftwalk.sweep.workers import single_threaded_processes
 
 SMALL = Budget(design=32, starts=1, short=6, long=6, retest=2)
 DISTANCES = dw.apply_overrides(dw.Study(), {"calibration.bootstrap": 0})

@@ -15,7 +15,6 @@ from driftwalk.calibration.ranking.model_evidence import (
     Evidence,
     EvidenceRanking,
     Shortlist,
-    discrepancy_sentence,
     rank_by_evidence,
     ranking_sentence,
     shortlist_models,
@@ -107,7 +106,7 @@ def test_of_those_that_are_not_told_apart_the_one_with_the_fewest_numbers_is_nam
 
 
 def test_nobody_is_named_where_no_model_gives_the_summaries() -> None:
-    assert rank_by_evidence(ENTRIES, {0: said(300.0, 1.0), 1: said(200.0, 2.0)}) == EvidenceRanking(
+    assert rank_by_evidence(ENTRIES, {0: said(300.0, 1.0), 1: said(220.0, 2.0)}) == EvidenceRanking(
         None, ()
     )
     assert rank_by_evidence(ENTRIES, {}) == EvidenceRanking(None, ())
@@ -121,13 +120,8 @@ def test_the_sentence_says_whom_and_why() -> None:
         "recordings is below 140; no clear difference from twelve, with as many numbers or more; "
         "less likely are nine 812"
     )
-    none = {0: said(812.4, 0.0), 1: said(201.0, -400.0)}
+    none = {0: said(812.4, 0.0), 1: said(211.0, -400.0)}
     assert ranking_sentence(names, none, rank_by_evidence(ENTRIES, none)) == (
-        "No model reproduces the summaries of the motion: the misfits are nine 812, three 201, "
+        "No model reproduces the summaries of the motion: the misfits are nine 812, three 211, "
         "those of the models' own recordings below 140"
     )
-
-
-def test_a_model_that_does_not_give_them_is_told_by_how_much() -> None:
-    assert discrepancy_sentence(said(139.0, 0.0)) is None
-    assert "a misfit of 300" in str(discrepancy_sentence(said(300.0, 0.0)))

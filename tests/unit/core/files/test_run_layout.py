@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from driftwalk.core.errors import RunDirectoryError
-from driftwalk.core.files.file_names import path_inside
+from driftwalk.core.files.bounded import path_inside
 from driftwalk.core.files.run_layout import complete_move, move_aside
 from driftwalk.core.files.rundir import RunDirectory
 from driftwalk.sweep import grid, run_sweep

@@ -24,7 +24,7 @@ import pytest
 import driftwalk as dw
 from driftwalk.conditions import Conditions
 from driftwalk.core.errors import ConfigurationError, InputError
-from driftwalk.core.seeds import world_keys
+from driftwalk.core.random_streams import world_keys
 from driftwalk.motion import MotionModel, Parameter, ProgramModel, motion_model
 from driftwalk.motion.external_program import process
 from driftwalk.motion.external_program.program import program_words

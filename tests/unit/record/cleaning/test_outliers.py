@@ -13,7 +13,12 @@ from hypothesis import given, strategies as st
 
 import driftwalk as dw
 from driftwalk.likelihood.preparation import prepare
-from driftwalk.likelihood.tracker_errors.outliers import OUTLIER, outliers_in, without_outliers
+from driftwalk.record.cleaning.outliers import (
+    OUTLIER,
+    outliers_in,
+    without_far_outliers,
+    without_outliers,
+)
 from driftwalk.schema import Track, body_track
 from driftwalk.schema.answers.facts import facts_of
 
@@ -92,6 +97,53 @@ def test_gaps_and_short_tracks_are_left_alone() -> None:
     assert not outliers_in(short).any()
     still = Track(track.time, np.zeros(SAMPLES), np.zeros(SAMPLES), track.theta)
     assert not outliers_in(still).any()
+
+
+def walker() -> Track:
+    """Return a body at 2 cm/s that turns by up to a right angle a second."""
+    rng = np.random.default_rng(3)
+    time = 0.1 * np.arange(6000.0)
+    place = 2e-3 * np.cumsum(np.exp(1j * np.cumsum(0.3 * rng.normal(size=time.size))))
+    seen = place + 3e-4 * (rng.normal(size=time.size) + 1j * rng.normal(size=time.size))
+    return Track(time, seen.real, seen.imag, 0.0 * time)
+
+
+def test_all_far_mistakes_of_a_walker_go_alone_in_pairs_and_beside_missing_frames() -> None:
+    """One sample in fifty, 1 to 3 cm off, and one frame in twenty missing; no other sample goes."""
+    rng = np.random.default_rng(4)
+    clean = walker()
+    assert without_far_outliers(clean).time.size > clean.time.size - 3
+    wrong = rng.uniform(size=clean.time.size) < 0.02
+    wrong[3000:3002] = True
+    off = rng.uniform(0.01, 0.03, wrong.size) * np.exp(2j * np.pi * rng.uniform(size=wrong.size))
+    kept = rng.uniform(size=wrong.size) < 0.95
+    x, y = clean.x + wrong * off.real, clean.y + wrong * off.imag
+    seen = Track(*(axis[kept] for axis in (clean.time, x, y, clean.theta)))
+    left = without_far_outliers(seen).time
+    assert np.isin(clean.time[wrong & kept], left).sum() <= 1
+    assert np.isin(clean.time[~wrong & kept], left, invert=True).sum() <= 3
+
+
+def test_the_tank_is_placed_without_the_mistakes(tmp_path: Path) -> None:
+    """A body goes round at the wall; one sample in fifty is 3 cm off, half of these beyond it."""
+    rng = np.random.default_rng(6)
+    time = 0.1 * np.arange(6000.0)
+    place = 0.135 * np.exp(0.2j * time) + 3e-4 * (
+        rng.normal(size=6000) + 1j * rng.normal(size=6000)
+    )
+    place[rng.uniform(size=6000) < 0.02] *= 1.2
+    path = tmp_path / "walker.csv"
+    table = np.column_stack([time, place.real, place.imag])
+    np.savetxt(path, table, delimiter=",", header="t,x,y", comments="", fmt="%.6f")
+    read = dw.load(path, tank="circle:0.3", length_unit="m")
+    assert read["x"].values[0, 0] == pytest.approx(place[0].real, abs=1e-6)
+
+
+def test_a_body_that_turns_back_makes_no_mistake() -> None:
+    """It goes to and fro within one sample, by its usual step."""
+    track = walker()
+    track.x[AT] += 2e-3
+    assert track.time[AT] in without_far_outliers(track).time
 
 
 def with_mistakes(track: xr.Dataset, share: float, size_m: float, seed: int) -> xr.Dataset:

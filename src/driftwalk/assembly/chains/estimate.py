@@ -1,0 +1,457 @@
+"""Kinetics of self-assembly: rates between the outcome classes, judged on held-out runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from driftwalk.assembly.chains.hidden import (
+    FORMS,
+    Form,
+    Model,
+    bin_edges,
+    counts_and_times,
+    fit,
+    log_likelihood,
+)
+from driftwalk.assembly.chains.histories import (
+    Histories,
+    blocks_of,
+    datasets_of,
+    histories,
+)
+from driftwalk.assembly.chains.mixing import (
+    WELL_MIXED,
+    equal_rates,
+    judge_mixing,
+    needed_events,
+)
+from driftwalk.assembly.chains.predicted import passage, shares
+from driftwalk.assembly.outcomes.class_names import sort_classes
+from driftwalk.core.arrays import Floats, Integers
+from driftwalk.core.errors import InputError
+from driftwalk.schema.answers.facts import texts
+from driftwalk.schema.check import build_dataset
+from driftwalk.sweep import WorkUnit, grid, run_sweep
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.sweep import Store
+
+
+class KineticsPolicy(NamedTuple):
+    """How models are chosen and their errors found."""
+
+    folds: int = 5
+    """Parts of the runs, each held out once; 10 chose the same models (`studies/kinetics`)."""
+    least_runs: int = 20
+    """Runs without which no model is chosen; chosen by hand, four in each part."""
+    replicates: int = 50
+    """Bootstrap samples of the runs: their standard deviation is known within a tenth."""
+    iterations: int = 30
+    """Iterations of a replicate, which begins at the estimate."""
+    stored: int = 120
+    """Steps of the stored curves."""
+    confidence: float = 0.9
+    """Of the intervals and bands; that of the rest of driftwalk."""
+
+
+KINETICS_POLICY = KineticsPolicy()
+NAMES = ("first", "second")
+
+
+def kinetics(
+    runs: xr.Dataset | Sequence[xr.Dataset],
+    other: xr.Dataset | Sequence[xr.Dataset] | None = None,
+    *,
+    target: str | None = None,
+    blocks: int | None = None,
+    seed: int = 1,
+    store: Callable[[str], Store] | None = None,
+    executor: Executor | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> xr.Dataset:
+    """Return how fast blocks assemble and by which steps: rates between the outcome classes.
+
+    Fits a continuous-time Markov chain, a semi-Markov chain and chains with hidden states to the
+    histories of the runs, and chooses one on runs that were held out.
+
+    Parameters
+    ----------
+    runs : xarray.Dataset or sequence of xarray.Dataset
+        An `assembly`, a `classification` of a recording, or several of one number of blocks.
+    other : xarray.Dataset or sequence of xarray.Dataset, optional
+        The same of other runs, such as real ones: are the rates equal?
+    target : str, optional
+        Outcome class to be reached, such as "T"; without it there is no committor.
+    blocks : int, optional
+        Another number of blocks, for which the rate of the first joining is extrapolated where the
+        tank is well mixed; at least 2.
+    seed : int
+        Seed of the bootstrap, at least 0.
+    store : callable, optional
+        Returns the store of a sweep by its name, such as that of a run directory, to be continued.
+    executor : concurrent.futures.Executor, optional
+        Computes work units elsewhere; the result does not depend on it.
+    progress : callable, optional
+        Called as ``progress(done, total)``.
+
+    Returns
+    -------
+    xarray.Dataset
+        Kind "kinetics". ``rate`` [1/s] on (source, transition) with exact Poisson intervals;
+        ``share`` on (time, class), predicted, with ``empirical``; ``score`` on (model), mean
+        held-out log likelihood of a run; ``p_corrected`` on (test); with `target` ``committor`` and
+        ``passage_time`` [s] on (class); with `other` ``equal_p`` on (transition). The verdict is
+        ``attrs["verdict"]``.
+
+    Raises
+    ------
+    InputError
+        When a dataset holds no outcome classes, numbers of blocks differ, the target is no class
+        of these blocks, or there are too few runs to tell.
+
+    Notes
+    -----
+    The rates are q_ij = N_ij / T_i with the transitions N_ij and the time T_i in class i; standard
+    error q_ij / √N_ij. See docs/how-to/kinetics.md.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> runs = dw.assemble(dw.Study(), dw.tank30_flow(), blocks=2, runs=400, duration="60s")
+    >>> found = dw.kinetics(runs, target="2")
+    >>> found["transition"].values.tolist()
+    ['1+1 -> 2']
+    """
+    given = [datasets_of(runs), *([] if other is None else [datasets_of(other)])]
+    sets, own_target = check_kinetics(*given, target=target, blocks=blocks)
+    found = sets[0]
+    mixing = judge_mixing(found)
+    folds, replicates = KINETICS_POLICY.folds, KINETICS_POLICY.replicates
+    whole = len(FORMS) * folds + replicates
+    how: dict[str, Any] = {"executor": executor}
+    scored = run_sweep(
+        HeldOut(found),
+        grid(model=np.arange(len(FORMS)), fold=np.arange(folds)).units(1),
+        store=None if store is None else store("held_out"),
+        progress=None if progress is None else lambda done, _: progress(done, whole),
+        **how,
+    )
+    scores = np.nansum(scored["score"].reshape(len(FORMS), folds, -1), axis=1)
+    best = int(scores.mean(axis=1).argmax())
+    behind = scores - scores[best]
+    error = behind.std(axis=1, ddof=1) / np.sqrt(found.runs)
+    chosen = int(np.flatnonzero(behind.mean(axis=1) >= -error)[0])
+    model = fit(found, FORMS[chosen])
+    pairs = np.argwhere(np.sum([counts_and_times(one)[0] for one in sets], axis=0) > 0)
+    bands = run_sweep(
+        Replicate(found, model, pairs, own_target, seed),
+        grid(replicate=np.arange(replicates)).units(1),
+        store=None if store is None else store("bootstrap"),
+        progress=None
+        if progress is None
+        else lambda done, _: progress(whole - replicates + done, whole),
+        **how,
+    )
+    data, coords, attrs = _rates(sets, pairs, seed)
+    data |= {
+        "score": ("model", scores.mean(axis=1)),
+        "score_behind": ("model", behind.mean(axis=1)),
+        "score_behind_standard_error": ("model", error),
+        **_over_time(sets, model, bands["share"]),
+        **_chosen(model, pairs, bands["hazard"]),
+        "statistic": ("test", np.array([one.statistic for one in mixing.tests])),
+        "statistic_low": ("test", np.array([one.low for one in mixing.tests])),
+        "statistic_high": ("test", np.array([one.high for one in mixing.tests])),
+        "events": ("test", np.array([one.events for one in mixing.tests], dtype=np.int64)),
+        "p": ("test", np.array([one.p for one in mixing.tests])),
+        "p_corrected": ("test", mixing.corrected),
+        "reason": ("reason", texts(mixing.reasons)),
+    }
+    if own_target is not None:
+        way = passage(model, own_target)
+        for name, value in way._asdict().items():
+            data[name] = ("class", value)
+            data[f"{name}_standard_error"] = ("class", bands[name].std(axis=0, ddof=1))
+        attrs["target"] = str(target)
+    duration = found.recorded_s()
+    coords |= {
+        "model": ("model", np.array([form.name for form in FORMS], dtype=object)),
+        "test": ("test", np.array([one.name for one in mixing.tests], dtype=object)),
+        "time": ("time", np.linspace(0.0, duration, KINETICS_POLICY.stored + 1)),
+        "class": ("class", np.array(found.classes, dtype=object)),
+    }
+    attrs |= {
+        "verdict": mixing.word,
+        "chosen": FORMS[chosen].name,
+        "blocks": blocks_of(found.classes[0]),
+        "runs": found.runs,
+        "joins": found.joins,
+        "duration_s": duration,
+        "confidence": KINETICS_POLICY.confidence,
+        "seed": seed,
+        **_completion(found, model),
+        **({} if blocks is None else _other_blocks(found, mixing.word, blocks)),
+    }
+    return build_dataset("kinetics", data, coords, attrs)
+
+
+def check_kinetics(
+    *given: Sequence[xr.Dataset], target: str | None, blocks: int | None
+) -> tuple[list[Histories], int | None]:
+    """Return the histories of data sets with common classes, and the index of the target.
+
+    Parameters
+    ----------
+    *given : sequence of xarray.Dataset
+        One or two data sets.
+    target : str or None
+        Outcome class to be reached.
+    blocks : int or None
+        Another number of blocks.
+
+    Returns
+    -------
+    list of Histories
+        One for each data set.
+    int or None
+        Index of the target.
+
+    Raises
+    ------
+    InputError
+        As `kinetics` does.
+
+    Examples
+    --------
+    >>> check_kinetics([], target=None, blocks=1)
+    Traceback (most recent call last):
+    driftwalk.core.errors.InputError: blocks must be at least 2 to join, got 1
+    """
+    if blocks is not None and blocks < 2:
+        raise InputError(f"blocks must be at least 2 to join, got {blocks}")
+    names = [histories(one).classes for one in given]
+    sizes = [blocks_of(one[0]) for one in names]
+    if len({*sizes}) > 1:
+        raise InputError(
+            f"the data sets have {sizes[0]} and {sizes[1]} blocks: give those of one number of "
+            "blocks"
+        )
+    known = sort_classes([name for one in names for name in one])
+    sets = [histories(one, classes=known) for one in given]
+    _enough(sets[0])
+    return sets, _target(target, sets[0])
+
+
+def _target(target: str | None, found: Histories) -> int | None:
+    """Return the index of the target; refuse one that the runs cannot or did not reach."""
+    if target is None:
+        return None
+    if target in found.classes:
+        return found.classes.index(target)
+    blocks = blocks_of(found.classes[0])
+    try:
+        own = blocks_of(target)
+    except InputError as error:
+        raise InputError(f"target {target}: {error}") from error
+    if own != blocks:
+        raise InputError(f"target {target} has {own} blocks, and the runs have {blocks}")
+    raise InputError(
+        f"no run was ever in the target {target}: the runs were in {', '.join(found.classes)}"
+    )
+
+
+def _enough(found: Histories) -> None:
+    least = KINETICS_POLICY.least_runs
+    if found.runs >= least and found.joins >= least:
+        return
+    needed = max(needed_events(1), least)
+    more = max(needed, -(-needed * found.runs // max(found.joins, 1)))
+    raise InputError(
+        f"cannot tell: {found.runs} runs with {found.joins} changes of class; record {more} runs"
+    )
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Held-out log likelihoods, NaN of the runs of other folds; a work unit is a model and fold."""
+
+    found: Histories
+
+    def __call__(self, unit: WorkUnit) -> dict[str, Floats]:
+        """Return the scores of a unit, shape (1, run)."""
+        [at], [fold] = (unit.settings[name] for name in ("model", "fold"))
+        out = np.arange(self.found.runs) % KINETICS_POLICY.folds == int(fold)
+        score = np.full((1, self.found.runs), np.nan)
+        model = _trained(self.found, FORMS[int(at)], ~out)
+        score[0, out] = log_likelihood(self.found.of(out), model)
+        return {"score": score}
+
+
+def _trained(found: Histories, form: Form, kept: Any) -> Model:
+    """Return a model of some runs; of a transition that only others made it has half an event."""
+    counts, times = counts_and_times(found)
+    missing = (counts > 0) & (counts_and_times(found, kept.astype(np.float64))[0] == 0)
+    model = fit(found.of(kept), form, edges=bin_edges(found.of(kept), form.bins))
+    rate = 0.5 * missing / np.where(times > 0, times, 1.0)[:, None]
+    return model._replace(hazard=model.hazard + rate[:, None, :, None])
+
+
+@dataclass(frozen=True)
+class Replicate:
+    """The predictions of a model fitted again to a bootstrap sample of the runs."""
+
+    found: Histories
+    model: Model
+    pairs: Integers
+    """Transitions whose hazards are returned, shape (transition, 2)."""
+    target: int | None
+    seed: int
+
+    def __call__(self, unit: WorkUnit) -> dict[str, Floats]:
+        """Return hazards, shares, committors and passage times of a unit, of one replicate."""
+        [number] = unit.settings["replicate"]
+        random = np.random.default_rng([self.seed, int(number)])
+        runs = self.found.runs
+        again = fit(
+            self.found, self.model.form, edges=self.model.edges, begin=self.model,
+            weight=random.multinomial(runs, np.full(runs, 1.0 / runs)).astype(np.float64),
+            iterations=KINETICS_POLICY.iterations,
+        )  # fmt: skip
+        start, end = self.pairs.T
+        made = {
+            "hazard": again.hazard[start, :, end],
+            "share": shares(again, self.found.recorded_s(), steps=KINETICS_POLICY.stored)[1],
+        }
+        if self.target is not None:
+            made |= passage(again, self.target)._asdict()
+        return {name: values[None] for name, values in made.items()}
+
+
+def _rates(
+    sets: Sequence[Histories], places: Integers, seed: int
+) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
+    """Return N_ij, T_i, q_ij with exact Poisson intervals, and whether two sets have equal ones."""
+    from scipy.stats import chi2
+
+    counted = [counts_and_times(one) for one in sets]
+    names = sets[0].classes
+    pairs = [(int(i), int(j)) for i, j in places]
+    number = np.array([[counts[pair] for pair in pairs] for counts, _ in counted])
+    spent = np.array([[times[i] for i, _ in pairs] for _, times in counted])
+    alpha = 1.0 - KINETICS_POLICY.confidence
+    with np.errstate(divide="ignore", invalid="ignore"):
+        low = np.where(number > 0, 0.5 * chi2.ppf(0.5 * alpha, 2.0 * number), 0.0) / spent
+        high = 0.5 * chi2.ppf(1.0 - 0.5 * alpha, 2.0 * number + 2.0) / spent
+        rate, error = number / spent, np.sqrt(number) / spent
+    dims = ("source", "transition")
+    data: dict[str, Any] = {
+        "count": (dims, number.astype(np.int64)),
+        "time_in_class": (("source", "class"), np.array([times for _, times in counted])),
+        "rate": (dims, rate),
+        "rate_standard_error": (dims, error),
+        "rate_low": (dims, low),
+        "rate_high": (dims, high),
+    }
+    coords = {
+        "transition": (
+            "transition", np.array([f"{names[i]} -> {names[j]}" for i, j in pairs], dtype=object)
+        ),
+        "source": ("source", np.array(NAMES[: len(sets)], dtype=object)),
+    }  # fmt: skip
+    attrs: dict[str, Any] = {}
+    if len(sets) > 1:
+        p, corrected = equal_rates(sets[0], sets[1], pairs, seed=seed)
+        data |= {"equal_p": ("transition", p), "equal_p_corrected": ("transition", corrected)}
+        joint = float(np.nanmin(corrected)) if np.isfinite(p).any() else np.nan
+        attrs = {"equal_p": joint, "other_runs": sets[1].runs}
+    return data, coords, attrs
+
+
+def _chosen(model: Model, pairs: Integers, again: Floats) -> dict[str, Any]:
+    """Return the hazards of the chosen model with their errors, and its hidden states."""
+    start, end = pairs.T
+    dims = ("transition", "bin", "hidden")
+    low = np.pad(model.edges, ((0, 0), (1, 0)))
+    return {
+        "hazard": (dims, model.hazard[start, :, end]),
+        "hazard_standard_error": (dims, again.std(axis=0, ddof=1)),
+        "bin_start": (("class", "bin"), np.where(np.isfinite(low), low, np.nan)),
+        "hidden_start": (("class", "hidden"), model.start),
+        "hidden_change": (("class", "hidden", "hidden_after"), model.switch),
+    }
+
+
+def _over_time(sets: Sequence[Histories], model: Model, band: Floats) -> dict[str, Any]:
+    """Return predicted shares with their band, and the shares of runs still watched."""
+    from scipy.stats import norm
+
+    duration, stored = sets[0].recorded_s(), KINETICS_POLICY.stored
+    course = shares(model, duration, steps=5 * stored)[1][::5]
+    wide = norm.ppf(0.5 + 0.5 * KINETICS_POLICY.confidence) * band.std(axis=0, ddof=1)
+    time = np.linspace(0.0, duration, stored + 1)
+    seen = np.stack([empirical_shares(one, time) for one in sets])
+    return {
+        "share": (("time", "class"), course),
+        "share_low": (("time", "class"), np.clip(course - wide, 0.0, 1.0)),
+        "share_high": (("time", "class"), np.clip(course + wide, 0.0, 1.0)),
+        "empirical": (("source", "time", "class"), seen),
+    }
+
+
+def empirical_shares(found: Histories, time: Floats) -> Floats:
+    """Return the share of runs in each class at each time, of those that are still watched.
+
+    A run that ended in a class that no run ever left stays in it. NaN where no run is watched.
+    """
+    entry = found.entry
+    left = np.bincount(found.state[found.target >= 0], minlength=len(found.classes)) > 0
+    end = entry + found.duration
+    end[(found.target < 0) & ~left[found.state]] = np.inf
+    # A run is still watched at its very end.
+    end[found.target < 0] *= 1.0 + 1e-9
+    count = np.empty((time.size, len(found.classes)))
+    for state in range(len(found.classes)):
+        own = found.state == state
+        count[:, state] = np.searchsorted(np.sort(entry[own]), time, side="right")
+        count[:, state] -= np.searchsorted(np.sort(end[own]), time, side="right")
+    total = count.sum(axis=1, keepdims=True)
+    return np.where(total > 0, count / np.maximum(total, 1.0), np.nan)
+
+
+def _completion(found: Histories, model: Model) -> dict[str, Any]:
+    """Return the KS distance of the completion times and its 95 % floor, where runs complete."""
+    whole = np.array(["+" not in name for name in found.classes])
+    first = whole[found.state] & np.r_[False, ~whole[found.state[:-1]]] & ~found.first
+    happened = np.sort(found.entry[first])
+    if not happened.size:
+        return {}
+    time, course = shares(model, found.recorded_s())
+    seen = np.searchsorted(happened, time, side="right") / found.runs
+    distance = float(np.abs(course[:, whole].sum(axis=1) - seen).max())
+    return {"completion_ks": distance, "completion_ks_floor": 1.358 / np.sqrt(found.runs)}
+
+
+def _other_blocks(found: Histories, verdict: str, blocks: int) -> dict[str, Any]:
+    """Return the rate of the first joining of another number of blocks, or why there is none."""
+    if verdict != WELL_MIXED:
+        return {
+            "other_blocks": blocks,
+            "other_blocks_refused": f"no rate for {blocks} blocks is extrapolated: {verdict}",
+        }
+    own = blocks_of(found.classes[0])
+    apart = found.first & np.array([set(n.split("+")) == {"1"} for n in found.classes])[found.state]
+    joins, spent = (found.target[apart] >= 0).sum(), found.duration[apart].sum()
+    pairs = blocks * (blocks - 1) / (own * (own - 1))
+    rate = float(pairs * joins / spent)
+    return {
+        "other_blocks": blocks,
+        "other_blocks_rate_per_s": rate,
+        "other_blocks_rate_standard_error_per_s": rate / float(np.sqrt(max(joins, 1))),
+    }

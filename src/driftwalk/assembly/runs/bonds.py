@@ -1,0 +1,71 @@
+"""Bonds that break: what is refused, and how many events a run may have."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from driftwalk.core.errors import InputError
+from driftwalk.core.files.shards import Arrays
+
+if TYPE_CHECKING:
+    from driftwalk.model import Study
+
+
+def require_bonds(study: Study) -> None:
+    """Refuse a strength of bonds under a force without memory or length, and a lone `bond_force_N`.
+
+    Raises
+    ------
+    InputError
+        Says which keys to set.
+    """
+    rules, forces = study.assembly, study.forces
+    if rules.bond_strength_N > 0 and not (
+        forces.force_memory_s > 0 and forces.stirring_length_m > 0
+    ):
+        raise InputError(
+            "a threshold on a white force depends on the time step: a strength of bonds "
+            "(`assembly.bond_strength_N`) needs a force with memory and length "
+            "([forces] force_memory_s and `forces.stirring_length_m`, both more than 0); or give "
+            "a rate (`assembly.bond_rate_per_s`)"
+        )
+    if rules.bond_force_N > 0 and not rules.bond_rate_per_s > 0:
+        raise InputError(
+            "`assembly.bond_force_N` scales a rate, and bonds have none: give "
+            "`assembly.bond_rate_per_s` too"
+        )
+
+
+def event_rows(study: Study, *, duration: float) -> int:
+    """Return for how many events a run has room at first: a run with more is simulated again.
+
+    It is what bonds without load make if all blocks are always in one assembly, and half as much.
+    """
+    rules = study.assembly
+    least = max(rules.blocks - 1, 1)
+    if not rules.bonds_break:
+        return least
+    return least + 16 + int(6.0 * rules.blocks * rules.bond_rate_per_s * duration)
+
+
+def bond_attrs(study: Study) -> dict[str, Any]:
+    """Return the attributes that say how bonds break; none where they are permanent."""
+    rules = study.assembly
+    if not rules.bonds_break:
+        return {}
+    names = ("bond_rate_per_s", "bond_force_N", "bond_strength_N", "relatch_clearance")
+    return {name: float(getattr(rules, name)) for name in names}
+
+
+def with_event_rows(arrays: Arrays, rows: int) -> Arrays:
+    """Return results with another room for events: the last are cut off, or rows of -1 added."""
+    changed = {}
+    for name, values in arrays.items():
+        if name.startswith("event_") and values.ndim > 1:
+            kept = values[:, :rows]
+            lacking = [(0, 0)] * values.ndim
+            lacking[1] = (0, rows - kept.shape[1])
+            changed[name] = np.pad(kept, lacking, constant_values=-1)
+    return {**arrays, **changed}

@@ -1,0 +1,151 @@
+"""A page on the kinetics of self-assembly: verdict, rates, shares over time, way to a target."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from driftwalk.page.parts import (
+    Maker,
+    Section,
+    chart,
+    figure,
+    label,
+    quantity,
+    require,
+    required,
+    sections_of,
+    series,
+    summary_section,
+    table_section,
+    value_of,
+)
+from driftwalk.schema.answers.facts import sentences
+from driftwalk.schema.answers.kinetics import (
+    equal_table,
+    equal_words,
+    rate_table,
+    score_table,
+    target_table,
+)
+from driftwalk.schema.answers.parts import Table, each
+from driftwalk.schema.shapes import short_class
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+MOST_CURVES = 12
+"""Classes whose shares are drawn: those with the largest share at some time. Chosen by hand."""
+
+
+def kinetics_sections(*, kinetics: xr.Dataset | None = None) -> list[Section]:
+    """Return the sections of a page on kinetics.
+
+    Parameters
+    ----------
+    kinetics : xarray.Dataset, optional
+        A `kinetics`; None while there is none yet.
+
+    Returns
+    -------
+    list of dict
+        Sections; what cannot be shown is an empty one that says why.
+
+    Examples
+    --------
+    >>> [part["kind"] for part in kinetics_sections()]
+    ['empty']
+    """
+    parts: list[tuple[str, str, Maker]] = [
+        ("shares", "Shares over time", shares_section),
+        ("rates", "Rates", rates_sections),
+        ("tests", "Tests of a well-mixed tank", mixing_section),
+        ("models", "Models", lambda found: _table("models", "Models", score_table(found))),
+    ]
+    if kinetics is not None and "target" in kinetics.attrs:
+        title = "Way to the target"
+        parts.append(("target", title, lambda found: _table("target", title, target_table(found))))
+    if kinetics is not None and kinetics.sizes.get("source") == 2:
+        name = "Equal rates"
+        parts.append(("equal", name, lambda found: _table("equal", name, equal_table(found))))
+    nothing = "There are no rates yet."
+    return sections_of(kinetics, nothing, kinetics_summary, lambda _: [], parts)
+
+
+def kinetics_summary(kinetics: xr.Dataset) -> Section:
+    """Return the verdict with its reasons, and the chosen model."""
+    facts = kinetics.attrs
+    runs, blocks = required(kinetics, "runs"), required(kinetics, "blocks")
+    paragraphs = [
+        f"{runs} runs of {blocks} blocks changed their outcome class {facts['joins']} times. "
+        "Each run is a history of classes; the rates between them were estimated by likelihood.",
+        f"Verdict: {required(kinetics, 'verdict')}.",
+        *(f"{text[:1].upper()}{text[1:]}." for text in sentences(kinetics, "reason")),
+        f"The shares are those of the {required(kinetics, 'chosen')}, the simplest model that is "
+        "within a standard error of the best on held-out runs.",
+    ]
+    if "equal_p" in facts:
+        paragraphs.append(f"Equal rates of both data sets: {equal_words(kinetics)}.")
+    if "other_blocks_refused" in facts:
+        paragraphs.append(f"{str(facts['other_blocks_refused']).capitalize()}.")
+    chance = value_of(kinetics, "completion_ks_floor")
+    note = None if chance is None else f"by chance up to {quantity(chance)}"
+    shown = [
+        figure("KS distance of completion times", value_of(kinetics, "completion_ks"), note=note)
+    ]
+    if "other_blocks_rate_per_s" in facts:
+        words = f"first join of {facts['other_blocks']} blocks, extrapolated"
+        shown.append(figure(words, value_of(kinetics, "other_blocks_rate_per_s"), "s-1"))
+    return summary_section(paragraphs, shown)
+
+
+def shares_section(kinetics: xr.Dataset) -> Section:
+    """Return predicted shares with their bands, and those that were seen as points."""
+    require(kinetics, "time", "share", "share_low", "share_high", "empirical")
+    time = kinetics["time"].values
+    largest = np.argsort(-kinetics["share"].values.max(axis=0), kind="stable")[:MOST_CURVES]
+    drawn = []
+    for at in sorted(largest.tolist()):
+        one = kinetics.isel({"class": at})
+        name = short_class(str(one["class"].values))
+        ends = (one["share_low"].values, one["share_high"].values)
+        drawn.append(series(name, time, one["share"].values, ends=ends))
+        for source in each(one, "source"):
+            seen = f"{name}, seen, {source['source'].values} data set"
+            points = source["empirical"].values[::6]
+            drawn.append(series(seen, time[::6], points, style="points"))
+    return chart(
+        "shares", "Shares over time", "Lines are predicted, points were seen.",
+        x=label("time", "s"), y=label("share of runs"), series=drawn,
+    )  # fmt: skip
+
+
+def rates_sections(kinetics: xr.Dataset) -> list[Section]:
+    """Return the rates of each data set as a table."""
+    require(kinetics, "count", "rate", "rate_low", "rate_high")
+    tables = (rate_table(kinetics, at) for at in range(kinetics.sizes["source"]))
+    return [
+        _table(f"rates-{at}", f"Rates, {one.title}" if one.title else "Rates", one)
+        for at, one in enumerate(tables, start=1)
+    ]
+
+
+def mixing_section(kinetics: xr.Dataset) -> Section:
+    """Return Weibull's shapes and Spearman's coefficients with their p-values."""
+    require(kinetics, "statistic", "p", "p_corrected")
+    names = ("statistic", "statistic_low", "statistic_high", "p", "p_corrected")
+    rows = [
+        [str(one["test"].values), int(one["events"]), *(f"{float(one[n]):.3g}" for n in names)]
+        for one in each(kinetics, "test")
+    ]
+    note = (
+        "Of a sojourn the Weibull shape (1: exponential), of two waits Spearman's coefficient "
+        "(0: no memory). The p-values are corrected by Holm's method."
+    )
+    columns = ["test", "events", "statistic", "from", "to (90 %)", "p", "p, corrected"]
+    return table_section("tests", "Tests of a well-mixed tank", columns, rows, note)
+
+
+def _table(id: str, title: str, table: Table) -> Section:
+    return table_section(id, title, table.columns, table.rows)

@@ -1,0 +1,151 @@
+"""Kinetics of self-assembly: the graph of classes with their rates, and shares over time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from driftwalk.core.arrays import Floats
+from driftwalk.plot.assembly_courses import TIME_LABEL
+from driftwalk.plot.parts import style
+from driftwalk.plot.parts.assembly_labels import check_kind, class_colors
+from driftwalk.plot.parts.polyomino_sketch import (
+    are_discs,
+    class_cells,
+    place_sketch,
+    sketch_size,
+)
+from driftwalk.schema.shapes import short_class
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+SHOWN_SHARE = 0.01
+"""Classes that reach this share are drawn, and the transitions with this part of what leaves."""
+
+
+def plot_class_graph(kinetics: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw the outcome classes by their number of assemblies, and the rates between them.
+
+    The width of an arrow is the share of the transitions that leave its class.
+
+    Parameters
+    ----------
+    kinetics : xarray.Dataset
+        A `kinetics`.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure when left out.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+
+    Raises
+    ------
+    InputError
+        When the dataset is of another kind.
+
+    Examples
+    --------
+    ``plot_class_graph(found)``
+    """
+    check_kind(kinetics, "kinetics", "rate", "count", "share")
+    ax = style.axes_or_new(ax, height_mm=90.0)
+    rates, counts = (kinetics[name].isel(source=0).values for name in ("rate", "count"))
+    pairs = [str(name).split(" -> ") for name in kinetics["transition"].values]
+    leaving: dict[str, int] = {}
+    for (start, _), count in zip(pairs, counts, strict=True):
+        leaving[start] = leaving.get(start, 0) + int(count)
+    kept = [
+        (start, end, rate, count / leaving[start])
+        for (start, end), rate, count in zip(pairs, rates, counts, strict=True)
+        if count > SHOWN_SHARE * leaving[start]
+    ]
+    place = _places(list(dict.fromkeys(name for one in kept for name in one[:2])))
+    discs = are_discs(*place)
+    for start, end, rate, share in kept:
+        first, last = np.array(place[start]), np.array(place[end])
+        ax.annotate(
+            "", xy=tuple(first + 0.8 * (last - first)), xytext=tuple(first + 0.2 * (last - first)),
+            arrowprops={"arrowstyle": "-|>", "lw": 0.4 + 2.6 * share, "color": style.MUTED},
+        )  # fmt: skip
+        # Half-way labels of several fans would lie on each other: higher classes have them nearer.
+        at = first + (0.7 - 0.4 * first[1]) * (last - first)
+        ax.text(
+            float(at[0]), float(at[1]), f"{1e3 * rate:.2g}", fontsize=6.0, ha="center", va="center",
+            bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none"},
+        )  # fmt: skip
+    colors = class_colors(list(place))
+    for name, at in place.items():
+        ax.plot(*at, "o", ms=28, color="white", mec=colors[name], mew=0.8)
+        side = 20.0 / float(sketch_size(class_cells(name)).max())
+        place_sketch(ax, name, at, cell_pt=min(side, 6.0), color=colors[name], discs=discs)
+        ax.annotate(
+            short_class(name), at, xytext=(0, -15), textcoords="offset points", ha="center",
+            va="top", fontsize=6.5,
+        )  # fmt: skip
+    ax.set_xlim(-0.12, 1.12)
+    ax.set_ylim(-0.12, 1.1)
+    ax.set_axis_off()
+    ax.set_title("rates (1/1000 s)", loc="left")
+    return ax
+
+
+def _places(names: list[str]) -> dict[str, tuple[float, float]]:
+    """Return a column for each number of assemblies, the most on the left."""
+    columns = sorted({name.count("+") for name in names}, reverse=True)
+    place = {}
+    for at, number in enumerate(columns):
+        column = [name for name in names if name.count("+") == number]
+        x = at / max(len(columns) - 1, 1)
+        for row, name in enumerate(column):
+            place[name] = (x, 1.0 - (row + 0.5) / len(column))
+    return place
+
+
+def plot_predicted_shares(kinetics: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw predicted shares of the classes over time with their bands, and those seen as points.
+
+    Parameters
+    ----------
+    kinetics : xarray.Dataset
+        A `kinetics`.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure when left out.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+
+    Raises
+    ------
+    InputError
+        When the dataset is of another kind.
+
+    Examples
+    --------
+    ``plot_predicted_shares(found)``
+    """
+    check_kind(kinetics, "kinetics", "time", "share", "empirical")
+    ax = style.axes_or_new(ax, height_mm=90.0)
+    time: Floats = kinetics["time"].values
+    largest = kinetics["share"].values.max(axis=0)
+    names = [str(name) for name in kinetics["class"].values]
+    shown = [at for at in np.argsort(-largest, kind="stable")[:12] if largest[at] > SHOWN_SHARE]
+    colors = class_colors([names[at] for at in sorted(shown)])
+    for at in sorted(shown):
+        one, color = kinetics.isel({"class": at}), colors[names[at]]
+        ax.fill_between(time, one["share_low"], one["share_high"], color=color, alpha=0.25, lw=0)
+        ax.plot(time, one["share"], color=color, label=short_class(names[at]))
+        for source, marker in zip(range(kinetics.sizes["source"]), "ox", strict=False):
+            seen = one["empirical"].values[source]
+            ax.plot(time[::6], seen[::6], marker, color=color, ms=2.5, mew=0.7)
+    ax.set(xlabel=TIME_LABEL, ylabel="share of runs", xlim=(time[0], time[-1]), ylim=(0.0, None))
+    ax.legend(ncols=2, fontsize=6.0)
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.set_title("predicted (lines), seen (points)", loc="left")
+    return ax

@@ -1,0 +1,58 @@
+"""`driftwalk kinetics` from the command line: a run, what it holds, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+import xarray as xr
+from chain_runs import chain_runs
+from command_line import RECORDING, here
+
+import driftwalk as dw
+
+pytestmark = pytest.mark.slow
+
+
+def test_a_run_holds_its_answer_and_its_figures(tmp_path: Path) -> None:
+    chain_runs(60, 1).to_netcdf(tmp_path / "runs.nc")
+    out = tmp_path / "out"
+    done = here("kinetics", tmp_path / "runs.nc", "-o", out, "--target", "T", "--json")
+    assert done.code == 0, done.err
+    facts = json.loads(done.out)
+    found = xr.load_dataset(out / "kinetics.nc")
+    assert facts["verdict"] == found.attrs["verdict"]
+    assert facts["transitions"][0]["rate_per_s"] == found["rate"].values[0, 0]
+    assert sorted(path.stem for path in out.glob("figures/*.png")) == ["class_graph", "shares"]
+    again = dw.kinetics(chain_runs(60, 1), target="T")
+    assert again["share"].equals(found["share"])
+    assert here("report", out, "-o", tmp_path / "page.html").code == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["FEW"], "cannot tell: 5 runs"),
+        (["RUNS", "--target", "q"], "target q: no shape"),
+        (["RUNS", "--target", "2+1"], "target 2.1 has 3 blocks, and the runs have 4"),
+        (["RUNS", "THREE"], "the data sets have 4 and 2 blocks"),
+        (["EMPTY"], "holds no assembly"),
+        (["NOWHERE"], "does not exist"),
+        ([str(RECORDING)], "NetCDF"),
+        (["RUNS", "RUNS", "RUNS"], "two sources can be compared, got 3"),
+    ],
+)
+def test_bad_inputs_are_one_line(tmp_path: Path, words: list[str], said: str) -> None:
+    chain_runs(60, 1).to_netcdf(tmp_path / "RUNS")
+    chain_runs(5, 1).to_netcdf(tmp_path / "FEW")
+    two = chain_runs(30, 1).assign_coords({"class": ["2"] * 6 + ["1+1"]})
+    two.assign_attrs(blocks=2).to_netcdf(tmp_path / "THREE")
+    (tmp_path / "EMPTY").mkdir()
+    given = [tmp_path / word if word.isupper() else word for word in words]
+    done = here("kinetics", *given, "-o", tmp_path / "out")
+    assert done.code == 2
+    assert re.search(said, done.err), done.err
+    assert len(done.err.strip().splitlines()) == 1
+    assert not (tmp_path / "out").exists()
