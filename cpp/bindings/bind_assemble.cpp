@@ -146,6 +146,6 @@ void register_assemble(nb::module_& module) {
              "connector_axis"_a, "hidden_share"_a, "stirring_length"_a, "incompressible"_a,
              "block_restitution"_a, "block_friction"_a, "sample_every"_a, "threads"_a,
              "precision"_a, "faces"_a.none() = nb::none(), "flow_start"_a = nb::none(),
-             "glued"_a = nb::none(), "pull"_a = nb::none(),
-             "bonds"_a = BondNumbers{0, 0, 0, 1.25}, "event_rows"_a = 0);
+             "glued"_a = nb::none(), "pull"_a = nb::none(), "bonds"_a = BondNumbers{0, 0, 0, 1.25},
+             "event_rows"_a = 0);
 }

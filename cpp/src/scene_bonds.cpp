@@ -65,8 +65,8 @@ void record_of(const AssemblyRules& rules, Scene& scene, EventKind kind, int fir
                {face_at(rules, scene, first, second), face_at(rules, scene, second, first)});
 }
 
-// Whether neighbours are bonded: those that have just latched, and those whose faces may. Where none
-// has latched all are.
+// Whether neighbours are bonded: those that have just latched, and those whose faces may. Where
+// none has latched all are.
 bool can_bond(const AssemblyRules& rules, const Scene& scene, int first, int second,
               BlockPair joined) {
   if (rules.faces == nullptr || joined.first < 0 ||

@@ -18,6 +18,7 @@ from driftwalk.assembly.outcomes.class_names import world_class
 from driftwalk.assembly.outcomes.sizes import compactness
 from driftwalk.core.errors import InputError
 from driftwalk.schema.shapes import all_single, counts_of_shape, is_one_assembly
+from driftwalk.viewer.play.playground import shape_counts
 
 BLOCKS = 40
 
@@ -145,6 +146,18 @@ def test_two_of_five_hundred_given_blocks_that_overlap_are_named() -> None:
     start[321, :2] = start[17, :2] + 0.9 * SIDE
     with pytest.raises(InputError, match="blocks 17 and 321 of run 0 overlap"):
         dw.assembly_path(study, flow, start=start, duration=1.0)
+
+
+def test_a_playground_of_many_blocks_counts_sizes() -> None:
+    flow = dw.flow.stretch_flow(dw.tank30_flow(), diameter=0.6)
+    study = dw.Study(tank={"diameter_m": 0.6}, assembly={"blocks": 120})
+    source = dw.viewer.PlaySource(study, flow)
+    source.tank.advance(2.0)
+    labels = source.tank.assembly
+    found = shape_counts(source.tank.outcome, labels)
+    assert sum(found.values()) == np.unique(labels).size
+    assert sum(int(name.split()[0]) * count for name, count in found.items()) == 120
+    assert found["1"] < 120
 
 
 @pytest.mark.parametrize("ratio", [0.5, 10.0])

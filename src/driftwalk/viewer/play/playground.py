@@ -8,8 +8,12 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
+import numpy as np
+import numpy.typing as npt
+
 from driftwalk.assembly import LiveTank
 from driftwalk.core.arrays import Floats
+from driftwalk.schema.shapes import MOST_NAMED
 from driftwalk.viewer.play.playground_base import Playground
 from driftwalk.viewer.play.settings import knobs_for, most_blocks_in, values_of
 from driftwalk.viewer.play.stream import frame_line, shown_angles
@@ -22,6 +26,20 @@ if TYPE_CHECKING:
 
 ROUNDING: Final = 1e-6
 """Share of a time step within which an instant is that of the step's end."""
+
+
+def shape_counts(outcome: str, assembly: npt.NDArray[np.int32]) -> Counter[str]:
+    """Return how many assemblies of each shape there are; of many blocks, of each size.
+
+    Examples
+    --------
+    >>> shape_counts("2+1+1", np.array([0, 0, 2, 3], np.int32))
+    Counter({'1': 2, '2': 1})
+    """
+    if assembly.size <= MOST_NAMED:
+        return Counter(outcome.split("+"))
+    sizes = np.unique(assembly, return_counts=True)[1].tolist()
+    return Counter(str(size) if size <= 2 else f"{size} blocks" for size in sizes)
 
 
 class Stream(Protocol):
@@ -173,7 +191,7 @@ class PlaySource(Playground):
             poles=tank.poles.tolist(),
             waiting=tank.waiting,
             outcome=outcome,
-            counts=Counter(outcome.split("+")),
+            counts=shape_counts(outcome, tank.assembly),
             flow_scale=tank.flow_scale,
         )
 
