@@ -215,15 +215,17 @@ BINDINGS: dict[str, dict[str, Any]] = {
     ("binding", "magnets"), [*((name, "none") for name in BINDINGS), ("poles", "3x3x1mm,1.2T")]
 )
 def test_typed_faces_agree(binding: str, magnets: str, latching: str) -> None:
-    model = study(0.2, interaction={"magnets": magnets})
+    model, pulled = study(0.2, interaction={"magnets": magnets}), magnets != "none"
     faces = face_table(Assembly(blocks=6, **BINDINGS[binding]))
     flow = drain(model, inflow=2.0, spin=1.5)
     latched = 0
     for seed in (201, 202, 203):
         key = world_key(seed)
         run = compare(
-            model, flow, start=placed(model, flow, 6, key), key=key, force_std=2e-3, steps=120,
+            model, flow, start=placed(model, flow, 6, key), key=key, force_std=2e-3, steps=100,
             latching=latching, faces=faces, connector_distance=0.015,
+            # Magnets that come near multiply rounding faster than collisions do.
+            tolerance=1e-6 if pulled else TOLERANCE,
         )  # fmt: skip
         assert run["first_contact_step"] > 0, "the blocks never met"
         latched += int(run["event_count"])
