@@ -13,9 +13,9 @@ template <class Real>
 struct PackMemory {
   static constexpr int lanes = Numbers<Real>::lanes;
   bool one_world;
-  Member<Real>* members; // [row]
-  Sums<Real>* sums;      // [row]
-  Pulled<Real>* pulled;  // [row]
+  Member<Real>* members;                         // [row]
+  Sums<Real>* sums;                              // [row]
+  Pulled<Real>* pulled;                          // [row]
   Pulled<typename Numbers<Real>::Scalar>* alone; // [block] of one world
   BlockBook* books;                              // [block][lane], of one world [block]
   Bond* bonds;                                   // [world][bond_room]
