@@ -312,3 +312,13 @@ def test_many_blocks_have_types_and_start_glued() -> None:
     glued = run(glued="xx")
     assert ((glued["event_time"] == 0.0).sum("event") == 20).all()
     assert (glued["event_count"] > 20).all()
+
+
+def test_only_faces_that_latch_are_bonded() -> None:
+    # Faces without a magnet lie next to others in an assembly, and no bond holds them.
+    found = shaken(faces="N,S,none,none", bond_rate_per_s=0.3)
+    kind, face = found["event_kind"].values, found["event_face"].values
+    bonded = face[np.isin(kind, [0, 1, 2, 3])]
+    assert {int(k) for k in kind[kind >= 0]} >= {0, 1}
+    poles = np.array([1, -1, 0, 0])[bonded]
+    assert (np.sort(poles, axis=1) == [-1, 1]).all()
