@@ -189,7 +189,7 @@ def attraction_section(attraction: xr.Dataset) -> Section:
     drawn = [
         series(words, gap[found > 0.0], found[found > 0.0])
         for words, found in (
-            ("measured by a balance", attraction["force"].values),
+            ("as stated", attraction["force"].values),
             ("in the simulation", attraction["simulated_force"].values),
         )
     ]
