@@ -63,6 +63,9 @@ nb::dict assemble(const Model& model, In<double, 3> start, In<std::uint64_t, 1> 
   rules.restitution = block_restitution;
   rules.friction = block_friction;
   set_glued(rules, glued);
+  if (rules.glued > 1 && (rules.bonds_break || faces != nullptr)) {
+    throw std::invalid_argument("glued blocks have no types, and their bonds do not break");
+  }
   if (pull != nullptr) {
     rules.pull = pull->rules();
   }

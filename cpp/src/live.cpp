@@ -74,8 +74,13 @@ struct LiveWorld::Inside {
     }
     pack.book(0).assemblies = scene.assemblies;
     pack.renew();
-    if (rules.bonds_break) {
-      pack.bond_anew(step, 0);
+  }
+
+  // Every block is of its first kind again.
+  void begin_kinds() {
+    for (int b = 0; b < rules.blocks; ++b) {
+      pack.memory().book(b, 0).kind = first_kind(rules.faces, b);
+      set_poles(rules, pack.memory(), b, 0);
     }
   }
 
@@ -105,6 +110,7 @@ struct LiveWorld::Inside {
 
   const Prepared<double>& run;
   AssemblyRules rules;
+  bool poles_repel = false; // by what was given with the forces
   std::uint64_t key;
   std::array<std::int32_t, most_events> event_step, event_kind;
   std::array<std::int32_t, 2 * most_events> event_block, event_face;
@@ -163,15 +169,13 @@ void LiveWorld::set_bonds(double rate, double relatch_clearance) {
 
 void LiveWorld::set_faces(const FaceRules* faces) {
   inside_->rules.faces = faces;
-  inside_->rules.pull.like_poles_repel = faces != nullptr;
-  for (int b = 0; b < inside_->rules.blocks; ++b) {
-    inside_->pack.memory().book(b, 0).kind = first_kind(faces, b);
-    set_poles(inside_->rules, inside_->pack.memory(), b, 0);
-  }
+  inside_->rules.pull.like_poles_repel = inside_->poles_repel || faces != nullptr;
+  inside_->begin_kinds();
 }
 
 void LiveWorld::set_pull(const PullRules& pull) {
   inside_->rules.pull = pull;
+  inside_->poles_repel = pull.like_poles_repel;
   inside_->rules.pull.like_poles_repel = pull.like_poles_repel || inside_->rules.faces != nullptr;
   for (int b = 0; b < inside_->rules.blocks; ++b) {
     set_poles(inside_->rules, inside_->pack.memory(), b, 0);
@@ -185,6 +189,7 @@ int LiveWorld::set_blocks(int blocks) {
     Scene& scene = inside_->filled_scene();
     keep_first_blocks(inside_->rules, scene, blocks);
     inside_->take_scene(scene);
+    drop_bonds(scene, inside_->pack.book(0).bonds);
   } else if (blocks > inside_->rules.blocks) {
     inside_->add_blocks(blocks);
   }
@@ -195,6 +200,8 @@ void LiveWorld::part() {
   Scene& scene = inside_->filled_scene();
   part_blocks(inside_->rules, scene);
   inside_->take_scene(scene);
+  inside_->pack.book(0).bonds.count = 0;
+  inside_->begin_kinds();
 }
 
 int LiveWorld::blocks() const {

@@ -91,6 +91,14 @@ void begin_lattice(Scene& scene, int lowest) {
 // Cuts an assembly in two: the blocks marked in `side`, and the others.
 void cut(const AssemblyRules& rules, Scene& scene, int assembly, const std::int32_t* side) {
   const SceneAssembly from = scene.assembly[assembly];
+  // Neighbours that no bond has held have to become clear of each other too.
+  for (int b = from.first; rules.faces != nullptr && b >= 0; b = scene.block[b].next) {
+    for (int c = scene.block[b].next; c >= 0; c = scene.block[c].next) {
+      if (side[b] != side[c] && are_neighbours(rules, scene, b, c)) {
+        bond_of(scene.bonds, b, c);
+      }
+    }
+  }
   int lowest[2] = {-1, -1};
   for (int b = from.first; b >= 0; b = scene.block[b].next) {
     int& own = lowest[side[b]];
@@ -148,6 +156,10 @@ void bond_assembly(const AssemblyRules& rules, Scene& scene, int assembly, Block
   BondList& bonds = scene.bonds;
   for (int b = scene.assembly[assembly].first; b >= 0; b = scene.block[b].next) {
     for (int c = scene.block[b].next; c >= 0; c = scene.block[c].next) {
+      // What has lain side by side in one of the two before is as it was.
+      if (joined.first >= 0 && scene.blocks_before[b].assembly == scene.blocks_before[c].assembly) {
+        continue;
+      }
       if (!are_neighbours(rules, scene, b, c) || !can_bond(rules, scene, b, c, joined)) {
         continue;
       }
@@ -179,6 +191,21 @@ void bond_all(const AssemblyRules& rules, Scene& scene) {
       bond_assembly(rules, scene, a, {-1, -1});
     }
   }
+}
+
+void drop_bonds(const Scene& scene, BondList& bonds) {
+  int count = 0;
+  for (int k = 0; k < bonds.count; ++k) {
+    Bond bond = bonds.bond[k];
+    if (bond.second >= scene.blocks) {
+      continue;
+    }
+    if (scene.block[bond.first].assembly != scene.block[bond.second].assembly) {
+      bond.state = BondState::parted;
+    }
+    bonds.bond[count++] = bond;
+  }
+  bonds.count = count;
 }
 
 bool are_unclear(const Scene& scene, int assembly, int other) {

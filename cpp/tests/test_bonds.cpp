@@ -118,9 +118,31 @@ void every_bond_has_a_hazard_of_its_own() {
   }
 }
 
+void blocks_that_go_take_their_own_bonds_alone() {
+  // A square of four with an open bond, without its last block: the other bonds are as they were.
+  const Place place(Place::wide(), 4);
+  const driftwalk::AssemblyRules rules = breaking(place);
+  Uniform draw;
+  Bonded made(rules, {{0, 0}, {1, 0}, {1, 1}, {0, 1}}, draw);
+  made.end(0);
+  const std::vector<Bond> before = made.bonds;
+  driftwalk::keep_first_blocks(rules, made.hand.scene, 3);
+  driftwalk::drop_bonds(made.hand.scene, made.hand.scene.bonds);
+  int kept = 0;
+  for (const Bond& bond : before) {
+    if (bond.second > 0 && bond.second < 3) {
+      const Bond& now = made.bonds[std::size_t(kept++)];
+      CHECK(now.first == bond.first && now.second == bond.second);
+      CHECK(now.state == bond.state && now.left == bond.left);
+    }
+  }
+  CHECK(kept == 2 && made.hand.scene.bonds.count == kept);
+}
+
 } // namespace
 
 int main() {
+  blocks_that_go_take_their_own_bonds_alone();
   a_parting_keeps_momentum_and_energy();
   a_loop_is_cut_where_two_bonds_are_broken();
   every_bond_has_a_hazard_of_its_own();

@@ -233,6 +233,11 @@ inline void read_block(const AssemblyRules& rules, const Scene& scene, const Pac
   put(m.motion.vx, lane, body.vx);
   put(m.motion.vy, lane, body.vy);
   put(m.motion.omega, lane, body.omega);
+  put(m.before.x, lane, body.before.x);
+  put(m.before.y, lane, body.before.y);
+  put(m.before.theta, lane, body.before.theta);
+  put(m.axes_before.cosine, lane, body.before.cosine);
+  put(m.axes_before.sine, lane, body.before.sine);
   if (body.touched) {
     put_rest(m.drag, lane);
   }

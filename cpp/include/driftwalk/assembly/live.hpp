@@ -36,7 +36,8 @@ struct LiveEvents {
   const std::int32_t* face;
 };
 
-// Changes take effect with the next step. Nothing is allocated but in the constructor.
+// Changes take effect with the next step. Memory is allocated in the constructor, and where a list
+// of near pairs outgrows its room.
 class LiveWorld {
 public:
   // `run` has to outlive the world. Blocks [x, y, theta], as many as the rules say, start at rest,

@@ -268,9 +268,11 @@ private:
     bool complete = false;
     if constexpr (Crowded) {
       if (listed_) {
+        if (!books_[0].running) {
+          return false;
+        }
         renew_list();
-        return books_[0].running &&
-               is_to_settle(near_, memory_.members, memory_.crowd, scratch_.scene.pairs) &&
+        return is_to_settle(near_, memory_.members, memory_.crowd, scratch_.scene.pairs) &&
                settle_lane(step, 0);
       }
     }

@@ -239,17 +239,17 @@ inline void pull_pair(const PullRules& rules, typename Numbers<Real>::Bool apart
   if (!any(near)) {
     return;
   }
-  if (rules.centres) {
+  if (rules.centres.cells > 0) {
     attract(keep(near, look_up(rules.centres, squared)), dx, dy, a, b);
   }
-  if (rules.resistance) {
+  if (rules.resistance.cells > 0) {
     const Real parting = (b.vx - a.vx) * dx + (b.vy - a.vy) * dy;
     attract(keep(near, look_up(rules.resistance, squared) * parting), dx, dy, a, b);
   }
-  if (rules.faces) {
+  if (rules.faces.cells > 0) {
     pull_faces(rules, near, dx, dy, a, b);
   }
-  if (rules.oriented) {
+  if (rules.oriented.distances > 0) {
     for (int lane = 0; lane < Numbers<Real>::lanes; ++lane) {
       if (lane_of(near, lane)) {
         Pulled<T> first = lane_of_pulled(a, lane), second = lane_of_pulled(b, lane);

@@ -11,7 +11,6 @@ struct RadialTable {
   const double* twice = nullptr; // the same numbers
   int cells = 0;                 // 0: there is no such function
   int first = 0;                 // number of the first cell: a float's bits without the lowest 17
-  explicit operator bool() const { return cells > 0; }
 };
 
 // Energy [J] of two faces with an axis each, by the coefficients of a quadratic B-spline: in the
@@ -22,7 +21,6 @@ struct OrientedTable {
   int distances = 0, angles = 0;
   double first = 0, per_step = 0; // logarithm of the first distance; steps per unit of it
   double low = 0, high = 0;       // distances between which it holds [m]
-  explicit operator bool() const { return distances > 0; }
 };
 
 struct PullRules {

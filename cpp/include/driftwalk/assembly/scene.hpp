@@ -115,6 +115,8 @@ void part_blocks(const AssemblyRules& rules, Scene& scene);
 void break_bonds(const AssemblyRules& rules, Scene& scene);
 // Bonds all neighbours of all assemblies anew.
 void bond_all(const AssemblyRules& rules, Scene& scene);
+// Forgets the bonds of blocks that are gone; those across assemblies have parted.
+void drop_bonds(const Scene& scene, BondList& bonds);
 // Marks the blocks on the side of a bond's first block, without crossing it: 1 in `side`, which has
 // an entry per block and 0 for all others. Returns whether it is a bridge.
 bool find_side(const BondList& bonds, int blocks, const Bond& bond, std::int32_t* side);
