@@ -88,7 +88,7 @@ def test_a_recording_of_the_model_is_matched_by_its_summaries_alone():
     starts = Starts()
     found = matched(Toy(bent, 1), starts, replicates=200)
     assert starts.calls == 0
-    assert found.usual
+    assert found.misfit.usual
     assert not found.unlike
     assert found.stretch == 1.0
     std = deviations()
@@ -106,7 +106,7 @@ def test_what_the_model_cannot_give_widens_the_draws():
     starts = Starts((0.4, 0.6), (0.41, 0.6), (0.9, 0.9))
     found = matched(Toy(bent, 2, off=10.0), starts)
     assert starts.calls == 1
-    assert not found.usual
+    assert not found.misfit.usual
     assert MATCHING.matches * SPREAD.size < found.discrepancy < MATCHING.hopeless * SPREAD.size
     assert found.stretch == pytest.approx(np.sqrt(found.discrepancy / found.median_discrepancy))
     assert found.stretch > 2.0
@@ -129,7 +129,7 @@ def test_another_start_is_no_use_for_another_model():
     found = matched(Toy(bent, 3, off=300.0), starts)
     assert starts.calls == 0
     assert found.discrepancy > MATCHING.hopeless * SPREAD.size
-    assert not found.usual
+    assert not found.misfit.usual
     assert ((found.sample >= 0.0) & (found.sample <= 1.0)).all()
 
 
@@ -139,7 +139,7 @@ def test_a_regression_with_large_errors_is_a_start_all_the_same():
     starts = Starts((0.9, 0.1))
     found = matched(Toy(waves(3.0), 4), starts)
     assert starts.calls == 0
-    assert found.usual
+    assert found.misfit.usual
     np.testing.assert_allclose(found.point, TRUTH, atol=0.01)
 
 
@@ -149,7 +149,7 @@ def test_where_summaries_find_no_neighbourhood_the_search_does():
     starts = Starts((0.9, 0.1), (0.91, 0.11), (0.42, 0.58))
     found = matched(Toy(waves(5.0), 4), starts)
     assert starts.calls == 1
-    assert found.usual
+    assert found.misfit.usual
     np.testing.assert_allclose(found.point, TRUTH, atol=0.01)
 
 

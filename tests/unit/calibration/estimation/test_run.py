@@ -174,7 +174,7 @@ def test_another_model_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
         assert float(found["interval_stretch"]) > 2.0
         assert "nothing is determined" in warnings
     assert any(
-        text.startswith("the summaries of the motion differ from the model's")
+        text.startswith("summaries of the motion: a misfit of ")
         for text in found["verdict_reason"].values
     )
     assert found["verdict"] == "does not explain"
