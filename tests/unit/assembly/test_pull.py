@@ -253,12 +253,84 @@ def test_a_wrong_table_is_refused_with_its_place(text: str, words: str, tmp_path
     [
         ({"magnets": "40x5x2mm,1.3T"}, "have no room in a block of 30 mm"),
         ({"magnets": "5x5x2mm,1.3T", "magnet_inset_m": 0.014}, "have no room"),
-        ({"magnets": "5x5x2mm,1.3T", "cutoff_m": 0.003}, "leaves no force"),
+        pytest.param(
+            {"magnets": "1x1x1mm,0.001T"}, "with less than 0.01 mN", marks=pytest.mark.slow
+        ),
     ],
 )
 def test_magnets_without_room_are_refused(given: dict[str, Any], words: str) -> None:
     with pytest.raises(dw.InputError, match=words):
         block_pull(dw.Study(interaction=given))
+
+
+def table_of(path: Path, rows: list[str], columns: str = "gap_mm,force_mN") -> str:
+    path.write_text("\n".join([columns, *rows]))
+    return str(path)
+
+
+def test_a_table_that_ends_with_a_force_is_capped_where_it_is_steep(tmp_path: Path) -> None:
+    rows = [f"{gap},{500 / (1 + gap) ** 2}" for gap in np.linspace(0.0, 5.0, 11)]
+    text = table_of(tmp_path / "table.csv", rows)
+    found = dw.attraction(dw.Study(interaction={"attraction": text}))
+    assert found is not None
+    # Slopes of the rows: 17.7 N/m from 2.5 to 3 mm and 12.5 N/m from 3 mm on; the step takes 14.5.
+    assert found.attrs["capped_below_m"] == pytest.approx(3e-3, rel=0.01)
+    assert found.attrs["most_simulated_N"] == pytest.approx(0.03125, rel=0.01)
+    assert found.attrs["force_at_10mm_N"] == 0.0
+    pull = block_pull(dw.Study(interaction={"attraction": text, "cutoff_m": 4.5e-3}))
+    assert pull is not None
+    assert pull.faces is not None
+    assert pull.faces.cutoff == pytest.approx(4.5e-3)
+    assert float(pull.faces(3.5e-3)) == pytest.approx(500e-3 / 4.5**2)
+
+
+@pytest.mark.slow
+def test_a_table_with_offsets_acts_up_to_its_corner(tmp_path: Path) -> None:
+    # mN: (10 - gap) cos²(offset / 12 mm · π / 2), whose energy is (10 - gap)² / 2 times the cos².
+    def share(offset: Any) -> Any:
+        return np.cos(np.asarray(offset) / 12.0 * np.pi / 2) ** 2
+
+    rows = [
+        f"{gap},{offset},{(10 - gap) * share(offset)}"
+        for gap in np.linspace(0.0, 10.0, 11)
+        for offset in np.linspace(0.0, 12.0, 25)
+    ]
+    text = table_of(tmp_path / "table.csv", rows, "gap_mm,offset_mm,force_mN")
+
+    def force(gap: float, offset: float) -> tuple[float, float]:
+        pair = still_pair(
+            [[0.0, 0.0, 0.0], [SIDE + 1e-3 * gap, 1e-3 * offset, 0.0]],
+            interaction={"attraction": text},
+            simulation={"time_step_s": 1e-3},
+        )
+        tank = dw.LiveTank(**pair)
+        tank.advance(1e-3)
+        return float(1e6 * MASS * tank.vx[0]), float(1e6 * MASS * tank.vy[0])
+
+    for gap, offset in ((2.0, 0.0), (5.0, 4.0), (8.0, 0.0), (7.0, 8.0)):
+        along, across = force(gap, offset)
+        assert along == pytest.approx((10 - gap) * share(offset), abs=0.25), (gap, offset)
+        slope = np.sin(offset / 12.0 * np.pi) * np.pi / 24.0 * (10 - gap) ** 2 / 2
+        assert across == pytest.approx(slope, abs=0.5), (gap, offset)
+
+
+def test_a_cutoff_counts_from_face_to_face() -> None:
+    given = {"magnets": "5x5x2mm,1.3T", "capillary": "on", "cutoff_m": 0.02}
+    pull = block_pull(dw.Study(interaction=given))
+    assert pull is not None
+    assert pull.faces is not None
+    assert pull.centres is not None
+    assert pull.faces.cutoff == pytest.approx(0.024)
+    assert pull.centres.cutoff == pytest.approx(SIDE + 0.02)
+    assert float(pull.centres(SIDE)) == pytest.approx(float(pull.centres.force(np.array(SIDE))))
+
+
+@pytest.mark.slow
+def test_the_cap_is_that_of_the_time_step_and_not_the_taper() -> None:
+    weak = {"magnets": "1x1x1mm,0.2T", "capillary": "on", "meniscus_height_m": 1e-4}
+    found = dw.attraction(dw.Study(interaction=weak, simulation={"time_step_s": 1e-3}))
+    assert found is not None
+    assert found.attrs["capped_below_m"] == 0.0
 
 
 def test_discs_have_no_faces() -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from driftwalk.assembly.pull.tables import BlockPull, block_pull
+from driftwalk.core.arrays import Floats
 from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:
@@ -54,12 +55,15 @@ def attraction(study: Study) -> xr.Dataset | None:
     forces = [force for force in (pull.faces, pull.centres) if force is not None]
     reach = max(force.cutoff - force.contact for force in forces)
     gap = np.append(0.0, np.geomspace(1e-4, max(reach, 2e-4), POINTS))
-    felt = np.sum([force.force(gap + force.contact) for force in forces], axis=0)
+
+    def felt_at(gap: Floats) -> Floats:
+        return np.sum([force.force(gap + force.contact) for force in forces], axis=0)
+
+    felt = felt_at(gap)
     simulated = np.sum([force(gap + force.contact) for force in forces], axis=0)
     steps = (felt[1:] + felt[:-1]) / 2.0 * np.diff(gap)
     energy = -np.append(np.cumsum(steps[::-1])[::-1], 0.0)
-    capped = gap[simulated < 0.999 * felt]
-    capped = capped[capped < gap[-1] / 2.0]
+    capped = max(0.0, *(force.capped_at - force.contact for force in forces))
     return build_dataset(
         "attraction",
         {
@@ -71,10 +75,10 @@ def attraction(study: Study) -> xr.Dataset | None:
         {
             "between": _words(study.interaction, pull),
             "force_at_contact_N": float(felt[0]),
-            "force_at_10mm_N": float(np.interp(SHOWN_GAP_M, gap, felt)),
+            "force_at_10mm_N": float(felt_at(np.array([SHOWN_GAP_M]))[0]),
             "binding_energy_J": float(-energy[0]),
             "most_simulated_N": float(simulated.max()),
-            "capped_below_m": float(capped[-1]) if capped.size else 0.0,
+            "capped_below_m": capped,
             "study": study.to_toml(),
         },
     )
