@@ -264,7 +264,7 @@ def test_magnets_without_room_are_refused(given: dict[str, Any], words: str) -> 
 
 
 def table_of(path: Path, rows: list[str], columns: str = "gap_mm,force_mN") -> str:
-    path.write_text("\n".join([columns, *rows]))
+    path.write_text("\n".join([columns, *rows]), encoding="utf-8")
     return str(path)
 
 
@@ -331,6 +331,17 @@ def test_the_cap_is_that_of_the_time_step_and_not_the_taper() -> None:
     found = dw.attraction(dw.Study(interaction=weak, simulation={"time_step_s": 1e-3}))
     assert found is not None
     assert found.attrs["capped_below_m"] == 0.0
+
+
+def test_typed_faces_have_poles_or_magnets_are_refused() -> None:
+    kinds = [{"name": "A", "count": 4, "faces": ["p", "p", "q", "q"]}]
+    given = {"interaction": {"magnets": "3x3x1mm,1.2T", "cutoff_m": 0.02}}
+    study = dw.Study(assembly={"binding": {"kinds": kinds, "latches": [["p", "q"]]}}, **given)
+    with pytest.raises(dw.InputError, match="no face of these blocks has one"):
+        block_pull(study)
+    found = dw.attraction(dw.Study(assembly={"faces": "N,S,N,S"}, **given))
+    assert found is not None
+    assert "poles given by the faces, 1 mm below" in found.attrs["between"]
 
 
 def test_discs_have_no_faces() -> None:

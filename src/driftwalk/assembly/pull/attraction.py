@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
-    from driftwalk.model.interaction import Interaction
 
 SHOWN_GAP_M: Final = 0.010
 """Gap at which the force is stated: an easy one to set with a spacer."""
@@ -57,7 +56,7 @@ def attraction(study: Study) -> xr.Dataset | None:
     gap = np.append(0.0, np.geomspace(1e-4, max(reach, 2e-4), POINTS))
 
     def felt_at(gap: Floats) -> Floats:
-        return np.sum([force.force(gap + force.contact) for force in forces], axis=0)
+        return np.asarray(sum(force.force(gap + force.contact) for force in forces))
 
     felt = felt_at(gap)
     simulated = np.sum([force(gap + force.contact) for force in forces], axis=0)
@@ -73,7 +72,7 @@ def attraction(study: Study) -> xr.Dataset | None:
         },
         {"gap": ("gap", gap)},
         {
-            "between": _words(study.interaction, pull),
+            "between": _words(study, pull),
             "force_at_contact_N": float(felt[0]),
             "force_at_10mm_N": float(felt_at(np.array([SHOWN_GAP_M]))[0]),
             "binding_energy_J": float(-energy[0]),
@@ -84,11 +83,14 @@ def attraction(study: Study) -> xr.Dataset | None:
     )
 
 
-def _words(given: Interaction, pull: BlockPull) -> str:
+def _words(study: Study, pull: BlockPull) -> str:
     """Return what acts between the blocks."""
+    given, is_typed = study.interaction, study.assembly.typed_faces is not None
     parts = []
     if given.magnet is not None:
-        seats = "turning in their seats" if given.poles == "turning" else "fixed"
+        seats = "poles given by the faces" if is_typed else "turning in their seats"
+        if given.poles == "fixed":
+            seats = "fixed, poles given by the faces" if is_typed else "fixed"
         inset = f"{1e3 * given.magnet_inset_m:g} mm below the faces"
         parts.append(f"magnets {given.magnets}, {seats}, {inset}")
     if given.attraction is not None:

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
+from driftwalk.assembly.lattice.typed_faces import face_table
 from driftwalk.assembly.pull.magnets import coaxial_force, magnet_energy
 from driftwalk.assembly.pull.measured import MeasuredAttraction, read_attraction
 from driftwalk.core.arrays import Floats
@@ -141,7 +142,8 @@ def block_pull(study: Study) -> BlockPull | None:
     Raises
     ------
     InputError
-        When a magnet has no room in its block, discs have magnets, or a table cannot be read.
+        When a magnet has no room in its block, discs have magnets, no typed face has a pole, or a
+        table cannot be read.
 
     Examples
     --------
@@ -153,10 +155,14 @@ def block_pull(study: Study) -> BlockPull | None:
     if not study.interaction.is_on:
         return None
     mass = study.block.mass_kg * (1.0 + study.forces.added_mass_share)
-    text = study.interaction.attraction
-    measured = None if text is None else read_attraction(text)
+    given = study.interaction
+    measured = None if given.attraction is None else read_attraction(given.attraction)
+    if measured is not None and given.cutoff_m != "auto":
+        measured = measured.up_to(given.cutoff_m)
+    if given.magnet or measured:
+        _require_poles(study)
     return _block_pull(
-        study.interaction, study.block.side_m, study.block.is_round,
+        given, study.block.side_m, study.block.is_round,
         mass, study.time_step_s, study.water.density_kg_m3, measured,
     )  # fmt: skip
 
@@ -184,8 +190,6 @@ def _block_pull(
             2.0 * (half - lever), steepest, given.cutoff_m,
         )  # fmt: skip
     elif measured is not None:
-        if given.cutoff_m != "auto":
-            measured = measured.up_to(given.cutoff_m)
         faces = _limited(measured.at_gap, 0.0, steepest, measured.longest_gap)
     if given.capillary == "on":
         centres = _meniscus(given, side, density)
@@ -213,6 +217,16 @@ def _block_pull(
     if resistance is not None:
         native.set_radial("resistance", *resistance.cells())
     return BlockPull(faces, lever, centres, resistance, native)
+
+
+def _require_poles(study: Study) -> None:
+    """Refuse typed faces without a pole: no force of faces would act."""
+    table = face_table(study.assembly)
+    if table is not None and not table.pole.any():
+        raise InputError(
+            "[interaction] magnets and attraction act between the poles N and S of typed faces, "
+            "and no face of these blocks has one: name faces N and S, or leave them out"
+        )
 
 
 def _require_room(magnet: Magnet, inset: float, side: float) -> None:
