@@ -15,6 +15,7 @@ import driftwalk as dw
 from driftwalk.assembly import assemble
 from driftwalk.assembly.pull.magnets import coaxial_force, magnet_energy
 from driftwalk.assembly.pull.tables import block_pull
+from driftwalk.assembly.runs.plan import make_plan, simulate_rows, start_poses
 from driftwalk.model.interaction import Magnet
 
 SIDE, MASS = 0.03, 0.0116
@@ -312,6 +313,19 @@ def test_a_table_with_offsets_acts_up_to_its_corner(tmp_path: Path) -> None:
         assert along == pytest.approx((10 - gap) * share(offset), abs=0.25), (gap, offset)
         slope = np.sin(offset / 12.0 * np.pi) * np.pi / 24.0 * (10 - gap) ** 2 / 2
         assert across == pytest.approx(slope, abs=0.5), (gap, offset)
+
+
+def test_a_run_keeps_the_table_of_its_start(tmp_path: Path) -> None:
+    table = tmp_path / "table.csv"
+    pair = still_pair(
+        [[0.0, 0.0, 0.0], [SIDE + 0.01, 0.0, 0.0]],
+        interaction={"attraction": table_of(table, ["0,20", "20,0"])},
+    )
+    study = dw.apply_overrides(pair["study"], {"assembly.blocks": 2})
+    plan = make_plan(study, pair["flow"], settings={"runs": 1, "duration_s": 5.0})
+    start = start_poses(plan, pair["start"])
+    table.unlink()
+    assert simulate_rows(plan, start)["event_count"].tolist() == [1]
 
 
 def test_a_cutoff_counts_from_face_to_face() -> None:

@@ -131,13 +131,30 @@ class BlockPull:
     native: _core.Pull
 
 
-def block_pull(study: Study) -> BlockPull | None:
+def table_of(study: Study) -> MeasuredAttraction | None:
+    """Read the table of attraction of a study, up to its cut-off; None where it names none.
+
+    Raises
+    ------
+    InputError
+        When it cannot be read, or begins beyond the cut-off.
+    """
+    given = study.interaction
+    if given.attraction is None:
+        return None
+    found = read_attraction(given.attraction)
+    return found if given.cutoff_m == "auto" else found.up_to(given.cutoff_m)
+
+
+def block_pull(study: Study, table: MeasuredAttraction | None = None) -> BlockPull | None:
     """Return the forces between the blocks of a study; None where they feel none.
 
     Parameters
     ----------
     study : Study
         Block, water, time step and interaction.
+    table : MeasuredAttraction, optional
+        Its table of attraction where that has been read: a run reads it once.
 
     Raises
     ------
@@ -156,9 +173,7 @@ def block_pull(study: Study) -> BlockPull | None:
         return None
     mass = study.block.mass_kg * (1.0 + study.forces.added_mass_share)
     given = study.interaction
-    measured = None if given.attraction is None else read_attraction(given.attraction)
-    if measured is not None and given.cutoff_m != "auto":
-        measured = measured.up_to(given.cutoff_m)
+    measured = table or table_of(study)
     if given.magnet or measured:
         _require_poles(study)
     return _block_pull(
