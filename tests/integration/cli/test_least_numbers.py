@@ -100,6 +100,16 @@ def test_a_connector_without_effect_is_said(tmp_path: Path) -> None:
     assert "no effect" not in done.err
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("no_figures")
+def test_the_resistance_of_the_water_is_stated_alone(tmp_path: Path) -> None:
+    options = ("--duration", "1s", "--approach-resistance", "1e-4", "-o", tmp_path / "run")
+    done = here("assemble", *BLOCKS, *options)
+    assert "the water between two blocks resists: 0.0001 N s times speed / gap" in done.out, (
+        done.err
+    )
+
+
 def test_the_force_of_a_study_is_bounded_in_python() -> None:
     study = dw.Study(forces={"force_interval_s": 1e-9})
     with pytest.raises(

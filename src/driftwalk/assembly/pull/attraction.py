@@ -97,6 +97,4 @@ def _words(study: Study, pull: BlockPull) -> str:
         parts.append(f"the table {given.attraction}")
     if pull.centres is not None:
         parts.append(f"menisci {1e3 * given.meniscus_height_m:g} mm high")
-    if given.approach_resistance_N_s > 0.0:
-        parts.append("resistance of the water between them")
     return "; ".join(parts)
