@@ -102,7 +102,11 @@ def assembled(study: Study, result: AssemblyResult) -> Answer:
     return assembly_answer(
         result.distribution,
         times=result.times,
-        settings={"drag_coefficient": forces.drag_coefficient, "force_std_N": forces.force_std_N},
+        settings={
+            "drag_coefficient": forces.drag_coefficient,
+            "force_std_N": forces.force_std_N,
+            "approach_resistance_N_s": study.interaction.approach_resistance_N_s,
+        },
         drawn=result.drawn,
         sizes=result.sizes,
         sizes_drawn=result.sizes_drawn,

@@ -111,7 +111,11 @@ class Interaction(Section):
     cutoff_m: Annotated[float | Literal["auto"], Quantity("m", gt=0, le=10, words=("auto",))] = (
         "auto"
     )
-    """Distance of two faces beyond which they feel nothing; "auto": where the force is 0.01 mN."""
+    """Gap beyond which faces and menisci feel nothing.
+
+    Gap between two faces beyond which magnets, a table and menisci have no effect; "auto": where
+    magnets attract with 0.01 mN, at the end of the table, and at 12 capillary lengths of menisci.
+    """
 
     @field_validator("magnets")
     @classmethod

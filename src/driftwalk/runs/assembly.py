@@ -134,7 +134,7 @@ class AssemblyWork:
             steady_state,
         )
 
-        settings = self.study.assembly
+        settings, table = self.study.assembly, _table_hash(self.study)
         drawn = sizes_drawn = None
         course = run.course(self._usual_parts())
         how: dict[str, Any] = {"threads": self.threads, "executor": run.executor}
@@ -178,6 +178,10 @@ class AssemblyWork:
             trial=FIXED_TRIAL,
             threads=self.threads,
         )
+        if _table_hash(self.study) != table:
+            raise InputError(
+                f"{self.study.interaction.attraction} has changed during the run: start it again"
+            )
         path = run.keep("path.nc", path)
         course.begin("figures")
         run.draw()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -98,6 +99,37 @@ def test_a_connector_without_effect_is_said(tmp_path: Path) -> None:
     assert said in done.err
     done = here("assemble", *BLOCKS, *options, "--latching", "connector", "-o", tmp_path / "two")
     assert "no effect" not in done.err
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("no_figures")
+def test_the_resistance_of_the_water_is_stated_alone(tmp_path: Path) -> None:
+    options = ("--duration", "1s", "--approach-resistance", "1e-4", "-o", tmp_path / "run")
+    done = here("assemble", *BLOCKS, *options)
+    assert "the water between two blocks resists: 0.0001 N s times speed / gap" in done.out, (
+        done.err
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("no_figures")
+def test_a_table_that_changes_during_a_run_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import driftwalk.assembly
+
+    table, simulate = tmp_path / "table.csv", driftwalk.assembly.assembly_path
+    table.write_text("gap_mm,force_mN\n0,20\n20,0", encoding="utf-8")
+
+    def changed(*given: Any, **options: Any) -> Any:
+        table.write_text("gap_mm,force_mN\n0,10\n20,0", encoding="utf-8")
+        return simulate(*given, **options)
+
+    monkeypatch.setattr(driftwalk.assembly, "assembly_path", changed)
+    options = ("--duration", "1s", "--attraction", table, "-o", tmp_path / "run")
+    done = here("assemble", *BLOCKS, *options)
+    assert done.code == 2
+    assert "table.csv has changed during the run: start it again" in done.err
 
 
 def test_the_force_of_a_study_is_bounded_in_python() -> None:

@@ -15,6 +15,7 @@ import driftwalk as dw
 from driftwalk.assembly import assemble
 from driftwalk.assembly.pull.magnets import coaxial_force, magnet_energy
 from driftwalk.assembly.pull.tables import block_pull
+from driftwalk.assembly.runs.plan import make_plan, simulate_rows, start_poses
 from driftwalk.model.interaction import Magnet
 
 SIDE, MASS = 0.03, 0.0116
@@ -253,12 +254,108 @@ def test_a_wrong_table_is_refused_with_its_place(text: str, words: str, tmp_path
     [
         ({"magnets": "40x5x2mm,1.3T"}, "have no room in a block of 30 mm"),
         ({"magnets": "5x5x2mm,1.3T", "magnet_inset_m": 0.014}, "have no room"),
-        ({"magnets": "5x5x2mm,1.3T", "cutoff_m": 0.003}, "leaves no force"),
+        pytest.param(
+            {"magnets": "1x1x1mm,0.001T"}, "with less than 0.01 mN", marks=pytest.mark.slow
+        ),
     ],
 )
 def test_magnets_without_room_are_refused(given: dict[str, Any], words: str) -> None:
     with pytest.raises(dw.InputError, match=words):
         block_pull(dw.Study(interaction=given))
+
+
+def table_of(path: Path, rows: list[str], columns: str = "gap_mm,force_mN") -> str:
+    path.write_text("\n".join([columns, *rows]), encoding="utf-8")
+    return str(path)
+
+
+def test_a_table_that_ends_with_a_force_is_capped_where_it_is_steep(tmp_path: Path) -> None:
+    rows = [f"{gap},{500 / (1 + gap) ** 2}" for gap in np.linspace(0.0, 5.0, 11)]
+    text = table_of(tmp_path / "table.csv", rows)
+    found = dw.attraction(dw.Study(interaction={"attraction": text}))
+    assert found is not None
+    # Slopes of the rows: 17.7 N/m from 2.5 to 3 mm and 12.5 N/m from 3 mm on; the step takes 14.5.
+    assert found.attrs["capped_below_m"] == pytest.approx(3e-3, rel=0.01)
+    assert found.attrs["most_simulated_N"] == pytest.approx(0.03125, rel=0.01)
+    assert found.attrs["force_at_10mm_N"] == 0.0
+    pull = block_pull(dw.Study(interaction={"attraction": text, "cutoff_m": 4.5e-3}))
+    assert pull is not None
+    assert pull.faces is not None
+    assert pull.faces.cutoff == pytest.approx(4.5e-3)
+    assert float(pull.faces(3.5e-3)) == pytest.approx(500e-3 / 4.5**2)
+
+
+@pytest.mark.slow
+def test_a_table_with_offsets_acts_up_to_its_corner(tmp_path: Path) -> None:
+    # mN: (10 - gap) cos²(offset / 12 mm · π / 2), whose energy is (10 - gap)² / 2 times the cos².
+    def share(offset: Any) -> Any:
+        return np.cos(np.asarray(offset) / 12.0 * np.pi / 2) ** 2
+
+    rows = [
+        f"{gap},{offset},{(10 - gap) * share(offset)}"
+        for gap in np.linspace(0.0, 10.0, 11)
+        for offset in np.linspace(0.0, 12.0, 25)
+    ]
+    text = table_of(tmp_path / "table.csv", rows, "gap_mm,offset_mm,force_mN")
+
+    def force(gap: float, offset: float) -> tuple[float, float]:
+        pair = still_pair(
+            [[0.0, 0.0, 0.0], [SIDE + 1e-3 * gap, 1e-3 * offset, 0.0]],
+            interaction={"attraction": text},
+            simulation={"time_step_s": 1e-3},
+        )
+        tank = dw.LiveTank(**pair)
+        tank.advance(1e-3)
+        return float(1e6 * MASS * tank.vx[0]), float(1e6 * MASS * tank.vy[0])
+
+    for gap, offset in ((2.0, 0.0), (5.0, 4.0), (8.0, 0.0), (7.0, 8.0)):
+        along, across = force(gap, offset)
+        assert along == pytest.approx((10 - gap) * share(offset), abs=0.25), (gap, offset)
+        slope = np.sin(offset / 12.0 * np.pi) * np.pi / 24.0 * (10 - gap) ** 2 / 2
+        assert across == pytest.approx(slope, abs=0.5), (gap, offset)
+
+
+def test_a_run_keeps_the_table_of_its_start(tmp_path: Path) -> None:
+    table = tmp_path / "table.csv"
+    pair = still_pair(
+        [[0.0, 0.0, 0.0], [SIDE + 0.01, 0.0, 0.0]],
+        interaction={"attraction": table_of(table, ["0,20", "20,0"])},
+    )
+    study = dw.apply_overrides(pair["study"], {"assembly.blocks": 2})
+    plan = make_plan(study, pair["flow"], settings={"runs": 1, "duration_s": 5.0})
+    start = start_poses(plan, pair["start"])
+    table.unlink()
+    assert simulate_rows(plan, start)["event_count"].tolist() == [1]
+
+
+def test_a_cutoff_counts_from_face_to_face() -> None:
+    given = {"magnets": "5x5x2mm,1.3T", "capillary": "on", "cutoff_m": 0.02}
+    pull = block_pull(dw.Study(interaction=given))
+    assert pull is not None
+    assert pull.faces is not None
+    assert pull.centres is not None
+    assert pull.faces.cutoff == pytest.approx(0.024)
+    assert pull.centres.cutoff == pytest.approx(SIDE + 0.02)
+    assert float(pull.centres(SIDE)) == pytest.approx(float(pull.centres.force(np.array(SIDE))))
+
+
+@pytest.mark.slow
+def test_the_cap_is_that_of_the_time_step_and_not_the_taper() -> None:
+    weak = {"magnets": "1x1x1mm,0.2T", "capillary": "on", "meniscus_height_m": 1e-4}
+    found = dw.attraction(dw.Study(interaction=weak, simulation={"time_step_s": 1e-3}))
+    assert found is not None
+    assert found.attrs["capped_below_m"] == 0.0
+
+
+def test_typed_faces_have_poles_or_magnets_are_refused() -> None:
+    kinds = [{"name": "A", "count": 4, "faces": ["p", "p", "q", "q"]}]
+    given = {"interaction": {"magnets": "3x3x1mm,1.2T", "cutoff_m": 0.02}}
+    study = dw.Study(assembly={"binding": {"kinds": kinds, "latches": [["p", "q"]]}}, **given)
+    with pytest.raises(dw.InputError, match="no face of these blocks has one"):
+        block_pull(study)
+    found = dw.attraction(dw.Study(assembly={"faces": "N,S,N,S"}, **given))
+    assert found is not None
+    assert "poles given by the faces, 1 mm below" in found.attrs["between"]
 
 
 def test_discs_have_no_faces() -> None:

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from driftwalk.assembly.pull.tables import BlockPull, block_pull
+from driftwalk.core.arrays import Floats
 from driftwalk.schema.check import build_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.model import Study
-    from driftwalk.model.interaction import Interaction
 
 SHOWN_GAP_M: Final = 0.010
 """Gap at which the force is stated: an easy one to set with a spacer."""
@@ -54,12 +54,15 @@ def attraction(study: Study) -> xr.Dataset | None:
     forces = [force for force in (pull.faces, pull.centres) if force is not None]
     reach = max(force.cutoff - force.contact for force in forces)
     gap = np.append(0.0, np.geomspace(1e-4, max(reach, 2e-4), POINTS))
-    felt = np.sum([force.force(gap + force.contact) for force in forces], axis=0)
+
+    def felt_at(gap: Floats) -> Floats:
+        return np.asarray(sum(force.force(gap + force.contact) for force in forces))
+
+    felt = felt_at(gap)
     simulated = np.sum([force(gap + force.contact) for force in forces], axis=0)
     steps = (felt[1:] + felt[:-1]) / 2.0 * np.diff(gap)
     energy = -np.append(np.cumsum(steps[::-1])[::-1], 0.0)
-    capped = gap[simulated < 0.999 * felt]
-    capped = capped[capped < gap[-1] / 2.0]
+    capped = max(0.0, *(force.capped_at - force.contact for force in forces))
     return build_dataset(
         "attraction",
         {
@@ -69,28 +72,29 @@ def attraction(study: Study) -> xr.Dataset | None:
         },
         {"gap": ("gap", gap)},
         {
-            "between": _words(study.interaction, pull),
+            "between": _words(study, pull),
             "force_at_contact_N": float(felt[0]),
-            "force_at_10mm_N": float(np.interp(SHOWN_GAP_M, gap, felt)),
+            "force_at_10mm_N": float(felt_at(np.array([SHOWN_GAP_M]))[0]),
             "binding_energy_J": float(-energy[0]),
             "most_simulated_N": float(simulated.max()),
-            "capped_below_m": float(capped[-1]) if capped.size else 0.0,
+            "capped_below_m": capped,
             "study": study.to_toml(),
         },
     )
 
 
-def _words(given: Interaction, pull: BlockPull) -> str:
+def _words(study: Study, pull: BlockPull) -> str:
     """Return what acts between the blocks."""
+    given, is_typed = study.interaction, study.assembly.typed_faces is not None
     parts = []
     if given.magnet is not None:
-        seats = "turning in their seats" if given.poles == "turning" else "fixed"
+        seats = "poles given by the faces" if is_typed else "turning in their seats"
+        if given.poles == "fixed":
+            seats = "fixed, poles given by the faces" if is_typed else "fixed"
         inset = f"{1e3 * given.magnet_inset_m:g} mm below the faces"
         parts.append(f"magnets {given.magnets}, {seats}, {inset}")
     if given.attraction is not None:
         parts.append(f"the table {given.attraction}")
     if pull.centres is not None:
         parts.append(f"menisci {1e3 * given.meniscus_height_m:g} mm high")
-    if given.approach_resistance_N_s > 0.0:
-        parts.append("resistance of the water between them")
     return "; ".join(parts)

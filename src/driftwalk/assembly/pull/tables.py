@@ -6,12 +6,13 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
+from driftwalk.assembly.lattice.typed_faces import face_table
 from driftwalk.assembly.pull.magnets import coaxial_force, magnet_energy
 from driftwalk.assembly.pull.measured import MeasuredAttraction, read_attraction
 from driftwalk.core.arrays import Floats
@@ -75,7 +76,7 @@ class RadialForce:
         """Return the attraction [N] that simulated blocks feel at distances [m]."""
         distance = np.asarray(distance, dtype=np.float64)
         inside = np.clip(distance, self.capped_at, self.cutoff)
-        return np.asarray(self.force(inside) * _taper(distance, self.cutoff))
+        return np.asarray(self.force(inside) * _taper(distance, self.cutoff, self.contact))
 
     def cells(self) -> tuple[npt.NDArray[np.float64], int]:
         """Return force over distance [N/m] and its slope in cells, and the first cell's number."""
@@ -99,8 +100,9 @@ def cell_start(cell: npt.NDArray[np.int64]) -> Floats:
     return (cell.astype(np.int32) << CELL_BITS).view(np.float32).astype(np.float64)
 
 
-def _taper(distance: Floats, cutoff: float) -> Floats:
-    part = np.clip((distance / cutoff - POLICY.taper) / (1.0 - POLICY.taper), 0.0, 1.0)
+def _taper(distance: Floats, cutoff: float, contact: float = 0.0) -> Floats:
+    start = max(POLICY.taper, contact / cutoff)
+    part = np.clip((distance / cutoff - start) / (1.0 - start), 0.0, 1.0)
     return np.asarray(1.0 - part**2 * (3.0 - 2.0 * part))
 
 
@@ -129,18 +131,36 @@ class BlockPull:
     native: _core.Pull
 
 
-def block_pull(study: Study) -> BlockPull | None:
+def table_of(study: Study) -> MeasuredAttraction | None:
+    """Read the table of attraction of a study, up to its cut-off; None where it names none.
+
+    Raises
+    ------
+    InputError
+        When it cannot be read, or begins beyond the cut-off.
+    """
+    given = study.interaction
+    if given.attraction is None:
+        return None
+    found = read_attraction(given.attraction)
+    return found if given.cutoff_m == "auto" else found.up_to(given.cutoff_m)
+
+
+def block_pull(study: Study, table: MeasuredAttraction | None = None) -> BlockPull | None:
     """Return the forces between the blocks of a study; None where they feel none.
 
     Parameters
     ----------
     study : Study
         Block, water, time step and interaction.
+    table : MeasuredAttraction, optional
+        Its table of attraction where that has been read: a run reads it once.
 
     Raises
     ------
     InputError
-        When a magnet has no room in its block, discs have magnets, or a table cannot be read.
+        When a magnet has no room in its block, discs have magnets, no typed face has a pole, or a
+        table cannot be read.
 
     Examples
     --------
@@ -152,10 +172,12 @@ def block_pull(study: Study) -> BlockPull | None:
     if not study.interaction.is_on:
         return None
     mass = study.block.mass_kg * (1.0 + study.forces.added_mass_share)
-    text = study.interaction.attraction
-    measured = None if text is None else read_attraction(text)
+    given = study.interaction
+    measured = table or table_of(study)
+    if given.magnet or measured:
+        _require_poles(study)
     return _block_pull(
-        study.interaction, study.block.side_m, study.block.is_round,
+        given, study.block.side_m, study.block.is_round,
         mass, study.time_step_s, study.water.density_kg_m3, measured,
     )  # fmt: skip
 
@@ -189,12 +211,13 @@ def _block_pull(
     if given.approach_resistance_N_s > 0.0:
         resistance = _approach(given.approach_resistance_N_s, side, mass, step)
     oriented: Energy | None = None
+    end = 0.0 if faces is None else faces.cutoff
     if faces is not None and measured is not None and measured.is_oriented:
-        oriented = measured.flat_below(faces.capped_at).energy
+        oriented, end = measured.flat_below(faces.capped_at).energy, measured.farthest
     elif faces is not None and magnet is not None and given.poles == "fixed":
         oriented = _fixed_poles(magnet, faces)
     reach = max(
-        0.0 if faces is None else faces.cutoff + 2.0 * lever,
+        0.0 if faces is None else end + 2.0 * lever,
         *(0.0 if force is None else force.cutoff for force in (centres, resistance)),
     )
     native = _core.Pull(
@@ -203,12 +226,22 @@ def _block_pull(
     if faces is not None and oriented is None:
         native.set_radial("faces", *faces.cells())
     elif faces is not None and oriented is not None:
-        _set_oriented(native, oriented, faces, symmetric=measured is None)
+        _set_oriented(native, oriented, faces.contact, end, of_magnets=measured is None)
     if centres is not None:
         native.set_radial("centres", *centres.cells())
     if resistance is not None:
         native.set_radial("resistance", *resistance.cells())
     return BlockPull(faces, lever, centres, resistance, native)
+
+
+def _require_poles(study: Study) -> None:
+    """Refuse typed faces without a pole: no force of faces would act."""
+    table = face_table(study.assembly)
+    if table is not None and not table.pole.any():
+        raise InputError(
+            "[interaction] magnets and attraction act between the poles N and S of typed faces, "
+            "and no face of these blocks has one: name faces N and S, or leave them out"
+        )
 
 
 def _require_room(magnet: Magnet, inset: float, side: float) -> None:
@@ -226,21 +259,26 @@ def _limited(
     force: Callable[[Floats], Floats],
     contact: float,
     steepest: float,
-    cutoff: float | str,
+    cutoff: float | Literal["auto"],
 ) -> RadialForce:
-    """Return a force that ends at its cut-off and is nowhere too steep for the time step."""
+    """Return a force that ends at its cut-off and is nowhere too steep for the time step.
+
+    A cut-off that is a number counts from face to face.
+    """
     reach = np.geomspace(max(contact, 1e-4), 1.0, 4000)
-    values = np.asarray(force(reach))
     if cutoff == "auto":
-        felt = reach[np.abs(values) > POLICY.least_force_N]
-        cutoff = float(felt[-1]) if felt.size else contact
-    end = float(cutoff)
+        felt = reach[np.abs(force(reach)) > POLICY.least_force_N]
+        end = float(felt[-1]) if felt.size else contact
+    else:
+        end = contact + cutoff
     if end <= contact:
         raise InputError(
-            f"[interaction] cutoff_m: faces that touch are {1e3 * contact:.3g} mm apart from "
-            f"magnet to magnet; a cut-off of {1e3 * end:.3g} mm leaves no force"
+            "[interaction] two faces that touch attract each other with less than "
+            f"{1e3 * POLICY.least_force_N:g} mN: give stronger magnets, or cutoff_m in numbers"
         )
-    steep = reach[np.abs(np.gradient(values, reach)) > steepest]
+    # The end itself is no slope of the force: the taper leads it to 0.
+    reach = reach[reach < end] if end > reach[2] else np.linspace(end / 2.0, end, 9)[:-1]
+    steep = reach[np.abs(np.gradient(force(reach), reach)) > steepest]
     capped = float(steep[-1]) if steep.size else 0.0
     return RadialForce(force, contact, min(max(capped, contact / 2.0), end), end)
 
@@ -258,7 +296,7 @@ def _meniscus(given: Interaction, side: float, density: float) -> RadialForce:
     strength /= float(k0(per_length * side / 2.0)) ** 2
     return RadialForce(
         lambda r: np.asarray(strength * k1(per_length * r)), side, 0.7 * side,
-        side + 12.0 / per_length,
+        side + (12.0 / per_length if given.cutoff_m == "auto" else given.cutoff_m),
     )  # fmt: skip
 
 
@@ -294,24 +332,26 @@ def _fixed_poles(magnet: Magnet, faces: RadialForce) -> Energy:
 
 
 def _set_oriented(
-    native: _core.Pull, energy: Energy, faces: RadialForce, *, symmetric: bool
+    native: _core.Pull, energy: Energy, contact: float, end: float, *, of_magnets: bool
 ) -> None:
     """Give the core the energy of two faces on (log distance, direction, angle)."""
     from scipy.ndimage import spline_filter1d
 
     n, step = POLICY.angles, POLICY.distance_step
-    low = max(faces.contact / 2.0, 5e-4)
-    log_distance = math.log(low) + step * np.arange(math.ceil(math.log(faces.cutoff / low) / step))
+    low = max(contact / 2.0, 5e-4)
+    # A table is 0 from its end on; the energy of magnets is led to 0 before it.
+    count = math.ceil(math.log(max(end / low, 2.0)) / step) + (0 if of_magnets else 2)
+    log_distance = math.log(low) + step * np.arange(count)
     r = np.exp(log_distance)
     turn = 2.0 * np.pi * np.arange(n) / n
-    grid = np.meshgrid(r, turn[: n // 4 + 1] if symmetric else turn, turn, indexing="ij")
+    grid = np.meshgrid(r, turn[: n // 4 + 1] if of_magnets else turn, turn, indexing="ij")
     found = np.concatenate(
         [energy(d * np.cos(a), d * np.sin(a), b) for d, a, b in zip(*grid, strict=True)]
     ).reshape(grid[0].shape)
-    if symmetric:  # magnets have the same energy in a mirror, and before and behind each other
+    if of_magnets:  # they have the same energy in a mirror, and before and behind each other
         mirrored = found[:, n // 4 - 1 : 0 : -1, -np.arange(n)]
         found = np.concatenate([found, mirrored] * 2, axis=1)
-    found *= _taper(r, r[-1])[:, None, None]
+        found *= _taper(r, r[-1])[:, None, None]
     spline = spline_filter1d(found, order=2, axis=0, mode="mirror")
     for axis in (1, 2):
         spline = spline_filter1d(spline, order=2, axis=axis, mode="grid-wrap")

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from driftwalk import _core
 from driftwalk.assembly.lattice.typed_faces import face_table
-from driftwalk.assembly.pull.tables import block_pull
+from driftwalk.assembly.pull.tables import block_pull, table_of
 from driftwalk.assembly.runs.bonds import event_rows, require_bonds
 from driftwalk.assembly.runs.glued import glued_cells, with_glue_events
 from driftwalk.assembly.runs.start import given_start, place_blocks, require_cover, require_room
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from driftwalk.assembly.lattice.polyomino import Chirality
+    from driftwalk.assembly.pull.measured import MeasuredAttraction
     from driftwalk.model import Study
 
 Backend = Literal["cpu", "reference"]
@@ -56,6 +57,8 @@ class Plan:
     """Which drawn flow a run has; None: the flow as it is."""
     flow_correlated_over: float | None = None
     """Distance over which the errors of a drawn flow go together [m]; None: each node alone."""
+    attraction: MeasuredAttraction | None = None
+    """The study's table of the force between two faces, as it was at the start."""
     law: Mapping[str, Floats] = field(default_factory=dict)
     """Drawn numbers of the law by their keys in the study, which has the others."""
 
@@ -144,7 +147,8 @@ def make_plan(
     require_room(chosen)
     require_bonds(chosen)
     require_cover(flow, chosen.tank)
-    block_pull(chosen)  # its errors come before any run
+    table = table_of(chosen)
+    block_pull(chosen, table)  # its errors come before any run
     runs = np.arange(chosen.assembly.runs) if index is None else index
     forces, steps = chosen.forces, whole_steps(chosen)
     keys = stream_keys("run", seed=chosen.assembly.seed, trial=trial, index=runs)
@@ -164,6 +168,7 @@ def make_plan(
         threads=threads or default_threads(),
         backend=backend,
         flow_start=flow_starts(flow, chosen, keys, duration=lasts),
+        attraction=table,
     )
 
 
@@ -206,7 +211,7 @@ def simulate_rows(
 
 def _simulate(plan: Plan, start: Floats, rows: slice, every: int, event_rows: int) -> Arrays:
     """Return what the native core gives for some runs; events beyond `event_rows` are counted."""
-    pull = block_pull(plan.study)
+    pull = block_pull(plan.study, plan.attraction)
     found = _core.assemble(
         plan.model(),
         start=np.ascontiguousarray(start[rows]),

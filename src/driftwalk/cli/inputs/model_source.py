@@ -26,6 +26,7 @@ SEARCHED: Final = ("forces.drag_coefficient", "forces.force_std_N")
 """Parameters that a run finds: a study file may hold any value for them."""
 FOUND_BY_A_RUN: Final = (*SEARCHED, "forces.force_interval_s")
 TANK_DIAMETER: Final = "tank.diameter_m"
+TABLE: Final = "interaction.attraction"
 CONNECTOR: Final = ("assembly.connector_distance_m", "assembly.connector_axis_rad")
 """Parameters of the latching rule "connector" alone."""
 RUN_NAMES: Final = (
@@ -84,10 +85,29 @@ def assembly_source(
         When a run is given with an option for what it has found, or with one that is `refused`;
         when there is no flow field, or a file or option is wrong.
     """
+    given = _with_table(given)
     if run is None:
         return _source_from_flow(given, flow_file)
     refuse_found(run, given.overrides, also=refused)
     return _source_from_run(run, flow_file, given)
+
+
+def _with_table(given: StudyOptions) -> StudyOptions:
+    """Return the options with the study file's table of attraction, relative to its folder."""
+    from driftwalk.model import load_study
+
+    if given.file is None or TABLE in given.overrides:
+        return given
+    name = load_study(given.file).interaction.attraction
+    if name is None:
+        return given
+    return given.and_also({TABLE: str(given.file.parent / name)}, keys=given.keys)
+
+
+def _table_of(study: Study) -> dict[str, Path]:
+    """Return the file of the table of attraction by its role, none where there is no table."""
+    name = study.interaction.attraction
+    return {} if name is None else {"attraction": Path(name)}
 
 
 def _source_from_flow(given: StudyOptions, flow_file: Path | None) -> Source:
@@ -105,7 +125,7 @@ def _source_from_flow(given: StudyOptions, flow_file: Path | None) -> Source:
     field = load_flow_for(flow_file, chosen)
     said = [*([] if warning is None else [warning]), *_without_effect(given, chosen)]
     field, stretched = _in_tank(field, given, chosen)
-    return Source(chosen, field, None, inputs, [*said, *stretched])
+    return Source(chosen, field, None, inputs | _table_of(chosen), [*said, *stretched])
 
 
 def _in_tank(field: xr.Dataset, given: StudyOptions, study: Study) -> tuple[xr.Dataset, list[str]]:
@@ -126,16 +146,33 @@ def _in_tank(field: xr.Dataset, given: StudyOptions, study: Study) -> tuple[xr.D
 
 
 def _without_effect(given: StudyOptions, study: Study) -> list[str]:
-    """Return a warning where a connector is described that no block has."""
-    idle = [option_name(key, keys=given.keys) for key in CONNECTOR if key in given.overrides]
-    latching = study.assembly.latching
-    if not idle or latching == "connector":
-        return []
-    verb = "has" if len(idle) == 1 else "have"
-    return [
-        f"{' and '.join(idle)} {verb} no effect with --latching {latching}: blocks have connectors "
-        "with --latching connector"
-    ]
+    """Return warnings of options that describe what no block has."""
+    rules, pull, varied = study.assembly, study.interaction, study.sensitivity
+    needs = (
+        (
+            CONNECTOR,
+            rules.latching == "connector" or "connector" in (varied.latching or ()),
+            f"with --latching {rules.latching}: blocks have connectors with --latching connector",
+        ),
+        (
+            ("interaction.magnet_inset_m", "interaction.poles"),
+            pull.magnet is not None or varied.magnets is not None,
+            "without --magnets",
+        ),
+        (("interaction.meniscus_height_m",), pull.capillary == "on", "without --capillary on"),
+        (
+            ("assembly.relatch_clearance",),
+            rules.bonds_break or varied.bond_rate_per_s is not None,
+            "without --bond-rate or --bond-strength: bonds never break",
+        ),
+    )
+    said = []
+    for keys, has_effect, without in needs:
+        idle = [option_name(key, keys=given.keys) for key in keys if key in given.overrides]
+        if idle and not has_effect:
+            verb = "has" if len(idle) == 1 else "have"
+            said.append(f"{' and '.join(idle)} {verb} no effect {without}")
+    return said
 
 
 def refuse_found(folder: Path, overrides: Mapping[str, Any], *, also: Sequence[str] = ()) -> None:
@@ -157,8 +194,8 @@ def refuse_found(folder: Path, overrides: Mapping[str, Any], *, also: Sequence[s
 def _source_from_run(folder: Path, flow_file: Path | None, given: StudyOptions) -> Source:
     """Return the model of the block that a run has found, in its flow field or another one.
 
-    The sections [assembly] and [sensitivity] of a study file take the place of the run's, and it
-    may say how a flow series is met; the model is the run's.
+    The sections [assembly], [interaction] and [sensitivity] of a study file take the place of the
+    run's, and it may say how a flow series is met; the model is the run's.
     """
     from driftwalk.runs import read_found
 
@@ -174,6 +211,7 @@ def _source_from_run(folder: Path, flow_file: Path | None, given: StudyOptions) 
         field, inputs["flow"] = load_flow_for(flow_file, chosen), flow_file
     field, stretched = _in_tank(field, given, chosen)
     warnings = [*found.warnings, *_without_effect(given, chosen), *stretched]
+    inputs = inputs | _table_of(chosen)
     return Source(chosen, field, found.uncertainty, inputs, warnings, found.not_drawn)
 
 
@@ -282,6 +320,7 @@ def _with_sections(study: Study, path: Path, folder: Path) -> Study:
     return study.model_copy(
         update={
             "assembly": given.assembly,
+            "interaction": given.interaction,
             "sensitivity": given.sensitivity,
             "flow": study.flow.model_copy(update=flow),
         }

@@ -26,7 +26,7 @@ _OVER_TIME: Final = {
 """Variables over time, their keys in JSON and their headings. Older files have no compactness."""
 _SETTINGS: Final = (
     *("confidence", "blocks", "duration_s", "seed", "latching", "hidden_face_drag", "chirality"),
-    *("drag_coefficient", "force_std_N", "force_interval_s"),
+    *("drag_coefficient", "force_std_N", "force_interval_s", "approach_resistance_N_s"),
     *("first_contact_median_s", "completion_median_s"),
 )
 
@@ -57,7 +57,7 @@ def assembly_answer(
     times : xarray.Dataset
         The `class_times` of the same runs.
     settings : mapping
-        ``drag_coefficient`` and ``force_std_N`` of these runs.
+        ``drag_coefficient``, ``force_std_N`` and ``approach_resistance_N_s`` of these runs.
     drawn : xarray.Dataset, optional
         The `outcome_distribution` of runs with drawn parameters.
     sizes, sizes_drawn : xarray.Dataset, optional
@@ -81,6 +81,10 @@ def assembly_answer(
         parts.append(f"faces: {facts['faces']}")
     if attraction is not None:
         parts.append(attraction_words(attraction))
+    if (resistance := facts["approach_resistance_N_s"]) > 0.0:
+        parts.append(
+            f"the water between two blocks resists: {resistance:.4g} N s times speed / gap"
+        )
     if sizes is None:
         parts.append(_classes(found, drawn))
     else:
