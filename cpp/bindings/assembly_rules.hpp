@@ -84,6 +84,28 @@ inline void set_bonds(driftwalk::AssemblyRules& rules, const BondNumbers& bonds)
   rules.bonds_break = rate > 0 || strength > 0;
 }
 
+using Cells = std::optional<In<std::int32_t, 2>>;
+
+// The cells (glued, 2) of the bodies of the start; none: blocks start alone.
+inline void set_glued(driftwalk::AssemblyRules& rules, const Cells& cells) {
+  if (!cells.has_value()) {
+    return;
+  }
+  const std::size_t count = cells->shape(0);
+  if (cells->shape(1) != 2 || count < 1 || count > driftwalk::most_blocks ||
+      rules.blocks % static_cast<int>(count) != 0) {
+    throw std::invalid_argument("glued must have shape (cells, 2), and divide the blocks");
+  }
+  rules.glued = static_cast<int>(count);
+  rules.glued_cells = cells->data();
+}
+
+// Poles of typed faces are signs: like ones repel.
+inline void set_faces(driftwalk::AssemblyRules& rules, const driftwalk::FaceRules* faces) {
+  rules.faces = faces;
+  rules.pull.like_poles_repel = rules.pull.like_poles_repel || faces != nullptr;
+}
+
 inline void require_blocks(std::size_t blocks) {
   if (blocks < 1 || blocks > driftwalk::most_blocks) {
     throw std::invalid_argument("a world has 1 to " + std::to_string(driftwalk::most_blocks) +

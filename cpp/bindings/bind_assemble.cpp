@@ -16,9 +16,10 @@ using namespace nb::literals;
 namespace {
 
 nb::tuple place_blocks(const Model& model, std::size_t blocks, In<std::uint64_t, 1> key,
-                       int threads) {
+                       int threads, Cells glued) {
   require_blocks(blocks);
-  const driftwalk::AssemblyRules rules = rules_of(model, blocks);
+  driftwalk::AssemblyRules rules = rules_of(model, blocks);
+  set_glued(rules, glued);
   const std::size_t worlds = key.size();
   std::vector<double> start(worlds * blocks * 3);
   std::vector<std::int32_t> placed(worlds);
@@ -40,8 +41,9 @@ nb::dict assemble(const Model& model, In<double, 3> start, In<std::uint64_t, 1> 
                   const std::string& latching, double connector_distance, double connector_axis,
                   double hidden_share, double stirring_length, bool incompressible,
                   double block_restitution, double block_friction, int sample_every, int threads,
-                  const std::string& precision, std::optional<In<double, 1>> flow_start,
-                  const Pull* pull, const BondNumbers& bonds, std::size_t event_rows) {
+                  const std::string& precision, const driftwalk::FaceRules* faces,
+                  std::optional<In<double, 1>> flow_start, Cells glued, const Pull* pull,
+                  const BondNumbers& bonds, std::size_t event_rows) {
   const std::size_t worlds = start.shape(0), blocks = start.shape(1);
   require_blocks(blocks);
   if (start.shape(2) != 3 || key.size() != worlds || drag_coefficient.size() != worlds ||
@@ -60,9 +62,11 @@ nb::dict assemble(const Model& model, In<double, 3> start, In<std::uint64_t, 1> 
   set_bonds(rules, bonds);
   rules.restitution = block_restitution;
   rules.friction = block_friction;
+  set_glued(rules, glued);
   if (pull != nullptr) {
     rules.pull = pull->rules();
   }
+  set_faces(rules, faces);
   const driftwalk::AssemblyWorlds batch{static_cast<std::int64_t>(worlds),
                                         steps,
                                         start.data(),
@@ -136,11 +140,12 @@ void register_assemble(nb::module_& module);
 void register_assemble(nb::module_& module) {
   register_pull(module);
   module.def("place_blocks", &place_blocks, "model"_a, nb::kw_only(), "blocks"_a, "key"_a,
-             "threads"_a);
+             "threads"_a, "glued"_a = nb::none());
   module.def("assemble", &assemble, "model"_a, nb::kw_only(), "start"_a, "key"_a,
              "drag_coefficient"_a, "force_std"_a, "steps"_a, "latching"_a, "connector_distance"_a,
              "connector_axis"_a, "hidden_share"_a, "stirring_length"_a, "incompressible"_a,
              "block_restitution"_a, "block_friction"_a, "sample_every"_a, "threads"_a,
-             "precision"_a, "flow_start"_a = nb::none(), "pull"_a = nb::none(),
-             "bonds"_a = BondNumbers{0, 0, 0, 1.25}, "event_rows"_a = 0);
+             "precision"_a, "faces"_a.none() = nb::none(), "flow_start"_a = nb::none(),
+             "glued"_a = nb::none(), "pull"_a = nb::none(), "bonds"_a = BondNumbers{0, 0, 0, 1.25},
+             "event_rows"_a = 0);
 }

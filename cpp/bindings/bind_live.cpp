@@ -24,7 +24,8 @@ void start_world(LiveWorld* self, const Model& model, In<double, 2> start, std::
                  double drag_coefficient, double force_std, const std::string& latching,
                  double connector_distance, double connector_axis, double hidden_share,
                  double stirring_length, bool incompressible, double block_restitution,
-                 double block_friction, double flow_start, const BondNumbers& bonds) {
+                 double block_friction, const driftwalk::FaceRules* faces, double flow_start,
+                 const BondNumbers& bonds) {
   require_blocks(start.shape(0));
   if (start.shape(1) != 3) {
     throw std::invalid_argument("start must have shape (blocks, 3)");
@@ -37,6 +38,7 @@ void start_world(LiveWorld* self, const Model& model, In<double, 2> start, std::
   set_bonds(rules, bonds);
   rules.restitution = block_restitution;
   rules.friction = block_friction;
+  rules.faces = faces;
   new (self) LiveWorld(model.twice(), rules, {drag_coefficient, force_std, 1.0}, start.data(), key,
                        flow_start);
 }
@@ -66,8 +68,9 @@ nb::dict advance(LiveWorld& world, std::int64_t steps) {
 nb::dict state(const LiveWorld& world) {
   const std::size_t blocks = static_cast<std::size_t>(world.blocks());
   std::vector<double> pose(blocks * 3), velocity(blocks * 3);
-  std::vector<std::int32_t> assembly(blocks), cell(blocks * 2), quarter(blocks);
-  world.read({pose.data(), velocity.data(), assembly.data(), cell.data(), quarter.data()});
+  std::vector<std::int32_t> assembly(blocks), cell(blocks * 2), quarter(blocks), kind(blocks);
+  world.read(
+      {pose.data(), velocity.data(), assembly.data(), cell.data(), quarter.data(), kind.data()});
   nb::dict out;
   out["pose"] = hand_out(std::move(pose), {blocks, 3});
   out["velocity"] = hand_out(std::move(velocity), {blocks, 3});
@@ -83,6 +86,7 @@ nb::dict state(const LiveWorld& world) {
   }
   const std::size_t count = pairs.size() / 2;
   out["bond"] = hand_out(std::move(pairs), {count, 2});
+  out["kind"] = hand_out(std::move(kind), {blocks});
   return out;
 }
 
@@ -97,10 +101,11 @@ int set_blocks(LiveWorld& world, std::size_t blocks) {
 void register_live(nb::module_& module);
 void register_live(nb::module_& module) {
   nb::class_<LiveWorld>(module, "LiveWorld")
-      .def("__init__", &start_world, nb::keep_alive<1, 2>(), "model"_a, nb::kw_only(), "start"_a,
-           "key"_a, "drag_coefficient"_a, "force_std"_a, "latching"_a, "connector_distance"_a,
-           "connector_axis"_a, "hidden_share"_a, "stirring_length"_a, "incompressible"_a,
-           "block_restitution"_a, "block_friction"_a, "flow_start"_a = 0.0,
+      .def("__init__", &start_world, nb::keep_alive<1, 2>(), nb::keep_alive<1, 15>(), "model"_a,
+           nb::kw_only(), "start"_a, "key"_a, "drag_coefficient"_a, "force_std"_a, "latching"_a,
+           "connector_distance"_a, "connector_axis"_a, "hidden_share"_a, "stirring_length"_a,
+           "incompressible"_a, "block_restitution"_a, "block_friction"_a,
+           "faces"_a.none() = nb::none(), "flow_start"_a = 0.0,
            "bonds"_a = BondNumbers{0, 0, 0, 1.25})
       .def("advance", &advance, "steps"_a)
       .def("state", &state)
@@ -119,6 +124,7 @@ void register_live(nb::module_& module) {
             world.set_rules(latching_of(latching), hidden_share, stirring_length);
           },
           nb::kw_only(), "latching"_a, "hidden_share"_a, "stirring_length"_a)
+      .def("set_faces", &LiveWorld::set_faces, nb::keep_alive<1, 2>(), "faces"_a.none())
       .def(
           "set_bonds",
           [](LiveWorld& world, double rate, double relatch_clearance) {

@@ -4,6 +4,7 @@
 void register_ks(nanobind::module_& module);
 void register_steps(nanobind::module_& module);
 void register_simulate(nanobind::module_& module);
+void register_faces(nanobind::module_& module);
 void register_assemble(nanobind::module_& module);
 void register_live(nanobind::module_& module);
 void register_infer(nanobind::module_& module);
@@ -13,6 +14,7 @@ NB_MODULE(_core, module) {
   register_ks(module);
   register_steps(module);
   register_simulate(module);
+  register_faces(module);
   register_assemble(module);
   register_live(module);
   register_infer(module);

@@ -161,8 +161,18 @@ void LiveWorld::set_bonds(double rate, double relatch_clearance) {
   }
 }
 
+void LiveWorld::set_faces(const FaceRules* faces) {
+  inside_->rules.faces = faces;
+  inside_->rules.pull.like_poles_repel = faces != nullptr;
+  for (int b = 0; b < inside_->rules.blocks; ++b) {
+    inside_->pack.memory().book(b, 0).kind = first_kind(faces, b);
+    set_poles(inside_->rules, inside_->pack.memory(), b, 0);
+  }
+}
+
 void LiveWorld::set_pull(const PullRules& pull) {
   inside_->rules.pull = pull;
+  inside_->rules.pull.like_poles_repel = pull.like_poles_repel || inside_->rules.faces != nullptr;
   for (int b = 0; b < inside_->rules.blocks; ++b) {
     set_poles(inside_->rules, inside_->pack.memory(), b, 0);
   }
@@ -218,6 +228,7 @@ void LiveWorld::read(const LiveBlocks& out) const {
     out.cell[2 * b] = book.cell_x;
     out.cell[2 * b + 1] = book.cell_y;
     out.quarter[b] = book.quarter;
+    out.kind[b] = book.kind;
   }
 }
 

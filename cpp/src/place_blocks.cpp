@@ -70,6 +70,27 @@ bool is_clear(const AssemblyRules& rules, const Placed& p, const double* start, 
   return true;
 }
 
+// Whether a block at its pose, and those that are glued to it, are inside and clear of earlier
+// ones.
+bool body_fits(const AssemblyRules& rules, int block, double* start) {
+  double* const pose = start + 3 * block;
+  const Vec2 axis{std::cos(pose[2]), std::sin(pose[2])};
+  for (int k = 0; k < rules.glued; ++k) {
+    if (k > 0) {
+      const double x = rules.side * (rules.glued_cells[2 * k] - rules.glued_cells[0]);
+      const double y = rules.side * (rules.glued_cells[2 * k + 1] - rules.glued_cells[1]);
+      pose[3 * k] = pose[0] + axis.x * x - axis.y * y;
+      pose[3 * k + 1] = pose[1] + axis.y * x + axis.x * y;
+      pose[3 * k + 2] = pose[2];
+    }
+    const Placed placed{{pose[3 * k], pose[3 * k + 1]}, axis};
+    if (!is_inside(rules, placed) || !is_clear(rules, placed, start, block)) {
+      return false;
+    }
+  }
+  return true;
+}
+
 // Word 0 of the address: attempt; 1: block; 2: draw.
 bool place_one(const AssemblyRules& rules, const Philox<UInt32>& stream, UInt32 attempt, int draws,
                int block, double* start) {
@@ -81,8 +102,7 @@ bool place_one(const AssemblyRules& rules, const Philox<UInt32>& stream, UInt32 
     pose[0] = rules.low_x + words[0] * 0x1p-32 * (rules.high_x - rules.low_x);
     pose[1] = rules.low_y + words[1] * 0x1p-32 * (rules.high_y - rules.low_y);
     pose[2] = (words[2] * 0x1p-31 - 1.0) * pi_value;
-    const Placed placed{{pose[0], pose[1]}, {std::cos(pose[2]), std::sin(pose[2])}};
-    if (is_inside(rules, placed) && is_clear(rules, placed, start, block)) {
+    if (body_fits(rules, block, start)) {
       return true;
     }
   }
@@ -103,7 +123,7 @@ int place_blocks(const AssemblyRules& rules, std::uint64_t key, double* start) {
   for (UInt32 attempt = 0; attempt < most_attempts; ++attempt) {
     int block = 0;
     while (block < rules.blocks && place_one(rules, stream, attempt, most_draws, block, start)) {
-      ++block;
+      block += rules.glued;
     }
     most = std::max(most, block);
     if (most == rules.blocks) {

@@ -65,6 +65,20 @@ void record_of(const AssemblyRules& rules, Scene& scene, EventKind kind, int fir
                {face_at(rules, scene, first, second), face_at(rules, scene, second, first)});
 }
 
+// Whether neighbours are bonded: those that have just latched, and those whose faces may. Where
+// none has latched all are.
+bool can_bond(const AssemblyRules& rules, const Scene& scene, int first, int second,
+              BlockPair joined) {
+  if (rules.faces == nullptr || joined.first < 0 ||
+      (std::min(joined.first, joined.second) == first &&
+       std::max(joined.first, joined.second) == second)) {
+    return true;
+  }
+  const SceneBlock &own = scene.block[first], &other = scene.block[second];
+  const int face = face_at(rules, scene, first, second) + own.quarter;
+  return types_latch(*rules.faces, own, face & 3, other, (face + 2) & 3);
+}
+
 // Moves a body's cells so that its lowest block is at the origin: they never leave their range.
 void begin_lattice(Scene& scene, int lowest) {
   const int x = scene.block[lowest].cell_x, y = scene.block[lowest].cell_y;
@@ -134,7 +148,7 @@ void bond_assembly(const AssemblyRules& rules, Scene& scene, int assembly, Block
   BondList& bonds = scene.bonds;
   for (int b = scene.assembly[assembly].first; b >= 0; b = scene.block[b].next) {
     for (int c = scene.block[b].next; c >= 0; c = scene.block[c].next) {
-      if (!are_neighbours(rules, scene, b, c)) {
+      if (!are_neighbours(rules, scene, b, c) || !can_bond(rules, scene, b, c, joined)) {
         continue;
       }
       Bond& bond = bond_of(bonds, b, c);

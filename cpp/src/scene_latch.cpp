@@ -37,6 +37,10 @@ bool can_latch(const AssemblyRules& rules, const Scene& scene, Candidate& c) {
     c.squared = dot(between, between);
     return c.face == 0 && c.peer == 0;
   }
+  if (rules.faces != nullptr &&
+      !types_latch(*rules.faces, scene.block[c.first], c.face, scene.block[c.second], c.peer)) {
+    return false;
+  }
   const Vec2 n = face_normal(assembly_of(scene, c.first), c.face);
   const Vec2 m = face_normal(assembly_of(scene, c.second), c.peer);
   const Vec2 gap = between + (m - n) * (rules.side / 2);
@@ -265,7 +269,8 @@ bool try_merge(const AssemblyRules& rules, Scene& scene, const Merge& merge) {
   conserve_momentum(kept, moved, rules.mass, body);
   place_by(scene, joint, merge.anchor, anchor);
   if (!push_inside(rules, scene, joint, most_rounds) ||
-      (!rules.round && !is_clear_of_others(rules, scene, joint))) {
+      (!rules.round && !is_clear_of_others(rules, scene, joint)) ||
+      (rules.faces != nullptr && poles_refuse(*rules.faces, scene, kept.first, moved.first))) {
     copy_members(kept, scene.blocks_before, scene.block);
     copy_members(moved, scene.blocks_before, scene.block);
     scene.assembly[merge.stays] = kept;
@@ -278,6 +283,10 @@ bool try_merge(const AssemblyRules& rules, Scene& scene, const Merge& merge) {
   record_event(scene, EventKind::joining, {merge.anchor, merge.guest}, own_faces);
   if (rules.bonds_break) {
     bond_assembly(rules, scene, joint, {merge.anchor, merge.guest});
+  }
+  if (rules.faces != nullptr) {
+    become(*rules.faces, scene.block[merge.anchor], own_faces[0], scene.block[merge.guest],
+           own_faces[1]);
   }
   return true;
 }

@@ -1,4 +1,4 @@
-// Assemblies that lose blocks, or come apart into them.
+// Assemblies that lose blocks, come apart into them, or are made of them at the start.
 #include "driftwalk/assembly/settle_parts.hpp"
 
 #include <algorithm>
@@ -83,12 +83,30 @@ void keep_first_blocks(const AssemblyRules& rules, Scene& scene, int blocks) {
   }
 }
 
+void glue_blocks(const AssemblyRules& rules, Scene& scene) {
+  for (int first = 0; first < scene.blocks; first += rules.glued) {
+    const Vec2 at = centre(scene, first);
+    for (int k = 0; k < rules.glued; ++k) {
+      SceneBlock& block = scene.block[first + k];
+      block.assembly = first;
+      block.cell_x = rules.glued_cells[2 * k];
+      block.cell_y = rules.glued_cells[2 * k + 1];
+      scene.assembly[first + k].blocks = 0;
+    }
+    measure_assembly(rules, scene, first);
+    place_by(scene, first, first, at);
+    scene.assembly[first].touched = true;
+  }
+  scene.assemblies = scene.blocks / rules.glued;
+}
+
 void part_blocks(const AssemblyRules& rules, Scene& scene) {
   std::copy_n(scene.block, scene.blocks, scene.blocks_before);
   for (int b = 0; b < scene.blocks; ++b) {
     SceneBlock& block = scene.block[b];
     block.assembly = b;
     block.cell_x = block.cell_y = block.quarter = 0;
+    block.kind = first_kind(rules.faces, b);
   }
   for (int a = 0; a < scene.blocks; ++a) {
     const SceneAssembly from = scene.assembly[a];

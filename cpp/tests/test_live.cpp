@@ -60,17 +60,19 @@ void still(double, double, double& u, double& v) {
 // The state of a live world; room for as many blocks as there may be.
 struct Look {
   std::vector<double> pose, velocity;
-  std::vector<std::int32_t> assembly, cell, quarter;
+  std::vector<std::int32_t> assembly, cell, quarter, kind;
   std::size_t blocks = 0;
 
   Look()
       : pose(3 * driftwalk::most_blocks), velocity(pose.size()), assembly(driftwalk::most_blocks),
-        cell(2 * driftwalk::most_blocks), quarter(driftwalk::most_blocks) {}
+        cell(2 * driftwalk::most_blocks), quarter(driftwalk::most_blocks),
+        kind(driftwalk::most_blocks) {}
   explicit Look(const LiveWorld& world) : Look() { at(world); }
 
   void at(const LiveWorld& world) {
     blocks = std::size_t(world.blocks());
-    world.read({pose.data(), velocity.data(), assembly.data(), cell.data(), quarter.data()});
+    world.read(
+        {pose.data(), velocity.data(), assembly.data(), cell.data(), quarter.data(), kind.data()});
   }
   Square square(std::size_t b) const {
     return {pose[3 * b], pose[3 * b + 1], pose[3 * b + 2], side};

@@ -24,6 +24,7 @@ from driftwalk.assembly import (
     assemble_drawn as assemble_drawn,
     assembly_path as assembly_path,
     assembly_sizes as assembly_sizes,
+    attraction as attraction,
     class_times as class_times,
     classify as classify,
     l1_distance as l1_distance,

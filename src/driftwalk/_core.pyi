@@ -138,7 +138,7 @@ def available_instruction_sets() -> list[str]: ...
 
 # --- self-assembly ------------------------------------------------------------------------------
 # Start poses [m, m, rad] of shape (worlds, blocks, 3), and how many blocks of each world found a
-# place.
+# place; `glued`: cells (n, 2) of bodies of n blocks each.
 # Tables of the forces between blocks, see `driftwalk.assembly.pull.tables`.
 class Pull:
     def __init__(
@@ -150,8 +150,27 @@ class Pull:
     ) -> None: ...
 
 def place_blocks(
-    model: Model, *, blocks: int, key: _Keys, threads: int
+    model: Model,
+    *,
+    blocks: int,
+    key: _Keys,
+    threads: int,
+    glued: npt.NDArray[np.int32] | None = None,
 ) -> tuple[_Floats, npt.NDArray[np.int32]]: ...
+
+# Typed faces. latches (types, types), 0 or 1; of each kind type and pole (kinds, 4), of the faces
+# +x, +y, -x, -y, and count (kinds,) at the start; becomes (kinds * 4, types): kinds after a latch.
+class FaceRules:
+    def __init__(
+        self,
+        *,
+        latches: npt.NDArray[np.int32],
+        type: npt.NDArray[np.int32],
+        pole: npt.NDArray[np.int32],
+        count: npt.NDArray[np.int32],
+        becomes: npt.NDArray[np.int32],
+    ) -> None: ...
+
 def assemble(
     model: Model,
     *,
@@ -171,12 +190,14 @@ def assemble(
     sample_every: int,
     threads: int,
     precision: str,
+    faces: FaceRules | None = None,
     flow_start: _Floats | None = None,
     # rate [1/s] and force [N] (Bell), strength [N], clearance [sides]; with bonds that break the
     # result has event_kind: 0 joining, 1 parting, 2 opening and 3 closing of a bond of a loop; and
     # event_count counts events beyond event_rows, which are not written
     bonds: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.25),
     event_rows: int = 0,
+    glued: npt.NDArray[np.int32] | None = None,
     pull: Pull | None = None,
 ) -> dict[str, npt.NDArray[Any] | int]: ...
 
@@ -199,6 +220,7 @@ class LiveWorld:
         incompressible: bool,
         block_restitution: float,
         block_friction: float,
+        faces: FaceRules | None = None,
         flow_start: float = 0.0,
         bonds: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 1.25),
     ) -> None: ...
@@ -207,12 +229,15 @@ class LiveWorld:
     def advance(self, steps: int) -> dict[str, npt.NDArray[np.int32]]: ...
     # pose (blocks, 3) [m, m, rad], velocity (blocks, 3) [m/s, m/s, rad/s], assembly (blocks,),
     # cell (blocks, 2), quarter (blocks,); where bonds break bond (n, 2), those that are whole.
+    # cell (blocks, 2), quarter and kind (blocks,).
     def state(self) -> dict[str, npt.NDArray[Any]]: ...
     def set_forces(
         self, *, drag_coefficient: float, force_std: float, flow_scale: float
     ) -> None: ...
     def set_rules(self, *, latching: str, hidden_share: float, stirring_length: float) -> None: ...
     def set_bonds(self, *, rate: float, relatch_clearance: float) -> None: ...
+    # Blocks are of the kinds at the start again.
+    def set_faces(self, faces: FaceRules | None) -> None: ...
     def set_pull(self, pull: Pull | None) -> None: ...
     def set_blocks(self, blocks: int) -> int: ...  # as many as there are then
     def part(self) -> None: ...

@@ -229,9 +229,9 @@ def _wide_tank(_: Path) -> Names:
 
 
 def _active_body(folder: Path) -> Names:
-    """Provide ``recording.nc``: a minute and a half of an active body."""
+    """Provide ``recording.nc``: three minutes of an active body."""
     values = {"speed": 0.03, "rotational_diffusion": 0.5, "turn_rate": 0.3}
-    seen = moving(dw.motion_model("active", clearance=0.015), values, 90.0, seed=3, noise=3e-4)
+    seen = moving(dw.motion_model("active", clearance=0.015), values, 180.0, seed=3, noise=3e-4)
     dw.save_trajectory(seen, folder / "recording.nc")
     return {}
 
@@ -491,7 +491,7 @@ PAGES: dict[str, Page] = {
     "docs/how-to/calibrate-a-moving-body.md": Page(
         provide=_active_body,
         instead={
-            "--model active ": "--model active --parameter clearance=0.015 --bootstrap 20 ",
+            "--model active ": "--model active --parameter clearance=0.015 ",
             "run-tumble+wall --parameter turn_rate=0": "active+diffusion --parameter turn_rate=0.3 "
             "--parameter clearance=0.015 --bootstrap 20",
         },

@@ -156,6 +156,7 @@ FORMS: dict[str, Callable[[], xr.Dataset]] = {
     ),
     "steady_state": lambda: dw.steady_state(every_kind("assembly whose bonds break")),
     "kinetics": lambda: kinetics(chain_runs(60, 1), chain_runs(30, 2), target="T", blocks=3),
+    "attraction": lambda: dw.attraction(dw.Study(interaction={"magnets": "5x5x2mm,1.3T"})),
     "assembly_path": lambda: dw.assembly_path(small(), FLOW, runs=[0], seed=5),
     "outcome_distribution": lambda: dw.outcome_distribution(every_kind("assembly")),
     "outcome_distribution of realisations": lambda: dw.sensitivity_reference(small(), FLOW),

@@ -18,8 +18,10 @@ from twin_assembly import SIDE, Floats, study, swirl
 
 import driftwalk as dw
 from driftwalk import _core
+from driftwalk.assembly.lattice.typed_faces import face_table
 from driftwalk.assembly.pull.tables import block_pull
 from driftwalk.core.random_streams import world_keys
+from driftwalk.model import Assembly
 from driftwalk.simulation.backend import Camera, native_model
 
 TOLERANCE = 1e-9
@@ -47,6 +49,7 @@ def native_row(
     """Run one world in the kernel; arguments as of the twin."""
     alone = {name: np.array([arguments.pop(name)]) for name in ("drag_coefficient", "force_std")}
     hidden = {"none": 0.0, "full": 1.0}[arguments.pop("hidden_face_drag")]
+    faces = arguments.pop("faces", None)
     rows = _core.assemble(
         native_model(model, flow, np.zeros(1), Camera()),
         start=np.ascontiguousarray(start[None]),
@@ -56,6 +59,7 @@ def native_row(
         hidden_share=hidden,
         stirring_length=0.0,
         incompressible=False,
+        faces=None if faces is None else faces.native(),
         pull=None if (pull := block_pull(model)) is None else pull.native,
         **alone,
         **arguments,
@@ -182,6 +186,50 @@ def test_events_and_poses_agree_beyond_the_paper_s_law(law: str, hidden: str) ->
         latching="collision", hidden_face_drag=hidden,
     )  # fmt: skip
     assert run["event_count"] > 0, "nothing latched"
+
+
+BINDINGS: dict[str, dict[str, Any]] = {
+    "poles": {"faces": "N,S,N,S"},
+    "poles in pairs": {"faces": "N,N,S,S"},
+    "grammar": {
+        "binding": {
+            "kinds": [
+                {"name": "A", "count": 3, "faces": ["a", "b", "a", "N"]},
+                {"name": "B", "count": 3, "faces": ["b", "S", "N", "none"]},
+                {"name": "C", "faces": ["b", "b", "none", "b"]},
+            ],
+            "latches": [["a", "b"], ["b", "b"], ["N", "S"]],
+            "after": [
+                {"kind": "A", "face": "+x", "meets": "b", "becomes": "C"},
+                {"kind": "A", "face": "-x", "becomes": "B"},
+                {"kind": "B", "face": "+x", "meets": "a", "becomes": "C"},
+            ],
+        }
+    },
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("latching", ["collision", "connector"])
+@pytest.mark.parametrize(
+    ("binding", "magnets"), [*((name, "none") for name in BINDINGS), ("poles", "3x3x1mm,1.2T")]
+)
+def test_typed_faces_agree(binding: str, magnets: str, latching: str) -> None:
+    model, pulled = study(0.2, interaction={"magnets": magnets}), magnets != "none"
+    faces = face_table(Assembly(blocks=6, **BINDINGS[binding]))
+    flow = drain(model, inflow=2.0, spin=1.5)
+    latched = 0
+    for seed in (201, 202, 203):
+        key = world_key(seed)
+        run = compare(
+            model, flow, start=placed(model, flow, 6, key), key=key, force_std=2e-3, steps=100,
+            latching=latching, faces=faces, connector_distance=0.015,
+            # Magnets that come near multiply rounding faster than collisions do.
+            tolerance=1e-6 if pulled else TOLERANCE,
+        )  # fmt: skip
+        assert run["first_contact_step"] > 0, "the blocks never met"
+        latched += int(run["event_count"])
+    assert latched > 3
 
 
 TANKS: tuple[dict[str, Any], ...] = (

@@ -25,6 +25,7 @@ from driftwalk.assembly.outcomes.distribution import (
     sampling_variance,
 )
 from driftwalk.assembly.outcomes.event_rates import rate_interval
+from driftwalk.assembly.outcomes.kind_classes import kind_classes
 from driftwalk.assembly.outcomes.l1 import (
     L1NoiseFloor,
     PairwiseL1,
@@ -80,6 +81,7 @@ __all__ = [
     "draw_parameters",
     "has_uncertainty",
     "interaction_quantiles",
+    "kind_classes",
     "kinetics",
     "l1_distance",
     "l1_in_floors",

@@ -14,10 +14,12 @@ from driftwalk import _core
 from driftwalk.assembly.lattice.bonds import CLOSING, JOINING, PARTING, BondGraph
 from driftwalk.assembly.lattice.join_history import LatticeWorld
 from driftwalk.assembly.lattice.joined_faces import ROUNDING
+from driftwalk.assembly.lattice.typed_faces import face_table
 from driftwalk.assembly.outcomes.disc_contacts import disc_class
 from driftwalk.assembly.pull.tables import block_pull
 from driftwalk.assembly.runs.bonds import require_bonds
 from driftwalk.assembly.runs.dataset import times_of
+from driftwalk.assembly.runs.glued import glued_cells
 from driftwalk.assembly.runs.plan import MOST_STEPS, make_plan, start_poses
 from driftwalk.assembly.runs.start import require_room
 from driftwalk.core.arrays import Floats
@@ -51,6 +53,7 @@ class _Moment:
         self.state: dict[str, npt.NDArray[Any]] = world.state()
         self.time = float(times_of(np.array(world.step), time_step=study.time_step_s))
         self._chirality = study.assembly.chirality
+        self.table = face_table(study.assembly)
         self._diameter = study.block.side_m if study.block.is_round else 0.0
 
     @cached_property
@@ -125,6 +128,10 @@ class LiveTank:
         plan = make_plan(
             study, flow, settings={"blocks": blocks, "seed": seed}, index=np.arange(1), ends=False
         )
+        if glued_cells(plan.study.assembly) is not None:
+            raise InputError(
+                "a live tank starts with single blocks, not with glued ones (`assembly.glued`)"
+            )
         self._flow = plan.flow
         self._lock = Lock()
         # Never held while the world advances. Where both are held, this one is taken second.
@@ -217,6 +224,7 @@ class LiveTank:
         force_std: float | None = None,
         flow_scale: float | None = None,
         latching: Latching | None = None,
+        faces: str | None = None,
         hidden_face_drag: HiddenFaceDrag | str | None = None,
         stirring_length: float | None = None,
         bond_rate: float | None = None,
@@ -237,6 +245,8 @@ class LiveTank:
         latching : {"collision", "connector", "none"}
             How blocks latch from then on. Joined blocks stay joined, even with "none", unless they
             are parted.
+        faces : str
+            Types of the blocks' faces, such as "N,S,N,S", or "any"; what is joined stays so.
         hidden_face_drag : {"none", "full"} or float
             Drag on faces that are joined; a number is its share of a free face's, 0 to 1.
         stirring_length : float
@@ -263,6 +273,7 @@ class LiveTank:
             "forces.drag_coefficient": drag_coefficient,
             "forces.force_std_N": force_std,
             "assembly.latching": latching,
+            "assembly.faces": faces,
             "assembly.hidden_face_drag": hidden_face_drag,
             "forces.stirring_length_m": stirring_length,
             "assembly.bond_rate_per_s": bond_rate,
@@ -363,6 +374,17 @@ class LiveTank:
         return labels
 
     @property
+    def poles(self) -> npt.NDArray[np.int32]:
+        """Poles of the blocks' faces +x, +y, -x, -y: 1 N, -1 S, 0 none, (block, face).
+
+        No rows where faces have no types.
+        """
+        moment = self._moment
+        if moment.table is None:
+            return np.zeros((0, 4), dtype=np.int32)
+        return np.asarray(moment.table.pole[moment.state["kind"]])
+
+    @property
     def outcome(self) -> str:
         """Outcome class of the world, as `assemble` and `classify` name it."""
         return self._moment.outcome
@@ -390,6 +412,7 @@ class LiveTank:
         with self._wishes_lock:
             wished = self._wishes
             changed = wished is not self._active
+            before = self._active.study.assembly
             self._wishes = self._active = wished._replace(part=False) if wished.part else wished
         if changed:
             self._set_forces()
@@ -403,6 +426,9 @@ class LiveTank:
             self._world.set_bonds(
                 rate=rules.bond_rate_per_s, relatch_clearance=rules.relatch_clearance
             )
+            if (rules.faces, rules.binding) != (before.faces, before.binding):
+                table = face_table(rules)
+                self._world.set_faces(None if table is None else table.native())
         if wished.part:
             self._world.part()
             self._look()

@@ -5,10 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from driftwalk.cli.inputs.model_source import RUN_NAMES, assembly_source, with_glued
+from driftwalk.cli.inputs.model_source import (
+    RUN_NAMES,
+    assembly_source,
+    with_binding,
+    with_glued,
+)
 from driftwalk.cli.inputs.recordings import opening_note
 from driftwalk.cli.options.run import RunOptions, with_run_options
-from driftwalk.cli.options.shared_types import FlowFile, Run, option
+from driftwalk.cli.options.shared_types import PANEL, FlowFile, Run, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_prediction
 from driftwalk.core.errors import InputError
@@ -27,12 +32,21 @@ def assemble(
     given: StudyOptions,
     run: Run = None,
     flow: FlowFile = None,
-    glued: Annotated[
+    earlier: Annotated[
         Path | None,
         option(
             "--from RUN",
             "Fit of glued blocks, or of free ones in one recording: what a hidden face and a "
             "neighbour feel.",
+            show_default=False,
+        ),
+    ] = None,
+    binding: Annotated[
+        Path | None,
+        option(
+            "--binding FILE",
+            "Kinds of blocks, types of their faces, and which of them latch, as a TOML table.",
+            panel=PANEL,
             show_default=False,
         ),
     ] = None,
@@ -50,14 +64,14 @@ def assemble(
     from driftwalk.runs import AssemblyWork
 
     _check_film(film)
-    given, quantiles = with_glued(given, glued)
+    given, quantiles = with_glued(with_binding(given, binding), earlier)
     refused = [] if given.file is None else ["--study"]
     source = assembly_source(run, flow, given, refused=refused)
     work = AssemblyWork(
         source.study,
         source.flow,
         source.uncertainty,
-        source.inputs if glued is None else {**source.inputs, "glued": glued / "fit.nc"},
+        source.inputs if earlier is None else {**source.inputs, "glued": earlier / "fit.nc"},
         options.threads,
         film,
         quantiles,

@@ -29,7 +29,8 @@ BLOCKS = 4
 
 @with_study_options(
     ASSEMBLY_KEYS,
-    *("body_shape", "side", "mass", "depth", "tank_diameter", "blocks", "seed", "flow_repeat"),
+    *("body_shape", "side", "mass", "depth", "tank_diameter", "blocks", "faces", "seed"),
+    "flow_repeat",
 )
 def play(
     given: StudyOptions,

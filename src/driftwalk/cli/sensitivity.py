@@ -43,6 +43,7 @@ AXES: Final = {
     "blocks": "sensitivity.blocks",
     "flow": "sensitivity.flow",
     "latching": "sensitivity.latching",
+    "faces": "sensitivity.faces",
     "hidden-face-drag": "sensitivity.hidden_face_drag",
     "stirring-length": "sensitivity.stirring_length_m",
     "bond-rate": "sensitivity.bond_rate_per_s",
@@ -183,8 +184,9 @@ def vary_overrides(given: Sequence[str]) -> dict[str, Any]:
             )
         if key in found:
             raise InputError(f"--vary {text}: {name} is varied twice; name all values at once")
-        # The values of magnets have commas of their own: "none; 3x3x1mm,1.2T".
-        words = [word.strip() for word in values.split(";" if name == "magnets" else ",")]
+        # The values of magnets, and of faces, have commas of their own: "none; 3x3x1mm,1.2T".
+        parted = name == "magnets" or ";" in values
+        words = [word.strip() for word in values.split(";" if parted else ",")]
         if not all(words):
             raise InputError(f"--vary {text}: a value is missing after '{name}='")
         try:

@@ -67,6 +67,8 @@ class AssemblySettings(ModelSettings, total=False):
     latching: Annotated[str, "assembly.latching"]
     connector_distance: Annotated[Number, "assembly.connector_distance_m"]
     connector_axis: Annotated[Number, "assembly.connector_axis_rad"]
+    faces: Annotated[str, "assembly.faces"]
+    glued: Annotated[str, "assembly.glued"]
     hidden_face_drag: Annotated[Number, "assembly.hidden_face_drag"]
     chirality: Annotated[str, "assembly.chirality"]
     block_restitution: Annotated[Number, "assembly.block_restitution"]

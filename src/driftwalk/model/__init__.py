@@ -1,6 +1,7 @@
 """Parameters of a simulation: frozen, with units, read from and written to TOML."""
 
 from driftwalk.model.assembly import Assembly
+from driftwalk.model.binding import Binding, read_binding
 from driftwalk.model.block import Block
 from driftwalk.model.calibration import Calibration
 from driftwalk.model.fit import Fit
@@ -26,6 +27,7 @@ from driftwalk.model.template import (
 
 __all__ = [
     "Assembly",
+    "Binding",
     "Block",
     "Calibration",
     "Columns",
@@ -49,6 +51,7 @@ __all__ = [
     "load_study",
     "parameter_table",
     "parse_study",
+    "read_binding",
     "short_study_template",
     "study_template",
 ]

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Final, Literal
+from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
-from driftwalk.model.section import Quantity, Section, Seed
+from pydantic import Field, field_validator, model_validator
+
+from driftwalk.core.errors import ConfigurationError
+from driftwalk.model.binding import Binding, Kind, face_types, faces_text
+from driftwalk.model.section import Placeholder, Quantity, Section, Seed
 
 MOST_BLOCKS: Final = 2000
 """The most that the native core takes."""
@@ -49,6 +53,23 @@ class Assembly(Section):
     """Largest rotation of two connectors against each other about their axis. Blocks float upright,
     so this rotation is always 0 and the condition is always met; the key only completes the
     description of a connector."""
+    faces: Annotated[str, Placeholder("N,S,N,S")] = "any"
+    """Types of the faces +x, +y, -x, -y of every block: N, S or none; or "any".
+
+    Types of the faces +x, +y, -x, -y of every block: N and S are fixed magnets, of which unlike
+    ones latch, "none" (or -) latches with none. "any": every face latches with every other.
+    """
+    binding: Binding | None = Field(
+        default=None,
+        examples=['{ kinds = [{ name = "A", count = 4, faces = ["N", "S", "N", "S"] }] }'],
+    )
+    """Kinds of blocks, types of their faces, which of them latch, and what blocks become then: the
+    table of `driftwalk assemble --binding`, in place of `faces`."""
+    glued: Annotated[str, Placeholder("SHAPE")] = "x"
+    """Blocks that start glued together, such as "xx" or "x./xx"; "x": single blocks.
+
+    Rows of the blocks that start glued together, permanently: "xx" are dimers, "x" single blocks.
+    """
     hidden_face_drag: HiddenFaceDrag = "none"
     """Drag on faces that are joined.
 
@@ -88,6 +109,50 @@ class Assembly(Section):
     """Distance of the centres of blocks that parted, in sides, from which they may latch again."""
     confidence: Annotated[float, Quantity("1", gt=0, lt=1)] = 0.9
     """Simultaneous confidence of the intervals of the proportions."""
+
+    @classmethod
+    def replaced_by(cls, keys: set[str]) -> set[str]:
+        """Return the one of `faces` and `binding` that loses its meaning by the other."""
+        return {"faces", "binding"} if keys & {"faces", "binding"} else set()
+
+    @field_validator("faces", mode="before")
+    @classmethod
+    def _four_types(cls, value: Any) -> str:
+        return faces_text(",".join(map(str, value)) if isinstance(value, list) else str(value))
+
+    @field_validator("glued")
+    @classmethod
+    def _glued_shape(cls, value: str) -> str:
+        if value != "x":
+            from driftwalk.model.bodies import Measures, rigid_body
+
+            if not set(value) <= set("x./"):
+                raise ConfigurationError(
+                    f"expected rows of blocks such as xx or x./xx, got '{value}'"
+                )
+            rigid_body(value, Measures(1.0, None, 1, 0.0))
+        return value
+
+    @model_validator(mode="after")
+    def _one_rule(self) -> Self:
+        if self.binding is None:
+            return self
+        if self.faces != "any":
+            raise ConfigurationError("faces and binding both say which faces latch: give one")
+        if self.binding.blocks != self.blocks:
+            raise ConfigurationError(
+                f"binding: the kinds count {self.binding.blocks} blocks, and there are "
+                f"{self.blocks} (blocks): make them the same"
+            )
+        return self
+
+    @property
+    def typed_faces(self) -> Binding | None:
+        """Rules of typed faces, None where every face latches with every other."""
+        types = face_types(self.faces)
+        if types is None:
+            return self.binding
+        return Binding(kinds=(Kind(name="block", count=self.blocks, faces=types),))
 
     @property
     def bonds_break(self) -> bool:

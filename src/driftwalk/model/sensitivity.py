@@ -10,6 +10,7 @@ from pydantic import Field, field_validator, model_validator
 from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.grid import MOST_SETTINGS
 from driftwalk.model.assembly import MOST_BLOCKS, HiddenFaceDrag, Latching
+from driftwalk.model.binding import faces_text
 from driftwalk.model.calibration import ForceGrid
 from driftwalk.model.forces import DragCoefficient, ForceStd
 from driftwalk.model.interaction import MagnetText, parse_magnet
@@ -20,6 +21,7 @@ AXES: Final[dict[str, str]] = {
     "blocks": "blocks",
     "flow": "flow",
     "latching": "latching",
+    "faces": "faces",
     "hidden_face_drag": "hidden_face_drag",
     "stirring_length": "stirring_length_m",
     "bond_rate": "bond_rate_per_s",
@@ -71,6 +73,8 @@ class Sensitivity(ForceGrid):
         default=None, examples=['["collision", "connector"]']
     )
     """Latching rules to compare, an axis of the map."""
+    faces: tuple[str, ...] | None = Field(default=None, examples=['["any", "NSNS"]'])
+    """Types of the blocks' faces to compare, an axis of the map."""
     hidden_face_drag: tuple[HiddenFaceDrag, ...] | None = Field(
         default=None, examples=['["none", "full"]']
     )
@@ -93,6 +97,11 @@ class Sensitivity(ForceGrid):
     """Drag coefficients to compare, an axis of the map, instead of the range."""
     force_std_N: tuple[ForceStd, ...] | None = Field(default=None, examples=['["0.2mN", "0.55mN"]'])
     """Values of force_std to compare, an axis of the map, instead of the range."""
+
+    @field_validator("faces")
+    @classmethod
+    def _face_types(cls, values: tuple[str, ...] | None) -> tuple[str, ...] | None:
+        return None if values is None else tuple(map(faces_text, values))
 
     @field_validator(*LISTS)
     @classmethod

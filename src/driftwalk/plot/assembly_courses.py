@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from textwrap import fill
 from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
@@ -39,7 +40,7 @@ LABEL_GAP: Final = 0.012
 TIME_LABEL: Final = "time (s)"
 SURVIVAL: Final = {
     "first_contact": ("no two blocks have met", style.BLUE, "-"),
-    "completion": ("more than one assembly", style.ORANGE, (0, (5, 2))),
+    "completion": ("not yet one assembly", style.ORANGE, (0, (5, 2))),
 }
 
 BAR_WIDTH: Final = 0.76
@@ -146,7 +147,7 @@ def plot_attraction(attraction: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax = style.axes_or_new(ax, height_mm=65.0)
     gap = 1e3 * np.asarray(attraction["gap"].values, dtype=np.float64)
     for name, text, color, dashes in (
-        ("force", "measured by a balance", style.BLUE, "-"),
+        ("force", "as stated", style.BLUE, "-"),
         ("simulated_force", "in the simulation", style.ORANGE, (0, (5, 2))),
     ):
         force = 1e3 * np.asarray(attraction[name].values, dtype=np.float64)
@@ -157,7 +158,7 @@ def plot_attraction(attraction: xr.Dataset, ax: Axes | None = None) -> Axes:
     )  # fmt: skip
     ax.spines[["top", "right"]].set_visible(False)
     ax.legend(frameon=False)
-    ax.set_title(str(attraction.attrs["between"]), loc="left")
+    ax.set_title(fill(str(attraction.attrs["between"]), 42), loc="left", size="small")
     return ax
 
 

@@ -16,6 +16,7 @@ from driftwalk.plot.parts import style
 from driftwalk.plot.parts.arena import CM_PER_M, arena_of, draw_arena, draw_scale_bar
 from driftwalk.plot.parts.assembly_labels import PALETTE
 from driftwalk.plot.parts.film_file import FRAMES_PER_S, Frame, require_film_writer, write_frames
+from driftwalk.plot.parts.poles import empty_bars, pole_bars, poles_of
 from driftwalk.schema.check import kind_name
 
 if TYPE_CHECKING:
@@ -46,6 +47,8 @@ class _Scene:
     color: Integers
     side: float | None
     arena: dict[str, Any]
+    pole: Any = None
+    """Poles of the faces, (body, face); None: none are known."""
 
 
 def write_animation(
@@ -61,7 +64,8 @@ def write_animation(
 
     Blocks are coloured by assembly, the bodies of a recording each by its own colour. A line in a
     block points where its orientation does; a body without an orientation is a disc. Behind each
-    lies its way of the last 5 s of the film. The film has 12.5 frames per second as GIF and 25 as
+    lies its way of the last 5 s of the film. Faces that are magnets have a bar, red for N and white
+    for S. The film has 12.5 frames per second as GIF and 25 as
     MP4; each shows the last sample up to its time, and a body that was not seen for three of its
     usual intervals is not shown. More than 64 bodies have no lines and no ways.
 
@@ -152,6 +156,7 @@ def _scene(motion: xr.Dataset, run: int) -> _Scene:
         np.asarray(color, dtype=np.int64),
         None if side is None else CM_PER_M * float(side),
         arena_of(motion),
+        poles_of(motion),
     )
 
 
@@ -192,12 +197,14 @@ def _frames(scene: _Scene, moments: Floats, rate: float, dots: int) -> Iterator[
     canvas.draw()
     empty = canvas.copy_from_bbox(figure.bbox)
     trails = LineCollection([], colors=style.MUTED, linewidths=0.8, alpha=0.7, zorder=2)
+    bars = empty_bars()
     count = scene.place.shape[1]
     edge = style.edge_width(count)
     bodies = PolyCollection([], edgecolors=style.INK, linewidths=edge, zorder=3)
     pointers = LineCollection([], colors=style.INK, linewidths=0.9, zorder=4)
     clock = figure.text(0.04, 0.955, "", size=9.0, va="center")
-    for artist in (trails, bodies, pointers):
+    artists = (trails, bodies, bars, pointers)
+    for artist in artists:
         ax.add_collection(artist, autolim=False)
     seen = _last_seen(scene)
     digits = 1 if rate < 10.0 else 0
@@ -210,13 +217,18 @@ def _frames(scene: _Scene, moments: Floats, rate: float, dots: int) -> Iterator[
         first = int(np.searchsorted(scene.time, moment - TRAIL_S * rate))
         bodies.set_verts(_outlines(scene, seen[until - 1][body], body, size))
         bodies.set_facecolor([PALETTE[scene.color[one] % len(PALETTE)] for one in shown])
+        if scene.pole is not None:
+            poses = scene.place[until - 1], scene.theta[until - 1]
+            corners, colors = pole_bars(poses[0][:, 0], poses[0][:, 1], poses[1], scene.pole, size)
+            bars.set_verts(corners)
+            bars.set_facecolor(colors)
         if count <= MOST_TRAILS:
             # NaN breaks the line.
             trails.set_segments([scene.place[first:until, body] for _, body in shown])
             pointers.set_segments([line for one in shown if (line := _pointer(scene, *one, size))])
         clock.set_text(f"t = {moment:.{digits}f} s")
         canvas.restore_region(empty)
-        for artist in (trails, bodies, pointers):
+        for artist in artists:
             ax.draw_artist(artist)
         figure.draw_artist(clock)
         yield np.asarray(canvas.buffer_rgba())[:, :, :3]

@@ -18,6 +18,7 @@ from driftwalk.plot.parts.arena import (
     label_position,
 )
 from driftwalk.plot.parts.assembly_labels import PALETTE
+from driftwalk.plot.parts.poles import empty_bars, pole_bars, poles_of
 from driftwalk.schema import Track, body_track
 from driftwalk.schema.check import kind_name
 
@@ -261,8 +262,9 @@ def _one_run(dataset: xr.Dataset, run: int, *, kind: str = "") -> xr.Dataset:
     runs = dataset.sizes["run"]
     if not 0 <= run < runs:
         raise InputError(f"run={run}: the dataset has {runs} runs, counted from 0")
-    one: xr.Dataset = dataset[list(POSES)].isel(run=run).transpose(..., "block")
-    return one
+    shown = [*POSES, *(["pole"] if "pole" in dataset else [])]
+    one: xr.Dataset = dataset[shown].isel(run=run)
+    return one.transpose("time", "block", ..., missing_dims="ignore")
 
 
 def _sample_at(one: xr.Dataset, time: float | None) -> int:
@@ -287,3 +289,11 @@ def _draw_blocks(ax: Axes, moment: xr.Dataset) -> None:
         zorder=3,
     )
     ax.add_collection(blocks)
+    if (pole := poles_of(moment)) is not None:
+        half = CM_PER_M * float(moment.attrs["block_side_m"]) / 2.0
+        x, y = (CM_PER_M * moment[name].values for name in "xy")
+        bars = empty_bars()
+        corners, faces = pole_bars(x, y, moment["theta"].values, pole, half)
+        bars.set_verts(corners)
+        bars.set_facecolor(faces)
+        ax.add_collection(bars)

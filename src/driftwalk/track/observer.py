@@ -414,7 +414,11 @@ def observe(recording: xr.Dataset, *, side: float, **rules: Any) -> xr.Dataset:
     further = sorted(set().union(*sets) - set(classes))
     if further:
         classes += further
-        found = found.reindex({"class": list(classes)}, fill_value={"proportion": 0.0})
+        # Of a class in which the world was not for certain, no rate is known.
+        unseen = {"proportion": 0.0}
+        for name in ("joining", "parting"):
+            unseen |= {f"{name}_count": 0, f"{name}_rate_low": 0.0, f"{name}_rate_high": np.inf}
+        found = found.reindex({"class": list(classes)}, fill_value=unseen)
     possible = np.array([[name in one for name in classes] for one in sets])
     known = outcome >= 0
     possible[known] = np.arange(len(classes)) == outcome[known, None]

@@ -279,6 +279,9 @@ def test_a_calibration_without_bootstrap_gives_one_distribution(
         (["--side", "40cm"], "the block does not fit"),
         (["--body-shape", "disc:3cm", "--latching", "connector"], "discs have no faces"),
         (["--body-shape", "rectangle:4x2cm"], "squares and discs assemble"),
+        (["--faces", "N,S,N"], "the types of 4 faces, in the order +x, +y, -x, -y"),
+        (["--faces", "NSNS", "--body-shape", "disc:3cm"], "leave out their types (--faces)"),
+        (["--glued", "xx", "--blocks", "5"], "(--glued): give 4 blocks"),
         (["--seed=-1"], "--seed"),
     ],
 )
@@ -290,6 +293,24 @@ def test_a_bad_option(
     line = refusal(here("assemble", *words, "--runs", "5", *options, "-o", tmp_path / "run"))
     assert says in line
     assert not (tmp_path / "run").exists()
+
+
+def test_kinds_of_blocks_from_a_file(tmp_path: Path) -> None:
+    rules = tmp_path / "rules.toml"
+    kind = '[[kinds]]\nname = "{}"\ncount = {}\nfaces = ["{}", "none", "none", "none"]\n'
+    rules.write_text(kind.format("A", 2, "N") + kind.format("B", 3, "S"))
+    words = ("assemble", "--flow", FLOW, "--binding", rules, "--runs", "20", "--duration", "20s")
+    found = here(*words, "--film", "none", "--json", "-o", tmp_path / "five")
+    assert found.code == 0
+    told = json.loads(found.out)
+    assert told["blocks"] == 5
+    assert told["faces"].startswith("2 A (N,none,none,none), 3 B (S,none,none,none); N latches")
+    kept = xr.open_dataset(tmp_path / "five" / "assembly.nc")
+    assert kept["pole"].values.tolist() == [[1, 0, 0, 0]] * 2 + [[-1, 0, 0, 0]] * 3
+    clash = refusal(here(*words, "--blocks", "4", "-o", tmp_path / "four"))
+    assert "the kinds count 5 blocks, and --blocks says 4" in clash
+    both = refusal(here(*words, "--faces", "NSNS", "-o", tmp_path / "both"))
+    assert "both say which faces latch" in both
 
 
 @pytest.mark.slow

@@ -182,6 +182,7 @@ BAD: dict[str, Callable[[Path, Path], list[Words]]] = {
         ["sensitivity", bad, "-o", out],
         ["sensitivity", "--flow", bad, "-o", out],
     ],
+    "kinetics": lambda bad, out: [["kinetics", bad, "-o", out]],
     "export": lambda bad, out: [["export", bad, "--to", "csv", "-o", out / "folder"]],
     "cite": lambda bad, out: [["cite", bad]],
     "classify": lambda bad, out: [["classify", bad, "--side", "3cm"]],
@@ -256,6 +257,12 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_finished_run(tmp_path_factory.mktemp("finished") / "run")
 
 
+def assembled(place: Path, out: Path) -> Path:
+    """Return a finished run of self-assembly."""
+    here("assemble", "--flow", FLOW, "--blocks", "3", "--runs", "100", "--film", "none", "-o", out)
+    return out
+
+
 SHORT = ("--to", "60s")
 ONE = ("--threads", "1")
 QUICK: dict[str, Callable[[Path, Path, Path], Words]] = {
@@ -313,6 +320,9 @@ LONG: dict[str, Callable[[Path, Path, Path], Words]] = {
     "sensitivity": lambda place, run, out: [
         *("sensitivity", "--flow", FLOW, "--vary", "drag-coefficient=0.2,0.6", "--blocks", "3"),
         *("--runs", "15", "--realisations", "3", "--duration", "20s", *ONE, "-o", out / "run"),
+    ],
+    "kinetics": lambda place, run, out: [
+        *("kinetics", assembled(place, out / "three"), "-o", out / "run")
     ],
 }
 ELSEWHERE = {"demo", "view", "play"}

@@ -44,6 +44,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from driftwalk.assembly.lattice.typed_faces import FaceTable
 from driftwalk.assembly.pull.tables import BlockPull, block_pull
 from driftwalk.core.errors import InputError
 from driftwalk.simulation.backend import wall_edges
@@ -51,6 +52,7 @@ from twin.block import TwinModel, drag, force_normals, next_force, push_of_water
 from twin.body import Assembly, Floats, Square, cross, single_block, wrapped
 from twin.bonds import CLOSING, JOINING, Bonds, break_bonds, faces_between
 from twin.contacts import collide, overlapping_pairs, separate
+from twin.faces import Faces
 from twin.latch import Joined, Latch, Latching, candidates, latch_once
 from twin.pull import pull_of_blocks
 from twin.wall import Wall, meet_wall
@@ -140,6 +142,7 @@ def assemble_reference(
     hidden_face_drag: HiddenFaceDrag,
     block_restitution: float,
     block_friction: float,
+    faces: FaceTable | None = None,
     sample_every: int = 0,
     bond_rate: float = 0.0,
     relatch_clearance: float = 1.25,
@@ -169,6 +172,8 @@ def assemble_reference(
         Whether faces inside an assembly feel the water.
     block_restitution, block_friction : float
         Of collisions between blocks [1].
+    faces : FaceTable, optional
+        Rules of typed faces.
     sample_every : int, optional
         Steps between samples of the path; 0: none, and a complete world ends early.
     bond_rate, relatch_clearance : float
@@ -203,7 +208,12 @@ def assemble_reference(
     rules = make_rules(
         study,
         flow,
-        latch=Latch(latching, connector_distance, connector_axis),
+        latch=Latch(
+            latching,
+            connector_distance,
+            connector_axis,
+            None if faces is None else Faces(faces, faces.first_kinds(len(start)).tolist()),
+        ),
         drag_coefficient=drag_coefficient,
         hidden_face_drag=hidden_face_drag,
         block_restitution=block_restitution,
@@ -369,8 +379,10 @@ def drag_sums(
     if rules.pull is not None:
         sizes = [body.size for body in world.assemblies]
         owner = np.repeat(np.arange(len(sizes)), sizes)
+        typed = rules.latch.faces
+        pole = None if typed is None else np.concatenate([typed.poles(b) for b in world.assemblies])
         force_x, force_y, torque = np.stack([force_x, force_y, torque]) + pull_of_blocks(
-            rules.pull, *_drifted(world), hidden, owner
+            rules.pull, *_drifted(world), hidden, owner, None if pole is None else pole.T
         )
     sums, first = [], 0
     for body, arm in zip(world.assemblies, arms, strict=True):

@@ -10,6 +10,7 @@ import numpy as np
 
 from twin.body import NEIGHBOURS, Assembly, Floats, Ints, cross, turned
 from twin.contacts import Pair, close_pairs, overlap, overlapping_pairs
+from twin.faces import Faces
 from twin.wall import Wall, push_inside
 
 Latching = Literal["none", "collision", "connector"]
@@ -29,6 +30,7 @@ class Latch:
     latching: Latching
     distance: float
     axis: float
+    faces: Faces | None = None
 
 
 class Candidate(NamedTuple):
@@ -78,7 +80,11 @@ def latch_once(
             continue
         others = [body for body in assemblies if body not in (stayed[0], moved[0])]
         if not any(_overlap_deeply(made, place) for other in others for place in _places(other)):
+            if latch.faces is not None and latch.faces.refused(made, stayed[0].blocks):
+                continue
             made.before = made.pose.copy()
+            if latch.faces is not None:
+                latch.faces.become((stayed[1], moved[1]), (_own_face(*stayed), _own_face(*moved)))
             return Joined(
                 (stayed[1], moved[1]),
                 (_own_face(*stayed), _own_face(*moved)),
@@ -114,6 +120,12 @@ def candidates(latch: Latch, assemblies: list[Assembly]) -> Iterator[Candidate]:
                 else:
                     opposed = np.arccos(np.clip(-normal @ other_normal, -1, 1))
                     fits = distance <= latch.distance and bool(opposed <= latch.axis)
+                if latch.faces is not None:
+                    own = _own_face(pair.bodies[0], pair.blocks[0], face)
+                    other_own = _own_face(pair.bodies[1], pair.blocks[1], other_face)
+                    fits = fits and latch.faces.latch(
+                        pair.blocks[0], own, pair.blocks[1], other_own
+                    )
                 if fits:
                     yield Candidate(distance, pair.blocks[0], face, pair.blocks[1], other_face)
 

@@ -27,7 +27,12 @@ def strength(force: RadialForce, squared: npt.ArrayLike) -> Floats:
 
 
 def pull_of_blocks(
-    pull: BlockPull, members: Floats, motions: Floats, hidden: npt.NDArray[np.bool_], body: Floats
+    pull: BlockPull,
+    members: Floats,
+    motions: Floats,
+    hidden: npt.NDArray[np.bool_],
+    body: Floats,
+    pole: npt.NDArray[np.int_] | None = None,
 ) -> Floats:
     """Return force x, y [N] and torque [N m] on each block, about its centre, shape (3, n).
 
@@ -41,6 +46,8 @@ def pull_of_blocks(
         Joined faces, in the assembly's frame.
     body : ndarray, shape (n,)
         The assembly of each block.
+    pole : ndarray of int, shape (4, n), optional
+        Poles of the faces, in the assembly's frame: like ones repel; default: all attract.
     """
     found = np.zeros_like(members)
     centres = members[:2].T
@@ -58,6 +65,8 @@ def pull_of_blocks(
             for j in np.flatnonzero(~hidden[:, b]):
                 apart = way + levers[j, b] - levers[i, a]
                 one = strength(pull.faces, apart @ apart) * apart
+                if pole is not None:
+                    one = -pole[i, a] * pole[j, b] * one
                 force += one
                 found[2, a] += cross(levers[i, a], one)
                 found[2, b] -= cross(levers[j, b], one)

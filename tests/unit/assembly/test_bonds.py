@@ -44,6 +44,7 @@ def first_partings(run: dict[str, Any]) -> tuple[Floats, Any]:
     return (step - run["event_step"][:, 0]).astype(float), run["event_block"][at, first]
 
 
+@pytest.mark.slow
 def test_lifetimes_are_exponential() -> None:
     # False alarms: 1 in 1000 seeds. A lifetime ends with a step: half of one is taken off.
     rate, worlds = 2.0, 2000
@@ -57,6 +58,7 @@ def test_lifetimes_are_exponential() -> None:
     assert lifetime.mean() == pytest.approx(1 / rate, rel=0.08)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("load", ["paper", "linear drag"])
 def test_a_constant_pull_shortens_lifetimes_as_bell_says(load: str) -> None:
     # Water that is drawn out holds a dimer in the middle and pulls at its ends. The pull on one is
@@ -156,6 +158,7 @@ def four() -> xr.Dataset:
     )
 
 
+@pytest.mark.slow
 def test_a_run_with_more_events_than_there_was_room_is_simulated_again(
     four: xr.Dataset, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -212,6 +215,7 @@ def test_permanent_bonds_have_no_kinds_of_events() -> None:
         dw.steady_state(found)
 
 
+@pytest.mark.slow
 def test_discs_part_too() -> None:
     discs = dw.Study(block={"shape": "disc"}, assembly={"bond_rate_per_s": 0.2})
     found = dw.assemble(discs, dw.tank30_flow(), blocks=5, runs=30, duration=60.0)
@@ -274,6 +278,7 @@ def test_classify_reads_joinings_and_partings_of_a_simulated_recording() -> None
     assert np.isnan(one["parting_rate"].values[~came]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", ["square", "disc"])
 def test_many_blocks_part_as_few_do(shape: str, monkeypatch: pytest.MonkeyPatch) -> None:
     # Worlds of more than 64 blocks are replayed by other code: it gives the same for fewer.
@@ -292,3 +297,23 @@ def test_many_blocks_part_as_few_do(shape: str, monkeypatch: pytest.MonkeyPatch)
     real = few["event_shape"].values >= 0
     np.testing.assert_array_equal(real, many["event_shape"].values >= 0)
     np.testing.assert_array_equal(names[0][real], names[1][real])
+
+
+def test_a_pull_is_the_same_in_a_world_of_many_blocks() -> None:
+    # A dimer in the middle of drawn-out water: alone, and with 24 blocks far from it, which lie in
+    # the lanes of the same world.
+    water = model(
+        strain(0.3), times=[0.0], radius=1.5, nodes=np.arange(-31, 32) * 0.05
+    )  # fmt: skip
+    start = np.zeros((12, 26, 3))
+    start[:, :2] = row(2, 12)
+    other = np.arange(24)
+    start[:, 2:, 0] = 0.5 * np.where(other % 2, 1, -1)
+    start[:, 2:, 1] = 0.08 * (other // 2 - 5.5)
+    parted = []
+    for poses in (start[:, :2], start):
+        run = assemble(water, poses, keys(12), steps=300, bonds=(0.5, 1e-4, 0.0, 1.25), **NEVER)
+        own = (run["event_kind"] == 1) & (run["event_block"] < 2).all(axis=2)
+        parted.append(np.where(own, run["event_step"], -1).max(axis=1).tolist())
+    assert parted[0] == parted[1]
+    assert sum(step > 0 for step in parted[0]) > 5

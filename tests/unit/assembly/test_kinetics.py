@@ -12,7 +12,7 @@ import xarray as xr
 from chain_runs import CLASSES, RATES, chain_runs, rate_matrix
 
 import driftwalk as dw
-from driftwalk.assembly.chains.estimate import empirical_shares
+from driftwalk.assembly.chains.estimate import completion, empirical_shares
 from driftwalk.assembly.chains.hidden import FORMS, Form, Model, fit, log_likelihood
 from driftwalk.assembly.chains.histories import histories
 from driftwalk.assembly.chains.mixing import holm, mixing_tests, score
@@ -247,6 +247,7 @@ def test_histories_go_back_where_blocks_part() -> None:
     assert found.state.tolist() == [1, 0, 1, 0]
     assert found.duration.tolist() == [2.0, 3.0, 4.0, 1.0]
     assert found.target.tolist() == [0, 1, 0, -1]
+    assert 0.0 <= completion(found, fit(found, CHAIN))["completion_ks"] <= 1.0
     cut = found.until(6.0)
     assert cut.duration.tolist() == [2.0, 3.0, 1.0]
     assert cut.target.tolist() == [0, 1, -1]

@@ -84,6 +84,7 @@ def with_it(keys: Mapping[str, str], name: str) -> list[str]:
 def values_of(key: str) -> st.SearchStrategy[tuple[str, Any]]:
     """Return texts that a user may type for a key, each with the value that it means."""
     by_hand: dict[str, list[tuple[str, Any]]] = {
+        "assembly.faces": [("any", "any"), ("N,S,N,S", "N,S,N,S")],
         "fit.interaction": [("true", True)],
         "fit.switching_times_s": [("1, 2.5", (1.0, 2.5)), ("16ms", (0.016,))],
         "block.shape": [("disc", "disc"), ("xx", "xx"), ("x./xx", "x./xx")],

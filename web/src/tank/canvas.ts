@@ -27,6 +27,8 @@ export interface Blocks {
   /** Outlined only: where it is has been predicted, not seen. */
   readonly hidden?: readonly boolean[];
   readonly names?: readonly string[];
+  /** Poles of the magnets at the faces +x, +y, -x, -y: 1 N, -1 S, 0 none; nothing where there are none. */
+  readonly poles?: readonly (readonly number[])[];
 }
 
 export interface Trail {
@@ -304,12 +306,25 @@ function drawBlocks(view: View, blocks: Blocks, side: number, opacity: number): 
       context.globalAlpha = 1;
       context.strokeStyle = ink;
       context.stroke();
+      if (Number.isFinite(theta)) drawPoles(context, half, blocks.poles?.[index] ?? []);
       if (Number.isFinite(theta) && half > 7) drawHeading(context, half, ink);
     }
     context.restore();
     const name = blocks.names?.[index];
     if (name !== undefined && half > 7) drawName(context, name, x, y, half, ink);
   }
+}
+
+/** Draws a bar along every face that is a magnet, as films do: N red, S white. */
+function drawPoles(context: CanvasRenderingContext2D, half: number, poles: readonly number[]): void {
+  poles.forEach((pole, face) => {
+    if (pole === 0) return;
+    context.save();
+    context.rotate((-face * Math.PI) / 2);
+    context.fillStyle = pole > 0 ? "#c1121f" : "#ffffff";
+    context.fillRect(0.62 * half, -0.72 * half, 0.32 * half, 1.44 * half);
+    context.restore();
+  });
 }
 
 /** Draws a short line to the block's +x face. */

@@ -25,6 +25,7 @@ const tankMessage = object({
   y: list(number),
   theta: list(nullable(number)),
   assembly: list(number),
+  poles: withDefault(list(list(number)), []),
   waiting: withDefault(number, 0),
   outcome: nullable(text),
   counts: withDefault(record(number), new Map<string, number>()),
@@ -179,7 +180,7 @@ class Playground {
       state.x.map((x, index) => ({ id: String(index), x_m: x, y_m: state.y[index] ?? null })),
     );
     const trails = this.trails?.all().map(({ id, x, y }) => ({ x, y, colour: hue(Number(id)) })) ?? [];
-    this.tank.draw({ blocks: { x: state.x, y: state.y, theta, colours }, trails });
+    this.tank.draw({ blocks: { x: state.x, y: state.y, theta, colours, poles: state.poles }, trails });
     this.link.send({ type: "ready" });
     this.countFrame();
     this.pause.textContent = state.paused ? "Run" : "Pause";

@@ -168,8 +168,8 @@ inline void finish_member(const Physics<Real, T, Law>& physics, const Real* tota
   find_arm(m);
 }
 
-// Rows of lanes: blocks of a pack of worlds, or those of one world. `pull` adds what blocks do to each
-// other to the sums of each.
+// Rows of lanes: blocks of a pack of worlds, or those of one world. `pull` adds what blocks do to
+// each other to the sums of each.
 template <class Real, class T, class Law, class Sum, class Pull>
 inline void advance(const Physics<Real, T, Law>& physics, int half, Member<Real>* members,
                     Sums<Real>* sums, int rows, const Sum& sum, const Pull& pull) {

@@ -74,8 +74,11 @@ inline void set_poles(const AssemblyRules& rules, const PackMemory<Real>& pack, 
   const BlockBook& book = pack.book(block, lane);
   for (int face = 0; face < 4; ++face) {
     const bool joined = (book.joined >> face & 1) != 0;
+    const int own = (face - book.quarter) & 3;
+    const double pole =
+        rules.faces != nullptr ? rules.faces->pole[book.kind][own] : rules.pull.pole[own];
     put(pack.pulled[pack.one_world ? block / PackMemory<Real>::lanes : block].pole[face], lane,
-        joined ? 0.0 : rules.pull.pole[(face - book.quarter) & 3]);
+        joined ? 0.0 : pole);
   }
 }
 
@@ -119,7 +122,7 @@ inline void load_block(const AssemblyRules& rules, const double* pose, const Pac
   for (Real& normal : m.normals) {
     put(normal, lane, T(0));
   }
-  pack.book(block, lane) = {0, 0, 0, 0};
+  pack.book(block, lane) = {0, 0, 0, 0, first_kind(rules.faces, block)};
   set_poles(rules, pack, block, lane);
 }
 
@@ -162,6 +165,7 @@ inline void fill_scene(const AssemblyRules& rules, const PackMemory<Real>& pack,
     block.cell_y = book.cell_y;
     block.quarter = book.quarter;
     block.joined = book.joined;
+    block.kind = book.kind;
     block.turn = book.turn;
     block.offset_x = get(m.offset_x, lane);
     block.offset_y = get(m.offset_y, lane);
@@ -239,7 +243,9 @@ inline void read_block(const AssemblyRules& rules, const Scene& scene, const Pac
   pack.book(b, lane) = {static_cast<std::int16_t>(block.cell_x),
                         static_cast<std::int16_t>(block.cell_y),
                         static_cast<std::uint8_t>(block.quarter),
-                        static_cast<std::uint8_t>(block.joined), block.turn};
+                        static_cast<std::uint8_t>(block.joined),
+                        block.kind,
+                        block.turn};
   cover_faces(rules, pack, b, lane);
 }
 

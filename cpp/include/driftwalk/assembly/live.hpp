@@ -24,6 +24,7 @@ struct LiveBlocks {
   std::int32_t* assembly; // lowest block of its assembly
   std::int32_t* cell;     // [x, y] on the assembly's lattice
   std::int32_t* quarter;
+  std::int32_t* kind; // of typed faces
 };
 
 // Events of the last `advance`, as in AssemblyOutputs.
@@ -53,6 +54,8 @@ public:
   void set_rules(Latching latching, double hidden_share, double stirring_length);
   // The rate at which bonds break [1/s], and how far apart what has parted has to be [side].
   void set_bonds(double rate, double relatch_clearance);
+  // Blocks are of the kinds at the start again; the rules have to outlive the world.
+  void set_faces(const FaceRules* faces);
   // The tables have to outlive the world.
   void set_pull(const PullRules& pull);
   // Removes the last blocks, or adds blocks at random free places, at rest, as long as there are

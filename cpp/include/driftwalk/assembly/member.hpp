@@ -48,6 +48,7 @@ struct Sums {
 struct BlockBook {
   std::int16_t cell_x, cell_y;
   std::uint8_t quarter, joined;
+  std::uint8_t kind = 0; // of typed faces
   double turn = 0;
 };
 

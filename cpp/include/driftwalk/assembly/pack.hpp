@@ -75,6 +75,9 @@ public:
     book.key = key;
     book.bonds.count = 0;
     load_lane<Real, T>(rules_, start, memory_, own);
+    if (rules_.glued > 1) {
+      glue(own);
+    }
     for (int lane = own; lane < end_of(own); ++lane) {
       put(stream_.key0, lane, static_cast<UInt32>(key));
       put(stream_.key1, lane, static_cast<UInt32>(key >> 32));
@@ -158,6 +161,14 @@ public:
   }
 
 private:
+  void glue(int own) {
+    Scene& scene = scratch_.scene;
+    fill_scene(rules_, memory_, own, blocks_, scene);
+    glue_blocks(rules_, scene);
+    read_scene(rules_, scene, memory_, own);
+    books_[own].assemblies = scene.assemblies;
+  }
+
   void feel_pull() {
     if (!rules_.pull.on) {
       return;

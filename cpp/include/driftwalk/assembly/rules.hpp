@@ -1,6 +1,7 @@
 // What a batch of worlds with several blocks is: plain data, no logic.
 #pragma once
 
+#include "driftwalk/assembly/face_rules.hpp"
 #include "driftwalk/assembly/pull_rules.hpp"
 #include "driftwalk/simulate/prepared.hpp"
 
@@ -17,6 +18,9 @@ struct AssemblyRules {
   int blocks = 1;
   double side = 0, mass = 0, inertia = 0; // of one block
   bool round = false;                     // discs of this diameter instead of squares
+  // Blocks that are glued at the start, as many in a row as a body has; one: they start alone.
+  int glued = 1;
+  const std::int32_t* glued_cells = nullptr; // [glued][x, y] on the body's lattice
   // wall, as in BatchModel
   double radius = 0;
   const PreparedEdge<double>* edges = nullptr;
@@ -26,7 +30,8 @@ struct AssemblyRules {
   // between blocks
   double restitution = 0, friction = 0;
   Latching latching = Latching::collision;
-  double connector_distance = 0; // largest distance between the centres of two faces that latch
+  const FaceRules* faces = nullptr; // null: any face latches with any
+  double connector_distance = 0;    // largest distance between the centres of two faces that latch
   // Cosine of the largest angle between a face's normal and the other's opposite.
   double connector_cosine = 1;
   double hidden_share = 0; // of the drag of a free face that a joined face feels, 0 to 1

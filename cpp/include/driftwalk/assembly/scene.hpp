@@ -17,6 +17,7 @@ struct SceneBlock {
   int next;                  // next member of the assembly, -1 after the last
   int cell_x, cell_y;        // on the assembly's lattice
   int quarter;               // its own frame is the assembly's turned by this many quarter turns
+  std::uint8_t kind;         // of typed faces
   unsigned joined;           // bit f: face f (of the assembly's frame) has a neighbour
   double turn;               // of a disc, in place of the quarter turns [rad], 0 to 2 pi
   double offset_x, offset_y; // from the centre of mass, in the assembly's frame [m]
@@ -105,6 +106,8 @@ void settle(const AssemblyRules& rules, Scene& scene);
 // some goes on as it was moving; where its blocks no longer hang together it is several assemblies.
 // Those are marked as touched.
 void keep_first_blocks(const AssemblyRules& rules, Scene& scene, int blocks);
+// Glues blocks to the bodies of the start, each where its first block is.
+void glue_blocks(const AssemblyRules& rules, Scene& scene);
 // Makes every block an assembly of its own, which moves as the block did, with its own frame.
 void part_blocks(const AssemblyRules& rules, Scene& scene);
 

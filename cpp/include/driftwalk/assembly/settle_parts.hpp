@@ -131,6 +131,15 @@ void bond_assembly(const AssemblyRules& rules, Scene& scene, int assembly, Block
 bool are_unclear(const Scene& scene, int assembly, int other);
 // One line of the world's list of events; faces in the blocks' own frames.
 void record_event(Scene& scene, EventKind kind, const int (&blocks)[2], const int (&faces)[2]);
+// Whether the types of two faces, each in its assembly's frame, latch.
+bool types_latch(const FaceRules& faces, const SceneBlock& block, int face, const SceneBlock& other,
+                 int peer);
+// Whether a merge brings at least as many pairs of like poles side by side as pairs of faces that
+// latch: it would fall apart. `blocks_before` links the members of the two assemblies, of which
+// these are the first.
+bool poles_refuse(const FaceRules& faces, const Scene& scene, int stayed, int moved);
+// Makes two blocks what they become when these faces, in their own frames, have latched.
+void become(const FaceRules& faces, SceneBlock& block, int face, SceneBlock& other, int peer);
 
 // Merges what latches, one pair of faces after the other. Leaves the list of close pairs as it then
 // is.

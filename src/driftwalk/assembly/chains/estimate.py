@@ -196,7 +196,7 @@ def kinetics(
         "duration_s": duration,
         "confidence": KINETICS_POLICY.confidence,
         "seed": seed,
-        **_completion(found, model),
+        **completion(found, model),
         **({} if blocks is None else _other_blocks(found, mixing.word, blocks)),
     }
     return build_dataset("kinetics", data, coords, attrs)
@@ -425,14 +425,16 @@ def empirical_shares(found: Histories, time: Floats) -> Floats:
     return np.where(total > 0, count / np.maximum(total, 1.0), np.nan)
 
 
-def _completion(found: Histories, model: Model) -> dict[str, Any]:
+def completion(found: Histories, model: Model) -> dict[str, Any]:
     """Return the KS distance of the completion times and its 95 % floor, where runs complete."""
     whole = np.array(["+" not in name for name in found.classes])
-    first = whole[found.state] & np.r_[False, ~whole[found.state[:-1]]] & ~found.first
-    happened = np.sort(found.entry[first])
+    complete = whole[found.state]
+    # Where blocks part, a run is complete several times: the first counts.
+    happened = np.sort(found.entry[complete][np.unique(found.run[complete], return_index=True)[1]])
     if not happened.size:
         return {}
-    time, course = shares(model, found.recorded_s())
+    once = model._replace(hazard=np.where(whole[:, None, None, None], 0.0, model.hazard))
+    time, course = shares(once, found.recorded_s())
     seen = np.searchsorted(happened, time, side="right") / found.runs
     distance = float(np.abs(course[:, whole].sum(axis=1) - seen).max())
     return {"completion_ks": distance, "completion_ks_floor": 1.358 / np.sqrt(found.runs)}

@@ -21,6 +21,7 @@ from driftwalk.assembly.lattice.bonds import (
 )
 from driftwalk.assembly.lattice.many_blocks import DiscWorld, SquareWorld, replay_many
 from driftwalk.assembly.lattice.polyomino import STEPS, Chirality, name_of, require_chirality
+from driftwalk.assembly.lattice.typed_faces import FaceTable
 from driftwalk.assembly.outcomes.class_names import (
     class_name,
     listed_classes,
@@ -49,6 +50,8 @@ class ReplayedEvents(NamedTuple):
     """Names of the classes: all for up to 8 blocks, beyond that those that occurred."""
     shapes: tuple[str, ...]
     """Names of the shapes, by the same rule."""
+    kind: Integers | None = None
+    """Kinds of the blocks at the end, (run, block); None where faces have no types."""
 
 
 def replay_events(
@@ -61,6 +64,7 @@ def replay_events(
     assembly: npt.ArrayLike,
     event_kind: npt.ArrayLike | None = None,
     chirality: Chirality = "merged",
+    faces: FaceTable | None = None,
 ) -> ReplayedEvents:
     """Replay the events of simulated runs on the lattice.
 
@@ -83,6 +87,8 @@ def replay_events(
         formed. Default: all are joinings.
     chirality : {"merged", "distinct"}
         Whether mirror images are one shape or two.
+    faces : FaceTable, optional
+        Rules of typed faces; default: every face latches with every other.
 
     Returns
     -------
@@ -93,7 +99,8 @@ def replay_events(
     ------
     InputError
         When shapes disagree, an event cannot be (a face of no block, two blocks of one assembly, a
-        cell taken twice), or the events do not lead to the state at the end; names the run.
+        cell taken twice, faces whose types do not latch), or the events do not lead to the state at
+        the end; names the run.
 
     Examples
     --------
@@ -111,13 +118,15 @@ def replay_events(
     end = _Lattice(*map(_whole, (cell, quarter, assembly)))
     _check_arrays(events, end)
     blocks = end.assembly.shape[1]
+    kind = None if faces is None else _follow_kinds(events, faces, end.assembly.shape)
     if _is_many(events, blocks):
-        return _replay_many(events, end, lambda _: SquareWorld(blocks, chirality))
+        many = _replay_many(events, end, lambda _: SquareWorld(blocks, chirality))
+        return many._replace(kind=kind)
     replay = _Replay(end.assembly.shape, events, chirality=chirality)
     for event in range(int(events.number.max(initial=0))):
         replay.apply(event, np.flatnonzero(events.number > event), events)
     _check_end(replay.lattice, end)
-    return replay.result()
+    return replay.result()._replace(kind=kind)
 
 
 def replay_contacts(
@@ -181,6 +190,20 @@ def _replay_many(
     found = replay_many(events.number, events.block, events.face, world_of=world_of)
     _check_end(_Lattice(found.cell, found.quarter, found.assembly), end)
     return ReplayedEvents(*found[:6])
+
+
+def _follow_kinds(events: _Events, faces: FaceTable, shape: tuple[int, ...]) -> Integers:
+    """Return the kinds of the blocks at the end, and refuse faces that may not latch."""
+    kind = np.broadcast_to(faces.first_kinds(shape[1]), shape).copy()
+    for event in range(int(events.number.max(initial=0))):
+        at = np.flatnonzero(events.number > event)
+        if events.kind is not None:
+            at = at[events.kind[at, event] == JOINING]
+        pair = at[:, None], events.block[at, event]
+        holds, became = faces.latch(kind[pair], events.face[at, event])
+        _refuse(~holds, at, event, "joins two faces whose types do not latch")
+        kind[pair] = became
+    return kind
 
 
 class _Events(NamedTuple):

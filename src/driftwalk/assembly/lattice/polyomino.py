@@ -208,13 +208,14 @@ def _short_names(chirality: Chirality) -> dict[str, str]:
 
 
 def _canonical_code(cells: Cells, chirality: Chirality) -> str:
-    codes = [_code(turned) for turned in _orientations(cells, chirality)]
+    codes = [_code(turned) for turned in orientations(cells, chirality)]
     fewest = min(code.count("/") for code in codes)
     # Of codes with the same rows, "x" counts for more than ".".
     return max(code for code in codes if code.count("/") == fewest)
 
 
-def _orientations(cells: Cells, chirality: Chirality) -> Iterator[Cells]:
+def orientations(cells: Cells, chirality: Chirality) -> Iterator[Cells]:
+    """Give cells in all ways to turn them, and to mirror them where that is merged."""
     mirrored = [tuple((-x, y) for x, y in cells)] if chirality == "merged" else []
     for turned in (cells, *mirrored):
         for _ in range(4):

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from driftwalk.assembly.runs.glued import glued_cells
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
 
@@ -14,7 +15,10 @@ if TYPE_CHECKING:
 
 
 def require_bonds(study: Study) -> None:
-    """Refuse a strength of bonds under a force without memory or length, and a lone `bond_force_N`.
+    """Refuse bonds that cannot be as stated.
+
+    These are a strength under a force without memory or length, a lone `bond_force_N`, and glued
+    blocks whose bonds break.
 
     Raises
     ------
@@ -35,6 +39,11 @@ def require_bonds(study: Study) -> None:
         raise InputError(
             "`assembly.bond_force_N` scales a rate, and bonds have none: give "
             "`assembly.bond_rate_per_s` too"
+        )
+    if rules.bonds_break and glued_cells(rules) is not None:
+        raise InputError(
+            "glued blocks (`assembly.glued`) never part: let them start alone, or leave the bonds "
+            "permanent (`assembly.bond_rate_per_s` of 0)"
         )
 
 

@@ -15,7 +15,9 @@ import numpy.typing as npt
 
 from driftwalk.assembly.lattice.bonds import JOINING, PARTING
 from driftwalk.assembly.lattice.events import ReplayedEvents, replay_contacts, replay_events
+from driftwalk.assembly.lattice.typed_faces import face_table
 from driftwalk.assembly.runs.bonds import bond_attrs
+from driftwalk.assembly.runs.glued import glued_cells
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
@@ -80,6 +82,9 @@ def build_assembly(plan: Plan, arrays: Arrays, *, attrs: dict[str, Any]) -> xr.D
         data["event_face"] = (by_side, whole["event_face"])
         data["cell"] = ((*by_block, "axis"), whole["cell"])
         data["quarter"] = (by_block, whole["quarter"])
+    data |= _poles(plan)
+    if study.assembly.binding is not None and replayed.kind is not None:
+        data["kind"] = (by_block, replayed.kind.astype(np.int32))
     if plan.flow_draw is not None:
         data["flow_draw"] = ("run", plan.flow_draw.astype(np.int32))
     if plan.flow_start is not None:
@@ -117,6 +122,7 @@ def replay_of(plan: Plan, arrays: Arrays) -> ReplayedEvents:
         **{name: arrays[name] for name in ("cell", "quarter", "assembly")},
         event_kind=arrays.get("event_kind"),
         chirality=plan.study.assembly.chirality,
+        faces=face_table(plan.study.assembly),
     )
 
 
@@ -138,7 +144,7 @@ def build_path(plan: Plan, samples: Arrays, *, every: int) -> xr.Dataset:
     assembly = samples["sample_assembly"].astype(np.int32)
     return build_dataset(
         "assembly_path",
-        {**_poses(pose, dims), "assembly": (dims, assembly)},
+        {**_poses(pose, dims), "assembly": (dims, assembly), **_poles(plan)},
         {
             "run": ("run", plan.index),
             "time": ("time", time),
@@ -150,6 +156,15 @@ def build_path(plan: Plan, samples: Arrays, *, every: int) -> xr.Dataset:
             "sample_interval_s": float(np.round(every * step, DECIMALS)),
         },
     )
+
+
+def _poles(plan: Plan) -> dict[str, Any]:
+    """Return the poles of the blocks' faces, where there are any and no block changes them."""
+    table = face_table(plan.study.assembly)
+    if table is None or not table.pole.any() or table.rewrites:
+        return {}
+    kinds = table.first_kinds(plan.study.assembly.blocks)
+    return {"pole": (("block", "face"), table.pole[kinds])}
 
 
 def assembly_attrs(plan: Plan) -> dict[str, Any]:
@@ -169,12 +184,14 @@ def assembly_attrs(plan: Plan) -> dict[str, Any]:
         "chirality": settings.chirality,
         "latching": settings.latching,
         **(connector if settings.latching == "connector" else {}),
+        **({} if (faces := settings.typed_faces) is None else {"faces": faces.words}),
         "hidden_face_drag": "full" if plan.is_round else str(settings.hidden_face_drag),
         "block_restitution": settings.block_restitution,
         "block_friction": settings.block_friction,
         **bond_attrs(study),
         "block_side_m": study.block.side_m,
         **({"block_shape": "disc"} if plan.is_round else {}),
+        **({"glued": settings.glued} if glued_cells(settings) is not None else {}),
         "arena": study.tank.to_arena_json(),
         "force_interval_s": forces.force_interval_s,
         "time_step_s": study.time_step_s,

@@ -11,8 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
+from driftwalk.assembly.lattice.typed_faces import face_table
 from driftwalk.assembly.pull.tables import block_pull
 from driftwalk.assembly.runs.bonds import event_rows, require_bonds
+from driftwalk.assembly.runs.glued import glued_cells, with_glue_events
 from driftwalk.assembly.runs.start import given_start, place_blocks, require_cover, require_room
 from driftwalk.core.arrays import Floats, Integers, Keys
 from driftwalk.core.errors import InputError
@@ -87,6 +89,7 @@ class Plan:
                 *(rules.bond_rate_per_s, rules.bond_force_N, rules.bond_strength_N),
                 rules.relatch_clearance,
             ),
+            "faces": None if (table := face_table(rules)) is None else table.native(),
         }
 
 
@@ -218,8 +221,10 @@ def _simulate(plan: Plan, start: Floats, rows: slice, every: int, event_rows: in
         threads=plan.threads,
         precision="double" if plan.backend == "reference" else "single",
         flow_start=None if plan.flow_start is None else np.ascontiguousarray(plan.flow_start[rows]),
+        glued=(cells := glued_cells(plan.study.assembly)),
     )
-    return {name: values for name, values in found.items() if isinstance(values, np.ndarray)}
+    arrays = {name: values for name, values in found.items() if isinstance(values, np.ndarray)}
+    return with_glue_events(arrays, cells, plan.study.assembly.blocks)
 
 
 Stream = Literal["run", "parameters", "flow", "glued"]

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from driftwalk import _core
+from driftwalk.assembly.runs.glued import glued_cells
 from driftwalk.core.arrays import Floats, Keys
 from driftwalk.core.errors import InputError
 from driftwalk.schema import FLAGS, check_flow_field
@@ -35,20 +36,43 @@ def require_room(study: Study) -> None:
     if study.block.shape not in ("square", "disc"):
         raise InputError(
             f"squares and discs assemble, and the body is '{study.block.shape}' (`block.shape`): "
-            "start from the fit of one square block, or of a disc"
+            "start from the fit of one square block, or of a disc; squares may start glued "
+            "(`assembly.glued`)"
         )
+    if (cells := glued_cells(study.assembly)) is not None:
+        _require_glued(study, len(cells))
     if study.block.is_round and study.assembly.latching == "connector":
         raise InputError(
             "connectors latch face to face, and discs have no faces: latching is 'collision' or "
             "'none' for them (`assembly.latching`)"
         )
+    if study.block.is_round and study.assembly.typed_faces is not None:
+        raise InputError(
+            "discs have no faces: leave out their types (`assembly.faces`), or take squares"
+        )
     count, side, tank = study.assembly.blocks, study.block.side_m, study.tank
-    room = tank_area(tank)
-    if count * study.block.area_m2 > room:
+    area, room = count * study.block.area_m2, tank_area(tank)
+    if area > room:
         raise InputError(
             f"{count} blocks of {side:g} m do not fit into the tank, a {tank.describe()}: they "
-            f"cover {count * study.block.area_m2:.4g} m2, the tank {room:.4g} m2; use fewer blocks "
+            f"cover {area:.4g} m2, the tank {room:.4g} m2; use fewer blocks "
             "(`assembly.blocks`) or a larger tank"
+        )
+
+
+def _require_glued(study: Study, cells: int) -> None:
+    """Refuse glued blocks that make up no two bodies, discs, and faces with types."""
+    rules = study.assembly
+    if study.block.is_round or rules.typed_faces is not None:
+        raise InputError(
+            f"blocks start glued as '{rules.glued}' (`assembly.glued`) where they are squares "
+            "whose faces have no types"
+        )
+    if rules.blocks % cells or rules.blocks == cells:
+        raise InputError(
+            f"{rules.blocks} blocks make up no two bodies '{rules.glued}' or more "
+            f"(`assembly.glued`): give {2 * cells} blocks or a further multiple of {cells} "
+            "(`assembly.blocks`)"
         )
 
 
@@ -69,7 +93,9 @@ def place_blocks(study: Study, model: _core.Model, keys: Keys, *, threads: int) 
         When the blocks of a run find no place; names the run and how many of its blocks did.
     """
     count = study.assembly.blocks
-    start, placed = _core.place_blocks(model, blocks=count, key=keys, threads=threads)
+    start, placed = _core.place_blocks(
+        model, blocks=count, key=keys, threads=threads, glued=glued_cells(study.assembly)
+    )
     short = np.flatnonzero(placed < count)
     if short.size:
         run = int(short[0])
@@ -101,6 +127,10 @@ def given_start(study: Study, start: npt.ArrayLike, *, runs: int) -> Floats:
     InputError
         When the shape is another, a number is not finite, a block crosses the wall or two overlap.
     """
+    if glued_cells(study.assembly) is not None:
+        raise InputError(
+            "start: glued blocks start at random places; leave the poses out, or take single blocks"
+        )
     poses = np.asarray(start, dtype=np.float64)
     whole = (runs, study.assembly.blocks, 3)
     if poses.shape not in (whole, whole[1:]):

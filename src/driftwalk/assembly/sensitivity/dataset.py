@@ -160,7 +160,7 @@ def _reference_attrs(reference: xr.Dataset) -> dict[str, Any]:
     """Return where the reference lies, as far as it says."""
     facts = {"reference_runs": int(reference.attrs["runs"])}
     keys = (
-        "blocks", "latching", "hidden_face_drag", "drag_coefficient", "force_std_N",
+        "blocks", "latching", "faces", "hidden_face_drag", "drag_coefficient", "force_std_N",
         "realisations", "mean_pairwise_l1", "expected_pairwise_l1",
     )  # fmt: skip
     facts |= {f"reference_{key}": reference.attrs[key] for key in keys if key in reference.attrs}

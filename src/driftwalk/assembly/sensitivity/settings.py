@@ -352,6 +352,7 @@ KEYS: Final[dict[str, str]] = {
     "blocks": "assembly.blocks",
     "flow": "",
     "latching": "assembly.latching",
+    "faces": "assembly.faces",
     "hidden_face_drag": "assembly.hidden_face_drag",
     "stirring_length": "forces.stirring_length_m",
     "bond_rate": "assembly.bond_rate_per_s",

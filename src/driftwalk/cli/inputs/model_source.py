@@ -32,7 +32,8 @@ RUN_NAMES: Final = (
     *("blocks", "duration", "tank_diameter", "body_shape", "side", "mass", "depth"),
     *("drag_coefficient", "force_std", "force_interval"),
     *("wall_friction", "wall_restitution", "time_step"),
-    *("latching", "connector_distance", "connector_axis", "hidden_face_drag", "chirality"),
+    *("latching", "connector_distance", "connector_axis", "faces", "glued", "hidden_face_drag"),
+    "chirality",
     *("stirring_length", "stirring"),
     *("bond_rate", "bond_strength", "relatch_clearance"),
     *("magnets", "magnet_inset", "poles", "attraction", "capillary", "meniscus_height"),
@@ -220,6 +221,34 @@ def with_glued(given: StudyOptions, folder: Path | None) -> tuple[StudyOptions, 
     kept = {key: value for key, value in values.items() if key not in given.overrides}
     drawn = {key: values for key, values in quantiles.items() if key in kept}
     return given.and_also(kept, keys=given.keys), drawn
+
+
+def with_binding(given: StudyOptions, path: Path | None) -> StudyOptions:
+    """Return the options with the rules of typed faces of a file, and as many blocks as they count.
+
+    Raises
+    ------
+    ConfigurationError
+        When the file is wrong, or names another number of blocks than an option.
+    """
+    if path is None:
+        return given
+    from driftwalk.model import read_binding
+
+    found = read_binding(path)
+    rules = {
+        "assembly.blocks": found.blocks,
+        "assembly.binding": found.model_dump(exclude_unset=True),
+    }
+    wanted = given.overrides.get("assembly.blocks", found.blocks)
+    if "assembly.faces" in given.overrides:
+        raise InputError(f"--faces and --binding {path} both say which faces latch: give one")
+    if wanted != found.blocks:
+        raise InputError(
+            f"{path}: the kinds count {found.blocks} blocks, and --blocks says {wanted}; make them "
+            "the same"
+        )
+    return given.and_also(rules, keys=given.keys)
 
 
 def load_flow_for(path: Path, study: Study) -> xr.Dataset:

@@ -144,7 +144,12 @@ def assembly_summary(
     done += _parameters(distribution, assembly)
     rules = [
         f"{words} {facts[name]}"
-        for name, words in (("latching", "latching by"), ("hidden_face_drag", "hidden-face drag"))
+        for name, words in (
+            ("latching", "latching by"),
+            ("faces", "faces:"),
+            ("glued", "glued at the start as"),
+            ("hidden_face_drag", "hidden-face drag"),
+        )
         if name in facts
     ]
     done += f" ({', '.join(rules)})" if rules else ""
@@ -184,7 +189,7 @@ def attraction_section(attraction: xr.Dataset) -> Section:
     drawn = [
         series(words, gap[found > 0.0], found[found > 0.0])
         for words, found in (
-            ("measured by a balance", attraction["force"].values),
+            ("as stated", attraction["force"].values),
             ("in the simulation", attraction["simulated_force"].values),
         )
     ]

@@ -49,6 +49,7 @@ _NUMBERS: Final[dict[str, tuple[str, str, str]]] = {
 _WORDS: Final[dict[str, str]] = {
     "flow": "flow",
     "latching": "latching",
+    "faces": "faces",
     "hidden_face_drag": "drag on hidden faces",
     "magnets": "magnets",
 }

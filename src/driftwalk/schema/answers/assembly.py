@@ -75,6 +75,10 @@ def assembly_answer(
         f"C_d = {facts['drag_coefficient']:.4g}, σ_F = {1e3 * facts['force_std_N']:.4g} mN redrawn "
         f"every {1e3 * facts['force_interval_s']:g} ms"
     ]
+    if "glued" in facts:
+        parts.append(f"blocks start glued: {facts['glued']}")
+    if "faces" in facts:
+        parts.append(f"faces: {facts['faces']}")
     if attraction is not None:
         parts.append(attraction_words(attraction))
     if sizes is None:
@@ -100,6 +104,7 @@ def assembly_answer(
         **_json(found, sizes),
         **({} if steady is None else {"steady_state": steady_json(steady)}),
         **{key: facts[key] for key in _SETTINGS},
+        **({"faces": facts["faces"]} if "faces" in facts else {}),
         "drawn": None
         if drawn is None
         else {"parameters": _drawn(drawn), **_json(drawn, sizes_drawn)},

@@ -33,6 +33,10 @@ attributes (bonds break):
     bond_force_N number: tension that multiplies the rate by e; 0: the rate is constant
     bond_strength_N number: tension that breaks a bond at once; 0: none
     relatch_clearance number: distance of centres in sides from which parted blocks latch again
+attributes (blocks start glued to bodies):
+    glued text: rows of the blocks of a body; its joinings are those at time 0
+attributes (faces have types):
+    faces text: kinds of blocks, and which types of their faces latch
 attributes (latching by a connector):
     connector_distance_m number: tolerance of the connector
     connector_axis_rad number: tolerance of the connector
@@ -45,6 +49,11 @@ _CLASS: Final = (
 )
 _ORDER: Final = "first of the assembly that stayed, then of the one that was moved"
 _FACES: Final = "faces that joined, in the blocks' own frames: 0 +x, 1 +y, 2 -x, 3 -y"
+_POLES: Final = """
+variables (faces are magnets, and stay so):
+    pole(block face) [1] int: pole of the magnet at each face +x, +y, -x, -y of the block: 1 N, \
+        -1 S, 0 none
+"""
 _LOWEST: Final = "assembly of the block, as its lowest block"
 _NOWHERE: Final = "-1 where there is none"
 
@@ -60,6 +69,7 @@ dimensions:
     part: stayed, moved, became
     block: blocks
     axis: x, y
+    face: faces of a block, where they are magnets
     class: every class up to 8 squares; beyond that, and of discs, those that occurred
     shape: polyominoes; contact graphs of discs
 variables:
@@ -105,7 +115,9 @@ variables (drawn from a fit of glued blocks):
     stirring_length(run) [m]: distance over which blocks share the stochastic force
 variables (flow fields were drawn):
     flow_draw(run) int: which drawn flow field the run had
-attributes (made by a run):
+variables (blocks are of several kinds):
+    kind(run block) int: kind of the block at the end, by its place in the table of kinds
+{_POLES}attributes (made by a run):
     drawn text: what was drawn for each run, or "no"
 """,
     began_in_flow("run"),
@@ -125,6 +137,7 @@ dimensions:
     run: chosen runs
     time: samples
     block: blocks
+    face: faces of a block, where they are magnets
 variables:
     x({_PATH}) [m]: position x of the block's centre
     y({_PATH}) [m]: position y of the block's centre
@@ -133,7 +146,7 @@ variables:
     run int
     time(time) [s]: time from the start of the run
     block int
-attributes:
+{_POLES}attributes:
     sample_interval_s number: time between samples
 """,
     *SETTINGS,

@@ -16,6 +16,7 @@ variables (an axis):
     blocks(blocks) [1] int: number of blocks
     flow(flow) text: flow field
     latching(latching) text: when two blocks latch
+    faces(faces) text: types of the faces +x, +y, -x, -y of the blocks
     hidden_face_drag(hidden_face_drag) text: drag on joined faces; a word, or its share of a free \
         face's
     stirring_length(stirring_length) [m]: distance over which blocks share the stochastic force
@@ -30,6 +31,9 @@ attributes (the reference says so):
     reference_blocks number: blocks of the reference
     reference_latching text: latching of the reference
     reference_hidden_face_drag text: hidden faces of the reference
+attributes (the reference has typed faces):
+    reference_faces text: kinds of blocks, and which types of their faces latch
+attributes (the reference says so):
     reference_drag_coefficient number: where the reference lies
     reference_force_std_N number: where the reference lies
     reference_tank_diameter_m number: where the reference lies

@@ -188,6 +188,7 @@ class PlaySource(Playground):
             tank.y,
             shown_angles(tank),
             assembly=tank.assembly.tolist(),
+            poles=tank.poles.tolist(),
             waiting=tank.waiting,
             outcome=outcome,
             counts=shape_counts(outcome, tank.assembly),

@@ -102,6 +102,7 @@ KNOBS: Final = (
     Knob("blocks", "blocks", "1", 1, MOST_BLOCKS, 1, whole=True),
     Knob("flow_scale", "strength of the flow", "×", 0.0, 3.0, 0.05),
     Knob("latching", "latching", choices=("collision", "connector", "none")),
+    Knob("faces", "poles of the faces", choices=("any", "N,S,N,S", "N,N,S,S", "N,N,N,N")),
     Knob("hidden_face_drag", "drag on joined faces", choices=("none", "full")),
     Knob("stirring_length", "length of the stirring", "m", 0.0, 0.3, 0.005),
     Knob("bond_rate", "rate at which bonds break", "1/s", 0.0, 1.0, 0.01),
@@ -124,7 +125,7 @@ def knobs_for(tank: LiveTank, *, most_blocks: int) -> dict[str, Knob]:
     knobs = {knob.name: knob.reaching(values[knob.name]) for knob in KNOBS}
     if tank.is_round:
         # Discs have no faces.
-        del knobs["hidden_face_drag"], knobs["magnets"]
+        del knobs["hidden_face_drag"], knobs["faces"], knobs["magnets"]
         knobs["latching"] = replace(knobs["latching"], choices=("collision", "none"))
     return knobs | {"blocks": replace(knobs["blocks"], most=most_blocks)}
 
@@ -138,6 +139,7 @@ def values_of(tank: LiveTank, *, speed: float) -> dict[str, Any]:
         "blocks": rules.blocks,
         "flow_scale": tank.flow_scale,
         "latching": rules.latching,
+        "faces": rules.faces,
         "hidden_face_drag": str(rules.hidden_face_drag),
         "stirring_length": forces.stirring_length_m,
         "bond_rate": rules.bond_rate_per_s,
