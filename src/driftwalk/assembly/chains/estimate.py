@@ -36,6 +36,7 @@ from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.schema.answers.facts import texts
 from driftwalk.schema.check import build_dataset
+from driftwalk.schema.shapes import is_one_assembly
 from driftwalk.sweep import WorkUnit, grid, run_sweep
 
 if TYPE_CHECKING:
@@ -427,7 +428,7 @@ def empirical_shares(found: Histories, time: Floats) -> Floats:
 
 def completion(found: Histories, model: Model) -> dict[str, Any]:
     """Return the KS distance of the completion times and its 95 % floor, where runs complete."""
-    whole = np.array(["+" not in name for name in found.classes])
+    whole = np.array([is_one_assembly(name) for name in found.classes])
     complete = whole[found.state]
     # Where blocks part, a run is complete several times: the first counts.
     happened = np.sort(found.entry[complete][np.unique(found.run[complete], return_index=True)[1]])
