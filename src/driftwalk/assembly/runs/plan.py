@@ -127,8 +127,8 @@ def make_plan(
     Raises
     ------
     InputError
-        When an option is out of range, the blocks have no room, the flow does not cover the
-        tank, or is over before the runs.
+        When an option is out of range, the blocks have no room or are not as many as their kinds
+        count, the flow does not cover the tank, or is over before the runs.
     """
     from driftwalk.model import apply_overrides
 
@@ -143,6 +143,8 @@ def make_plan(
     chosen = apply_overrides(study, given)
     require_room(chosen)
     require_bonds(chosen)
+    if ends:  # the kinds of a live tank repeat
+        _require_kinds(chosen)
     require_cover(flow, chosen.tank)
     block_pull(chosen)  # its errors come before any run
     runs = np.arange(chosen.assembly.runs) if index is None else index
@@ -165,6 +167,16 @@ def make_plan(
         backend=backend,
         flow_start=flow_starts(flow, chosen, keys, duration=lasts),
     )
+
+
+def _require_kinds(study: Study) -> None:
+    """Refuse kinds that count other than the blocks of the study."""
+    rules = study.assembly
+    if rules.binding is not None and rules.binding.blocks != rules.blocks:
+        raise InputError(
+            f"binding: the kinds count {rules.binding.blocks} blocks, and there are "
+            f"{rules.blocks} (blocks): make them the same"
+        )
 
 
 def whole_steps(study: Study) -> int:
