@@ -13,6 +13,7 @@ from single_block import SIDE, model, swirl
 import driftwalk as dw
 from driftwalk.assembly import assembly_sizes, replay_events
 from driftwalk.assembly.lattice import events as module
+from driftwalk.assembly.lattice.events import replay_contacts
 from driftwalk.assembly.lattice.polyomino import shape_size
 from driftwalk.assembly.outcomes.class_names import sort_classes, world_class
 from driftwalk.assembly.outcomes.sizes import compactness
@@ -156,6 +157,19 @@ def test_discs_in_hundreds() -> None:
         assert shape_size(name) == own.size
         if own.size > 8:
             assert name.endswith(f", {(np.triu(apart < 0.0303, 1)).sum()} contacts")
+
+
+def test_a_ring_of_many_discs_has_its_name() -> None:
+    turn = np.arange(12) * np.pi / 6
+    places = np.stack([10.0 + np.arange(70), np.zeros(70)], axis=1)
+    places[:12] = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    pairs = [(k, k + 1) for k in range(11)]
+    made = replay_contacts(
+        [11], [pairs], pose=places[None], assembly=[[0] * 12 + list(range(12, 70))],
+        diameter=2 * np.sin(np.pi / 12),
+    )  # fmt: skip
+    became = [made.shapes[one] for one in made.event_shape[0, 7:, 2]]
+    assert became == ["chain9", "chain10", "chain11", "ring12"]
 
 
 def test_nothing_is_in_anything_among_three_hundred() -> None:

@@ -160,6 +160,10 @@ class DiscWorld(SquareWorld):
         """Return the name of the contact graph of a body."""
         members = self.members[body]
         if len(members) > MOST_DISCS:
+            met = (sum(self.body[one] == body for one in self.near[member]) for member in members)
+            if max(met) == 2:
+                word = "ring" if self.joins[body] == len(members) else "chain"
+                return f"{word}{len(members)}"
             return counted_graph(len(members), self.joins[body])
         place = {member: index for index, member in enumerate(members)}
         pairs = [(place[a], place[b]) for a in members for b in self.near[a] if b in place]
