@@ -12,7 +12,7 @@ import xarray as xr
 from chain_runs import CLASSES, RATES, chain_runs, rate_matrix
 
 import driftwalk as dw
-from driftwalk.assembly.chains.estimate import completion, empirical_shares
+from driftwalk.assembly.chains.estimate import _other_blocks, completion, empirical_shares
 from driftwalk.assembly.chains.hidden import FORMS, Form, Model, fit, log_likelihood
 from driftwalk.assembly.chains.histories import histories
 from driftwalk.assembly.chains.mixing import holm, mixing_tests, score
@@ -269,6 +269,9 @@ def test_glued_blocks_start_in_the_class_of_their_bodies() -> None:
     assert found.classes == ("2+2", "O")
     assert found.duration.tolist() == [4.0, 1.0]
     assert found.joins == 1
+    assert _other_blocks(found, "well mixed", 6)["other_blocks_refused"].endswith(
+        "no run starts with single blocks"
+    )
 
 
 def test_classes_that_count_assemblies_have_no_rates() -> None:

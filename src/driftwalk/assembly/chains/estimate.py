@@ -450,6 +450,12 @@ def _other_blocks(found: Histories, verdict: str, blocks: int) -> dict[str, Any]
         }
     own = blocks_of(found.classes[0])
     apart = found.first & np.array([set(n.split("+")) == {"1"} for n in found.classes])[found.state]
+    if not apart.any():
+        return {
+            "other_blocks": blocks,
+            "other_blocks_refused": f"no rate for {blocks} blocks is extrapolated: no run starts "
+            "with single blocks",
+        }
     joins, spent = (found.target[apart] >= 0).sum(), found.duration[apart].sum()
     pairs = blocks * (blocks - 1) / (own * (own - 1))
     rate = float(pairs * joins / spent)
