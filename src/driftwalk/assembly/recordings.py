@@ -172,8 +172,8 @@ def _dataset(
     joined, blocks = history.joined, poses.x.shape[1]
     names = {*history.outcome, *(event.outcome for event in (*joined, *history.split))}
     classes = listed_classes(names, blocks, chirality=history.chirality)
-    parts = {shape for name in names for shape in name.split("+")}
-    shapes = listed_shapes(parts, blocks, chirality=history.chirality)
+    parts = {shape for event in joined for shape in event.shapes}
+    shapes = listed_shapes({"1", *parts}, blocks, chirality=history.chirality)
     known = ~_unknown_blocks(poses, rules.hold)
     sound: Bools = np.logical_and.reduce(known, axis=1)
     outcome = np.where(sound, _places(history.outcome, classes), UNKNOWN).astype(np.int32)

@@ -135,15 +135,8 @@ class Assembly(Section):
 
     @model_validator(mode="after")
     def _one_rule(self) -> Self:
-        if self.binding is None:
-            return self
-        if self.faces != "any":
+        if self.binding is not None and self.faces != "any":
             raise ConfigurationError("faces and binding both say which faces latch: give one")
-        if self.binding.blocks != self.blocks:
-            raise ConfigurationError(
-                f"binding: the kinds count {self.binding.blocks} blocks, and there are "
-                f"{self.blocks} (blocks): make them the same"
-            )
         return self
 
     @property

@@ -1,8 +1,8 @@
 """Names of the contact graphs of discs, as they stand in the outcome classes of datasets.
 
 A graph has a name of the literature (chain4, star4, ring4, triangle, paw, diamond) or is called by
-its contacts, the discs being letters: ``ab.ac.ad.be``. Of more than 8 discs only the two counts are
-said: ``9 discs, 10 contacts``.
+its contacts, the discs being letters: ``ab.ac.ad.be``. Of more than 8 discs only chains and rings
+have a name, and of others the two counts are said: ``9 discs, 10 contacts``.
 """
 
 from __future__ import annotations

@@ -68,6 +68,18 @@ def all_single(blocks: int) -> str:
     return counted_class(blocks) if blocks > MOST_NAMED else "+".join(["1"] * blocks)
 
 
+def counted_assemblies(name: str) -> int:
+    """Return how many assemblies a counted class says, 0 of a class that names its shapes.
+
+    Examples
+    --------
+    >>> counted_assemblies("12 assemblies"), counted_assemblies("2+2")
+    (12, 0)
+    """
+    counted = _ASSEMBLIES.fullmatch(name)
+    return int(counted[1]) if counted else 0
+
+
 def is_one_assembly(name: str) -> bool:
     """Return whether all blocks of an outcome class are in one assembly.
 
@@ -76,8 +88,7 @@ def is_one_assembly(name: str) -> bool:
     >>> [is_one_assembly(name) for name in ("T", "2+2", "1 assembly", "12 assemblies")]
     [True, False, True, False]
     """
-    counted = _ASSEMBLIES.fullmatch(name)
-    return counted[1] == "1" if counted else "+" not in name
+    return counted_assemblies(name) == 1 or not (counted_assemblies(name) or "+" in name)
 
 
 def short_class(name: str) -> str:

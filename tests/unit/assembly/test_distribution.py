@@ -205,3 +205,10 @@ def test_wrong_counts_and_runs_are_said() -> None:
         sampling_variance(0.5, 1)
     with pytest.raises(InputError, match="numbers from 0 to 1"):
         sampling_variance(1.5, 10)
+
+
+def test_counts_of_many_blocks_have_a_distribution() -> None:
+    found = outcome_distribution({"37 assemblies": 3, "1 assembly": 1})
+    assert found.attrs["complete"] == 0.25
+    assert "blocks" not in found.attrs
+    assert "37 assemblies" in repr(found)

@@ -12,7 +12,7 @@ import xarray as xr
 from chain_runs import CLASSES, RATES, chain_runs, rate_matrix
 
 import driftwalk as dw
-from driftwalk.assembly.chains.estimate import completion, empirical_shares
+from driftwalk.assembly.chains.estimate import _other_blocks, completion, empirical_shares
 from driftwalk.assembly.chains.hidden import FORMS, Form, Model, fit, log_likelihood
 from driftwalk.assembly.chains.histories import histories
 from driftwalk.assembly.chains.mixing import holm, mixing_tests, score
@@ -251,3 +251,34 @@ def test_histories_go_back_where_blocks_part() -> None:
     cut = found.until(6.0)
     assert cut.duration.tolist() == [2.0, 3.0, 1.0]
     assert cut.target.tolist() == [0, 1, -1]
+
+
+def test_glued_blocks_start_in_the_class_of_their_bodies() -> None:
+    """Two dimers: what is glued at time 0 is no transition."""
+    runs = xr.Dataset(
+        {
+            "outcome": ("run", [0]),
+            "event_time": (("run", "event"), [[0.0, 0.0, 4.0]]),
+            "event_class": (("run", "event"), [[2, 1, 0]]),
+            "end_time": ("run", [5.0]),
+        },
+        {"class": ["O", "2+2", "2+1+1", "1+1+1+1"]},
+        {"kind": "assembly", "blocks": 4},
+    )
+    found = histories([runs])
+    assert found.classes == ("2+2", "O")
+    assert found.duration.tolist() == [4.0, 1.0]
+    assert found.joins == 1
+    assert _other_blocks(found, "well mixed", 6)["other_blocks_refused"].endswith(
+        "no run starts with single blocks"
+    )
+
+
+def test_classes_that_count_assemblies_have_no_rates() -> None:
+    recording = xr.Dataset(
+        {"outcome": ("time", [1, 0])},
+        {"time": [0.0, 1.0], "class": ["69 assemblies", "70 assemblies"]},
+        {"kind": "classification", "blocks": 70},
+    )
+    with pytest.raises(InputError, match=r"'70 assemblies' counts .* use at most 64 blocks"):
+        histories([recording])

@@ -13,10 +13,12 @@ from single_block import SIDE, model, swirl
 import driftwalk as dw
 from driftwalk.assembly import assembly_sizes, replay_events
 from driftwalk.assembly.lattice import events as module
+from driftwalk.assembly.lattice.events import replay_contacts
 from driftwalk.assembly.lattice.polyomino import shape_size
-from driftwalk.assembly.outcomes.class_names import world_class
+from driftwalk.assembly.outcomes.class_names import sort_classes, world_class
 from driftwalk.assembly.outcomes.sizes import compactness
 from driftwalk.core.errors import InputError
+from driftwalk.schema import build_trajectory
 from driftwalk.schema.shapes import all_single, counts_of_shape, is_one_assembly
 from driftwalk.viewer.play.playground import shape_counts
 
@@ -52,6 +54,44 @@ def test_run_after_run_is_as_side_by_side(monkeypatch: pytest.MonkeyPatch) -> No
     for own, number in ((names.outcome, counted.outcome), (names.event_class, counted.event_class)):
         assemblies = [1 + names.classes[one].count("+") for one in own[own >= 0]]
         assert [int(counted.classes[one].split()[0]) for one in number[own >= 0]] == assemblies
+
+
+def test_many_blocks_that_part_are_replayed_one_run_at_a_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # No (run, block, block) array: a run of 2000 blocks would have 4 MB of it.
+    monkeypatch.delattr(module, "BondGraph")
+    bar = np.zeros((2, 70, 2), dtype=int)
+    made = replay_events(
+        [3, 2],
+        [[[0, 1], [0, 1], [4, 2]], [[0, 1], [1, 0], [0, 0]]],
+        [[[0, 2], [0, 2], [0, 2]], [[0, 2], [2, 0], [0, 0]]],
+        event_kind=[[0, 1, 0], [0, 1, 0]],
+        cell=np.where(np.arange(70)[:, None] == 2, [[[1, 0]], [[0, 0]]], bar),
+        quarter=np.zeros((2, 70), dtype=int),
+        assembly=[[0, 1, 2, 3, 2, *range(5, 70)], list(range(70))],
+    )
+    assert [made.classes[one] for one in made.event_class[0]] == [
+        *("69 assemblies", "70 assemblies", "69 assemblies")
+    ]
+    assert [made.classes[one] for one in made.outcome] == ["69 assemblies", "70 assemblies"]
+    assert [made.shapes[one] for one in made.event_shape[0, 1]] == ["1", "1", "2"]
+
+
+def test_the_class_of_the_start_is_listed_and_classes_are_in_order() -> None:
+    raw = raw_arrays([random_run(70, np.random.default_rng(5), stop=1.0)], 70)
+    assert "70 assemblies" in replay_events(**raw).classes
+    names = ["70 assemblies", "9 assemblies", "1 assembly", "12 assemblies"]
+    assert sort_classes(names) == ("1 assembly", "9 assemblies", "12 assemblies", "70 assemblies")
+
+
+def test_a_recording_of_many_blocks_is_classified() -> None:
+    x = 0.1 * np.arange(70) * np.ones((3, 1))
+    x[:, 1] = 0.03
+    none = np.zeros_like(x)
+    found = dw.classify(build_trajectory(np.arange(3.0), x, none, none), side=0.03)
+    assert found["class"].values[found["outcome"].values].tolist() == ["69 assemblies"] * 3
+    assert found["shape"].values.tolist() == ["1", "2"]
 
 
 def test_what_cannot_be_names_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -117,6 +157,19 @@ def test_discs_in_hundreds() -> None:
         assert shape_size(name) == own.size
         if own.size > 8:
             assert name.endswith(f", {(np.triu(apart < 0.0303, 1)).sum()} contacts")
+
+
+def test_a_ring_of_many_discs_has_its_name() -> None:
+    turn = np.arange(12) * np.pi / 6
+    places = np.stack([10.0 + np.arange(70), np.zeros(70)], axis=1)
+    places[:12] = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    pairs = [(k, k + 1) for k in range(11)]
+    made = replay_contacts(
+        [11], [pairs], pose=places[None], assembly=[[0] * 12 + list(range(12, 70))],
+        diameter=2 * np.sin(np.pi / 12),
+    )  # fmt: skip
+    became = [made.shapes[one] for one in made.event_shape[0, 7:, 2]]
+    assert became == ["chain9", "chain10", "chain11", "ring12"]
 
 
 def test_nothing_is_in_anything_among_three_hundred() -> None:

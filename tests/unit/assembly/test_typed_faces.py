@@ -245,13 +245,28 @@ def test_what_is_wrong_in_a_file_of_rules(old: str, new: str, words: str, tmp_pa
         ({"faces": "N,S,N"}, "such as N,S,N,S; got 'N,S,N'"),
         ({"faces": "N,S,N,x"}, "a face is N, S or none, got 'x'"),
         ({"faces": "N,S,N,S", "binding": HOOKS}, "both say which faces latch"),
-        ({"blocks": 5, "binding": HOOKS}, "the kinds count 4 blocks, and there are 5"),
     ],
 )
 def test_what_is_wrong_in_a_study(values: dict[str, Any], words: str) -> None:
     with pytest.raises(ConfigurationError) as caught:
         Study(assembly=values)
     assert words in str(caught.value)
+
+
+def test_kinds_count_the_blocks_of_runs_and_repeat_in_a_live_tank() -> None:
+    study, still = Study(assembly={"binding": HOOKS}), dw.uniform_flow(0.0, 0.0)
+    with pytest.raises(InputError, match="the kinds count 4 blocks, and there are 5"):
+        assemble(study, still, blocks=5, runs=1, duration=0.1)
+    tank = dw.LiveTank(study, still)
+    tank.set(blocks=7)
+    tank.advance(1.0)
+    tank.set(blocks=3)
+    tank.restart()
+    assert tank.blocks == 3
+    tank.set(blocks=6)
+    tank.advance(1.0)
+    kinds = tank._world.state()["kind"].tolist()
+    assert kinds == [0, 0, 1, 1, 0, 0]
 
 
 def test_discs_have_no_faces() -> None:

@@ -22,8 +22,9 @@ from driftwalk.model import Study
 from driftwalk.page.html import page_frame
 from driftwalk.schema import Parameter
 from driftwalk.sweep import grid
+from driftwalk.viewer.watch.assembly import _items
 from driftwalk.viewer.watch.run_page import RunSource
-from driftwalk.viewer.watch.sensitivity import RunningSensitivity
+from driftwalk.viewer.watch.sensitivity import RunningSensitivity, _blocks
 from driftwalk.viewer.watch.shards import StoreReader
 
 DRAG, FORCE = [0.2, 0.3, 0.4], [1e-4, 2e-4, 3e-4, 4e-4]
@@ -585,3 +586,9 @@ def test_what_is_no_run_is_refused(tmp_path: Path, run: RunDirectory) -> None:
     ):
         with pytest.raises(InputError, match=words):
             RunSource(tmp_path / name)
+
+
+def test_counted_classes_under_way() -> None:
+    counts = Counter({"37 assemblies": 3, "70 assemblies": 1})
+    assert _blocks(counts) == 0
+    assert [one["class"] for one in _items(counts, 0.9)] == ["37 assemblies", "70 assemblies"]

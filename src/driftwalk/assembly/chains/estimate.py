@@ -36,6 +36,7 @@ from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.schema.answers.facts import texts
 from driftwalk.schema.check import build_dataset
+from driftwalk.schema.shapes import is_one_assembly
 from driftwalk.sweep import WorkUnit, grid, run_sweep
 
 if TYPE_CHECKING:
@@ -427,7 +428,7 @@ def empirical_shares(found: Histories, time: Floats) -> Floats:
 
 def completion(found: Histories, model: Model) -> dict[str, Any]:
     """Return the KS distance of the completion times and its 95 % floor, where runs complete."""
-    whole = np.array(["+" not in name for name in found.classes])
+    whole = np.array([is_one_assembly(name) for name in found.classes])
     complete = whole[found.state]
     # Where blocks part, a run is complete several times: the first counts.
     happened = np.sort(found.entry[complete][np.unique(found.run[complete], return_index=True)[1]])
@@ -449,6 +450,12 @@ def _other_blocks(found: Histories, verdict: str, blocks: int) -> dict[str, Any]
         }
     own = blocks_of(found.classes[0])
     apart = found.first & np.array([set(n.split("+")) == {"1"} for n in found.classes])[found.state]
+    if not apart.any():
+        return {
+            "other_blocks": blocks,
+            "other_blocks_refused": f"no rate for {blocks} blocks is extrapolated: no run starts "
+            "with single blocks",
+        }
     joins, spent = (found.target[apart] >= 0).sum(), found.duration[apart].sum()
     pairs = blocks * (blocks - 1) / (own * (own - 1))
     rate = float(pairs * joins / spent)

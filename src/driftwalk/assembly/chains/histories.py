@@ -12,7 +12,7 @@ from driftwalk.assembly.outcomes.class_names import class_shapes
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.schema.check import kind_name
-from driftwalk.schema.shapes import all_single
+from driftwalk.schema.shapes import MOST_NAMED, all_single, counted_assemblies
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -109,6 +109,11 @@ def histories(datasets: Sequence[xr.Dataset], *, classes: Sequence[str] | None =
                 f"{kind!r}"
             )
         rows += _of_runs(found) if kind == "assembly" else _of_recording(found)
+    if counted := [name for row in rows for name in row[0] if counted_assemblies(name)]:
+        raise InputError(
+            f"the class '{counted[0]}' counts assemblies, as classes of more than {MOST_NAMED} "
+            f"blocks do, and rates are between shapes: use at most {MOST_NAMED} blocks"
+        )
     names = tuple(dict.fromkeys([*(classes or ()), *(name for row in rows for name in row[0])]))
     if not rows:
         raise InputError("no run has an outcome class: there is nothing to estimate rates from")
@@ -179,7 +184,9 @@ def _of_runs(assembly: xr.Dataset) -> list[tuple[list[str], Floats, float]]:
     for at in np.flatnonzero(assembly["outcome"].values >= 0):
         real = np.isfinite(time[at]) & (after[at] >= 0)
         passed = [start, *(names[index] for index in after[at][real])]
-        rows.append(_merged(passed, np.r_[0.0, time[at][real]], float(end[at])))
+        entry = np.r_[0.0, time[at][real]]
+        begun = int(np.flatnonzero(entry == 0.0)[-1])  # glued blocks join at time 0
+        rows.append(_merged(passed[begun:], entry[begun:], float(end[at])))
     return rows
 
 

@@ -119,7 +119,7 @@ def replay_events(
     _check_arrays(events, end)
     blocks = end.assembly.shape[1]
     kind = None if faces is None else _follow_kinds(events, faces, end.assembly.shape)
-    if _is_many(events, blocks):
+    if blocks > MOST_NAMED:
         many = _replay_many(events, end, lambda _: SquareWorld(blocks, chirality))
         return many._replace(kind=kind)
     replay = _Replay(end.assembly.shape, events, chirality=chirality)
@@ -166,7 +166,7 @@ def replay_contacts(
     events = _Events(_whole(event_count), block, np.zeros_like(block), _kinds(event_kind))
     end = _Lattice(np.zeros((*labels.shape, 2), np.int64), np.zeros_like(labels), labels)
     _check_arrays(events, end)
-    if _is_many(events, end.assembly.shape[1]):
+    if end.assembly.shape[1] > MOST_NAMED:
         reach = diameter * (1.0 + CONTACT_POLICY.gap) if events.kind is None else 0.0
         return _replay_many(events, end, lambda run: DiscWorld(pose[run], reach=reach))
     replay = _DiscReplay(pose, events, diameter=diameter)
@@ -176,18 +176,10 @@ def replay_contacts(
     return replay.result()
 
 
-def _is_many(events: _Events, blocks: int) -> bool:
-    """Return whether runs are replayed one after the other: of many blocks that never part."""
-    if events.kind is None:
-        return blocks > MOST_NAMED
-    real = np.arange(events.kind.shape[1]) < events.number[:, None]
-    return blocks > MOST_NAMED and not events.kind[real].any()
-
-
 def _replay_many(
     events: _Events, end: _Lattice, world_of: Callable[[int], SquareWorld]
 ) -> ReplayedEvents:
-    found = replay_many(events.number, events.block, events.face, world_of=world_of)
+    found = replay_many(*events, blocks=end.assembly.shape[1], world_of=world_of)
     _check_end(_Lattice(found.cell, found.quarter, found.assembly), end)
     return ReplayedEvents(*found[:6])
 

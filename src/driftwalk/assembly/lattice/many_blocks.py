@@ -160,6 +160,10 @@ class DiscWorld(SquareWorld):
         """Return the name of the contact graph of a body."""
         members = self.members[body]
         if len(members) > MOST_DISCS:
+            met = (sum(self.body[one] == body for one in self.near[member]) for member in members)
+            if max(met) == 2:
+                word = "ring" if self.joins[body] == len(members) else "chain"
+                return f"{word}{len(members)}"
             return counted_graph(len(members), self.joins[body])
         place = {member: index for index, member in enumerate(members)}
         pairs = [(place[a], place[b]) for a in members for b in self.near[a] if b in place]
@@ -192,6 +196,7 @@ def replay_many(
     face: Integers,
     kind: Integers | None = None,
     *,
+    blocks: int,
     world_of: Callable[[int], SquareWorld],
 ) -> ManyReplayed:
     """Replay the events of runs of many blocks.
@@ -204,6 +209,8 @@ def replay_many(
         As in `replay_events`.
     kind : ndarray of int, shape (runs, events), optional
         As in `replay_events`.
+    blocks : int
+        Blocks of each run.
     world_of : callable
         The world of a run at its start.
 
@@ -213,13 +220,14 @@ def replay_many(
         When an event cannot be; names the run.
     """
     runs, slots = block.shape[:2]
-    worlds = [world_of(run) for run in range(runs)]
-    blocks = len(worlds[0].body) if worlds else 0
+    cell = np.zeros((runs, blocks, 2), dtype=np.int64)
+    quarter, assembly = (np.zeros((runs, blocks), dtype=np.int64) for _ in range(2))
     known = {"1": 0}
     event_assembly = np.full((runs, slots, 2), -1, dtype=np.int32)
     event_shape = np.full((runs, slots, 3), -1, dtype=np.int32)
     kinds = np.zeros((runs, slots), dtype=np.int64) if kind is None else kind
-    for run, world in enumerate(worlds):
+    for run in range(runs):
+        world = world_of(run)
         shape_of = [0] * blocks
         last, told = number[run], kinds[run].tolist()
         for event in range(last):
@@ -247,13 +255,15 @@ def replay_many(
                 raise InputError(f"run {run}, event {event}: {error}") from None
             event_assembly[run, event] = lowest
             event_shape[run, event] = *parts, became
+        cell[run], quarter[run] = world.cell, world.quarter
+        assembly[run] = [world.lowest[body] for body in world.body]
     # A joining leaves one assembly less, a parting one more; the place of a class among those that
     # occurred.
     happened = np.arange(slots) < number[:, None]
     change = happened * ((kinds == PARTING).astype(np.int64) - (kinds == JOINING))
     left = blocks + change.cumsum(axis=1)
     at_end = blocks + change.sum(axis=1)
-    occurred = np.unique(np.concatenate([at_end, left[happened]]))
+    occurred = np.unique(np.concatenate([[blocks], at_end, left[happened]]))
     place = np.full(blocks + 1, -1, dtype=np.int32)
     place[occurred] = np.arange(occurred.size)
     shapes = tuple(sorted(known, key=shape_order))
@@ -266,9 +276,7 @@ def replay_many(
         place[at_end],
         tuple(counted_class(int(one)) for one in occurred),
         shapes,
-        np.array([world.cell for world in worlds]).reshape(runs, blocks, 2),
-        np.array([world.quarter for world in worlds]).reshape(runs, blocks),
-        np.array([[world.lowest[body] for body in world.body] for world in worlds]),
+        *(cell, quarter, assembly),
     )
 
 

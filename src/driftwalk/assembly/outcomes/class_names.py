@@ -26,7 +26,7 @@ from driftwalk.assembly.lattice.polyomino import (
 )
 from driftwalk.core.errors import InputError
 from driftwalk.schema.contact_graphs import discs_of
-from driftwalk.schema.shapes import MOST_NAMED, counted_class
+from driftwalk.schema.shapes import MOST_NAMED, counted_assemblies, counted_class
 
 MOST_BLOCKS = 8
 """Blocks up to which all classes are listed; of more, those that occur. Chosen by hand."""
@@ -258,6 +258,8 @@ def listed_shapes(
 
 
 def _class_order(name: str) -> tuple[list[int], list[tuple[int, int, str, str]]]:
+    if counted := counted_assemblies(name):
+        return [counted], []
     shapes = name.split("+")
     return [-shape_size(shape) for shape in shapes], [shape_order(shape) for shape in shapes]
 

@@ -17,7 +17,7 @@ from driftwalk.assembly.outcomes.class_names import class_shapes
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.schema.check import build_dataset, require_kind
-from driftwalk.schema.shapes import all_single, is_one_assembly
+from driftwalk.schema.shapes import all_single, counted_assemblies, is_one_assembly
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -99,7 +99,7 @@ def outcome_distribution(
         raise InputError("time: plain counts have no times; give the assembly dataset")
     else:
         names, count = _checked_counts(assembly_or_counts)
-        attrs = {"left_out": 0, "blocks": _blocks(names)}
+        attrs = {"left_out": 0, **_blocks(names)}
     return _dataset(names, count, confidence, attrs)
 
 
@@ -282,10 +282,12 @@ def _checked_counts(counts: Mapping[str, int]) -> tuple[list[str], Integers]:
     return [str(name) for name in counts], np.array([int(n) for n in counts.values()], np.int64)
 
 
-def _blocks(names: list[str]) -> int:
-    """Return of how many blocks the classes are."""
+def _blocks(names: list[str]) -> dict[str, int]:
+    """Return of how many blocks the classes are, nothing of counted ones, which do not say it."""
     if not names:
         raise InputError("there are no classes: a distribution needs at least one")
+    if all(map(counted_assemblies, names)):
+        return {}
     sizes = {name: sum(shape_size(shape) for shape in class_shapes(name)) for name in names}
     first, last = min(names, key=sizes.__getitem__), max(names, key=sizes.__getitem__)
     if sizes[first] < sizes[last]:
@@ -293,7 +295,7 @@ def _blocks(names: list[str]) -> int:
             f"class '{first}' is of {sizes[first]} blocks and class '{last}' of {sizes[last]}: "
             "a distribution has one number of blocks"
         )
-    return sizes[first]
+    return {"blocks": sizes[first]}
 
 
 def _dataset(

@@ -130,8 +130,8 @@ def make_plan(
     Raises
     ------
     InputError
-        When an option is out of range, the blocks have no room, the flow does not cover the
-        tank, or is over before the runs.
+        When an option is out of range, the blocks have no room or are not as many as their kinds
+        count, the flow does not cover the tank, or is over before the runs.
     """
     from driftwalk.model import apply_overrides
 
@@ -146,6 +146,8 @@ def make_plan(
     chosen = apply_overrides(study, given)
     require_room(chosen)
     require_bonds(chosen)
+    if ends:  # the kinds of a live tank repeat
+        _require_kinds(chosen)
     require_cover(flow, chosen.tank)
     table = table_of(chosen)
     block_pull(chosen, table)  # its errors come before any run
@@ -170,6 +172,16 @@ def make_plan(
         flow_start=flow_starts(flow, chosen, keys, duration=lasts),
         attraction=table,
     )
+
+
+def _require_kinds(study: Study) -> None:
+    """Refuse kinds that count other than the blocks of the study."""
+    rules = study.assembly
+    if rules.binding is not None and rules.binding.blocks != rules.blocks:
+        raise InputError(
+            f"binding: the kinds count {rules.binding.blocks} blocks, and there are "
+            f"{rules.blocks} (blocks): make them the same"
+        )
 
 
 def whole_steps(study: Study) -> int:

@@ -108,7 +108,7 @@ def assembly_answer(
         **_json(found, sizes),
         **({} if steady is None else {"steady_state": steady_json(steady)}),
         **{key: facts[key] for key in _SETTINGS},
-        **({"faces": facts["faces"]} if "faces" in facts else {}),
+        **{key: facts[key] for key in ("glued", "faces") if key in facts},
         "drawn": None
         if drawn is None
         else {"parameters": _drawn(drawn), **_json(drawn, sizes_drawn)},

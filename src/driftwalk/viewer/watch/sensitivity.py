@@ -25,6 +25,7 @@ from driftwalk.page.sections.outcomes import cells_of
 from driftwalk.page.sections.sensitivity_maps import AXES, axis_words, over_time_part, ranked_axes
 from driftwalk.plot.parts.assembly_labels import classes_to_show
 from driftwalk.plot.parts.polyomino_sketch import are_discs
+from driftwalk.schema.shapes import counted_assemblies
 from driftwalk.viewer.watch.run_page import NO_CELL, Running, Section
 
 if TYPE_CHECKING:
@@ -171,10 +172,11 @@ def _shares(count: Mapping[str, int]) -> dict[str, float]:
 
 
 def _blocks(count: Mapping[str, int]) -> int:
-    """Return the number of blocks of the classes that were counted."""
+    """Return the number of blocks of the classes that were counted, 0 where these do not say it."""
     from driftwalk.assembly.lattice.polyomino import shape_size
 
-    return sum(map(shape_size, next(iter(count)).split("+"))) if count else 0
+    name = next(iter(count), None)
+    return 0 if name is None or counted_assemblies(name) else sum(map(shape_size, name.split("+")))
 
 
 def _axis(name: str, values: tuple[Any, ...]) -> dict[str, Any]:

@@ -48,6 +48,12 @@ def answered(form: str) -> tuple[xr.Dataset, Answer]:
     return found, answer
 
 
+def test_json_says_how_blocks_start() -> None:
+    found = stored("outcome-distribution").assign_attrs(glued="xx")
+    answer = assembled(small(), AssemblyResult(found, found, stored("class-times"), None))
+    assert json.loads(to_json(answer.facts))["glued"] == "xx"
+
+
 def _rounded(text: str) -> Any:
     """Return what JSON holds; the last digits of numbers depend on the processor."""
     return json.loads(text, parse_float=lambda number: float(f"{float(number):.12g}"))
