@@ -271,7 +271,6 @@ def test_a_calibration_without_bootstrap_gives_one_distribution(
         (["--runs", "0"], "'--runs'"),
         (["--duration", "0"], "--duration"),
         (["--duration", "5mm"], "--duration"),
-        (["--tank", "50x50cm"], "the flow field does not cover the tank"),
         (["--latching", "conector"], "did you mean 'connector'?"),
         (["--chirality", "left"], "--chirality over"),
         (["--hidden-face-drag", "2"], "--hidden-face-drag over"),
