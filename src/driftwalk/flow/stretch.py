@@ -39,7 +39,7 @@ def stretch_flow(field: xr.Dataset, *, diameter: float) -> xr.Dataset:
     >>> import driftwalk as dw
     >>> wide = dw.flow.stretch_flow(dw.tank30_flow(), diameter=3.0)
     >>> wide.attrs["stretched_by"], round(float(wide["x"].max()), 2)
-    (10.0, 1.5)
+    (10.0, 1.47)
     """
     arena = json.loads(field.attrs.get("arena", "{}"))
     if arena.get("shape") != "circle":

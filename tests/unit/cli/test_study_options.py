@@ -85,6 +85,9 @@ def values_of(key: str) -> st.SearchStrategy[tuple[str, Any]]:
     """Return texts that a user may type for a key, each with the value that it means."""
     by_hand: dict[str, list[tuple[str, Any]]] = {
         "assembly.faces": [("any", "any"), ("N,S,N,S", "N,S,N,S")],
+        "assembly.glued": [("x", "x"), ("xx", "xx"), ("x./xx", "x./xx")],
+        "interaction.magnets": [("none", "none"), ("5x5x2mm,1.3T", "5x5x2mm,1.3T")],
+        "interaction.attraction": [("a/table.csv", "a/table.csv")],
         "fit.interaction": [("true", True)],
         "fit.switching_times_s": [("1, 2.5", (1.0, 2.5)), ("16ms", (0.016,))],
         "block.shape": [("disc", "disc"), ("xx", "xx"), ("x./xx", "x./xx")],
