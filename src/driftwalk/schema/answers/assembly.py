@@ -26,7 +26,7 @@ _OVER_TIME: Final = {
 """Variables over time, their keys in JSON and their headings. Older files have no compactness."""
 _SETTINGS: Final = (
     *("confidence", "blocks", "duration_s", "seed", "latching", "hidden_face_drag", "chirality"),
-    *("drag_coefficient", "force_std_N", "force_interval_s", "approach_resistance_N_s"),
+    *("drag_coefficient", "force_std_N", "force_interval_s"),
     *("first_contact_median_s", "completion_median_s"),
 )
 
@@ -81,7 +81,7 @@ def assembly_answer(
         parts.append(f"faces: {facts['faces']}")
     if attraction is not None:
         parts.append(attraction_words(attraction))
-    if (resistance := facts["approach_resistance_N_s"]) > 0.0:
+    if (resistance := facts.get("approach_resistance_N_s", 0.0)) > 0.0:
         parts.append(
             f"the water between two blocks resists: {resistance:.4g} N s times speed / gap"
         )
@@ -109,6 +109,7 @@ def assembly_answer(
         **({} if steady is None else {"steady_state": steady_json(steady)}),
         **{key: facts[key] for key in _SETTINGS},
         **{key: facts[key] for key in ("glued", "faces") if key in facts},
+        **({"approach_resistance_N_s": resistance} if resistance > 0.0 else {}),
         "drawn": None
         if drawn is None
         else {"parameters": _drawn(drawn), **_json(drawn, sizes_drawn)},
