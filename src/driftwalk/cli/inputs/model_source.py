@@ -85,11 +85,10 @@ def assembly_source(
         When a run is given with an option for what it has found, or with one that is `refused`;
         when there is no flow field, or a file or option is wrong.
     """
-    given = _with_table(given)
     if run is None:
-        return _source_from_flow(given, flow_file)
+        return _source_from_flow(_with_table(given), flow_file)
     refuse_found(run, given.overrides, also=refused)
-    return _source_from_run(run, flow_file, given)
+    return _source_from_run(run, flow_file, _with_table(given))
 
 
 def _with_table(given: StudyOptions) -> StudyOptions:
