@@ -19,10 +19,10 @@ from driftwalk.assembly.chains.mixing import (
 from driftwalk.assembly.chains.predicted import passage, shares
 from driftwalk.sweep import grid, run_sweep
 
-pytestmark = pytest.mark.slow
 CHAINS = 400
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("runs", [40, 400])
 def test_a_well_mixed_tank_is_refused_in_five_percent_at_most(runs: int) -> None:
     """More than the 99.9 % quantile of 5 % would be no chance."""
@@ -31,6 +31,7 @@ def test_a_well_mixed_tank_is_refused_in_five_percent_at_most(runs: int) -> None
     assert refused <= binom.ppf(0.999, CHAINS, 0.05), refused
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("shape", "memory"), [(0.7, 1.0), (1.0, 0.15)])
 def test_a_tank_that_is_not_is_refused(shape: float, memory: float) -> None:
     """In 0.9 of the data sets; fewer than the 0.1 % quantile would be no chance."""
@@ -42,6 +43,7 @@ def test_a_tank_that_is_not_is_refused(shape: float, memory: float) -> None:
     assert refused >= binom.ppf(0.001, 100, 0.9), refused
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("memory", [1.0, 0.1])
 def test_equal_rates_are_refused_in_five_percent_at_most(memory: float) -> None:
     """Of 300 simulated runs and 30 others of half the length, with memory or without."""
@@ -58,7 +60,13 @@ def test_equal_rates_are_refused_in_five_percent_at_most(memory: float) -> None:
     assert refused <= binom.ppf(0.999, sets, 0.05), refused
 
 
-@pytest.mark.parametrize(("form", "memory"), [(FORMS[0], 1.0), (FORMS[2], 0.2)])
+@pytest.mark.parametrize(
+    ("form", "memory"),
+    [
+        pytest.param(FORMS[0], 1.0, marks=pytest.mark.slow),
+        pytest.param(FORMS[2], 0.2, marks=pytest.mark.study),
+    ],
+)
 def test_bands_hold_the_truth_as_often_as_they_say(form: Form, memory: float) -> None:
     """Shares after 60 and 150 s and the committor, of 200 runs; 90 % within binomial chance."""
     truth = histories([chain_runs(30_000, 9, memory=memory)], classes=CLASSES)
