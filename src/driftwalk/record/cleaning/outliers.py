@@ -175,6 +175,8 @@ def without_far_outliers(track: Track) -> Track:
     interval = np.diff(track.time)
     speeds = np.hypot(np.diff(track.x), np.diff(track.y)) / interval
     usual = float(np.median(interval) * np.quantile(speeds, OUTLIER.usual_steps))
+    if usual == 0.0:
+        return track  # at rest nearly always: its steps say nothing of how far it goes
     gap = OUTLIER.longest_far_gap
     while (wrong := outliers_in(track, least=usual, longest_gap=gap)).any():
         track = Track(*(column[~wrong] for column in track))

@@ -192,3 +192,12 @@ def test_samples_beyond_the_greatest_speed_are_counted(tmp_path: Path) -> None:
     assert ready.samples == 3001 - wrong
     damaged = read.assign_attrs(counts='{"per_body": [1]}')
     assert prepare([damaged], coarse_study(), None, None).facts["jumps_removed"] == 0
+
+
+def test_a_body_that_hardly_moves_keeps_its_bouts() -> None:
+    # Synthetic: positions rounded to 1 mm, at rest in 92 of 100 steps, quick turns in the others.
+    rng = np.random.default_rng(1)
+    moves = np.arange(2000) % 100 < 8
+    x, y = np.round(np.cumsum(moves * rng.normal(0.0, 0.004, (2, 2000)), axis=1), 3)
+    track = Track(0.1 * np.arange(2000), x, y, 0 * x)
+    assert without_far_outliers(track).time.size == 2000
