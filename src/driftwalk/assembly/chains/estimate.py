@@ -32,6 +32,7 @@ from driftwalk.assembly.chains.mixing import (
 )
 from driftwalk.assembly.chains.predicted import passage, shares
 from driftwalk.assembly.outcomes.class_names import sort_classes
+from driftwalk.assembly.outcomes.event_rates import rate_interval
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.schema.answers.facts import texts
@@ -339,17 +340,13 @@ def _rates(
     sets: Sequence[Histories], places: Integers, seed: int
 ) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
     """Return N_ij, T_i, q_ij with exact Poisson intervals, and whether two sets have equal ones."""
-    from scipy.stats import chi2
-
     counted = [counts_and_times(one) for one in sets]
     names = sets[0].classes
     pairs = [(int(i), int(j)) for i, j in places]
     number = np.array([[counts[pair] for pair in pairs] for counts, _ in counted])
     spent = np.array([[times[i] for i, _ in pairs] for _, times in counted])
-    alpha = 1.0 - KINETICS_POLICY.confidence
+    low, high = rate_interval(number, spent, confidence=KINETICS_POLICY.confidence)
     with np.errstate(divide="ignore", invalid="ignore"):
-        low = np.where(number > 0, 0.5 * chi2.ppf(0.5 * alpha, 2.0 * number), 0.0) / spent
-        high = 0.5 * chi2.ppf(1.0 - 0.5 * alpha, 2.0 * number + 2.0) / spent
         rate, error = number / spent, np.sqrt(number) / spent
     dims = ("source", "transition")
     data: dict[str, Any] = {
