@@ -37,8 +37,8 @@ def require_bonds(study: Study) -> None:
         )
     if rules.bond_force_N > 0 and not rules.bond_rate_per_s > 0:
         raise InputError(
-            "`assembly.bond_force_N` scales a rate, and bonds have none: give "
-            "`assembly.bond_rate_per_s` too"
+            "the force of a bond multiplies its rate, and bonds have none: give a rate above 0 "
+            "(`assembly.bond_rate_per_s`), or leave the force out"
         )
     if rules.bonds_break and glued_cells(rules) is not None:
         raise InputError(
