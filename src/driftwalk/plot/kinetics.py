@@ -66,8 +66,12 @@ def plot_class_graph(kinetics: xr.Dataset, ax: Axes | None = None) -> Axes:
     ]
     place = _places(list(dict.fromkeys(name for one in kept for name in one[:2])))
     discs = are_discs(*place)
+    shown = {one[:2] for one in kept}
     for start, end, rate, share in kept:
         first, last = np.array(place[start]), np.array(place[end])
+        if (end, start) in shown:  # there and back run next to each other
+            along = (last - first) / np.hypot(*(last - first))
+            first, last = (at + 0.022 * np.array([-along[1], along[0]]) for at in (first, last))
         ax.annotate(
             "", xy=tuple(first + 0.8 * (last - first)), xytext=tuple(first + 0.2 * (last - first)),
             arrowprops={"arrowstyle": "-|>", "lw": 0.4 + 2.6 * share, "color": style.MUTED},
