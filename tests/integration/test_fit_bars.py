@@ -34,7 +34,7 @@ def visited(recording: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     return centres[columns], centres[rows]
 
 
-@pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.parametrize(
     ("realisation", "angle", "most_drag", "most_flow"),
     [

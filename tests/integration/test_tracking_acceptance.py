@@ -164,7 +164,7 @@ def test_four_blocks_with_heavy_noise(
     assert found["unmarked"] == 0
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_a_fit_of_tracked_poses_is_that_of_the_true_ones(
     scenes: ModuleType, scores: ModuleType, tmp_path: Path
 ) -> None:
