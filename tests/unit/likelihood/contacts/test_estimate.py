@@ -11,7 +11,7 @@ from driftwalk.likelihood import estimate_wall
 from driftwalk.model import apply_overrides
 
 
-@pytest.mark.study
+@pytest.mark.slow
 def test_the_wall_of_a_simulation_is_found() -> None:
     """Intervals of 99.9 %: each misses once in a thousand; the seeds are fixed."""
     restitution, friction = 0.8, 0.3
