@@ -432,9 +432,7 @@ def _joined(start: State, plan: Plan) -> dict[str, npt.NDArray[Any]]:
     ):
         values = np.asarray(start.get(name, np.zeros((*whole, *own))), dtype=kind)
         if name not in start and name not in ("velocity", "kind"):
-            raise InputError(
-                f"start: '{name}' is missing; `state` of a batch has all that it needs"
-            )
+            raise InputError(f"start: '{name}' is missing; a batch's own state has all of it")
         if values.shape != (*whole, *own):
             raise InputError(
                 f"start: expected {name} of shape {(*whole, *own)}, got shape {values.shape}"
