@@ -46,8 +46,8 @@ class StartPolicy(NamedTuple):
     """Which assemblies are a start."""
 
     off_lattice: float = 0.05
-    """How far a block may be from its place on the lattice of its assembly, in sides; chosen by
-    hand: a tracked block is measured to a few hundredths of its side."""
+    """How far a corner of a block may be from its place on the lattice of its assembly, in sides;
+    chosen by hand: a tracked block is measured to a few hundredths of its side."""
 
 
 START_POLICY: Final = StartPolicy()
@@ -408,13 +408,22 @@ class TankBatch:
                 self._outcome[world] = self._names[address]
 
     def _require_lattice(self, given: Floats) -> None:
-        """Refuse a start whose blocks are not where the lattices of their assemblies put them."""
-        off = np.hypot(*(self._batch.state()["pose"] - given)[..., :2].transpose(2, 0, 1))
-        world, block = np.unravel_index(off.argmax(), off.shape)
-        if off.max() > START_POLICY.off_lattice * self._study.block.side_m:
+        """Refuse a start beyond the tank, or off the lattices of its assemblies."""
+        beyond = np.flatnonzero(~self.sound)
+        if beyond.size:
             raise InputError(
-                f"start: block {block} of world {world} is {off.max():.3g} m off the place that "
-                "the lattice of its assembly gives it: check assembly, cell and quarter"
+                f"start: a block of world {beyond[0]} is beyond the tank, a "
+                f"{self._study.tank.describe()}"
+            )
+        apart = self._batch.state()["pose"] - given
+        turned = np.abs(np.angle(np.exp(1j * apart[..., 2])))
+        side = self._study.block.side_m
+        off = np.hypot(apart[..., 0], apart[..., 1]) + math.sqrt(0.5) * side * turned
+        world, block = np.unravel_index(off.argmax(), off.shape)
+        if off.max() > START_POLICY.off_lattice * side:
+            raise InputError(
+                f"start: a corner of block {block} of world {world} is {off.max():.3g} m off the "
+                "place that the lattice of its assembly gives it: check assembly, cell and quarter"
             )
 
 

@@ -276,12 +276,16 @@ def test_refuses_starts_that_are_none() -> None:
     study = tank_study()
     batch = dw.TankBatch(study, STILL, worlds=2, blocks=2)
     good = batch.state()
+    domino = {"assembly": np.zeros((2, 2)), "cell": np.array([[[0, 0], [1, 0]]] * 2)}
     for changed, words in (
         ({"pose": good["pose"][:1]}, "shape"),
         ({"cell": None}, "cell"),
         ({"velocity": np.full((2, 2, 3), math.inf)}, "velocity"),
         ({"assembly": np.array([[0, 0], [1, 1]])}, "lowest"),
-        ({"assembly": np.zeros((2, 2)), "cell": np.array([[[0, 0], [1, 0]]] * 2)}, "lattice"),
+        (domino, "lattice"),
+        ({**domino, "pose": np.array([[[0, 0, 0], [0.03, 0, 0.1]]] * 2)}, "lattice"),
+        ({**domino, "pose": np.array([[[1, 0, 0], [1.03, 0, 0]]] * 2)}, "beyond the tank"),
+        ({**domino, "cell": np.array([[[0, 0], [2, 0]]] * 2)}, "lattice"),
     ):
         start = {key: values for key, values in (good | changed).items() if values is not None}
         with pytest.raises(InputError, match=words):
