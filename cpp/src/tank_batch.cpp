@@ -94,7 +94,12 @@ TankBatch::TankBatch(std::vector<TankFlow> flows, std::vector<std::uint64_t> key
   const std::vector<double> nothing(worlds);
   TankGroup group;
   group.begins = true;
-  group.joined = joined;
+  LiveBlocks given{};
+  if (joined != nullptr) {
+    given = *joined;
+    given.pose = pose_.data();
+    group.joined = &given;
+  }
   run({none.data(), none.data(), nothing.data(), nothing.data(), nothing.data()}, group, threads);
 }
 

@@ -88,12 +88,6 @@ struct LiveBlocks {
   std::int32_t* cell;     // [x, y] on the assembly's lattice
   std::int32_t* quarter;
   std::int32_t* kind; // of typed faces
-
-  // Those from a row on.
-  LiveBlocks from(std::int64_t row) const {
-    return {pose + 3 * row, velocity + 3 * row, assembly + row,
-            cell + 2 * row, quarter + row,      kind + row};
-  }
 };
 
 } // namespace driftwalk

@@ -29,8 +29,8 @@ struct TankSettings {
 
 class TankBatch {
 public:
-  // Blocks [world][block][x, y, theta] start at rest, or as `joined` says. The runs of the flows,
-  // and what the rules point to, have to outlive the batch.
+  // Blocks [world][block][x, y, theta] start at rest, or as `joined`, but for its pose, says. The
+  // runs of the flows, and what the rules point to, have to outlive the batch.
   TankBatch(std::vector<TankFlow> flows, std::vector<std::uint64_t> key, const double* start,
             const LiveBlocks* joined, int threads);
 

@@ -5,6 +5,11 @@
 
 DRIFTWALK_LANES_BEGIN
 
+inline LiveBlocks rows_from(const LiveBlocks& blocks, std::int64_t row) {
+  return {blocks.pose + 3 * row, blocks.velocity + 3 * row, blocks.assembly + row,
+          blocks.cell + 2 * row, blocks.quarter + row,      blocks.kind + row};
+}
+
 template <class Real, class T, class Law, bool Crowded>
 class TankPack {
 public:
@@ -38,7 +43,9 @@ public:
 private:
   using Pack = WorldPack<Real, T, Law, Crowded>;
 
-  LiveBlocks blocks_of(int own) const { return group_.now.from(group_.world[own] * rules_.blocks); }
+  LiveBlocks blocks_of(int own) const {
+    return rows_from(group_.now, group_.world[own] * rules_.blocks);
+  }
   char* state_of(std::int64_t world) const {
     return group_.state + static_cast<std::int64_t>(KeptLayout<Real>::bytes(rules_.blocks)) * world;
   }
@@ -52,7 +59,7 @@ private:
     } else {
       pack_.begin(own, own, group_.step, blocks_of(own).pose, key, flow_start);
       if (group_.joined != nullptr) {
-        pack_.join(own, group_.joined->from(world * rules_.blocks));
+        pack_.join(own, rows_from(*group_.joined, world * rules_.blocks));
       }
     }
     pack_.set_forces(own, group_.drag_coefficient[world], group_.force_std[world]);
