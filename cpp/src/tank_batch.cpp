@@ -49,8 +49,9 @@ struct Packs {
     const auto group = [&](std::int64_t w) {
       return std::tuple(settings.flow[w], settings.latching[w], settings.flow_scale[w]);
     };
-    std::stable_sort(world.begin(), world.end(),
-                     [&](std::int64_t a, std::int64_t b) { return group(a) < group(b); });
+    std::sort(world.begin(), world.end(), [&](std::int64_t a, std::int64_t b) {
+      return std::tuple(group(a), a) < std::tuple(group(b), b);
+    });
     for (std::size_t k = 0; k < world.size(); ++k) {
       if (begin.empty() || k - begin.back() == static_cast<std::size_t>(lanes) ||
           group(world[k]) != group(world[k - 1])) {

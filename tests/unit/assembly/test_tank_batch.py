@@ -26,7 +26,7 @@ STUDIES: dict[str, dict[str, Any]] = {
     "magnets": {"interaction": {"magnets": "5x5x2mm,1.3T"}},
     "discs": {"block": {"shape": "disc", "side_m": 0.03, "mass_kg": 0.0116}},
     "rectangle": {
-        "tank": {"shape": "rectangle", "diameter_m": None, "width_m": 0.25, "height_m": 0.2}
+        "tank": {"shape": "rectangle", "diameter_m": None, "width_m": 0.2, "height_m": 0.15}
     },
     "many": {"assembly": {"blocks": 30}},
 }
