@@ -77,6 +77,14 @@ class JoinCriteria:
             "--hold", "Time for which an unseen block keeps its joins (default: 1s).", unit="s"
         ),
     ] = None
+    play: Annotated[
+        float | None,
+        _tolerance(
+            "--play",
+            "How far joined faces may move against each other (default: as far as noise does).",
+            unit="m",
+        ),
+    ] = None
 
 
 @with_options(JoinCriteria)
