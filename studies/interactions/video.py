@@ -87,7 +87,18 @@ def compare(tracks: list[Path], out: Path) -> dict[str, Any]:
             if count >= LEAST_EVENTS * RUNS_OF_TRUTH:
                 at = {"class": name}
                 rows.append(_row(kind, name, float(truth[f"{kind}_rate"].sel(at)), found))
-    return {"recordings": len(tracks), "events": totals, "rates": rows}
+    bond = STUDY.assembly.bond_rate_per_s
+    ends = [(one.attrs["bond_rate_low_per_s"], one.attrs["bond_rate_high_per_s"]) for one in found]
+    return {
+        "recordings": len(tracks),
+        "events": totals,
+        "bond_rate": {
+            "true_per_s": bond,
+            "mean_per_s": float(np.mean([one.attrs["bond_rate_per_s"] for one in found])),
+            "hold": sum(low <= bond <= high for low, high in ends),
+        },
+        "rates": rows,
+    }
 
 
 def _row(kind: str, name: str, rate: float, found: list[xr.Dataset]) -> dict[str, Any]:

@@ -22,7 +22,12 @@ from driftwalk.assembly.lattice.joined_faces import (
 from driftwalk.assembly.lattice.polyomino import Chirality, require_chirality
 from driftwalk.assembly.lattice.rigid_joins import rigid_joins
 from driftwalk.assembly.outcomes.class_names import listed_classes, listed_shapes
-from driftwalk.assembly.outcomes.event_rates import clustering, rate_variables
+from driftwalk.assembly.outcomes.event_rates import (
+    bridges_of,
+    clustering,
+    rate_interval,
+    rate_variables,
+)
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.schema import body_names, check_trajectory
@@ -98,9 +103,10 @@ def classify(
         Several at one sample are in order, those that came apart before those that joined.
         ``joining_rate``, ``parting_rate`` (class) [1/s]: events in this class over the time in it,
         with counts and intervals: exact Poisson ones, of joinings widened as far as they cluster.
-        ``attrs``: the tolerances, ``dropped_joins``,
-        ``unknown_samples``, ``known_s`` (time in which the class is known), ``closest_m`` (smallest
-        distance of two centres).
+        ``attrs``: the tolerances, ``dropped_joins``, ``unknown_samples``, ``known_s`` (time in
+        which the class is known), ``closest_m`` (smallest distance of two centres), and
+        ``bond_rate_per_s`` (partings per bond and second in classes without loops) with its ends
+        ``bond_rate_low_per_s`` and ``bond_rate_high_per_s``.
 
     Raises
     ------
@@ -199,11 +205,12 @@ def _dataset(
     # A sample holds until the next one, if that comes in time.
     lasts = np.append(np.minimum(np.diff(poses.time), rules.hold), 0.0)
     lasts = np.where(sound, lasts, 0.0)
+    rates = _rates(history, outcome, lasts, classes)
     data: dict[str, Any] = {
         "outcome": ("time", outcome),
         "assembly": (("time", "body"), assembly),
         "proportion": ("class", _shares(outcome, lasts, len(classes))),
-        **_rates(history, outcome, lasts, classes),
+        **rates,
         **_event_variables("event", joined, poses.time, classes),
         **_event_variables("split", history.split, poses.time, classes),
         "event_assembly": (("event", "side"), _padded([one.assemblies for one in joined], 2)),
@@ -238,6 +245,7 @@ def _dataset(
             "unknown_samples": int((~sound).sum()),
             "known_s": float(lasts.sum()),
             "rate_confidence": RATE_CONFIDENCE,
+            **_bond_rate(rates, outcome, lasts, classes),
         },
     )
 
@@ -279,6 +287,23 @@ def _rates(
             clusters=clusters,
         )
     return data
+
+
+def _bond_rate(
+    rates: dict[str, Any], outcome: npt.NDArray[np.int32], lasts: Floats, classes: Sequence[str]
+) -> dict[str, float]:
+    """Return the partings per bond and second in classes without loops, where there are any."""
+    bonds = np.array([bridges_of(name) for name in classes])
+    time = float((lasts * np.where(outcome >= 0, bonds[outcome], 0)).sum())
+    if time == 0.0:
+        return {}
+    count = int(rates["parting_count"][1][bonds > 0].sum())
+    low, high = rate_interval(count, time, confidence=RATE_CONFIDENCE)
+    return {
+        "bond_rate_per_s": count / time,
+        "bond_rate_low_per_s": float(low),
+        "bond_rate_high_per_s": float(high),
+    }
 
 
 def _places(names: Iterable[str], listed: Sequence[str]) -> list[int]:

@@ -333,6 +333,20 @@ def test_blocks_that_drift_past_each_other_are_not_joined(offset: float) -> None
         classify(recording, side=SIDE, play=0.0)
 
 
+def test_the_rate_of_bonds_counts_each_bond() -> None:
+    """A row of three for 10 s loses a block; the two others stay together for 10 s."""
+    x = np.tile([0.0, SIDE, 2 * SIDE], (201, 1))
+    x[100:, 2] = 1.0
+    zeros = np.zeros_like(x)
+    found = classify(build_trajectory(np.arange(201) / RATE, x, zeros, zeros), side=SIDE)
+    assert found.attrs["bond_rate_per_s"] == pytest.approx(1 / 30.0)
+    # Garwood's interval of one event: ln(1 / 0.95), and the mean with P(0 or 1) = 0.05.
+    assert found.attrs["bond_rate_low_per_s"] == pytest.approx(0.05129 / 30.0, rel=1e-3)
+    assert found.attrs["bond_rate_high_per_s"] == pytest.approx(4.7439 / 30.0, rel=1e-3)
+    apart = classify(two_blocks(np.full(20, 2 * SIDE)), side=SIDE)
+    assert "bond_rate_per_s" not in apart.attrs
+
+
 def test_noise_widens_the_play() -> None:
     distance = passing_and_joined(0.0)
     noise = np.random.default_rng(1).normal(0.0, 0.4e-3, distance.size)

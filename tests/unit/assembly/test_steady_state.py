@@ -65,7 +65,7 @@ def test_intervals_of_rates_are_those_of_garwood() -> None:
 def test_intervals_of_events_that_come_in_bursts(burst: int, exact: float) -> None:
     """Bursts at random times, 30 events on average: the exact interval fails where they are of 4.
 
-    400 sets, 92 % of which hold: false alarms 1 in 1000.
+    400 sets, 93 to 95 % of which hold: false alarms 1 in 1000.
     """
     rng = np.random.default_rng(4)
     held, plain = [], []
@@ -77,7 +77,7 @@ def test_intervals_of_events_that_come_in_bursts(burst: int, exact: float) -> No
         held.append(low <= 0.3 <= high)
         low, high = rate_interval(when.size, 100.0)
         plain.append(low <= 0.3 <= high)
-    assert 0.87 < np.mean(held) < 0.97
+    assert 0.89 < np.mean(held) < 0.98
     assert np.mean(plain) == pytest.approx(exact, abs=0.05)
 
 

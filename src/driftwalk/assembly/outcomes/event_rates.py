@@ -10,6 +10,7 @@ import numpy.typing as npt
 from driftwalk.assembly.outcomes.distribution import check_confidence
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
+from driftwalk.schema.shapes import cells_of_shape
 
 PARTS: Final = 5
 """Parts of a class's time that tell how events cluster; of 4, 5, 8 and 12 the number whose 90 %
@@ -67,8 +68,8 @@ def clustering(
 ) -> float:
     """Return the factor by which an interval must count fewer events because they cluster.
 
-    It is the variance of the counts in equal parts of the time over their mean, at least 1; as few
-    parts do not tell it well, above 1 times the square of Student's quantile over the normal one.
+    It is the variance of the counts in equal parts of the time over their mean, times the square
+    of Student's quantile over the normal one, as few parts do not tell it well; at least 1.
 
     Parameters
     ----------
@@ -95,10 +96,25 @@ def clustering(
         return 1.0
     counts = np.histogram(when, bins=parts, range=(0.0, time))[0]
     ratio = float(counts.var(ddof=1) / counts.mean())
-    if ratio <= 1.0:
-        return 1.0
     end = (1.0 + confidence) / 2
-    return float(ratio * (stdtrit(parts - 1, end) / ndtri(end)) ** 2)
+    return max(1.0, float(ratio * (stdtrit(parts - 1, end) / ndtri(end)) ** 2))
+
+
+def bridges_of(name: str) -> int:
+    """Return the bonds of an outcome class of squares; 0 where loops hold blocks more than once.
+
+    Examples
+    --------
+    >>> [bridges_of(name) for name in ("1+1", "L3+2", "O+1", "12 assemblies")]
+    [0, 3, 0, 0]
+    """
+    bonds = 0
+    for cells in map(cells_of_shape, name.split("+")):
+        beside = sum(((x + 1, y) in cells) + ((x, y + 1) in cells) for x, y in cells)
+        if not cells or beside > len(cells) - 1:
+            return 0
+        bonds += beside
+    return bonds
 
 
 def rate_variables(

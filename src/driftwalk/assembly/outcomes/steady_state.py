@@ -119,7 +119,7 @@ def steady_state(assembly: xr.Dataset, *, confidence: float = 0.9) -> xr.Dataset
     }
     for name, kind in (("joining", JOINING), ("parting", PARTING)):
         count = np.bincount(stays.state[stays.ends_by == kind], minlength=len(names))
-        clusters = _clusters(stays, time, runs, confidence) if kind == JOINING else 1.0
+        clusters = _clusters(stays, np.float64(time), runs, confidence) if kind == JOINING else 1.0
         data |= rate_variables(
             name, count, time, dim="class", confidence=confidence, clusters=clusters
         )

@@ -380,6 +380,10 @@ attributes:
     unknown_samples number: samples of unknown class
     known_s number: time in which the class is known
     rate_confidence number: with which an interval of a rate holds, each on its own
+attributes (there was a bond that is in no loop):
+    bond_rate_per_s number: partings per bond and second in classes without loops
+    bond_rate_low_per_s number: its lower limit, exact Poisson
+    bond_rate_high_per_s number: its upper limit
 attributes (the recording says so):
     source
 attributes (the tank is known):
