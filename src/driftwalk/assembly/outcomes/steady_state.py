@@ -110,7 +110,7 @@ def steady_state(assembly: xr.Dataset, *, confidence: float = 0.9) -> xr.Dataset
     mean, low, high = _mean_and_ends(parts, confidence)
     half = joined.shape[0] // 2
     p = _steadiness((joined[half:] - joined[:half]).reshape(-1, len(names)))
-    time = np.bincount(stays.state, weights=stays.lasts, minlength=len(names))
+    time = np.bincount(stays.state, weights=stays.lasts, minlength=len(names)).astype(np.float64)
     data: dict[str, Any] = {
         "time_share": ("class", mean),
         "time_share_low": ("class", low),
@@ -119,7 +119,7 @@ def steady_state(assembly: xr.Dataset, *, confidence: float = 0.9) -> xr.Dataset
     }
     for name, kind in (("joining", JOINING), ("parting", PARTING)):
         count = np.bincount(stays.state[stays.ends_by == kind], minlength=len(names))
-        clusters = _clusters(stays, np.float64(time), runs, confidence) if kind == JOINING else 1.0
+        clusters = _clusters(stays, time, runs, confidence) if kind == JOINING else 1.0
         data |= rate_variables(
             name, count, time, dim="class", confidence=confidence, clusters=clusters
         )
