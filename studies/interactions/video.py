@@ -9,6 +9,8 @@ results/video.json; with --again they come from the tracks of OUT alone.
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import sys
 from dataclasses import replace
@@ -20,6 +22,7 @@ import xarray as xr
 
 import driftwalk as dw
 from driftwalk.assembly.lattice.bonds import JOINING, PARTING
+from driftwalk.assembly.outcomes.event_rates import bridges_of
 from driftwalk.cli.main import main as driftwalk
 
 RECORDINGS: Final = 40
@@ -57,8 +60,10 @@ def film(run: int, out: Path) -> Path:
 
 
 def command(*words: object) -> None:
-    """Run a command of driftwalk."""
-    if driftwalk([str(word) for word in words]):
+    """Run a command of driftwalk, without what it prints on stdout."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        code = driftwalk([str(word) for word in words])
+    if code:
         raise SystemExit(f"driftwalk {words[0]} failed")
 
 
@@ -71,7 +76,7 @@ def compare(tracks: list[Path], out: Path) -> dict[str, Any]:
     found = []
     for track in tracks:
         words = ("--side", SIDE, "-o", out / "classes.nc", "--overwrite")
-        command("classify", track, *words, "--json")
+        command("classify", track, *words)
         found.append(xr.load_dataset(out / "classes.nc"))
     counted = (("joining", "event", JOINING), ("parting", "split", PARTING))
     totals = {
@@ -88,17 +93,27 @@ def compare(tracks: list[Path], out: Path) -> dict[str, Any]:
                 at = {"class": name}
                 rows.append(_row(kind, name, float(truth[f"{kind}_rate"].sel(at)), found))
     bond = STUDY.assembly.bond_rate_per_s
+    rates = [one.attrs["bond_rate_per_s"] for one in found]
+    partings = [_bridge_partings(one) for one in found]
+    time = sum(count / rate for count, rate in zip(partings, rates, strict=True) if count)
     ends = [(one.attrs["bond_rate_low_per_s"], one.attrs["bond_rate_high_per_s"]) for one in found]
     return {
         "recordings": len(tracks),
         "events": totals,
         "bond_rate": {
             "true_per_s": bond,
-            "mean_per_s": float(np.mean([one.attrs["bond_rate_per_s"] for one in found])),
-            "hold": sum(low <= bond <= high for low, high in ends),
+            "of_all_per_s": round(sum(partings) / time, 5),
+            "events_per_recording": round(float(np.mean(partings)), 2),
+            "hold": sum(bool(low <= bond <= high) for low, high in ends),
         },
         "rates": rows,
     }
+
+
+def _bridge_partings(found: xr.Dataset) -> int:
+    """Return the partings in classes without loops."""
+    sizes = [bridges_of(str(name)) > 0 for name in found["class"].values]
+    return int(found["parting_count"].values[sizes].sum())
 
 
 def _row(kind: str, name: str, rate: float, found: list[xr.Dataset]) -> dict[str, Any]:
