@@ -1,9 +1,10 @@
-"""What forces between blocks change: python rows.py [RUNS].
+"""What forces between blocks and bonds that break change: python rows.py [RUNS].
 
 Four blocks for 300 s in the flow of the bundled recording, C_d = 0.45, σ_F = 0.55 mN every 10 ms.
 Prints one row per variant: the l1 distance of its outcome distribution to that of blocks that feel
 nothing of each other (Eq. 5), the share of complete runs, the median time of first contact, and the
-shares of four classes. Further rows are further entries of ROWS.
+shares of four classes at the end. Where bonds break, the shares of time in them follow, and whether
+these are steady. Further rows are further entries of ROWS.
 """
 
 from __future__ import annotations
@@ -22,6 +23,9 @@ ROWS: Final[dict[str, dict[str, Any]]] = {
     "magnets 5×5×2 mm, 1.2 T": {"interaction.magnets": "5x5x2mm,1.2T"},
     "menisci 1 mm high": {"interaction.capillary": "on"},
     "resistance 0.1 mN s": {"interaction.approach_resistance_N_s": 1e-4},
+    "bonds break at 0.001 /s": {"assembly.bond_rate_per_s": 0.001},
+    "bonds break at 0.01 /s": {"assembly.bond_rate_per_s": 0.01},
+    "bonds break at 0.1 /s": {"assembly.bond_rate_per_s": 0.1},
 }  # fmt: skip
 """Variants by what is set of the study."""
 CLASSES: Final = ("T", "L", "O", "1+1+1+1")
@@ -38,16 +42,27 @@ def print_row(name: str, changes: dict[str, Any], *, runs: int, stock: Any = Non
     print(
         f"| {name} | {apart} | {outcomes.attrs['complete']:.3f} "
         f"| {times.attrs['first_contact_median_s']:.2f} s "
-        f"| {' '.join(f'{share.get(one, 0.0):.3f}' for one in CLASSES)} |",
+        f"| {' '.join(f'{share.get(one, 0.0):.3f}' for one in CLASSES)} | {_steady(found)} |",
         flush=True,
     )
     return outcomes
 
 
+def _steady(found: Any) -> str:
+    """Return the shares of time in the classes where bonds break, and whether they are steady."""
+    if "bond_rate_per_s" not in found.attrs:
+        return ""
+    steady = dw.steady_state(found)
+    time = [float(steady["time_share"].sel({"class": name})) for name in CLASSES]
+    shares = " ".join(f"{share:.3f}" for share in time)
+    return f"{shares}, steady: {steady.attrs['steady']} (p = {steady.attrs['steady_p']:.2g})"
+
+
 def main() -> None:
     """Print all rows."""
     runs = int(sys.argv[1]) if len(sys.argv) > 1 else 500
-    print("| variant | l1 | complete | first contact | T L O all apart |\n|---|---|---|---|---|")
+    print("| variant | l1 | complete | first contact | T L O all apart | of the time |")
+    print("|---|---|---|---|---|---|")
     stock = None
     for name, changes in ROWS.items():
         outcomes = print_row(name, changes, runs=runs, stock=stock)

@@ -20,10 +20,16 @@ from driftwalk.assembly.lattice.joined_faces import (
     smallest_distance,
 )
 from driftwalk.assembly.lattice.polyomino import Chirality, require_chirality
+from driftwalk.assembly.lattice.rigid_joins import rigid_joins
 from driftwalk.assembly.outcomes.class_names import listed_classes, listed_shapes
-from driftwalk.assembly.outcomes.event_rates import rate_variables
+from driftwalk.assembly.outcomes.event_rates import (
+    bridges_of,
+    clustering,
+    rate_interval,
+    rate_variables,
+)
 from driftwalk.core.arrays import Bools, Floats
-from driftwalk.core.errors import InputError
+from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.schema import body_names, check_trajectory
 from driftwalk.schema.check import build_dataset
 
@@ -47,13 +53,15 @@ def classify(
     release_angle: float | None = None,
     min_duration: float = JOIN_POLICY.min_duration_s,
     hold: float | None = None,
+    play: float | None = None,
 ) -> xr.Dataset:
     """Return the outcome class of the blocks of a recording at every time.
 
     Two blocks are joined from the first sample at which the centres of two of their faces are
     within `join_distance` and the faces look at each other within `join_angle`, if that lasts for
     `min_duration`; they come apart at the first sample beyond `release_distance` or
-    `release_angle`, if that lasts as long. Assemblies are blocks connected by joins, on a lattice;
+    `release_angle`, if that lasts as long, or that have moved against each other by more than
+    `play`. Assemblies are blocks connected by joins, on a lattice;
     where joins contradict each other there, the loosest are dropped and counted.
 
     Parameters
@@ -77,6 +85,11 @@ def classify(
     hold : float, optional
         How long a block that is not seen keeps its joins [s]; after that its state is unknown until
         it is seen again. Default: 1 s, or three sampling intervals if that is longer.
+    play : float, optional
+        How far joined faces may move against each other [m]; a turn counts as what the far face
+        moves. Default: twice the median movement of faces that fit within `min_duration`, at least
+        a fiftieth of a side. Then blocks that only drift past each other are left out; infinity
+        counts them as joined.
 
     Returns
     -------
@@ -89,15 +102,23 @@ def classify(
         ``split_block``, ``split_face``, ``split_class``; padded with NaN and -1 to at least one.
         Several at one sample are in order, those that came apart before those that joined.
         ``joining_rate``, ``parting_rate`` (class) [1/s]: events in this class over the time in it,
-        with exact Poisson intervals and counts. ``attrs``: the tolerances, ``dropped_joins``,
-        ``unknown_samples``, ``known_s`` (time in which the class is known), ``closest_m`` (smallest
-        distance of two centres).
+        with counts and intervals: exact Poisson ones, of joinings widened as far as they cluster.
+        ``attrs``: the tolerances, ``dropped_joins``, ``unknown_samples``, ``known_s`` (time in
+        which the class is known), ``closest_m`` (smallest distance of two centres), and
+        ``bond_rate_per_s`` (partings per bond and second in classes without loops) with its ends
+        ``bond_rate_low_per_s`` and ``bond_rate_high_per_s``.
 
     Raises
     ------
     InputError
         When there is no sample, a body has no orientation, no two bodies are ever seen in the same
         sample, or a tolerance is out of range.
+
+    Notes
+    -----
+    Of the contacts in which the faces do not move, those are joins that lie as most of the joined
+    time lies: their distance from fitting exactly is at most the 90 % quantile over that time, and
+    play/sqrt(samples) for noise. One of 10 s or more is a join wherever the faces lie.
 
     Examples
     --------
@@ -117,8 +138,11 @@ def classify(
     rules = JoinRules.completed(
         side, join_distance, join_angle, release_distance, release_angle, min_duration, hold
     )
-    history = JoinHistory(poses.x.shape, find_joins(poses, rules), chirality=chirality)
-    return _dataset(recording, poses, rules, history)
+    if play is not None and not play > 0:
+        raise ConfigurationError(f"play must be more than 0, got {play:g}")
+    joins, play = rigid_joins(poses, find_joins(poses, rules), rules, play)
+    history = JoinHistory(poses.x.shape, joins, chirality=chirality)
+    return _dataset(recording, poses, rules, history, play)
 
 
 def _checked_poses(recording: xr.Dataset) -> Poses:
@@ -167,7 +191,7 @@ def _shares(outcome: npt.NDArray[np.int32], lasts: Floats, classes: int) -> Floa
 
 
 def _dataset(
-    recording: xr.Dataset, poses: Poses, rules: JoinRules, history: JoinHistory
+    recording: xr.Dataset, poses: Poses, rules: JoinRules, history: JoinHistory, play: float
 ) -> xr.Dataset:
     joined, blocks = history.joined, poses.x.shape[1]
     names = {*history.outcome, *(event.outcome for event in (*joined, *history.split))}
@@ -181,11 +205,12 @@ def _dataset(
     # A sample holds until the next one, if that comes in time.
     lasts = np.append(np.minimum(np.diff(poses.time), rules.hold), 0.0)
     lasts = np.where(sound, lasts, 0.0)
+    rates = _rates(history, outcome, lasts, classes)
     data: dict[str, Any] = {
         "outcome": ("time", outcome),
         "assembly": (("time", "body"), assembly),
         "proportion": ("class", _shares(outcome, lasts, len(classes))),
-        **_rates(history, outcome, lasts, classes),
+        **rates,
         **_event_variables("event", joined, poses.time, classes),
         **_event_variables("split", history.split, poses.time, classes),
         "event_assembly": (("event", "side"), _padded([one.assemblies for one in joined], 2)),
@@ -214,11 +239,13 @@ def _dataset(
             "release_angle_rad": rules.release_angle,
             "min_duration_s": rules.min_duration,
             "hold_s": rules.hold,
+            "play_m": play,
             "dropped_joins": len(history.dropped),
             "closest_m": smallest_distance(poses),
             "unknown_samples": int((~sound).sum()),
             "known_s": float(lasts.sum()),
             "rate_confidence": RATE_CONFIDENCE,
+            **_bond_rate(rates, outcome, lasts, classes),
         },
     )
 
@@ -234,17 +261,49 @@ def _rates(
     events = [(event, "parting") for event in history.split]
     events += [(event, "joining") for event in history.joined]
     events.sort(key=lambda one: one[0].sample)
+    spent = np.where(outcome[:, None] == np.arange(len(classes)), lasts[:, None], 0.0)
+    clock = np.vstack([np.zeros(len(classes)), np.cumsum(spent, axis=0)])
     before = _places(history.outcome[:1], classes)[0]
-    count = {kind: np.zeros(len(classes), dtype=np.int64) for kind in ("joining", "parting")}
+    when: dict[str, list[list[float]]] = {
+        kind: [[] for _ in classes] for kind in ("joining", "parting")
+    }
     for event, kind in events:
-        count[kind][before] += outcome[max(event.sample - 1, 0)] != UNKNOWN
+        if outcome[max(event.sample - 1, 0)] != UNKNOWN:
+            when[kind][before].append(clock[event.sample, before])
         before = _places([event.outcome], classes)[0]
-    known = outcome >= 0
-    time = np.bincount(outcome[known], weights=lasts[known], minlength=len(classes))
     data: dict[str, Any] = {}
-    for kind, number in count.items():
-        data |= rate_variables(kind, number, time, dim="class", confidence=RATE_CONFIDENCE)
+    for kind, moments in when.items():
+        # Bonds break independently of each other; blocks that parted lately are near each other.
+        clusters = [
+            clustering(one, time, confidence=RATE_CONFIDENCE) if kind == "joining" else 1.0
+            for one, time in zip(moments, clock[-1], strict=True)
+        ]
+        data |= rate_variables(
+            kind,
+            [len(one) for one in moments],
+            clock[-1],
+            dim="class",
+            confidence=RATE_CONFIDENCE,
+            clusters=clusters,
+        )
     return data
+
+
+def _bond_rate(
+    rates: dict[str, Any], outcome: npt.NDArray[np.int32], lasts: Floats, classes: Sequence[str]
+) -> dict[str, float]:
+    """Return the partings per bond and second in classes without loops, where there are any."""
+    bonds = np.array([bridges_of(name) for name in classes])
+    time = float((lasts * np.where(outcome >= 0, bonds[outcome], 0)).sum())
+    if time == 0.0:
+        return {}
+    count = int(rates["parting_count"][1][bonds > 0].sum())
+    low, high = rate_interval(count, time, confidence=RATE_CONFIDENCE)
+    return {
+        "bond_rate_per_s": count / time,
+        "bond_rate_low_per_s": float(low),
+        "bond_rate_high_per_s": float(high),
+    }
 
 
 def _places(names: Iterable[str], listed: Sequence[str]) -> list[int]:

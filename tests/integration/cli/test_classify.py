@@ -142,6 +142,7 @@ def test_tolerances(recording: Path) -> None:
         "--release-angle": ("30deg", "release_angle_rad", np.pi / 6),
         "--min-duration": ("2s", "min_duration_s", 2.0),
         "--hold": ("3s", "hold_s", 3.0),
+        "--play": ("4mm", "play_m", 0.004),
     }
     words = [word for option, (text, _, _) in options.items() for word in (option, text)]
     values = values_of(here("classify", recording, "--json", *words))

@@ -301,15 +301,73 @@ def test_a_join_lasts_for_half_a_second(samples: int, joined: bool) -> None:
 def test_joined_faces_may_fit_less_well_than_those_that_join() -> None:
     near, between, beyond = SIDE + 0.002, SIDE + 0.005, SIDE + 0.007
     distance = np.repeat([between, near, between, beyond, between], 10)
-    found = classify(two_blocks(distance), side=SIDE)
+    found = classify(two_blocks(distance), side=SIDE, play=math.inf)
     assert names_over_time(found) == ["1+1"] * 10 + ["2"] * 20 + ["1+1"] * 20
     angle = np.radians(np.repeat([15.0, 5.0, 15.0, 25.0, 15.0], 10))
     theta = np.column_stack([np.zeros(50), angle])
     # Turned about the centre of the face, so that only the angle changes.
     x = SIDE / 2 + SIDE / 2 * np.cos(angle)
     y = np.column_stack([np.zeros(50), SIDE / 2 * np.sin(angle)])
-    turned = classify(two_blocks(x, y=y, theta=theta), side=SIDE)
+    turned = classify(two_blocks(x, y=y, theta=theta), side=SIDE, play=math.inf)
     assert names_over_time(turned) == names_over_time(found)
+
+
+def passing_and_joined(offset: float) -> np.ndarray:
+    """Return distances [m]: two drift past each other for 1.5 s, then are joined for 9 s."""
+    past = SIDE + np.linspace(-0.0028, 0.0028, 15)
+    apart = np.full(10, 2 * SIDE)
+    return np.concatenate([apart, past, apart, np.full(90, SIDE + offset), apart])
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.002])
+def test_blocks_that_drift_past_each_other_are_not_joined(offset: float) -> None:
+    """Only rest tells them apart: joined faces may lie 2 mm off their places."""
+    recording = two_blocks(passing_and_joined(offset))
+    found = classify(recording, side=SIDE)
+    assert found["event_time"].values.tolist() == [3.5]
+    assert found["split_time"].values.tolist() == [12.5]
+    assert found.attrs["play_m"] == pytest.approx(0.02 * SIDE)
+    every = classify(recording, side=SIDE, play=SIDE)
+    assert every["event_time"].values.tolist() == [1.0, 3.5]
+    with pytest.raises(ConfigurationError, match="play must be more than 0, got 0"):
+        classify(recording, side=SIDE, play=0.0)
+
+
+def test_the_rate_of_bonds_counts_each_bond() -> None:
+    """A row of three for 10 s loses a block; the two others stay together for 10 s."""
+    x = np.tile([0.0, SIDE, 2 * SIDE], (201, 1))
+    x[100:, 2] = 1.0
+    zeros = np.zeros_like(x)
+    found = classify(build_trajectory(np.arange(201) / RATE, x, zeros, zeros), side=SIDE)
+    assert found.attrs["bond_rate_per_s"] == pytest.approx(1 / 30.0)
+    # Garwood's interval of one event: ln(1 / 0.95), and the mean with P(0 or 1) = 0.05.
+    assert found.attrs["bond_rate_low_per_s"] == pytest.approx(0.05129 / 30.0, rel=1e-3)
+    assert found.attrs["bond_rate_high_per_s"] == pytest.approx(4.7439 / 30.0, rel=1e-3)
+    apart = classify(two_blocks(np.full(20, 2 * SIDE)), side=SIDE)
+    assert "bond_rate_per_s" not in apart.attrs
+
+
+def test_noise_widens_the_play() -> None:
+    distance = passing_and_joined(0.0)
+    noise = np.random.default_rng(1).normal(0.0, 0.4e-3, distance.size)
+    found = classify(two_blocks(distance + noise), side=SIDE)
+    # The median of |n(0, 0.4 mm √2)| is 0.38 mm, and play twice that.
+    assert found.attrs["play_m"] == pytest.approx(0.76e-3, rel=0.3)
+    assert found["event_time"].values == pytest.approx([3.5], abs=0.2)
+    assert found["split_time"].values == pytest.approx([12.5], abs=0.2)
+
+
+def test_contacts_that_lie_as_no_join_does_are_left_out() -> None:
+    """Blocks at rest 2 mm off are joined if nothing else says how joined ones lie, or for long."""
+    apart, off = np.full(10, 2 * SIDE), SIDE + 0.002
+    short, joined = np.full(8, off), np.full(150, SIDE)
+    found = classify(two_blocks(np.concatenate([apart, short, apart, joined])), side=SIDE)
+    assert found["event_time"].values == pytest.approx([2.8])
+    alone = classify(two_blocks(np.concatenate([apart, short, apart])), side=SIDE)
+    assert alone["event_time"].values == pytest.approx([1.0])
+    long = np.concatenate([apart, np.full(102, off), apart, np.repeat(joined, 10)])
+    found = classify(two_blocks(long), side=SIDE)
+    assert found["event_time"].values == pytest.approx([1.0, 12.2])
 
 
 def test_a_tolerance_of_the_user_counts() -> None:

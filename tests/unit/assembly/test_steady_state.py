@@ -8,6 +8,7 @@ import xarray as xr
 from scipy.stats import chi2
 
 from driftwalk.assembly import rate_interval, steady_state
+from driftwalk.assembly.outcomes.event_rates import clustering
 from driftwalk.core.errors import InputError
 
 BREAK, LATCH = 0.5, 0.2
@@ -58,6 +59,26 @@ def test_intervals_of_rates_are_those_of_garwood() -> None:
     assert (float(nothing[0]), float(nothing[1])) == (0.0, np.inf)
     with pytest.raises(InputError, match="not negative"):
         rate_interval(-1, 1.0)
+
+
+@pytest.mark.parametrize(("burst", "exact"), [(1, 0.9), (4, 0.55)])
+def test_intervals_of_events_that_come_in_bursts(burst: int, exact: float) -> None:
+    """Bursts at random times, 30 events on average: the exact interval fails where they are of 4.
+
+    400 sets, 93 to 95 % of which hold: false alarms 1 in 1000.
+    """
+    rng = np.random.default_rng(4)
+    held, plain = [], []
+    for _ in range(400):
+        starts = rng.uniform(0.0, 100.0, rng.poisson(30 / burst))
+        when = np.repeat(starts, burst)
+        less = clustering(when, 100.0)
+        low, high = rate_interval(when.size / less, 100.0 / less)
+        held.append(low <= 0.3 <= high)
+        low, high = rate_interval(when.size, 100.0)
+        plain.append(low <= 0.3 <= high)
+    assert 0.89 < np.mean(held) < 0.98
+    assert np.mean(plain) == pytest.approx(exact, abs=0.05)
 
 
 @pytest.mark.slow

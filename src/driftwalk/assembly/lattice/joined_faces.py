@@ -163,13 +163,19 @@ class PairPoses(NamedTuple):
         towards = np.stack([bearing, bearing + np.pi]) - self.theta
         return np.rint(towards / QUARTER).astype(np.int64) % 4
 
-    def misfit(self, faces: Integers, side: float) -> tuple[Floats, Floats]:
-        """Return distance [m] and angle [rad] between two faces."""
+    def lie(self, faces: Integers, side: float) -> Floats:
+        """Return how the second face lies to the first: ahead, aside [m], turned [rad], (3, n)."""
         normal = self.theta + faces * QUARTER
         arms = 0.5 * side * np.stack([np.cos(normal), np.sin(normal)])
-        distance = np.hypot(*(self.apart + arms[:, 1] - arms[:, 0]))
-        turned = normal[1] - normal[0]
-        return distance, np.abs(np.remainder(turned, 2.0 * np.pi) - np.pi)
+        x, y = self.apart + arms[:, 1] - arms[:, 0]
+        cos, sin = np.cos(normal[0]), np.sin(normal[0])
+        turned = np.remainder(normal[1] - normal[0], 2.0 * np.pi) - np.pi
+        return np.stack([cos * x + sin * y, cos * y - sin * x, turned])
+
+    def misfit(self, faces: Integers, side: float) -> tuple[Floats, Floats]:
+        """Return distance [m] and angle [rad] between two faces."""
+        ahead, aside, turned = self.lie(faces, side)
+        return np.hypot(ahead, aside), np.abs(turned)
 
 
 def _joins_of_pair(
@@ -187,12 +193,12 @@ def _joins_of_pair(
     fits = (distance <= rules.join_distance) & (angle <= rules.join_angle)
     kind = np.where(fits, 4 * nearest[0] + nearest[1], -1)
     joins = []
-    start = _first_streak(pair.time, kind, 0, rules)
+    start = first_streak(pair.time, kind, 0, rules)
     while start is not None:
         faces = nearest[:, start]
         distance, angle = pair.misfit(faces[:, None], rules.side)
         beyond = (distance > rules.release_distance) | (angle > rules.release_angle)
-        stop = _first_streak(pair.time, np.where(beyond, 0, -1), start, rules)
+        stop = first_streak(pair.time, np.where(beyond, 0, -1), start, rules)
         looseness = np.maximum(distance / rules.join_distance, angle / rules.join_angle)
         joins.append(
             Join(
@@ -203,12 +209,12 @@ def _joins_of_pair(
                 float(np.median(looseness[start:stop])),
             )
         )
-        start = None if stop is None else _first_streak(pair.time, kind, stop, rules)
+        start = None if stop is None else first_streak(pair.time, kind, stop, rules)
     return joins
 
 
-def _first_streak(time: Floats, kind: Integers, begin: int, rules: JoinRules) -> int | None:
-    """Return where the first streak of one kind (>= 0) begins that lasts long enough.
+def first_streak(time: Floats, kind: Integers, begin: int, rules: JoinRules) -> int | None:
+    """Return where the first streak of one kind (>= 0) begins that lasts for `min_duration`.
 
     A streak does not go on across a gap that is longer than `hold`.
     """

@@ -1,8 +1,8 @@
-"""Rates of joining and parting per outcome class, with exact Poisson intervals."""
+"""Rates of joining and parting per outcome class, with Poisson intervals that know of clusters."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -10,6 +10,11 @@ import numpy.typing as npt
 from driftwalk.assembly.outcomes.distribution import check_confidence
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
+from driftwalk.schema.shapes import cells_of_shape
+
+PARTS: Final = 5
+"""Parts of a class's time that tell how events cluster; of 4, 5, 8 and 12 the number whose 90 %
+intervals held most evenly in simulated recordings of 300 to 1800 s."""
 
 
 def rate_interval(
@@ -52,14 +57,74 @@ def rate_interval(
         raise InputError("a rate needs a count and a time that are not negative")
     tail = (1.0 - confidence) / 2
     known = span > 0
-    low = np.where(k > 0, gammaincinv(np.maximum(k, 1.0), tail), 0.0)
+    low = np.where(k > 0, gammaincinv(np.where(k > 0, k, 1.0), tail), 0.0)
     high = gammaincinv(k + 1.0, 1.0 - tail)
     unit = np.where(known, span, 1.0)
     return np.where(known, low / unit, 0.0), np.where(known, high / unit, np.inf)
 
 
+def clustering(
+    moments: npt.ArrayLike, time: float, *, parts: int = PARTS, confidence: float = 0.9
+) -> float:
+    """Return the factor by which an interval must count fewer events because they cluster.
+
+    It is the variance of the counts in equal parts of the time over their mean, times the square
+    of Student's quantile over the normal one, as few parts do not tell it well; at least 1.
+
+    Parameters
+    ----------
+    moments : array_like
+        When each event came, in [0, time] [s].
+    time : float
+        Time in which they were seen [s].
+    parts : int
+        Number of parts, from 2.
+    confidence : float
+        As in `rate_interval`.
+
+    Examples
+    --------
+    >>> clustering([1.0, 3.0, 5.0, 7.0, 9.0], 10.0)
+    1.0
+    >>> round(clustering([1.0, 1.1, 1.2, 1.3, 9.0], 10.0), 2)
+    5.04
+    """
+    from scipy.special import ndtri, stdtrit
+
+    when = np.asarray(moments, dtype=np.float64)
+    if when.size == 0 or not time > 0:
+        return 1.0
+    counts = np.histogram(when, bins=parts, range=(0.0, time))[0]
+    ratio = float(counts.var(ddof=1) / counts.mean())
+    end = (1.0 + confidence) / 2
+    return max(1.0, float(ratio * (stdtrit(parts - 1, end) / ndtri(end)) ** 2))
+
+
+def bridges_of(name: str) -> int:
+    """Return the bonds of an outcome class of squares; 0 where loops hold blocks more than once.
+
+    Examples
+    --------
+    >>> [bridges_of(name) for name in ("1+1", "L3+2", "O+1", "12 assemblies")]
+    [0, 3, 0, 0]
+    """
+    bonds = 0
+    for cells in map(cells_of_shape, name.split("+")):
+        beside = sum(((x + 1, y) in cells) + ((x, y + 1) in cells) for x, y in cells)
+        if not cells or beside > len(cells) - 1:
+            return 0
+        bonds += beside
+    return bonds
+
+
 def rate_variables(
-    name: str, count: npt.ArrayLike, time: npt.ArrayLike, *, dim: str, confidence: float
+    name: str,
+    count: npt.ArrayLike,
+    time: npt.ArrayLike,
+    *,
+    dim: str,
+    confidence: float,
+    clusters: npt.ArrayLike = 1.0,
 ) -> dict[str, Any]:
     """Return a count per class and its rate with interval, as variables of a dataset.
 
@@ -71,9 +136,12 @@ def rate_variables(
         As in `rate_interval`, one entry per class.
     dim : str
         The dimension of the classes.
+    clusters : array_like
+        By how much events cluster: the interval is that of so many times fewer in less time.
     """
-    low, high = rate_interval(count, time, confidence=confidence)
     number, span = np.asarray(count), np.asarray(time, dtype=np.float64)
+    fewer = 1.0 / np.asarray(clusters, dtype=np.float64)
+    low, high = rate_interval(number * fewer, span * fewer, confidence=confidence)
     rate = np.divide(number, span, out=np.full(span.shape, np.nan), where=span > 0)
     return {
         f"{name}_count": (dim, number.astype(np.int64)),

@@ -20,7 +20,7 @@ from driftwalk.assembly.outcomes.distribution import (
     require_assembly,
     runs_with_outcome,
 )
-from driftwalk.assembly.outcomes.event_rates import rate_variables
+from driftwalk.assembly.outcomes.event_rates import PARTS, clustering, rate_variables
 from driftwalk.assembly.outcomes.survival import survival_curve
 from driftwalk.core.arrays import Bools, Floats, Integers
 from driftwalk.schema.check import build_dataset
@@ -41,6 +41,8 @@ class SteadyPolicy(NamedTuple):
     """Draws of the test; with them p is known to 0.005 at 0.05."""
     false_alarms: float = 0.05
     """Share of steady states that the test calls none; chosen by hand."""
+    most_parts: int = 50
+    """Parts of the time, at most, that tell how joinings cluster; chosen by hand."""
     ages: int = 61
     """Ages at which the survival of a class is kept; chosen by hand."""
 
@@ -48,7 +50,8 @@ class SteadyPolicy(NamedTuple):
 STEADY_POLICY: Final = SteadyPolicy()
 METHOD: Final = (
     "share of time in the second half of the runs, Student's t over runs (batches of few runs); "
-    "rates exact Poisson (Garwood); lifetimes Kaplan-Meier, censored at the end of a run"
+    "rates Poisson (Garwood), of joinings widened as far as they cluster; lifetimes Kaplan-Meier, "
+    "censored at the end of a run"
 )
 
 
@@ -107,7 +110,7 @@ def steady_state(assembly: xr.Dataset, *, confidence: float = 0.9) -> xr.Dataset
     mean, low, high = _mean_and_ends(parts, confidence)
     half = joined.shape[0] // 2
     p = _steadiness((joined[half:] - joined[:half]).reshape(-1, len(names)))
-    time = np.bincount(stays.state, weights=stays.lasts, minlength=len(names))
+    time = np.bincount(stays.state, weights=stays.lasts, minlength=len(names)).astype(np.float64)
     data: dict[str, Any] = {
         "time_share": ("class", mean),
         "time_share_low": ("class", low),
@@ -116,7 +119,10 @@ def steady_state(assembly: xr.Dataset, *, confidence: float = 0.9) -> xr.Dataset
     }
     for name, kind in (("joining", JOINING), ("parting", PARTING)):
         count = np.bincount(stays.state[stays.ends_by == kind], minlength=len(names))
-        data |= rate_variables(name, count, time, dim="class", confidence=confidence)
+        clusters = _clusters(stays, time, runs, confidence) if kind == JOINING else 1.0
+        data |= rate_variables(
+            name, count, time, dim="class", confidence=confidence, clusters=clusters
+        )
     age, curves = _lifetimes(stays, len(names), confidence)
     return build_dataset(
         "steady_state",
@@ -205,6 +211,19 @@ def _steadiness(differences: Floats) -> float:
     signs = generator.choice([-1.0, 1.0], size=(STEADY_POLICY.signs, moved.shape[0]))
     by_chance = np.abs(signs @ moved / scale).max(axis=1)
     return float((1 + (by_chance >= found - 1e-12).sum()) / (1 + STEADY_POLICY.signs))
+
+
+def _clusters(stays: _Stays, time: Floats, runs: int, confidence: float) -> Floats:
+    """Return by how much the joinings of each class cluster, over the time in it of all runs."""
+    parts = min(max(runs, PARTS), STEADY_POLICY.most_parts)
+    found = np.ones(time.size)
+    for state in np.unique(stays.state):
+        own = stays.state == state
+        moments = np.cumsum(stays.lasts[own])[stays.ends_by[own] == JOINING]
+        # Sums of the same numbers in another order may differ in the last digit.
+        within = np.minimum(moments, time[state])
+        found[state] = clustering(within, time[state], parts=parts, confidence=confidence)
+    return found
 
 
 def _lifetimes(stays: _Stays, classes: int, confidence: float) -> tuple[Floats, dict[str, Any]]:

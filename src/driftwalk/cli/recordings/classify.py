@@ -77,6 +77,14 @@ class JoinCriteria:
             "--hold", "Time for which an unseen block keeps its joins (default: 1s).", unit="s"
         ),
     ] = None
+    play: Annotated[
+        float | None,
+        _tolerance(
+            "--play",
+            "How far joined faces may move against each other (default: as far as noise does).",
+            unit="m",
+        ),
+    ] = None
 
 
 @with_options(JoinCriteria)
@@ -243,6 +251,9 @@ def _rate_table(summary: dict[str, Any]) -> None:
     heads = (["joinings", "[1/s]", interval], ["partings", "[1/s]", interval])
     print_table(rows, columns=["class", *heads[0], *heads[1]])
     print()
+    if (rate := summary.get("bond_rate_per_s")) is not None:
+        low, high = summary["bond_rate_low_per_s"], summary["bond_rate_high_per_s"]
+        print(f"a bond breaks at {rate:.3g} /s   {interval} {low:.3g} to {high:.3g}\n")
 
 
 def _warnings(found: xr.Dataset) -> list[str]:

@@ -310,18 +310,18 @@ attributes ({_OF_RUNS}):
 )
 
 
-def _rates(name: str, words: str, note: str) -> tuple[Variable, ...]:
+def _rates(name: str, words: str, note: str, law: str) -> tuple[Variable, ...]:
     return variables(f"""
     {name}_count(class) [1] int: {words} while the world was of this class
     {name}_rate(class) [s-1]: {words} over the time in this class; NaN where there is no time
-    {name}_rate_low(class) [s-1]: lower limit of the rate of {note}, exact Poisson
-    {name}_rate_high(class) [s-1]: upper limit of the rate of {note}, exact Poisson
+    {name}_rate_low(class) [s-1]: lower limit of the rate of {note}, {law}
+    {name}_rate_high(class) [s-1]: upper limit of the rate of {note}, {law}
 """)
 
 
 RATES: Final = (
-    *_rates("joining", "joinings", "joining"),
-    *_rates("parting", "partings", "parting"),
+    *_rates("joining", "joinings", "joining", "Poisson, widened as far as they cluster"),
+    *_rates("parting", "partings", "parting", "exact Poisson"),
 )
 """Rates of joining and parting per class."""
 
@@ -374,11 +374,16 @@ attributes:
     release_angle_rad number: how far faces turn when they part
     min_duration_s number: how long a joining lasts at least
     hold_s number: how long a pose holds without a sample
+    play_m number: how far joined faces may move against each other
     dropped_joins number: joinings that contradict others
     closest_m number: smallest distance of two centres
     unknown_samples number: samples of unknown class
     known_s number: time in which the class is known
     rate_confidence number: with which an interval of a rate holds, each on its own
+attributes (there was a bond that is in no loop):
+    bond_rate_per_s number: partings per bond and second in classes without loops
+    bond_rate_low_per_s number: its lower limit, exact Poisson
+    bond_rate_high_per_s number: its upper limit
 attributes (the recording says so):
     source
 attributes (the tank is known):
