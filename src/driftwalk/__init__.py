@@ -107,6 +107,7 @@ _NAMES = {
         "compare",
         "compare_models",
         "fit",
+        "infer_outcomes",
         "kinetics",
         "report",
         "simulate",
