@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from driftwalk.cli.inputs.model_source import RUN_NAMES, assembly_source
-from driftwalk.cli.inputs.recordings import opening_note
 from driftwalk.cli.kinetics import files_of, opened_histories
 from driftwalk.cli.options.run import RunOptions, with_run_options
 from driftwalk.cli.options.shared_types import PANEL, FlowFile, argument, option
@@ -20,8 +19,8 @@ from driftwalk.model import declared
 if TYPE_CHECKING:
     import xarray as xr
 
-NAMES = tuple(name for name in RUN_NAMES if name not in ("duration", "seed"))
-"""Options for the study: the duration is that of the data, the seed has its own option."""
+NAMES = tuple(name for name in RUN_NAMES if name not in ("duration", "seed", "confidence"))
+"""Options for the study: the duration is that of the data, the others have no effect here."""
 SYMBOLS = {"C_d": "drag_coefficient", "sigma_F": "force_std", "σ_F": "force_std"}
 """Symbols of parameters, and their names."""
 
@@ -71,20 +70,22 @@ def infer_outcomes(
     data sets that its regions hold the truth, before it states one. If you stop the run, the same
     command continues it.
     """
+    from driftwalk.assembly.outcome_posterior.infer import DEFAULT_VARY
+    from driftwalk.assembly.outcome_posterior.nodes import VARIED
     from driftwalk.runs import OutcomePosteriorWork
 
     outcomes, inputs = _outcomes(source)
-    model = assembly_source(None, flow, given)
-    chosen: dict[str, Any] = {"runs": runs, "truths": truths, "seed": seed}
-    if vary:
-        chosen["vary"] = _ranges(vary)
+    ranges = _ranges(vary) if vary else DEFAULT_VARY
+    # What varies is stated: no default of it is assumed.
+    middle = {VARIED[name]: 0.5 * sum(ends) for name, ends in ranges.items()}
+    model = assembly_source(None, flow, given.and_also(middle, keys=ASSEMBLY_KEYS))
+    chosen: dict[str, Any] = {"vary": ranges, "runs": runs, "truths": truths, "seed": seed}
     if after is not None:
         chosen["after"] = after
     work = OutcomePosteriorWork(
         outcomes, model.flow, model.study, chosen, {**model.inputs, **inputs}, options.threads
     )
-    begun = opening_note(model.study, given, about="simulation", otherwise="")
-    found: xr.Dataset = options.run(work, "infer-outcomes", begun=begun)
+    found: xr.Dataset = options.run(work, "infer-outcomes")
     print_result(found, options.out, json=options.json)
     if not options.json:
         print_warnings(model.warnings)

@@ -57,7 +57,7 @@ class DesignPolicy(NamedTuple):
     rounds: int = 4
     """Further rounds at most; chosen by hand."""
     runs: int = 300
-    """Simulated runs of a node: as many told the same as twice as many."""
+    """Simulated runs of a node; chosen by hand."""
     truths: int = 200
     """Data sets of the self-check: a coverage of 90 % is known within 2 %."""
     points: int = 8192

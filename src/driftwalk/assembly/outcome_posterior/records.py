@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
+from driftwalk.assembly.runs.dataset import DECIMALS
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.schema.shapes import all_single, is_one_assembly
 
@@ -33,9 +34,10 @@ class CategoryPolicy(NamedTuple):
     """How runs are put into categories; no category depends on what was observed."""
 
     completion_bins: int = 4
-    """Bins of completion times between quantiles of the simulated ones; 8 told no more."""
+    """Bins of completion times between quantiles of the simulated ones; chosen by hand."""
     join_times: int = 3
-    """Times at which joins are counted, quantiles of the simulated ones, next to the end."""
+    """Quantiles of the simulated joins at which joins are counted, next to the end; chosen by
+    hand."""
     least_share: float = 0.01
     """Categories with a smaller share of all simulated runs are one; chosen by hand."""
     most: int = 24
@@ -83,7 +85,7 @@ def record_of(classes: Sequence[str], entry: Sequence[float], end: float) -> Rec
 def records_of_histories(found: Histories, end: float) -> list[Record]:
     """Return the records of histories of outcome classes, read until a time [s]."""
     rows = np.flatnonzero(np.append(found.first, True))
-    entry = found.entry
+    entry = np.round(found.entry, DECIMALS)  # sums of sojourns differ in the last digits
     return [
         record_of(
             [found.classes[k] for k in found.state[begin:stop]], entry[begin:stop].tolist(), end
