@@ -12,7 +12,7 @@ from driftwalk.cli.options.shared_types import PANEL, FlowFile, argument, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_result, print_warnings
 from driftwalk.core.errors import ConfigurationError, InputError
-from driftwalk.core.study_keys import ASSEMBLY_KEYS
+from driftwalk.core.study_keys import ASSEMBLY_KEYS, INFERRED_KEYS, INFERRED_RANGES
 from driftwalk.core.units import parse_quantity
 from driftwalk.model import declared
 
@@ -70,14 +70,12 @@ def infer_outcomes(
     data sets that its regions hold the truth, before it states one. If you stop the run, the same
     command continues it.
     """
-    from driftwalk.assembly.outcome_posterior.infer import DEFAULT_VARY
-    from driftwalk.assembly.outcome_posterior.nodes import VARIED
     from driftwalk.runs import OutcomePosteriorWork
 
     outcomes, inputs = _outcomes(source)
-    ranges = _ranges(vary) if vary else DEFAULT_VARY
+    ranges = _ranges(vary) if vary else INFERRED_RANGES
     # What varies is stated: no default of it is assumed.
-    middle = {VARIED[name]: 0.5 * sum(ends) for name, ends in ranges.items()}
+    middle = {INFERRED_KEYS[name]: 0.5 * sum(ends) for name, ends in ranges.items()}
     model = assembly_source(None, flow, given.and_also(middle, keys=ASSEMBLY_KEYS))
     chosen: dict[str, Any] = {"vary": ranges, "runs": runs, "truths": truths, "seed": seed}
     if after is not None:
@@ -104,19 +102,17 @@ def _outcomes(source: Path) -> tuple[Any, dict[str, Path]]:
 
 def _ranges(given: list[str]) -> dict[str, tuple[float, float]]:
     """Return the ranges of ``NAME=FROM:TO``; a unit after the end holds for the start too."""
-    from driftwalk.assembly.outcome_posterior.nodes import VARIED
-
     found: dict[str, tuple[float, float]] = {}
     for text in given:
         words, sign, ends = text.partition("=")
         name, parts = words.strip().replace("-", "_"), ends.split(":")
         name = SYMBOLS.get(name, name)
-        if name not in VARIED or not sign or len(parts) != 2:
-            names = ", ".join(one.replace("_", "-") for one in VARIED)
+        if name not in INFERRED_KEYS or not sign or len(parts) != 2:
+            names = ", ".join(one.replace("_", "-") for one in INFERRED_KEYS)
             raise InputError(f"--vary {text}: expected NAME=FROM:TO with a name out of {names}")
         if name in found:
             raise InputError(f"--vary {text}: {words} is named twice")
-        quantity = declared(VARIED[name]).quantity
+        quantity = declared(INFERRED_KEYS[name]).quantity
         unit = "1" if quantity is None else quantity.unit
         tail = parts[1].strip().lstrip("0123456789.eE+-")
         first = parts[0].strip() + ("" if parts[0].strip()[-1:].isalpha() else tail)

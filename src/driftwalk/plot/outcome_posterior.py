@@ -70,7 +70,9 @@ def plot_outcome_posterior(
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     names = [f"{n.words} ({n.reader_unit})" if n.reader_unit else n.words for n in numbers]
     ax.set(xlabel=names[0], ylabel=names[1])
-    ax.set_title(f"{posterior.attrs['used']}: {confidence:.0%} and 50 % regions", loc="left")
+    ax.set_title(
+        f"{posterior.attrs['used']}: {100 * confidence:.0f} % and 50 % regions", loc="left"
+    )
     return ax
 
 
@@ -131,8 +133,10 @@ def plot_data_widths(posterior: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax.axvline(1.0, color=style.MUTED, lw=0.7)
     ax.set_yticks(place, kinds)
     ax.invert_yaxis()
-    ax.set(xlabel="median 90 % interval over that without data", xlim=(0.0, 1.1))
-    ax.legend(fontsize=6.5)
+    ax.set(
+        xlabel=f"median 90 % interval over that without data, {posterior.attrs['runs']} runs",
+        xlim=(0.0, 1.1),
+    )
     ax.spines[["top", "right"]].set_visible(False)
-    ax.set_title(f"{posterior.attrs['runs']} runs each", loc="left")
+    ax.legend(fontsize=6.5, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=size)
     return ax

@@ -209,7 +209,7 @@ def test_a_row_per_run(tmp_path: Path) -> None:
             "vary drag_coefficient",
         ),
         ({"T": 3}, {"runs": 3}, "runs: expected at least 20"),
-        ([Record("T", 70.0)], {"after": 60.0}, "later than --after 60 s"),
+        ([Record("T", 70.0)], {"after": 60.0}, "later than the final classes .60 s"),
     ],
 )
 def test_a_bad_problem_is_refused(outcomes, how, said: str) -> None:

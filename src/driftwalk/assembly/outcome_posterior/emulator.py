@@ -14,7 +14,7 @@ class EmulatorPolicy(NamedTuple):
     """How the emulator is fitted and integrated."""
 
     pseudo_count: float = 0.5
-    """Of every category at a node: Jeffreys' prior of a multinomial."""
+    """Added to the count of each category: Jeffreys' prior of a multinomial."""
     mean_variance: float = 25.0
     """Prior variance of the mean of a log share: e^5 up or down, so that the nodes decide."""
     length: float = 0.3

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from driftwalk.assembly.outcome_posterior.emulator import Emulator, log_likelihoods
-from driftwalk.assembly.outcome_posterior.nodes import VARIED, Nodes
+from driftwalk.assembly.outcome_posterior.nodes import Nodes
 from driftwalk.assembly.outcome_posterior.observed import Observed, Outcomes, merged, observed_of
 from driftwalk.assembly.outcome_posterior.records import (
     BOTH,
@@ -35,6 +35,7 @@ from driftwalk.assembly.runs.plan import chirality_of
 from driftwalk.assembly.sensitivity.settings import FIRST_TRIALS, place_first
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.core.study_keys import INFERRED_KEYS, INFERRED_RANGES
 from driftwalk.schema.answers.facts import texts
 from driftwalk.schema.check import build_dataset
 
@@ -70,7 +71,6 @@ class DesignPolicy(NamedTuple):
 
 
 DESIGN_POLICY = DesignPolicy()
-DEFAULT_VARY = {"drag_coefficient": (0.3, 0.6), "force_std": (0.2e-3, 1.2e-3)}
 PREFERRED = (BOTH, CLASSES, JOINS, TIMES, EARLY)
 """Kinds of data in the order in which the stated region is taken from those that cover."""
 
@@ -229,6 +229,11 @@ def check_outcomes(
     outcomes, flow, study, vary, after, runs, truths, seed, threads
         As in `infer_outcomes`.
 
+    Returns
+    -------
+    OutcomeProblem
+        Data, study and ranges.
+
     Raises
     ------
     InputError
@@ -256,7 +261,7 @@ def check_outcomes(
             f"the outcomes have {observed.blocks} blocks, and the study has "
             f"{chosen.assembly.blocks} (blocks): make them the same"
         )
-    names, low, high = _ranges(DEFAULT_VARY if vary is None else vary, chosen)
+    names, low, high = _ranges(INFERRED_RANGES if vary is None else vary, chosen)
     over: dict[str, Any] = {"sensitivity.runs": runs, "sensitivity.seed": seed}
     if observed.after is not None:
         over["assembly.duration_s"] = observed.after
@@ -277,13 +282,13 @@ def _ranges(
     from driftwalk.model import apply_overrides
 
     for name, ends in vary.items():
-        if name not in VARIED:
-            raise InputError(f"vary: there is no '{name}'; choose from {', '.join(VARIED)}")
+        if name not in INFERRED_KEYS:
+            raise InputError(f"vary: there is no '{name}'; choose from {', '.join(INFERRED_KEYS)}")
         if len(ends) != 2 or not ends[0] < ends[1]:
             raise InputError(f"vary {name}: expected the lowest and the highest value, got {ends}")
         try:
             for end in ends:
-                apply_overrides(study, {VARIED[name]: float(end)})
+                apply_overrides(study, {INFERRED_KEYS[name]: float(end)})
         except ConfigurationError as error:
             raise InputError(f"vary {name}: {error}") from error
     if not 2 <= len(vary) <= 4:
@@ -342,7 +347,7 @@ class Emulated(NamedTuple):
 
 
 class Checked(NamedTuple):
-    """What the self-check found."""
+    """Result of the self-check."""
 
     truth: Floats
     coverage: Mapping[str, Coverage]
@@ -536,7 +541,7 @@ def _classes(
 def _unit(name: str) -> str:
     from driftwalk.model import declared
 
-    quantity = declared(VARIED[name]).quantity
+    quantity = declared(INFERRED_KEYS[name]).quantity
     return "1" if quantity is None else quantity.unit
 
 

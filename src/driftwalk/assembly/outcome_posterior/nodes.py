@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from driftwalk.assembly.sensitivity.settings import (
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import DriftwalkError, InputError
 from driftwalk.core.files.shards import Arrays
-from driftwalk.core.study_keys import ASSEMBLY_KEYS
+from driftwalk.core.study_keys import INFERRED_KEYS
 from driftwalk.simulation.backend import BROKEN
 from driftwalk.sweep import (
     MemoryStore,
@@ -45,16 +45,6 @@ if TYPE_CHECKING:
 
     from driftwalk.model import Study
 
-VARIED: Final = {
-    name: ASSEMBLY_KEYS[name]
-    for name in (
-        "drag_coefficient", "force_std", "hidden_face_drag", "stirring_length", "bond_rate",
-        "bond_strength", "block_restitution", "block_friction", "wall_restitution",
-        "wall_friction", "mass", "side",
-    )
-}  # fmt: skip
-"""From the name of a parameter that can be estimated to its key in a study."""
-
 
 @dataclass(frozen=True, eq=False)
 class Nodes:
@@ -67,7 +57,7 @@ class Nodes:
     flow : xarray.Dataset
         The flow field.
     names : sequence of str
-        Parameters that vary, keys of `VARIED`.
+        Parameters that vary, keys of `INFERRED_KEYS`.
     value : ndarray, shape (node, parameter)
         Their values, SI.
     first_trial : int
@@ -116,7 +106,9 @@ class Nodes:
 
         value = self.value[rows.start : rows.stop]
         column = dict(zip(self.names, value.T, strict=True))
-        apart = {VARIED[name]: column[name] for name in self.names if name not in OF_EACH_RUN}
+        apart = {
+            INFERRED_KEYS[name]: column[name] for name in self.names if name not in OF_EACH_RUN
+        }
         studies = [self.study]
         if apart:
             studies = [

@@ -77,7 +77,8 @@ def observed_of(given: Outcomes, *, after: float | None) -> Observed:
         late = [one.completion for one in records if after < one.completion < np.inf]
         if late:
             raise InputError(
-                f"a run was complete after {min(late):g} s, later than --after {after:g} s"
+                f"a run was complete after {min(late):g} s, later than the final classes "
+                f"({after:g} s)"
             )
     renamed = [one._replace(final=known[one.final]) for one in records]
     return Observed(renamed, next(iter(sizes)), after)
@@ -111,23 +112,32 @@ def merged(records: Sequence[Record]) -> list[Record]:
     ]
 
 
-def read_outcomes(path: Path) -> list[Record]:
+def read_outcomes(path: str | Path) -> list[Record]:
     """Return the outcomes of a table: counts of classes, or a row per run.
 
     Parameters
     ----------
-    path : Path
+    path : path-like
         CSV with the columns ``class`` and ``count``; or a row per run with ``class`` and, where
         they are known, ``completion_time_s`` (empty where the run did not become one assembly) and
         ``join_times_s`` (times, with spaces between them).
+
+    Returns
+    -------
+    list of Record
+        One for each run, as `infer_outcomes` takes them.
 
     Raises
     ------
     FormatError
         With file and line: an unknown column, no number, a negative count, an unknown class.
+
+    Examples
+    --------
+    ``read_outcomes("counts.csv")``
     """
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
+        with Path(path).open(newline="", encoding="utf-8-sig") as file:
             rows = [row for row in csv.reader(file) if any(map(str.strip, row))]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise FormatError(f"cannot be read as a table of outcomes: {error}", path=path) from error

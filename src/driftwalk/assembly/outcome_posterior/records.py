@@ -48,7 +48,7 @@ CATEGORY_POLICY = CategoryPolicy()
 
 
 class Record(NamedTuple):
-    """What is known of one run."""
+    """Everything known of one run."""
 
     final: str
     """Outcome class at the end."""

@@ -54,7 +54,7 @@ def interval_ends() -> Floats:
 
 
 class Coverage(NamedTuple):
-    """What the self-check found of one kind of data."""
+    """Result of the self-check for one kind of data."""
 
     power: float
     """Power of the likelihood with which regions hold; NaN where none does."""

@@ -56,7 +56,7 @@ def outcome_posterior_sections(*, posterior: xr.Dataset | None = None) -> list[S
     parts: list[tuple[str, str, Maker]] = [
         ("posterior", "Posterior", density_sections),
         ("classes", "Classes", lambda found: _table("classes", "Classes", class_table(found))),
-        ("data", "What each kind of data tells", _data_section),
+        ("data", "Information in each kind of data", _data_section),
     ]
     nothing = "The emulator is not checked yet: there is no posterior."
     return sections_of(posterior, nothing, posterior_summary, lambda _: [], parts)
@@ -125,7 +125,9 @@ def _data_section(posterior: xr.Dataset) -> Section:
         "intervals are medians, over those that hold without data."
     )
     table = data_table(posterior)
-    return table_section("data", "What each kind of data tells", table.columns, table.rows, note)
+    return table_section(
+        "data", "Information in each kind of data", table.columns, table.rows, note
+    )
 
 
 def _table(id: str, title: str, table: Table) -> Section:

@@ -93,7 +93,7 @@ def data_table(found: xr.Dataset) -> Table:
     ]
     widths = [f"{name.replace('_', ' ')}: interval" for name in names]
     columns = ["what is seen of each run", "truths held", "power", *widths, "given"]
-    return Table(rows, columns, "what each kind of data tells (intervals over those without data)")
+    return Table(rows, columns, "information in each kind of data (intervals over the prior's)")
 
 
 def _facts(found: xr.Dataset, reasons: list[str]) -> dict[str, Any]:
