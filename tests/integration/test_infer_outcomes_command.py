@@ -83,7 +83,7 @@ def test_all_join_in_the_centre_so_the_force_is_not_determined(tmp_path: Path) -
 @pytest.mark.parametrize(
     ("text", "words", "said"),
     [
-        ("", (), "counts.csv is empty"),
+        ("", (), "counts.csv: is empty"),
         ("class,count\n2,-1\n", (), "line 2: count: expected a whole number"),
         ("class,count\nQ9,3\n", (), "line 2: class Q9: no shape"),
         ("class,count\n2+1,3\n", (), "have 3 blocks, and the study has 2"),

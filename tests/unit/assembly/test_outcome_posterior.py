@@ -104,6 +104,7 @@ def test_quantiles_of_a_weighted_sample() -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("spread", "power"), [(1.0, (0.8, 1.0)), (0.7, (0.4, 0.7))])
 def test_the_self_check_widens_a_likelihood_that_is_too_narrow(
     spread: float, power: tuple[float, float]
@@ -127,14 +128,14 @@ def test_the_self_check_widens_a_likelihood_that_is_too_narrow(
 
 @pytest.fixture(scope="module")
 def runs() -> object:
-    return dw.assemble(dw.Study(), FLOW, blocks=3, runs=40, duration="60s", seed=3)
+    return dw.assemble(dw.Study(), FLOW, blocks=3, runs=20, duration="30s", seed=3)
 
 
 def test_records_of_events_and_of_histories_are_the_same(runs) -> None:
     names = [str(name) for name in runs["class"].values]
     time, became = runs["event_time"].values, runs["event_class"].values
-    made = records_of_events(time, became, names, blocks=3, end=60.0)
-    assert records_of_histories(histories([runs]), 60.0) == made
+    made = records_of_events(time, became, names, blocks=3, end=30.0)
+    assert records_of_histories(histories([runs]), 30.0) == made
     assert records_from_text(records_to_text(made)) == made
     assert [one.final for one in made] == [names[k] for k in runs["outcome"].values]
     done = np.array([one.completion for one in made])

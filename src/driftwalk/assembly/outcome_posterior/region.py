@@ -37,13 +37,18 @@ def weights_of(log_likelihood: Floats, *, power: float = 1.0) -> Floats:
 
 
 def quantiles_of(point: Floats, weight: Floats, at: Floats) -> Floats:
-    """Return quantiles of a weighted sample by parameter, shape (parameter, quantile)."""
-    found = np.empty((point.shape[1], len(at)))
+    """Return quantiles of a weighted sample, shape (..., parameter, quantile).
+
+    The weights have shape (..., point).
+    """
+    found = np.empty((*weight.shape[:-1], point.shape[1], len(at)))
     for k, values in enumerate(point.T):
         order = np.argsort(values)
+        own = weight[..., order]
         # The middle of each point's share, so that a uniform sample has its own quantiles.
-        below = np.cumsum(weight[order]) - 0.5 * weight[order]
-        found[k] = np.interp(at, below, values[order])
+        below = np.cumsum(own, axis=-1) - 0.5 * own
+        for row in np.ndindex(weight.shape[:-1]):
+            found[(*row, k)] = np.interp(at, below[row], values[order])
     return found
 
 
@@ -96,7 +101,7 @@ def covered(
     """
     weight = weights_of(log_likelihood, power=power)
     denser = np.where(log_likelihood > own[:, None], weight, 0.0).sum(axis=1)
-    ends = np.array([quantiles_of(point, row, interval_ends()[[0, 2]]) for row in weight])
+    ends = quantiles_of(point, weight, interval_ends()[[0, 2]])
     inside = (ends[..., 0] <= truth) & (truth <= ends[..., 1])
     return denser <= REGION_POLICY.confidence, inside, ends[..., 1] - ends[..., 0]
 
