@@ -146,7 +146,7 @@ def log_likelihoods(mean: Floats, variance: Floats, count: Integers, *, seed: in
     ndarray, shape (data sets, points)
         ln E[Π p_k^n_k], without the multinomial coefficient.
     """
-    from scipy.special import log_softmax, logsumexp
+    from scipy.special import log_softmax
     from scipy.stats import norm, qmc
 
     draws, sets = EMULATOR_POLICY.draws, len(count)
@@ -159,5 +159,6 @@ def log_likelihoods(mean: Floats, variance: Floats, count: Integers, *, seed: in
         level = mean[part, None, :] + np.sqrt(variance[part, None, :]) * drawn
         share = log_softmax(level, axis=2)
         each = np.tensordot(count.astype(np.float64), share, axes=(1, 2))
-        found[:, part] = logsumexp(each, axis=2) - np.log(draws)
+        most = each.max(axis=2, keepdims=True)
+        found[:, part] = most[..., 0] + np.log(np.exp(each - most).mean(axis=2))
     return found
