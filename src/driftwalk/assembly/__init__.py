@@ -4,8 +4,9 @@ from driftwalk.assembly.chains.estimate import check_kinetics, kinetics
 from driftwalk.assembly.lattice.events import ReplayedEvents, replay_events
 from driftwalk.assembly.lattice.polyomino import polyomino_cells, polyomino_name, polyominoes
 from driftwalk.assembly.live_world import LiveEvent, LiveTank
-from driftwalk.assembly.outcome_posterior.infer import check_outcomes, infer_outcomes
+from driftwalk.assembly.outcome_posterior.infer import infer_outcomes
 from driftwalk.assembly.outcome_posterior.observed import read_outcomes
+from driftwalk.assembly.outcome_posterior.problem import check_outcomes
 from driftwalk.assembly.outcomes.class_names import (
     class_cells,
     class_name,

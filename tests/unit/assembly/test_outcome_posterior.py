@@ -27,7 +27,12 @@ from driftwalk.assembly.outcome_posterior.records import (
     records_of_histories,
     records_to_text,
 )
-from driftwalk.assembly.outcome_posterior.region import quantiles_of, self_check, weights_of
+from driftwalk.assembly.outcome_posterior.region import (
+    intervals_of,
+    quantiles_of,
+    self_check,
+    weights_of,
+)
 from driftwalk.core.errors import FormatError, InputError
 
 FLOW = dw.tank30_flow()
@@ -102,6 +107,15 @@ def test_quantiles_of_a_weighted_sample() -> None:
     assert quantiles_of(point, weight, np.array([0.05, 0.5, 0.95]))[0] == pytest.approx(
         wanted, abs=1e-3
     )
+
+
+def test_the_shortest_interval_of_a_posterior_at_an_end_of_its_range_begins_there() -> None:
+    point = np.random.default_rng(8).random((4000, 1))
+    low, middle, high = intervals_of(point, weights_of(-10.0 * point[:, 0]))[0]
+    assert low == 0.0
+    # An exponential density that is cut off at 1.
+    assert middle == pytest.approx(-np.log(1 - 0.5 * (1 - np.exp(-10.0))) / 10.0, abs=0.01)
+    assert high == pytest.approx(-np.log(1 - 0.9 * (1 - np.exp(-10.0))) / 10.0, abs=0.02)
 
 
 @pytest.mark.slow

@@ -23,7 +23,7 @@ variables:
     value(point parameter): parameters of the sample; in the units of the coordinate unit
     weight(point) [1]: posterior weight of a point of the sample
     estimate(parameter): posterior median
-    interval(parameter bound): interval of the posterior, equal tails; at the confidence
+    interval(parameter bound): shortest interval of the posterior; at the confidence
     determined(parameter) bool: whether the outcomes determine the parameter
     low(parameter): lower end of the range
     high(parameter): upper end of the range
