@@ -108,6 +108,7 @@ _NAMES = {
         "compare",
         "compare_models",
         "fit",
+        "infer_outcomes",
         "kinetics",
         "report",
         "simulate",

@@ -99,6 +99,7 @@ from driftwalk.notebook import (
     compare as compare,
     compare_models as compare_models,
     fit as fit,
+    infer_outcomes as infer_outcomes,
     kinetics as kinetics,
     report as report,
     simulate as simulate,

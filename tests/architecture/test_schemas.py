@@ -18,6 +18,7 @@ OF_WHAT_IS_GIVEN = {
     *("estimate", "interval", "coarse_estimate", "first_half_estimate"),
     *("number_value", "departure_estimate", "departure_std"),
     *("profile_value", "searched_estimate", "draws", "range", "truth"),
+    *("node_value", "truth_value"),
     *("check_recorded", "check_median", "check_low", "check_high"),
 }
 """Numbers whose unit depends on the input, the output or the parameter."""

@@ -302,6 +302,15 @@ def _assembled(folder: Path) -> Names:
     return {}
 
 
+FEW_NODES = "--runs 20 --truths 20"
+
+
+def _counted(folder: Path) -> Names:
+    """Provide ``counts.csv``: outcomes of two blocks."""
+    (folder / "counts.csv").write_text("class,count\n2,12\n1+1,8\n", encoding="utf-8")
+    return {}
+
+
 def _chains(folder: Path) -> Names:
     """Provide ``four/`` and ``real/``: runs of a chain, and as many recordings of another one."""
     for name, seed, runs in (("four", 1, 40), ("real", 2, 12)):
@@ -602,6 +611,18 @@ PAGES: dict[str, Page] = {
         provide=_files(_assembled, _chains),
         holds=("found.attrs['target'] == 'T'", "found.sizes['class'] == 7"),
         makes=("kinetics/kinetics.nc", "to-T/kinetics.nc", "both.html", "eight/manifest.json"),
+        draws=False,
+        slow=True,
+    ),
+    "docs/how-to/outcomes-alone.md": Page(
+        provide=_files(_counted, _chains, _flow("flow.nc")),
+        instead={
+            "--mass 11.6g -o": f"--mass 11.6g --blocks 2 --after 4s {FEW_NODES} -o",
+            "infer-outcomes real/": f"infer-outcomes real/ {FEW_NODES} --after 20s",
+            "after=20.0": "after=4.0, runs=20, truths=20",
+        },
+        holds=("found.attrs['blocks'] == 2",),
+        makes=("posterior.html", "from-real/posterior.nc"),
         draws=False,
         slow=True,
     ),

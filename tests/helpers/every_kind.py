@@ -19,7 +19,7 @@ from switching_worlds import START_S, coarse_study as switched_study, two_flows
 from walkers import diffuse, tumble
 
 import driftwalk as dw
-from driftwalk.assembly import assemble, kinetics, sobol_design, sobol_indices
+from driftwalk.assembly import assemble, infer_outcomes, kinetics, sobol_design, sobol_indices
 from driftwalk.calibration import calibrate, compare_models
 from driftwalk.calibration.evolution import Budget
 from driftwalk.comparison import compare
@@ -156,6 +156,13 @@ FORMS: dict[str, Callable[[], xr.Dataset]] = {
     ),
     "steady_state": lambda: dw.steady_state(every_kind("assembly whose bonds break")),
     "kinetics": lambda: kinetics(chain_runs(60, 1), chain_runs(30, 2), target="T", blocks=3),
+    "outcome_posterior": lambda: infer_outcomes(
+        {"2": 12, "1+1": 8},
+        FLOW,
+        small(assembly={"blocks": 2, "duration_s": 4.0}),
+        runs=20,
+        truths=20,
+    ),
     "attraction": lambda: dw.attraction(dw.Study(interaction={"magnets": "5x5x2mm,1.3T"})),
     "assembly_path": lambda: dw.assembly_path(small(), FLOW, runs=[0], seed=5),
     "outcome_distribution": lambda: dw.outcome_distribution(every_kind("assembly")),

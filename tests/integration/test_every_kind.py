@@ -21,6 +21,7 @@ COSTLY = (
         "assembly",
         "assembly_sizes",
         "kinetics",
+        "outcome_posterior",
         "classification with blocks hidden",
     ),
 )

@@ -4,6 +4,9 @@ from driftwalk.assembly.chains.estimate import check_kinetics, kinetics
 from driftwalk.assembly.lattice.events import ReplayedEvents, replay_events
 from driftwalk.assembly.lattice.polyomino import polyomino_cells, polyomino_name, polyominoes
 from driftwalk.assembly.live_world import LiveEvent, LiveTank
+from driftwalk.assembly.outcome_posterior.infer import infer_outcomes
+from driftwalk.assembly.outcome_posterior.observed import read_outcomes
+from driftwalk.assembly.outcome_posterior.problem import check_outcomes
 from driftwalk.assembly.outcomes.class_names import (
     class_cells,
     class_name,
@@ -72,6 +75,7 @@ __all__ = [
     "check_assembly",
     "check_indices",
     "check_kinetics",
+    "check_outcomes",
     "check_sensitivity",
     "class_at",
     "class_cells",
@@ -82,6 +86,7 @@ __all__ = [
     "disconnected_alignment",
     "draw_parameters",
     "has_uncertainty",
+    "infer_outcomes",
     "interaction_quantiles",
     "kind_classes",
     "kinetics",
@@ -99,6 +104,7 @@ __all__ = [
     "principal_components",
     "proportion_interval",
     "rate_interval",
+    "read_outcomes",
     "replay_events",
     "sampling_variance",
     "sensitivity_indices",

@@ -48,9 +48,9 @@ def kinetics(
 
     if len(sources) > 2:
         raise InputError(f"two sources can be compared, got {len(sources)}: name files in a folder")
-    files = [_files(source) for source in sources]
+    files = [files_of(source) for source in sources]
     work = KineticsWork(
-        [[_opened(path) for path in paths] for paths in files],
+        [[opened_histories(path) for path in paths] for paths in files],
         target=target,
         blocks=blocks,
         seed=seed,
@@ -64,7 +64,7 @@ def kinetics(
     print_result(found, options.out, json=options.json)
 
 
-def _files(source: Path) -> list[Path]:
+def files_of(source: Path) -> list[Path]:
     """Return the files of a source: the assembly of a run, or all classifications of a folder."""
     from driftwalk.core.files.run_layout import state_of
 
@@ -87,7 +87,8 @@ def _files(source: Path) -> list[Path]:
     return found
 
 
-def _opened(path: Path) -> xr.Dataset:
+def opened_histories(path: Path) -> xr.Dataset:
+    """Return the dataset of a file that holds outcome classes over time."""
     from driftwalk.schema.check import check_contents, kind_name
     from driftwalk.schema.stores.netcdf import open_netcdf
 

@@ -118,6 +118,17 @@ STUDY_KEYS: Final = _keys_of(StudySettings)
 """From an argument's name to the key of the study that it sets."""
 CALIBRATION_KEYS: Final = _keys_of(CalibrationSettings)
 ASSEMBLY_KEYS: Final = _keys_of(AssemblySettings)
+INFERRED_KEYS: Final = {
+    name: ASSEMBLY_KEYS[name]
+    for name in (
+        "drag_coefficient", "force_std", "hidden_face_drag", "stirring_length", "bond_rate",
+        "bond_strength", "block_restitution", "block_friction", "wall_restitution",
+        "wall_friction", "mass", "side",
+    )
+}  # fmt: skip
+"""Parameters that outcomes of self-assembly alone may determine."""
+INFERRED_RANGES: Final = {"drag_coefficient": (0.3, 0.6), "force_std": (0.2e-3, 1.2e-3)}
+"""Those that are inferred where none is named, and their ranges, SI: around the paper's."""
 FIT_KEYS: Final = _keys_of(FitSettings)
 SENSITIVITY_KEYS: Final[dict[str, str]] = {
     **ASSEMBLY_KEYS,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from functools import partial
-from itertools import product
+from itertools import combinations, product
 from typing import TYPE_CHECKING, Any, Literal
 
 from driftwalk.figures.write import Figures
@@ -19,6 +19,7 @@ from driftwalk.plot.assembly_courses import (
 from driftwalk.plot.components import plot_biplot
 from driftwalk.plot.kinetics import plot_class_graph, plot_predicted_shares
 from driftwalk.plot.outcome_bars import plot_outcomes
+from driftwalk.plot.outcome_posterior import plot_data_widths, plot_outcome_posterior
 from driftwalk.plot.parts import style
 from driftwalk.plot.sensitivity_maps import (
     KEY_ROW_MM,
@@ -244,3 +245,29 @@ def kinetics_figures(kinetics: xr.Dataset) -> Figures:
         "class_graph": lambda: style.figure_of(plot_class_graph(kinetics)),
         "shares": lambda: style.figure_of(plot_predicted_shares(kinetics)),
     }
+
+
+def outcome_posterior_figures(posterior: xr.Dataset) -> Figures:
+    """Return the figures of a posterior from outcomes: the joint posterior, what data tell.
+
+    Parameters
+    ----------
+    posterior : xarray.Dataset
+        An `outcome_posterior`.
+
+    Returns
+    -------
+    dict of str to callable
+        ``posterior``, one more for each further pair of parameters, and ``data``.
+
+    Examples
+    --------
+    ``write_figures(outcome_posterior_figures(found), "posterior/figures")``
+    """
+    pairs = list(combinations(range(posterior.sizes["parameter"]), 2))
+    names = ["posterior", *(f"posterior_{a + 1}_{b + 1}" for a, b in pairs[1:])]
+    drawn = {
+        name: lambda pair=pair: style.figure_of(plot_outcome_posterior(posterior, pair=pair))
+        for name, pair in zip(names, pairs, strict=True)
+    }
+    return {**drawn, "data": lambda: style.figure_of(plot_data_widths(posterior))}

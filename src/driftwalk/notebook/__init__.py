@@ -5,6 +5,7 @@ loaded; a second, different statement is an error.
 """
 
 from driftwalk.notebook.fitting import calibrate, compare_models, fit
+from driftwalk.notebook.outcomes import infer_outcomes
 from driftwalk.notebook.reporting import report
 from driftwalk.notebook.simulating import assemble, compare, kinetics, simulate
 
@@ -14,6 +15,7 @@ __all__ = [
     "compare",
     "compare_models",
     "fit",
+    "infer_outcomes",
     "kinetics",
     "report",
     "simulate",

@@ -29,6 +29,7 @@ ACTIVE = (
     *("--known", "rotational_diffusion", "--study", "known.toml"),
 )
 VARIED = ("--vary", "drag-coefficient=0.2,0.6", "--vary", "force-std=0.2mN,1mN")
+QUICK = ("--after", "4s", "--runs", "20", "--truths", "20")
 LITTLE = ("--blocks", "3", "--duration", "20s")
 
 RUNS: dict[str, tuple[tuple[object, ...], str]] = {
@@ -52,6 +53,10 @@ RUNS: dict[str, tuple[tuple[object, ...], str]] = {
         "Self-assembly under way",
     ),
     "kinetics": (("kinetics", "runs.nc"), "Kinetics under way"),
+    "outcome_posterior": (
+        ("infer-outcomes", "counts.csv", "--flow", FLOW, *TANK, "--blocks", "2", *QUICK),
+        "Parameters from outcomes under way",
+    ),
     "sensitivity": (
         ("sensitivity", "--flow", FLOW, *TANK, *LITTLE, *VARIED, "--runs", "5"),
         "A sensitivity analysis under way",
@@ -97,6 +102,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for name, text in (("grid", GRID), ("known", KNOWN), ("truth", TRUTH)):
         (tmp_path / f"{name}.toml").write_text(text, encoding="utf-8")
     chain_runs(60, 1).to_netcdf(tmp_path / "runs.nc")
+    (tmp_path / "counts.csv").write_text("class,count\n2,12\n1+1,8\n", encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

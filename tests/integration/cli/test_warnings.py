@@ -183,6 +183,10 @@ BAD: dict[str, Callable[[Path, Path], list[Words]]] = {
         ["sensitivity", "--flow", bad, "-o", out],
     ],
     "kinetics": lambda bad, out: [["kinetics", bad, "-o", out]],
+    "infer-outcomes": lambda bad, out: [
+        ["infer-outcomes", bad, "--flow", FLOW, "-o", out],
+        ["infer-outcomes", counted(out), "--flow", bad, "-o", out],
+    ],
     "export": lambda bad, out: [["export", bad, "--to", "csv", "-o", out / "folder"]],
     "cite": lambda bad, out: [["cite", bad]],
     "classify": lambda bad, out: [["classify", bad, "--side", "3cm"]],
@@ -263,6 +267,14 @@ def assembled(place: Path, out: Path) -> Path:
     return out
 
 
+def counted(out: Path) -> Path:
+    """Return a table of outcomes."""
+    out.mkdir(exist_ok=True)
+    table = out / "counts.csv"
+    table.write_text("class,count\n2,12\n1+1,8\n", encoding="utf-8")
+    return table
+
+
 SHORT = ("--to", "60s")
 ONE = ("--threads", "1")
 QUICK: dict[str, Callable[[Path, Path, Path], Words]] = {
@@ -323,6 +335,10 @@ LONG: dict[str, Callable[[Path, Path, Path], Words]] = {
     ],
     "kinetics": lambda place, run, out: [
         *("kinetics", assembled(place, out / "three"), "-o", out / "run")
+    ],
+    "infer-outcomes": lambda place, run, out: [
+        *("infer-outcomes", counted(out), "--flow", FLOW, "--blocks", "2", "--after", "4s"),
+        *("--runs", "20", "--truths", "20", *ONE, "-o", out / "run"),
     ],
 }
 ELSEWHERE = {"demo", "view", "play"}

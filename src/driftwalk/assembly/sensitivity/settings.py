@@ -54,6 +54,10 @@ class TrialPolicy(NamedTuple):
     """Of the reference; chosen by hand."""
     sobol: int = 3 << 32
     """Of the Sobol indices; chosen by hand."""
+    emulator: int = 4 << 32
+    """Of the nodes of an emulator of the outcomes; chosen by hand."""
+    self_check: int = 5 << 32
+    """Of the data sets of its self-check; chosen by hand."""
 
 
 FIRST_TRIALS: Final = TrialPolicy()
@@ -172,7 +176,7 @@ def simulate_settings(
     longest = max(w.index.size * w.steps * w.study.assembly.blocks for w in settings.worlds)
     design = grid(setting=np.arange(settings.size))
     units = design.units(settings_per_unit(settings.size, longest))
-    kept = _TextStore(MemoryStore() if store is None else store)
+    kept = TextStore(MemoryStore() if store is None else store)
     try:
         function = partial(_compute, settings)
         found = run_sweep(function, units, store=kept, progress=progress, executor=executor)
@@ -215,7 +219,7 @@ class _Tally:
         self.courses: list[Courses] = []
 
     def add(self, found: Arrays, classes: Sequence[str], plan: Plan) -> None:
-        """Add runs, as `_simulate` returns them."""
+        """Add runs, as `simulate_pieces` returns them."""
         sound = (found["status"].astype(np.int64) & BROKEN) == 0
         self.left_out += int((~sound).sum())
         occurred, number = np.unique(found["outcome"][sound], return_counts=True)
@@ -235,7 +239,7 @@ def _compute(settings: Settings, unit: WorkUnit) -> Arrays:
         plan = settings.worlds[world]
         same = rows[settings.world[rows] == world].tolist()
         for pieces in _calls(same, plan.index.size, BLOCKS_AT_ONCE // plan.study.assembly.blocks):
-            found, classes = _simulate(plan, settings, pieces)
+            found, classes = simulate_pieces(plan, settings, pieces)
             begin = 0
             for piece in pieces:
                 part = slice(begin, begin + len(piece.runs))
@@ -253,20 +257,20 @@ def _compute(settings: Settings, unit: WorkUnit) -> Arrays:
     }
 
 
-class _Piece(NamedTuple):
+class Piece(NamedTuple):
     """Some runs of a setting."""
 
     setting: int
     runs: range
 
 
-def _calls(settings: list[int], runs: int, most: int) -> Iterator[list[_Piece]]:
+def _calls(settings: list[int], runs: int, most: int) -> Iterator[list[Piece]]:
     """Yield groups of runs of settings, each for one call of the core."""
-    group: list[_Piece] = []
+    group: list[Piece] = []
     room = most
     for setting in settings:
         for first in range(0, runs, most):
-            piece = _Piece(setting, range(first, min(first + most, runs)))
+            piece = Piece(setting, range(first, min(first + most, runs)))
             if len(piece.runs) > room:
                 yield group
                 group, room = [], most
@@ -275,8 +279,8 @@ def _calls(settings: list[int], runs: int, most: int) -> Iterator[list[_Piece]]:
     yield group
 
 
-def _simulate(
-    plan: Plan, settings: Settings, pieces: list[_Piece]
+def simulate_pieces(
+    plan: Plan, settings: Settings, pieces: list[Piece]
 ) -> tuple[Arrays, tuple[str, ...]]:
     """Simulate the runs of some settings in one call.
 
@@ -321,7 +325,7 @@ def _median(steps: list[Integers], time_step: float) -> float:
     return float(times_of(happened[half - 1], time_step=time_step))
 
 
-class _TextStore:
+class TextStore:
     """A store that keeps text too: class names differ from unit to unit, in number and length."""
 
     def __init__(self, inner: Store) -> None:

@@ -18,6 +18,7 @@ MAIN_OPTIONS: Final[dict[str, str]] = {
     "compare-models": "out flow study body models parameter threads",
     "fit": "out study body switching-times wall compare-laws json",
     "flow": "out study body tracers window cells",
+    "infer-outcomes": "out flow vary after blocks truths cluster json",
     "info": "fps scale columns tank body json",
     "kinetics": "out target blocks cluster json",
     "play": "flow model parameter recording blocks live",

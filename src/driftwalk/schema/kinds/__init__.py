@@ -14,6 +14,7 @@ from driftwalk.schema.kinds import (
     model_check,
     models,
     motion,
+    outcome_posterior,
     recovery,
     sensitivity,
     steady_state,
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 _FILES: Final = (
     motion, flow, calibration, models, fit, recovery, model_check, assembly, steady_state,
-    sensitivity, kinetics,
+    sensitivity, kinetics, outcome_posterior,
 )  # fmt: skip
 
 KINDS: Final[dict[str, Kind]] = {kind.name: kind for file in _FILES for kind in file.KINDS}

@@ -186,6 +186,18 @@ BUILT_IN: Final = (
         places={"figures": "figures"},
     ),
     RunKind(
+        name="outcome_posterior",
+        title="Parameters from outcomes alone",
+        under_way="Parameters from outcomes under way",
+        words="posterior from outcomes",
+        command="infer-outcomes",
+        file="posterior.nc",
+        figures="driftwalk.figures.assembly:outcome_posterior_figures",
+        page=f"{_SECTIONS}.outcome_posterior:outcome_posterior_sections",
+        answer=f"{_ANSWERS}.outcome_posterior:outcome_posterior_answer",
+        places={"figures": "figures"},
+    ),
+    RunKind(
         name="recovery",
         title="Recovery study",
         under_way="A recovery study under way",

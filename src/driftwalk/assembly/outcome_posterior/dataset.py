@@ -1,0 +1,145 @@
+"""The dataset of a posterior from outcomes: intervals, verdict with its reasons, self-check."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from driftwalk.assembly.outcome_posterior.problem import Checked, Emulated, OutcomeProblem
+from driftwalk.assembly.outcome_posterior.records import BOTH, CLASSES, EARLY, JOINS, KINDS, TIMES
+from driftwalk.assembly.outcome_posterior.region import REGION_POLICY, intervals_of, weights_of
+from driftwalk.core.arrays import Floats
+from driftwalk.core.study_keys import INFERRED_KEYS
+from driftwalk.schema.answers.facts import texts
+from driftwalk.schema.check import build_dataset
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+PREFERRED = (BOTH, CLASSES, JOINS, TIMES, EARLY)
+"""Kinds of data in the order in which the stated region is taken from those that cover."""
+
+
+def posterior_dataset(problem: OutcomeProblem, emulated: Emulated, checked: Checked) -> xr.Dataset:
+    """Return the dataset of a posterior."""
+    low, span = problem.low, problem.high - problem.low
+    coverage, policy = checked.coverage, REGION_POLICY
+    offered = [kind for kind in PREFERRED if kind in problem.kinds and coverage[kind].offered]
+    used = offered[0] if offered else None
+    ends = np.full((len(KINDS), len(problem.names), 3), np.nan)
+    weight = np.full(len(emulated.point), 1.0 / len(emulated.point))
+    for at, kind in enumerate(KINDS):
+        if kind in offered:
+            own = weights_of(checked.log_likelihood[kind], power=coverage[kind].power)
+            ends[at] = intervals_of(emulated.point, own)
+            weight = own if kind == used else weight
+    chosen = ends[KINDS.index(used)] if used else ends[0]
+    part = (chosen[:, 2] - chosen[:, 0]) / policy.confidence
+    determined = part < policy.prior_like
+    explained = checked.explained
+    value = low + emulated.point * span
+    names, observed, predicted = _classes(problem, emulated, weight)
+    unit = [_unit(name) for name in problem.names]
+    verdict = "determined"
+    if used is None:
+        verdict = "cannot tell: no kind of data has regions that cover"
+    elif not explained:
+        verdict = "cannot tell: the model does not explain the outcomes"
+    elif not determined.all():
+        verdict = "partly determined" if determined.any() else "cannot tell"
+    kinds = list(KINDS)
+    data: dict[str, Any] = {
+        "value": (("point", "parameter"), value),
+        "weight": ("point", weight),
+        "estimate": ("parameter", low + chosen[:, 1] * span),
+        "interval": (("parameter", "bound"), low[:, None] + chosen[:, [0, 2]] * span[:, None]),
+        "determined": ("parameter", determined & explained & (used is not None)),
+        "low": ("parameter", low),
+        "high": ("parameter", problem.high),
+        "observed": ("data", np.array([kind in problem.kinds for kind in kinds])),
+        "offered": ("data", np.array([coverage[kind].offered for kind in kinds])),
+        "power": ("data", np.array([coverage[kind].power for kind in kinds])),
+        "coverage": ("data", np.array([coverage[kind].joint for kind in kinds])),
+        "interval_coverage": (
+            ("data", "parameter"), np.stack([coverage[kind].marginal for kind in kinds])
+        ),
+        "expected_width": (
+            ("data", "parameter"), np.stack([coverage[kind].width for kind in kinds])
+        ),
+        "width": (("data", "parameter"), (ends[..., 2] - ends[..., 0]) / policy.confidence),
+        "count": ("class", observed),
+        "share": ("class", predicted),
+        "node_value": (("node", "parameter"), low + emulated.node * span),
+        "truth_value": (("truth", "parameter"), low + checked.truth * span),
+        "reason": ("reason", texts(_reasons(problem, chosen, determined, checked, used))),
+    }  # fmt: skip
+    coords = {
+        "parameter": ("parameter", np.array(problem.names, dtype=object)),
+        "unit": ("parameter", np.array(unit, dtype=object)),
+        "data": ("data", np.array(kinds, dtype=object)),
+        "class": ("class", np.array(names, dtype=object)),
+    }
+    attrs = {
+        "verdict": verdict,
+        "used": used or "none",
+        "runs": len(problem.observed.records),
+        "blocks": problem.observed.blocks,
+        "after_s": problem.study.assembly.duration_s,
+        "p": checked.p,
+        "emulator_noise": emulated.noise,
+        "node_runs": problem.study.sensitivity.runs,
+        "truths": problem.truths,
+        "confidence": policy.confidence,
+        "seed": problem.seed,
+        "study": problem.study.to_toml(),
+    }
+    return build_dataset("outcome_posterior", data, coords, attrs)
+
+
+def _classes(
+    problem: OutcomeProblem, emulated: Emulated, weight: Floats
+) -> tuple[list[str], Any, Floats]:
+    """Return the final classes, how often they were seen, and their predicted mean shares."""
+    from scipy.special import softmax
+
+    categories = emulated.categories[CLASSES]
+    mean, _ = emulated.emulators[CLASSES].predict(emulated.point)
+    seen = categories.counts(problem.observed.records)
+    return [str(label) for label in categories.labels], seen, weight @ softmax(mean, axis=1)
+
+
+def _unit(name: str) -> str:
+    from driftwalk.model import declared
+
+    quantity = declared(INFERRED_KEYS[name]).quantity
+    return "1" if quantity is None else quantity.unit
+
+
+def _reasons(
+    problem: OutcomeProblem, ends: Floats, determined: Any, checked: Checked, used: str | None
+) -> list[str]:
+    """Return sentences for what is not determined, and why."""
+    policy, found = REGION_POLICY, []
+    if not checked.explained:
+        found.append(
+            f"the outcomes agree with no setting of the ranges (p = {checked.p:.2g}): widen the "
+            "ranges, or the model is wrong"
+        )
+    if used is None:
+        lacking = ", ".join(
+            f"{kind} hold {checked.coverage[kind].joint:.0%}" for kind in problem.kinds
+        )
+        found.append(f"regions do not cover in the self-check ({lacking}): use narrower ranges")
+        return found
+    for name, known, (low, _, high) in zip(problem.names, determined, ends, strict=True):
+        words = name.replace("_", " ")
+        if not known:
+            found.append(
+                f"cannot tell {words}: its interval is {(high - low) / policy.confidence:.0%} of "
+                "the one without data"
+            )
+        elif low < 0.01 or high > 0.99:
+            side = "lower" if low < 0.01 else "upper"
+            found.append(f"{words}: the interval reaches the {side} end of its range; widen it")
+    return found

@@ -1,0 +1,112 @@
+"""Parameters from outcomes alone, in one line of a notebook."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Unpack
+
+from driftwalk.core.study_keys import ASSEMBLY_KEYS, AssemblySettings, study_overrides
+from driftwalk.notebook.simulating import model_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from driftwalk.assembly.outcome_posterior.observed import Outcomes
+    from driftwalk.model import Study
+    from driftwalk.runs import Progress
+
+
+def infer_outcomes(
+    outcomes: Outcomes | xr.Dataset | str | PathLike[str],
+    model: Study | xr.Dataset,
+    flow: xr.Dataset | None = None,
+    *,
+    vary: Mapping[str, tuple[float, float]] | None = None,
+    after: float | None = None,
+    truths: int | None = None,
+    threads: int | None = None,
+    folder: str | PathLike[str] | None = None,
+    overwrite: bool = False,
+    progress: Progress | None = None,
+    **settings: Unpack[AssemblySettings],
+) -> xr.Dataset:
+    """Return the posterior of parameters from the outcomes of self-assembly alone.
+
+    Parameters
+    ----------
+    outcomes : mapping of str to int, path-like, xarray.Dataset, or sequence of them
+        Runs by final outcome class; a table of them, as ``driftwalk infer-outcomes`` reads it; or
+        `assembly` or `classification` datasets.
+    model : Study or xarray.Dataset
+        A study, a `fit` or a `calibration`: all but the parameters that vary.
+    flow : xarray.Dataset, optional
+        The water's velocity, a `flow_field`; a fit brings its own.
+    vary : mapping of str to (float, float), optional
+        Lowest and highest value of two to four parameters, SI. Default: ``drag_coefficient`` 0.3 to
+        0.6 and ``force_std`` 0.2 to 1.2 mN.
+    after : float, optional
+        When the final classes are read [s].
+    truths : int, optional
+        Data sets of the self-check, at least 20; default: 200.
+    threads : int, optional
+        Default: all processors. The result does not depend on it.
+    folder : path-like, optional
+        Run directory to make or continue, the same as that of ``driftwalk infer-outcomes``.
+    overwrite : bool
+        Whether a finished run there is moved aside; it is refused otherwise.
+    progress : callable, optional
+        Called as ``progress(done, total, text)`` while the work goes on.
+    **settings
+        Over the study, as of `assemble`; ``runs`` are those of a node, 300 by default, and ``seed``
+        is that of the simulations.
+
+    Returns
+    -------
+    Result
+        Kind "outcome_posterior", see `driftwalk.assembly.infer_outcomes`; its text begins with the
+        verdict.
+
+    Raises
+    ------
+    InputError
+        When the outcomes are no classes of the study's blocks, a parameter is not known or its
+        range is empty, or blocks do not fit the tank.
+    FormatError
+        When the table cannot be read.
+    RunDirectoryError
+        When the directory is in use, holds another run, or cannot be written.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> few = {"blocks": 2, "duration": "20s", "runs": 20, "truths": 20}
+    >>> found = dw.infer_outcomes({"2": 12, "1+1": 8}, dw.Study(), dw.tank30_flow(), **few)
+    >>> found["parameter"].values.tolist()
+    ['drag_coefficient', 'force_std']
+    """
+    from driftwalk.assembly import infer_outcomes as infer, read_outcomes
+    from driftwalk.notebook.result import as_result, run_in_folder
+    from driftwalk.runs import OutcomePosteriorWork
+    from driftwalk.runs.resumable_run import silent
+
+    given: Any = outcomes
+    inputs = {}
+    if isinstance(outcomes, (str, PathLike)):
+        inputs = {"outcomes": Path(outcomes)}
+        given = read_outcomes(Path(outcomes))
+    found = model_of(model, flow, study_overrides(keys=ASSEMBLY_KEYS, **settings))
+    chosen: dict[str, Any] = {"vary": vary, "after": after, "truths": truths}
+    chosen |= {name: settings.get(name) for name in ("runs", "seed")}
+    options = {name: value for name, value in chosen.items() if value is not None}
+    say = progress or silent
+    if folder is not None:
+        work = OutcomePosteriorWork(given, found.flow, found.study, options, inputs, threads)
+        return as_result(run_in_folder(folder, "infer-outcomes", work, overwrite, say))
+    return as_result(
+        infer(
+            given, found.flow, found.study, **options, threads=threads,
+            progress=lambda done, total: say(done, total, "runs"),
+        )
+    )  # fmt: skip

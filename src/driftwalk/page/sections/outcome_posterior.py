@@ -1,0 +1,134 @@
+"""A page on parameters from outcomes alone: intervals, posterior, classes, what data tell."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from driftwalk.page.parts import (
+    Maker,
+    Section,
+    chart,
+    figure,
+    label,
+    require,
+    required,
+    sections_of,
+    series,
+    summary_section,
+    table_section,
+)
+from driftwalk.schema.answers.facts import sentences
+from driftwalk.schema.answers.outcome_posterior import (
+    agreement,
+    class_table,
+    data_table,
+    number_of,
+)
+from driftwalk.schema.answers.parts import Table, each
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+BINS = 40
+"""Bins of a marginal density; chosen by hand."""
+
+
+def outcome_posterior_sections(*, posterior: xr.Dataset | None = None) -> list[Section]:
+    """Return the sections of a page on parameters from outcomes alone.
+
+    Parameters
+    ----------
+    posterior : xarray.Dataset, optional
+        An `outcome_posterior`; None while there is none yet.
+
+    Returns
+    -------
+    list of dict
+        Sections; what cannot be shown is an empty one that says why.
+
+    Examples
+    --------
+    >>> [part["kind"] for part in outcome_posterior_sections()]
+    ['empty']
+    """
+    parts: list[tuple[str, str, Maker]] = [
+        ("posterior", "Posterior", density_sections),
+        ("classes", "Classes", lambda found: _table("classes", "Classes", class_table(found))),
+        ("data", "Information in each kind of data", _data_section),
+    ]
+    nothing = "The emulator is not checked yet: there is no posterior."
+    return sections_of(posterior, nothing, posterior_summary, lambda _: [], parts)
+
+
+def posterior_summary(posterior: xr.Dataset) -> Section:
+    """Return the verdict with its reasons, and the intervals."""
+    facts, confidence = posterior.attrs, float(required(posterior, "confidence"))
+    paragraphs = [
+        f"{required(posterior, 'runs')} runs of {required(posterior, 'blocks')} blocks ended in "
+        f"outcome classes, which were read after {required(posterior, 'after_s'):g} s. An emulator "
+        "learned from simulated runs how the shares of the outcomes depend on the parameters.",
+        f"Verdict: {required(posterior, 'verdict')}.",
+        *(f"{text[:1].upper()}{text[1:]}." for text in sentences(posterior, "reason")),
+        f"Inferred from {facts['used']}; {agreement(posterior)}.",
+    ]
+    shown = []
+    for one in each(posterior, "parameter"):
+        number, known = number_of(one), bool(one["determined"])
+        ends = tuple(one["interval"].values.tolist()) if known else (None, None)
+        shown.append(
+            figure(
+                number.label or number.name.replace("_", " "),
+                float(one["estimate"]) if known else None,
+                number.unit,
+                symbol=number.symbol,
+                note=None if known else "cannot tell",
+                ends=ends,
+                confidence=confidence if known else None,
+            )
+        )
+    return summary_section(paragraphs, shown)
+
+
+def density_sections(posterior: xr.Dataset) -> list[Section]:
+    """Return the marginal density of each parameter as steps."""
+    require(posterior, "value", "weight", "low", "high")
+    weight = posterior["weight"].values
+    made = []
+    for at, one in enumerate(each(posterior, "parameter")):
+        number = number_of(one)
+        ends = (float(one["low"]), float(one["high"]))
+        density, edges = np.histogram(
+            one["value"].values, BINS, range=ends, weights=weight, density=True
+        )
+        flat = np.full(BINS, 1.0 / (ends[1] - ends[0]))
+        name = number.label or number.name.replace("_", " ")
+        drawn = [
+            series("posterior", edges, density * (ends[1] - ends[0]), style="step"),
+            series("without data", edges, flat * (ends[1] - ends[0]), style="step"),
+        ]
+        made.append(
+            chart(
+                f"posterior-{at + 1}", f"Posterior of {name}",
+                x=label(number.words, number.unit), y=label("density over the prior"),
+                series=drawn,
+            )
+        )  # fmt: skip
+    return made
+
+
+def _data_section(posterior: xr.Dataset) -> Section:
+    note = (
+        "Simulated data sets at parameters drawn from the posterior were inferred with the same "
+        "emulator. The power widens the likelihood until the regions hold their truths; the "
+        "intervals are medians, over those that hold without data."
+    )
+    table = data_table(posterior)
+    return table_section(
+        "data", "Information in each kind of data", table.columns, table.rows, note
+    )
+
+
+def _table(id: str, title: str, table: Table) -> Section:
+    return table_section(id, title, table.columns, table.rows)

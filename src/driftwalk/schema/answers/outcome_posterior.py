@@ -1,0 +1,134 @@
+"""The answer of parameters from outcomes alone: intervals, the self-check, what other data tell."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from driftwalk.schema.answers.facts import sentences
+from driftwalk.schema.answers.parts import Answer, Estimate, Part, Row, Table, each
+from driftwalk.schema.description import Number
+from driftwalk.schema.kinds.fit import PARAMETERS
+from driftwalk.schema.shapes import short_class
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def outcome_posterior_answer(found: xr.Dataset) -> Answer:
+    """Return the answer of an `outcome_posterior`.
+
+    Parameters
+    ----------
+    found : xarray.Dataset
+        An `outcome_posterior`.
+    """
+    facts = found.attrs
+    reasons = sentences(found, "reason")
+    parts: list[Part] = [
+        f"{facts['runs']} runs of {facts['blocks']} blocks, classes after {facts['after_s']:g} s; "
+        f"{found.sizes['node']} nodes of {facts['node_runs']} simulated runs",
+        Row("verdict", str(facts["verdict"])),
+        *(estimate_part(one, float(facts["confidence"])) for one in each(found, "parameter")),
+        *reasons,
+    ]
+    if facts["used"] != "none":
+        parts.append(Row("inferred from", f"{facts['used']}; {agreement(found)}"))
+    parts += [class_table(found), data_table(found)]
+    return Answer(parts, _facts(found, reasons), [])
+
+
+def number_of(one: xr.Dataset) -> Number:
+    """Return the name of a parameter, and its unit for a reader."""
+    name, unit = (str(one[key].values) for key in ("parameter", "unit"))
+    return PARAMETERS.get(name, Number(name, unit))
+
+
+def estimate_part(one: xr.Dataset, confidence: float) -> Part:
+    """Return the estimate of a parameter with its interval, or that the data cannot tell."""
+    number = number_of(one)
+    if not bool(one["determined"]):
+        low, high = (number.factor * float(one[end]) for end in ("low", "high"))
+        unit = number.reader_unit
+        return Row(number.words, f"cannot tell: between {low:.4g} and {high:.4g} {unit}".rstrip())
+    low, high = (float(end) for end in one["interval"].values)
+    return Estimate(number, float(one["estimate"]), (low, high), confidence)
+
+
+def agreement(found: xr.Dataset) -> str:
+    """Return how well the model agrees with the outcomes, and how precise the emulator is."""
+    return (
+        f"p = {float(found.attrs['p']):.2g} that simulated runs agree no better; emulator's error "
+        f"{float(found.attrs['emulator_noise']):.0%} of the sampling error"
+    )
+
+
+def class_table(found: xr.Dataset) -> Table:
+    """Return the observed classes, and the shares that the posterior predicts."""
+    rows = [
+        [
+            short_class(name) if (name := str(one["class"].values)) != "rest" else name,
+            int(one["count"]),
+            f"{int(one['count']) / max(int(found.attrs['runs']), 1):.3f}",
+            f"{float(one['share']):.3f}",
+        ]
+        for one in each(found, "class")
+    ]
+    return Table(rows, ["class", "runs", "share", "predicted"])
+
+
+def data_table(found: xr.Dataset) -> Table:
+    """Return the coverage and the expected interval widths of each kind of data."""
+    truths = int(found.attrs["truths"])
+    names = [str(name) for name in found["parameter"].values]
+    rows = [
+        [
+            str(one["data"].values),
+            f"{round(truths * float(one['coverage']))} of {truths}",
+            f"{float(one['power']):.1f}" if bool(one["offered"]) else "not offered",
+            *(f"{float(width):.0%}" for width in one["expected_width"].values),
+            "yes" if bool(one["observed"]) else "",
+        ]
+        for one in each(found, "data")
+    ]
+    widths = [f"{name.replace('_', ' ')}: interval" for name in names]
+    columns = ["what is seen of each run", "truths held", "power", *widths, "given"]
+    return Table(rows, columns, "information in each kind of data (intervals over the prior's)")
+
+
+def _facts(found: xr.Dataset, reasons: list[str]) -> dict[str, Any]:
+    def plain(value: Any) -> Any:
+        return None if isinstance(value, float) and not math.isfinite(value) else value
+
+    parameters = {}
+    for one in each(found, "parameter"):
+        number = number_of(one)
+        known = bool(one["determined"])
+        ends = one["interval"].values.tolist() if known else [None, None]
+        parameters[number.key] = {
+            "estimate": float(one["estimate"]) if known else None,
+            "interval": ends,
+            "determined": known,
+            "range": [float(one["low"]), float(one["high"])],
+        }
+    data = [
+        {
+            "data": str(one["data"].values),
+            **{name: bool(one[name]) for name in ("observed", "offered")},
+            **{name: plain(float(one[name])) for name in ("power", "coverage")},
+            **{
+                name: [plain(value) for value in one[name].values.tolist()]
+                for name in ("interval_coverage", "expected_width", "width")
+            },
+        }
+        for one in each(found, "data")
+    ]
+    classes = [
+        {"class": str(one["class"].values), "count": int(one["count"]),
+         "predicted": float(one["share"])}
+        for one in each(found, "class")
+    ]  # fmt: skip
+    own = {k: v for k, v in found.attrs.items() if k not in ("kind", "schema_version", "study")}
+    return {
+        **own, "reasons": reasons, "parameters": parameters, "data": data, "classes": classes
+    }  # fmt: skip
