@@ -108,6 +108,7 @@ _NAMES = {
         "compare_models",
         "fit",
         "kinetics",
+        "maximise_yield",
         "report",
         "simulate",
     ),

@@ -99,6 +99,7 @@ from driftwalk.notebook import (
     compare_models as compare_models,
     fit as fit,
     kinetics as kinetics,
+    maximise_yield as maximise_yield,
     report as report,
     simulate as simulate,
 )

@@ -53,6 +53,7 @@ from driftwalk.assembly.sensitivity.sobol import (
     sobol_design,
     sobol_indices,
 )
+from driftwalk.assembly.yields.run import check_yield, maximise_yield
 
 __all__ = [
     "Alignment",
@@ -71,6 +72,7 @@ __all__ = [
     "check_indices",
     "check_kinetics",
     "check_sensitivity",
+    "check_yield",
     "class_at",
     "class_cells",
     "class_name",
@@ -86,6 +88,7 @@ __all__ = [
     "l1_distance",
     "l1_in_floors",
     "l1_noise_floor",
+    "maximise_yield",
     "merge_chirality",
     "outcome_classes",
     "outcome_distribution",

@@ -29,6 +29,7 @@ from driftwalk.plot.sensitivity_maps import (
     shown_classes,
 )
 from driftwalk.plot.tank import plot_film_strip
+from driftwalk.plot.yields import plot_yield_front, plot_yield_settings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -243,4 +244,27 @@ def kinetics_figures(kinetics: xr.Dataset) -> Figures:
     return {
         "class_graph": lambda: style.figure_of(plot_class_graph(kinetics)),
         "shares": lambda: style.figure_of(plot_predicted_shares(kinetics)),
+    }
+
+
+def yield_figures(yields: xr.Dataset) -> Figures:
+    """Return the figures of a maximised yield: the front of yield and time, and the settings.
+
+    Parameters
+    ----------
+    yields : xarray.Dataset
+        A `yield`.
+
+    Returns
+    -------
+    dict of str to callable
+        ``front`` and ``settings``.
+
+    Examples
+    --------
+    ``write_figures(yield_figures(found), "yield/figures")``
+    """
+    return {
+        "front": lambda: style.figure_of(plot_yield_front(yields)),
+        "settings": lambda: style.figure_of(plot_yield_settings(yields)),
     }

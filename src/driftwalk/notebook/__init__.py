@@ -7,6 +7,7 @@ loaded; a second, different statement is an error.
 from driftwalk.notebook.fitting import calibrate, compare_models, fit
 from driftwalk.notebook.reporting import report
 from driftwalk.notebook.simulating import assemble, compare, kinetics, simulate
+from driftwalk.notebook.yields import maximise_yield
 
 __all__ = [
     "assemble",
@@ -15,6 +16,7 @@ __all__ = [
     "compare_models",
     "fit",
     "kinetics",
+    "maximise_yield",
     "report",
     "simulate",
 ]

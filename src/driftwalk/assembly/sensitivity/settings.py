@@ -54,6 +54,10 @@ class TrialPolicy(NamedTuple):
     """Of the reference; chosen by hand."""
     sobol: int = 3 << 32
     """Of the Sobol indices; chosen by hand."""
+    choice: int = 4 << 32
+    """Of the runs that choose the setting of the largest yield; chosen by hand."""
+    fresh: int = 5 << 32
+    """Of the fresh runs that report its yield; chosen by hand."""
 
 
 FIRST_TRIALS: Final = TrialPolicy()
@@ -215,7 +219,7 @@ class _Tally:
         self.courses: list[Courses] = []
 
     def add(self, found: Arrays, classes: Sequence[str], plan: Plan) -> None:
-        """Add runs, as `_simulate` returns them."""
+        """Add runs, as `simulate_pieces` returns them."""
         sound = (found["status"].astype(np.int64) & BROKEN) == 0
         self.left_out += int((~sound).sum())
         occurred, number = np.unique(found["outcome"][sound], return_counts=True)
@@ -235,7 +239,7 @@ def _compute(settings: Settings, unit: WorkUnit) -> Arrays:
         plan = settings.worlds[world]
         same = rows[settings.world[rows] == world].tolist()
         for pieces in _calls(same, plan.index.size, BLOCKS_AT_ONCE // plan.study.assembly.blocks):
-            found, classes = _simulate(plan, settings, pieces)
+            found, classes = simulate_pieces(plan, settings, pieces)
             begin = 0
             for piece in pieces:
                 part = slice(begin, begin + len(piece.runs))
@@ -253,20 +257,20 @@ def _compute(settings: Settings, unit: WorkUnit) -> Arrays:
     }
 
 
-class _Piece(NamedTuple):
+class Piece(NamedTuple):
     """Some runs of a setting."""
 
     setting: int
     runs: range
 
 
-def _calls(settings: list[int], runs: int, most: int) -> Iterator[list[_Piece]]:
+def _calls(settings: list[int], runs: int, most: int) -> Iterator[list[Piece]]:
     """Yield groups of runs of settings, each for one call of the core."""
-    group: list[_Piece] = []
+    group: list[Piece] = []
     room = most
     for setting in settings:
         for first in range(0, runs, most):
-            piece = _Piece(setting, range(first, min(first + most, runs)))
+            piece = Piece(setting, range(first, min(first + most, runs)))
             if len(piece.runs) > room:
                 yield group
                 group, room = [], most
@@ -275,8 +279,8 @@ def _calls(settings: list[int], runs: int, most: int) -> Iterator[list[_Piece]]:
     yield group
 
 
-def _simulate(
-    plan: Plan, settings: Settings, pieces: list[_Piece]
+def simulate_pieces(
+    plan: Plan, settings: Settings, pieces: list[Piece]
 ) -> tuple[Arrays, tuple[str, ...]]:
     """Simulate the runs of some settings in one call.
 
@@ -351,6 +355,8 @@ KEYS: Final[dict[str, str]] = {
     "tank_diameter": "tank.diameter_m",
     "blocks": "assembly.blocks",
     "flow": "",
+    "flow_scale": "",
+    "glued": "assembly.glued",
     "latching": "assembly.latching",
     "faces": "assembly.faces",
     "hidden_face_drag": "assembly.hidden_face_drag",
@@ -403,7 +409,7 @@ class Axes:
         apart = [name for name in self.values if name not in OF_EACH_RUN]
         along = [name for name in self.values if name in OF_EACH_RUN]
         worlds = [
-            self._world(dict(zip(apart, chosen, strict=True)), flow, threads)
+            self.world(dict(zip(apart, chosen, strict=True)), flow, threads)
             for chosen in product(*(self.values[name] for name in apart))
         ]
         size = math.prod(self.shape)
@@ -418,11 +424,20 @@ class Axes:
             },
         )
 
-    def _world(self, chosen: dict[str, Any], flow: xr.Dataset, threads: int | None) -> Plan:
+    def world(self, chosen: Mapping[str, Any], flow: xr.Dataset, threads: int | None) -> Plan:
+        """Return everything about a setting but drag coefficient, force and random numbers.
+
+        Raises
+        ------
+        InputError
+            When a value is out of range, the blocks have no room, or the flow does not cover the
+            tank; names the setting.
+        """
         from driftwalk.model import apply_overrides
 
         changes = {KEYS[name]: value for name, value in chosen.items() if KEYS[name]}
         field = self.flows[chosen["flow"]] if "flow" in chosen else flow
+        field = _scaled(field, chosen.get("flow_scale", 1.0))
         try:
             return world_plan(apply_overrides(self.study, changes), field, threads=threads)
         except InputError as error:
@@ -430,6 +445,12 @@ class Axes:
                 raise
             where = ", ".join(f"{name} = {value}" for name, value in chosen.items())
             raise InputError(f"at {where}: {error}") from error
+
+
+def _scaled(field: xr.Dataset, scale: float) -> xr.Dataset:
+    """Return a flow of another strength, with its standard errors."""
+    names = ("u", "v", "u_standard_error", "v_standard_error")
+    return field.assign({name: scale * field[name] for name in names if name in field})
 
 
 def make_axes(study: Study, axes: Mapping[str, Any] | None) -> Axes:
