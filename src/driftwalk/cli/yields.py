@@ -56,7 +56,7 @@ def maximise_yield(
     """Find the setting in which most runs assemble into a target by a time.
 
     Compares the settings of --vary with the same random numbers: successive halving, a local search
-    in ranges, and further runs until the others are worse or cannot be told apart. Reports the
+    in ranges, and further runs until the others are worse or cannot be distinguished. Reports the
     yield from fresh runs, and the best yield for every time. If you stop the run, the same command
     continues it.
     """

@@ -113,5 +113,5 @@ def plot_yield_settings(found: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax.invert_yaxis()
     ax.set_xlabel("yield less that of the best")
     ax.spines[["top", "right"]].set_visible(False)
-    ax.set_title("o best, □ cannot be told apart, x worse", loc="left")
+    ax.set_title("o best, □ alike, x worse", loc="left")
     return ax

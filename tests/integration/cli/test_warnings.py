@@ -183,6 +183,10 @@ BAD: dict[str, Callable[[Path, Path], list[Words]]] = {
         ["sensitivity", "--flow", bad, "-o", out],
     ],
     "kinetics": lambda bad, out: [["kinetics", bad, "-o", out]],
+    "yield": lambda bad, out: [
+        ["yield", bad, "--target", "T", "-o", out],
+        ["yield", "--flow", bad, "--target", "T", "-o", out],
+    ],
     "export": lambda bad, out: [["export", bad, "--to", "csv", "-o", out / "folder"]],
     "cite": lambda bad, out: [["cite", bad]],
     "classify": lambda bad, out: [["classify", bad, "--side", "3cm"]],
@@ -323,6 +327,11 @@ LONG: dict[str, Callable[[Path, Path, Path], Words]] = {
     ],
     "kinetics": lambda place, run, out: [
         *("kinetics", assembled(place, out / "three"), "-o", out / "run")
+    ],
+    "yield": lambda place, run, out: [
+        *("yield", "--flow", FLOW, "--target", "L3", "--vary", "force-std=0.2mN,1mN"),
+        *("--blocks", "3", "--runs", "100", "--fresh-runs", "20", "--duration", "20s", *ONE),
+        *("-o", out / "run"),
     ],
 }
 ELSEWHERE = {"demo", "view", "play"}

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Found(NamedTuple):
-    """What search, selection and fresh runs gave."""
+    """The results of search, selection and fresh runs."""
 
     arms: Arms
     target: str

@@ -37,7 +37,7 @@ class YieldPolicy(NamedTuple):
     on_front: int = 3
     """Settings of the front of yield and time that get fresh runs; chosen by hand."""
     alike: int = 4
-    """Settings that cannot be told apart from the best and get fresh runs; chosen by hand."""
+    """Settings that cannot be distinguished from the best and get fresh runs; chosen by hand."""
     most_arms: int = 2000
     """Settings that are compared at most; chosen by hand."""
 
@@ -68,7 +68,7 @@ def maximise_yield(
     """Find the setting in which most runs assemble into a target by a time.
 
     Successive halving chooses among the settings, a local search refines those of `ranges`, and
-    further runs tell apart what is near the best. Run k of every setting has the same random
+    further runs distinguish what is near the best. Run k of every setting has the same random
     numbers. The yield is reported from fresh runs, which chose nothing.
 
     Parameters
@@ -89,7 +89,7 @@ def maximise_yield(
     ranges : mapping of str to (float, float), optional
         Lowest and highest value of continuous settings, which are searched in between.
     runs : int
-        Runs that choose by halving; the search has as many again, telling apart up to four times
+        Runs that choose by halving; the search has as many again, distinguishing up to four times
         as many.
     fresh_runs : int
         Runs of each reported setting, >= 1.
@@ -122,7 +122,7 @@ def maximise_yield(
     Notes
     -----
     Successive halving: Karnin, Koren and Somekh 2013. Indifference zone: Kim and Nelson 2001.
-    See docs/yield.md.
+    See docs/how-to/yield.md.
 
     Examples
     --------

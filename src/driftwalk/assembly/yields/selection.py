@@ -1,6 +1,6 @@
 """Ranking and selection of settings that share their random numbers.
 
-Successive halving finds a good setting with few runs; further runs then tell the others apart from
+Successive halving finds a good setting with few runs; further runs then distinguish the others from
 it, or stop where they cannot be better by more than the indifference. Settings are arms: run k of
 every arm has the same random numbers, so that arms are compared run by run.
 """
@@ -20,14 +20,14 @@ Sample = Callable[[Sequence[int], range], Bools]
 
 
 class SelectionPolicy(NamedTuple):
-    """How many runs an arm gets, and when arms are told apart."""
+    """How many runs an arm gets, and when arms are distinguished."""
 
     least_runs: int = 20
     """Runs of an arm in the first round at least; chosen by hand, for an error of 0.1."""
     growth: float = 1.3
     """Runs of a look over those of the one before, where all have as many; chosen by hand."""
     most: int = 4
-    """Runs that tell apart at most, in budgets of halving: `studies/yield` needs 1 to 4."""
+    """Runs that distinguish at most, in budgets of halving: `studies/yield` needs 1 to 4."""
     tuned_runs: int = 2000
     """Runs at which the confidence sequence is narrowest: those of a last round of halving."""
 
@@ -143,7 +143,7 @@ class Selection(NamedTuple):
     best: int
     """The chosen arm."""
     alike: list[int]
-    """Arms that cannot be told apart from it."""
+    """Arms that cannot be distinguished from it."""
     within: float
     """None of them is better by more than this, with the stated confidence."""
 

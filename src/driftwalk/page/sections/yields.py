@@ -71,7 +71,7 @@ def yield_sections(*, yields: xr.Dataset | None = None) -> list[Section]:
 
 
 def yield_summary(yields: xr.Dataset) -> Section:
-    """Return the best setting, its yield, and whether it was told apart from the others."""
+    """Return the best setting, its yield, and whether it was distinguished from the others."""
     best = yields.isel(setting=required(yields, "best"))
     target, facts = short_class(str(required(yields, "target"))), yields.attrs
     low, high = (float(best[f"fresh_yield_{end}"]) for end in ("low", "high"))
@@ -127,7 +127,7 @@ def along_sections(yields: xr.Dataset) -> list[Section]:
         for word in ("worse", "alike", "best"):
             mine = yields["standing"].values == word
             if mine.any():
-                text = "cannot be told apart" if word == "alike" else word
+                text = "cannot be distinguished" if word == "alike" else word
                 at = np.array(shown)[mine]
                 drawn.append(series(text, at, share[mine], style="points"))
         words = name.replace("_", " ")

@@ -97,19 +97,19 @@ def yield_words(found: xr.Dataset, at: int) -> str:
 
 
 def standing_sentences(found: xr.Dataset) -> list[str]:
-    """Return whether the best was told apart from the others, in words."""
+    """Return whether the best was distinguished from the others, in words."""
     alike = np.flatnonzero(found["standing"].values == "alike")
     facts = found.attrs
     if not alike.size:
         return [f"every other setting is worse, with {facts['confidence']:.0%} confidence"]
-    first = f"these {alike.size + 1} cannot be told apart within {100 * facts['within']:.2g} %: "
+    first = f"these {alike.size + 1} cannot be distinguished within {100 * facts['within']:.2g} %: "
     order = alike[np.argsort(-(found["reached"] / found["runs"]).values[alike], kind="stable")]
     named = "; ".join(setting_words(found, int(at)) for at in (facts["best"], *order[:LISTED]))
     more = f"; and {order.size - LISTED} more" if order.size > LISTED else ""
     said = [first + named + more]
     if facts["within"] > 1.001 * facts["indifference"]:
         said.append(
-            f"to tell apart within {100 * facts['indifference']:.2g} %, give more runs (--runs)"
+            f"to distinguish them within {100 * facts['indifference']:.2g} %, give more runs"
         )
     return said
 
@@ -136,7 +136,7 @@ def setting_table(found: xr.Dataset) -> Table:
                 f"{low:.3f} to {high:.3f}" if math.isfinite(fresh) else "",
                 f"{share[at]:.3f}",
                 int(one["runs"]),
-                "cannot be told apart"
+                "cannot be distinguished"
                 if one["standing"] == "alike"
                 else str(one["standing"].values),
             ]

@@ -22,7 +22,7 @@ variables:
     difference(setting) [1]: yield of the best less that of the setting, over the runs they share
     difference_low(setting) [1]: lower limit of the difference, at all looks and settings at once
     difference_high(setting) [1]: upper limit of the difference
-    standing(setting) text: best, alike (cannot be told apart from it) or worse
+    standing(setting) text: best, alike (cannot be distinguished from it) or worse
     fresh_runs(setting) [1] int: fresh runs, which chose nothing
     fresh_yield(setting) [1]: share of them with the target by the time; NaN where there are none
     fresh_yield_low(setting) [1]: lower limit of the yield; exact, of a binomial count
