@@ -20,6 +20,11 @@ from driftwalk.schema.kinds.flow import flow_series_words
 
 _RANGE = re.compile(r"[^:;]+:[^:;]+")
 """Two ends; three parts are a range with a step, which is a list."""
+UNSTATED = {
+    "force_std": "the force was not stated",
+    "drag_coefficient": "the drag coefficient was not stated",
+}
+"""Beginnings of warnings that do not hold where the parameter varies."""
 Ranges = dict[str, tuple[float, float]]
 
 
@@ -86,7 +91,10 @@ def maximise_yield(
     found = options.run(work, "yield", begun=begun)
     answer = yield_answer(found)
     series = flow_series_words(found.attrs, holds="yields hold")
-    warnings = [*source.warnings, *series, *answer.warnings]
+    # A parameter that varies needs no value of its own.
+    idle = [text for name, text in UNSTATED.items() if name in found]
+    kept = [one for one in source.warnings if not one.startswith(tuple(idle))]
+    warnings = [*kept, *series, *answer.warnings]
     print_prediction(answer, options.out, run, warnings, json=options.json)
 
 

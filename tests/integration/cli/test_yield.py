@@ -13,6 +13,7 @@ from command_line import FLOW, here
 
 import driftwalk as dw
 from driftwalk.core.files.shards import ShardStore
+from driftwalk.viewer.watch.run_page import RunSource
 
 pytestmark = pytest.mark.slow
 
@@ -66,6 +67,10 @@ def test_a_stopped_run_is_continued(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     with monkeypatch.context() as patch:
         patch.setattr(ShardStore, "write", stopped)
         assert here(*words, "-o", tmp_path / "parts").code == 130
+    # Its page shows the settings that have runs.
+    (shown,) = RunSource(tmp_path / "parts").greeting()
+    assert "Settings so far" in json.dumps(shown)
+    assert "flow scale 0.5" in json.dumps(shown)
     assert here(*words, "-o", tmp_path / "parts").code == 0
     one, two = (xr.load_dataset(tmp_path / name / "yields.nc") for name in ("whole", "parts"))
     assert one.identical(two)

@@ -88,7 +88,10 @@ def _over_time(found: Found, kept: list[int], confidence: float) -> dict[str, An
     """Return the shares over time, and the front: chosen by the first runs, from fresh ones."""
     fresh = [arm for arm in kept if found.judge.size(arm)]
     rows = [(found.reported if arm in fresh else found.chosen).share(arm) for arm in kept]
-    ahead = np.array([found.chosen.cautious(arm) for arm in fresh]).argmax(axis=0)
+    best = found.selected.best
+    # Where another is better by less than its standard error, the best for the named time stays.
+    seen = [found.chosen.share(a) if a == best else found.chosen.cautious(a) for a in fresh]
+    ahead = np.array(seen).argmax(axis=0)
     front = np.array([kept.index(arm) for arm in fresh])[ahead]
     share = np.array(rows)
     runs = found.judge.size(fresh[0])

@@ -21,6 +21,8 @@ SHOWN: Final = {"force_std": (1e3, " mN"), "tank_diameter": (1e2, " cm"), "bond_
 """Factor and unit in which a reader sees the values of an axis."""
 LISTED: Final = 12
 """Settings of a table; a search has more."""
+NAMED: Final = 4
+"""Settings that a sentence names, next to the best."""
 NUMBERS: Final = (
     *("runs", "reached", "fresh_runs"),
     *(f"{name}{end}" for name in ("fresh_yield", "difference") for end in ("", "_low", "_high")),
@@ -104,9 +106,18 @@ def standing_sentences(found: xr.Dataset) -> list[str]:
         return [f"every other setting is worse, with {facts['confidence']:.0%} confidence"]
     first = f"these {alike.size + 1} cannot be distinguished within {100 * facts['within']:.2g} %: "
     order = alike[np.argsort(-(found["reached"] / found["runs"]).values[alike], kind="stable")]
-    named = "; ".join(setting_words(found, int(at)) for at in (facts["best"], *order[:LISTED]))
-    more = f"; and {order.size - LISTED} more" if order.size > LISTED else ""
+    named = "; ".join(setting_words(found, int(at)) for at in (facts["best"], *order[:NAMED]))
+    more = f"; and {order.size - NAMED} more" if order.size > NAMED else ""
     said = [first + named + more]
+    kept = found.isel(setting=[int(facts["best"]), *alike])
+    spans = [
+        f"{name.replace('_', ' ')} {value_text(name, kept[name].min())} to "
+        f"{value_text(name, kept[name].max())}"
+        for name in str(facts["searched"]).split(", ")
+        if name
+    ]
+    if spans:
+        said.append(f"of the ranges they take {', '.join(spans)}")
     if facts["within"] > 1.001 * facts["indifference"]:
         said.append(
             f"to distinguish them within {100 * facts['indifference']:.2g} %, give more runs"
