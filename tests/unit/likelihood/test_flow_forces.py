@@ -7,7 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
-from switching_worlds import FORCES_N, START_S, SWITCH_S, coarse_study, two_settings
+from switching_worlds import (
+    DRAG,
+    FORCES_N,
+    NOISE_M,
+    START_S,
+    SWITCH_S,
+    coarse_study,
+    true_flows,
+    two_settings,
+)
 
 import driftwalk as dw
 from driftwalk.core.errors import InputError
@@ -61,6 +70,11 @@ def test_each_flow_has_its_force(fit: xr.Dataset) -> None:
     assert list(settings) == ["low", "high"]
     assert settings["high"].study.forces.force_std_N == force[1]
     assert settings["low"].flow.attrs["flow_label"] == "low"
+    truth = {"drag_coefficient": DRAG, "tracking_noise": NOISE_M}
+    for interval, flow in enumerate(true_flows()):
+        given = {"force_std": FORCES_N[interval], "interval": interval, "flow": flow}
+        score = dw.score_fit(fit, recordings=two_settings(1), **truth, **given)
+        assert score["force_std_N_error"] == pytest.approx(force[interval] / FORCES_N[interval] - 1)
     with pytest.raises(InputError):
         flow_settings(fit.assign(flow_force_std_high=("flow", [np.inf, np.inf])))
 
