@@ -105,8 +105,8 @@ class FoundRun:
         if "flow_force_std" in self.found:
             first = str(self.found["flow"].values[0])
             said.append(
-                f"of the {self.words}: each flow has its own σ_F; that of flow {first} is taken for "
-                "all (`flow_settings` gives the others)"
+                f"of the {self.words}: each flow has its own σ_F; that of flow {first} is taken "
+                "for all (`flow_settings` gives the others)"
             )
         left_out = self.found.attrs.get("flow_strength_left_out")
         said += [] if left_out is None else [f"of the {self.words}: {left_out}"]
