@@ -29,12 +29,14 @@ from driftwalk.schema.answers.yields import (
     standing_sentences,
     value_text,
     varied,
+    yield_answer,
 )
 from driftwalk.schema.shapes import short_class
 
 if TYPE_CHECKING:
     import xarray as xr
 
+BY_TIME = "Best setting by time"
 MOST_CURVES = 6
 """Settings whose yield is drawn over time; chosen by hand."""
 
@@ -65,9 +67,9 @@ def yield_sections(*, yields: xr.Dataset | None = None) -> list[Section]:
             lambda found: _table("settings", "Settings", setting_table(found)),
         ),
         ("along", "Along each setting", along_sections),
-        ("times", "Best setting by time", lambda found: _table("times", "", front_table(found))),
+        ("times", BY_TIME, lambda found: _table("times", BY_TIME, front_table(found))),
     ]
-    return sections_of(yields, "There is no yield yet.", yield_summary, lambda _: [], parts)
+    return sections_of(yields, "There is no yield yet.", yield_summary, _warnings, parts)
 
 
 def yield_summary(yields: xr.Dataset) -> Section:
@@ -140,5 +142,9 @@ def along_sections(yields: xr.Dataset) -> list[Section]:
     return found
 
 
+def _warnings(found: xr.Dataset) -> list[str]:
+    return yield_answer(found).warnings
+
+
 def _table(id: str, title: str, table: Table) -> Section:
-    return table_section(id, title or table.title, table.columns, table.rows)
+    return table_section(id, title, table.columns, table.rows)
