@@ -110,6 +110,7 @@ _NAMES = {
         "fit",
         "infer_outcomes",
         "kinetics",
+        "maximise_yield",
         "report",
         "simulate",
     ),

@@ -101,6 +101,7 @@ from driftwalk.notebook import (
     fit as fit,
     infer_outcomes as infer_outcomes,
     kinetics as kinetics,
+    maximise_yield as maximise_yield,
     report as report,
     simulate as simulate,
 )

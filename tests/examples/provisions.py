@@ -432,6 +432,7 @@ last bits of the flow are another world, and four machines gave 0.019 to 0.023."
 FEW_RUNS = "--runs 20 --film none"
 CAMERA = {"camera:0": "video.mp4"}  # no camera here: a file in its place
 # A minute of 2 x 2 settings instead of half a day.
+FEW_OF_YIELD = "--blocks 2 --duration 20s --fresh-runs 20"
 FEW_SETTINGS = "--runs 10 --realisations 2 --duration 1min"
 
 PAGES: dict[str, Page] = {
@@ -640,6 +641,23 @@ PAGES: dict[str, Page] = {
             "dw.outcome_distribution(again).attrs['complete'] == float(setting['complete'])",
             "rules['l1_distance'].shape == (2,)",
         ),
+        draws=False,
+        slow=True,
+    ),
+    "docs/how-to/yield.md": Page(
+        provide=_files(_fitted),
+        instead={
+            "--target T --by 2min --vary flow-scale=0.5:1.5": f"--target 2 {FEW_OF_YIELD} "
+            "--runs 1300 --by 10s --vary flow-scale=0.5:1.5",
+            "--target T --vary flow-scale=0,0.5,1,1.5": f"--target 2 {FEW_OF_YIELD} "
+            "--runs 960 --vary flow-scale=0,0.5,1,1.5",
+            "--target T --by 2min --vary tank=25cm,30cm --vary blocks=4,5": "--target 2 --by 10s "
+            f"{FEW_OF_YIELD} --runs 160 --vary tank=25cm,30cm --vary blocks=2,3",
+            'target="T",': 'target="2", blocks=2, duration="20s", fresh_runs=20,',
+            'by="2min",': 'by="10s", selection_runs=1300,',
+        },
+        holds=("found.attrs['target'] == '2'",),
+        makes=("yield/yields.nc", "listed/yields.nc", "tanks/yields.nc", "yield.html"),
         draws=False,
         slow=True,
     ),

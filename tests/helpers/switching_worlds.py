@@ -11,6 +11,7 @@ import driftwalk as dw
 from driftwalk.flow import random_tank_flow
 from driftwalk.model import Study, apply_overrides
 from driftwalk.schema import build_flow_field, build_trajectory
+from driftwalk.simulation import Start
 
 DRAG = 0.4
 FORCE_N = 6e-4
@@ -54,3 +55,31 @@ def two_flows(duration: float = SWITCH_S) -> xr.Dataset:
     assert not run["status"].values.any()
     pose = {name: run[name].values[0, :, 0].astype(float) for name in ("x", "y", "theta")}
     return build_trajectory(START_S + clock, **pose, attrs={"source": "switched.csv"})
+
+
+FORCES_N = (4e-4, 9e-4)
+"""σ_F of the two settings of the pumps."""
+
+
+def two_settings(seed: int, *, duration: float = SWITCH_S) -> xr.Dataset:
+    """Return a recording of so many seconds in each of two flows, with the σ_F of each.
+
+    The block is held for a moment at the switch: the second part begins at rest where the first
+    one ended.
+    """
+    clock = 0.1 * np.arange(round(10.0 * duration) + 1)
+    parts: list[dict[str, np.ndarray]] = []
+    start = None
+    for number, (flow, force) in enumerate(zip(true_flows(), FORCES_N, strict=True)):
+        wanted = {"simulation.time_step_s": 0.0025, "forces.force_std_N": force}
+        study = apply_overrides(coarse_study(), wanted)
+        run = dw.simulate(
+            study, flow, sample_time=clock, replicates=1, seed=100 * seed + number, start=start
+        )
+        assert not run["status"].values.any()
+        pose = {name: run[name].values[0, :, 0].astype(float) for name in ("x", "y", "theta")}
+        start = Start(*(axis[-1] for axis in pose.values()))
+        parts.append({name: axis[: -1 if number == 0 else None] for name, axis in pose.items()})
+    pose = {name: np.concatenate([one[name] for one in parts]) for name in parts[0]}
+    time = START_S + 0.1 * np.arange(pose["x"].size)
+    return build_trajectory(time, **pose, attrs={"source": "pumps.csv"})

@@ -57,6 +57,7 @@ from driftwalk.assembly.sensitivity.sobol import (
     sobol_indices,
 )
 from driftwalk.assembly.tank_batch import TankBatch
+from driftwalk.assembly.yields.run import check_yield, maximise_yield
 
 __all__ = [
     "Alignment",
@@ -77,6 +78,7 @@ __all__ = [
     "check_kinetics",
     "check_outcomes",
     "check_sensitivity",
+    "check_yield",
     "class_at",
     "class_cells",
     "class_name",
@@ -93,6 +95,7 @@ __all__ = [
     "l1_distance",
     "l1_in_floors",
     "l1_noise_floor",
+    "maximise_yield",
     "merge_chirality",
     "outcome_classes",
     "outcome_distribution",

@@ -49,6 +49,7 @@ COMMANDS: Final[dict[str, Command]] = {
     "sensitivity": Command(_PREDICT, "Vary the model and see what assembles.", "sensitivity"),
     "kinetics": Command(_PREDICT, "Estimate rates between outcome classes.", "kinetics"),
     "infer-outcomes": Command(_PREDICT, "Infer parameters from outcomes alone.", "infer_outcomes"),
+    "yield": Command(_PREDICT, "Find the setting with the largest yield.", "yields"),
     "play": Command(_PREDICT, "Change parameters while a simulation runs.", "play"),
     "compare": Command(_COMPARE, "Measure the distance between two motions.", "compare"),
     "compare-models": Command(_COMPARE, "Rank motion models on a recording.", "compare_models"),

@@ -42,6 +42,8 @@ AXES: Final = {
     "tank": "sensitivity.tank_diameter_m",
     "blocks": "sensitivity.blocks",
     "flow": "sensitivity.flow",
+    "flow-scale": "sensitivity.flow_scale",
+    "glued": "sensitivity.glued",
     "latching": "sensitivity.latching",
     "faces": "sensitivity.faces",
     "hidden-face-drag": "sensitivity.hidden_face_drag",
@@ -81,14 +83,7 @@ def sensitivity(
 
     given = given.and_also(vary_overrides(vary or []), keys=VARY_KEYS)
     source = assembly_source(run, flow, given)
-    named = VARY_KEYS["vary flow"] in given.overrides
-    if run is not None and not named and given.file is None and source.study.sensitivity.flow:
-        # A run may be someone else's: it does not say which files of this machine are read.
-        raise InputError(
-            f"the study of {run} names flow files ({', '.join(source.study.sensitivity.flow)}): "
-            "name the files again, --vary flow=FILE,FILE, or give the study file, --study FILE"
-        )
-    paths = _flow_paths(source.study, Path() if named or given.file is None else given.file.parent)
+    paths = flow_paths(source.study, given, run)
     work = SensitivityWork(
         study=source.study,
         flow=source.flow,
@@ -122,9 +117,24 @@ def sensitivity_of(result: SensitivityResult) -> Answer:
     )
 
 
-def _flow_paths(study: Study, folder: Path) -> dict[str, Path]:
-    """Return the files of the flow fields; those of a study file are relative to its folder."""
-    return {name: folder / name for name in study.sensitivity.flow or ()}
+def flow_paths(study: Study, given: StudyOptions, run: Path | None) -> dict[str, Path]:
+    """Return the files of the flow fields; those of a study file are relative to its folder.
+
+    Raises
+    ------
+    InputError
+        When only the study of a run names them.
+    """
+    named = VARY_KEYS["vary flow"] in given.overrides
+    names = study.sensitivity.flow or ()
+    if run is not None and not named and given.file is None and names:
+        # A run may be someone else's: it does not say which files of this machine are read.
+        raise InputError(
+            f"the study of {run} names flow files ({', '.join(names)}): "
+            "name the files again, --vary flow=FILE,FILE, or give the study file, --study FILE"
+        )
+    folder = Path() if named or given.file is None else given.file.parent
+    return {name: folder / name for name in names}
 
 
 def _warnings(source: Source, result: SensitivityResult) -> list[str]:

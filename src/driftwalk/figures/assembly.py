@@ -30,6 +30,7 @@ from driftwalk.plot.sensitivity_maps import (
     shown_classes,
 )
 from driftwalk.plot.tank import plot_film_strip
+from driftwalk.plot.yields import plot_yield_front, plot_yield_settings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -271,3 +272,26 @@ def outcome_posterior_figures(posterior: xr.Dataset) -> Figures:
         for name, pair in zip(names, pairs, strict=True)
     }
     return {**drawn, "data": lambda: style.figure_of(plot_data_widths(posterior))}
+
+
+def yield_figures(yields: xr.Dataset) -> Figures:
+    """Return the figures of a maximised yield: the front of yield and time, and the settings.
+
+    Parameters
+    ----------
+    yields : xarray.Dataset
+        A `yield`.
+
+    Returns
+    -------
+    dict of str to callable
+        ``front`` and ``settings``.
+
+    Examples
+    --------
+    ``write_figures(yield_figures(found), "yield/figures")``
+    """
+    return {
+        "front": lambda: style.figure_of(plot_yield_front(yields)),
+        "settings": lambda: style.figure_of(plot_yield_settings(yields)),
+    }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -212,6 +212,10 @@ def fitted_flow(fit: xr.Dataset, *, interval: int | None = None) -> xr.Dataset:
     if interval is not None:
         flow = intervals.flows[interval]
         attrs["flow_label"] = intervals.labels[flow]
+        if "flow_force_std" in fit:
+            own = (float(fit[f"flow_force_std_{end}"][flow]) for end in ("low", "high"))
+            lasts = float(fit["force_interval"])
+            attrs[f"{FIT_PREFIX}force_noise_intensity"] = [end**2 * lasts for end in own]
         attrs["intervals"] = ", ".join(intervals.describe(one) for one in intervals.of_flow(flow))
         return build_flow_field(x, y, attrs=attrs, **fields[flow])
     attrs["repeat"] = "hold"  # before the first switch and after the last the flow is steady
@@ -224,6 +228,52 @@ def fitted_flow(fit: xr.Dataset, *, interval: int | None = None) -> xr.Dataset:
         strength = np.interp(time, moving.time, moving.strength)[:, None, None]
         frames |= {name: strength * frames[name] for name in ("u", "v")}
     return build_flow_field(x, y, time=time, attrs=attrs, **frames)
+
+
+class FlowSetting(NamedTuple):
+    """Flow and parameters that belong to one setting of the pumps."""
+
+    study: Study
+    """With the σ_F of the flow, and everything else that the fit found."""
+    flow: xr.Dataset
+    """A `flow_field`."""
+
+
+def flow_settings(fit: xr.Dataset) -> dict[str, FlowSetting]:
+    """Return the settings of the pumps of a fit by their names (`fit.flow_labels`).
+
+    Parameters
+    ----------
+    fit : xarray.Dataset
+        Result of `fit_motion`. Without named flows all have one σ_F.
+
+    Returns
+    -------
+    dict of str to FlowSetting
+        Study and flow of each; of a fit without switching times the one is called "A".
+
+    Raises
+    ------
+    InputError
+        When the dataset is no fit, or does not determine C_d or σ_F.
+
+    Examples
+    --------
+    >>> flow_settings(fit)["B"].study.forces.force_std_N  # doctest: +SKIP
+    0.0012
+    """
+    from driftwalk.conditions import estimated_study
+
+    intervals, found = fitted_intervals(require_fit(fit)), {}
+    for flow, label in enumerate(intervals.labels):
+        own = {}
+        if "flow_force_std" in fit:
+            if not np.isfinite(fit["flow_force_std_high"].values[flow]):
+                raise InputError(f"the fit does not determine σ_F in flow {label}")
+            own = {"forces.force_std_N": float(fit["flow_force_std"][flow])}
+        field = fitted_flow(fit, interval=intervals.of_flow(flow)[0])
+        found[label] = FlowSetting(estimated_study(fit, own), field)
+    return found
 
 
 def _field_variables(fit: xr.Dataset) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 
 from driftwalk.core.arrays import Floats
-from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.filter.parameters import INTENSITIES, Point
 from driftwalk.likelihood.law.force_law import inertia_facts, inertia_of, number_facts
 from driftwalk.likelihood.newton import Mode, known_numbers_variance
 from driftwalk.likelihood.prior import PRIOR
@@ -144,6 +144,8 @@ def parameter_facts(
         values["effective_drag_coefficient"] = (drag, reach_of_drag)
         values["effective_force_std_N"] = (math.sqrt(intensity / interval), 0.5 * reach[1])
     facts: dict[str, Any] = {"force_interval_s": interval, "confidence": confidence}
+    if point.intensity_contrasts:
+        facts |= _flow_forces(point, covariance, math.sqrt(total / interval), normal, of_force)
     for name, (value, width) in values.items():
         facts[name] = value
         facts[f"{name}_interval"] = _ends(value, width)
@@ -151,6 +153,27 @@ def parameter_facts(
         **facts,
         **inertia_facts(heavier, facts, normal),
         **number_facts(point, normal**2 * covariance, study),
+    }
+
+
+def _flow_forces(
+    point: Point, covariance: Floats, first: float, normal: float, of_first: float
+) -> dict[str, Any]:
+    """Return sigma_F in each flow with its interval; `first` is that of the first flow."""
+    order = list(point.extras)
+    force, ends = [first], [_ends(first, of_first)]
+    for flow, contrast in point.intensity_contrasts.items():
+        at = [1, 1 + order.index(INTENSITIES[flow - 1])]
+        variance = float(covariance[np.ix_(at, at)].sum()) - float(covariance[1, 1])
+        # What is common to all flows, the mass among it, is as uncertain as in the first one.
+        width = math.sqrt(max(of_first**2 + 0.25 * normal**2 * variance, 0.0))
+        force.append(first * math.exp(0.5 * contrast))
+        ends.append(_ends(force[-1], width))
+    low, high = zip(*ends, strict=True)
+    return {
+        "flow_force_std_N": force,
+        "flow_force_std_low_N": list(low),
+        "flow_force_std_high_N": list(high),
     }
 
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from driftwalk.core.arrays import Floats
 from driftwalk.likelihood.filter.forgetting import due_share
-from driftwalk.likelihood.filter.parameters import Point
+from driftwalk.likelihood.filter.parameters import INTENSITIES, Point
 from driftwalk.likelihood.newton import Mode, ModeSearch, known_numbers_variance
 from driftwalk.likelihood.refuse import cholesky
 
@@ -141,25 +141,27 @@ def restricted_drag(search: ModeSearch, mode: Mode, *, intensity: bool = True) -
 def _with_restricted_intensity(
     search: ModeSearch, mode: Mode, point: Point, found: list[Profile]
 ) -> Point:
-    """Return the point after one Newton step in ln q on the restricted criterion.
+    """Return the point after one Newton step in ln q of each flow on the restricted criterion.
 
     The other noises go along the ridge of the likelihood; their own slopes, and the slope of
     the lever, are too small to matter.
     """
     at, values = zip(*((one.log_drag, one.half_log_determinant) for one in found), strict=True)
     here = float(np.interp(point.log_drag, at, values))
-    more = replace(point, log_intensity=point.log_intensity + REML.intensity_step)
-    moved = replace(mode, point=more)
-    there = profile_at(search, moved, point.log_drag, point.coefficients.ravel())
-    slope = (there.half_log_determinant - here) / REML.intensity_step
     drag = point.coefficients.size
     with_drag = mode.covariance[drag + 1 :, drag]
-    # Of the noises with ln q, at this C_d.
-    column = mode.covariance[drag + 1 :, drag + 1] - with_drag * (
-        with_drag[0] / mode.covariance[drag, drag]
-    )
-    step = np.zeros(drag + 1 + column.size)
-    step[drag + 1 :] = -column * slope
+    step = np.zeros(drag + 1 + with_drag.size)
+    for row, (name, value) in enumerate(point.extras.items()):
+        if name != "log_intensity" and name not in INTENSITIES:
+            continue
+        moved = replace(mode, point=point.with_extra(name, value + REML.intensity_step))
+        there = profile_at(search, moved, point.log_drag, point.coefficients.ravel())
+        slope = (there.half_log_determinant - here) / REML.intensity_step
+        # Of the noises with this ln q, at this C_d.
+        column = mode.covariance[drag + 1 :, drag + 1 + row] - with_drag * (
+            with_drag[row] / mode.covariance[drag, drag]
+        )
+        step[drag + 1 :] -= column * slope
     return point.moved(step)
 
 

@@ -106,7 +106,7 @@ def score_fit(
     truth = dict(zip(SCORED, (drag_coefficient, force_std, tracking_noise), strict=True))
     score: dict[str, Any] = {}
     for name, value in truth.items():
-        score.update(_parameter_score(fit, name, value))
+        score.update(_parameter_score(fit, name, value, interval or 0))
     side = parse_study(fit.attrs["study"], source="the study of the fit").block.side_m
     if recordings is None:
         cells = _surrounded(estimated, radius=0.5 * side)
@@ -135,7 +135,7 @@ def block_flow(flow: xr.Dataset, x: npt.ArrayLike, y: npt.ArrayLike, *, side: fl
     return np.stack([part.mean(axis=1) for part in bilinear(flow, at_x, at_y)], axis=-1)
 
 
-def _parameter_score(fit: xr.Dataset, name: str, truth: float) -> dict[str, Any]:
+def _parameter_score(fit: xr.Dataset, name: str, truth: float, interval: int) -> dict[str, Any]:
     from scipy.special import ndtri
 
     if not (math.isfinite(truth) and truth > 0.0):
@@ -145,6 +145,11 @@ def _parameter_score(fit: xr.Dataset, name: str, truth: float) -> dict[str, Any]
     facts = facts_of(fit)
     value = float(facts[name])
     low, high = facts[f"{name}_interval"]
+    if name == "force_std_N" and "flow_force_std" in fit:
+        flow = fitted_intervals(fit).flows[interval]
+        value, low, high = (
+            float(fit[f"flow_force_std{end}"][flow]) for end in ("", "_low", "_high")
+        )
     reach = 2.0 * float(ndtri(0.5 + 0.5 * facts["confidence"]))
     sd = math.log(high / low) / reach
     return {

@@ -20,6 +20,8 @@ AXES: Final[dict[str, str]] = {
     "tank_diameter": "tank_diameter_m",
     "blocks": "blocks",
     "flow": "flow",
+    "flow_scale": "flow_scale",
+    "glued": "glued",
     "latching": "latching",
     "faces": "faces",
     "hidden_face_drag": "hidden_face_drag",
@@ -69,6 +71,12 @@ class Sensitivity(ForceGrid):
     """Numbers of blocks to compare, an axis of the map."""
     flow: tuple[str, ...] | None = Field(default=None, examples=['["flow_a.nc", "flow_b.nc"]'])
     """Files of flow fields to compare, an axis of the map."""
+    flow_scale: tuple[Annotated[float, Quantity("1", ge=0, le=100)], ...] | None = Field(
+        default=None, examples=["[0.5, 1.0, 1.5]"]
+    )
+    """Factors on the flow velocity to compare, an axis of the map."""
+    glued: tuple[str, ...] | None = Field(default=None, examples=['["x", "xx"]'])
+    """Bodies that blocks start glued to, to compare, an axis of the map."""
     latching: tuple[Latching, ...] | None = Field(
         default=None, examples=['["collision", "connector"]']
     )
@@ -131,8 +139,8 @@ class Sensitivity(ForceGrid):
         return self
 
     @property
-    def axes(self) -> dict[str, tuple[Any, ...]]:
-        """Values of each axis of the map, SI, in the order of the dimensions."""
+    def lists(self) -> dict[str, tuple[Any, ...]]:
+        """Values of each axis that has a list, SI, in the order of the dimensions."""
         lists = {name: getattr(self, key) for name, key in AXES.items()}
         given = {name: values for name, values in lists.items() if values is not None}
         if hidden := given.get("hidden_face_drag"):
@@ -140,5 +148,10 @@ class Sensitivity(ForceGrid):
             given["hidden_face_drag"] = tuple(
                 one if isinstance(one, str) else f"{one:g}" for one in hidden
             )
+        return given
+
+    @property
+    def axes(self) -> dict[str, tuple[Any, ...]]:
+        """Values of each axis of the map: the lists, else the ranges of C_d and σ_F."""
         ranges = {"drag_coefficient": self.drag_coefficients, "force_std": self.force_stds_N}
-        return given or ranges
+        return self.lists or ranges

@@ -8,6 +8,7 @@ from driftwalk.notebook.fitting import calibrate, compare_models, fit
 from driftwalk.notebook.outcomes import infer_outcomes
 from driftwalk.notebook.reporting import report
 from driftwalk.notebook.simulating import assemble, compare, kinetics, simulate
+from driftwalk.notebook.yields import maximise_yield
 
 __all__ = [
     "assemble",
@@ -17,6 +18,7 @@ __all__ = [
     "fit",
     "infer_outcomes",
     "kinetics",
+    "maximise_yield",
     "report",
     "simulate",
 ]

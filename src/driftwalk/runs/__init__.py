@@ -8,6 +8,7 @@ from driftwalk.runs.kinetics import KineticsWork
 from driftwalk.runs.outcome_posterior import OutcomePosteriorWork
 from driftwalk.runs.recovery import RecoveryWork
 from driftwalk.runs.resumable_run import Progress, Run, Work, run_work
+from driftwalk.runs.yields import YieldWork
 from driftwalk.schema.stores.netcdf import netcdf_bytes
 
 __all__ = [
@@ -26,6 +27,7 @@ __all__ = [
     "SensitivityResult",
     "SensitivityWork",
     "Work",
+    "YieldWork",
     "flow_of_result",
     "netcdf_bytes",
     "read_earlier_fit",

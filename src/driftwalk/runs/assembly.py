@@ -120,7 +120,7 @@ class AssemblyWork:
             "flow_sha256": dataset_hash(self.flow, tuple(n for n in names if n in self.flow)),
             "calibration_sha256": dataset_hash(found, drawn_from),
             **({"quantiles": drawn} if (drawn := _lists(self.quantiles)) else {}),
-            **_table_hash(self.study),
+            **table_hash(self.study),
         }
 
     def compute(self, run: Run) -> AssemblyResult:
@@ -134,7 +134,7 @@ class AssemblyWork:
             steady_state,
         )
 
-        settings, table = self.study.assembly, _table_hash(self.study)
+        settings, table = self.study.assembly, table_hash(self.study)
         drawn = sizes_drawn = None
         course = run.course(self._usual_parts())
         how: dict[str, Any] = {"threads": self.threads, "executor": run.executor}
@@ -178,7 +178,7 @@ class AssemblyWork:
             trial=FIXED_TRIAL,
             threads=self.threads,
         )
-        if _table_hash(self.study) != table:
+        if table_hash(self.study) != table:
             raise InputError(
                 f"{self.study.interaction.attraction} has changed during the run: start it again"
             )
@@ -220,7 +220,7 @@ class AssemblyWork:
         }
 
 
-def _table_hash(study: Study) -> dict[str, str]:
+def table_hash(study: Study) -> dict[str, str]:
     """Return the hash of a table of attractions: a run goes on only with the same one."""
     table = study.interaction.attraction
     if table is None:
@@ -318,7 +318,7 @@ class SensitivityWork:
             "flow_sha256": dataset_hash(self.flow, ("u", "v")),
             "flows_sha256": flows,
             "sobol_samples": self.samples,
-            **_table_hash(self.study),
+            **table_hash(self.study),
         }
 
     def compute(self, run: Run) -> SensitivityResult:

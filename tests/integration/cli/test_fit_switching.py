@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 import xarray as xr
 from command_line import Done, answer, here, refusal
-from switching_worlds import DRAG, START_S, SWITCH_S, true_flows, two_flows
+from switching_worlds import (
+    DRAG,
+    FORCES_N,
+    START_S,
+    SWITCH_S,
+    true_flows,
+    two_flows,
+    two_settings,
+)
 
 import driftwalk as dw
 
@@ -16,13 +24,16 @@ COARSE = ("--force-interval", "10ms", "--spline-spacing", "3cm", "--angle", "giv
 SWITCH = ("--switching-times", f"{START_S + SWITCH_S:g}s")
 
 
-@pytest.fixture(scope="module")
-def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("recording") / "switched.csv"
-    track = two_flows()
+def written(track: xr.Dataset, path: Path) -> Path:
+    """Write a track as a table."""
     columns = [track["time"].values, *(track[name].values[:, 0] for name in ("x", "y", "theta"))]
     np.savetxt(path, np.column_stack(columns), "%.7f", ",", header="t,x,y,theta", comments="")
     return path
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return written(two_flows(), tmp_path_factory.mktemp("recording") / "switched.csv")
 
 
 @pytest.fixture(scope="module")
@@ -114,3 +125,22 @@ def test_mistakes_are_one_line(
     done = here("fit", recording, "-o", tmp_path / "run", *options)
     assert words in refusal(done)
     assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("no_figures")
+def test_named_flows_have_a_force_each(tmp_path: Path) -> None:
+    """Four sd each; a right model fails its check once in fifty."""
+    track = written(two_settings(2), tmp_path / "pumps.csv")
+    words = ("fit", track, *COARSE, *SWITCH, "--flow-labels", "low,high", "-o", tmp_path / "run")
+    done = here(*words)
+    assert done.code == 0, done.err
+    assert "force in flow low σ_F" in done.out
+    assert "force in flow high σ_F" in done.out
+    found = answer(here(*words, "--overwrite", "--json"))
+    assert found["verdict"] == "explains", found["verdict_reasons"]
+    sd = np.log(np.divide(found["flow_force_std_high_N"], found["flow_force_std_low_N"])) / 3.29
+    assert (abs(np.log(np.divide(found["flow_force_std_N"], FORCES_N))) < 4.0 * sd).all()
+    assert here("report", tmp_path / "run", "-o", tmp_path / "page.html").code == 0
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "force in flow high" in page

@@ -61,6 +61,10 @@ RUNS: dict[str, tuple[tuple[object, ...], str]] = {
         ("sensitivity", "--flow", FLOW, *TANK, *LITTLE, *VARIED, "--runs", "5"),
         "A sensitivity analysis under way",
     ),
+    "yield": (
+        ("yield", "--flow", FLOW, *TANK, *LITTLE, *VARIED, "--target", "L3", "--runs", "200"),
+        "Search for the largest yield under way",
+    ),
 }
 """By the kind of run: the command, as small as it allows, and the title of its live page."""
 

@@ -187,6 +187,10 @@ BAD: dict[str, Callable[[Path, Path], list[Words]]] = {
         ["infer-outcomes", bad, "--flow", FLOW, "-o", out],
         ["infer-outcomes", counted(out), "--flow", bad, "-o", out],
     ],
+    "yield": lambda bad, out: [
+        ["yield", bad, "--target", "T", "-o", out],
+        ["yield", "--flow", bad, "--target", "T", "-o", out],
+    ],
     "export": lambda bad, out: [["export", bad, "--to", "csv", "-o", out / "folder"]],
     "cite": lambda bad, out: [["cite", bad]],
     "classify": lambda bad, out: [["classify", bad, "--side", "3cm"]],
@@ -339,6 +343,11 @@ LONG: dict[str, Callable[[Path, Path, Path], Words]] = {
     "infer-outcomes": lambda place, run, out: [
         *("infer-outcomes", counted(out), "--flow", FLOW, "--blocks", "2", "--after", "4s"),
         *("--runs", "20", "--truths", "20", *ONE, "-o", out / "run"),
+    ],
+    "yield": lambda place, run, out: [
+        *("yield", "--flow", FLOW, "--target", "L3", "--vary", "force-std=0.2mN,1mN"),
+        *("--blocks", "3", "--runs", "100", "--fresh-runs", "20", "--duration", "20s", *ONE),
+        *("-o", out / "run"),
     ],
 }
 ELSEWHERE = {"demo", "view", "play"}

@@ -58,6 +58,10 @@ class TrialPolicy(NamedTuple):
     """Of the nodes of an emulator of the outcomes; chosen by hand."""
     self_check: int = 5 << 32
     """Of the data sets of its self-check; chosen by hand."""
+    choice: int = 6 << 32
+    """Of the runs that choose the setting of the largest yield; chosen by hand."""
+    fresh: int = 7 << 32
+    """Of the fresh runs that report its yield; chosen by hand."""
 
 
 FIRST_TRIALS: Final = TrialPolicy()
@@ -355,6 +359,8 @@ KEYS: Final[dict[str, str]] = {
     "tank_diameter": "tank.diameter_m",
     "blocks": "assembly.blocks",
     "flow": "",
+    "flow_scale": "",
+    "glued": "assembly.glued",
     "latching": "assembly.latching",
     "faces": "assembly.faces",
     "hidden_face_drag": "assembly.hidden_face_drag",
@@ -407,7 +413,7 @@ class Axes:
         apart = [name for name in self.values if name not in OF_EACH_RUN]
         along = [name for name in self.values if name in OF_EACH_RUN]
         worlds = [
-            self._world(dict(zip(apart, chosen, strict=True)), flow, threads)
+            self.world(dict(zip(apart, chosen, strict=True)), flow, threads)
             for chosen in product(*(self.values[name] for name in apart))
         ]
         size = math.prod(self.shape)
@@ -422,11 +428,20 @@ class Axes:
             },
         )
 
-    def _world(self, chosen: dict[str, Any], flow: xr.Dataset, threads: int | None) -> Plan:
+    def world(self, chosen: Mapping[str, Any], flow: xr.Dataset, threads: int | None) -> Plan:
+        """Return everything about a setting but drag coefficient, force and random numbers.
+
+        Raises
+        ------
+        InputError
+            When a value is out of range, the blocks have no room, or the flow does not cover the
+            tank; names the setting.
+        """
         from driftwalk.model import apply_overrides
 
         changes = {KEYS[name]: value for name, value in chosen.items() if KEYS[name]}
         field = self.flows[chosen["flow"]] if "flow" in chosen else flow
+        field = _scaled(field, chosen.get("flow_scale", 1.0))
         try:
             return world_plan(apply_overrides(self.study, changes), field, threads=threads)
         except InputError as error:
@@ -434,6 +449,12 @@ class Axes:
                 raise
             where = ", ".join(f"{name} = {value}" for name, value in chosen.items())
             raise InputError(f"at {where}: {error}") from error
+
+
+def _scaled(field: xr.Dataset, scale: float) -> xr.Dataset:
+    """Return a flow of another strength, with its standard errors."""
+    names = ("u", "v", "u_standard_error", "v_standard_error")
+    return field.assign({name: scale * field[name] for name in names if name in field})
 
 
 def make_axes(study: Study, axes: Mapping[str, Any] | None) -> Axes:

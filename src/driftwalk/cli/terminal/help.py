@@ -29,6 +29,7 @@ MAIN_OPTIONS: Final[dict[str, str]] = {
     "study recover": "study out recordings duration model parameter threads",
     "track": "markers out camera tank scale bodies side",
     "watch": "markers bodies side camera tank scale out",
+    "yield": "out target by vary flow runs cluster json",
 }
 """The options that ``--help`` shows; every option of a command that is not named here."""
 _RESULT: Final = "Result"

@@ -31,7 +31,7 @@ from driftwalk.likelihood.check.restarts import (
     sections_of,
     within_sections,
 )
-from driftwalk.likelihood.filter.parameters import PULSES, STRENGTHS, Point
+from driftwalk.likelihood.filter.parameters import INTENSITIES, PULSES, STRENGTHS, Point
 from driftwalk.likelihood.filter.series import Series, wall_intervals
 from driftwalk.likelihood.fitted_modes import flow_frames
 from driftwalk.likelihood.flow_intervals import fitted_flow, fitted_intervals
@@ -180,7 +180,13 @@ def replicates_at_estimate(
     drag, force = fitted_value(fit, "drag_coefficient"), fitted_value(fit, "force_std")
     point = estimate.point
     parts = [
-        _simulated(one, _keys(seed, CheckStream.ESTIMATE, index, one, count), drag, force, point)
+        _simulated(
+            one,
+            _keys(seed, CheckStream.ESTIMATE, index, one, count),
+            drag,
+            force * _force_factor(point, estimate.passes.series[index]),
+            point,
+        )
         for index, one in enumerate(series)
     ]
     return _joined(parts)
@@ -223,7 +229,8 @@ def posterior_replicates(
             own = replace(like, flow=flow, camera=camera, threads=1)
             drawn = replace(one, problem=replace(one.problem, like=own))
             return _simulated(
-                drawn, keys[k : k + 1], float(drag[k]), float(force[k]), point,
+                drawn, keys[k : k + 1], float(drag[k]),
+                float(force[k]) * _force_factor(points[k], filtered), point,
                 float(filtered.time[0]), with_path=with_path,
             )  # fmt: skip
 
@@ -243,7 +250,7 @@ def _posterior_samples(
     generator = np.random.default_rng([seed, CheckStream.PARAMETERS])
     size = estimate.point.coefficients.size
     names = fit["log_parameter"].values.tolist()
-    changing = [one for one in (*STRENGTHS, *PULSES) if one in names]
+    changing = [one for one in (*STRENGTHS, *PULSES, *INTENSITIES) if one in names]
     drawn = [0, 1, 2, *(names.index(one) for one in changing)]
     found = fit["covariance"].values[np.ix_(drawn, drawn)]
     widest = float(np.sqrt(np.diag(found)[:3].max()))
@@ -266,6 +273,11 @@ def _posterior_samples(
             point = point.with_extra(name, point.number(name) + float(off))
         points.append(point)
     return points, np.exp(logs[:, :3] * (1.0, 0.5, 1.0))
+
+
+def _force_factor(point: Point, series: Series) -> float:
+    """Return σ_F in the flow of a series over that in the first flow."""
+    return math.exp(0.5 * point.intensity_contrasts.get(series.flow, 0.0))
 
 
 class _World(NamedTuple):

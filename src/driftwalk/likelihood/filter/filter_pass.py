@@ -30,7 +30,12 @@ from driftwalk.likelihood.filter.difference_pairs import (
     noise_derivatives,
     used_of,
 )
-from driftwalk.likelihood.filter.parameters import OF_PREDICTIONS, STRENGTHS, Point
+from driftwalk.likelihood.filter.parameters import (
+    INTENSITIES,
+    OF_PREDICTIONS,
+    STRENGTHS,
+    Point,
+)
 from driftwalk.likelihood.filter.series import (
     FILTER,
     Body,
@@ -123,6 +128,11 @@ class Passes:
         found: dict[str, Pair] = {}
         for name in [*names, *(["strength_0"] if waves else [])]:
             if name in waves:
+                continue
+            if name in INTENSITIES:
+                # The point has the q of this flow: its own number is ln q, those of others nothing.
+                own = INTENSITIES[series.flow - 1] == name if series.flow else False
+                found[name] = found["log_intensity"] if own else Pair(base, base, 1.0)
                 continue
             low, high, step, most, *_ = difference = difference_of(point, name)
             one = base

@@ -53,6 +53,8 @@ OF_PREDICTIONS: Final = ("hidden_share",)
 is wrong to the order in which the filter is. Of a dimer that was slow in the water they said 1
 where the share was 0, by seven standard deviations."""
 PULSES: Final = ("pulse_cosine", "pulse_sine")
+INTENSITIES: Final = tuple(f"flow_intensity_{k}" for k in range(1, 64))
+"""ln q in the second flow, the third and so on, less that in the first."""
 
 
 class Drag(NamedTuple):
@@ -85,6 +87,7 @@ NUMBERS: Final[Mapping[str, Number]] = {
     **{
         name: Number(0.0, 1e-4, 0.3 / max(k, 1), 0.2, -1.0, 1.0) for k, name in enumerate(STRENGTHS)
     },
+    **dict.fromkeys(INTENSITIES, Number(0.0, 1e-4, 3.0, 1.0, -12.0, 12.0)),
     "strength_0": Number(0.0, 1e-4, 0.3, 0.2, -1.0, 1.0),
     "pulse_cosine": Number(0.0, 1e-4, 0.3, 0.2, -1.0, 1.0),
     "pulse_sine": Number(0.0, 1e-4, 0.3, 0.2, -1.0, 1.0),
@@ -171,10 +174,22 @@ class Point:
         return np.asarray(self.coefficients[0] if self.layers > 1 else self.coefficients)
 
     def in_flow(self, flow: int) -> Point:
-        """Return the point with the coefficients of one flow alone, its modes included."""
+        """Return the point with the coefficients and the q of one flow alone, modes included."""
         if self.coefficients.ndim == 3 or self.layers > 1:
             return self
-        return replace(self, coefficients=self.coefficients[flow])
+        more = self.intensity_contrasts.get(flow, 0.0)
+        return replace(
+            self, coefficients=self.coefficients[flow], log_intensity=self.log_intensity + more
+        )
+
+    @property
+    def intensity_contrasts(self) -> dict[int, float]:
+        """The ln q of each flow less that of the first; empty where all have one q."""
+        known = {**self.fixed, **self.opened}
+        if INTENSITIES[0] not in known:
+            return {}
+        named = enumerate(INTENSITIES, start=1)
+        return {flow: known[name] for flow, name in named if name in known}
 
     def moved(self, step: Floats) -> Point:
         """Return the point after a step in (coefficients, ln C_d, noises, numbers)."""

@@ -15,6 +15,7 @@ from driftwalk.likelihood.filter.parameters import (
     CHANGES,
     DRAG_SHAPES,
     DRAGS,
+    INTENSITIES,
     STRENGTHS,
     Point,
 )
@@ -74,6 +75,10 @@ def assumptions_of(study: Study, angle: str, *, recordings: int, flows: int) -> 
         opened.update(dict.fromkeys(STRENGTHS, 0.0))
     elif fit.flow_strength == "auto" and alone:
         tried += STRENGTHS
+    if fit.flow_labels is not None and flows > 1:
+        if flows > len(INTENSITIES):
+            raise InputError(f"{flows} flows are more than {len(INTENSITIES)}: name fewer")
+        opened.update(dict.fromkeys(INTENSITIES[: flows - 1], 0.0))
     pulses = fit.flow_strength != "constant" and alone
     gradient = "off" if fit.law == "paper" else fit.pressure_gradient
     if gradient == "auto" and _states_other(study, "pressure_gradient"):

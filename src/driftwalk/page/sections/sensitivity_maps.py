@@ -35,6 +35,7 @@ AXES: Final = {
     "force_std": ("stochastic force σ_F", "N", "_N"),
     "tank_diameter": ("tank diameter", "m", "_m"),
     "blocks": ("number of blocks", "1", ""),
+    "flow_scale": ("strength of the flow", "1", ""),
     "stirring_length": ("length of the stirring", "m", "_m"),
     "bond_rate": ("rate at which bonds break", "1/s", "_per_s"),
 }

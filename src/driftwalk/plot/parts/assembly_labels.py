@@ -43,11 +43,13 @@ _NUMBERS: Final[dict[str, tuple[str, str, str]]] = {
     "force_std": (r"stochastic force $\sigma_F$ (mN)", "mN", "N"),
     "tank_diameter": ("tank diameter (cm)", "cm", "m"),
     "blocks": ("number of blocks", "", ""),
+    "flow_scale": ("strength of the flow", "", ""),
     "stirring_length": ("stirring length (cm)", "cm", "m"),
     "bond_rate": ("rate at which bonds break (1/s)", "", ""),
 }
 _WORDS: Final[dict[str, str]] = {
     "flow": "flow",
+    "glued": "glued at the start",
     "latching": "latching",
     "faces": "faces",
     "hidden_face_drag": "drag on hidden faces",

@@ -36,7 +36,7 @@ _PREFIXES: Final = {
     "first_half_estimate": "first_half_",
 }
 """Variable along the parameters to what stands in front of the flat names."""
-_ROWS: Final = ("", "bound", "axis", "switch")
+_ROWS: Final = ("", "bound", "axis", "switch", "flow")
 """Dimensions of what is a fact: a number, a pair, a few times."""
 _TYPES: Final = {"float": np.float64, "int": np.int64}
 

@@ -6,6 +6,7 @@ map of residuals, so that one dataset answers whether its numbers may be used.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import isfinite
 from typing import TYPE_CHECKING, Any, Final
 
@@ -124,12 +125,36 @@ def fitted_parts(fit: xr.Dataset, *, hint: str = "") -> list[Part]:
 
 
 def model_estimates(fit: xr.Dataset) -> list[Estimate]:
-    """Return the estimates of the block and the tracking noise; no C_d where the drag is linear."""
+    """Return the estimates of the block and the tracking noise; no C_d where the drag is linear.
+
+    Where flows were named each has its own σ_F.
+    """
     linear = fit.attrs.get("drag_law") == "linear"
-    return [
+    found = [
         one
         for one in estimates(fit)
         if one.number not in LAW_NUMBERS and not (linear and one.number.name == "drag_coefficient")
+    ]
+    if "flow_force_std" not in fit:
+        return found
+    return [
+        part
+        for one in found
+        if one.number.name != "force_noise_intensity"
+        for part in (_of_flows(fit, one) if one.number.name == "force_std" else [one])
+    ]
+
+
+def _of_flows(fit: xr.Dataset, first: Estimate) -> list[Estimate]:
+    """Return σ_F in each flow."""
+    columns = (fit[f"flow_force_std{end}"].values for end in ("", "_low", "_high"))
+    return [
+        first._replace(
+            number=replace(first.number, label=f"force in flow {label}"),
+            value=float(value),
+            ends=(float(low), float(high)),
+        )
+        for label, value, low, high in zip(fit["flow"].values, *columns, strict=True)
     ]
 
 

@@ -18,6 +18,7 @@ from driftwalk.schema.kinds import (
     recovery,
     sensitivity,
     steady_state,
+    yields,
 )
 from driftwalk.schema.parameters import is_block, stored_parameters
 
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 _FILES: Final = (
     motion, flow, calibration, models, fit, recovery, model_check, assembly, steady_state,
-    sensitivity, kinetics, outcome_posterior,
+    sensitivity, kinetics, outcome_posterior, yields,
 )  # fmt: skip
 
 KINDS: Final[dict[str, Kind]] = {kind.name: kind for file in _FILES for kind in file.KINDS}

@@ -232,6 +232,10 @@ variables (with switching times):
     flow text
     interval_flow(flow_interval) [1] int: number of the flow in each interval between the \
         switching times
+    flow_force_std(flow) [N]: σ_F in the flow, where flows were named; the parameter force_std is \
+        that of the first
+    flow_force_std_low(flow) [N]: lower end of its interval
+    flow_force_std_high(flow) [N]: upper end of its interval
     switching_time(switch) [s]: when the flow changes; on the clock of the recordings
     recording_start [s]: first sample of the first recording
 attributes:

@@ -15,6 +15,8 @@ variables (an axis):
     tank_diameter(tank_diameter) [m]: diameter of the tank
     blocks(blocks) [1] int: number of blocks
     flow(flow) text: flow field
+    flow_scale(flow_scale) [1]: factor on the flow velocity
+    glued(glued) text: rows of the blocks of a body at the start
     latching(latching) text: when two blocks latch
     faces(faces) text: types of the faces +x, +y, -x, -y of the blocks
     hidden_face_drag(hidden_face_drag) text: drag on joined faces; a word, or its share of a free \

@@ -1,0 +1,150 @@
+"""A page on a maximised yield: the best setting, the others, and the front of yield and time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from driftwalk.page.parts import (
+    Maker,
+    Section,
+    chart,
+    figure,
+    label,
+    mark,
+    percent,
+    require,
+    required,
+    sections_of,
+    series,
+    summary_section,
+    table_section,
+)
+from driftwalk.schema.answers.parts import Table
+from driftwalk.schema.answers.yields import (
+    front_table,
+    setting_table,
+    setting_words,
+    standing_sentences,
+    value_text,
+    varied,
+    yield_answer,
+)
+from driftwalk.schema.shapes import short_class
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+BY_TIME = "Best setting by time"
+MOST_CURVES = 6
+"""Settings whose yield is drawn over time; chosen by hand."""
+
+
+def yield_sections(*, yields: xr.Dataset | None = None) -> list[Section]:
+    """Return the sections of a page on a maximised yield.
+
+    Parameters
+    ----------
+    yields : xarray.Dataset, optional
+        A `yield`; None while there is none yet.
+
+    Returns
+    -------
+    list of dict
+        Sections; what cannot be shown is an empty one that says why.
+
+    Examples
+    --------
+    >>> [part["kind"] for part in yield_sections()]
+    ['empty']
+    """
+    parts: list[tuple[str, str, Maker]] = [
+        ("front", "Front of yield and time", front_section),
+        (
+            "settings",
+            "Settings",
+            lambda found: _table("settings", "Settings", setting_table(found)),
+        ),
+        ("along", "Along each setting", along_sections),
+        ("times", BY_TIME, lambda found: _table("times", BY_TIME, front_table(found))),
+    ]
+    return sections_of(yields, "There is no yield yet.", yield_summary, _warnings, parts)
+
+
+def yield_summary(yields: xr.Dataset) -> Section:
+    """Return the best setting, its yield, and whether it was distinguished from the others."""
+    best = yields.isel(setting=required(yields, "best"))
+    target, facts = short_class(str(required(yields, "target"))), yields.attrs
+    low, high = (float(best[f"fresh_yield_{end}"]) for end in ("low", "high"))
+    paragraphs = [
+        f"{yields.sizes['setting']} settings were compared by {facts['chosen_runs']} runs: run k "
+        "of every setting has the same random numbers. The yields come from "
+        f"{facts['reported_runs']} fresh runs, which chose nothing.",
+        f"Most runs reach {target} by {facts['by_s']:g} s at "
+        f"{setting_words(yields, required(yields, 'best'))}.",
+        *(f"{text[:1].upper()}{text[1:]}." for text in standing_sentences(yields)),
+    ]
+    shown = [
+        figure(
+            f"yield of {target} by {facts['by_s']:g} s", float(best["fresh_yield"]),
+            note=f"{percent(low)} to {percent(high)}, {facts['confidence']:.0%} interval",
+        )
+    ]  # fmt: skip
+    return summary_section(paragraphs, shown)
+
+
+def front_section(yields: xr.Dataset) -> Section:
+    """Return the largest yield over time, and the curves of some settings."""
+    require(yields, "time", "share", "front_yield", "front_yield_low", "front_yield_high")
+    time = yields["time"].values
+    ends = (yields["front_yield_low"].values, yields["front_yield_high"].values)
+    drawn = [series("best setting of each time", time, yields["front_yield"].values, ends=ends)]
+    fresh = np.flatnonzero(yields["fresh_runs"].values > 0)
+    order = fresh[np.argsort(-yields["fresh_yield"].values[fresh], kind="stable")]
+    drawn += [
+        series(setting_words(yields, int(at)), time, yields["share"].values[at])
+        for at in order[:MOST_CURVES]
+    ]
+    return chart(
+        "front", "Front of yield and time",
+        "From fresh runs; for each time the setting was chosen by the runs before them.",
+        x=label("time", "s"), y=label("share of runs with the target"), series=drawn,
+        marks=[mark("by", x=yields.attrs["by_s"])],
+    )  # fmt: skip
+
+
+def along_sections(yields: xr.Dataset) -> list[Section]:
+    """Return the yields of all settings along each axis with numbers."""
+    require(yields, "runs", "reached", "standing")
+    share = (yields["reached"] / yields["runs"]).values
+    found = []
+    for name in varied(yields):
+        values = yields[name].values
+        if values.dtype == object or len(set(values.tolist())) < 2:
+            continue
+        unit = value_text(name, values[0]).partition(" ")[2]
+        shown = [float(value_text(name, value).partition(" ")[0]) for value in values]
+        drawn = []
+        for word in ("worse", "alike", "best"):
+            mine = yields["standing"].values == word
+            if mine.any():
+                text = "cannot be distinguished" if word == "alike" else word
+                at = np.array(shown)[mine]
+                drawn.append(series(text, at, share[mine], style="points"))
+        words = name.replace("_", " ")
+        found.append(
+            chart(
+                f"along-{name}", f"Yield along {words}", "Of the runs that chose.",
+                x=label(f"{words} ({unit})" if unit else words), y=label("yield"), series=drawn,
+            )
+        )  # fmt: skip
+    return found
+
+
+def _warnings(found: xr.Dataset) -> list[str]:
+    return yield_answer(found).warnings
+
+
+def _table(id: str, title: str, table: Table) -> Section:
+    return table_section(id, title, table.columns, table.rows)

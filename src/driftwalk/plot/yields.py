@@ -1,0 +1,117 @@
+"""The yield of self-assembly: the front of yield and time, and the settings with their standing."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from driftwalk.plot.assembly_courses import TIME_LABEL
+from driftwalk.plot.parts import style
+from driftwalk.plot.parts.assembly_labels import check_kind
+from driftwalk.schema.answers.yields import setting_words
+from driftwalk.schema.shapes import short_class
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+
+MOST_SETTINGS = 16
+"""Settings that are drawn as rows; chosen by hand."""
+MARKERS = {"best": "o", "alike": "s", "worse": "x"}
+
+
+def plot_yield_front(found: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw the largest yield over time with its exact interval, and the settings that give it.
+
+    Parameters
+    ----------
+    found : xarray.Dataset
+        A `yield`.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure when left out.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+
+    Raises
+    ------
+    InputError
+        When the dataset is of another kind.
+
+    Examples
+    --------
+    ``plot_yield_front(found)``
+    """
+    check_kind(found, "yield", "time", "share", "front_yield", "front_setting")
+    ax = style.axes_or_new(ax, height_mm=80.0)
+    time = found["time"].values
+    ax.fill_between(
+        time, found["front_yield_low"], found["front_yield_high"], color=style.MUTED, alpha=0.3,
+        lw=0, label="best of each time",
+    )  # fmt: skip
+    ahead = np.bincount(found["front_setting"].values, minlength=found.sizes["setting"])
+    ahead[int(found.attrs["best"])] += time.size
+    for at in np.argsort(-ahead, kind="stable")[: int((ahead > 0).sum())]:
+        ax.plot(time, found["share"].values[at], label=setting_words(found, int(at)))
+    ax.axvline(found.attrs["by_s"], color=style.MUTED, lw=0.6, ls="--")
+    target = short_class(str(found.attrs["target"]))
+    ax.set(
+        xlabel=TIME_LABEL, ylabel=f"share of runs with {target}", xlim=(time[0], time[-1]),
+        ylim=(0.0, None),
+    )  # fmt: skip
+    ax.legend(fontsize=6.0)
+    ax.spines[["top", "right"]].set_visible(False)
+    return ax
+
+
+def plot_yield_settings(found: xr.Dataset, ax: Axes | None = None) -> Axes:
+    """Draw how much less than the best each setting gives, with its interval, the best on top.
+
+    Parameters
+    ----------
+    found : xarray.Dataset
+        A `yield`.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure when left out.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        The axes drawn on.
+
+    Raises
+    ------
+    InputError
+        When the dataset is of another kind.
+
+    Examples
+    --------
+    ``plot_yield_settings(found)``
+    """
+    check_kind(found, "yield", "difference", "standing")
+    ax = style.axes_or_new(ax, height_mm=90.0)
+    behind = found["difference"].values
+    order = np.argsort(behind + (found["standing"].values == "worse"), kind="stable")
+    order = order[:MOST_SETTINGS]
+    for row, at in enumerate(order):
+        one = found.isel(setting=at)
+        reach = [
+            [float(one["difference_high"] - one["difference"])],
+            [float(one["difference"] - one["difference_low"])],
+        ]
+        word = str(one["standing"].values)
+        color = style.MUTED if word == "worse" else "C0"
+        ax.errorbar(
+            -behind[at], row, xerr=reach, fmt=MARKERS[word], color=color, ms=3.0, lw=0.8,
+        )  # fmt: skip
+    ax.axvspan(-found.attrs["indifference"], 0.0, color=style.MUTED, alpha=0.2, lw=0)
+    words = [setting_words(found, int(at)) for at in order]
+    ax.set_yticks(range(len(order)), words, fontsize=6.0)
+    ax.invert_yaxis()
+    ax.set_xlabel("yield less that of the best")
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.set_title("o best, □ alike, x worse", loc="left")
+    return ax

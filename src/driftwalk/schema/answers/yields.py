@@ -1,0 +1,203 @@
+"""The answer of a maximised yield: the best setting, those like it, and the front over time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from driftwalk.schema.answers.parts import Answer, Part, Row, Table
+from driftwalk.schema.answers.sensitivity import key_of
+from driftwalk.schema.kinds.sensitivity import AXES
+from driftwalk.schema.shapes import short_class
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+NAMES: Final = tuple(one.name for one in AXES)
+SHOWN: Final = {"force_std": (1e3, " mN"), "tank_diameter": (1e2, " cm"), "bond_rate": (1.0, " /s")}
+"""Factor and unit in which a reader sees the values of an axis."""
+LISTED: Final = 12
+"""Settings of a table; a search has more."""
+NAMED: Final = 4
+"""Settings that a sentence names, next to the best."""
+NUMBERS: Final = (
+    *("runs", "reached", "fresh_runs"),
+    *(f"{name}{end}" for name in ("fresh_yield", "difference") for end in ("", "_low", "_high")),
+)
+
+
+def yield_answer(found: xr.Dataset) -> Answer:
+    """Return the answer of a `yield`.
+
+    Parameters
+    ----------
+    found : xarray.Dataset
+        A `yield`.
+    """
+    facts = found.attrs
+    best = int(facts["best"])
+    parts: list[Part] = [
+        f"{found.sizes['setting']} settings compared by {facts['chosen_runs']} runs on shared "
+        f"random numbers; yields from {facts['reported_runs']} fresh runs",
+        Row("best setting", setting_words(found, best)),
+        Row(f"yield of {short_class(str(facts['target']))}", yield_words(found, best)),
+        *standing_sentences(found),
+        setting_table(found),
+        front_table(found),
+    ]
+    warnings = []
+    if facts["left_out"]:
+        warnings.append(
+            f"{facts['left_out']} runs broke down and count as without the target; use a smaller "
+            "time step"
+        )
+    return Answer(parts, _facts(found), warnings)
+
+
+def varied(found: xr.Dataset) -> list[str]:
+    """Return the names of the axes that vary."""
+    return [name for name in NAMES if name in found]
+
+
+def value_text(name: str, value: Any) -> str:
+    """Return a value of an axis in the unit of a reader.
+
+    Examples
+    --------
+    >>> value_text("force_std", 0.00055), value_text("latching", "collision")
+    ('0.55 mN', 'collision')
+    """
+    if isinstance(value, str):
+        return value
+    factor, unit = SHOWN.get(name, (1.0, ""))
+    return f"{factor * float(value):.4g}{unit}"
+
+
+def setting_words(found: xr.Dataset, at: int) -> str:
+    """Return the values of a setting, as in "flow scale 1.5, force std 1.2 mN"."""
+    return point_words({name: found[name].values[at] for name in varied(found)})
+
+
+def point_words(point: Mapping[str, Any]) -> str:
+    """Return the values of a setting by the names of their axes, in words."""
+    return ", ".join(
+        f"{name.replace('_', ' ')} {value_text(name, value)}" for name, value in point.items()
+    )
+
+
+def yield_words(found: xr.Dataset, at: int) -> str:
+    """Return the yield of a setting with its exact interval, and of how many fresh runs."""
+    one = found.isel(setting=at)
+    return (
+        f"{float(one['fresh_yield']):.3f} by {found.attrs['by_s']:g} s   "
+        f"{found.attrs['confidence']:.0%} interval {float(one['fresh_yield_low']):.3f} to "
+        f"{float(one['fresh_yield_high']):.3f}   {int(one['fresh_runs'])} fresh runs"
+    )
+
+
+def standing_sentences(found: xr.Dataset) -> list[str]:
+    """Return whether the best was distinguished from the others, in words."""
+    alike = np.flatnonzero(found["standing"].values == "alike")
+    facts = found.attrs
+    if not alike.size:
+        return [f"every other setting is worse, with {facts['confidence']:.0%} confidence"]
+    first = f"these {alike.size + 1} cannot be distinguished within {100 * facts['within']:.2g} %: "
+    order = alike[np.argsort(-(found["reached"] / found["runs"]).values[alike], kind="stable")]
+    named = "; ".join(setting_words(found, int(at)) for at in (facts["best"], *order[:NAMED]))
+    more = f"; and {order.size - NAMED} more" if order.size > NAMED else ""
+    said = [first + named + more]
+    kept = found.isel(setting=[int(facts["best"]), *alike])
+    spans = [
+        f"{name.replace('_', ' ')} {value_text(name, kept[name].min())} to "
+        f"{value_text(name, kept[name].max())}"
+        for name in str(facts["searched"]).split(", ")
+        if name
+    ]
+    if spans:
+        said.append(f"of the ranges they take {', '.join(spans)}")
+    if facts["within"] > 1.001 * facts["indifference"]:
+        said.append(
+            f"to distinguish them within {100 * facts['indifference']:.2g} %, give more runs"
+        )
+    return said
+
+
+def setting_table(found: xr.Dataset) -> Table:
+    """Return the settings, the best ones first."""
+    share = (found["reached"] / found["runs"]).values
+    rank = {"best": 0, "alike": 1, "worse": 2}
+    keys = [
+        (rank[str(word)], -one) for word, one in zip(found["standing"].values, share, strict=True)
+    ]
+    order = sorted(range(len(keys)), key=keys.__getitem__)
+    names = varied(found)
+    rows = []
+    for at in order[:LISTED]:
+        one = found.isel(setting=at)
+        low, high, fresh = (
+            float(one[f"fresh_yield{end}"]) for end in ("_low", "_high", "")
+        )  # fmt: skip
+        rows.append(
+            [
+                *(value_text(name, found[name].values[at]) for name in names),
+                f"{fresh:.3f}" if math.isfinite(fresh) else "",
+                f"{low:.3f} to {high:.3f}" if math.isfinite(fresh) else "",
+                f"{share[at]:.3f}",
+                int(one["runs"]),
+                "cannot be distinguished"
+                if one["standing"] == "alike"
+                else str(one["standing"].values),
+            ]
+        )
+    share_words = f"{found.attrs['confidence']:.0%} interval"
+    columns = [*(name.replace("_", " ") for name in names), "yield", share_words]
+    left = len(order) - LISTED
+    title = f"the best {LISTED} of {len(order)} settings" if left > 0 else ""
+    return Table(rows, [*columns, "of runs that chose", "runs", "standing"], title)
+
+
+def front_table(found: xr.Dataset) -> Table:
+    """Return the front of yield and time: where the best setting changes, and the yields there."""
+    front = found["front_setting"].values
+    value, low, high = (found[f"front_yield{end}"].values for end in ("", "_low", "_high"))
+    last = len(front) - 1
+    tenths = range(last // 10, last + 1, max(last // 10, 1))
+    rows = [
+        [
+            f"{float(found['time'][at]):g}",
+            f"{value[at]:.3f}",
+            f"{low[at]:.3f} to {high[at]:.3f}",
+            setting_words(found, int(front[at])),
+        ]
+        for at in tenths
+    ]
+    share_words = f"{found.attrs['confidence']:.0%} interval"
+    return Table(rows, ["time [s]", "yield", share_words, "setting"], "front of yield and time")
+
+
+def _facts(found: xr.Dataset) -> dict[str, Any]:
+    own = {k: v for k, v in found.attrs.items() if k not in ("kind", "schema_version", "best")}
+    names = varied(found)
+    settings = [
+        {
+            **{key_of(name): found[name].values[at] for name in names},
+            **{name: found[name].values[at] for name in NUMBERS},
+            "standing": str(found["standing"].values[at]),
+        }
+        for at in range(found.sizes["setting"])
+    ]
+    front = [
+        {
+            "time_s": float(found["time"][at]),
+            "setting": int(found["front_setting"][at]),
+            **{
+                f"yield{end}": float(found[f"front_yield{end}"][at])
+                for end in ("", "_low", "_high")
+            },
+        }
+        for at in range(found.sizes["time"])
+    ]
+    return {**own, "best": settings[int(found.attrs["best"])], "settings": settings, "front": front}
