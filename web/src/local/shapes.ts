@@ -1,8 +1,7 @@
 /** Names of shapes and outcome classes, as src/driftwalk/assembly/outcomes/class_names.py gives them. */
 
-import { SHAPES } from "../polyomino";
-
-type Cell = readonly [x: number, y: number];
+import { SHAPES, type Square } from "../polyomino";
+import { code, turns } from "../tank/joined";
 
 interface Joined {
   readonly assembly: ArrayLike<number>;
@@ -14,47 +13,31 @@ const LONGEST = 40;
 const NAMES = Object.keys(SHAPES);
 const known = new Map<string, string>();
 
-function codeOf(cells: readonly Cell[]): string {
-  const [left, top] = [Math.min(...cells.map(([x]) => x)), Math.max(...cells.map(([, y]) => y))];
-  const width = 1 + Math.max(...cells.map(([x]) => x)) - left;
-  const height = 1 + top - Math.min(...cells.map(([, y]) => y));
-  const rows = Array.from({ length: height }, () => Array<string>(width).fill("."));
-  for (const [x, y] of cells) rows[top - y]?.splice(x - left, 1, "x");
-  return rows.map((row) => row.join("")).join("/");
-}
-
-function rowsOf(code: string): number {
-  return code.split("/").length;
+function rowsOf(rowCode: string): number {
+  return rowCode.split("/").length;
 }
 
 /** Returns the code of the fewest rows, and among those the one with cells the earliest, of all ways to turn cells. */
-function canonical(cells: readonly Cell[], merged: boolean): string {
-  const codes: string[] = [];
-  for (const mirror of merged ? [1, -1] : [1]) {
-    let turned: Cell[] = cells.map(([x, y]) => [mirror * x, y]);
-    for (let quarter = 0; quarter < 4; quarter += 1) {
-      codes.push(codeOf(turned));
-      turned = turned.map(([x, y]) => [-y, x]);
-    }
-  }
+function canonical(cells: readonly Square[], merged: boolean): string {
+  const codes = [...turns(cells), ...(merged ? turns(cells.map(([x, y]): Square => [-x, y])) : [])];
   const fewest = Math.min(...codes.map(rowsOf));
-  return codes.filter((code) => rowsOf(code) === fewest).reduce((one, other) => (other > one ? other : one));
+  return codes.filter((one) => rowsOf(one) === fewest).reduce((one, other) => (other > one ? other : one));
 }
 
-function cellsOf(code: string): Cell[] {
-  const rows = code.split("/");
+function cellsOf(rowCode: string): Square[] {
+  const rows = rowCode.split("/");
   return rows.flatMap((row, index) =>
-    [...row].flatMap((letter, x): Cell[] => (letter === "x" ? [[x, rows.length - index]] : [])),
+    [...row].flatMap((letter, x): Square[] => (letter === "x" ? [[x, rows.length - index]] : [])),
   );
 }
 
 /** Returns the name of a shape: a short one up to four cells, else its canonical code. */
-export function shapeName(cells: readonly Cell[], merged: boolean): string {
-  const given = `${merged}${codeOf(cells)}`;
+export function shapeName(cells: readonly Square[], merged: boolean): string {
+  const given = `${merged}${code(cells)}`;
   let name = known.get(given);
   if (name === undefined) {
-    const code = canonical(cells, merged);
-    name = NAMES.find((short) => canonical(cellsOf(SHAPES[short] ?? ""), merged) === code) ?? code;
+    const own = canonical(cells, merged);
+    name = NAMES.find((short) => canonical(cellsOf(SHAPES[short] ?? ""), merged) === own) ?? own;
     known.set(given, name);
   }
   return name;
@@ -65,7 +48,7 @@ function order(name: string): readonly (number | string)[] {
   const place = NAMES.indexOf(name);
   const cells = cellsOf(SHAPES[name] ?? name);
   if (place >= 0) return [-cells.length, place, "", ""];
-  const sorted = (code: string): string => code.replace(/[x/.]/g, (sign) => String("x/.".indexOf(sign)));
+  const sorted = (own: string): string => own.replace(/[x/.]/g, (sign) => String("x/.".indexOf(sign)));
   return [-cells.length, rowsOf(name) - 1, sorted(canonical(cells, true)), sorted(name)];
 }
 
@@ -95,7 +78,7 @@ export function className(state: Joined, merged: boolean, most: number): string 
   if (state.assembly.length > most) return groups.length === 1 ? "1 assembly" : `${groups.length} assemblies`;
   const names = groups.map((group) =>
     shapeName(
-      group.map((block): Cell => [state.cell[2 * block] ?? 0, state.cell[2 * block + 1] ?? 0]),
+      group.map((block): Square => [state.cell[2 * block] ?? 0, state.cell[2 * block + 1] ?? 0]),
       merged,
     ),
   );
