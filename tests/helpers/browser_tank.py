@@ -21,7 +21,8 @@ from driftwalk.viewer import PlaySource
 from driftwalk.viewer.play.saved import local_tank
 
 PRELUDE = """async (given) => {
-  const { modelOf, checkLocal, LocalTank, MotionWindow, outcomeOf, className } = driftwalkPlayground;
+  const { modelOf, checkLocal, LocalTank } = driftwalkPlayground;
+  const { MotionWindow, outcomeOf, className } = driftwalkPlayground;
   const model = given.local === undefined ? null : await modelOf(checkLocal(given.local, ""));
   const hex = (numbers) => Array.from(
     new BigUint64Array(Float64Array.from(numbers).buffer), (bits) => bits.toString(16));

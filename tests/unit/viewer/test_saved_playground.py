@@ -1,4 +1,4 @@
-"""The saved playground: its core, as WebAssembly in Node, against the native one and against Python."""
+"""The saved playground: its WebAssembly, in Node, against the native core and against Python."""
 
 from __future__ import annotations
 

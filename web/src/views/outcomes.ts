@@ -11,6 +11,7 @@ import type { Link, Message } from "./socket";
 const RUNS = 200;
 /** Classes that are drawn; of more, the most frequent. */
 const MOST = 12;
+const CHANGED = " The settings have changed since then.";
 const LONGEST_SKETCH = 16;
 /** Quantile of the normal law for intervals of 90 %. */
 const Z = 1.645;
@@ -18,6 +19,7 @@ const Z = 1.645;
 const countsMessage = object({ counts: record(number), done: number, runs: number });
 
 export class OutcomesPanel {
+  private outdated = false;
   private readonly body = el("div", {});
   private readonly words = el("p", { class: "note", role: "status" });
   private readonly button = el("button", { type: "button", "data-action": "count" }, `Simulate ${RUNS} runs`);
@@ -25,10 +27,18 @@ export class OutcomesPanel {
   constructor(root: HTMLElement, section: RawSection, link: Link) {
     this.button.addEventListener("click", () => {
       this.words.textContent = "The first runs are on their way.";
+      this.outdated = false;
       link.send({ type: "count", runs: RUNS });
     });
     root.append(el("h2", {}, section.title), el("div", { class: "actions" }, this.button), this.words, this.body);
     if (section.note !== null) root.append(el("p", { class: "note" }, section.note));
+  }
+
+  /** A setting has changed: the runs were with those before. */
+  outdate(): void {
+    if (this.outdated || this.body.childElementCount === 0) return;
+    this.outdated = true;
+    this.words.append(CHANGED);
   }
 
   show(content: Message): void {
@@ -45,6 +55,7 @@ export class OutcomesPanel {
     const others = rest > 0 ? `; ${rest} runs ended in ${sorted.length - MOST} other classes` : "";
     this.words.textContent = `${done} of ${runs} runs${others}. Whiskers: 90 % intervals, one class at a time.`;
     const frame = { id: "outcomes", kind: "classes", title: "", note: null, confidence: 0.9, runs: done };
+    if (this.outdated) this.words.append(CHANGED);
     this.body.replaceChildren();
     drawClasses({ ...frame, series: [{ name: "runs", items }] }, this.body);
     this.body.dataset["done"] = String(done);

@@ -158,6 +158,7 @@ class Playground {
     const knobs = makeKnobs(section, (name, value) => {
       this.note.textContent = "";
       this.set({ name, value });
+      if (name !== "speed") this.outcomes?.outdate();
     });
     panel.append(el("h2", {}, section.title), this.actions(), knobs.element);
     if (section.note !== null) panel.append(el("p", { class: "note" }, section.note));
@@ -179,7 +180,17 @@ class Playground {
     this.pause.addEventListener("click", () => act(this.last?.paused === true ? "run" : "pause")());
     const clear = el("button", { type: "button", "data-action": "clear" }, "Clear the density");
     clear.addEventListener("click", act("clear"));
-    return el("div", { class: "actions" }, this.pause, restart, clear);
+    return el("div", { class: "actions" }, this.pause, restart, clear, localCore() !== null && this.linkButton());
+  }
+
+  private linkButton(): HTMLElement {
+    const copy = el("button", { type: "button", "data-action": "link" }, "Copy the link");
+    const say = (words: string) => (): void => void (this.note.textContent = words);
+    copy.addEventListener("click", () => {
+      const done = navigator.clipboard?.writeText(location.href) ?? Promise.reject(new Error("no clipboard"));
+      done.then(say("The link to these settings is copied."), say("The address of this page has these settings."));
+    });
+    return copy;
   }
 
   private showSection(content: unknown): void {

@@ -97,7 +97,7 @@ class PlaySource(Playground):
         body: str | None = None,
         seed: int = 1,
     ) -> None:
-        self.tank = LiveTank(study, flow, blocks=blocks, seed=seed)
+        self.tank, self.water = LiveTank(study, flow, blocks=blocks, seed=seed), flow
         knobs = knobs_for(self.tank, most_blocks=most_blocks_in(self.tank))
         super().__init__(study, flow, knobs, recording=recording, body=body, seed=seed)
         self._stream: Stream | None = None

@@ -79,7 +79,7 @@ class Playground(Source):
         body: str | None,
         seed: int,
     ) -> None:
-        self._study, self.flow, self.knobs = study, flow, dict(knobs)
+        self._study, self.knobs = study, dict(knobs)
         self._arrows = None if flow is None else flow_arrows(flow)
         self.recording = None if recording is None else beside(recording, study, body=body)
         self.motion = MotionWindow(self.recording, seed=seed)

@@ -64,7 +64,7 @@ def save_playground(
         section(
             "outcomes",
             "outcomes",
-            "What they assemble into",
+            "Outcomes",
             "Runs of the tank as it is set now, each until all blocks are one assembly or "
             f"{source.tank.study.assembly.duration_s:g} s have passed.",
         )
@@ -81,7 +81,7 @@ def local_tank(source: PlaySource) -> dict[str, Any]:
         The tank.
     """
     study = source.tank.study
-    plan = make_plan(study, source.flow, settings={}, index=np.arange(1), ends=False)
+    plan = make_plan(study, source.water, settings={}, index=np.arange(1), ends=False)
     given = model_arguments(study, plan.flow, np.zeros(1), Camera())
     arrays = {name: value for name, value in given.items() if isinstance(value, np.ndarray)}
     numbers = {name: value for name, value in given.items() if isinstance(value, (int, float))}
