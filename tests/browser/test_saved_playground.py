@@ -1,4 +1,4 @@
-"""The saved playground in Chromium: from one file, offline, as fast and as exact as it has to be."""
+"""The saved playground in Chromium: from one file, offline, fast enough, with the native bits."""
 
 from __future__ import annotations
 

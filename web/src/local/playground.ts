@@ -206,13 +206,18 @@ function count(model: Model, request: Request & { type: "count" }, publish: Publ
 function serve(): void {
   const publish: Publish = (message) => postMessage(message);
   let moving: Moving | null = null;
+  const begin = async (request: Request & { type: "begin" | "count" }): Promise<void> => {
+    const model = await modelOf(checkLocal(request.local, ""));
+    if (request.type === "count") return count(model, request, publish);
+    const { values, seed, speed } = request;
+    moving = new Moving(new LocalTank(model, values, seed), speed, seed, publish);
+    await moving.begin();
+  };
   addEventListener("message", (event: MessageEvent<Request>) => {
     const request = event.data;
     if (request.type === "begin" || request.type === "count") {
-      void modelOf(checkLocal(request.local, "")).then(async (model) => {
-        if (request.type === "count") return count(model, request, publish);
-        moving = new Moving(new LocalTank(model, request.values, request.seed), request.speed, request.seed, publish);
-        await moving.begin();
+      begin(request).catch((error: unknown) => {
+        publish({ type: "note", words: `The tank cannot run here: ${String(error)}` });
       });
     } else moving?.receive(request);
   });
