@@ -3,7 +3,7 @@
 import { Core, inflated } from "./core";
 import { type Local, type Model, checkLocal, makeModel } from "./model";
 import { MotionWindow } from "./motion";
-import { shapeCounts } from "./shapes";
+import { shapeCounts, sizesName } from "./shapes";
 import { LocalTank, type Values } from "./tank";
 
 /** What the page asks of a worker, first of all how to begin. */
@@ -21,6 +21,8 @@ const PICTURE_MS = 12;
 const LONGEST_PAUSE_MS = 100;
 const DENSITY_MS = 500;
 const COUNT_MS = 100;
+/** Blocks up to which outcomes are told apart by their shapes, as `MOST_BLOCKS` in class_names.py; of more by sizes. */
+const MOST_LISTED = 8;
 /** Share of a time step within which an instant is that of the step's end. */
 const ROUNDING = 1e-6;
 
@@ -174,31 +176,44 @@ class Moving {
   }
 }
 
+export interface Outcome {
+  readonly name: string;
+  /** When all blocks were one assembly [s], to a second; null where they never were. */
+  readonly complete: number | null;
+}
+
 /** Returns the class at the end of a run: when all blocks are one assembly, or after the study's duration. */
-export function outcomeOf(model: Model, values: Values, seed: number, replicate: number): string {
+export function outcomeOf(model: Model, values: Values, seed: number, replicate: number): Outcome {
   const tank = new LocalTank(model, values, seed, replicate);
   const { run_steps: end, rules } = model.local;
   const forever = values.bond_rate > 0 || (rules.get("bond_strength") ?? 0) > 0;
   const every = Math.ceil(1 / tank.timeStep);
-  let isWhole = false;
-  while (tank.step < end && (forever || !isWhole)) {
+  let complete: number | null = null;
+  while (tank.step < end && (forever || complete === null)) {
     tank.go(Math.min(every, end - tank.step));
-    isWhole = values.blocks > 1 && tank.read().assembly.every((label) => label === 0);
+    const isWhole = values.blocks > 1 && tank.read().assembly.every((label) => label === 0);
+    if (isWhole) complete ??= tank.time;
   }
-  const outcome = tank.outcome(tank.read());
+  const state = tank.read();
+  const name = values.blocks > MOST_LISTED ? `sizes ${sizesName(state)}` : tank.outcome(state);
   tank.end();
-  return outcome;
+  return { name, complete };
 }
 
 function count(model: Model, request: Request & { type: "count" }, publish: Publish): void {
   const counts = new Map<string, number>();
+  const times: number[] = [];
   let told = 0;
   for (let done = 1; done <= request.runs; done += 1) {
-    const outcome = outcomeOf(model, request.values, request.seed, done - 1);
-    counts.set(outcome, (counts.get(outcome) ?? 0) + 1);
+    const { name, complete } = outcomeOf(model, request.values, request.seed, done - 1);
+    counts.set(name, (counts.get(name) ?? 0) + 1);
+    if (complete !== null) times.push(complete);
     if (done < request.runs && performance.now() - told < COUNT_MS) continue;
     told = performance.now();
-    publish({ type: "counts", counts: Object.fromEntries(counts), done, runs: request.runs });
+    times.sort((one, other) => one - other);
+    const half = times[Math.ceil(done / 2) - 1] ?? null;
+    const counted = { counts: Object.fromEntries(counts), done, runs: request.runs };
+    publish({ type: "counts", ...counted, complete: times.length / done, median_s: half });
   }
 }
 

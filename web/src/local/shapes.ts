@@ -8,8 +8,6 @@ interface Joined {
   readonly cell: ArrayLike<number>;
 }
 
-/** Letters of a class that a line has room for, as `LONGEST_CLASS` in src/driftwalk/schema/shapes.py. */
-const LONGEST = 40;
 const NAMES = Object.keys(SHAPES);
 const known = new Map<string, string>();
 
@@ -89,17 +87,6 @@ export function className(state: Joined, merged: boolean, most: number): string 
 export function sizesName(state: Joined): string {
   const sizes = members(state).map((group) => group.length);
   return sizes.sort((one, other) => other - one).join("+");
-}
-
-/** Returns a class as a line has room for it: of a long one the sizes of its shapes. */
-export function shortClass(name: string): string {
-  if (name.length <= LONGEST) return name;
-  const times = new Map<number, number>();
-  for (const shape of name.split("+")) {
-    const size = cellsOf(SHAPES[shape] ?? shape).length;
-    times.set(size, (times.get(size) ?? 0) + 1);
-  }
-  return `sizes ${[...times].map(([size, count]) => (count > 1 ? `${count}×${size}` : `${size}`)).join("+")}`;
 }
 
 /** Returns how many assemblies of each shape there are; of many blocks, of each size. */

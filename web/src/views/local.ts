@@ -1,9 +1,11 @@
 /** A playground without a server: workers run the core in this document, and its address keeps the settings. */
 
 import { PageError, plainObject } from "../check";
+import { el } from "../dom";
 import type { Request } from "../local/playground";
 import type { Values } from "../local/tank";
 import { type ControlsSection, type Page, checkControls } from "../page";
+import { rich } from "../symbols";
 import type { Handlers } from "./connection";
 import type { Link, Message } from "./socket";
 
@@ -11,6 +13,20 @@ type Item = ControlsSection["items"][number];
 
 /** Time after the last change at which the address shows it [ms]; browsers limit how often it may change. */
 const SETTLED_MS = 400;
+
+/** Settings that show what the tank is for. */
+const TRIES = [
+  ["find C_d and σ_F by hand: one block, until D is down at its noise floor", "blocks=1&latching=none&drag_coefficient=0.8&force_std=0.0003&speed=20"],
+  ["let sixteen blocks assemble", "blocks=16&speed=5"],
+  ["give their faces poles and magnets", "blocks=12&faces=N%2CS%2CN%2CS&magnets=5x5x2mm%2C1.2T&speed=2"],
+  ["let bonds break", "blocks=12&bond_rate=0.05&speed=5"],
+] as const;
+
+/** Returns links to settings to try. */
+export function tries(): HTMLElement {
+  const links = TRIES.map(([words, settings]) => el("li", {}, el("a", { href: `#${settings}` }, ...rich(words))));
+  return el("nav", { class: "tries", "aria-label": "Settings to try" }, el("p", {}, "Try:"), el("ul", {}, ...links));
+}
 
 /** Returns what the core needs, null in a page of a server. */
 export function localCore(): unknown {

@@ -1,11 +1,11 @@
 /** How often the tank as it is set assembles into what: runs in a worker, counted as they end. */
 
 import { el } from "../dom";
-import { number, object, record } from "../check";
-import { shortClass } from "../local/shapes";
+import { nullable, number, object, record } from "../check";
 import type { RawSection } from "../page";
 import { cellsOfShape, type Square } from "../polyomino";
 import { drawClasses } from "../sections/classes";
+import { duration, percent } from "../units";
 import type { Link, Message } from "./socket";
 
 const RUNS = 200;
@@ -16,7 +16,13 @@ const LONGEST_SKETCH = 16;
 /** Quantile of the normal law for intervals of 90 %. */
 const Z = 1.645;
 
-const countsMessage = object({ counts: record(number), done: number, runs: number });
+const countsMessage = object({
+  counts: record(number),
+  done: number,
+  runs: number,
+  complete: number,
+  median_s: nullable(number),
+});
 
 export class OutcomesPanel {
   private outdated = false;
@@ -42,10 +48,10 @@ export class OutcomesPanel {
   }
 
   show(content: Message): void {
-    const { counts, done, runs } = countsMessage(content, "");
+    const { counts, done, runs, complete, median_s: median } = countsMessage(content, "");
     const sorted = [...counts].sort(([, one], [, other]) => other - one);
     const items = sorted.slice(0, MOST).map(([name, count]) => ({
-      class: shortClass(name),
+      class: name,
       cells: sketchOf(name),
       count,
       ...interval(count, done),
@@ -53,7 +59,12 @@ export class OutcomesPanel {
     }));
     const rest = sorted.slice(MOST).reduce((sum, [, count]) => sum + count, 0);
     const others = rest > 0 ? `; ${rest} runs ended in ${sorted.length - MOST} other classes` : "";
-    this.words.textContent = `${done} of ${runs} runs${others}. Whiskers: 90 % intervals, one class at a time.`;
+    const half = median === null ? "" : `, half of all within ${duration(median)}`;
+    this.words.textContent = [
+      `${done} of ${runs} runs${others}.`,
+      `One assembly in ${percent(complete)}${half}.`,
+      "Whiskers: 90 % intervals, one class at a time.",
+    ].join(" ");
     const frame = { id: "outcomes", kind: "classes", title: "", note: null, confidence: 0.9, runs: done };
     if (this.outdated) this.words.append(CHANGED);
     this.body.replaceChildren();

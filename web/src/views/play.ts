@@ -13,7 +13,7 @@ import { duration, short } from "../units";
 import { type Handlers, connected } from "./connection";
 import { type Knobs, makeKnobs } from "./controls";
 import { DensityPanel } from "./density_panel";
-import { connectLocal, localCore } from "./local";
+import { connectLocal, localCore, tries } from "./local";
 import { newestWins } from "./newest";
 import { OutcomesPanel } from "./outcomes";
 import { ShapeList } from "./shape_list";
@@ -161,6 +161,7 @@ class Playground {
       if (name !== "speed") this.outcomes?.outdate();
     });
     panel.append(el("h2", {}, section.title), this.actions(), knobs.element);
+    if (localCore() !== null) panel.append(tries());
     if (section.note !== null) panel.append(el("p", { class: "note" }, section.note));
     return knobs;
   }
@@ -185,12 +186,13 @@ class Playground {
 
   private linkButton(): HTMLElement {
     const copy = el("button", { type: "button", "data-action": "link" }, "Copy the link");
-    const say = (words: string) => (): void => void (this.note.textContent = words);
+    const said = el("span", { class: "note", role: "status" });
+    const say = (words: string) => (): void => void (said.textContent = words);
     copy.addEventListener("click", () => {
       const done = navigator.clipboard?.writeText(location.href) ?? Promise.reject(new Error("no clipboard"));
       done.then(say("The link to these settings is copied."), say("The address of this page has these settings."));
     });
-    return copy;
+    return el("span", {}, copy, " ", said);
   }
 
   private showSection(content: unknown): void {

@@ -66,7 +66,8 @@ def save_playground(
             "outcomes",
             "Outcomes",
             "Runs of the tank as it is set now, each until all blocks are one assembly or "
-            f"{source.tank.study.assembly.duration_s:g} s have passed.",
+            f"{source.tank.study.assembly.duration_s:g} s have passed. Of more than 8 blocks the sizes "
+            "of the assemblies count, not their shapes.",
         )
     )
     return write_report(page, path, existing=existing, core=local_tank(source))
