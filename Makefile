@@ -90,7 +90,7 @@ docs: doctest
 # link that leads nowhere and an example that fails end it.
 site: $(DEV_TOOLS)
 	$(BIN)/sphinx-build -W --keep-going -q -c docs/site -b html . build/site
-	$(BIN)/driftwalk play --save build/site/playground.html
+	$(BIN)/driftwalk play --save build/site/playground.html --overwrite
 	@echo "site: build/site/index.html"
 
 lint: $(DEV_TOOLS)

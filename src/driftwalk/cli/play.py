@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from driftwalk.cli.inputs.model_source import ModelSource, flow_of_block, open_source
 from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.model import KnownModel, ModelName, PlayedParameters, playable_model
-from driftwalk.cli.options.shared_types import FlowFile, Run, option
+from driftwalk.cli.options.shared_types import FlowFile, Replace, Run, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_note, print_warnings
 from driftwalk.cli.view import Host, Open, Port, show
@@ -55,6 +55,7 @@ def play(
             "Write the playground as one HTML file that runs without a server, and end.",
         ),
     ] = None,
+    overwrite: Replace = False,
     port: Port = 8765,
     host: Host = "127.0.0.1",
     open: Open = None,
@@ -99,7 +100,7 @@ def play(
     seed = chosen.assembly.seed
     tank = PlaySource(chosen, field, recording=beside, body=body, seed=seed)
     if save is not None:
-        path = save_playground(tank, save, existing="replace")
+        path = save_playground(tank, save, existing="replace" if overwrite else "error")
         print_note(f"the playground: {path}, {path.stat().st_size / 1e6:.1f} MB")
         return
     with contextlib.ExitStack() as open_things:

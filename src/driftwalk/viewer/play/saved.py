@@ -60,16 +60,12 @@ def save_playground(
     ``save_playground(PlaySource(study, flow), "tank.html")``
     """
     page = source.greeting()[0]["page"]
-    page["sections"].append(
-        section(
-            "outcomes",
-            "outcomes",
-            "Outcomes",
-            "Runs of the tank as it is set now, each until all blocks are one assembly or "
-            f"{source.tank.study.assembly.duration_s:g} s have passed. Of more than 8 blocks the sizes "
-            "of the assemblies count, not their shapes.",
-        )
+    note = (
+        "Runs of the tank as it is set now, each until all blocks are one assembly or "
+        f"{source.tank.study.assembly.duration_s:g} s have passed. Of more than 8 blocks the "
+        "sizes of the assemblies count, not their shapes."
     )
+    page["sections"].append(section("outcomes", "outcomes", "Outcomes", note))
     return write_report(page, path, existing=existing, core=local_tank(source))
 
 
