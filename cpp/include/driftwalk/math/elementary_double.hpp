@@ -1,9 +1,12 @@
-// Logarithm, exponential, sine and cosine in double precision: no fused operation and no function
-// of the system, so the same bits on every system, in a browser too. Where no kernel comes, very
-// large numbers and none, the system answers.
+// Logarithm, exponential, sine and cosine in double precision: no fused operation and no function of
+// the system, so the same bits on every system, in a browser too. Where no kernel comes, very large
+// numbers and none, the system answers. Errors are measured in cpp/tests/test_math.cpp: below 1 ulp.
 //
-// Algorithms and coefficients: FreeBSD's msun, from fdlibm (Sun Microsystems, 1993, freely
-// granted). Errors are measured in cpp/tests/test_math.cpp: below 1 ulp.
+// Algorithms and coefficients are those of FreeBSD's msun, from fdlibm, whose notice is:
+//
+//     Copyright (C) 1993 by Sun Microsystems, Inc. All rights reserved.
+//     Developed at SunPro, a Sun Microsystems, Inc. business. Permission to use, copy, modify, and
+//     distribute this software is freely granted, provided that this notice is preserved.
 #pragma once
 
 #include "driftwalk/config.hpp"
