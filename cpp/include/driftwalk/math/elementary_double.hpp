@@ -1,6 +1,7 @@
-// Logarithm, exponential, sine and cosine in double precision: no fused operation and no function of
-// the system, so the same bits on every system, in a browser too. Where no kernel comes, very large
-// numbers and none, the system answers. Errors are measured in cpp/tests/test_math.cpp: below 1 ulp.
+// Logarithm, exponential, sine and cosine in double precision: no fused operation and no function
+// of the system, so the same bits on every system, in a browser too. Where no kernel comes, very
+// large numbers and none, the system answers. Errors are measured in cpp/tests/test_math.cpp: below
+// 1 ulp.
 //
 // Algorithms and coefficients are those of FreeBSD's msun, from fdlibm, whose notice is:
 //
