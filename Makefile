@@ -23,7 +23,7 @@ CPP := $(shell find cpp -name '*.cpp' -o -name '*.hpp')
 # Every worker imports every test file: with the bytecode of the last run that takes half the time.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-slow test-studies test-fresh test-browser fuzz fuzz-loaders fuzz-dialects doctest lint format cpp-test cpp-test-portable bench studies studies-tracking docs site web wheel cross release-check clean
+.PHONY: demo test test-slow test-studies test-fresh test-browser fuzz fuzz-loaders fuzz-dialects doctest lint format cpp-test cpp-test-portable bench studies studies-tracking docs site web wasm wheel cross release-check clean
 
 demo: $(PACKAGE)
 	$(BIN)/driftwalk demo
@@ -90,6 +90,7 @@ docs: doctest
 # link that leads nowhere and an example that fails end it.
 site: $(DEV_TOOLS)
 	$(BIN)/sphinx-build -W --keep-going -q -c docs/site -b html . build/site
+	$(BIN)/driftwalk play --save build/site/playground.html --overwrite
 	@echo "site: build/site/index.html"
 
 lint: $(DEV_TOOLS)
@@ -145,6 +146,10 @@ studies-tracking: $(TEST_TOOLS)
 	test -z "$(MOUSE)" || $(BIN)/python studies/tracking/run.py $(TRACKING) --set mouse \
 	  --video $(MOUSE)/mouse_video.mp4 --published $(MOUSE)/mouse_video_tracked.csv
 	$(BIN)/python studies/tracking/summary.py $(TRACKING) --store studies/tracking/results
+
+# The native core of the saved playground as WebAssembly, into the package; committed like the bundle.
+wasm: $(CROSS_TOOLS)
+	PATH="$(CURDIR)/$(BIN):$$PATH" .ci/wasm write
 
 wheel: $(DEV_TOOLS)
 	$(BIN)/python -m build

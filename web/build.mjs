@@ -28,6 +28,16 @@ async function buildBundle(folder) {
     minify: true,
     legalComments: "none",
   });
+  // The worker that runs a tank without a server; its tests call it by this name.
+  await build({
+    ...common,
+    entryPoints: { playground: "src/local/playground.ts" },
+    outdir: folder,
+    format: "iife",
+    globalName: "driftwalkPlayground",
+    minify: true,
+    legalComments: "none",
+  });
 }
 
 async function buildTests(folder) {

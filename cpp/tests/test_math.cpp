@@ -135,6 +135,38 @@ void check_sincos() {
   CHECK(worst.absolute < 1e-7);
 }
 
+// Distance of doubles in units of the last place, against the widest numbers of the machine.
+double double_ulps(double got, long double exact) {
+  const double near = std::fabs(static_cast<double>(exact));
+  const double ulp = std::nextafter(near, INFINITY) - near;
+  return static_cast<double>(std::fabs(got - exact)) / ulp;
+}
+
+void check_doubles() {
+  double worst_log = 0, worst_exp = 0, worst_sine = 0, worst_cosine = 0;
+  for (int k = 1; k <= 1000000; ++k) {
+    const double share = k * 1e-6, angle = 17.3 * (share - 0.5), power = 140 * (share - 0.5);
+    const double wide = std::exp2(1900 * (share - 0.5));
+    double sine = 0, cosine = 0;
+    driftwalk::sincos(angle, sine, cosine);
+    for (const double x : {share, 1 + share, wide}) {
+      worst_log = std::max(worst_log, double_ulps(driftwalk::log(x), std::log((long double)x)));
+    }
+    worst_exp =
+        std::max(worst_exp, double_ulps(driftwalk::exp(power), std::exp((long double)power)));
+    worst_sine = std::max(worst_sine, double_ulps(sine, std::sin((long double)angle)));
+    worst_cosine = std::max(worst_cosine, double_ulps(cosine, std::cos((long double)angle)));
+  }
+  std::printf("double: log %.3f, exp %.3f, sine %.3f, cosine %.3f ulp\n", worst_log, worst_exp,
+              worst_sine, worst_cosine);
+  CHECK(std::max({worst_log, worst_exp, worst_sine, worst_cosine}) <= 1.0);
+  double sine = 0, cosine = 0;
+  driftwalk::sincos(1e300, sine, cosine);
+  CHECK(sine == std::sin(1e300) && cosine == std::cos(1e300));
+  CHECK(std::isnan(driftwalk::log(NAN)) && std::isnan(driftwalk::exp(NAN)));
+  CHECK(driftwalk::log(0.0) == -INFINITY && driftwalk::exp(-1000.0) == 0.0);
+}
+
 // Packs against the plain rule, at equal, unordered and signed-zero operands.
 void check_select_rules() {
   const float values[] = {0.0f, -0.0f, 1.0f, -1.0f, NAN, INFINITY, -INFINITY, 3.5f};
@@ -199,6 +231,7 @@ int main() {
   check_wide_log();
   check_exp();
   check_sincos();
+  check_doubles();
   check_select_rules();
   check_wrap_angle();
   check_wide_products();

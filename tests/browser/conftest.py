@@ -71,7 +71,7 @@ def browser(launch: Callable[[], Browser], running: list[Browser]) -> Browser:
 class Visit:
     """A page in a browser of its own, and everything that it asked for or complained about."""
 
-    def __init__(self, page: Page, allowed: str) -> None:
+    def __init__(self, page: Page, allowed: str | tuple[str, ...]) -> None:
         self.page = page
         self.requests: list[str] = []
         self.refused: list[str] = []
@@ -111,7 +111,9 @@ def visit(browser: Browser) -> Iterator[Callable[..., Visit]]:
     """
     visits: list[Visit] = []
 
-    def start(allowed: str, *, viewport: dict[str, int] = DESKTOP, **options: Any) -> Visit:
+    def start(
+        allowed: str | tuple[str, ...], *, viewport: dict[str, int] = DESKTOP, **options: Any
+    ) -> Visit:
         context = browser.new_context(viewport=viewport, **options)
         context.set_default_timeout(PATIENCE_MS)
         visits.append(Visit(context.new_page(), allowed))

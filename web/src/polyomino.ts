@@ -6,7 +6,7 @@ import { svg } from "./dom";
 export type Square = readonly [x: number, y: number, disc?: number];
 
 /** Rows from top to bottom, as seen from above; larger shapes are named by theirs. */
-const SHAPES: Readonly<Record<string, string>> = {
+export const SHAPES: Readonly<Record<string, string>> = {
   "1": "x",
   "2": "xx",
   I3: "xxx",

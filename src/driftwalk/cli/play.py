@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from driftwalk.cli.inputs.model_source import ModelSource, flow_of_block, open_source
 from driftwalk.cli.inputs.other_files import explained
 from driftwalk.cli.options.model import KnownModel, ModelName, PlayedParameters, playable_model
-from driftwalk.cli.options.shared_types import FlowFile, Run, option
+from driftwalk.cli.options.shared_types import FlowFile, Replace, Run, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_note, print_warnings
 from driftwalk.cli.view import Host, Open, Port, show
@@ -48,6 +48,14 @@ def play(
             "--live PORT", "Port that publishes the tank as a tracker's stream; 0 for a free port."
         ),
     ] = None,
+    save: Annotated[
+        Path | None,
+        option(
+            "--save FILE",
+            "Write the playground as one HTML file that runs without a server, and end.",
+        ),
+    ] = None,
+    overwrite: Replace = False,
     port: Port = 8765,
     host: Host = "127.0.0.1",
     open: Open = None,
@@ -57,15 +65,21 @@ def play(
     With a RUN, uses the run's model, values, study, flow field and recording. Without one, study,
     flow and recording come from the bundled example. A tank without a flow field gets a random
     flow. With --model, shows bodies of that model, with a slider for each parameter. Ctrl-C ends
-    the server.
+    the server. With --save, there is none: the file holds the tank, the native core as
+    WebAssembly, the flow and the recording's steps, and loads nothing.
     """
-    from driftwalk.viewer import PlaySource, hello_line, require_server
+    from driftwalk.viewer import PlaySource, hello_line, require_server, save_playground
 
-    require_server()
+    if save is None:
+        require_server()
+    elif live is not None:
+        raise InputError("--live needs the server that --save does without: leave one out")
     source = open_source(run, given, model)
     if not source.is_block:
         if live is not None:
             raise InputError("--live publishes a tank of blocks: leave it out with another model")
+        if save is not None:
+            raise InputError("--save writes a tank of blocks: leave it out with another model")
         known = playable_model(model, parameters, run)
         shown = _of_model(known, source, flow, recording, body)
         show(shown, host=host, port=port, open=open)
@@ -85,6 +99,10 @@ def play(
         beside = _recording(recording, chosen, body, bundled=bundled)
     seed = chosen.assembly.seed
     tank = PlaySource(chosen, field, recording=beside, body=body, seed=seed)
+    if save is not None:
+        path = save_playground(tank, save, existing="replace" if overwrite else "error")
+        print_note(f"the playground: {path}, {path.stat().st_size / 1e6:.1f} MB")
+        return
     with contextlib.ExitStack() as open_things:
         if live is not None:
             from driftwalk.track import LiveServer

@@ -99,6 +99,11 @@ def steps_memory_time(points: Floats) -> float:
     return max(times)
 
 
+def usual_block_length(memory: float) -> int:
+    """Return the points of a block that a permutation moves, for a memory [points]."""
+    return math.ceil(_PERMUTATION.block_times * memory)
+
+
 def _autocorrelation(values: Floats) -> Floats:
     """Return rho at every lag; empty where there is none."""
     centred = values - values.mean() if values.size else values
@@ -215,8 +220,7 @@ def block_permutation_test(
     if seed < 0:
         raise InputError(f"seed must not be negative, got {seed}")
     memory = max(steps_memory_time(first), steps_memory_time(second))
-    usual = math.ceil(_PERMUTATION.block_times * memory)
-    length = usual if block_length is None else int(block_length)
+    length = usual_block_length(memory) if block_length is None else int(block_length)
     if length < 1:
         raise InputError(f"block_length must be at least 1, got {block_length}")
     blocks_a, blocks_b = first.shape[0] // length, second.shape[0] // length

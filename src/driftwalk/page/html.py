@@ -22,6 +22,10 @@ BUNDLE: Final[dict[str, str]] = {
     "driftwalk.js": "text/javascript; charset=utf-8",
 }
 """The files of the front end and their types."""
+WORKER: Final = "playground.js"
+"""The program that runs a tank in the browser, next to the page."""
+CORE: Final = "playground.wasm"
+"""The native core for that, as WebAssembly."""
 # What could end the element that holds the data, or break it as a program.
 _ESCAPES: Final = {ord(sign): f"\\u{ord(sign):04x}" for sign in "<>&\u2028\u2029"}
 
@@ -41,9 +45,13 @@ _REPORT: Final = """\
 <noscript><p>This page needs JavaScript, which is switched off here. It loads nothing from \
 anywhere.</p></noscript>
 <script type="application/json" id="driftwalk-page">{page}</script>
-<script>{program}</script>
+{more}<script>{program}</script>
 </body>
 </html>
+"""
+_CORE: Final = """\
+<script type="application/json" id="driftwalk-core">{core}</script>
+<script type="text/plain" id="driftwalk-worker">{worker}</script>
 """
 _SHELL: Final = """\
 <!doctype html>
@@ -92,7 +100,12 @@ def page_frame(view: str, title: str, **more: Any) -> dict[str, Any]:
     }
 
 
-def report_html(page: Mapping[str, Any], *, connect: Literal["none", "self"] = "none") -> str:
+def report_html(
+    page: Mapping[str, Any],
+    *,
+    connect: Literal["none", "self"] = "none",
+    core: Mapping[str, Any] | None = None,
+) -> str:
     """Return a page as one HTML document that loads nothing from anywhere.
 
     Parameters
@@ -101,12 +114,14 @@ def report_html(page: Mapping[str, Any], *, connect: Literal["none", "self"] = "
         Result of `report_page`.
     connect : {"none", "self"}
         Whether the document may talk to the server that it came from.
+    core : mapping, optional
+        What the native core needs to run in the document, see `save_playground`.
 
     Returns
     -------
     str
         The document, ASCII where the data stand. Its content security policy admits the style
-        sheet and the program by their hashes and nothing else.
+        sheet and the program by their hashes, with a `core` its WebAssembly, and nothing else.
 
     Raises
     ------
@@ -122,7 +137,8 @@ def report_html(page: Mapping[str, Any], *, connect: Literal["none", "self"] = "
     policy = "; ".join(
         [
             "default-src 'none'",
-            f"script-src {_hash_source(program)}",
+            f"script-src {_hash_source(program)}"
+            + ("" if core is None else " 'wasm-unsafe-eval'; worker-src blob:"),
             f"style-src {_hash_source(style)}",
             "img-src data: blob:",
             *(["connect-src 'self'"] if connect == "self" else []),
@@ -135,12 +151,17 @@ def report_html(page: Mapping[str, Any], *, connect: Literal["none", "self"] = "
         title=_text(_title(page)),
         style=style,
         page=embedded(page),
+        more="" if core is None else _CORE.format(core=embedded(core), worker=bundle_file(WORKER)),
         program=program,
     )
 
 
 def write_report(
-    page: Mapping[str, Any], path: str | Path, *, existing: Literal["error", "replace"] = "error"
+    page: Mapping[str, Any],
+    path: str | Path,
+    *,
+    existing: Literal["error", "replace"] = "error",
+    core: Mapping[str, Any] | None = None,
 ) -> Path:
     """Write a page as one HTML file, whole or not at all.
 
@@ -152,6 +173,8 @@ def write_report(
         The file, which ends in ``.html`` or ``.htm``.
     existing : {"error", "replace"}
         Behaviour if the file exists already.
+    core : mapping, optional
+        As in `report_html`.
 
     Returns
     -------
@@ -171,7 +194,7 @@ def write_report(
     """
     target = Path(path)
     require_target(target, existing=existing, endings=(".html", ".htm"))
-    write_atomic(target, report_html(page).encode("utf-8"))
+    write_atomic(target, report_html(page, core=core).encode("utf-8"))
     return target
 
 
@@ -222,15 +245,20 @@ def _text(value: str) -> str:
     return html.escape(shown.encode("utf-8", "replace").decode("utf-8"))
 
 
-def bundle_file(name: str) -> str:
-    """Return a file of the built front end, with the line ends that a browser will see."""
+def bundle_bytes(name: str) -> bytes:
+    """Return a file of the built front end as it is."""
     try:
-        text = (files("driftwalk.page") / "static" / name).read_text(encoding="utf-8")
+        return (files("driftwalk.page") / "static" / name).read_bytes()
     except OSError as error:
         raise InputError(
             f"the installation lacks {name}, which shows the page: install driftwalk again, or in "
             "a clone of it run 'make web'"
         ) from error
+
+
+def bundle_file(name: str) -> str:
+    """Return a file of the built front end, with the line ends that a browser will see."""
+    text = bundle_bytes(name).decode("utf-8")
     text = text.replace("\r\n", "\n").replace("\r", "\n")
     closing = "</style" if name.endswith(".css") else "</script"
     if closing in text.lower() or "<!--" in text:

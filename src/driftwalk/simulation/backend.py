@@ -86,7 +86,14 @@ def require_steps(duration: float, step: float) -> None:
 def native_model(
     study: Study, flow: xr.Dataset, sample_time: Floats, camera: Camera
 ) -> _core.Model:
-    """Return the native core's form of a model.
+    """Return the native core's form of a model, from `model_arguments`."""
+    return _core.Model(**model_arguments(study, flow, sample_time, camera))
+
+
+def model_arguments(
+    study: Study, flow: xr.Dataset, sample_time: Floats, camera: Camera
+) -> dict[str, Any]:
+    """Return a model as the native core takes it: numbers and arrays by name, in SI units.
 
     Parameters
     ----------
@@ -110,29 +117,29 @@ def native_model(
     check_sample_time(sample_time)
     require_steps(max(float(sample_time[-1]), forces.force_interval_s), step)
     body = study.body()
-    return _core.Model(
-        side=study.block.side_m,
-        mass=study.block.mass_kg,
-        inertia=study.block.inertia_kg_m2,
-        depth=study.wetted_depth_m,
-        strips=study.block.strips_per_face,
-        added_mass_share=forces.added_mass_share,
-        water_density=study.water.density_kg_m3,
-        linear_drag=forces.linear_drag_kg_s,
-        drag_power=forces.drag_power,
-        drag_speed=forces.drag_speed_m_s,
-        displaced_mass=study.displaced_mass_kg if forces.pressure_gradient else 0.0,
-        time_step=step,
-        steps_per_interval=round(forces.force_interval_s / step),
-        force_lever=study.force_lever_m,
-        force_memory=forces.force_memory_s,
-        disc_radius=body.disc_radius_m,
+    return {
+        "side": study.block.side_m,
+        "mass": study.block.mass_kg,
+        "inertia": study.block.inertia_kg_m2,
+        "depth": study.wetted_depth_m,
+        "strips": study.block.strips_per_face,
+        "added_mass_share": forces.added_mass_share,
+        "water_density": study.water.density_kg_m3,
+        "linear_drag": forces.linear_drag_kg_s,
+        "drag_power": forces.drag_power,
+        "drag_speed": forces.drag_speed_m_s,
+        "displaced_mass": study.displaced_mass_kg if forces.pressure_gradient else 0.0,
+        "time_step": step,
+        "steps_per_interval": round(forces.force_interval_s / step),
+        "force_lever": study.force_lever_m,
+        "force_memory": forces.force_memory_s,
+        "disc_radius": body.disc_radius_m,
         **body.arrays(),
         **_surroundings(
             study.tank, study.observation.field_of_view, flow, sample_time, camera,
             accelerating=forces.pressure_gradient,
         ),
-    )  # fmt: skip
+    }  # fmt: skip
 
 
 POINT: Final[dict[str, Any]] = {

@@ -7,6 +7,7 @@ from driftwalk.viewer.hub import Source
 from driftwalk.viewer.live_client import LiveSource
 from driftwalk.viewer.play.model_playground import ModelPlaySource
 from driftwalk.viewer.play.playground import PlaySource
+from driftwalk.viewer.play.saved import save_playground
 from driftwalk.viewer.play.stream import hello_line
 from driftwalk.viewer.server import require_server, serve
 from driftwalk.viewer.watch.run_page import RunSource
@@ -19,5 +20,6 @@ __all__ = [
     "Source",
     "hello_line",
     "require_server",
+    "save_playground",
     "serve",
 ]

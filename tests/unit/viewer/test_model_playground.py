@@ -158,7 +158,7 @@ def test_the_clock_the_steps_and_a_change_of_the_bodies() -> None:
         played._advance(float(duration), until=math.inf)
     simulated = float(np.random.default_rng(1).uniform(0.0, 0.1, 400).sum())
     assert played.time == pytest.approx(simulated, abs=1e-6)
-    points = played._motion.points()
+    points = played.motion.points()
     expected = 4 * (math.floor(simulated / 0.1) - 1)
     assert abs(len(points) - expected) <= 4
     assert np.median(points[:, 0]) == pytest.approx(0.002, rel=0.01)
@@ -166,14 +166,14 @@ def test_the_clock_the_steps_and_a_change_of_the_bodies() -> None:
     played._fulfil(lambda content: pytest.fail(str(content)))
     message = played._tank_message()
     assert (len(message["x"]), len(message["theta"]), message["time_s"]) == (7, 7, 0.0)
-    assert len(played._motion.points()) == 0
+    assert len(played.motion.points()) == 0
 
 
 def test_next_to_a_recording() -> None:
     recording = dw.tank30_recording().isel(time=slice(0, 600))
     played = source(recording=recording, body=None)
     played._advance(60.0, until=math.inf)
-    message = played._motion.message()
+    message = played.motion.message()
     assert message["steps"] > 1000
     assert 0.0 < message["ks_distance"] <= 1.0
     page = played.greeting()[0]["page"]

@@ -98,8 +98,8 @@ def test_values_that_it_refuses(name: str, value: Any) -> None:
 def test_a_knob_reaches_the_study_s_value() -> None:
     study = dw.apply_overrides(Study(), {"forces.drag_coefficient": 4.0})
     source = PlaySource(study, STILL, blocks=1)
-    assert source._knobs["drag_coefficient"].most == 4.0
-    assert source._knobs["force_std"].most == KNOB["force_std"].most
+    assert source.knobs["drag_coefficient"].most == 4.0
+    assert source.knobs["force_std"].most == KNOB["force_std"].most
 
 
 def test_arrows_are_the_flow() -> None:
@@ -114,8 +114,8 @@ def test_arrows_are_the_flow() -> None:
 def test_blocks_offered_have_room() -> None:
     source = PlaySource(Study(), STILL, blocks=1)
     # 40 % of a circle of 30 cm, in squares of 3 cm.
-    assert source._knobs["blocks"].most == int(FILLED * math.pi * 0.15**2 / 0.03**2)
-    source.tank.set(blocks=int(source._knobs["blocks"].most))
+    assert source.knobs["blocks"].most == int(FILLED * math.pi * 0.15**2 / 0.03**2)
+    source.tank.set(blocks=int(source.knobs["blocks"].most))
     source.tank.advance(2.0)
     assert source.tank.waiting == 0
 
@@ -215,7 +215,7 @@ def test_positions_are_taken_at_the_recording_s_interval(interval: float) -> Non
         study, flow, blocks=2, seed=1, duration=source.tank.time, sample_interval=1e-9,
         backend="reference",
     )  # fmt: skip
-    taken = source._motion._place[: source._motion._count]
+    taken = source.motion._place[: source.motion._count]
     instants = interval * np.arange(len(taken))
     assert 0.0 <= source.tank.time - instants[-1] < interval + 0.01
     for part, name in enumerate("xy"):
@@ -382,7 +382,7 @@ def test_every_corner_of_the_knobs_has_a_picture_and_a_density(change: dict[str,
         source._advance(0.5, until=math.inf)
     lone = Counter(source.tank.outcome.split("+"))
     assert source._tank_message()["counts"] == lone
-    sent = [source._tank_message(), source._motion.message(), source._controls()]
+    sent = [source._tank_message(), source.motion.message(), source._controls()]
     json.dumps(sent, allow_nan=False)
     assert sent[0]["time_s"] == pytest.approx(15.0, abs=0.02)
     assert len(sent[0]["x"]) + sent[0]["waiting"] == change.get("blocks", 4)

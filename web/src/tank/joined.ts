@@ -70,7 +70,7 @@ function latticeCells(blocks: readonly string[], joins: readonly Join[]): Square
 }
 
 /** Returns the codes of a shape in its four orientations. */
-function turns(cells: readonly Square[]): string[] {
+export function turns(cells: readonly Square[]): string[] {
   const looks: string[] = [];
   let now = cells;
   for (let quarter = 0; quarter < 4; quarter += 1) {

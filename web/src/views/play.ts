@@ -10,10 +10,12 @@ import { PALETTE } from "../colours";
 import { Trails } from "../tank/trails";
 import { onThemeChange } from "../theme";
 import { duration, short } from "../units";
-import { connected } from "./connection";
+import { type Handlers, connected } from "./connection";
 import { type Knobs, makeKnobs } from "./controls";
 import { DensityPanel } from "./density_panel";
+import { connectLocal, localCore, tries } from "./local";
 import { newestWins } from "./newest";
+import { OutcomesPanel } from "./outcomes";
 import { ShapeList } from "./shape_list";
 import type { Link, Message } from "./socket";
 
@@ -39,10 +41,12 @@ function hue(index: number): string {
 
 export function showPlay(first: Page): Promise<void> {
   const shell = makeShell(first);
-  shell.main.append(el("p", { class: "nothing" }, "Waiting for the server."));
+  const local = localCore();
+  const waits = local === null ? "Waiting for the server." : "Starting the tank.";
+  shell.main.append(el("p", { class: "nothing" }, waits));
   return new Promise((ready) => {
     let playground: Playground | null = null;
-    connected(shell, first, {
+    const handlers: Handlers = {
       received: (message, link) => {
         if (message.type === "page") {
           const page = checkPage(message["page"]);
@@ -52,7 +56,9 @@ export function showPlay(first: Page): Promise<void> {
         } else playground?.receive(message);
       },
       lost: () => playground?.rest(),
-    });
+    };
+    if (local === null) connected(shell, first, handlers);
+    else connectLocal(local, first, handlers);
   });
 }
 
@@ -60,6 +66,7 @@ class Playground {
   private readonly tank: TankCanvas;
   private readonly knobs: Knobs | null;
   private readonly density: DensityPanel;
+  private readonly outcomes: OutcomesPanel | null;
   private readonly pause = el("button", { type: "button" }, "Pause");
   private readonly clock = el("p", { class: "readout" });
   private readonly shapes = new ShapeList();
@@ -103,6 +110,7 @@ class Playground {
       density?.title ?? "Step length and turning angle",
       density?.note ?? null,
     );
+    this.outcomes = this.addOutcomes(beside, page);
     this.take = newestWins((state) => this.draw(state));
     onThemeChange(() => this.last !== null && this.tank.element.isConnected && this.draw(this.last));
   }
@@ -110,6 +118,7 @@ class Playground {
   receive(message: Message): void {
     if (message.type === "tank") this.take(tankMessage(message, ""));
     else if (message.type === "density") void this.density.show(message);
+    else if (message.type === "counts") this.outcomes?.show(message);
     else if (message.type === "note") this.note.textContent = String(message["words"] ?? "");
     else if (message.type === "section") this.showSection(message["section"]);
   }
@@ -149,10 +158,20 @@ class Playground {
     const knobs = makeKnobs(section, (name, value) => {
       this.note.textContent = "";
       this.set({ name, value });
+      if (name !== "speed") this.outcomes?.outdate();
     });
     panel.append(el("h2", {}, section.title), this.actions(), knobs.element);
+    if (localCore() !== null) panel.append(tries());
     if (section.note !== null) panel.append(el("p", { class: "note" }, section.note));
     return knobs;
+  }
+
+  private addOutcomes(beside: HTMLElement, page: Page): OutcomesPanel | null {
+    const section = page.sections.find((one) => one.kind === "outcomes");
+    if (section === undefined) return null;
+    const panel = el("section", { class: "section", "aria-label": section.title });
+    beside.append(panel);
+    return new OutcomesPanel(panel, section, this.link);
   }
 
   private actions(): HTMLElement {
@@ -162,7 +181,18 @@ class Playground {
     this.pause.addEventListener("click", () => act(this.last?.paused === true ? "run" : "pause")());
     const clear = el("button", { type: "button", "data-action": "clear" }, "Clear the density");
     clear.addEventListener("click", act("clear"));
-    return el("div", { class: "actions" }, this.pause, restart, clear);
+    return el("div", { class: "actions" }, this.pause, restart, clear, localCore() !== null && this.linkButton());
+  }
+
+  private linkButton(): HTMLElement {
+    const copy = el("button", { type: "button", "data-action": "link" }, "Copy the link");
+    const said = el("span", { class: "note", role: "status" });
+    const say = (words: string) => (): void => void (said.textContent = words);
+    copy.addEventListener("click", () => {
+      const done = navigator.clipboard?.writeText(location.href) ?? Promise.reject(new Error("no clipboard"));
+      done.then(say("The link to these settings is copied."), say("The address of this page has these settings."));
+    });
+    return el("span", {}, copy, " ", said);
   }
 
   private showSection(content: unknown): void {

@@ -1,11 +1,12 @@
 // Logarithm, exponential, sine and cosine of our own for the float packs: the same operations on
-// every instruction set give the same bits, which no vendor's library promises. Double uses libm.
+// every instruction set give the same bits, which no vendor's library promises.
 //
 // Sources: Cody-Waite reduction by pi/2 and minimax polynomials of the usual degree; errors are
 // measured in cpp/tests/test_math.cpp (log and exp below 1 ulp; sine and cosine below 2 ulp
 // on [-8, 8], the worst of every seventh float there 1.65).
 #pragma once
 
+#include "driftwalk/math/elementary_double.hpp"
 #include "driftwalk/math/pack.hpp"
 
 DRIFTWALK_LANES_BEGIN
@@ -52,10 +53,6 @@ inline void sincos(FloatPack<N> x, FloatPack<N>& sine, FloatPack<N>& cosine) {
   sincos_reduced(r, sine, cosine);
   rotate_quadrant(quadrant, sine, cosine);
 }
-DRIFTWALK_HD inline void sincos(double x, double& sine, double& cosine) {
-  sine = __builtin_sin(x);
-  cosine = __builtin_cos(x);
-}
 
 // Natural logarithm of a positive x (no zeros, no denormals, no infinities).
 template <int N>
@@ -82,9 +79,6 @@ inline FloatPack<N> log(FloatPack<N> x) {
   const Real e = to_real(x, exponent);
   return ((p * f * z + e * -2.12194440e-4f) - 0.5f * z) + f + e * 0.693359375f;
 }
-DRIFTWALK_HD inline double log(double x) {
-  return __builtin_log(x);
-}
 
 // Exponential of x, -87 <= x <= 88.
 template <int N>
@@ -103,9 +97,6 @@ inline FloatPack<N> exp(FloatPack<N> x) {
   p = p * r + 5.0000001201e-1f;
   const Bits scale = (power.v + 127) << 23;
   return (p * (r * r) + r + 1.0f) * Real((Values)scale);
-}
-DRIFTWALK_HD inline double exp(double x) {
-  return __builtin_exp(x);
 }
 
 template <class Real, class T>

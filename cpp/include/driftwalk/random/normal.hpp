@@ -26,10 +26,12 @@ inline void normal_pair(UIntPack<N> word0, UIntPack<N> word1, FloatPack<N>& firs
 
 DRIFTWALK_HD inline void normal_pair(UInt32 word0, UInt32 word1, double& first, double& second) {
   const double uniform = (double(word0 >> 8) + 1.0) * 0x1p-24;
-  const double radius = __builtin_sqrt(-2.0 * __builtin_log(uniform));
+  const double radius = __builtin_sqrt(-2.0 * log(uniform));
   const double quarter = double(word1 >> 30) + double((word1 >> 8) & 0x3fffffu) * 0x1p-22 - 0.5;
-  first = radius * __builtin_cos(quarter * (pi_value / 2));
-  second = radius * __builtin_sin(quarter * (pi_value / 2));
+  double sine, cosine;
+  sincos(quarter * (pi_value / 2), sine, cosine);
+  first = radius * cosine;
+  second = radius * sine;
 }
 
 DRIFTWALK_LANES_END

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -106,6 +106,30 @@ def _taper(distance: Floats, cutoff: float, contact: float = 0.0) -> Floats:
     return np.asarray(1.0 - part**2 * (3.0 - 2.0 * part))
 
 
+class PullTables(NamedTuple):
+    """Tables of forces between blocks, as the native core takes them; SI units."""
+
+    reach: float
+    """Distance of two centres beyond which blocks feel nothing [m]."""
+    lever: float
+    """Of the points that attract, from the centre of the block [m]."""
+    radial: dict[str, tuple[Floats, int]]
+    """Cells of the forces of "centres", "resistance" and "faces", and the number of the first."""
+    oriented: dict[str, Any] | None
+    """Energy of two faces: its coefficients on (distance, direction, angle), and where they are."""
+
+    def native(self) -> _core.Pull:
+        """Return the native core's form of the tables."""
+        made = _core.Pull(
+            reach=self.reach, lever=self.lever, pole=np.ones(4), like_poles_repel=False
+        )
+        for what, (cells, first) in self.radial.items():
+            made.set_radial(what, cells, first)
+        if self.oriented is not None:
+            made.set_oriented(**self.oriented)
+        return made
+
+
 @dataclass(frozen=True, eq=False)
 class BlockPull:
     """Forces between the blocks of a study at a distance.
@@ -120,14 +144,17 @@ class BlockPull:
         Attraction of two centres, of the menisci.
     resistance : RadialForce or None
         Of the water between two centres, per closing speed and distance [N s/m²].
-    native : driftwalk._core.Pull
+    tables : PullTables
         Their tables.
+    native : driftwalk._core.Pull
+        The native core's form of these.
     """
 
     faces: RadialForce | None
     lever: float
     centres: RadialForce | None
     resistance: RadialForce | None
+    tables: PullTables
     native: _core.Pull
 
 
@@ -220,18 +247,19 @@ def _block_pull(
         0.0 if faces is None else end + 2.0 * lever,
         *(0.0 if force is None else force.cutoff for force in (centres, resistance)),
     )
-    native = _core.Pull(
-        reach=reach, lever=lever, pole=np.ones(4), like_poles_repel=False
-    )  # fmt: skip
+    radial: dict[str, RadialForce | None] = {"centres": centres, "resistance": resistance}
+    tables = PullTables(reach, lever, {}, None)
     if faces is not None and oriented is None:
-        native.set_radial("faces", *faces.cells())
+        radial["faces"] = faces
     elif faces is not None and oriented is not None:
-        _set_oriented(native, oriented, faces.contact, end, of_magnets=measured is None)
-    if centres is not None:
-        native.set_radial("centres", *centres.cells())
-    if resistance is not None:
-        native.set_radial("resistance", *resistance.cells())
-    return BlockPull(faces, lever, centres, resistance, native)
+        of_magnets = measured is None
+        tables = tables._replace(
+            oriented=_oriented(oriented, faces.contact, end, of_magnets=of_magnets)
+        )
+    tables.radial.update(
+        {what: force.cells() for what, force in radial.items() if force is not None}
+    )
+    return BlockPull(faces, lever, centres, resistance, tables, tables.native())
 
 
 def _require_poles(study: Study) -> None:
@@ -331,10 +359,8 @@ def _fixed_poles(magnet: Magnet, faces: RadialForce) -> Energy:
     return energy
 
 
-def _set_oriented(
-    native: _core.Pull, energy: Energy, contact: float, end: float, *, of_magnets: bool
-) -> None:
-    """Give the core the energy of two faces on (log distance, direction, angle)."""
+def _oriented(energy: Energy, contact: float, end: float, *, of_magnets: bool) -> dict[str, Any]:
+    """Return the energy of two faces on (log distance, direction, angle), and where that is."""
     from scipy.ndimage import spline_filter1d
 
     n, step = POLICY.angles, POLICY.distance_step
@@ -355,7 +381,10 @@ def _set_oriented(
     spline = spline_filter1d(found, order=2, axis=0, mode="mirror")
     for axis in (1, 2):
         spline = spline_filter1d(spline, order=2, axis=axis, mode="grid-wrap")
-    native.set_oriented(
-        np.ascontiguousarray(spline), first=float(log_distance[0]), per_step=1.0 / step,
-        low=low, high=float(r[-1]),
-    )  # fmt: skip
+    return {
+        "coefficient": np.ascontiguousarray(spline),
+        "first": float(log_distance[0]),
+        "per_step": 1.0 / step,
+        "low": low,
+        "high": float(r[-1]),
+    }

@@ -82,7 +82,7 @@ class ModelPlaySource(Playground):
         knobs["bodies"] = Knob("bodies", "bodies", "1", 1, 32, 1, whole=True)
         knobs["speed"] = Knob(**{**vars(SPEED), "label": "speed of the clock"})
         super().__init__(study, flow, knobs, recording=recording, body=body, seed=seed)
-        interval = INTERVAL_S if self._recording is None else self._motion.interval
+        interval = INTERVAL_S if self.recording is None else self.motion.interval
         self.bodies = MovingBodies(
             model, begin, study, flow, bodies=4, interval=interval, seed=seed
         )
@@ -100,7 +100,7 @@ class ModelPlaySource(Playground):
             self._begin(int(value))
         else:
             self.bodies.change(name.removeprefix(PARAMETER), float(value))
-        self._motion.clear()
+        self.motion.clear()
 
     def _restart(self) -> None:
         self._begin(self.bodies.count)
@@ -123,7 +123,7 @@ class ModelPlaySource(Playground):
 
     def _take(self) -> None:
         x, y, _ = self.bodies.place()
-        self._motion.add(x, y, np.arange(x.size, dtype=np.int32))
+        self.motion.add(x, y, np.arange(x.size, dtype=np.int32))
 
     def _tank_message(self) -> dict[str, Any]:
         x, y, theta = self.bodies.place(self._left / self.bodies.sample_s)

@@ -97,7 +97,7 @@ class PlaySource(Playground):
         body: str | None = None,
         seed: int = 1,
     ) -> None:
-        self.tank = LiveTank(study, flow, blocks=blocks, seed=seed)
+        self.tank, self.water = LiveTank(study, flow, blocks=blocks, seed=seed), flow
         knobs = knobs_for(self.tank, most_blocks=most_blocks_in(self.tank))
         super().__init__(study, flow, knobs, recording=recording, body=body, seed=seed)
         self._stream: Stream | None = None
@@ -131,7 +131,7 @@ class PlaySource(Playground):
     def _change(self, name: str, value: Any) -> None:
         # Without latching nothing would hold together: whoever turns it off wants to see that.
         self.tank.set(**{name: value}, part=name == "latching" and value == "none")
-        self._motion.clear()
+        self.motion.clear()
 
     def _restart(self) -> None:
         self.tank.restart(seed=self._seed)
@@ -168,8 +168,8 @@ class PlaySource(Playground):
         self._left -= steps * self.tank.study.time_step_s
 
     def _take(self, x: Floats, y: Floats) -> None:
-        self._motion.add(x, y, self.tank.assembly)
-        self._next_sample += self._motion.interval
+        self.motion.add(x, y, self.tank.assembly)
+        self._next_sample += self.motion.interval
 
     def _shown(self, now: float) -> None:
         if self._stream is None:

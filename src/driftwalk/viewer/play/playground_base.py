@@ -79,10 +79,10 @@ class Playground(Source):
         body: str | None,
         seed: int,
     ) -> None:
-        self._study, self._knobs = study, dict(knobs)
+        self._study, self.knobs = study, dict(knobs)
         self._arrows = None if flow is None else flow_arrows(flow)
-        self._recording = None if recording is None else beside(recording, study, body=body)
-        self._motion = MotionWindow(self._recording, seed=seed)
+        self.recording = None if recording is None else beside(recording, study, body=body)
+        self.motion = MotionWindow(self.recording, seed=seed)
         self._seed, self._speed, self._paused = seed, 1.0, False
         self._settled = math.inf
         self._pace: deque[tuple[float, float]] = deque()
@@ -142,9 +142,9 @@ class Playground(Source):
             self._wish(ACTIONS[name], lambda: self._act(name))
 
     def _set(self, name: str, value: Any) -> None:
-        if name not in self._knobs:
+        if name not in self.knobs:
             raise InputError(f"there is no setting '{name[:40]}'")
-        wanted = self._knobs[name].read(value)
+        wanted = self.knobs[name].read(value)
         if name == "speed":
             self._speed = wanted
         else:
@@ -169,11 +169,11 @@ class Playground(Source):
         if name in ("pause", "run"):
             self._paused = name == "pause"
         elif name == "clear":
-            self._motion.clear()
+            self.motion.clear()
         else:
             self._seed += 1
             self._restart()
-            self._motion.clear()
+            self.motion.clear()
 
     def _move(self, publish: Publish) -> None:
         """Advance the tank with the clock, picture by picture, until the server ends."""
@@ -204,7 +204,7 @@ class Playground(Source):
     def _compare(self, publish: Publish) -> None:
         """Compare the motion with the recording's now and then, until the server ends."""
         while self._watched.wait() and not self._over.wait(0.5):
-            publish(self._motion.message())
+            publish(self.motion.message())
 
     def _note_pace(self, now: float) -> None:
         self._pace.append((now, self.time))
@@ -257,12 +257,12 @@ class Playground(Source):
     def _controls(self) -> dict[str, Any]:
         """Return the section with the knobs and what they stand at."""
         values = self._values()
-        items = [knob.item(values[name]) for name, knob in self._knobs.items()]
+        items = [knob.item(values[name]) for name, knob in self.knobs.items()]
         return section("controls", "controls", "Settings", self.controls_note, items=items)
 
     def _page(self) -> dict[str, Any]:
         """Return the whole page."""
-        recording = None if self._recording is None else self._recording.steps.name
+        recording = None if self.recording is None else self.recording.steps.name
         title = "Step length and turning angle"
         return page_frame(
             self.view,
