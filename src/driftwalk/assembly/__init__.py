@@ -1,6 +1,10 @@
 """Self-assembly of many blocks: outcomes, their uncertainty, and their dependence on the model."""
 
 from driftwalk.assembly.chains.estimate import check_kinetics, kinetics
+from driftwalk.assembly.control.live import LiveControl
+from driftwalk.assembly.control.modes import Modes, ModeSource, make_modes
+from driftwalk.assembly.control.plan import check_control, plan_control
+from driftwalk.assembly.control.trial import test_control
 from driftwalk.assembly.lattice.events import ReplayedEvents, replay_events
 from driftwalk.assembly.lattice.polyomino import polyomino_cells, polyomino_name, polyominoes
 from driftwalk.assembly.live_world import LiveEvent, LiveTank
@@ -57,8 +61,11 @@ from driftwalk.assembly.sensitivity.sobol import (
 __all__ = [
     "Alignment",
     "L1NoiseFloor",
+    "LiveControl",
     "LiveEvent",
     "LiveTank",
+    "ModeSource",
+    "Modes",
     "PairwiseL1",
     "ReplayedEvents",
     "SurvivalCurve",
@@ -68,6 +75,7 @@ __all__ = [
     "assembly_sizes",
     "attraction",
     "check_assembly",
+    "check_control",
     "check_indices",
     "check_kinetics",
     "check_sensitivity",
@@ -86,11 +94,13 @@ __all__ = [
     "l1_distance",
     "l1_in_floors",
     "l1_noise_floor",
+    "make_modes",
     "merge_chirality",
     "outcome_classes",
     "outcome_distribution",
     "pairwise_l1",
     "path_recording",
+    "plan_control",
     "polyomino_cells",
     "polyomino_name",
     "polyominoes",
@@ -107,5 +117,6 @@ __all__ = [
     "sort_classes",
     "steady_state",
     "survival_curve",
+    "test_control",
     "world_class",
 ]

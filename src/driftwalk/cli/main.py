@@ -48,6 +48,7 @@ COMMANDS: Final[dict[str, Command]] = {
     "assemble": Command(_PREDICT, "Simulate the self-assembly of many blocks.", "assemble"),
     "sensitivity": Command(_PREDICT, "Vary the model and see what assembles.", "sensitivity"),
     "kinetics": Command(_PREDICT, "Estimate rates between outcome classes.", "kinetics"),
+    "control": Command(_PREDICT, "Choose the agitation while blocks assemble.", "control"),
     "play": Command(_PREDICT, "Change parameters while a simulation runs.", "play"),
     "compare": Command(_COMPARE, "Measure the distance between two motions.", "compare"),
     "compare-models": Command(_COMPARE, "Rank motion models on a recording.", "compare_models"),

@@ -5,6 +5,7 @@ FastAPI and uvicorn, the extra ``[view]``, are imported when a server is started
 
 from driftwalk.viewer.hub import Source
 from driftwalk.viewer.live_client import LiveSource
+from driftwalk.viewer.pilot import pilot
 from driftwalk.viewer.play.model_playground import ModelPlaySource
 from driftwalk.viewer.play.playground import PlaySource
 from driftwalk.viewer.play.stream import hello_line
@@ -18,6 +19,7 @@ __all__ = [
     "RunSource",
     "Source",
     "hello_line",
+    "pilot",
     "require_server",
     "serve",
 ]
