@@ -7,6 +7,7 @@ void register_simulate(nanobind::module_& module);
 void register_faces(nanobind::module_& module);
 void register_assemble(nanobind::module_& module);
 void register_live(nanobind::module_& module);
+void register_tanks(nanobind::module_& module);
 void register_infer(nanobind::module_& module);
 
 NB_MODULE(_core, module) {
@@ -17,5 +18,6 @@ NB_MODULE(_core, module) {
   register_faces(module);
   register_assemble(module);
   register_live(module);
+  register_tanks(module);
   register_infer(module);
 }

@@ -223,20 +223,7 @@ LiveEvents LiveWorld::events() const {
 }
 
 void LiveWorld::read(const LiveBlocks& out) const {
-  const PackMemory<double>& memory = inside_->pack.memory();
-  for (int b = 0; b < inside_->rules.blocks; ++b) {
-    const Member<double>& m = memory.members[b];
-    const BlockBook& book = memory.book(b, 0);
-    inside_->read_pose(b, out.pose + 3 * b);
-    out.velocity[3 * b] = m.motion.vx - m.motion.omega * m.arm.y;
-    out.velocity[3 * b + 1] = m.motion.vy + m.motion.omega * m.arm.x;
-    out.velocity[3 * b + 2] = m.motion.omega;
-    out.assembly[b] = m.root;
-    out.cell[2 * b] = book.cell_x;
-    out.cell[2 * b + 1] = book.cell_y;
-    out.quarter[b] = book.quarter;
-    out.kind[b] = book.kind;
-  }
+  read_blocks<double, double>(inside_->rules, inside_->pack.memory(), 0, out);
 }
 
 const BondList& LiveWorld::bonds() const {

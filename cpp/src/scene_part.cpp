@@ -2,6 +2,7 @@
 #include "driftwalk/assembly/settle_parts.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 
 namespace driftwalk {
@@ -98,6 +99,42 @@ void glue_blocks(const AssemblyRules& rules, Scene& scene) {
     scene.assembly[first].touched = true;
   }
   scene.assemblies = scene.blocks / rules.glued;
+}
+
+void join_blocks(const AssemblyRules& rules, Scene& scene, const LiveBlocks& joined) {
+  constexpr double full_turn = 2 * 3.141592653589793;
+  scene.assemblies = 0;
+  for (int b = 0; b < scene.blocks; ++b) {
+    SceneBlock& block = scene.block[b];
+    const int lowest = block.assembly = joined.assembly[b];
+    block.cell_x = joined.cell[2 * b];
+    block.cell_y = joined.cell[2 * b + 1];
+    block.quarter = joined.quarter[b];
+    block.kind = static_cast<std::uint8_t>(joined.kind[b]);
+    if (rules.round) {
+      const double turn = scene.assembly[b].theta - scene.assembly[lowest].theta;
+      block.turn = turn - full_turn * std::floor(turn / full_turn);
+    }
+    if (lowest != b) {
+      scene.assembly[b].blocks = 0;
+    }
+    scene.assemblies += lowest == b;
+  }
+  for (int b = 0; b < scene.blocks; ++b) {
+    if (scene.block[b].assembly == b) {
+      const Vec2 at = centre(scene, b);
+      SceneAssembly& body = scene.assembly[b];
+      body = turned(body, (4 - scene.block[b].quarter) & 3);
+      measure_assembly(rules, scene, b);
+      place_by(scene, b, b, at);
+      const double* const v = joined.velocity + 3 * b;
+      body.vx = v[0] + v[2] * (at.y - body.y);
+      body.vy = v[1] - v[2] * (at.x - body.x);
+      body.omega = v[2];
+      body.before = {body.x, body.y, body.theta, body.cosine, body.sine};
+      body.touched = true;
+    }
+  }
 }
 
 void part_blocks(const AssemblyRules& rules, Scene& scene) {

@@ -37,6 +37,7 @@ _ROOMS = (
 _NAMES = {
     "driftwalk.assembly": (
         "LiveTank",
+        "TankBatch",
         "assemble_drawn",
         "assembly_path",
         "assembly_sizes",

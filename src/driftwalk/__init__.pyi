@@ -21,6 +21,7 @@ from driftwalk import (
 )
 from driftwalk.assembly import (
     LiveTank as LiveTank,
+    TankBatch as TankBatch,
     assemble_drawn as assemble_drawn,
     assembly_path as assembly_path,
     assembly_sizes as assembly_sizes,

@@ -1,18 +1,11 @@
 // The self-assembly kernel, compiled once per instruction set.
+#include "driftwalk/assembly/kept_world.hpp"
 #include "driftwalk/assembly/run.hpp"
 #include "driftwalk/physics/laws/mixed.hpp"
 
 DRIFTWALK_LANES_BEGIN
 
 namespace {
-#if defined(__AVX512F__)
-constexpr int assembly_lanes = 16;
-#elif defined(__AVX2__)
-constexpr int assembly_lanes = 8;
-#else
-constexpr int assembly_lanes = 4;
-#endif
-
 using Real = FloatPack<assembly_lanes>;
 
 std::int64_t assemble(const Prepared<float>& run, const AssemblyRules& rules,
@@ -28,7 +21,8 @@ std::int64_t assemble(const Prepared<float>& run, const AssemblyRules& rules,
                                 : assembled.template operator()<QuadraticDrag>();
 }
 
-constexpr AssemblyKernel kernel{assemble, assembly_lanes, PackMemory<Real>::bytes};
+constexpr AssemblyKernel kernel{assemble, DRIFTWALK_PER_ISA(go_on_), assembly_lanes,
+                                PackMemory<Real>::bytes, KeptLayout<Real>::bytes};
 } // namespace
 
 DRIFTWALK_LANES_END

@@ -57,6 +57,7 @@ from driftwalk.assembly.sensitivity.sobol import (
     sobol_design,
     sobol_indices,
 )
+from driftwalk.assembly.tank_batch import TankBatch
 
 __all__ = [
     "Alignment",
@@ -69,6 +70,7 @@ __all__ = [
     "PairwiseL1",
     "ReplayedEvents",
     "SurvivalCurve",
+    "TankBatch",
     "assemble",
     "assemble_drawn",
     "assembly_path",

@@ -3,6 +3,7 @@
 
 #include "driftwalk/assembly/rules.hpp"
 #include "driftwalk/assembly/scene.hpp"
+#include "driftwalk/config.hpp"
 
 #include <cstddef>
 #include <cstdint>
@@ -26,16 +27,46 @@ using AssembleLanes = std::int64_t (*)(const Prepared<float>&, const AssemblyRul
                                        const AssemblyWorlds&, const AssemblyOutputs&,
                                        const WorldQueue&, AssemblyScratch&);
 
+// Worlds of a batch that go on together from where they are: those of one flow, one factor on its
+// velocity and one way of latching, at most as many as a pack has. Arrays are those of the whole
+// batch, one entry per world.
+struct TankGroup {
+  std::int64_t step = 0, steps = 0; // so many time steps from this one on
+  double flow_scale = 1;
+  const std::int64_t* world = nullptr; // which they are
+  int count = 0;
+  const std::uint64_t* key = nullptr;
+  const double* drag_coefficient = nullptr;
+  const double* force_std = nullptr;    // [N]
+  const double* flow_start = nullptr;   // as in AssemblyWorlds
+  char* state = nullptr;                // of each world kept_bytes(blocks)
+  const LiveBlocks* joined = nullptr;   // as they begin, where they begin with assemblies
+  LiveBlocks now{};                     // read at the end; pose is read at the start too
+  std::uint32_t* status = nullptr;      // likewise, bits of `Status`
+  std::int32_t* last_event = nullptr;   // step after which two blocks joined or parted last
+  AssemblyOutputs events;               // room for those of one step, one row per lane
+  bool begins = false;                  // they have no state yet
+};
+
+using GoOnLanes = void (*)(const Prepared<float>&, const AssemblyRules&, const TankGroup&,
+                           AssemblyScratch&);
+
 struct AssemblyKernel {
   AssembleLanes run;
+  GoOnLanes go_on;
   int lanes;
   std::size_t (*scratch_bytes)(int blocks);
+  std::size_t (*kept_bytes)(int blocks); // of one world
 };
 
 AssemblyKernel chosen_assembly_kernel();
 AssemblyKernel assembly_kernel_baseline();
 AssemblyKernel assembly_kernel_avx2();
 AssemblyKernel assembly_kernel_avx512();
+void go_on_baseline(const Prepared<float>&, const AssemblyRules&, const TankGroup&,
+                    AssemblyScratch&);
+void go_on_avx2(const Prepared<float>&, const AssemblyRules&, const TankGroup&, AssemblyScratch&);
+void go_on_avx512(const Prepared<float>&, const AssemblyRules&, const TankGroup&, AssemblyScratch&);
 
 // The same kernel in double precision, one world at a time.
 std::int64_t assemble_reference(const Prepared<double>&, const AssemblyRules&,
@@ -44,3 +75,15 @@ std::int64_t assemble_reference(const Prepared<double>&, const AssemblyRules&,
 std::size_t assembly_reference_bytes(int blocks);
 
 } // namespace driftwalk
+
+DRIFTWALK_LANES_BEGIN
+
+#if defined(__AVX512F__)
+inline constexpr int assembly_lanes = 16; // of a pack, worlds or blocks
+#elif defined(__AVX2__)
+inline constexpr int assembly_lanes = 8;
+#else
+inline constexpr int assembly_lanes = 4;
+#endif
+
+DRIFTWALK_LANES_END

@@ -273,6 +273,28 @@ inline T own_angle(const PackMemory<Real>& pack, int block, int world) {
   return turned > half ? turned - turn : turned;
 }
 
+template <class Real, class T>
+inline void read_blocks(const AssemblyRules& rules, const PackMemory<Real>& pack, int world,
+                        const LiveBlocks& out) {
+  for (int b = 0; b < rules.blocks; ++b) {
+    const Member<Real>& m = pack.member(b);
+    const int lane = pack.lane(b, world);
+    const BlockBook& book = pack.book(b, lane);
+    const T omega = get(m.motion.omega, lane);
+    out.pose[3 * b] = get(m.x, lane);
+    out.pose[3 * b + 1] = get(m.y, lane);
+    out.pose[3 * b + 2] = own_angle<Real, T>(pack, b, lane);
+    out.velocity[3 * b] = get(m.motion.vx, lane) - omega * get(m.arm.y, lane);
+    out.velocity[3 * b + 1] = get(m.motion.vy, lane) + omega * get(m.arm.x, lane);
+    out.velocity[3 * b + 2] = omega;
+    out.assembly[b] = get(m.root, lane);
+    out.cell[2 * b] = book.cell_x;
+    out.cell[2 * b + 1] = book.cell_y;
+    out.quarter[b] = book.quarter;
+    out.kind[b] = book.kind;
+  }
+}
+
 // Bits of `Status` of the world in a lane.
 template <class Real, class T>
 inline std::uint32_t lane_status(const Prepared<T>& run, const AssemblyRules& rules,

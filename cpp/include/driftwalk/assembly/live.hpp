@@ -17,16 +17,6 @@ struct LiveForces {
   double flow_scale = 1; // on the velocity of the water
 };
 
-// The blocks of a live world, one row each; arrays of `blocks()` rows.
-struct LiveBlocks {
-  double* pose;           // [x, y, theta]
-  double* velocity;       // [vx, vy, omega] of the block's centre
-  std::int32_t* assembly; // lowest block of its assembly
-  std::int32_t* cell;     // [x, y] on the assembly's lattice
-  std::int32_t* quarter;
-  std::int32_t* kind; // of typed faces
-};
-
 // Events of the last `advance`, as in AssemblyOutputs.
 struct LiveEvents {
   int count;

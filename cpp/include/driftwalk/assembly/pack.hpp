@@ -5,6 +5,7 @@
 #include "driftwalk/assembly/bond_load.hpp"
 #include "driftwalk/assembly/correlate.hpp"
 #include "driftwalk/assembly/lane.hpp"
+#include "driftwalk/assembly/kept_world.hpp"
 #include "driftwalk/assembly/near.hpp"
 #include "driftwalk/assembly/walls.hpp"
 #include "driftwalk/random/stirring.hpp"
@@ -78,12 +79,47 @@ public:
     if (rules_.glued > 1) {
       glue(own);
     }
+    begin_stream(own, key, flow_start);
     for (int lane = own; lane < end_of(own); ++lane) {
-      put(stream_.key0, lane, static_cast<UInt32>(key));
-      put(stream_.key1, lane, static_cast<UInt32>(key >> 32));
       put(draw_, lane, 0);
       begin_force(lane);
-      clocks_.begin(lane, flow_start);
+    }
+    list_crowd();
+  }
+
+  // Makes assemblies of the blocks of a world that has begun.
+  void join(int own, const LiveBlocks& joined) {
+    Scene& scene = scratch_.scene;
+    fill_scene(rules_, memory_, own, blocks_, scene);
+    join_blocks(rules_, scene, joined);
+    read_scene(rules_, scene, memory_, own);
+    books_[own].assemblies = scene.assemblies;
+    if (rules_.bonds_break) {
+      bond_anew(0, own);
+    }
+    list_crowd();
+  }
+
+  void keep(int own, char* state) const { keep_world(rules_, memory_, own, books_[own], state); }
+
+  // Goes on, from the pack's step `step`, with a world that has been kept at that step of its own.
+  void resume(int own, std::int64_t world, std::int64_t step, std::uint64_t key, double flow_start,
+              const char* state) {
+    LaneBook& book = books_[own];
+    book.world = world;
+    book.first_step = 0;
+    book.event_count = 0;
+    book.running = true;
+    book.key = key;
+    resume_world(rules_, memory_, own, book, state);
+    begin_stream(own, key, flow_start);
+    const std::int64_t draws = (step + period() - 1) / period();
+    for (int lane = own; lane < end_of(own); ++lane) {
+      put(draw_, lane, static_cast<UInt32>(draws));
+      if (draws > 0) {
+        put(kept_, lane, run_.force_kept);
+        put(fresh_, lane, T(1) - run_.force_kept);
+      }
     }
     list_crowd();
   }
@@ -167,6 +203,14 @@ private:
     glue_blocks(rules_, scene);
     read_scene(rules_, scene, memory_, own);
     books_[own].assemblies = scene.assemblies;
+  }
+
+  void begin_stream(int own, std::uint64_t key, double flow_start) {
+    for (int lane = own; lane < end_of(own); ++lane) {
+      put(stream_.key0, lane, static_cast<UInt32>(key));
+      put(stream_.key1, lane, static_cast<UInt32>(key >> 32));
+      clocks_.begin(lane, flow_start);
+    }
   }
 
   void feel_pull() {

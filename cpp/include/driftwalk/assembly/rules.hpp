@@ -80,4 +80,20 @@ struct AssemblyOutputs {
   std::int32_t* sample_assembly = nullptr; // [world][sample][block]
 };
 
+// The blocks of a world that keeps its state, one row each.
+struct LiveBlocks {
+  double* pose;           // [x, y, theta]
+  double* velocity;       // [vx, vy, omega] of the block's centre
+  std::int32_t* assembly; // lowest block of its assembly
+  std::int32_t* cell;     // [x, y] on the assembly's lattice
+  std::int32_t* quarter;
+  std::int32_t* kind; // of typed faces
+
+  // Those from a row on.
+  LiveBlocks from(std::int64_t row) const {
+    return {pose + 3 * row, velocity + 3 * row, assembly + row,
+            cell + 2 * row, quarter + row,      kind + row};
+  }
+};
+
 } // namespace driftwalk

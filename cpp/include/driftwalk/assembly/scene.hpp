@@ -108,6 +108,8 @@ void settle(const AssemblyRules& rules, Scene& scene);
 void keep_first_blocks(const AssemblyRules& rules, Scene& scene, int blocks);
 // Glues blocks to the bodies of the start, each where its first block is.
 void glue_blocks(const AssemblyRules& rules, Scene& scene);
+// Makes assemblies of blocks that are alone, each where its lowest block is and as that one moves.
+void join_blocks(const AssemblyRules& rules, Scene& scene, const LiveBlocks& joined);
 // Makes every block an assembly of its own, which moves as the block did, with its own frame.
 void part_blocks(const AssemblyRules& rules, Scene& scene);
 
