@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from copy import copy
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, get_args
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -28,7 +28,6 @@ from driftwalk.assembly.runs.plan import (
 from driftwalk.assembly.runs.start import require_room
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.errors import InputError
-from driftwalk.core.processors import default_threads
 from driftwalk.simulation.backend import BROKEN
 
 if TYPE_CHECKING:
@@ -164,9 +163,7 @@ class TankBatch:
         self._outcome = np.full(count, "", dtype=object)
         self._name(np.ones(count, dtype=bool))
 
-    def _begin(
-        self, plans: list[Plan], poses: Floats, joined: State | None
-    ) -> _core.TankBatch:
+    def _begin(self, plans: list[Plan], poses: Floats, joined: State | None) -> _core.TankBatch:
         models, pull, rules = self._kept
         return _core.TankBatch(
             models,
@@ -284,9 +281,7 @@ class TankBatch:
         """
         return self._batch.state()
 
-    def take(
-        self, worlds: npt.ArrayLike, *, seed: int, first: int = 0
-    ) -> TankBatch:
+    def take(self, worlds: npt.ArrayLike, *, seed: int, first: int = 0) -> TankBatch:
         """Return a batch that begins from copies of some worlds, with new forces.
 
         Parameters
@@ -419,7 +414,9 @@ def _joined(start: State, plan: Plan) -> dict[str, npt.NDArray[Any]]:
     ):
         values = np.asarray(start.get(name, np.zeros((*whole, *own))), dtype=kind)
         if name not in start and name not in ("velocity", "kind"):
-            raise InputError(f"start: '{name}' is missing; `state` of a batch has all that it needs")
+            raise InputError(
+                f"start: '{name}' is missing; `state` of a batch has all that it needs"
+            )
         if values.shape != (*whole, *own):
             raise InputError(
                 f"start: expected {name} of shape {(*whole, *own)}, got shape {values.shape}"

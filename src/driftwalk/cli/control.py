@@ -66,9 +66,7 @@ def plan(
     dwell: Annotated[
         float, option("--dwell", "Time for which a mode is held at least.", unit="s")
     ] = 0.0,
-    rounds: Annotated[
-        int, option("--rounds N", "Rounds of planning.", panel=PANEL, min=1)
-    ] = 12,
+    rounds: Annotated[int, option("--rounds N", "Rounds of planning.", panel=PANEL, min=1)] = 12,
     worlds: Annotated[
         int, option("--worlds N", "Simulated worlds of a round.", panel=PANEL, min=20)
     ] = 1000,
@@ -113,13 +111,11 @@ def plan(
     print_result(found, options.out, json=options.json)
 
 
-@control_app.command(cls=HelpCommand)
+@control_app.command("test", cls=HelpCommand)
 @with_options(RunOptions, "out", "cluster", "cluster_options", "overwrite", "json")
-def test(
+def try_policy(
     policy: Policy,
-    worlds: Annotated[
-        int, option("--worlds N", "Fresh worlds of each arm.", min=20)
-    ] = 2000,
+    worlds: Annotated[int, option("--worlds N", "Fresh worlds of each arm.", min=20)] = 2000,
     latency: Annotated[
         float | None,
         option("--latency", "Latency of the worlds (default: the plan's).", unit="s"),

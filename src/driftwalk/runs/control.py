@@ -135,10 +135,10 @@ class ControlTestWork:
     def checked(self) -> Self:
         """Refuse what is no policy."""
         from driftwalk.assembly.control.stored import stored_rules
-        from driftwalk.assembly.control.trial import test_setting
+        from driftwalk.assembly.control.trial import trial_setting
 
         stored_rules(self.policy)
-        test_setting(self.policy, self.worlds, self.latency_s, self.missed, self.force_factor)
+        trial_setting(self.policy, self.worlds, self.latency_s, self.missed, self.force_factor)
         return self
 
     def specification(self) -> dict[str, Any]:
@@ -157,9 +157,9 @@ class ControlTestWork:
 
     def compute(self, run: Run) -> xr.Dataset:
         """Run the arms and keep what they reached."""
-        from driftwalk.assembly import test_control
+        from driftwalk.assembly import try_control
 
-        found = test_control(
+        found = try_control(
             self.policy, worlds=self.worlds, latency=self.latency_s, missed=self.missed,
             force_factor=self.force_factor, store=run.store, executor=run.executor,
             progress=lambda done, total: run.progress(done, total, "worlds"),

@@ -54,7 +54,9 @@ def pilot(
                 yield from _follow(control, stream, f"{host}:{port}", patience_s)
         except OSError as error:
             if not connected:
-                raise InputError(f"no tracker on {host}:{port}: {error.strerror or error}") from error
+                raise InputError(
+                    f"no tracker on {host}:{port}: {error.strerror or error}"
+                ) from error
         if control.ended:
             return
         yield control.safe("the stream has stopped")

@@ -1,4 +1,4 @@
-"""A controller: it turns what is seen of worlds into modes, in simulated worlds and in real ones."""
+"""A controller: it turns what is seen of worlds into modes, in simulated and in real ones."""
 
 from __future__ import annotations
 

@@ -110,7 +110,8 @@ def _posterior(parameters: Floats, random: np.random.Generator | None) -> Floats
         # A sum of gammas may vanish where all parameters are tiny: then the mean.
         parts = random.standard_gamma(parameters)
         parts = np.where(parts.sum(axis=-1, keepdims=True) > 0, parts, parameters)
-    return parts / parts.sum(axis=-1, keepdims=True)
+    mean: Floats = parts / parts.sum(axis=-1, keepdims=True)
+    return mean
 
 
 class Plan(NamedTuple):
@@ -149,12 +150,12 @@ def value_iteration(probability: Floats, *, target: int, periods: int) -> Plan:
     >>> plan.action[1, 0, 0].item(), plan.value[2, 0, 0].round(2).item()
     (1, 0.36)
     """
-    classes, _, modes, _ = probability.shape
+    classes = probability.shape[0]
     ages = age_bin(np.arange(periods + 1))
     value = np.zeros((periods + 1, classes, periods + 1))
     value[0, target] = 1.0
     action = np.zeros((periods, classes, periods + 1), dtype=np.int64)
-    enter, stay = probability[..., :-1], probability[:, ages, :, -1]
+    enter, stay = probability[..., :-1], probability[..., -1][:, ages]
     for left in range(periods):
         before = value[left]
         older = np.concatenate([before[:, 1:], before[:, -1:]], axis=1)

@@ -44,7 +44,9 @@ class LiveControl:
         self._tank = (json.loads(policy.attrs["arena"]), float(policy.attrs["block_side_m"]))
         self.blocks = int(policy.attrs["blocks"])
         self._bonds_break = self._modes.study.assembly.bonds_break
-        self._restart(math.nan)
+        self._begun = self._since = math.nan
+        self._last, self._due, self._outcome, self.ended = math.inf, 0.0, "", False
+        self._controller = Controller(self._rules, np.zeros(1, dtype=np.int64))
 
     def hello(self, content: Mapping[str, Any]) -> None:
         """Take the first line of a stream.
@@ -137,10 +139,8 @@ class LiveControl:
 
     def _restart(self, time: float) -> None:
         self._begun = self._since = time
-        self._last = time if math.isfinite(time) else math.inf
-        self._outcome, self._due = "", 0.0
+        self._due, self._outcome, self.ended = 0.0, "", False
         self._controller = Controller(self._rules, np.zeros(1, dtype=np.int64))
-        self.ended = False
 
     def _require_blocks(self, number: Any) -> None:
         if number is not None and int(number) != self.blocks:
@@ -153,7 +153,8 @@ def _same_tank(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> bool:
     """Return whether two tanks have the same shape and, within 1 %, the same size."""
     sizes = [key for key in ours if key.endswith("_m") and not key.startswith("center")]
     return theirs.get("shape") == ours.get("shape") and all(
-        np.shape(theirs.get(key)) == np.shape(ours[key])
+        key in theirs
+        and np.shape(theirs[key]) == np.shape(ours[key])
         and np.allclose(np.asarray(theirs[key], float), np.asarray(ours[key], float), rtol=0.01)
         for key in sizes
     )

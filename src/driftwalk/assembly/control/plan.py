@@ -20,7 +20,7 @@ from driftwalk.assembly.control.modes import Modes
 from driftwalk.assembly.control.worlds import Setting, Worlds, decisions_of, periods_of
 from driftwalk.assembly.outcomes.class_names import outcome_classes
 from driftwalk.assembly.outcomes.distribution import proportion_interval
-from driftwalk.core.arrays import Floats
+from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
 from driftwalk.schema.check import build_dataset
@@ -231,7 +231,7 @@ def plan_control(
         modes, wanted, classes, worlds, seed,
         (lambda _: None) if store is None else store, executor,
         (lambda *_: None) if progress is None else progress,
-        worlds * (rounds + CONTROL_POLICY.finalists + 3),
+        worlds * (rounds + CONTROL_POLICY.finalists + 4),
     )  # fmt: skip
     return planner.plan(rounds)
 
@@ -267,24 +267,29 @@ class _Planner:
         for at in range(rounds):
             plans.append(self.policy(seen))
             random = np.random.default_rng([self.seed, at])
-            tried = [plans[-1] if few else self.policy(seen, random) for few in best[:CONTROL_POLICY.drawn]]
+            tried = [
+                plans[-1] if few else self.policy(seen, random)
+                for few in best[: CONTROL_POLICY.drawn]
+            ]
             followed = self.run(f"round_{at}", self.rules(safe, *tried))
             seen.append(decisions_of(followed))
             reached[at] = self.hit(followed)[best].mean()
         plans.append(self.policy(seen))
-        # The last policies are compared in worlds that they share, the best of them in fresh ones.
-        shared, last = self.used, range(max(len(plans) - CONTROL_POLICY.finalists, 0), len(plans))
+        # The last policies, and the best mode alone, are compared in worlds that they share.
+        constantly = Plan(np.full_like(plans[-1].action, safe), plans[-1].value)
+        last = [*plans[-CONTROL_POLICY.finalists :], constantly]
+        shared = self.used
         again = [
-            self.hit(self.run(f"final_{at}", self.rules(safe, plans[at]), first=shared)).sum()
-            for at in last
+            self.hit(self.run(f"final_{at}", self.rules(safe, one), first=shared)).sum()
+            for at, one in enumerate(last)
         ]
-        final = last[int(np.argmax(again))]
-        fresh = self.hit(self.run("fresh", self.rules(safe, plans[final]), worlds=2 * self.worlds))
-        return self.dataset(plans, final, constant, each, reached, fresh)
+        best_plan = last[int(np.argmax(again))]
+        fresh = self.hit(self.run("fresh", self.rules(safe, best_plan), worlds=2 * self.worlds))
+        return self.dataset(plans, best_plan.action, constant, each, reached, fresh)
 
     def rules(self, safe: int, *plans: Plan) -> Rules:
         """Return policies with what is kept to."""
-        action = np.stack([one.action for one in plans]).astype(np.int16)
+        action = np.stack([one.action for one in plans])
         return Rules(action, safe, self.wanted.dwell)
 
     def policy(self, seen: list[Decisions], random: np.random.Generator | None = None) -> Plan:
@@ -298,7 +303,7 @@ class _Planner:
     def hit(self, found: Arrays) -> Floats:
         """Return which worlds are in the target at the deadline, as 0 and 1."""
         target = self.classes.index(self.wanted.target)
-        return (found["after"][:, -1] == target).astype(np.float64)
+        return np.asarray(found["after"][:, -1] == target, dtype=np.float64)
 
     def run(
         self, name: str, rules: Rules, *, worlds: int | None = None, first: int | None = None,
@@ -319,7 +324,7 @@ class _Planner:
         )
 
     def dataset(
-        self, plans: list[Plan], final: int, constant: Floats, each: int, reached: Floats,
+        self, plans: list[Plan], action: Integers, constant: Floats, each: int, reached: Floats,
         fresh: Floats,
     ) -> xr.Dataset:  # fmt: skip
         """Return the policy as a dataset."""
@@ -327,10 +332,10 @@ class _Planner:
         low, high = proportion_interval(fresh.sum(), fresh.size, confidence=share)
         wanted, modes = self.wanted, self.modes
         start = self.classes.index(all_single(modes.study.assembly.blocks))
-        ages = np.arange(plans[final].action.shape[2])
+        ages = np.arange(action.shape[2])
         flow = modes.flows[0]
         data = {
-            "action": (("left", "class", "age"), plans[final].action.astype(np.int32)),
+            "action": (("left", "class", "age"), action.astype(np.int32)),
             "flow": ("mode", modes.flow.astype(np.int32)),
             "flow_scale": ("mode", modes.flow_scale),
             "force_std": (("mode", "draw"), modes.force_std),
@@ -357,7 +362,7 @@ class _Planner:
             "reached": float(fresh.mean()), "reached_low": float(low), "reached_high": float(high),
             "confidence": share, "worlds": int(fresh.size), "worlds_used": self.used,
             "constant_worlds": each, "safe_mode": modes.name[int(constant.argmax())],
-            "final_round": final, "blocks": modes.study.assembly.blocks,
+            "blocks": modes.study.assembly.blocks,
             "arena": modes.study.tank.to_arena_json(), "block_side_m": modes.study.block.side_m,
             "study": modes.study.to_toml(), "seed": self.seed,
         })  # fmt: skip

@@ -27,7 +27,7 @@ CONSTANTS = 3
 """Constant modes that are run, those with the largest shares in the plan; chosen by hand."""
 
 
-def test_control(
+def try_control(
     policy: xr.Dataset,
     *,
     worlds: int = 2000,
@@ -66,10 +66,10 @@ def test_control(
 
     Examples
     --------
-    ``test_control(policy, worlds=2000)["reached"]``
+    ``try_control(policy, worlds=2000)["reached"]``
     """
     rules, wanted, modes = stored_rules(policy), stored_wanted(policy), stored_modes(policy)
-    setting = test_setting(policy, worlds, latency, missed, force_factor)
+    setting = trial_setting(policy, worlds, latency, missed, force_factor)
     classes = tuple(str(name) for name in policy["class"].values)
     target, seed = classes.index(wanted.target), int(policy.attrs["seed"])
     # Behind all worlds of the plan.
@@ -135,7 +135,7 @@ def test_control(
     })  # fmt: skip
 
 
-def test_setting(
+def trial_setting(
     policy: xr.Dataset,
     worlds: int,
     latency: float | None,
@@ -147,7 +147,7 @@ def test_setting(
     Parameters
     ----------
     policy, worlds, latency, missed, force_factor
-        As in `test_control`.
+        As in `try_control`.
 
     Raises
     ------

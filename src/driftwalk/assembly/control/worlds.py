@@ -15,6 +15,7 @@ from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.files.shards import Arrays
 from driftwalk.sweep import WorkUnit
 
+
 @dataclass(frozen=True)
 class Setting:
     """What a controller is up against.

@@ -69,7 +69,7 @@ def rounds_section(policy: xr.Dataset) -> Section:
     number = np.arange(1.0, policy.sizes["round"] + 1.0)
     drawn = [
         series("promised", number, policy["promised"].values),
-        series("reached in simulated worlds", number, policy["round_reached"].values, style="points"),
+        series("reached", number, policy["round_reached"].values, style="points"),
     ]  # fmt: skip
     note = "The promise of value iteration is too large; only what was reached counts."
     return chart(
@@ -94,7 +94,7 @@ def action_sections(policy: xr.Dataset) -> list[Section]:
     return [table_section("policy", "What it does", columns, rows, note)]
 
 
-def test_sections(*, control_test: xr.Dataset | None = None) -> list[Section]:
+def trial_sections(*, control_test: xr.Dataset | None = None) -> list[Section]:
     """Return the sections of a page on the test of a policy.
 
     Parameters
@@ -104,7 +104,7 @@ def test_sections(*, control_test: xr.Dataset | None = None) -> list[Section]:
 
     Examples
     --------
-    >>> [part["kind"] for part in test_sections()]
+    >>> [part["kind"] for part in trial_sections()]
     ['empty']
     """
     parts: list[tuple[str, str, Maker]] = [
@@ -113,15 +113,16 @@ def test_sections(*, control_test: xr.Dataset | None = None) -> list[Section]:
         ("usage", "Modes used", lambda found: _table("usage", "Modes used", usage_table(found))),
     ]
     nothing = "There is no test yet."
-    return sections_of(control_test, nothing, test_summary, lambda _: [], parts)
+    return sections_of(control_test, nothing, trial_summary, lambda _: [], parts)
 
 
-def test_summary(test: xr.Dataset) -> Section:
+def trial_summary(test: xr.Dataset) -> Section:
     """Return what each arm reached."""
     facts = test.attrs
     table = arm_table(test)
     words = [
-        f"{row[0].capitalize()}: {row[1]} ({row[2]})" + (f", gain {row[3]} ({row[4]})." if row[3] else ".")
+        f"{row[0].capitalize()}: {row[1]} ({row[2]})"
+        + (f", gain {row[3]} ({row[4]})." if row[3] else ".")
         for row in ([str(cell) for cell in one] for one in table.rows)
     ]  # fmt: skip
     ends = (test["reached_low"].values[0], test["reached_high"].values[0])

@@ -48,7 +48,7 @@ def mode_table(policy: xr.Dataset) -> Table:
     return Table(rows, ["mode", "reaches it alone"])
 
 
-def test_answer(found: xr.Dataset) -> Answer:
+def trial_answer(found: xr.Dataset) -> Answer:
     """Return the answer of a `control_test`.
 
     Parameters

@@ -30,7 +30,7 @@ variables:
     drag_coefficient(mode draw) [1]: drag coefficient C_d of the mode
     constant_reached(mode) [1]: share of the worlds that this mode alone brought to the target
     promised(round) [1]: probability of the target by value iteration, too large
-    round_reached(round) [1]: share of the worlds of the round that reached the target under it; NaN of the last
+    round_reached(round) [1]: share of its worlds that reached the target; NaN of the last
     u(field y x) [m s-1]: flow velocity x
     v(field y x) [m s-1]: flow velocity y
     flag(field y x) int: origin of the node's value, as in a flow_field
@@ -55,7 +55,6 @@ attributes:
     worlds_used number: worlds of the whole plan
     constant_worlds number: worlds of each mode alone
     safe_mode text: best mode alone, and that of a stream that stops
-    final_round number: round of the policy, from 0
     blocks number: blocks in the tank
     block_side_m number: side of a block
     arena

@@ -204,9 +204,9 @@ BUILT_IN: Final = (
         words="test of control",
         command="control test",
         file="control_test.nc",
-        figures="driftwalk.figures.control:test_figures",
-        page=f"{_SECTIONS}.control:test_sections",
-        answer=f"{_ANSWERS}.control:test_answer",
+        figures="driftwalk.figures.control:trial_figures",
+        page=f"{_SECTIONS}.control:trial_sections",
+        answer=f"{_ANSWERS}.control:trial_answer",
         places={"figures": "figures"},
     ),
     RunKind(
