@@ -104,7 +104,7 @@ void advance(TankBatch& batch, std::int64_t steps, In<std::int32_t, 1> flow,
     throw std::invalid_argument("settings must have one entry per world");
   }
   for (std::size_t w = 0; w < worlds; ++w) {
-    if (flow.data()[w] < 0 || flow.data()[w] >= batch.flows() || latching.data()[w] < 0 ||
+    if (flow.data()[w] < -1 || flow.data()[w] >= batch.flows() || latching.data()[w] < 0 ||
         latching.data()[w] > 2) {
       throw std::invalid_argument("there is no such flow, or way of latching");
     }
@@ -113,9 +113,9 @@ void advance(TankBatch& batch, std::int64_t steps, In<std::int32_t, 1> flow,
     throw std::invalid_argument("a world has at most 2^31 - 2 steps");
   }
   nb::gil_scoped_release release;
-  batch.advance({flow.data(), latching.data(), flow_scale.data(), drag_coefficient.data(),
-                 force_std.data()},
-                steps, threads);
+  batch.advance(
+      {flow.data(), latching.data(), flow_scale.data(), drag_coefficient.data(), force_std.data()},
+      steps, threads);
 }
 
 TankBatch take(const TankBatch& batch, const std::vector<std::int64_t>& world,
@@ -160,9 +160,10 @@ void register_tanks(nb::module_& module) {
       .def("take", &take, "worlds"_a, "key"_a)
       .def("state", &state)
       .def_prop_ro("step", &TankBatch::step)
-      .def("status", [](const TankBatch& batch) {
-        return hand_out(std::vector(batch.status()), {batch.status().size()});
-      })
+      .def("status",
+           [](const TankBatch& batch) {
+             return hand_out(std::vector(batch.status()), {batch.status().size()});
+           })
       .def("last_event", [](const TankBatch& batch) {
         return hand_out(std::vector(batch.last_event()), {batch.last_event().size()});
       });

@@ -9,7 +9,6 @@
 
 #include <algorithm>
 #include <cstring>
-#include <numeric>
 #include <tuple>
 
 namespace driftwalk {
@@ -41,8 +40,12 @@ struct Packs {
   std::vector<std::int64_t> world;
   std::vector<std::size_t> begin;
 
-  Packs(const TankSettings& settings, std::int64_t worlds, int lanes) : world(worlds) {
-    std::iota(world.begin(), world.end(), std::int64_t(0));
+  Packs(const TankSettings& settings, std::int64_t worlds, int lanes) {
+    for (std::int64_t w = 0; w < worlds; ++w) {
+      if (settings.flow[w] >= 0) {
+        world.push_back(w);
+      }
+    }
     const auto group = [&](std::int64_t w) {
       return std::tuple(settings.flow[w], settings.latching[w], settings.flow_scale[w]);
     };
@@ -77,8 +80,8 @@ TankBatch::TankBatch(std::vector<TankFlow> flows, std::vector<std::uint64_t> key
     : flows_(std::move(flows)), key_(std::move(key)) {
   const std::size_t worlds = key_.size(), rows = worlds * static_cast<std::size_t>(blocks());
   const bool twice = flows_.front().twice != nullptr;
-  state_.resize(worlds * (twice ? KeptLayout<double>::bytes : chosen_assembly_kernel().kept_bytes)(
-                             blocks()));
+  state_.resize(
+      worlds * (twice ? KeptLayout<double>::bytes : chosen_assembly_kernel().kept_bytes)(blocks()));
   pose_.assign(start, start + 3 * rows);
   velocity_.resize(3 * rows);
   assembly_.resize(rows);
@@ -96,8 +99,8 @@ TankBatch::TankBatch(std::vector<TankFlow> flows, std::vector<std::uint64_t> key
 }
 
 LiveBlocks TankBatch::now() {
-  return {pose_.data(), velocity_.data(), assembly_.data(), cell_.data(), quarter_.data(),
-          kind_.data()};
+  return {pose_.data(), velocity_.data(), assembly_.data(),
+          cell_.data(), quarter_.data(),  kind_.data()};
 }
 
 void TankBatch::advance(const TankSettings& settings, std::int64_t steps, int threads) {
@@ -145,11 +148,10 @@ void TankBatch::run(const TankSettings& settings, TankGroup group, int threads) 
               });
   } else {
     const AssemblyKernel kernel = chosen_assembly_kernel();
-    run_packs(kernel.lanes, kernel.scratch_bytes(blocks()),
-              [&](const TankFlow& flow, const AssemblyRules& rules, const TankGroup& own,
-                  AssemblyScratch& scratch) {
-                kernel.go_on(flow.single->view(), rules, own, scratch);
-              });
+    run_packs(
+        kernel.lanes, kernel.scratch_bytes(blocks()),
+        [&](const TankFlow& flow, const AssemblyRules& rules, const TankGroup& own,
+            AssemblyScratch& scratch) { kernel.go_on(flow.single->view(), rules, own, scratch); });
   }
 }
 

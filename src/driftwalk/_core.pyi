@@ -246,6 +246,54 @@ class LiveWorld:
     @property
     def status(self) -> int: ...
 
+class TankBatch:
+    # start (worlds, blocks, 3) [m, m, rad], key (worlds,); flow_start: of each model (worlds,) [s].
+    # joined: velocity (worlds, blocks, 3), assembly, cell (worlds, blocks, 2), quarter and kind of
+    # worlds that begin with assemblies.
+    def __init__(
+        self,
+        models: list[Model],
+        *,
+        start: _Floats,
+        key: _Keys,
+        precision: str,
+        connector_distance: float,
+        connector_axis: float,
+        hidden_share: float,
+        stirring_length: float,
+        incompressible: bool,
+        block_restitution: float,
+        block_friction: float,
+        faces: FaceRules | None,
+        bonds: tuple[float, float, float, float],
+        pull: Pull | None,
+        glued: npt.NDArray[np.int32] | None,
+        flow_start: list[_Floats | None],
+        joined: dict[str, npt.NDArray[Any]] | None,
+        threads: int,
+    ) -> None: ...
+    # One entry per world. flow: index of the model, -1: the world rests. latching: 0 none,
+    # 1 collision, 2 connector.
+    def advance(
+        self,
+        steps: int,
+        *,
+        flow: npt.NDArray[np.int32],
+        latching: npt.NDArray[np.int32],
+        flow_scale: _Floats,
+        drag_coefficient: _Floats,
+        force_std: _Floats,
+        threads: int,
+    ) -> None: ...
+    def take(self, worlds: list[int], key: _Keys) -> TankBatch: ...
+    # As that of a LiveWorld, of all worlds, without bonds.
+    def state(self) -> dict[str, npt.NDArray[Any]]: ...
+    def status(self) -> npt.NDArray[np.uint32]: ...
+    # Step after which blocks joined or parted last; 0: not since the start.
+    def last_event(self) -> npt.NDArray[np.int32]: ...
+    @property
+    def step(self) -> int: ...
+
 # --- the likelihood fit -------------------------------------------------------------------------
 class InnovationsFilter:
     # Time [s] increasing; x and y [m], NaN where a sample is missing. excluded: 1 where the

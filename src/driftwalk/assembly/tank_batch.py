@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from copy import copy
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 State = Mapping[str, npt.NDArray[Any]]
+Complete = Literal["moves", "rests"]
 
 _LATCHING: Final = ("none", "collision", "connector")
 """The ways of latching in the order of the native core's numbers."""
@@ -90,6 +91,10 @@ class TankBatch:
         Threads; default: all processors.
     backend : {"cpu", "reference"}
         As in `assemble`.
+    complete : {"moves", "rests"}
+        What a world does whose blocks have become one assembly that cannot come apart: it moves on,
+        or rests from the end of that `advance` on. Its class is final, and computing it no more
+        saves time.
 
     Raises
     ------
@@ -123,11 +128,14 @@ class TankBatch:
         start: npt.ArrayLike | State | None = None,
         workers: int | None = None,
         backend: Backend = "cpu",
+        complete: Complete = "moves",
     ) -> None:
         flows = list(flow) if isinstance(flow, Sequence) else [flow]
         count = study.assembly.runs if worlds is None else worlds
         if count < 1 or not flows:
             raise InputError(f"a batch has worlds and a flow, got {count} and {len(flows)}")
+        if complete not in get_args(Complete):
+            raise InputError(f"complete must be 'moves' or 'rests', got {complete!r}")
         plans = [
             make_plan(
                 study,
@@ -159,6 +167,10 @@ class TankBatch:
         )
         self._steps_per_interval = round(forces.force_interval_s / plan.study.time_step_s)
         self._due = 0.0
+        rules = plan.study.assembly
+        comes_apart = rules.bond_rate_per_s > 0 or rules.bond_strength_N > 0
+        self._rests = complete == "rests" and rules.blocks > 1 and not comes_apart
+        self._resting = np.zeros(count, dtype=bool)
         self._names: dict[bytes, str] = {}
         self._outcome = np.full(count, "", dtype=object)
         self._name(np.ones(count, dtype=bool))
@@ -264,7 +276,9 @@ class TankBatch:
                 self._settings = self._wishes
             waits = self._settings is not self._wishes
             now = min(steps, self._steps_per_interval - into) if waits else steps
-            self._batch.advance(now, **self._settings._asdict(), threads=self._threads)
+            settings = self._settings._asdict()
+            settings["flow"] = np.where(self._resting, np.int32(-1), self._settings.flow)
+            self._batch.advance(now, **settings, threads=self._threads)
             steps -= now
         self._name((self._batch.last_event() != before) | ~self.sound)
 
@@ -318,7 +332,7 @@ class TankBatch:
         taken._wishes = (
             _Settings(*(values[index] for values in self._wishes)) if wait else taken._settings
         )
-        taken._outcome = self._outcome[index]
+        taken._outcome, taken._resting = self._outcome[index], self._resting[index]
         return taken
 
     @property
@@ -376,6 +390,7 @@ class TankBatch:
         if not changed.any():
             return
         state, sound = self._batch.state(), self.sound
+        self._resting = self._rests & (state["assembly"] == 0).all(axis=1)
         side, rules = self._study.block.side_m, self._study.assembly
         for world in np.flatnonzero(changed).tolist():
             own = {name: values[world] for name, values in state.items()}

@@ -25,7 +25,9 @@ STUDIES: dict[str, dict[str, Any]] = {
     "faces": {"assembly": {"faces": "N,S,N,S"}},
     "magnets": {"interaction": {"magnets": "5x5x2mm,1.3T"}},
     "discs": {"block": {"shape": "disc", "side_m": 0.03, "mass_kg": 0.0116}},
-    "polygon": {"tank": {"diameter_m": None, "corners_m": [[0, 0], [0.3, 0], [0.2, 0.25]]}},
+    "rectangle": {
+        "tank": {"shape": "rectangle", "diameter_m": None, "width_m": 0.25, "height_m": 0.2}
+    },
     "many": {"assembly": {"blocks": 30}},
 }
 
@@ -99,16 +101,16 @@ def test_worlds_are_those_of_assembly_path(name: str) -> None:
     study = study_of(name)
     settings: dict[str, Any] = {"seed": 4}
     path = dw.assembly_path(
-        study, swirl(study), duration=3.0, sample_interval=1.0, runs=20, **settings
+        study, swirl(study), duration=3.0, sample_interval=1.0, runs=range(8, 20), **settings
     )
     batch = dw.TankBatch(study, swirl(study), worlds=12, first=8, **settings)
     for k in range(3):
         batch.advance(1.0)
         found = batch.state()
         for axis, part in enumerate(("x", "y", "theta")):
-            expected = path[part].values[8:, k + 1]
+            expected = path[part].values[:, k + 1]
             assert np.array_equal(found["pose"][..., axis].astype(np.float32), expected)
-        assert np.array_equal(found["assembly"], path["assembly"].values[8:, k + 1])
+        assert np.array_equal(found["assembly"], path["assembly"].values[:, k + 1])
 
 
 @pytest.mark.parametrize("name", ["paper", "law", "discs"])
@@ -212,8 +214,31 @@ def test_a_domino_without_drag_flies_and_spins_on_from_its_start() -> None:
     pose = batch.state()["pose"][0]
     middle = place.mean(axis=0) + 2.0 * speed
     np.testing.assert_allclose(pose[:, :2].mean(axis=0), middle, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(pose[:, 2], np.array([0.3, 0.3 + math.pi / 2]) + 2 * spin, rtol=1e-12)
+    turned = pose[:, 2] - (np.array([0.3, 0.3 + math.pi / 2]) + 2.0 * spin)
+    np.testing.assert_allclose(np.remainder(turned + 1.0, 2 * math.pi), 1.0, rtol=0, atol=1e-12)
     np.testing.assert_allclose(np.hypot(*(pose[1] - pose[0])[:2]), 0.03, rtol=1e-12)
+
+
+def test_complete_worlds_rest_and_the_others_do_not_notice() -> None:
+    study = study_of("paper")
+    moving, resting = (
+        dw.TankBatch(study, swirl(study), worlds=40, blocks=3, complete=complete)
+        for complete in ("moves", "rests")
+    )
+    for one in (moving, resting):
+        one.advance(20.0)
+    done = np.isin(moving.outcome, ["I3", "L3"])
+    assert 5 < np.count_nonzero(done) < 40
+    before = resting.state()["pose"]
+    assert np.array_equal(moving.state()["pose"], before)
+    for one in (moving, resting):
+        one.advance(5.0)
+    after = resting.state()["pose"]
+    assert np.array_equal(after[done], before[done])
+    assert np.array_equal(after[~done], moving.state()["pose"][~done])
+    assert resting.outcome.tolist() == moving.outcome.tolist()
+    assert np.array_equal(resting.class_since, moving.class_since)
+    assert resting.time == 25.0
 
 
 def test_glued_blocks_start_joined() -> None:

@@ -16,7 +16,8 @@ struct KeptLayout {
 
   // `rows` of a world; where it has its pack alone, whole rows of lanes.
   KeptLayout(int blocks, int rows, bool one_world)
-      : books(sizeof(LaneBook)), bonds(books + static_cast<std::size_t>(blocks) * sizeof(BlockBook)),
+      : books(sizeof(LaneBook)),
+        bonds(books + static_cast<std::size_t>(blocks) * sizeof(BlockBook)),
         members(bonds + static_cast<std::size_t>(bond_room(blocks)) * sizeof(Bond)),
         member(one_world ? sizeof(Member<Real>) : words * sizeof(Int32)),
         size(members + static_cast<std::size_t>(rows) * member) {}
@@ -53,8 +54,8 @@ inline void keep_world(const AssemblyRules& rules, const PackMemory<Real>& pack,
   const KeptLayout<Real> layout(rules.blocks, rows, pack.one_world);
   std::memcpy(state, &book, sizeof book);
   for (int b = 0; b < rules.blocks; ++b) {
-    std::memcpy(state + layout.books + sizeof(BlockBook) * b,
-                &pack.book(b, pack.lane(b, own)), sizeof(BlockBook));
+    std::memcpy(state + layout.books + sizeof(BlockBook) * b, &pack.book(b, pack.lane(b, own)),
+                sizeof(BlockBook));
   }
   std::memcpy(state + layout.bonds, book.bonds.bond, sizeof(Bond) * book.bonds.count);
   for (int row = 0; row < rows; ++row) {

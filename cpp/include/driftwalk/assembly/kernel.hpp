@@ -37,15 +37,15 @@ struct TankGroup {
   int count = 0;
   const std::uint64_t* key = nullptr;
   const double* drag_coefficient = nullptr;
-  const double* force_std = nullptr;    // [N]
-  const double* flow_start = nullptr;   // as in AssemblyWorlds
-  char* state = nullptr;                // of each world kept_bytes(blocks)
-  const LiveBlocks* joined = nullptr;   // as they begin, where they begin with assemblies
-  LiveBlocks now{};                     // read at the end; pose is read at the start too
-  std::uint32_t* status = nullptr;      // likewise, bits of `Status`
-  std::int32_t* last_event = nullptr;   // step after which two blocks joined or parted last
-  AssemblyOutputs events;               // room for those of one step, one row per lane
-  bool begins = false;                  // they have no state yet
+  const double* force_std = nullptr;  // [N]
+  const double* flow_start = nullptr; // as in AssemblyWorlds
+  char* state = nullptr;              // of each world kept_bytes(blocks)
+  const LiveBlocks* joined = nullptr; // as they begin, where they begin with assemblies
+  LiveBlocks now{};                   // read at the end; pose is read at the start too
+  std::uint32_t* status = nullptr;    // likewise, bits of `Status`
+  std::int32_t* last_event = nullptr; // step after which two blocks joined or parted last
+  AssemblyOutputs events;             // room for those of one step, one row per lane
+  bool begins = false;                // they have no state yet
 };
 
 using GoOnLanes = void (*)(const Prepared<float>&, const AssemblyRules&, const TankGroup&,

@@ -4,8 +4,8 @@
 
 #include "driftwalk/assembly/bond_load.hpp"
 #include "driftwalk/assembly/correlate.hpp"
-#include "driftwalk/assembly/lane.hpp"
 #include "driftwalk/assembly/kept_world.hpp"
+#include "driftwalk/assembly/lane.hpp"
 #include "driftwalk/assembly/near.hpp"
 #include "driftwalk/assembly/walls.hpp"
 #include "driftwalk/random/stirring.hpp"

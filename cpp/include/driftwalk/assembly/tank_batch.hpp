@@ -20,7 +20,7 @@ struct TankFlow {
 
 // Of every world; arrays have an entry per world.
 struct TankSettings {
-  const std::int32_t* flow;     // index of its flow
+  const std::int32_t* flow;     // index of its flow; -1: the world rests, as if there were no time
   const std::int32_t* latching; // a Latching
   const double* flow_scale;     // factor on the velocity of the water
   const double* drag_coefficient;
