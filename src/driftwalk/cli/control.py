@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,7 +14,7 @@ from driftwalk.cli.options.run import RunOptions
 from driftwalk.cli.options.shared_types import PANEL, FlowFile, argument, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.help import HelpCommand, HelpGroup
-from driftwalk.cli.terminal.output import print_json, print_result, print_warnings
+from driftwalk.cli.terminal.output import print_result, print_warnings
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.study_keys import ASSEMBLY_KEYS
 from driftwalk.core.units import parse_quantity
@@ -164,7 +165,7 @@ def run(
     if not patience > 0.0:
         raise InputError(f"--patience has to be above 0 s, got {patience:g} s")
     for line in pilot(_opened(policy)[0], host, int(port), patience_s=patience):
-        print_json(line)
+        print(json.dumps(line), flush=True)
 
 
 def vary_strengths(given: list[str]) -> dict[str, list[float]]:

@@ -79,7 +79,7 @@ class LiveControl:
             When the tank holds another number of blocks.
         """
         time = float(content["time_s"])
-        if not time >= self._last:
+        if not time >= self._last:  # `_last` is infinite before the first
             # The first frame, or a tank that was restarted.
             self._restart(time)
             if "bodies" in content:
@@ -93,7 +93,7 @@ class LiveControl:
             return None
         spent = time - self._begun
         reached = self._outcome == self._wanted.target
-        done = is_one_assembly(self._outcome) and not self._bonds_break
+        done = is_one_assembly(self._outcome or "+") and not self._bonds_break
         if done or spent >= self._wanted.by_s:
             self.ended = True
             return {
@@ -115,7 +115,6 @@ class LiveControl:
     def _decide(self, outcome: str, time: float, left: int) -> dict[str, Any]:
         seen = np.array([self._number.get(outcome, UNKNOWN)])
         age = ages(np.array([time - self._since]), self._wanted.every_s)
-        before = int(self._controller.mode[0])
         mode = int(self._controller.decide(seen, age, left=left)[0])
         return {
             "type": "decision",
@@ -124,7 +123,6 @@ class LiveControl:
             "class": outcome,
             "time_in_class_s": time - self._since,
             "reason": "policy" if seen[0] != UNKNOWN else "class unknown, mode held",
-            "changed": mode != before,
             **self._mode(mode),
         }
 
