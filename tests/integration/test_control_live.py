@@ -1,4 +1,4 @@
-"""`driftwalk control run` on a stream: a tracker that stops, and the page's program as the pumps."""
+"""`driftwalk control run` on streams: a tracker that stops, and the pump program of the page."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from driftwalk.cli.inputs.model_source import RUN_NAMES, Source, assembly_source
+from driftwalk.cli.inputs.model_source import Source, assembly_source
 from driftwalk.cli.options.flatten_options import with_options
 from driftwalk.cli.options.run import RunOptions
 from driftwalk.cli.options.shared_types import PANEL, FlowFile, argument, option
@@ -24,7 +24,11 @@ if TYPE_CHECKING:
 
 UNITS = {"flow-scale": "1", "force-std": "N"}
 """What can be varied, with its unit."""
-NAMES = tuple(name for name in RUN_NAMES if name not in ("duration", "confidence"))
+NAMES = (
+    *("blocks", "tank_diameter", "side", "mass", "depth"),
+    *("drag_coefficient", "force_std", "force_interval"),
+    *("latching", "faces", "hidden_face_drag", "chirality", "bond_rate", "seed"),
+)
 
 control_app = typer.Typer(name="control", add_completion=False, cls=HelpGroup)
 

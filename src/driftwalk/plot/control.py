@@ -43,7 +43,7 @@ def plot_policy(policy: xr.Dataset, ax: Axes | None = None) -> Axes:
     from matplotlib import colormaps
     from matplotlib.patches import Patch
 
-    check_kind(policy, "control_policy", "action", "age", "left")
+    check_kind(policy, "control_policy", "action", "age", "phase")
     ax = style.axes_or_new(ax, height_mm=90.0)
     names = [str(name) for name in policy["class"].values]
     # Most blocks assemble through the classes listed last; those of one assembly need no mode.
@@ -51,10 +51,11 @@ def plot_policy(policy: xr.Dataset, ax: Axes | None = None) -> Axes:
     action = policy["action"].values[-1, shown]
     used = np.unique(action)
     color = {mode: colormaps["tab20"](k % 20) for k, mode in enumerate(used.tolist())}
-    age, every = policy["age"].values, float(policy.attrs["every_s"])
+    age = policy["age"].values
+    width = np.diff(age, append=2.0 * age[-1])
     for row, modes in enumerate(action):
         ax.barh(
-            np.full(age.size, row), np.full(age.size, every), left=age, height=0.8,
+            np.full(age.size, row), width, left=age, height=0.8,
             color=[color[mode] for mode in modes.tolist()],
         )  # fmt: skip
     ax.set_yticks(range(len(shown)), [short_class(names[at]) for at in shown])

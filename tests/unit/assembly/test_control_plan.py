@@ -1,4 +1,4 @@
-"""Value iteration against closed forms and a search through all histories; estimates; controllers."""
+"""Value iteration against closed forms and a search of all histories; estimates; controllers."""
 
 from __future__ import annotations
 
@@ -83,9 +83,7 @@ def test_no_other_policy_of_a_small_process_does_better() -> None:
         last = [row[1] + (row[2] if at == 2 else 0.0) for at, row in enumerate(after)]
         return float(np.dot(weight, last))
 
-    every = [
-        value(a, (b, c, d)) for a in (0, 1) for b in (0, 1) for c in (0, 1) for d in (0, 1)
-    ]
+    every = [value(a, (b, c, d)) for a in (0, 1) for b in (0, 1) for c in (0, 1) for d in (0, 1)]
     assert plan.value[2, 0, 0] == pytest.approx(max(every))
 
 
@@ -118,7 +116,7 @@ def test_drawn_transitions_have_the_mean_of_their_posterior() -> None:
 @pytest.fixture
 def rules() -> Rules:
     """Mode 1 in class 0 and mode 2 in class 1, whatever the age and the time left."""
-    action = np.zeros((1, 4, 2, 3), dtype=np.int64)
+    action = np.zeros((1, 3, 2, BINS), dtype=np.int64)
     action[:, :, 0], action[:, :, 1] = 1, 2
     return Rules(action, safe=0, dwell=2)
 
@@ -139,14 +137,14 @@ def test_without_a_class_the_mode_is_held_and_the_safe_mode_comes_first(rules: R
     assert decide(controller, UNKNOWN, 2) == 2
 
 
-def test_ages_beyond_the_table_have_its_last_modes() -> None:
-    action = np.zeros((1, 1, 1, 3), dtype=np.int64)
-    action[..., 2] = 5
+def test_long_ages_have_the_modes_of_the_last_bin() -> None:
+    action = np.zeros((1, 3, 1, BINS), dtype=np.int64)
+    action[..., -1] = 5
     controller = Controller(Rules(action), np.zeros(1, int))
     assert controller.decide(np.array([0]), np.array([99]), left=1).tolist() == [5]
 
 
 def test_worlds_take_several_policies_in_turn() -> None:
-    action = np.arange(3).reshape(3, 1, 1, 1)
+    action = np.arange(3)[:, None, None, None] * np.ones((3, 1, BINS), dtype=np.int64)
     controller = Controller(Rules(action), np.array([7, 8, 9]))
     assert controller.decide(np.zeros(3, int), np.zeros(3, int), left=1).tolist() == [1, 2, 0]

@@ -25,7 +25,7 @@ def policy() -> xr.Dataset:
     found = dw.plan_control(modes, TARGET, 30.0, every=5.0, rounds=1, worlds=20)
     apart = found["class"].values.tolist().index(SINGLE)
     action = np.zeros_like(found["action"].values)
-    action[:, apart, :2], action[:, apart, 2:] = 1, 2
+    action[:, apart, :2], action[:, apart, 2:] = 1, 2  # from 10 s on
     return found.assign(action=(found["action"].dims, action)).assign_attrs(
         safe_mode=str(found["mode"].values[0])
     )

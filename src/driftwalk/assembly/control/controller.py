@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from driftwalk.assembly.control.decision_process import age_bin, phase_of
 from driftwalk.core.arrays import Integers
 
 UNKNOWN = -1
@@ -18,9 +19,9 @@ class Rules:
 
     Attributes
     ----------
-    action : ndarray of int, shape (policy, left, class, age)
-        Mode with k + 1 periods left, in a class, after so many whole periods there. Worlds take
-        the policies in turn, where there are several.
+    action : ndarray of int, shape (policy, phase, class, age bin)
+        Modes by the time left, the class and the time in it. Worlds take the policies in turn,
+        where there are several.
     safe : int
         Mode where nothing is known: at the start without a class, and when the stream stops.
     dwell : int
@@ -44,7 +45,8 @@ class Controller:
 
     Examples
     --------
-    >>> rules = Rules(np.array([[[[2, 2], [1, 1]]]]), safe=0)
+    >>> action = np.broadcast_to(np.array([2, 1])[:, None], (1, 3, 2, 6))
+    >>> rules = Rules(action, safe=0)
     >>> controller = Controller(rules, np.arange(2))
     >>> controller.decide(np.array([1, UNKNOWN]), np.array([0, 0]), left=1).tolist()
     [1, 0]
@@ -79,9 +81,8 @@ class Controller:
         ndarray of int, shape (worlds,)
             The modes.
         """
-        action = self._rules.action
-        age = np.minimum(age, action.shape[3] - 1)
-        wanted = action[self._policy, left - 1, np.maximum(seen, 0), age].astype(np.int64)
+        action = self._rules.action[:, phase_of(left)]
+        wanted = action[self._policy, np.maximum(seen, 0), age_bin(age)]
         if wish is not None:
             wanted = np.where(wish >= 0, wish, wanted)
         looked = seen != UNKNOWN if wish is None else (seen != UNKNOWN) | (wish >= 0)

@@ -29,6 +29,10 @@ class ProcessPolicy(NamedTuple):
     age_weight: float = 30.0
     """Decisions that the estimate of all ages counts for; of 3 to 100 the best in held-out halves
     of 144,000 decisions, with 100 no worse (`studies/control`)."""
+    phase_starts: tuple[int, ...] = (1, 5, 13)
+    """Fewest decisions left of the phases of a policy; chosen by hand."""
+    phase_places: tuple[float, ...] = (0.5, 0.5, 0.7)
+    """Where in each phase, from its end, value iteration is read; chosen by hand."""
     mode_weight: float = 10.0
     """Decisions that the estimate of all modes counts for; chosen by hand."""
 
@@ -59,6 +63,17 @@ def age_bin(age: Integers) -> Integers:
     [0, 1, 2, 5]
     """
     return np.searchsorted(np.array(PROCESS_POLICY.age_starts), age, side="right") - 1
+
+
+def phase_of(left: int) -> int:
+    """Return the phase of a decision by how many are left, this one too.
+
+    Examples
+    --------
+    >>> [phase_of(left) for left in (1, 4, 5, 60)]
+    [0, 0, 1, 2]
+    """
+    return int(np.searchsorted(PROCESS_POLICY.phase_starts, left, side="right")) - 1
 
 
 def transitions(
@@ -163,3 +178,32 @@ def value_iteration(probability: Floats, *, target: int, periods: int) -> Plan:
         action[left] = gain.argmax(axis=-1)
         value[left + 1] = gain.max(axis=-1)
     return Plan(action, value)
+
+
+def gains(probability: Floats, plan: Plan) -> Floats:
+    """Return what each mode gains in each cell: phase of the run, class and age.
+
+    Parameters
+    ----------
+    probability : ndarray, shape (class, age bin, mode, class + 1)
+        As `transitions` returns it.
+    plan : Plan
+        Of these probabilities.
+
+    Returns
+    -------
+    ndarray, shape (phase, class, age bin, mode)
+        Probability of the target when the mode is taken once and the best ones after it, by value
+        iteration.
+    """
+    periods = plan.action.shape[0]
+    ages = np.minimum(np.array(PROCESS_POLICY.age_starts), periods)
+    found = []
+    starts = (*PROCESS_POLICY.phase_starts, periods + 1)
+    for start, end, place in zip(starts, starts[1:], PROCESS_POLICY.phase_places, strict=False):
+        left = min(round(start + place * (max(end, start + 1) - 1 - start)), periods)
+        before = plan.value[left - 1]
+        older = before[:, np.minimum(ages + 1, periods)]
+        enter, stay = probability[..., :-1], probability[..., -1]
+        found.append((enter * before[:, 0]).sum(axis=-1) + stay * older[:, :, None])
+    return np.stack(found)

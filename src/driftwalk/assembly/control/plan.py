@@ -11,11 +11,13 @@ import numpy as np
 
 from driftwalk.assembly.control.controller import Rules
 from driftwalk.assembly.control.decision_process import (
+    PROCESS_POLICY,
     Decisions,
-    Plan,
+    gains,
     transitions,
     value_iteration,
 )
+from driftwalk.assembly.control.improvement import IMPROVEMENT_POLICY, cells_like, prior_of
 from driftwalk.assembly.control.modes import Modes
 from driftwalk.assembly.control.worlds import Setting, Worlds, decisions_of, periods_of
 from driftwalk.assembly.outcomes.class_names import outcome_classes
@@ -36,6 +38,8 @@ class ControlPolicy(NamedTuple):
 
     most_blocks: int = 7
     """Blocks, at most: 7 have 200 classes; chosen by hand."""
+    modelled: int = 2
+    """Rounds by value iteration; more of them reach no more (`studies/control`)."""
     drawn: int = 20
     """Policies of a round, a quarter of them the best, the others of drawn probabilities; by hand.
     """
@@ -43,8 +47,6 @@ class ControlPolicy(NamedTuple):
     """Worlds of a work unit, about a second; chosen by hand."""
     confidence: float = 0.9
     """Of the intervals; that of the rest of driftwalk."""
-    finalists: int = 3
-    """Policies that are compared once more with fresh worlds; chosen by hand."""
 
 
 CONTROL_POLICY = ControlPolicy()
@@ -164,9 +166,10 @@ def plan_control(
 ) -> xr.Dataset:
     """Return which mode of agitation to choose when, so that a class is reached by a deadline.
 
-    Each mode is run on its own first. In each round, transitions between classes are estimated
-    from all worlds so far, and fresh worlds run under policies of value iteration: the best one,
-    and those of transitions drawn from what is known, so that whatever may be better is tried.
+    Each mode is run on its own first. In the first rounds, transitions between classes are
+    estimated from all worlds so far, and fresh worlds run under policies of value iteration: the
+    best one, and those of transitions drawn from what is known. In the later ones, the policy is
+    improved by what whole worlds reach.
 
     Parameters
     ----------
@@ -200,7 +203,7 @@ def plan_control(
     Returns
     -------
     xarray.Dataset
-        Kind "control_policy". ``action`` on (left, class, age); ``constant_reached`` on (mode);
+        Kind "control_policy". ``action`` on (phase, class, age); ``constant_reached`` on (mode);
         ``promised`` and ``reached`` on (round). The yield that is stated, ``attrs["reached"]`` with
         its interval, is that of fresh worlds.
 
@@ -231,7 +234,7 @@ def plan_control(
         modes, wanted, classes, worlds, seed,
         (lambda _: None) if store is None else store, executor,
         (lambda *_: None) if progress is None else progress,
-        worlds * (rounds + CONTROL_POLICY.finalists + 4),
+        worlds * (rounds + 6),
     )  # fmt: skip
     return planner.plan(rounds)
 
@@ -250,55 +253,60 @@ class _Planner:
     done: int = 0
     used: int = 0
     """Worlds so far: the number of the next new one."""
+    safe: int = 0
+    """Best mode alone."""
 
     def plan(self, rounds: int) -> xr.Dataset:
         """Return the policy."""
-        periods = self.wanted.setting.periods
-        none = Rules(np.zeros((1, periods, len(self.classes), 1), dtype=np.int16))
+        none = np.zeros((1, *cells_like(len(self.classes))), dtype=np.int64)
         # The modes in turn, each in the same number of worlds.
         each = -(-self.worlds // self.modes.size)
         alone = self.run("constant", none, worlds=each * self.modes.size, arm="constant")
         own = np.arange(each * self.modes.size) % self.modes.size
         constant = np.bincount(own, weights=self.hit(alone), minlength=self.modes.size)
-        safe, seen = int(constant.argmax()), [decisions_of(alone)]
-        plans: list[Plan] = []
-        reached = np.zeros(rounds)
-        best = np.arange(self.worlds) % CONTROL_POLICY.drawn < CONTROL_POLICY.drawn // 4
-        for at in range(rounds):
-            plans.append(self.policy(seen))
+        self.safe, seen = int(constant.argmax()), [decisions_of(alone)]
+        promised, reached = np.full((2, rounds), np.nan)
+        count = CONTROL_POLICY.drawn
+        best = np.arange(self.worlds) % count < count // 4
+        for at in range(min(CONTROL_POLICY.modelled, rounds)):
             random = np.random.default_rng([self.seed, at])
-            tried = [
-                plans[-1] if few else self.policy(seen, random)
-                for few in best[: CONTROL_POLICY.drawn]
-            ]
-            followed = self.run(f"round_{at}", self.rules(safe, *tried))
+            plans = [self.planned(seen, random if k >= count // 4 else None) for k in range(count)]
+            promised[at] = plans[0][1]
+            tables = np.stack([gain.argmax(axis=-1) for gain, _ in plans])
+            followed = self.run(f"round_{at}", tables)
             seen.append(decisions_of(followed))
             reached[at] = self.hit(followed)[best].mean()
-        plans.append(self.policy(seen))
-        # The last policies, and the best mode alone, are compared in worlds that they share.
-        constantly = Plan(np.full_like(plans[-1].action, safe), plans[-1].value)
-        last = [*plans[-CONTROL_POLICY.finalists :], constantly]
+        gain, promise = self.planned(seen)
+        scale = float(np.nanmean(reached)) / max(promise, 1e-9)
+        prior = known = prior_of(gain, scale=min(scale, 1.0))
+        best = np.arange(self.worlds) % IMPROVEMENT_POLICY.greedy == 0
+        for at in range(min(CONTROL_POLICY.modelled, rounds), rounds):
+            modes = known.drawn(self.worlds, np.random.default_rng([self.seed, at]))
+            followed = self.run(f"round_{at}", modes)
+            reached[at] = self.hit(followed)[best].mean()
+            known = known.faded(prior).updated(followed, modes, self.hit(followed))
+        # The policy, that of the model and the best mode alone are compared in the same worlds.
+        last = [known.best(), gain.argmax(axis=-1), np.full_like(known.best(), self.safe)]
         shared = self.used
         again = [
-            self.hit(self.run(f"final_{at}", self.rules(safe, one), first=shared)).sum()
+            self.hit(self.run(f"final_{at}", one[None], first=shared)).sum()
             for at, one in enumerate(last)
         ]
-        best_plan = last[int(np.argmax(again))]
-        fresh = self.hit(self.run("fresh", self.rules(safe, best_plan), worlds=2 * self.worlds))
-        return self.dataset(plans, best_plan.action, constant, each, reached, fresh)
+        action = last[int(np.argmax(again))]
+        fresh = self.hit(self.run("fresh", action[None], worlds=2 * self.worlds))
+        return self.dataset(action, constant, each, promised, reached, fresh)
 
-    def rules(self, safe: int, *plans: Plan) -> Rules:
-        """Return policies with what is kept to."""
-        action = np.stack([one.action for one in plans])
-        return Rules(action, safe, self.wanted.dwell)
-
-    def policy(self, seen: list[Decisions], random: np.random.Generator | None = None) -> Plan:
-        """Return the best policy for what was seen, or for probabilities drawn from it."""
+    def planned(
+        self, seen: list[Decisions], random: np.random.Generator | None = None
+    ) -> tuple[Floats, float]:
+        """Return the gains of all modes for what was seen, or drawn from it, and the promise."""
         probability = transitions(
             seen, classes=len(self.classes), modes=self.modes.size, random=random
         )
         target = self.classes.index(self.wanted.target)
-        return value_iteration(probability, target=target, periods=self.wanted.setting.periods)
+        plan = value_iteration(probability, target=target, periods=self.wanted.setting.periods)
+        start = self.classes.index(all_single(self.modes.study.assembly.blocks))
+        return gains(probability, plan), float(plan.value[-1, start, 0])
 
     def hit(self, found: Arrays) -> Floats:
         """Return which worlds are in the target at the deadline, as 0 and 1."""
@@ -306,7 +314,7 @@ class _Planner:
         return np.asarray(found["after"][:, -1] == target, dtype=np.float64)
 
     def run(
-        self, name: str, rules: Rules, *, worlds: int | None = None, first: int | None = None,
+        self, name: str, tables: Integers, *, worlds: int | None = None, first: int | None = None,
         **how: Any,
     ) -> Arrays:  # fmt: skip
         """Return what worlds did; they are new ones unless the number of the first is given."""
@@ -314,7 +322,10 @@ class _Planner:
         begin = self.used if first is None else first
         self.used = max(self.used, begin + count)
         before, self.done = self.done, self.done + count
-        work = Worlds(self.modes, self.classes, self.wanted.setting, rules, self.seed, **how)
+        rules = Rules(tables.astype(np.int16), self.safe, self.wanted.dwell)
+        work = Worlds(
+            self.modes, self.classes, self.wanted.setting, rules, self.seed, begin, **how
+        )  # fmt: skip
         return run_sweep(
             work,
             grid(world=np.arange(begin, begin + count)).units(CONTROL_POLICY.unit),
@@ -324,34 +335,32 @@ class _Planner:
         )
 
     def dataset(
-        self, plans: list[Plan], action: Integers, constant: Floats, each: int, reached: Floats,
+        self, action: Integers, constant: Floats, each: int, promised: Floats, reached: Floats,
         fresh: Floats,
     ) -> xr.Dataset:  # fmt: skip
         """Return the policy as a dataset."""
         share = CONTROL_POLICY.confidence
         low, high = proportion_interval(fresh.sum(), fresh.size, confidence=share)
         wanted, modes = self.wanted, self.modes
-        start = self.classes.index(all_single(modes.study.assembly.blocks))
-        ages = np.arange(action.shape[2])
         flow = modes.flows[0]
         data = {
-            "action": (("left", "class", "age"), action.astype(np.int32)),
+            "action": (("phase", "class", "age"), action.astype(np.int32)),
             "flow": ("mode", modes.flow.astype(np.int32)),
             "flow_scale": ("mode", modes.flow_scale),
             "force_std": (("mode", "draw"), modes.force_std),
             "drag_coefficient": (("mode", "draw"), modes.drag_coefficient),
             "constant_reached": ("mode", constant / each),
-            "promised": ("round", np.array([one.value[-1, start, 0] for one in plans])),
-            "round_reached": ("round", np.r_[reached, np.nan]),
+            "promised": ("round", promised),
+            "round_reached": ("round", reached),
             **{
                 name: (("field", "y", "x"), np.stack([one[name].values for one in modes.flows]))
                 for name in ("u", "v", "flag")
             },
         }
         coords = {
-            "left": ("left", wanted.every_s * (1.0 + np.arange(wanted.setting.periods))),
+            "phase": ("phase", wanted.every_s * np.array(PROCESS_POLICY.phase_starts)),
             "class": ("class", np.array(self.classes, dtype=object)),
-            "age": ("age", wanted.every_s * ages),
+            "age": ("age", wanted.every_s * np.array(PROCESS_POLICY.age_starts)),
             "mode": ("mode", np.array(modes.name, dtype=object)),
             "y": ("y", flow["y"].values),
             "x": ("x", flow["x"].values),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from driftwalk.assembly.control.controller import Rules
+from driftwalk.assembly.control.improvement import cells_like
 from driftwalk.assembly.control.modes import Modes
 from driftwalk.assembly.control.plan import Wanted
 from driftwalk.core.errors import InputError
@@ -47,6 +48,8 @@ def stored_rules(policy: xr.Dataset) -> Rules:
     action = policy["action"].values.astype("int64")
     if not ((action >= 0) & (action < len(names))).all():
         raise InputError(f"the policy chooses modes that are none of its {len(names)}")
+    if action.shape != cells_like(policy.sizes["class"]):
+        raise InputError(f"the policy has other phases or ages: {action.shape}")
     wanted = stored_wanted(policy)
     return Rules(action[None], names.index(policy.attrs["safe_mode"]), wanted.dwell)
 

@@ -57,6 +57,8 @@ class Worlds:
         The policy.
     seed : int
         Of the starts, the forces and what is missed.
+    first : int
+        Number of the world that has the first of several policies, from where they are counted.
     arm : {"policy", "constant", "random"}
         The policy, one mode for each world in turn, or another random mode at each decision.
     only : int or None
@@ -68,6 +70,7 @@ class Worlds:
     setting: Setting
     rules: Rules
     seed: int
+    first: int = 0
     arm: Literal["policy", "constant", "random"] = "policy"
     only: int | None = None
 
@@ -86,7 +89,7 @@ class Worlds:
             first=int(world[0]), workers=1,
         )  # fmt: skip
         wishes, missed = self._drawn(world)
-        controller = Controller(self.rules, world)
+        controller = Controller(self.rules, world - self.first)
         number = {name: at for at, name in enumerate(self.classes)}
         found = {
             name: np.empty((world.size, periods), dtype=np.int16)

@@ -79,18 +79,15 @@ def rounds_section(policy: xr.Dataset) -> Section:
 
 def action_sections(policy: xr.Dataset) -> list[Section]:
     """Return the modes that are chosen with all the time left, by class and time in it."""
-    require(policy, "action", "left", "age")
+    require(policy, "action", "phase", "age")
     names = [str(name) for name in policy["mode"].values]
-    ages = policy["age"].values
-    kept = [0, *(2 ** np.arange(20)).tolist()]
-    kept = [at for at in kept if at < ages.size]
     rows = [
-        [short_class(str(name)), *(names[policy["action"].values[-1, at, k]] for k in kept)]
+        [short_class(str(name)), *(names[mode] for mode in policy["action"].values[-1, at])]
         for at, name in enumerate(policy["class"].values)
         if "+" in str(name)
     ]
-    columns = ["class", *(f"after {ages[k]:g} s" for k in kept)]
-    note = "With all the time left."
+    columns = ["class", *(f"after {age:g} s" for age in policy["age"].values)]
+    note = f"With {policy['phase'].values[-1]:g} s left or more."
     return [table_section("policy", "What it does", columns, rows, note)]
 
 

@@ -10,33 +10,33 @@ CONTROL_POLICY: Final = kind(
     """
 kind: control_policy
 version: 1
-read: action left class age mode flow flow_scale force_std drag_coefficient u v x y
+read: action phase class age mode flow flow_scale force_std drag_coefficient u v x y
 read_attributes: target every_s blocks study safe_mode
 dimensions:
-    left: decisions, by the time that is left
+    phase: phases of the run, by the time that is left
     class: outcome classes of the blocks
-    age: time in the class; the last is open
+    age: bins of the time in the class
     mode: modes of agitation
     draw: the estimate, and draws from the uncertainty of the fits
-    round: rounds of planning, and the policy after the last
+    round: rounds of planning
     field: flow fields
     y: nodes of the flow
     x: nodes of the flow
 variables:
-    action(left class age) int: number of the mode to choose, from 0
+    action(phase class age) int: number of the mode to choose, from 0
     flow(mode) int: number of the flow field of the mode, from 0
     flow_scale(mode) [1]: factor on the flow
     force_std(mode draw) [N]: stochastic force sigma_F of the mode
     drag_coefficient(mode draw) [1]: drag coefficient C_d of the mode
     constant_reached(mode) [1]: share of the worlds that this mode alone brought to the target
-    promised(round) [1]: probability of the target by value iteration, too large
-    round_reached(round) [1]: share of its worlds that reached the target; NaN of the last
+    promised(round) [1]: probability of the target by value iteration; NaN without it
+    round_reached(round) [1]: share of the worlds that reached the target under its best policy
     u(field y x) [m s-1]: flow velocity x
     v(field y x) [m s-1]: flow velocity y
     flag(field y x) int: origin of the node's value, as in a flow_field
-    left(left) [s]: time left at the decision
+    phase(phase) [s]: shortest time left at a decision of the phase
     class text
-    age(age) [s]: time in the class
+    age(age) [s]: time in the class from which the bin holds
     mode text
     x(x) [m]: x
     y(y) [m]: y
