@@ -18,7 +18,7 @@ from typing import Any
 import xarray as xr
 
 import driftwalk as dw
-from driftwalk.assembly.control.plan import Wanted
+from driftwalk.assembly import Wanted
 from driftwalk.runs import ControlPlanWork, ControlTestWork, run_work
 
 SCALES, FORCES = (0.0, 0.5, 1.0, 1.5), (2e-4, 5.5e-4, 1.2e-3)

@@ -15,13 +15,13 @@ from made_up_fit import made_up_fit
 from small_sensitivity import FLOW as STREAM, small
 
 import driftwalk as dw
-from driftwalk.assembly import Modes
+from driftwalk.assembly import Modes, Wanted
 from driftwalk.assembly.control.controller import Rules
-from driftwalk.assembly.control.plan import Wanted
 from driftwalk.assembly.control.stored import stored_modes, stored_rules
 from driftwalk.assembly.control.worlds import Setting, Worlds
 from driftwalk.core.files.shards import ShardStore
 from driftwalk.runs import ControlPlanWork, run_work
+from driftwalk.schema.kinds.fit import FIT
 from driftwalk.sweep import grid
 
 pytestmark = pytest.mark.slow
@@ -137,7 +137,11 @@ def test_a_stopped_plan_goes_on_to_the_same_policy(
 
 
 def test_draws_from_a_fit_are_those_of_its_uncertainty() -> None:
-    fit = made_up_fit()
+    names = ["ln_drag_coefficient", "ln_noise_intensity"]
+    axes = ("log_parameter", "other_log_parameter")
+    fit = made_up_fit().assign(covariance=(axes, np.diag([0.01, 0.04])))
+    fit = fit.assign_coords(log_parameter=names, other_log_parameter=names)
+    fit.attrs["schema_version"] = FIT.version
     study = small()
     one = dw.ModeSource(study, STREAM, fit)
     found = dw.make_modes([one], flow_scales=[0.0, 1.0], force_stds=[2e-4, 4e-4], seed=3)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import subprocess
 import sys
@@ -101,21 +100,19 @@ def test_other_programs_and_other_tanks_are_refused(policy: xr.Dataset) -> None:
 def test_the_pump_program_of_the_page_turns_the_knobs_of_play(
     policy: xr.Dataset, tmp_path: Path
 ) -> None:
-    [program] = re.findall(r"```python\n(# pumps\.py.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
+    [program] = re.findall(r"```py\n(# pumps\.py.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
     (tmp_path / "pumps.py").write_text(program, encoding="utf-8")
     policy.to_netcdf(tmp_path / "policy.nc")
     with held_port() as live, served("play", "--blocks", "3", "--live", live) as play:
-        control = subprocess.Popen(
-            [sys.executable, "-m", "driftwalk", "control", "run", "policy.nc",
-             "--live", f"127.0.0.1:{live}"],
-            cwd=tmp_path, stdout=subprocess.PIPE, env={**os.environ, "PYTHONUNBUFFERED": "1"},
-        )  # fmt: skip
-        pumps = subprocess.run(
-            [sys.executable, "pumps.py", f"ws://127.0.0.1:{play.port}/ws"],
-            cwd=tmp_path, stdin=control.stdout, capture_output=True, text=True, timeout=60.0,
-            check=False,
-        )  # fmt: skip
-        assert control.wait(timeout=10.0) == 0
+        follow = [sys.executable, "-m", "driftwalk", "control", "run", "policy.nc"]
+        follow += ["--live", f"127.0.0.1:{live}"]
+        turn = [sys.executable, "pumps.py", f"ws://127.0.0.1:{play.port}/ws"]
+        with subprocess.Popen(follow, cwd=tmp_path, stdout=subprocess.PIPE) as control:
+            pumps = subprocess.run(
+                turn, cwd=tmp_path, stdin=control.stdout, capture_output=True, text=True,
+                timeout=120.0, check=False,
+            )  # fmt: skip
+            assert control.wait(timeout=30.0) == 0
         assert pumps.returncode == 0, pumps.stderr
         with play.socket() as browser:
             page = received(browser, "page")["page"]

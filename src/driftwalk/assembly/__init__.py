@@ -3,7 +3,7 @@
 from driftwalk.assembly.chains.estimate import check_kinetics, kinetics
 from driftwalk.assembly.control.live import LiveControl
 from driftwalk.assembly.control.modes import Modes, ModeSource, make_modes
-from driftwalk.assembly.control.plan import check_control, plan_control
+from driftwalk.assembly.control.plan import Wanted, check_control, plan_control
 from driftwalk.assembly.control.trial import try_control
 from driftwalk.assembly.lattice.events import ReplayedEvents, replay_events
 from driftwalk.assembly.lattice.polyomino import polyomino_cells, polyomino_name, polyominoes
@@ -71,6 +71,7 @@ __all__ = [
     "ReplayedEvents",
     "SurvivalCurve",
     "TankBatch",
+    "Wanted",
     "assemble",
     "assemble_drawn",
     "assembly_path",

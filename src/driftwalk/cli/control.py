@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 UNITS = {"flow-scale": "1", "force-std": "N"}
-"""What can be varied, with its unit."""
+"""Numbers of a mode that can be varied, with their units."""
 NAMES = (
     *("blocks", "tank_diameter", "side", "mass", "depth"),
     *("drag_coefficient", "force_std", "force_interval"),
@@ -83,8 +83,7 @@ def plan(
     A mode is a flow, a factor on it and a stochastic force: name a fit for each setting of the
     pumps, or one fit (or --flow) with --vary. If you stop the run, the same command continues it.
     """
-    from driftwalk.assembly import ModeSource, make_modes
-    from driftwalk.assembly.control.plan import Wanted
+    from driftwalk.assembly import ModeSource, Wanted, make_modes
     from driftwalk.runs import ControlPlanWork
 
     sources: list[Source] = [

@@ -3,9 +3,9 @@
 FastAPI and uvicorn, the extra ``[view]``, are imported when a server is started.
 """
 
+from driftwalk.viewer.control_stream import pilot
 from driftwalk.viewer.hub import Source
 from driftwalk.viewer.live_client import LiveSource
-from driftwalk.viewer.pilot import pilot
 from driftwalk.viewer.play.model_playground import ModelPlaySource
 from driftwalk.viewer.play.playground import PlaySource
 from driftwalk.viewer.play.stream import hello_line

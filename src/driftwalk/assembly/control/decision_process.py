@@ -41,7 +41,7 @@ PROCESS_POLICY = ProcessPolicy()
 
 
 class Decisions(NamedTuple):
-    """What worlds did in one period each, shape (decision,)."""
+    """Decisions of worlds, and the class one period later, shape (decision,)."""
 
     source: Integers
     """Class at the decision."""

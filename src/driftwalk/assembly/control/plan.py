@@ -54,7 +54,7 @@ CONTROL_POLICY = ControlPolicy()
 
 @dataclass(frozen=True)
 class Wanted:
-    """What is to be reached.
+    """A target and its deadline.
 
     Attributes
     ----------

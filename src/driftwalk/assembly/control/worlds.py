@@ -18,7 +18,7 @@ from driftwalk.sweep import WorkUnit
 
 @dataclass(frozen=True)
 class Setting:
-    """What a controller is up against.
+    """Decisions, and how late and how well the tank is seen.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class Worlds:
         ``seen`` and ``after`` are true classes before and after a period, ``age`` whole periods in
         the class, ``mode`` the mode from the latency on, ``entered`` whether a class was entered.
         """
-        from driftwalk.assembly import TankBatch
+        from driftwalk.assembly.tank_batch import TankBatch
 
         world = np.asarray(unit.settings["world"], dtype=np.int64)
         setting, periods = self.setting, self.setting.periods

@@ -43,7 +43,7 @@ def policy_sections(*, policy: xr.Dataset | None = None) -> list[Section]:
     """
     parts: list[tuple[str, str, Maker]] = [
         ("rounds", "Rounds of planning", rounds_section),
-        ("policy", "What it does", action_sections),
+        ("policy", "Modes chosen", action_sections),
         ("modes", "Modes alone", lambda found: _table("modes", "Modes alone", mode_table(found))),
     ]
     return sections_of(policy, "There is no policy yet.", policy_summary, lambda _: [], parts)
@@ -88,7 +88,7 @@ def action_sections(policy: xr.Dataset) -> list[Section]:
     ]
     columns = ["class", *(f"after {age:g} s" for age in policy["age"].values)]
     note = f"With {policy['phase'].values[-1]:g} s left or more."
-    return [table_section("policy", "What it does", columns, rows, note)]
+    return [table_section("policy", "Modes chosen", columns, rows, note)]
 
 
 def trial_sections(*, control_test: xr.Dataset | None = None) -> list[Section]:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def pilot(
     policy: xr.Dataset, host: str, port: int, *, patience_s: float = 2.0
 ) -> Iterator[dict[str, Any]]:
-    """Yield the decisions for a tank, as its tracker streams it.
+    """Return the decisions for a tank, as its tracker streams it, one after the other.
 
     Parameters
     ----------
@@ -29,9 +29,9 @@ def pilot(
     patience_s : float
         Time without a frame after which the safe mode is chosen [s].
 
-    Yields
-    ------
-    dict
+    Returns
+    -------
+    iterator of dict
         ``type`` "decision", "safe" or "end", with the ``mode``, its ``flow_scale`` and
         ``force_std_N``. The last one is the end.
 
