@@ -2,9 +2,9 @@
 
 Each world has a mode of its own in every cell: a phase of the run, a class, and an age. Whether it
 reached the target counts for all cells that it visited, each with the mode it had there (Monte
-Carlo control; Sutton and Barto, Reinforcement learning, chapter 5). The probability that a
-mode of a cell reaches the target has a Beta law. Modes are drawn in proportion to the probability that they are the best (Thompson
-1933), so that most worlds soon try what may be better.
+Carlo control; Sutton and Barto, Reinforcement learning, chapter 5). The probability that a mode of
+a cell reaches the target has a Beta law. Modes are drawn in proportion to their probability of
+being the best (Thompson 1933), so that most worlds soon try what may be better.
 """
 
 from __future__ import annotations
