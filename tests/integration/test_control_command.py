@@ -50,7 +50,12 @@ def test_a_plan_and_its_test_hold_what_they_say(tmp_path: Path) -> None:
     np.testing.assert_allclose(test["share"][:, -1], test["reached"])
     again = dw.try_control(policy, worlds=40)
     assert again["share"].equals(test["share"])
-    for folder, names in (("policy", ["policy"]), ("test", ["run", "shares"])):
+    # The film is the run that the test shows: the same classes at the decisions.
+    path = xr.load_dataset(tmp_path / "test" / "path.nc").isel(run=0)
+    joined = path["assembly"].sel(time=test["time"], method="nearest").values
+    single = test["class"].values.tolist().index("1+1")
+    assert ((joined[:, 0] != joined[:, 1]) == (test["film_class"].values == single)).all()
+    for folder, names in (("policy", ["policy"]), ("test", ["film_strip", "run", "shares"])):
         assert sorted(path.stem for path in tmp_path.glob(f"{folder}/figures/*.png")) == names
     page = tmp_path / "page.html"
     assert here("report", tmp_path / "policy", tmp_path / "test", "-o", page).code == 0

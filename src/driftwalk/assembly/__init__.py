@@ -4,7 +4,7 @@ from driftwalk.assembly.chains.estimate import check_kinetics, kinetics
 from driftwalk.assembly.control.live import LiveControl
 from driftwalk.assembly.control.modes import Modes, ModeSource, make_modes
 from driftwalk.assembly.control.plan import Wanted, check_control, plan_control
-from driftwalk.assembly.control.trial import try_control
+from driftwalk.assembly.control.trial import control_path, try_control
 from driftwalk.assembly.lattice.events import ReplayedEvents, replay_events
 from driftwalk.assembly.lattice.polyomino import polyomino_cells, polyomino_name, polyominoes
 from driftwalk.assembly.live_world import LiveEvent, LiveTank
@@ -88,6 +88,7 @@ __all__ = [
     "class_shapes",
     "class_times",
     "classify",
+    "control_path",
     "disconnected_alignment",
     "draw_parameters",
     "has_uncertainty",

@@ -157,11 +157,12 @@ class ControlTestWork:
 
     def compute(self, run: Run) -> xr.Dataset:
         """Run the arms and keep what they reached."""
-        from driftwalk.assembly import try_control
+        from driftwalk.assembly import control_path, try_control
 
         found = try_control(
             self.policy, worlds=self.worlds, latency=self.latency_s, missed=self.missed,
             force_factor=self.force_factor, store=run.store, executor=run.executor,
             progress=lambda done, total: run.progress(done, total, "worlds"),
         )  # fmt: skip
+        run.keep("path.nc", control_path(self.policy, found))
         return run.keep("control_test.nc", found)

@@ -263,7 +263,8 @@ class _Planner:
         each = -(-self.worlds // self.modes.size)
         alone = self.run("constant", none, worlds=each * self.modes.size, arm="constant")
         own = np.arange(each * self.modes.size) % self.modes.size
-        constant = np.bincount(own, weights=self.hit(alone), minlength=self.modes.size)
+        hits = np.bincount(own, weights=self.hit(alone), minlength=self.modes.size)
+        constant = hits.astype(np.float64)
         self.safe, seen = int(constant.argmax()), [decisions_of(alone)]
         promised, reached = np.full((2, rounds), np.nan)
         count = CONTROL_POLICY.drawn

@@ -12,6 +12,9 @@ from driftwalk.assembly.control.plan import CONTROL_POLICY
 from driftwalk.assembly.control.stored import stored_modes, stored_rules, stored_wanted
 from driftwalk.assembly.control.worlds import Setting, Worlds
 from driftwalk.assembly.outcomes.distribution import proportion_interval
+from driftwalk.assembly.runs.dataset import build_path
+from driftwalk.assembly.runs.plan import make_plan
+from driftwalk.assembly.tank_batch import TankBatch
 from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
@@ -23,6 +26,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 ARMS = ("policy", "best constant mode", "random switching")
+SAMPLE_S = 0.5
+"""Time between two pictures of a film [s]; chosen by hand."""
 CONSTANTS = 3
 """Constant modes that are run, those with the largest shares in the plan; chosen by hand."""
 
@@ -133,6 +138,60 @@ def try_control(
         "worlds": worlds, "confidence": share, "constant_mode": modes.name[best[chosen]],
         "film_world": first + example, "seed": seed,
     })  # fmt: skip
+
+
+def control_path(policy: xr.Dataset, test: xr.Dataset) -> xr.Dataset:
+    """Return the path of the blocks in the run that a test shows, simulated again.
+
+    Parameters
+    ----------
+    policy : xarray.Dataset
+        A `control_policy`.
+    test : xarray.Dataset
+        Its `control_test`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Kind "assembly_path", for a film.
+
+    Examples
+    --------
+    ``write_animation(control_path(policy, test), "run.gif")``
+    """
+    modes, facts = stored_modes(policy), test.attrs
+    world = np.array([int(facts["film_world"])])
+    plan = make_plan(
+        modes.study, modes.flows[0], settings={"seed": int(facts["seed"])}, index=world,
+        threads=1, ends=False,
+    )  # fmt: skip
+    every = max(round(SAMPLE_S / plan.study.time_step_s), 1)
+    sample, latency = every * plan.study.time_step_s, float(facts["latency_s"])
+    changes = {
+        float(time) + (latency if at else 0.0): mode
+        for at, (time, mode) in enumerate(
+            zip(test["time"].values, test["film_mode"].values, strict=True)
+        )
+        if mode >= 0
+    }
+    samples = sample * np.arange(int(float(facts["by_s"]) / sample) + 1)
+    batch = TankBatch(
+        modes.study, modes.flows, worlds=1, seed=int(facts["seed"]), first=int(world[0]), workers=1
+    )
+    poses, joined, now = [], [], 0.0
+    for time in sorted({*changes, *samples.tolist()}):
+        batch.advance(time - now)
+        now = time
+        if time in changes:
+            mode = np.array([changes[time]])
+            factor = float(facts["force_factor"])
+            batch.set(**modes.settings(mode, world, force_factor=factor))
+        if time in samples:
+            state = batch.state()
+            poses.append(state["pose"])
+            joined.append(state["assembly"])
+    found = {"sample_pose": np.stack(poses, axis=1), "sample_assembly": np.stack(joined, axis=1)}
+    return build_path(plan, found, every=every)
 
 
 def trial_setting(

@@ -9,6 +9,7 @@ import numpy as np
 from driftwalk.page.parts import (
     Maker,
     Section,
+    attempt,
     chart,
     figure,
     figure_with_ends,
@@ -20,6 +21,7 @@ from driftwalk.page.parts import (
     summary_section,
     table_section,
 )
+from driftwalk.page.sections.replay import replay_section
 from driftwalk.schema.answers.control import arm_table, mode_table, usage_table
 from driftwalk.schema.answers.parts import Table
 from driftwalk.schema.shapes import short_class
@@ -91,13 +93,17 @@ def action_sections(policy: xr.Dataset) -> list[Section]:
     return [table_section("policy", "Modes chosen", columns, rows, note)]
 
 
-def trial_sections(*, control_test: xr.Dataset | None = None) -> list[Section]:
+def trial_sections(
+    *, control_test: xr.Dataset | None = None, path: xr.Dataset | None = None
+) -> list[Section]:
     """Return the sections of a page on the test of a policy.
 
     Parameters
     ----------
     control_test : xarray.Dataset, optional
         A `control_test`; None while there is none yet.
+    path : xarray.Dataset, optional
+        The `assembly_path` of the run that it shows.
 
     Examples
     --------
@@ -110,7 +116,10 @@ def trial_sections(*, control_test: xr.Dataset | None = None) -> list[Section]:
         ("usage", "Modes used", lambda found: _table("usage", "Modes used", usage_table(found))),
     ]
     nothing = "There is no test yet."
-    return sections_of(control_test, nothing, trial_summary, lambda _: [], parts)
+    made = sections_of(control_test, nothing, trial_summary, lambda _: [], parts)
+    if path is not None:
+        made += attempt("replay", "The run", lambda: replay_section(path))
+    return made
 
 
 def trial_summary(test: xr.Dataset) -> Section:

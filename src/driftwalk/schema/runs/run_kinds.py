@@ -204,6 +204,7 @@ BUILT_IN: Final = (
         words="test of control",
         command="control test",
         file="control_test.nc",
+        datasets=("path",),
         figures="driftwalk.figures.control:trial_figures",
         page=f"{_SECTIONS}.control:trial_sections",
         answer=f"{_ANSWERS}.control:trial_answer",
