@@ -18,18 +18,18 @@ namespace {
 std::atomic<std::size_t> allocations = 0;
 }
 
-// Every allocation of this program counts.
-void* operator new(std::size_t size) {
+// Every allocation of this program counts. Inlined they look like a mismatch to gcc.
+[[gnu::noinline]] void* operator new(std::size_t size) {
   ++allocations;
   if (void* const memory = std::malloc(size)) {
     return memory;
   }
   throw std::bad_alloc();
 }
-void operator delete(void* memory) noexcept {
+[[gnu::noinline]] void operator delete(void* memory) noexcept {
   std::free(memory);
 }
-void operator delete(void* memory, std::size_t) noexcept {
+[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept {
   std::free(memory);
 }
 

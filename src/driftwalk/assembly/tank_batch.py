@@ -54,7 +54,7 @@ START_POLICY: Final = StartPolicy()
 
 
 class _Settings(NamedTuple):
-    """What every world has now, one entry each."""
+    """The settings of every world, one entry each."""
 
     flow: npt.NDArray[np.int32]
     latching: npt.NDArray[np.int32]
@@ -152,11 +152,12 @@ class TankBatch:
         self._study, self._threads = plan.study, plan.threads
         # What the native core points to.
         self._kept = ([one.model() for one in plans], block_pull(plan.study), plan.rules())
-        joined = _joined(start, plan) if isinstance(start, Mapping) else None
-        poses = start_poses(plan, start) if joined is None else joined["pose"]
-        self._batch = self._begin(plans, poses, joined)
-        if joined is not None:
+        if isinstance(start, Mapping):
+            joined = _joined(start, plan)
+            self._batch = self._begin(plans, joined["pose"], joined)
             self._require_lattice(joined["pose"])
+        else:
+            self._batch = self._begin(plans, start_poses(plan, start), None)
         forces = plan.study.forces
         self._settings = self._wishes = _Settings(
             flow=np.zeros(count, dtype=np.int32),
@@ -175,7 +176,9 @@ class TankBatch:
         self._outcome = np.full(count, "", dtype=object)
         self._name(np.ones(count, dtype=bool))
 
-    def _begin(self, plans: list[Plan], poses: Floats, joined: State | None) -> _core.TankBatch:
+    def _begin(
+        self, plans: list[Plan], poses: Floats, joined: dict[str, npt.NDArray[Any]] | None
+    ) -> _core.TankBatch:
         models, pull, rules = self._kept
         return _core.TankBatch(
             models,
@@ -386,7 +389,7 @@ class TankBatch:
         return number
 
     def _name(self, changed: Bools) -> None:
-        """Name the outcome classes of some worlds anew."""
+        """Name the outcome classes of worlds that have changed."""
         if not changed.any():
             return
         state, sound = self._batch.state(), self.sound
@@ -429,9 +432,7 @@ def _joined(start: State, plan: Plan) -> dict[str, npt.NDArray[Any]]:
     ):
         values = np.asarray(start.get(name, np.zeros((*whole, *own))), dtype=kind)
         if name not in start and name not in ("velocity", "kind"):
-            raise InputError(
-                f"start: '{name}' is missing; `state` of a batch has all that it needs"
-            )
+            raise InputError(f"start: '{name}' is missing; a batch's own state has all of it")
         if values.shape != (*whole, *own):
             raise InputError(
                 f"start: expected {name} of shape {(*whole, *own)}, got shape {values.shape}"
