@@ -86,7 +86,7 @@ class Worlds:
         setting, periods = self.setting, self.setting.periods
         batch = TankBatch(
             self.modes.study, self.modes.flows, worlds=world.size, seed=self.seed,
-            first=int(world[0]), workers=1,
+            first=int(world[0]), workers=1, complete="rests",
         )  # fmt: skip
         wishes, missed = self._drawn(world)
         controller = Controller(self.rules, world - self.first)
