@@ -100,7 +100,7 @@ def test_other_programs_and_other_tanks_are_refused(policy: xr.Dataset) -> None:
 def test_the_pump_program_of_the_page_turns_the_knobs_of_play(
     policy: xr.Dataset, tmp_path: Path
 ) -> None:
-    [program] = re.findall(r"```py\n(# pumps\.py.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
+    [program] = re.findall(r"```text\n(# pumps\.py.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
     (tmp_path / "pumps.py").write_text(program, encoding="utf-8")
     policy.to_netcdf(tmp_path / "policy.nc")
     with held_port() as live, served("play", "--blocks", "3", "--live", live) as play:
