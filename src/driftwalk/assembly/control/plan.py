@@ -19,7 +19,7 @@ from driftwalk.assembly.control.decision_process import (
 )
 from driftwalk.assembly.control.improvement import IMPROVEMENT_POLICY, cells_like, prior_of
 from driftwalk.assembly.control.modes import Modes
-from driftwalk.assembly.control.worlds import Setting, Worlds, decisions_of, periods_of
+from driftwalk.assembly.control.worlds import Setting, Worlds, decisions_of
 from driftwalk.assembly.outcomes.class_names import outcome_classes
 from driftwalk.assembly.outcomes.distribution import proportion_interval
 from driftwalk.core.arrays import Floats, Integers
@@ -81,7 +81,7 @@ class Wanted:
     def setting(self) -> Setting:
         """The setting of the worlds."""
         return Setting(
-            self.every_s, periods_of(self.by_s, self.every_s), self.latency_s, self.missed
+            self.every_s, round(self.by_s / self.every_s), self.latency_s, self.missed
         )
 
     @property
@@ -135,6 +135,12 @@ def check_control(modes: Modes, wanted: Wanted) -> tuple[str, ...]:
         raise InputError(
             f"decisions every {wanted.every_s:g} s need a deadline that is not sooner, got "
             f"{wanted.by_s:g} s"
+        )
+    whole = wanted.by_s / wanted.every_s
+    if abs(whole - round(whole)) > 1e-6 * whole:
+        raise InputError(
+            f"the deadline of {wanted.by_s:g} s is no whole number of periods of "
+            f"{wanted.every_s:g} s: choose another --by or --every"
         )
     if not 0.0 <= wanted.latency_s < wanted.every_s:
         raise InputError(

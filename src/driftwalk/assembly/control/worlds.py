@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -159,8 +158,3 @@ def decisions_of(found: Arrays) -> Decisions:
             for name in ("seen", "age", "mode", "after", "entered")
         )
     )
-
-
-def periods_of(by_s: float, every_s: float) -> int:
-    """Return the decisions up to a deadline, the last of which may be cut short by rounding."""
-    return max(math.floor(by_s / every_s + 1e-6), 1)
