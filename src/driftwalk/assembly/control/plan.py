@@ -140,7 +140,7 @@ def check_control(modes: Modes, wanted: Wanted) -> tuple[str, ...]:
     if abs(whole - round(whole)) > 1e-6 * whole:
         raise InputError(
             f"the deadline of {wanted.by_s:g} s is no whole number of periods of "
-            f"{wanted.every_s:g} s: choose another --by or --every"
+            f"{wanted.every_s:g} s: choose another deadline or period"
         )
     if not 0.0 <= wanted.latency_s < wanted.every_s:
         raise InputError(
