@@ -14,6 +14,8 @@ import driftwalk as dw
 from driftwalk.assembly import LiveControl, ModeSource, make_modes
 from driftwalk.core.errors import InputError
 
+pytestmark = pytest.mark.slow
+
 SINGLE, TARGET = "1+1", "2"
 
 
