@@ -59,6 +59,7 @@ def plot_policy(policy: xr.Dataset, ax: Axes | None = None) -> Axes:
             color=[color[mode] for mode in modes.tolist()],
         )  # fmt: skip
     ax.set_yticks(range(len(shown)), [short_class(names[at]) for at in shown])
+    ax.set_xlim(0.0, min(2.0 * float(age[-1]), float(policy.attrs["by_s"])))
     ax.set_xlabel("time in the class (s)")
     labels = policy["mode"].values
     keys = [Patch(color=color[mode], label=str(labels[mode])) for mode in used.tolist()]
