@@ -29,8 +29,8 @@ ARMS = ("policy", "best constant mode", "random switching")
 SAMPLE_S = 0.5
 """Time between two pictures of a film [s]; chosen by hand."""
 CONSTANTS = 5
-"""Constant modes that are run, those with the largest shares in the plan; with three, the best of
-12 was missed once in four tests (`studies/control`)."""
+"""Constant modes that are run, those with the largest shares in the plan; with three, one
+plan of `studies/control` missed the best of 12."""
 
 
 def try_control(
