@@ -37,6 +37,7 @@ _ROOMS = (
 _NAMES = {
     "driftwalk.assembly": (
         "LiveTank",
+        "ModeSource",
         "TankBatch",
         "assemble_drawn",
         "assembly_path",
@@ -46,13 +47,16 @@ _NAMES = {
         "classify",
         "l1_distance",
         "l1_noise_floor",
+        "make_modes",
         "outcome_distribution",
         "path_recording",
+        "plan_control",
         "principal_components",
         "sensitivity_indices",
         "sensitivity_map",
         "sensitivity_reference",
         "steady_state",
+        "try_control",
     ),
     "driftwalk.calibration": ("recover_model",),
     "driftwalk.comparison": (

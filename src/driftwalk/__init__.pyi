@@ -21,6 +21,7 @@ from driftwalk import (
 )
 from driftwalk.assembly import (
     LiveTank as LiveTank,
+    ModeSource as ModeSource,
     TankBatch as TankBatch,
     assemble_drawn as assemble_drawn,
     assembly_path as assembly_path,
@@ -30,13 +31,16 @@ from driftwalk.assembly import (
     classify as classify,
     l1_distance as l1_distance,
     l1_noise_floor as l1_noise_floor,
+    make_modes as make_modes,
     outcome_distribution as outcome_distribution,
     path_recording as path_recording,
+    plan_control as plan_control,
     principal_components as principal_components,
     sensitivity_indices as sensitivity_indices,
     sensitivity_map as sensitivity_map,
     sensitivity_reference as sensitivity_reference,
     steady_state as steady_state,
+    try_control as try_control,
 )
 from driftwalk.calibration import (
     recover_model as recover_model,

@@ -608,6 +608,22 @@ PAGES: dict[str, Page] = {
         makes=("tracks/README.md", "one/replicate_3.csv", "film/recording.gif", "paper/ks_map.pdf"),
         slow=True,
     ),
+    "docs/how-to/control.md": Page(
+        provide=_files(_fitted),
+        instead={
+            "--by 5min --every 5s --vary flow-scale=0,0.5,1,1.5 "
+            "--vary force-std=0.2mN,0.55mN,1.2mN": "--by 20s --every 5s --vary flow-scale=0,1 "
+            "--blocks 4 --rounds 1 --worlds 20",
+            "--worlds 2000": "--worlds 20",
+            # Whether a stream is followed is tested with a real one, in test_control_live.py.
+            "control run policy/ --live 127.0.0.1:5000 | python pumps.py": "control run --help",
+            "control run policy/ --live 127.0.0.1:5000": "control run --help",
+        },
+        holds=("found.attrs['worlds'] == 40",),
+        makes=("policy/policy.nc", "test/control_test.nc"),
+        draws=False,
+        slow=True,
+    ),
     "docs/how-to/kinetics.md": Page(
         provide=_files(_assembled, _chains),
         holds=("found.attrs['target'] == 'T'", "found.sizes['class'] == 7"),

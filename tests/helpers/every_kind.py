@@ -121,6 +121,12 @@ def model_recovery() -> xr.Dataset:
     return dw.recover_model(model, values, study, threads=2)
 
 
+def control_policy() -> xr.Dataset:
+    one = dw.ModeSource(small(assembly={"blocks": 3}), FLOW)
+    modes = dw.make_modes([one], flow_scales=[0.0, 1.0])
+    return dw.plan_control(modes, "L3", 20.0, rounds=3, worlds=20)
+
+
 def check() -> xr.Dataset:
     return dw.check_model(every_kind("fit with the angle in the state"), track(), replicates=4)
 
@@ -173,6 +179,8 @@ FORMS: dict[str, Callable[[], xr.Dataset]] = {
         runs=3200,
         fresh_runs=40,
     ),
+    "control_policy": control_policy,
+    "control_test": lambda: dw.try_control(every_kind("control_policy"), worlds=20),
     "attraction": lambda: dw.attraction(dw.Study(interaction={"magnets": "5x5x2mm,1.3T"})),
     "assembly_path": lambda: dw.assembly_path(small(), FLOW, runs=[0], seed=5),
     "outcome_distribution": lambda: dw.outcome_distribution(every_kind("assembly")),

@@ -1,6 +1,10 @@
 """Self-assembly of many blocks: outcomes, their uncertainty, and their dependence on the model."""
 
 from driftwalk.assembly.chains.estimate import check_kinetics, kinetics
+from driftwalk.assembly.control.live import LiveControl
+from driftwalk.assembly.control.modes import Modes, ModeSource, make_modes
+from driftwalk.assembly.control.plan import Wanted, check_control, plan_control
+from driftwalk.assembly.control.trial import control_path, try_control
 from driftwalk.assembly.lattice.events import ReplayedEvents, replay_events
 from driftwalk.assembly.lattice.polyomino import polyomino_cells, polyomino_name, polyominoes
 from driftwalk.assembly.live_world import LiveEvent, LiveTank
@@ -62,18 +66,23 @@ from driftwalk.assembly.yields.run import check_yield, maximise_yield
 __all__ = [
     "Alignment",
     "L1NoiseFloor",
+    "LiveControl",
     "LiveEvent",
     "LiveTank",
+    "ModeSource",
+    "Modes",
     "PairwiseL1",
     "ReplayedEvents",
     "SurvivalCurve",
     "TankBatch",
+    "Wanted",
     "assemble",
     "assemble_drawn",
     "assembly_path",
     "assembly_sizes",
     "attraction",
     "check_assembly",
+    "check_control",
     "check_indices",
     "check_kinetics",
     "check_outcomes",
@@ -85,6 +94,7 @@ __all__ = [
     "class_shapes",
     "class_times",
     "classify",
+    "control_path",
     "disconnected_alignment",
     "draw_parameters",
     "has_uncertainty",
@@ -95,12 +105,14 @@ __all__ = [
     "l1_distance",
     "l1_in_floors",
     "l1_noise_floor",
+    "make_modes",
     "maximise_yield",
     "merge_chirality",
     "outcome_classes",
     "outcome_distribution",
     "pairwise_l1",
     "path_recording",
+    "plan_control",
     "polyomino_cells",
     "polyomino_name",
     "polyominoes",
@@ -118,5 +130,6 @@ __all__ = [
     "sort_classes",
     "steady_state",
     "survival_curve",
+    "try_control",
     "world_class",
 ]

@@ -50,6 +50,7 @@ COMMANDS: Final[dict[str, Command]] = {
     "kinetics": Command(_PREDICT, "Estimate rates between outcome classes.", "kinetics"),
     "infer-outcomes": Command(_PREDICT, "Infer parameters from outcomes alone.", "infer_outcomes"),
     "yield": Command(_PREDICT, "Find the setting with the largest yield.", "yields"),
+    "control": Command(_PREDICT, "Choose the agitation while blocks assemble.", "control"),
     "play": Command(_PREDICT, "Change parameters while a simulation runs.", "play"),
     "compare": Command(_COMPARE, "Measure the distance between two motions.", "compare"),
     "compare-models": Command(_COMPARE, "Rank motion models on a recording.", "compare_models"),

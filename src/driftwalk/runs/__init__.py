@@ -2,6 +2,7 @@
 
 from driftwalk.runs.assembly import AssemblyResult, AssemblyWork, SensitivityResult, SensitivityWork
 from driftwalk.runs.calibration import CalibrationWork, ModelComparisonWork
+from driftwalk.runs.control import ControlPlanWork, ControlTestWork
 from driftwalk.runs.finished_run import FoundRun, flow_of_result, read_found, run_folder
 from driftwalk.runs.fit import Fitted, FitWork, read_earlier_fit
 from driftwalk.runs.kinetics import KineticsWork
@@ -15,6 +16,8 @@ __all__ = [
     "AssemblyResult",
     "AssemblyWork",
     "CalibrationWork",
+    "ControlPlanWork",
+    "ControlTestWork",
     "FitWork",
     "Fitted",
     "FoundRun",

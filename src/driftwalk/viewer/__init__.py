@@ -3,6 +3,7 @@
 FastAPI and uvicorn, the extra ``[view]``, are imported when a server is started.
 """
 
+from driftwalk.viewer.control_stream import pilot
 from driftwalk.viewer.hub import Source
 from driftwalk.viewer.live_client import LiveSource
 from driftwalk.viewer.play.model_playground import ModelPlaySource
@@ -19,6 +20,7 @@ __all__ = [
     "RunSource",
     "Source",
     "hello_line",
+    "pilot",
     "require_server",
     "save_playground",
     "serve",

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 from chain_runs import chain_runs
 from command_line import FLOW, GRID, RECORDING, here, leave_out_figures
+from every_kind import every_kind
 from few_simulations import compare_after_little, simulate_little
 
 from driftwalk.core.files.rundir import RunDirectory
@@ -31,6 +32,10 @@ ACTIVE = (
 VARIED = ("--vary", "drag-coefficient=0.2,0.6", "--vary", "force-std=0.2mN,1mN")
 QUICK = ("--after", "4s", "--runs", "20", "--truths", "20")
 LITTLE = ("--blocks", "3", "--duration", "20s")
+PLANNED = (
+    *("--blocks", "2", "--target", "2", "--by", "20s", "--vary", "flow-scale=0,1"),
+    *("--rounds", "1", "--worlds", "20"),
+)
 
 RUNS: dict[str, tuple[tuple[object, ...], str]] = {
     "calibration": (("calibrate", *SHORT, "--study", "grid.toml"), "A calibration under way"),
@@ -56,6 +61,14 @@ RUNS: dict[str, tuple[tuple[object, ...], str]] = {
     "outcome_posterior": (
         ("infer-outcomes", "counts.csv", "--flow", FLOW, *TANK, "--blocks", "2", *QUICK),
         "Parameters from outcomes under way",
+    ),
+    "control_policy": (
+        ("control", "plan", "--flow", FLOW, *TANK, *PLANNED),
+        "A plan of control under way",
+    ),
+    "control_test": (
+        ("control", "test", "policy.nc", "--worlds", "20"),
+        "A test of control under way",
     ),
     "sensitivity": (
         ("sensitivity", "--flow", FLOW, *TANK, *LITTLE, *VARIED, "--runs", "5"),
@@ -107,6 +120,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (tmp_path / f"{name}.toml").write_text(text, encoding="utf-8")
     chain_runs(60, 1).to_netcdf(tmp_path / "runs.nc")
     (tmp_path / "counts.csv").write_text("class,count\n2,12\n1+1,8\n", encoding="utf-8")
+    every_kind("control_policy").to_netcdf(tmp_path / "policy.nc")
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

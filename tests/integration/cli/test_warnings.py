@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from command_line import FLOW, GRID, RECORDING, Done, here, refusal
+from every_kind import every_kind
 from finished_run import write_finished_run
 
 from driftwalk.cli.main import COMMANDS, load_command
@@ -191,6 +192,12 @@ BAD: dict[str, Callable[[Path, Path], list[Words]]] = {
         ["yield", bad, "--target", "T", "-o", out],
         ["yield", "--flow", bad, "--target", "T", "-o", out],
     ],
+    "control plan": lambda bad, out: [
+        ["control", "plan", bad, "--target", "T", "--by", "60s", "-o", out],
+        ["control", "plan", "--flow", bad, "--target", "T", "--by", "60s", "-o", out],
+    ],
+    "control test": lambda bad, out: [["control", "test", bad, "-o", out]],
+    "control run": lambda bad, out: [["control", "run", bad, "--live", "127.0.0.1:5000"]],
     "export": lambda bad, out: [["export", bad, "--to", "csv", "-o", out / "folder"]],
     "cite": lambda bad, out: [["cite", bad]],
     "classify": lambda bad, out: [["classify", bad, "--side", "3cm"]],
@@ -279,6 +286,12 @@ def counted(out: Path) -> Path:
     return table
 
 
+def planned(out: Path) -> Path:
+    """Return a policy."""
+    every_kind("control_policy").to_netcdf(out)
+    return out
+
+
 SHORT = ("--to", "60s")
 ONE = ("--threads", "1")
 QUICK: dict[str, Callable[[Path, Path, Path], Words]] = {
@@ -337,6 +350,14 @@ LONG: dict[str, Callable[[Path, Path, Path], Words]] = {
         *("sensitivity", "--flow", FLOW, "--vary", "drag-coefficient=0.2,0.6", "--blocks", "3"),
         *("--runs", "15", "--realisations", "3", "--duration", "20s", *ONE, "-o", out / "run"),
     ],
+    "control plan": lambda place, run, out: [
+        *("control", "plan", "--flow", FLOW, *TANK, "--blocks", "2", "--target", "2"),
+        *("--by", "20s", "--vary", "flow-scale=0,1", "--rounds", "1", "--worlds", "20"),
+        *("-o", out / "run"),
+    ],
+    "control test": lambda place, run, out: [
+        *("control", "test", planned(out / "policy.nc"), "--worlds", "20", "-o", out / "run")
+    ],
     "kinetics": lambda place, run, out: [
         *("kinetics", assembled(place, out / "three"), "-o", out / "run")
     ],
@@ -350,8 +371,8 @@ LONG: dict[str, Callable[[Path, Path, Path], Words]] = {
         *("-o", out / "run"),
     ],
 }
-ELSEWHERE = {"demo", "view", "play"}
-"""`test_demo.py` and `page_server.py` run these with warnings as errors too."""
+ELSEWHERE = {"demo", "view", "play", "control run"}
+"""`test_demo.py`, `page_server.py` and `test_control_live.py` run these."""
 
 
 def own_words(err: str) -> None:

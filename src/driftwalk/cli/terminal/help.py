@@ -16,6 +16,7 @@ MAIN_OPTIONS: Final[dict[str, str]] = {
     "classify": "out side min-duration hold chirality json",
     "compare": "body body-b step-interval permutations out json",
     "compare-models": "out flow study body models parameter threads",
+    "control plan": "out target by every vary flow blocks",
     "fit": "out study body switching-times wall compare-laws json",
     "flow": "out study body tracers window cells",
     "infer-outcomes": "out flow vary after blocks truths cluster json",

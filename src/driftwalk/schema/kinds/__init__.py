@@ -8,6 +8,7 @@ from driftwalk.schema.description import Kind
 from driftwalk.schema.kinds import (
     assembly,
     calibration,
+    control,
     fit,
     flow,
     kinetics,
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
 _FILES: Final = (
     motion, flow, calibration, models, fit, recovery, model_check, assembly, steady_state,
-    sensitivity, kinetics, outcome_posterior, yields,
+    sensitivity, kinetics, outcome_posterior, yields, control,
 )  # fmt: skip
 
 KINDS: Final[dict[str, Kind]] = {kind.name: kind for file in _FILES for kind in file.KINDS}

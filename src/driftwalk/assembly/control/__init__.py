@@ -1,0 +1,1 @@
+"""Control of self-assembly: which agitation at which moment, to reach a target class in time."""

@@ -1,0 +1,382 @@
+"""Plan the control of self-assembly: a policy from runs in all modes, then from its own runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from driftwalk.assembly.control.controller import Rules
+from driftwalk.assembly.control.decision_process import (
+    PROCESS_POLICY,
+    Decisions,
+    gains,
+    transitions,
+    value_iteration,
+)
+from driftwalk.assembly.control.improvement import IMPROVEMENT_POLICY, cells_like, prior_of
+from driftwalk.assembly.control.modes import Modes
+from driftwalk.assembly.control.worlds import Setting, Worlds, decisions_of
+from driftwalk.assembly.outcomes.class_names import outcome_classes
+from driftwalk.assembly.outcomes.distribution import proportion_interval
+from driftwalk.core.arrays import Floats, Integers
+from driftwalk.core.errors import InputError
+from driftwalk.core.files.shards import Arrays
+from driftwalk.schema.check import build_dataset
+from driftwalk.schema.shapes import all_single
+from driftwalk.sweep import Store, grid, run_sweep
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+class ControlPolicy(NamedTuple):
+    """How a policy is planned."""
+
+    most_blocks: int = 7
+    """Blocks, at most: 7 have 200 classes; chosen by hand."""
+    modelled: int = 2
+    """Rounds by value iteration; more of them reach no more (`studies/control`)."""
+    drawn: int = 20
+    """Policies of a round, a quarter of them the best, the others of drawn probabilities; by hand.
+    """
+    unit: int = 250
+    """Worlds of a work unit, about a second; chosen by hand."""
+    confidence: float = 0.9
+    """Of the intervals; that of the rest of driftwalk."""
+
+
+CONTROL_POLICY = ControlPolicy()
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A target and its deadline.
+
+    Attributes
+    ----------
+    target : str
+        Outcome class.
+    by_s : float
+        Deadline [s].
+    every_s : float
+        Period of the decisions [s].
+    latency_s, missed : float
+        As in `Setting`.
+    dwell_s : float
+        Time for which a mode is held at least [s].
+    """
+
+    target: str
+    by_s: float
+    every_s: float
+    latency_s: float = 0.0
+    missed: float = 0.0
+    dwell_s: float = 0.0
+
+    @property
+    def setting(self) -> Setting:
+        """The setting of the worlds."""
+        return Setting(self.every_s, round(self.by_s / self.every_s), self.latency_s, self.missed)
+
+    @property
+    def dwell(self) -> int:
+        """Periods for which a mode is held at least."""
+        return max(int(np.ceil(self.dwell_s / self.every_s - 1e-6)), 1)
+
+
+def check_control(modes: Modes, wanted: Wanted) -> tuple[str, ...]:
+    """Return the classes of the blocks; refuse what no policy can be planned for.
+
+    Parameters
+    ----------
+    modes : Modes
+        The modes.
+    wanted : Wanted
+        What is to be reached.
+
+    Raises
+    ------
+    InputError
+        When the target has another number of blocks, or a time is out of range.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> modes = make_modes([ModeSource(dw.Study(), dw.tank30_flow())], flow_scales=[0.0, 1.0])
+    ... # doctest: +SKIP
+    >>> check_control(modes, Wanted("T", 60.0, 5.0))[0]  # doctest: +SKIP
+    'I'
+    """
+    from driftwalk.assembly.chains.histories import blocks_of
+
+    blocks = modes.study.assembly.blocks
+    if modes.study.block.is_round:
+        raise InputError("control needs blocks with faces: discs have no classes of shapes")
+    if not 2 <= blocks <= CONTROL_POLICY.most_blocks:
+        raise InputError(
+            f"control is planned for 2 to {CONTROL_POLICY.most_blocks} blocks, got {blocks}"
+        )
+    classes = outcome_classes(blocks, chirality=modes.study.assembly.chirality)
+    if wanted.target not in classes:
+        try:
+            own = blocks_of(wanted.target)
+        except InputError as error:
+            raise InputError(f"target {wanted.target}: {error}") from error
+        if own != blocks:
+            raise InputError(f"target {wanted.target} has {own} blocks, and the tank {blocks}")
+        raise InputError(f"target {wanted.target} is no class of {blocks} blocks")
+    if not 0.0 < wanted.every_s <= wanted.by_s:
+        raise InputError(
+            f"decisions every {wanted.every_s:g} s need a deadline that is not sooner, got "
+            f"{wanted.by_s:g} s"
+        )
+    whole = wanted.by_s / wanted.every_s
+    if abs(whole - round(whole)) > 1e-6 * whole:
+        raise InputError(
+            f"the deadline of {wanted.by_s:g} s is no whole number of periods of "
+            f"{wanted.every_s:g} s: choose another deadline or period"
+        )
+    if not 0.0 <= wanted.latency_s < wanted.every_s:
+        raise InputError(
+            f"the latency has to be below the {wanted.every_s:g} s between two decisions, got "
+            f"{wanted.latency_s:g} s"
+        )
+    if not 0.0 <= wanted.missed < 1.0:
+        raise InputError(f"the share of missed looks is from 0 to below 1, got {wanted.missed:g}")
+    if not 0.0 <= wanted.dwell_s <= wanted.by_s:
+        raise InputError(f"the dwell is from 0 s to the deadline, got {wanted.dwell_s:g} s")
+    return classes
+
+
+def plan_control(
+    modes: Modes,
+    target: str,
+    by: float,
+    *,
+    every: float = 5.0,
+    latency: float = 0.0,
+    missed: float = 0.0,
+    dwell: float = 0.0,
+    rounds: int = 12,
+    worlds: int = 1000,
+    seed: int = 1,
+    store: Callable[[str], Store] | None = None,
+    executor: Executor | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> xr.Dataset:
+    """Return which mode of agitation to choose when, so that a class is reached by a deadline.
+
+    Each mode is run on its own first. In the first rounds, transitions between classes are
+    estimated from all worlds so far, and fresh worlds run under policies of value iteration: the
+    best one, and those of transitions drawn from what is known. In the later ones, the policy is
+    improved by what whole worlds reach.
+
+    Parameters
+    ----------
+    modes : Modes
+        The modes, see `make_modes`.
+    target : str
+        Outcome class to be reached, such as "T".
+    by : float
+        Deadline [s].
+    every : float
+        Time between two decisions [s].
+    latency : float
+        From a look at the tank until the pumps have changed [s], below `every`.
+    missed : float
+        Share of the looks that give no class, 0 to below 1; the mode is held then.
+    dwell : float
+        Time for which a mode is held at least [s].
+    rounds : int
+        Rounds of planning, from 1.
+    worlds : int
+        Worlds of a round, from 20.
+    seed : int
+        Seed of all worlds.
+    store : callable, optional
+        Returns the store of a sweep by its name, such as that of a run directory, to be continued.
+    executor : concurrent.futures.Executor, optional
+        Computes work units elsewhere; the result does not depend on it.
+    progress : callable, optional
+        Called as ``progress(done, total)``.
+
+    Returns
+    -------
+    xarray.Dataset
+        Kind "control_policy". ``action`` on (phase, class, age); ``constant_reached`` on (mode);
+        ``promised`` and ``reached`` on (round). The yield that is stated, ``attrs["reached"]`` with
+        its interval, is that of fresh worlds.
+
+    Raises
+    ------
+    InputError
+        When the target has another number of blocks, or a number is out of range.
+
+    Notes
+    -----
+    Puterman, Markov decision processes (1994), chapter 4; see docs/control.md.
+
+    Examples
+    --------
+    >>> import driftwalk as dw
+    >>> from driftwalk.assembly import ModeSource, make_modes
+    >>> one = ModeSource(dw.Study(assembly={"blocks": 2}), dw.tank30_flow())
+    >>> modes = make_modes([one], flow_scales=[0.0, 1.0])
+    >>> policy = plan_control(modes, "2", 20.0, rounds=1, worlds=20)
+    >>> policy.attrs["target"], policy.sizes["mode"]
+    ('2', 2)
+    """
+    if rounds < 1 or worlds < 20:
+        raise InputError(f"at least 1 round and 20 worlds are needed, got {rounds} and {worlds}")
+    wanted = Wanted(target, by, every, latency, missed, dwell)
+    classes = check_control(modes, wanted)
+    planner = _Planner(
+        modes, wanted, classes, worlds, seed,
+        (lambda _: None) if store is None else store, executor,
+        (lambda *_: None) if progress is None else progress,
+        worlds * (rounds + 6),
+    )  # fmt: skip
+    return planner.plan(rounds)
+
+
+@dataclass
+class _Planner:
+    modes: Modes
+    wanted: Wanted
+    classes: tuple[str, ...]
+    worlds: int
+    seed: int
+    store: Callable[[str], Store | None]
+    executor: Executor | None
+    progress: Callable[[int, int], None]
+    total: int
+    done: int = 0
+    used: int = 0
+    """Worlds so far: the number of the next new one."""
+    safe: int = 0
+    """Best mode alone."""
+
+    def plan(self, rounds: int) -> xr.Dataset:
+        """Return the policy."""
+        none = np.zeros((1, *cells_like(len(self.classes))), dtype=np.int64)
+        # The modes in turn, each in the same number of worlds.
+        each = -(-self.worlds // self.modes.size)
+        alone = self.run("constant", none, worlds=each * self.modes.size, arm="constant")
+        own = np.arange(each * self.modes.size) % self.modes.size
+        hits = np.bincount(own, weights=self.hit(alone), minlength=self.modes.size)
+        constant = hits.astype(np.float64)
+        self.safe, seen = int(constant.argmax()), [decisions_of(alone)]
+        promised, reached = np.full((2, rounds), np.nan)
+        count = CONTROL_POLICY.drawn
+        best = np.arange(self.worlds) % count < count // 4
+        for at in range(min(CONTROL_POLICY.modelled, rounds)):
+            random = np.random.default_rng([self.seed, at])
+            plans = [self.planned(seen, random if k >= count // 4 else None) for k in range(count)]
+            promised[at] = plans[0][1]
+            tables = np.stack([gain.argmax(axis=-1) for gain, _ in plans])
+            followed = self.run(f"round_{at}", tables)
+            seen.append(decisions_of(followed))
+            reached[at] = self.hit(followed)[best].mean()
+        gain, promise = self.planned(seen)
+        scale = float(np.nanmean(reached)) / max(promise, 1e-9)
+        prior = known = prior_of(gain, scale=min(scale, 1.0))
+        best = np.arange(self.worlds) % IMPROVEMENT_POLICY.greedy == 0
+        for at in range(min(CONTROL_POLICY.modelled, rounds), rounds):
+            modes = known.drawn(self.worlds, np.random.default_rng([self.seed, at]))
+            followed = self.run(f"round_{at}", modes)
+            reached[at] = self.hit(followed)[best].mean()
+            known = known.faded(prior).updated(followed, modes, self.hit(followed))
+        # The policy, that of the model and the best mode alone are compared in the same worlds.
+        last = [known.best(), gain.argmax(axis=-1), np.full_like(known.best(), self.safe)]
+        shared = self.used
+        again = [
+            self.hit(self.run(f"final_{at}", one[None], first=shared)).sum()
+            for at, one in enumerate(last)
+        ]
+        action = last[int(np.argmax(again))]
+        fresh = self.hit(self.run("fresh", action[None], worlds=2 * self.worlds))
+        return self.dataset(action, constant, each, promised, reached, fresh)
+
+    def planned(
+        self, seen: list[Decisions], random: np.random.Generator | None = None
+    ) -> tuple[Floats, float]:
+        """Return the gains of all modes for what was seen, or drawn from it, and the promise."""
+        probability = transitions(
+            seen, classes=len(self.classes), modes=self.modes.size, random=random
+        )
+        target = self.classes.index(self.wanted.target)
+        plan = value_iteration(probability, target=target, periods=self.wanted.setting.periods)
+        start = self.classes.index(all_single(self.modes.study.assembly.blocks))
+        return gains(probability, plan), float(plan.value[-1, start, 0])
+
+    def hit(self, found: Arrays) -> Floats:
+        """Return which worlds are in the target at the deadline, as 0 and 1."""
+        target = self.classes.index(self.wanted.target)
+        return np.asarray(found["after"][:, -1] == target, dtype=np.float64)
+
+    def run(
+        self, name: str, tables: Integers, *, worlds: int | None = None, first: int | None = None,
+        **how: Any,
+    ) -> Arrays:  # fmt: skip
+        """Return what worlds did; they are new ones unless the number of the first is given."""
+        count = self.worlds if worlds is None else worlds
+        begin = self.used if first is None else first
+        self.used = max(self.used, begin + count)
+        before, self.done = self.done, self.done + count
+        rules = Rules(tables.astype(np.int16), self.safe, self.wanted.dwell)
+        work = Worlds(
+            self.modes, self.classes, self.wanted.setting, rules, self.seed, begin, **how
+        )  # fmt: skip
+        return run_sweep(
+            work,
+            grid(world=np.arange(begin, begin + count)).units(CONTROL_POLICY.unit),
+            store=self.store(name),
+            executor=self.executor,
+            progress=lambda done, _: self.progress(before + done, self.total),
+        )
+
+    def dataset(
+        self, action: Integers, constant: Floats, each: int, promised: Floats, reached: Floats,
+        fresh: Floats,
+    ) -> xr.Dataset:  # fmt: skip
+        """Return the policy as a dataset."""
+        share = CONTROL_POLICY.confidence
+        low, high = proportion_interval(fresh.sum(), fresh.size, confidence=share)
+        wanted, modes = self.wanted, self.modes
+        flow = modes.flows[0]
+        data = {
+            "action": (("phase", "class", "age"), action.astype(np.int32)),
+            "flow": ("mode", modes.flow.astype(np.int32)),
+            "flow_scale": ("mode", modes.flow_scale),
+            "force_std": (("mode", "draw"), modes.force_std),
+            "drag_coefficient": (("mode", "draw"), modes.drag_coefficient),
+            "constant_reached": ("mode", constant / each),
+            "promised": ("round", promised),
+            "round_reached": ("round", reached),
+            **{
+                name: (("field", "y", "x"), np.stack([one[name].values for one in modes.flows]))
+                for name in ("u", "v", "flag")
+            },
+        }
+        coords = {
+            "phase": ("phase", wanted.every_s * np.array(PROCESS_POLICY.phase_starts)),
+            "class": ("class", np.array(self.classes, dtype=object)),
+            "age": ("age", wanted.every_s * np.array(PROCESS_POLICY.age_starts)),
+            "mode": ("mode", np.array(modes.name, dtype=object)),
+            "y": ("y", flow["y"].values),
+            "x": ("x", flow["x"].values),
+        }
+        return build_dataset("control_policy", data, coords, {
+            "target": wanted.target, "by_s": wanted.by_s, "every_s": wanted.every_s,
+            "latency_s": wanted.latency_s, "missed": wanted.missed, "dwell_s": wanted.dwell_s,
+            "reached": float(fresh.mean()), "reached_low": float(low), "reached_high": float(high),
+            "confidence": share, "worlds": int(fresh.size), "worlds_used": self.used,
+            "constant_worlds": each, "safe_mode": modes.name[int(constant.argmax())],
+            "blocks": modes.study.assembly.blocks,
+            "arena": modes.study.tank.to_arena_json(), "block_side_m": modes.study.block.side_m,
+            "study": modes.study.to_toml(), "seed": self.seed,
+        })  # fmt: skip

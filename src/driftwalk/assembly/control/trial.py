@@ -1,0 +1,258 @@
+"""Test a policy in fresh worlds, against the best constant mode and random switching."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import Executor
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from driftwalk.assembly.control.plan import CONTROL_POLICY
+from driftwalk.assembly.control.stored import stored_modes, stored_rules, stored_wanted
+from driftwalk.assembly.control.worlds import Setting, Worlds
+from driftwalk.assembly.outcomes.distribution import proportion_interval
+from driftwalk.assembly.runs.dataset import build_path
+from driftwalk.assembly.runs.plan import make_plan
+from driftwalk.assembly.tank_batch import TankBatch
+from driftwalk.core.arrays import Floats
+from driftwalk.core.errors import InputError
+from driftwalk.core.files.shards import Arrays
+from driftwalk.schema.check import build_dataset
+from driftwalk.schema.shapes import is_one_assembly
+from driftwalk.sweep import Store, grid, run_sweep
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+ARMS = ("policy", "best constant mode", "random switching")
+SAMPLE_S = 0.5
+"""Time between two pictures of a film [s]; chosen by hand."""
+CONSTANTS = 5
+"""Constant modes that are run, those with the largest shares in the plan; with three, one
+plan of `studies/control` missed the best of 12."""
+
+
+def try_control(
+    policy: xr.Dataset,
+    *,
+    worlds: int = 2000,
+    latency: float | None = None,
+    missed: float | None = None,
+    force_factor: float = 1.0,
+    store: Callable[[str], Store] | None = None,
+    executor: Executor | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> xr.Dataset:
+    """Return how often a policy reaches its target in worlds that no plan has seen.
+
+    Parameters
+    ----------
+    policy : xarray.Dataset
+        A `control_policy`.
+    worlds : int
+        Worlds of each arm, from 20. The arms share starts and forces.
+    latency, missed : float, optional
+        Over the policy's, see `plan_control`.
+    force_factor : float
+        Factor on sigma_F of the worlds, above 0: what if the model is wrong?
+    store, executor, progress
+        As in `plan_control`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Kind "control_test": ``reached`` with its exact interval and the paired ``gain`` on (arm),
+        ``usage`` on (arm, mode).
+
+    Raises
+    ------
+    InputError
+        When the dataset is no policy, or a number is out of range.
+
+    Examples
+    --------
+    ``try_control(policy, worlds=2000)["reached"]``
+    """
+    rules, wanted, modes = stored_rules(policy), stored_wanted(policy), stored_modes(policy)
+    setting = trial_setting(policy, worlds, latency, missed, force_factor)
+    classes = tuple(str(name) for name in policy["class"].values)
+    target, seed = classes.index(wanted.target), int(policy.attrs["seed"])
+    # Behind all worlds of the plan.
+    first = int(policy.attrs["worlds_used"])
+    best = np.argsort(-policy["constant_reached"].values, kind="stable")[:CONSTANTS].tolist()
+    total, done = worlds * (2 + len(best)), 0
+
+    def ran(name: str, arm: Any, only: int | None = None) -> Arrays:
+        nonlocal done
+        before, done = done, done + worlds
+        return run_sweep(
+            Worlds(modes, classes, setting, rules, seed, arm=arm, only=only),
+            grid(world=np.arange(first, first + worlds)).units(CONTROL_POLICY.unit),
+            store=None if store is None else store(name),
+            executor=executor,
+            progress=None if progress is None else lambda at, _: progress(before + at, total),
+        )
+
+    policys = ran("policy", "policy")
+    constants = [ran(f"constant_{mode}", "constant", mode) for mode in best]
+    chosen = int(np.argmax([(one["after"][:, -1] == target).sum() for one in constants]))
+    found = [policys, constants[chosen], ran("random", "random")]
+    hits = np.stack([one["after"] == target for one in found]).astype(np.float64)
+    share = CONTROL_POLICY.confidence
+    reached = hits[:, :, -1]
+    low, high = proportion_interval(reached.sum(axis=1), worlds, confidence=share)
+    gain, half = _paired(reached[0] - reached, share)
+    whole = np.array([is_one_assembly(name) for name in classes])
+    example = _example(policys, target)
+    stated = [float(policy.attrs[name]) for name in ("reached", "reached_low", "reached_high")]
+    agree = low[0] <= stated[0] <= high[0]
+    data = {
+        "reached": ("arm", reached.mean(axis=1)),
+        "reached_low": ("arm", low),
+        "reached_high": ("arm", high),
+        "gain": ("arm", gain),
+        "gain_low": ("arm", gain - half),
+        "gain_high": ("arm", gain + half),
+        "share": (("arm", "time"), np.pad(hits.mean(axis=1), ((0, 0), (1, 0)))),
+        "usage": (("arm", "mode"), np.stack([_usage(one, whole, modes.size) for one in found])),
+        "class_usage": (
+            ("class", "mode"),
+            np.stack([
+                _usage(policys, np.arange(len(classes)) != at, modes.size)
+                for at in range(len(classes))
+            ]),
+        ),
+        "film_class": ("time", np.r_[policys["seen"][example], policys["after"][example, -1]]),
+        "film_mode": ("time", np.r_[policys["mode"][example], -1]),
+    }  # fmt: skip
+    coords = {
+        "arm": ("arm", np.array(ARMS, dtype=object)),
+        "time": ("time", setting.every_s * np.arange(setting.periods + 1.0)),
+        "mode": ("mode", np.array(modes.name, dtype=object)),
+        "class": ("class", np.array(classes, dtype=object)),
+    }
+    return build_dataset("control_test", data, coords, {
+        "target": wanted.target, "by_s": wanted.by_s, "every_s": wanted.every_s,
+        "latency_s": setting.latency_s, "missed": setting.missed, "force_factor": force_factor,
+        "stated": stated[0], "verdict": "as stated" if agree else "not as stated",
+        "worlds": worlds, "confidence": share, "constant_mode": modes.name[best[chosen]],
+        "film_world": first + example, "seed": seed,
+    })  # fmt: skip
+
+
+def control_path(policy: xr.Dataset, test: xr.Dataset) -> xr.Dataset:
+    """Return the path of the blocks in the run that a test shows, simulated again.
+
+    Parameters
+    ----------
+    policy : xarray.Dataset
+        A `control_policy`.
+    test : xarray.Dataset
+        Its `control_test`.
+
+    Returns
+    -------
+    xarray.Dataset
+        Kind "assembly_path", for a film.
+
+    Examples
+    --------
+    ``write_animation(control_path(policy, test), "run.gif")``
+    """
+    modes, facts = stored_modes(policy), test.attrs
+    world = np.array([int(facts["film_world"])])
+    plan = make_plan(
+        modes.study, modes.flows[0], settings={"seed": int(facts["seed"])}, index=world,
+        threads=1, ends=False,
+    )  # fmt: skip
+    every = max(round(SAMPLE_S / plan.study.time_step_s), 1)
+    sample, latency = every * plan.study.time_step_s, float(facts["latency_s"])
+    changes = {
+        float(time) + (latency if at else 0.0): mode
+        for at, (time, mode) in enumerate(
+            zip(test["time"].values, test["film_mode"].values, strict=True)
+        )
+        if mode >= 0
+    }
+    samples = sample * np.arange(int(float(facts["by_s"]) / sample) + 1)
+    batch = TankBatch(
+        modes.study, modes.flows, worlds=1, seed=int(facts["seed"]), first=int(world[0]), workers=1
+    )
+    poses, joined, now = [], [], 0.0
+    for time in sorted({*changes, *samples.tolist()}):
+        batch.advance(time - now)
+        now = time
+        if time in changes:
+            mode = np.array([changes[time]])
+            factor = float(facts["force_factor"])
+            batch.set(**modes.settings(mode, world, force_factor=factor))
+        if time in samples:
+            state = batch.state()
+            poses.append(state["pose"])
+            joined.append(state["assembly"])
+    found = {"sample_pose": np.stack(poses, axis=1), "sample_assembly": np.stack(joined, axis=1)}
+    return build_path(plan, found, every=every)
+
+
+def trial_setting(
+    policy: xr.Dataset,
+    worlds: int,
+    latency: float | None,
+    missed: float | None,
+    force_factor: float,
+) -> Setting:
+    """Return the setting of a test; refuse numbers that are out of range.
+
+    Parameters
+    ----------
+    policy, worlds, latency, missed, force_factor
+        As in `try_control`.
+
+    Raises
+    ------
+    InputError
+        When a number is out of range.
+    """
+    wanted = stored_wanted(policy)
+    setting = Setting(
+        wanted.every_s,
+        wanted.setting.periods,
+        wanted.latency_s if latency is None else latency,
+        wanted.missed if missed is None else missed,
+        force_factor,
+    )
+    if worlds < 20:
+        raise InputError(f"at least 20 worlds are needed, got {worlds}")
+    if not 0.0 < force_factor < np.inf:
+        raise InputError(f"the factor on sigma_F has to be above 0, got {force_factor:g}")
+    if not 0.0 <= setting.latency_s < setting.every_s:
+        raise InputError(
+            f"the latency has to be below the {setting.every_s:g} s between two decisions, got "
+            f"{setting.latency_s:g} s"
+        )
+    if not 0.0 <= setting.missed < 1.0:
+        raise InputError(f"the share of missed looks is from 0 to below 1, got {setting.missed:g}")
+    return setting
+
+
+def _paired(difference: Floats, confidence: float) -> tuple[Floats, Floats]:
+    """Return means of differences in the same worlds, and half of their intervals."""
+    from scipy.stats import norm
+
+    error = difference.std(axis=1, ddof=1) / np.sqrt(difference.shape[1])
+    return difference.mean(axis=1), norm.ppf(0.5 + 0.5 * confidence) * error
+
+
+def _usage(found: Arrays, left_out: Any, modes: int) -> Floats:
+    """Return the shares of the periods in each mode, but for those in classes left out."""
+    kept = (found["seen"] >= 0) & ~left_out[np.maximum(found["seen"], 0)]
+    count = np.bincount(found["mode"][kept], minlength=modes).astype(np.float64)
+    return count / count.sum() if count.sum() else np.full(modes, np.nan)
+
+
+def _example(found: Arrays, target: int) -> int:
+    """Return the first world that reached the target in many steps; the first of all else."""
+    reached = found["after"][:, -1] == target
+    steps = found["entered"].sum(axis=1)
+    return int(np.argmax(reached & (steps >= np.median(steps))))

@@ -1,0 +1,160 @@
+"""Simulated worlds under a policy, as a real tank would be: with latency and missed frames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from driftwalk.assembly.control.controller import UNKNOWN, Controller, Rules
+from driftwalk.assembly.control.decision_process import Decisions
+from driftwalk.assembly.control.modes import Modes
+from driftwalk.core.arrays import Floats, Integers
+from driftwalk.core.files.shards import Arrays
+from driftwalk.sweep import WorkUnit
+
+
+@dataclass(frozen=True)
+class Setting:
+    """Decisions, and how late and how well the tank is seen.
+
+    Attributes
+    ----------
+    every_s : float
+        Period of the decisions [s].
+    periods : int
+        Decisions up to the deadline.
+    latency_s : float
+        From a look at the tank until the pumps have changed [s], below a period.
+    missed : float
+        Share of the looks that give no class.
+    force_factor : float
+        Factor on sigma_F of the simulated worlds, to try a model that is wrong.
+    """
+
+    every_s: float
+    periods: int
+    latency_s: float = 0.0
+    missed: float = 0.0
+    force_factor: float = 1.0
+
+
+@dataclass(frozen=True)
+class Worlds:
+    """Simulates worlds; a work unit is some of them.
+
+    Attributes
+    ----------
+    modes : Modes
+        The modes.
+    classes : tuple of str
+        Outcome classes that are known; others have the number `UNKNOWN`.
+    setting : Setting
+        Decisions, latency and missed looks.
+    rules : Rules
+        The policy.
+    seed : int
+        Of the starts, the forces and what is missed.
+    first : int
+        Number of the world that has the first of several policies, from where they are counted.
+    arm : {"policy", "constant", "random"}
+        The policy, one mode for each world in turn, or another random mode at each decision.
+    only : int or None
+        The constant mode, where it is one.
+    """
+
+    modes: Modes
+    classes: tuple[str, ...]
+    setting: Setting
+    rules: Rules
+    seed: int
+    first: int = 0
+    arm: Literal["policy", "constant", "random"] = "policy"
+    only: int | None = None
+
+    def __call__(self, unit: WorkUnit) -> Arrays:
+        """Return what the worlds of a unit did, shapes (world, period).
+
+        ``seen`` and ``after`` are true classes before and after a period, ``age`` whole periods in
+        the class, ``mode`` the mode from the latency on, ``entered`` whether a class was entered.
+        """
+        from driftwalk.assembly.tank_batch import TankBatch
+
+        world = np.asarray(unit.settings["world"], dtype=np.int64)
+        setting, periods = self.setting, self.setting.periods
+        batch = TankBatch(
+            self.modes.study, self.modes.flows, worlds=world.size, seed=self.seed,
+            first=int(world[0]), workers=1, complete="rests",
+        )  # fmt: skip
+        wishes, missed = self._drawn(world)
+        controller = Controller(self.rules, world - self.first)
+        number = {name: at for at, name in enumerate(self.classes)}
+        found = {
+            name: np.empty((world.size, periods), dtype=np.int16)
+            for name in ("seen", "age", "mode", "after", "entered")
+        }
+        seen = numbers(batch.outcome, number)
+        for period in range(periods):
+            since = np.asarray(batch.class_since)
+            age = ages(period * setting.every_s - since, setting.every_s)
+            known = np.where(missed[:, period], UNKNOWN, seen)
+            mode = controller.decide(known, age, left=periods - period, wish=wishes[:, period])
+            if setting.latency_s > 0.0 and period > 0:
+                batch.advance(setting.latency_s)
+            batch.set(**self.modes.settings(mode, world, force_factor=setting.force_factor))
+            batch.advance(setting.every_s - (setting.latency_s if period > 0 else 0.0))
+            after = numbers(batch.outcome, number)
+            entered = (after != seen) | (np.asarray(batch.class_since) > since)
+            for name, values in (
+                ("seen", seen), ("age", age), ("mode", mode), ("after", after),
+                ("entered", entered),
+            ):  # fmt: skip
+                found[name][:, period] = values
+            seen = after
+        return found
+
+    def _drawn(self, world: Integers) -> tuple[Integers, Integers]:
+        """Return the modes that are wished for, and where the look gives no class."""
+        periods, modes = self.setting.periods, self.modes.size
+        wish = np.full((world.size, periods), -1)
+        lost = np.zeros((world.size, periods), dtype=bool)
+        if self.arm == "constant":
+            wish[:] = (world % modes if self.only is None else np.full(world.size, self.only))[
+                :, None
+            ]
+        if self.arm == "random" or self.setting.missed > 0.0:
+            for row, number in enumerate(world.tolist()):
+                random = np.random.default_rng([self.seed, number])
+                lost[row] = random.random(periods) < self.setting.missed
+                if self.arm == "random":
+                    wish[row] = random.integers(modes, size=periods)
+        return wish, lost
+
+
+def numbers(outcome: object, number: dict[str, int]) -> Integers:
+    """Return the classes of worlds by number, `UNKNOWN` for those without one."""
+    return np.array([number.get(str(name), UNKNOWN) for name in np.asarray(outcome)])
+
+
+def ages(time_in_class: Floats, every_s: float) -> Integers:
+    """Return whole periods that classes have lasted, from their times [s].
+
+    Examples
+    --------
+    >>> ages(np.array([0.0, 4.9, 5.0]), 5.0).tolist()
+    [0, 0, 1]
+    """
+    # What is a period but for rounding counts as one.
+    return np.floor(np.maximum(time_in_class, 0.0) / every_s + 1e-6).astype(np.int64)
+
+
+def decisions_of(found: Arrays) -> Decisions:
+    """Return the decisions of worlds in known classes, one after the other."""
+    kept = (found["seen"] != UNKNOWN) & (found["after"] != UNKNOWN)
+    return Decisions(
+        *(
+            np.asarray(found[name][kept], dtype=np.int64)
+            for name in ("seen", "age", "mode", "after", "entered")
+        )
+    )

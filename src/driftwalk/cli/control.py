@@ -1,0 +1,210 @@
+"""`driftwalk control`: choose the agitation while blocks assemble, so that a target is reached."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from driftwalk.cli.inputs.model_source import Source, assembly_source
+from driftwalk.cli.options.flatten_options import with_options
+from driftwalk.cli.options.run import RunOptions
+from driftwalk.cli.options.shared_types import PANEL, FlowFile, argument, option
+from driftwalk.cli.options.study import StudyOptions, with_study_options
+from driftwalk.cli.terminal.help import HelpCommand, HelpGroup
+from driftwalk.cli.terminal.output import print_result, print_warnings
+from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.core.study_keys import ASSEMBLY_KEYS
+from driftwalk.core.units import parse_quantity
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+UNITS = {"flow-scale": "1", "force-std": "N"}
+"""Numbers of a mode that can be varied, with their units."""
+NAMES = (
+    *("blocks", "tank_diameter", "side", "mass", "depth"),
+    *("drag_coefficient", "force_std", "force_interval"),
+    *("latching", "faces", "hidden_face_drag", "chirality", "bond_rate", "seed"),
+)
+
+control_app = typer.Typer(name="control", add_completion=False, cls=HelpGroup)
+
+Policy = Annotated[Path, argument("POLICY", "Run of driftwalk control plan, or its policy.nc.")]
+
+
+@control_app.callback(invoke_without_command=True)
+def control(ctx: typer.Context) -> None:
+    """Choose the agitation while blocks assemble: plan a policy, test it, run it."""
+    if ctx.invoked_subcommand is None:
+        typer.echo(ctx.get_help())
+
+
+@control_app.command(cls=HelpCommand)
+@with_options(RunOptions, "out", "cluster", "cluster_options", "overwrite", "json")
+@with_study_options(ASSEMBLY_KEYS, *NAMES)
+def plan(
+    given: StudyOptions,
+    target: Annotated[str, option("--target CLASS", "Outcome class to be reached, such as T.")],
+    by: Annotated[float, option("--by", "Deadline, such as 5min.", unit="s")],
+    runs: Annotated[
+        list[Path] | None,
+        argument("[RUN...]", "Fits or calibrations, one for each setting of the pumps."),
+    ] = None,
+    flow: FlowFile = None,
+    every: Annotated[float, option("--every", "Time between two decisions.", unit="s")] = 5.0,
+    vary: Annotated[
+        list[str] | None,
+        option(
+            "--vary NAME=VALUES",
+            "Modes: flow-scale=0,0.5,1 or force-std=0.2mN,1.2mN, over every flow. Repeatable.",
+        ),
+    ] = None,
+    latency: Annotated[
+        float, option("--latency", "From a look until the pumps have changed.", unit="s")
+    ] = 0.0,
+    missed: Annotated[
+        float, option("--missed SHARE", "Share of the looks that give no class.")
+    ] = 0.0,
+    dwell: Annotated[
+        float, option("--dwell", "Time for which a mode is held at least.", unit="s")
+    ] = 0.0,
+    rounds: Annotated[int, option("--rounds N", "Rounds of planning.", panel=PANEL, min=1)] = 12,
+    worlds: Annotated[
+        int, option("--worlds N", "Simulated worlds of a round.", panel=PANEL, min=20)
+    ] = 1000,
+    *,
+    options: RunOptions,
+) -> None:
+    """Plan which mode of agitation to choose when.
+
+    A mode is a flow, a factor on it and a stochastic force: name a fit for each setting of the
+    pumps, or one fit (or --flow) with --vary. If you stop the run, the same command continues it.
+    """
+    from driftwalk.assembly import ModeSource, Wanted, make_modes
+    from driftwalk.runs import ControlPlanWork
+
+    sources: list[Source] = [
+        assembly_source(run, flow, given) for run in (runs if runs else [None])
+    ]
+    strengths = vary_strengths(vary or [])
+    seed = sources[0].study.assembly.seed
+    modes = make_modes(
+        [
+            ModeSource(
+                one.study, one.flow, one.uncertainty,
+                "" if len(sources) == 1 or not runs else runs[at].name,
+            )
+            for at, one in enumerate(sources)
+        ],
+        flow_scales=strengths.get("flow-scale", [1.0]),
+        force_stds=strengths.get("force-std", []),
+        seed=seed,
+    )  # fmt: skip
+    inputs = {
+        f"mode {at} {role}": path
+        for at, one in enumerate(sources, start=1)
+        for role, path in one.inputs.items()
+    }
+    wanted = Wanted(target, by, every, latency, missed, dwell)
+    work = ControlPlanWork(modes, wanted, rounds, worlds, seed, inputs)
+    found: xr.Dataset = options.run(work, "control plan")
+    print_warnings(dict.fromkeys(text for one in sources for text in one.warnings))
+    print_result(found, options.out, json=options.json)
+
+
+@control_app.command("test", cls=HelpCommand)
+@with_options(RunOptions, "out", "cluster", "cluster_options", "overwrite", "json")
+def try_policy(
+    policy: Policy,
+    worlds: Annotated[int, option("--worlds N", "Fresh worlds of each arm.", min=20)] = 2000,
+    latency: Annotated[
+        float | None,
+        option("--latency", "Latency of the worlds (default: the plan's).", unit="s"),
+    ] = None,
+    missed: Annotated[
+        float | None, option("--missed SHARE", "Looks without a class (default: the plan's).")
+    ] = None,
+    force_factor: Annotated[
+        float, option("--force-factor NUMBER", "Factor on the worlds' sigma_F: a wrong model.")
+    ] = 1.0,
+    *,
+    options: RunOptions,
+) -> None:
+    """Test a policy in fresh simulated worlds.
+
+    States its yield, and the gain over the best constant mode and over random switching in worlds
+    with the same starts and forces.
+    """
+    from driftwalk.runs import ControlTestWork
+
+    stored, path = _opened(policy)
+    work = ControlTestWork(stored, worlds, latency, missed, force_factor, {"policy": path})
+    found: xr.Dataset = options.run(work, "control test")
+    print_result(found, options.out, json=options.json)
+
+
+@control_app.command(cls=HelpCommand)
+def run(
+    policy: Policy,
+    live: Annotated[
+        str, option("--live HOST:PORT", "Where driftwalk track or play publishes (--live PORT).")
+    ],
+    patience: Annotated[
+        float, option("--patience", "Time without a frame before the safe mode.", unit="s")
+    ] = 2.0,
+) -> None:
+    """Follow a policy over a tracker's stream: one line of JSON for each decision, on stdout.
+
+    Ends with the target, with another complete assembly, or at the deadline.
+    """
+    from driftwalk.viewer import pilot
+
+    host, colon, port = live.rpartition(":")
+    if not colon or not port.isdigit() or not 0 < int(port) < 65536:
+        raise InputError(f"--live {live}: expected HOST:PORT, such as 127.0.0.1:5000")
+    if not patience > 0.0:
+        raise InputError(f"--patience has to be above 0 s, got {patience:g} s")
+    for line in pilot(_opened(policy)[0], host, int(port), patience_s=patience):
+        print(json.dumps(line), flush=True)
+
+
+def vary_strengths(given: list[str]) -> dict[str, list[float]]:
+    """Return the values of what is varied.
+
+    Examples
+    --------
+    >>> vary_strengths(["flow-scale=0,1", "force-std=0.2mN"])
+    {'flow-scale': [0.0, 1.0], 'force-std': [0.0002]}
+    """
+    found: dict[str, list[float]] = {}
+    for text in given:
+        name, sign, values = text.partition("=")
+        name = name.strip().replace("_", "-")
+        if name not in UNITS or not sign:
+            raise InputError(
+                f"--vary {text}: expected NAME=VALUES with a name out of {', '.join(UNITS)}"
+            )
+        if name in found:
+            raise InputError(f"--vary {text}: {name} is varied twice; name all values at once")
+        try:
+            found[name] = [parse_quantity(word, UNITS[name]) for word in values.split(",")]
+        except ConfigurationError as error:
+            raise InputError(f"--vary {text}: {error}") from error
+    return found
+
+
+def _opened(policy: Path) -> tuple[Any, Path]:
+    """Return the policy of a run or a file, and its file."""
+    from driftwalk.schema.check import check_contents, kind_name
+    from driftwalk.schema.stores.netcdf import open_netcdf
+
+    path = policy / "policy.nc" if policy.is_dir() else policy
+    if not path.is_file():
+        raise InputError(f"{policy} holds no policy: plan one first (driftwalk control plan)")
+    found = open_netcdf(path)
+    if kind_name(found) != "control_policy":
+        raise InputError(f"{path} holds no policy: plan one first (driftwalk control plan)")
+    return check_contents(found, path), path

@@ -1,0 +1,178 @@
+"""Pages on control: what a policy reaches, what it does when, and its test in fresh worlds."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from driftwalk.page.parts import (
+    Maker,
+    Section,
+    attempt,
+    chart,
+    figure,
+    figure_with_ends,
+    label,
+    require,
+    required,
+    sections_of,
+    series,
+    summary_section,
+    table_section,
+)
+from driftwalk.page.sections.replay import replay_section
+from driftwalk.schema.answers.control import arm_table, mode_table, usage_table
+from driftwalk.schema.answers.parts import Table
+from driftwalk.schema.shapes import short_class
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def policy_sections(*, policy: xr.Dataset | None = None) -> list[Section]:
+    """Return the sections of a page on a policy.
+
+    Parameters
+    ----------
+    policy : xarray.Dataset, optional
+        A `control_policy`; None while there is none yet.
+
+    Examples
+    --------
+    >>> [part["kind"] for part in policy_sections()]
+    ['empty']
+    """
+    parts: list[tuple[str, str, Maker]] = [
+        ("rounds", "Rounds of planning", rounds_section),
+        ("policy", "Modes chosen", action_sections),
+        ("modes", "Modes alone", lambda found: _table("modes", "Modes alone", mode_table(found))),
+    ]
+    return sections_of(policy, "There is no policy yet.", policy_summary, lambda _: [], parts)
+
+
+def policy_summary(policy: xr.Dataset) -> Section:
+    """Return what the policy reaches."""
+    facts = policy.attrs
+    target = short_class(str(required(policy, "target")))
+    paragraphs = [
+        f"The policy looks at the outcome class every {facts['every_s']:g} s and chooses one of "
+        f"{policy.sizes['mode']} modes of agitation, by the class, the time since it was entered "
+        f"and the time left, so that {target} is there at {facts['by_s']:g} s.",
+        f"Safe mode, where nothing is seen: {facts['safe_mode']}.",
+    ]
+    shown = figure_with_ends(policy, "reached", f"{target} in fresh worlds")
+    return summary_section(paragraphs, [shown])
+
+
+def rounds_section(policy: xr.Dataset) -> Section:
+    """Return what each round promised, and what it reached."""
+    require(policy, "promised", "round_reached")
+    number = np.arange(1.0, policy.sizes["round"] + 1.0)
+    drawn = [
+        series("promised", number, policy["promised"].values),
+        series("reached", number, policy["round_reached"].values, style="points"),
+    ]  # fmt: skip
+    note = "The promise of value iteration is too large; only what was reached counts."
+    return chart(
+        "rounds", "Rounds of planning", note, x=label("round"), y=label("share"), series=drawn
+    )  # fmt: skip
+
+
+def action_sections(policy: xr.Dataset) -> list[Section]:
+    """Return the modes that are chosen with all the time left, by class and time in it."""
+    require(policy, "action", "phase", "age")
+    names = [str(name) for name in policy["mode"].values]
+    rows = [
+        [short_class(str(name)), *(names[mode] for mode in policy["action"].values[-1, at])]
+        for at, name in enumerate(policy["class"].values)
+        if "+" in str(name)
+    ]
+    columns = ["class", *(f"after {age:g} s" for age in policy["age"].values)]
+    note = f"With {policy['phase'].values[-1]:g} s left or more."
+    return [table_section("policy", "Modes chosen", columns, rows, note)]
+
+
+def trial_sections(
+    *, control_test: xr.Dataset | None = None, path: xr.Dataset | None = None
+) -> list[Section]:
+    """Return the sections of a page on the test of a policy.
+
+    Parameters
+    ----------
+    control_test : xarray.Dataset, optional
+        A `control_test`; None while there is none yet.
+    path : xarray.Dataset, optional
+        The `assembly_path` of the run that it shows.
+
+    Examples
+    --------
+    >>> [part["kind"] for part in trial_sections()]
+    ['empty']
+    """
+    parts: list[tuple[str, str, Maker]] = [
+        ("share", "Target over time", share_section),
+        ("film", "One run", film_section),
+        ("usage", "Modes used", lambda found: _table("usage", "Modes used", usage_table(found))),
+    ]
+    nothing = "There is no test yet."
+    made = sections_of(control_test, nothing, trial_summary, lambda _: [], parts)
+    if path is not None:
+        made += attempt("replay", "The run", lambda: replay_section(path))
+    return made
+
+
+def trial_summary(test: xr.Dataset) -> Section:
+    """Return what each arm reached."""
+    facts = test.attrs
+    table = arm_table(test)
+    words = [
+        f"{row[0].capitalize()}: {row[1]} ({row[2]})"
+        + (f", gain {row[3]} ({row[4]})." if row[3] else ".")
+        for row in ([str(cell) for cell in one] for one in table.rows)
+    ]  # fmt: skip
+    ends = (test["reached_low"].values[0], test["reached_high"].values[0])
+    share = figure(
+        "reached by the policy", test["reached"].values[0], ends=ends,
+        confidence=facts["confidence"],
+    )  # fmt: skip
+    return summary_section(
+        [
+            f"{required(test, 'worlds')} fresh worlds of each arm, with the same starts and "
+            f"forces. The plan states {facts['stated']:.3f}: {facts['verdict']}.",
+            f"Best constant mode: {facts['constant_mode']}.",
+            *words,
+        ],
+        [share],
+    )
+
+
+def share_section(test: xr.Dataset) -> Section:
+    """Return the share of the worlds in the target over time."""
+    require(test, "time", "share")
+    time = test["time"].values
+    drawn = [
+        series(str(name), time, test["share"].values[at])
+        for at, name in enumerate(test["arm"].values)
+    ]
+    return chart(
+        "share", "Target over time", "", x=label("time", "s"), y=label("share of worlds"),
+        series=drawn,
+    )  # fmt: skip
+
+
+def film_section(test: xr.Dataset) -> Section:
+    """Return the decisions of one run, where class or mode changed."""
+    require(test, "film_class", "film_mode")
+    classes, modes = test["film_class"].values, test["film_mode"].values
+    rows = []
+    for at, time in enumerate(test["time"].values):
+        if at and (classes[at], modes[at]) == (classes[at - 1], modes[at - 1]):
+            continue
+        mode = "" if modes[at] < 0 else str(test["mode"].values[modes[at]])
+        rows.append([f"{time:g}", short_class(str(test["class"].values[classes[at]])), mode])
+    return table_section("film", "One run", ["time [s]", "class", "mode from then on"], rows)
+
+
+def _table(id: str, title: str, table: Table) -> Section:
+    return table_section(id, title, table.columns, table.rows)

@@ -1,0 +1,209 @@
+"""`driftwalk control plan` and `test`: runs, what they hold, what they refuse, and resuming."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from command_line import FLOW, here
+from every_kind import every_kind
+from made_up_fit import made_up_fit
+from small_sensitivity import FLOW as STREAM, small
+
+import driftwalk as dw
+from driftwalk.assembly import Modes, Wanted
+from driftwalk.assembly.control.controller import Rules
+from driftwalk.assembly.control.stored import stored_modes, stored_rules
+from driftwalk.assembly.control.worlds import Setting, Worlds
+from driftwalk.core.files.shards import ShardStore
+from driftwalk.runs import ControlPlanWork, run_work
+from driftwalk.schema.kinds.fit import FIT
+from driftwalk.sweep import grid
+
+pytestmark = pytest.mark.slow
+
+TWO = (
+    *("--flow", FLOW, "--tank", "30cm", "--blocks", "2", "--target", "2", "--by", "20s"),
+    *("--vary", "flow-scale=0,1", "--vary", "force-std=0.2mN,1mN", "--rounds", "3"),
+    *("--worlds", "40"),
+)
+
+
+def modes() -> Modes:
+    one = dw.ModeSource(small(), STREAM)
+    return dw.make_modes([one], flow_scales=[0.0, 1.0], force_stds=[2e-4, 1e-3])
+
+
+def test_a_plan_and_its_test_hold_what_they_say(tmp_path: Path) -> None:
+    done = here("control", "plan", *TWO, "-o", tmp_path / "policy", "--json")
+    assert done.code == 0, done.err
+    policy = xr.load_dataset(tmp_path / "policy" / "policy.nc")
+    assert json.loads(done.out)["reached"] == policy.attrs["reached"]
+    done = here("control", "test", tmp_path / "policy", "--worlds", "40", "-o", tmp_path / "test")
+    assert done.code == 0, done.err
+    test = xr.load_dataset(tmp_path / "test" / "control_test.nc")
+    np.testing.assert_allclose(test["usage"].sum("mode"), 1.0)
+    np.testing.assert_allclose(test["share"][:, -1], test["reached"])
+    again = dw.try_control(policy, worlds=40)
+    assert again["share"].equals(test["share"])
+    # The film is the run that the test shows: the same classes at the decisions.
+    path = xr.load_dataset(tmp_path / "test" / "path.nc").isel(run=0)
+    joined = path["assembly"].sel(time=test["time"], method="nearest").values
+    single = test["class"].values.tolist().index("1+1")
+    assert ((joined[:, 0] != joined[:, 1]) == (test["film_class"].values == single)).all()
+    for folder, names in (("policy", ["policy"]), ("test", ["film_strip", "run", "shares"])):
+        assert sorted(path.stem for path in tmp_path.glob(f"{folder}/figures/*.png")) == names
+    page = tmp_path / "page.html"
+    assert here("report", tmp_path / "policy", tmp_path / "test", "-o", page).code == 0
+
+
+def test_a_policy_is_that_of_its_modes_again() -> None:
+    policy = every_kind("control_policy")
+    found = stored_modes(policy)
+    assert found.flow_scale.tolist() == [0.0, 1.0]
+    assert found.study.assembly.blocks == 3
+    np.testing.assert_array_equal(found.flows[0]["u"], STREAM["u"])
+    assert stored_rules(policy).action.shape == (1, 3, 4, 6)
+
+
+def test_worlds_do_not_depend_on_units_and_constant_ones_are_those_of_a_batch() -> None:
+    classes = dw.assembly.outcome_classes(3)
+    rules = Rules(np.zeros((1, 3, len(classes), 6), dtype=np.int64))
+    work = Worlds(modes(), classes, Setting(5.0, 3), rules, seed=4, arm="constant", only=3)
+    whole = work(next(iter(grid(world=np.arange(8)).units(8))))
+    parts = [work(unit) for unit in grid(world=np.arange(8)).units(3)]
+    for name, values in whole.items():
+        np.testing.assert_array_equal(values, np.concatenate([one[name] for one in parts]))
+    batch = dw.TankBatch(small(), STREAM, worlds=8, seed=4)
+    batch.set(force_std=1e-3, flow_scale=1.0)
+    batch.advance(15.0)
+    assert [classes[at] for at in whole["after"][:, -1]] == batch.outcome.tolist()
+
+
+def test_a_latency_delays_every_mode_but_the_first() -> None:
+    # Modes differ in the flow alone: in still water without force nothing moves.
+    one = dw.ModeSource(small(forces={"force_std_N": 0.0}), STREAM)
+    still = dw.make_modes([one], flow_scales=[0.0, 1.0])
+    classes = dw.assembly.outcome_classes(3)
+    # The flow runs in the last phase alone, which begins at the third of six decisions.
+    action = np.zeros((1, 3, len(classes), 6), dtype=np.int64)
+    action[:, 0] = 1
+    unit = next(iter(grid(world=np.arange(40)).units(40)))
+    prompt, late = (
+        Worlds(still, classes, Setting(2.0, 6, latency_s=latency), Rules(action), seed=1)(unit)
+        for latency in (0.0, 1.9)
+    )
+    assert (prompt["entered"][:, :2] == 0).all()
+    early, delayed = (one["entered"][:, 2:].sum(axis=1) for one in (prompt, late))
+    assert early.sum() >= delayed.sum() > 0
+
+
+def test_missed_looks_hold_the_mode() -> None:
+    classes = dw.assembly.outcome_classes(3)
+    action = np.ones((1, 3, len(classes), 6), dtype=np.int64)
+    rules = Rules(action, safe=0)
+    unit = next(iter(grid(world=np.arange(200)).units(200)))
+    found = Worlds(modes(), classes, Setting(0.1, 3, missed=0.5), rules, seed=1)(unit)
+    # In the safe mode until the first look: 1/2, 1/4, 1/8 of the worlds; 4 standard errors.
+    for period in range(3):
+        share = 0.5 ** (period + 1)
+        seen = (found["mode"][:, period] == 0).mean()
+        assert abs(seen - share) < 4.0 * np.sqrt(share * (1.0 - share) / 200)
+
+
+def test_a_stopped_plan_goes_on_to_the_same_policy(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Stopped(Exception):
+        """Represents a kill."""
+
+    written: list[str] = []
+    write = ShardStore.write
+
+    def some(store: ShardStore, *words: object) -> None:
+        if len(written) == 3:
+            raise Stopped
+        written.append("")
+        write(store, *words)  # type: ignore[arg-type]
+
+    work = ControlPlanWork(modes(), Wanted("L3", 20.0, 5.0), rounds=4, worlds=20, seed=1)
+    whole = run_work(work, tmp_path / "whole")
+    with monkeypatch.context() as patch:
+        patch.setattr(ShardStore, "write", some)
+        with pytest.raises(Exception):  # noqa: B017, PT011
+            run_work(work, tmp_path / "stopped")
+    again = run_work(work, tmp_path / "stopped")
+    assert again["action"].equals(whole["action"])
+    assert again.attrs["reached"] == whole.attrs["reached"]
+
+
+def test_draws_from_a_fit_are_those_of_its_uncertainty() -> None:
+    names = ["ln_drag_coefficient", "ln_noise_intensity"]
+    axes = ("log_parameter", "other_log_parameter")
+    fit = made_up_fit().assign(covariance=(axes, np.diag([0.01, 0.04])))
+    fit = fit.assign_coords(log_parameter=names, other_log_parameter=names)
+    fit.attrs["schema_version"] = FIT.version
+    study = small()
+    one = dw.ModeSource(study, STREAM, fit)
+    found = dw.make_modes([one], flow_scales=[0.0, 1.0], force_stds=[2e-4, 4e-4], seed=3)
+    drawn = dw.assembly.draw_parameters(fit, runs=99, seed=3)
+    ratio = drawn.force_std / study.forces.force_std_N
+    np.testing.assert_allclose(found.force_std[0], np.r_[2e-4, 2e-4 * ratio])
+    np.testing.assert_allclose(found.drag_coefficient[3, 1:], drawn.drag_coefficient)
+
+
+def test_modes_of_different_tanks_or_blocks_are_refused() -> None:
+    one = dw.ModeSource(small(), STREAM, name="fit-a")
+    for other, said in (
+        (small(tank={"diameter_m": 0.2}), "different tanks: fit-a .* fit-b"),
+        (small(assembly={"blocks": 2}), r"differ in \[assembly\] blocks: fit-a has 3, fit-b 2"),
+        (small(forces={"force_interval_s": 0.02}), r"\[forces\] force_interval_s"),
+    ):
+        with pytest.raises(dw.InputError, match=said):
+            dw.make_modes([one, dw.ModeSource(other, STREAM, name="fit-b")])
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--target", "T"], "target T has 4 blocks, and the tank 2"),
+        (["--target", "q"], "target q: no shape"),
+        (["--every", "30s"], "need a deadline that is not sooner"),
+        (["--every", "6s"], "no whole number of periods of 6 s"),
+        (["--latency", "5s"], "latency has to be below the 5 s"),
+        (["--missed", "1"], "missed looks is from 0 to below 1"),
+        (["--dwell", "60s"], "dwell is from 0 s to the deadline"),
+        (["--blocks", "8"], "planned for 2 to 7 blocks, got 8"),
+        (["--vary", "flow-scale=2"], "flow-scale is varied twice"),
+        (["--vary", "drag=2"], "expected NAME=VALUES with a name out of flow-scale, force-std"),
+    ],
+)
+def test_bad_plans_are_one_line(tmp_path: Path, words: list[str], said: str) -> None:
+    refused("plan", *TWO, *words, out=tmp_path / "out", said=said)
+
+
+def test_bad_policies_are_one_line(tmp_path: Path) -> None:
+    every_kind("control_policy").to_netcdf(tmp_path / "policy.nc")
+    every_kind("class_times").to_netcdf(tmp_path / "other.nc")
+    out = tmp_path / "out"
+    refused("test", tmp_path / "other.nc", out=out, said="other.nc holds no policy")
+    (tmp_path / "empty").mkdir()
+    refused("test", tmp_path / "empty", out=out, said="empty holds no policy")
+    refused("run", tmp_path / "other.nc", "--live", "127.0.0.1:5000", out=out, said="no policy")
+    good = tmp_path / "policy.nc"
+    refused("run", good, "--live", "5000", out=out, said="expected HOST:PORT")
+    refused("run", good, "--live", "127.0.0.1:1", out=out, said="no tracker on 127.0.0.1:1")
+    refused("test", good, "--latency", "9s", out=out, said="latency has to be below")
+    refused("test", good, "--force-factor", "0", out=out, said="above 0")
+
+
+def refused(command: str, *words: object, out: Path, said: str) -> None:
+    done = here("control", command, *words, *(() if command == "run" else ("-o", out)))
+    assert done.code == 2
+    assert re.search(said, done.err), done.err
+    assert len(done.err.strip().splitlines()) == 1
+    assert not out.exists()
