@@ -16,6 +16,7 @@ HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parents[1] / "tests" / "architecture")]
 
 from api_pages import write_pages  # noqa: E402
+import command_pages  # noqa: E402
 from contents import add_contents  # noqa: E402
 
 project = "driftwalk"
@@ -38,7 +39,11 @@ include_patterns = [
     "docs/gallery/**",
     "studies/*/README.md",
 ]
-exclude_patterns = ["docs/gallery/**/*.ipynb", "docs/gallery/**/*.py", "docs/gallery/**/*.zip"]
+exclude_patterns = [
+    *("docs/gallery/**/*.ipynb", "docs/gallery/**/*.py", "docs/gallery/**/*.zip"),
+    # A page for each command has its place.
+    "docs/reference/command-line.md",
+]
 
 myst_heading_anchors = 4
 myst_enable_extensions = ["dollarmath"]
@@ -48,7 +53,20 @@ html_title = f"driftwalk {release}"
 html_copy_source = False
 html_show_sourcelink = False
 html_show_copyright = False
-html_extra_path = [str(HERE / "front")]
+html_logo = str(HERE / "static" / "logo.svg")
+html_favicon = html_logo
+html_static_path = [str(HERE / "static")]
+html_css_files = ["pages.css"]
+templates_path = ["theme"]
+html_additional_pages = {"index": "front.html"}
+# A tank to play with: `driftwalk play --save` writes it, where the WebAssembly core is built.
+PLAYGROUND = HERE / "static" / "playground.html"
+html_extra_path = [str(PLAYGROUND)] if PLAYGROUND.exists() else []
+html_context = {
+    "loop": (HERE / "theme" / "loop.svg").read_text(encoding="utf-8"),
+    "playground": PLAYGROUND.exists(),
+}
+html_theme_options = {"sidebar_hide_name": False}
 
 copybutton_prompt_text = "$ "
 copybutton_only_copy_prompt_lines = False
@@ -73,4 +91,6 @@ sphinx_gallery_conf = {
 def setup(app: object) -> None:
     """Make the pages of the Python names, and the table of contents of the front page's links."""
     write_pages()
+    command_pages.write_pages()
+    app.connect("source-read", command_pages.move_links)  # type: ignore[attr-defined]
     app.connect("source-read", add_contents)  # type: ignore[attr-defined]

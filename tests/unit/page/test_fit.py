@@ -128,7 +128,8 @@ def test_the_answer_comes_first_with_its_picture_and_the_next_step(
     fit = made_up_fit()
     made = in_chapters(sections, fit, "tank")
     chapters = [part["chapter"] for part in made]
-    assert chapters[:2] == [None, None] and None not in chapters[2:]
+    assert chapters[:2] == [None, None]
+    assert None not in chapters[2:]
     # Each chapter is one piece, and nothing is lost.
     pieces = [
         name for name, before in zip(chapters, [0, *chapters], strict=False) if name != before
