@@ -28,17 +28,17 @@ def all_pages() -> dict[Path, str]:
     # What is left is about several commands.
     shared = {heading: f"# {heading}\n\n{_links(text)}" for heading, text in prose.items()}
     intro = parts[0].partition("\n")[2]
-    index = "\n".join(["# Commands\n", _links(intro, below="commands/", above=""), _index()])
+    index = "\n".join(["# Commands\n", _links(intro), _index()])
     pages = {FOLDER / f"{anchor(name)}.md": text for name, text in {**found, **shared}.items()}
-    return {REFERENCE / "commands.md": index, **pages}
+    return {FOLDER / "index.md": index, **pages}
 
 
-def move_links(_app: Any, name: str, source: list[str]) -> None:
+def move_links(_app: Any, _name: str, source: list[str]) -> None:
     """Lead the links into the one page to the pages here (the event `source-read` of Sphinx)."""
     text = source[0]
     text = re.sub(r"reference/command-line\.md#([\w-]+)", r"reference/commands/\1.md", text)
     text = re.sub(r"\]\(command-line\.md#([\w-]+)\)", r"](commands/\1.md)", text)
-    source[0] = re.sub(r"\b(reference/|\]\()command-line\.md", r"\1commands.md", text)
+    source[0] = re.sub(r"\b(reference/|\]\()command-line\.md", r"\1commands/index.md", text)
 
 
 def anchor(heading: str) -> str:
@@ -59,7 +59,7 @@ def _index() -> str:
     groups: dict[str, list[str]] = defaultdict(list)
     for name, command in _commands():
         first = (command.help or "").strip().partition("\n\n")[0]
-        row = f"| [`driftwalk {name}`](commands/{anchor(name)}.md) | {_cell(first)} |"
+        row = f"| [`driftwalk {name}`]({anchor(name)}.md) | {_cell(first)} |"
         groups[COMMANDS[name.split()[0]].heading].append(row)
     return "\n".join(
         f"## {heading}\n\n| command | what it does |\n|---|---|\n" + "\n".join(rows) + "\n"
@@ -94,12 +94,12 @@ def _cell(text: str) -> str:
     return " ".join(text.split()).replace("|", "\\|").replace("<", "&lt;").replace("[", "\\[")
 
 
-def _links(text: str, *, below: str = "", above: str = "../") -> str:
+def _links(text: str) -> str:
     """Return prose of the one page with its links as seen from where it stands now."""
 
     def moved(link: re.Match[str]) -> str:
         target = link[2]
-        new = f"{below}{target[1:]}.md" if target.startswith("#") else f"{above}{target}"
+        new = f"{target[1:]}.md" if target.startswith("#") else f"../{target}"
         return f"]({link[1]}{new})"
 
     return re.sub(r"\]\((\s*)([^)\s]+)\)", moved, text)

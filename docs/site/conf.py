@@ -15,8 +15,8 @@ from pathlib import Path
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parents[1] / "tests" / "architecture")]
 
-from api_pages import write_pages  # noqa: E402
 import command_pages  # noqa: E402
+from api_pages import write_pages  # noqa: E402
 from contents import add_contents  # noqa: E402
 
 project = "driftwalk"
@@ -53,8 +53,7 @@ html_title = f"driftwalk {release}"
 html_copy_source = False
 html_show_sourcelink = False
 html_show_copyright = False
-html_logo = str(HERE / "static" / "logo.svg")
-html_favicon = html_logo
+html_favicon = str(HERE / "static" / "logo.svg")
 html_static_path = [str(HERE / "static")]
 html_css_files = ["pages.css"]
 templates_path = ["theme"]
@@ -66,7 +65,6 @@ html_context = {
     "loop": (HERE / "theme" / "loop.svg").read_text(encoding="utf-8"),
     "playground": PLAYGROUND.exists(),
 }
-html_theme_options = {"sidebar_hide_name": False}
 
 copybutton_prompt_text = "$ "
 copybutton_only_copy_prompt_lines = False

@@ -15,7 +15,7 @@ GALLERY = ("Gallery", ["docs/gallery/index"])
 PROJECT = ("Project", ["README", "CHANGELOG", "CONTRIBUTING", "studies/*/README"])
 BELOW = {
     "docs/reference/python": ("Rooms", ["docs/reference/python/*"]),
-    "docs/reference/commands": ("Commands", ["docs/reference/commands/*"]),
+    "docs/reference/commands/index": ("Commands", ["docs/reference/commands/*"]),
 }
 """Pages with pages of their own."""
 HEADING = re.compile(r"^## (.+)$")

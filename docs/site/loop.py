@@ -127,7 +127,9 @@ def _arrows(flow: xr.Dataset) -> str:
             u, v = (26.0 / top * float(flow[name].isel(here)) for name in ("u", "v"))
             shade = SHADES[min(int(len(SHADES) * speed[row, column] / top), len(SHADES) - 1)]
             tip = (x + u, y - v)
-            ends = [(tip[0] - 0.3 * u + s * 0.18 * v, tip[1] + 0.3 * v + s * 0.18 * u) for s in (1, -1)]
+            ends = [
+                (tip[0] - 0.3 * u + s * 0.18 * v, tip[1] + 0.3 * v + s * 0.18 * u) for s in (1, -1)
+            ]
             (a, b), (c, d) = ends
             drawn.setdefault(shade, []).append(
                 f"M{x:.0f} {y:.0f}L{tip[0]:.1f} {tip[1]:.1f}M{a:.1f} {b:.1f}L{tip[0]:.1f} "

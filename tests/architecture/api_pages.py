@@ -21,7 +21,7 @@ from signatures import bases_of, signature_of
 import driftwalk
 
 FOLDER: Final = Path(__file__).resolve().parents[2] / "docs" / "reference" / "python"
-MADE: Final = "Made from the docstrings by `python tests/architecture/api_pages.py`."
+MADE: Final = "% Made from the docstrings by `python tests/architecture/api_pages.py`."
 ALL: Final = "names.md"
 # The calls of a notebook first, then the rooms in the order of the data.
 ROOMS: Final = (
@@ -67,7 +67,7 @@ def all_pages() -> dict[Path, str]:
 def _page_of_all() -> str:
     parts = [
         "# All names\n\n",
-        f"{MADE}\n"
+        f"{MADE}\n\n"
         "Each name leads to its arguments with units, results, errors and an example, as\n"
         "`help(driftwalk.fit)` shows them. Names in **bold** are also at the top, such as\n"
         "`driftwalk.load`.\n\n",
@@ -107,7 +107,7 @@ def _room_page(name: str) -> str:
     rows = [_row(name, room, public) for public in names if public not in constants]
     parts = [
         f"# {_title(name)}",
-        f"{MADE} [All names]({ALL}).",
+        f"{MADE}\n\n[All names]({ALL})",
         as_markdown(inspect.getdoc(room) or ""),
         TABLE + "".join(rows) if rows else "",
         *(_constant(room, public) for public in constants),
@@ -127,7 +127,7 @@ def _name_page(name: str, public: str) -> str:
     parts = [
         "---\norphan: true\n---",
         f"# {'driftwalk' if top else _module(name)}.{public}",
-        f"In [{_title(name)}](../{_file(name)}.md). {MADE}",
+        f"{MADE}\n\nIn [{_title(name)}](../{_file(name)}.md)",
         _code(public, found),
         as_markdown(inspect.getdoc(found) or ""),
     ]
