@@ -35,7 +35,24 @@ def test_speed_is_in_cm_per_s_and_outside_is_blank(flow) -> None:
     outside = flow["flag"].values == FLAGS["outside"]
     np.testing.assert_allclose(drawn[~outside], expected[~outside])
     assert outside.any()
-    assert np.isnan(drawn[outside]).all()
+    # Cells that the wall cuts have their centre outside: drawn as their neighbour, cut at the wall.
+    cut = outside & ~np.isnan(drawn)
+    size = float(flow["x"][1] - flow["x"][0])
+    centre = np.hypot(*np.meshgrid(flow["x"].values, flow["y"].values))
+    assert (centre[cut] < 0.15 + 1.5 * size).all()
+    assert np.isnan(drawn[outside & (centre > 0.15 + 2.0 * size)]).all()
+    assert _mesh(ax).get_clip_path() is not None
+
+
+def test_the_scale_is_that_of_the_measured_nodes(flow) -> None:
+    """A filled node may be far faster than all that was measured."""
+    guessed = flow.copy(deep=True)
+    row, column = np.argwhere(guessed["flag"].values == FLAGS["measured"])[0]
+    guessed["flag"][row, column] = FLAGS["filled"]
+    guessed["u"][row, column] = 10.0
+    kept = np.array(guessed["flag"].values == FLAGS["measured"])
+    measured = 100.0 * np.hypot(guessed["u"].values, guessed["v"].values)[kept]
+    assert _mesh(plot_flow(guessed)).get_clim()[1] == pytest.approx(measured.max())
 
 
 def test_tank_outline_labels_and_equal_aspect(flow) -> None:
