@@ -51,5 +51,5 @@ def test_commands_on_the_front_page_are_known() -> None:
 def test_links_of_the_pages_lead_somewhere(made: ModuleType) -> None:
     pages = made.all_pages()
     for path, text in pages.items():
-        broken = [link for link in broken_links(path, text) if not (path.parent / link) in pages]
+        broken = [link for link in broken_links(path, text) if (path.parent / link) not in pages]
         assert not broken, path

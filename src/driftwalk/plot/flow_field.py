@@ -86,7 +86,7 @@ def plot_flow(
     filled = (flag == FLAGS["filled"]) & np.isfinite(speed)
     top = _top(speed, filled) if speed_limit is None else 100.0 * speed_limit
     tank = arena_of(flow, arena)
-    shown, hatched = (speed, filled) if tank is None else _to_the_wall(speed, filled)
+    shown, hatched = (speed, filled) if tank is None else _to_the_wall(speed, filled, flag)
     mesh = ax.pcolormesh(
         x, y, shown, cmap=style.speed_colormap(), vmin=0.0, vmax=top or 1.0, shading="nearest"
     )
@@ -110,19 +110,20 @@ def _top(speed: Floats, filled: Bools) -> float:
     return float(np.max(speed[known] if known.any() else np.nan_to_num(speed), initial=0.0))
 
 
-def _to_the_wall(speed: Floats, filled: Bools) -> tuple[Floats, Bools]:
+def _to_the_wall(speed: Floats, filled: Bools, flag: npt.NDArray[np.int8]) -> tuple[Floats, Bools]:
     """Return the field with the cells that the wall cuts, as the next node inside has them.
 
     Their centres lie outside of the tank; without them white corners stay inside of the wall.
     """
     from scipy.ndimage import distance_transform_edt
 
-    if not np.isfinite(speed).any():
+    outside = flag == FLAGS["outside"]
+    if not outside.any() or outside.all():
         return speed, filled
-    off, nearest = distance_transform_edt(~np.isfinite(speed), return_indices=True)
-    near = off < 1.5
-    row, column = nearest
-    return np.where(near, speed[row, column], np.nan), near & filled[row, column]
+    off, (row, column) = distance_transform_edt(outside, return_indices=True)
+    # One cell further, corners included.
+    cut = outside & (off < 1.5)
+    return np.where(cut, speed[row, column], speed), filled | (cut & filled[row, column])
 
 
 def velocity_of(flow: xr.Dataset, field: Field) -> tuple[Floats, Floats, npt.NDArray[np.int8]]:
