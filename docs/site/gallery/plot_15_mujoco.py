@@ -49,11 +49,11 @@ mujoco.set_mjcb_passive(None)
 radius = 1e2 * study.tank.radius_m
 left.add_patch(plt.Circle((0, 0), radius, fill=False, color="0.5"))
 left.set(
-    xlabel="x [cm]", ylabel="y [cm]", aspect="equal",
+    xlabel="x (cm)", ylabel="y (cm)", aspect="equal",
     xlim=(-1.04 * radius, 1.04 * radius), ylim=(-1.04 * radius, 1.04 * radius),
     title="driftwalk (wide) and MuJoCo (black)",
 )  # fmt: skip
 right.set(
-    xlabel="time [s]", ylabel="distance [µm]", ylim=(0, None),
+    xlabel="time (s)", ylabel="distance (µm)", ylim=(0, None),
     title="how far apart the two are",
 )  # fmt: skip

@@ -314,8 +314,11 @@ def draw_sketches_below(ax: Axes, positions: Sequence[float], names: Sequence[st
                 )
             )  # fmt: skip
         if lines:
-            depth += NAME_GAP_PT + 1.2 * NAME_SIZE_PT * len(lines)
-            style = {"size": NAME_SIZE_PT, "color": INK, "ha": "center"}
+            # One word that is wider than its place is set smaller, and not turned.
+            widest = LETTER_PT * max(map(len, lines))
+            size = NAME_SIZE_PT * min(1.0, slot_pt / widest)
+            depth += NAME_GAP_PT + 1.2 * size * len(lines)
+            style = {"size": size, "color": INK, "ha": "center"}
             parts.append(TextArea("\n".join(lines), textprops=style, multilinebaseline=True))
         stacked = VPacker(children=parts, align="center", pad=0.0, sep=NAME_GAP_PT)
         _pinned(
