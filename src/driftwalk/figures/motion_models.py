@@ -184,7 +184,7 @@ def _label(calibration: xr.Dataset, index: int) -> str:
     one = calibration.isel(parameter=index)
     unit = str(one["unit"].values)
     words = fill(str(one["parameter"].values).replace("_", " "), width=11)
-    return words if unit == "1" else f"{words}\n[{unit}]"
+    return words if unit == "1" else f"{words}\n({unit.replace('2', '²')})"
 
 
 def comparison_figures(comparison: xr.Dataset) -> Figures:
