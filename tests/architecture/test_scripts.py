@@ -95,7 +95,7 @@ def test_the_page_of_performance_names_every_benchmark(name: str) -> None:
     assert f"bench_{name}.py" in page
 
 
-@pytest.mark.slow
+@pytest.mark.study
 @pytest.mark.parametrize("name", SMALLEST)
 def test_a_benchmark_runs_at_its_smallest_size(name: str) -> None:
     done = started(ROOT / "benchmarks" / f"bench_{name}.py", *SMALLEST[name])

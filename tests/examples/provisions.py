@@ -11,12 +11,13 @@ import shlex
 import shutil
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
+import pytest
 import xarray as xr
 from chain_runs import chain_runs
 from command_line import FLOW, GRID, RECORDING, here
@@ -63,19 +64,17 @@ class Page:
     """Whether the commands draw their figures, which take most of a small run."""
     little: bool = False
     """Whether searches for models simulate little, with every stage of theirs."""
-    daily: Mapping[str, str] = field(default_factory=dict)
-    """As `instead`, for a page that takes more than a minute: the whole of it runs once a week."""
     needs: tuple[str, ...] = ()
     """Packages without which the examples are skipped."""
     slow: bool = False
     """Whether the page takes more than 0.3 s of processor time."""
+    weekly: bool = False
+    """Whether it takes half a minute or more of commands that other tests run in CI."""
 
-    def every_day(self) -> Page:
-        """Return how the page runs in every test: it searches little, where that is a study."""
-        if not self.daily:
-            return self
-        instead = {**self.instead, **self.daily}
-        return replace(self, instead=instead, little=True, numbers=Numbers.ANY)
+    @property
+    def marks(self) -> list[pytest.MarkDecorator]:
+        """When the page runs."""
+        return [pytest.mark.study] * self.weekly or [pytest.mark.slow] * self.slow
 
 
 def _files(*provisions: Callable[[Path], Names]) -> Callable[[Path], Names]:
@@ -536,7 +535,7 @@ PAGES: dict[str, Page] = {
         ),
         draws=False,
         little=True,
-        slow=True,
+        weekly=True,
     ),
     "docs/how-to/dimer.md": Page(
         provide=_block_and_dimer,
@@ -675,6 +674,7 @@ PAGES: dict[str, Page] = {
         makes=("run/calibration.nc",),
         needs=("mujoco",),
         draws=False,
+        little=True,
         slow=True,
     ),
     "docs/how-to/view.md": Page(
@@ -713,12 +713,11 @@ PAGES: dict[str, Page] = {
         slow=True,
     ),
     "docs/tutorials/your-own-model.md": Page(
-        daily={"-o run": "--replicates 1 --bootstrap 4 -o run"},
         holds=("len(track) == 2000",),
         makes=("run/calibration.nc", "compare/comparison.nc"),
         numbers=Numbers.CLOSE,
         draws=False,
-        slow=True,
+        weekly=True,
     ),
     "docs/validation.md": Page(
         not_run={

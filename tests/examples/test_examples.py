@@ -46,19 +46,9 @@ def run_page(name: str, page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(name, marks=[pytest.mark.slow] * page.slow) for name, page in PAGES.items()],
+    [pytest.param(name, marks=page.marks) for name, page in PAGES.items()],
 )
 def test_examples_of_a_page_run(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    run_page(name, PAGES[name].every_day(), monkeypatch)
-
-
-@pytest.mark.study
-@pytest.mark.parametrize("name", [name for name, page in PAGES.items() if page.daily])
-def test_a_long_page_shows_what_it_prints(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Its numbers are compared; `test_examples_of_a_page_run` runs it with short searches."""
     monkeypatch.chdir(tmp_path)
     run_page(name, PAGES[name], monkeypatch)
 
@@ -194,7 +184,7 @@ def test_what_is_said_about_a_page_is_on_it(name: str) -> None:
     ]
     for pattern in (*PAGES[name].not_run, *PAGES[name].numbers_of):
         assert fnmatch.filter(commands, pattern), pattern
-    for old in PAGES[name].every_day().instead:
+    for old in PAGES[name].instead:
         assert any(old in block.text for block in blocks), old
 
 

@@ -183,11 +183,11 @@ def test_threads_do_not_change_a_single_bit(found):
     assert again.identical(found)
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_the_second_half_of_a_changing_flow_has_its_own_water():
     """The water flows half as fast from 200 s on: simulated with the first half's, D is above 0.3.
 
-    How it goes on is tested with `flow_since`.
+    How it goes on is tested with `flow_since`, in every run.
     """
     steady = dw.tank30_flow()
     fields = [steady, steady, *(2 * [steady.assign(u=0.5 * steady["u"], v=0.5 * steady["v"])])]
@@ -309,11 +309,12 @@ def test_a_minute_says_how_little_it_tells():
     assert window[0] <= low < TRUTH["force_std_N"] < high <= window[-1]
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_the_truth_of_a_slow_orbit_is_in_the_intervals():
     """Simulations of a smaller force scatter less there, and are nearer on average.
 
-    The seed is fixed, because each 90 % interval misses in a tenth of recordings.
+    The seed is fixed, because each 90 % interval misses in a tenth of recordings. In every run:
+    `test_the_truth_of_a_synthetic_recording_is_found`.
     """
     study = apply_overrides(
         dw.Study(),

@@ -164,10 +164,11 @@ def test_four_blocks_with_heavy_noise(
     assert found["unmarked"] == 0
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_a_fit_of_tracked_poses_is_that_of_the_true_ones(
     scenes: ModuleType, scores: ModuleType, tmp_path: Path
 ) -> None:
+    """The poses themselves are scored by `test_four_blocks_with_moderate_noise` in every run."""
     out, motion, truth = filmed(scenes, tmp_path, "closed-loop", 301, 200)
     errors = scores.score(xr.load_dataset(out), truth)
     sizes = 1e-3 * errors["position_sd_per_axis_mm"], np.radians(errors["angle_sd_deg"])
