@@ -19,6 +19,8 @@ import command_pages  # noqa: E402
 from api_pages import write_pages  # noqa: E402
 from contents import add_contents  # noqa: E402
 
+from driftwalk.cli.main import load_command  # noqa: E402
+
 project = "driftwalk"
 author = "The driftwalk developers"
 copyright = author
@@ -58,12 +60,10 @@ html_static_path = [str(HERE / "static")]
 html_css_files = ["pages.css"]
 templates_path = ["theme"]
 html_additional_pages = {"index": "front.html"}
-# A tank to play with: `driftwalk play --save` writes it, where the WebAssembly core is built.
-PLAYGROUND = HERE / "static" / "playground.html"
-html_extra_path = [str(PLAYGROUND)] if PLAYGROUND.exists() else []
 html_context = {
     "loop": (HERE / "theme" / "loop.svg").read_text(encoding="utf-8"),
-    "playground": PLAYGROUND.exists(),
+    # `make site` saves it next to the front page, with a driftwalk that can.
+    "playground": any("--save" in one.opts for one in load_command("play").params),
 }
 
 copybutton_prompt_text = "$ "

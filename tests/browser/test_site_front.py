@@ -61,7 +61,9 @@ NAMELESS = """() => [...document.querySelectorAll(
   .filter((e) => !(e.textContent.trim() || e.getAttribute("aria-label") || e.labels?.length
     || e.hasAttribute("alt")))
   .map((e) => e.outerHTML.slice(0, 120))"""
-FIRST_PAINT = """() => performance.getEntriesByName("first-contentful-paint")[0]?.startTime ?? null"""
+FIRST_PAINT = (
+    """() => performance.getEntriesByName("first-contentful-paint")[0]?.startTime ?? null"""
+)
 
 
 @pytest.fixture(scope="module")
