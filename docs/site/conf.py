@@ -11,6 +11,7 @@ from __future__ import annotations
 import sys
 from importlib.metadata import version as version_of
 from pathlib import Path
+from typing import Any
 
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parents[1] / "tests" / "architecture")]
@@ -86,9 +87,24 @@ sphinx_gallery_conf = {
 }
 
 
+def crop_thumbnails(app: Any, error: Exception | None) -> None:
+    """Show of a wide figure its first panel: shrunk as a whole it could not be read."""
+    from PIL import Image
+
+    for thumbnail in [] if error else Path(app.outdir, "_images").glob("sphx_glr_*_thumb.png"):
+        whole = thumbnail.with_name(thumbnail.name.replace("_thumb", "_001"))
+        if whole.exists():
+            with Image.open(whole) as picture:
+                width, height = picture.size
+                part = picture.crop((0, 0, min(width, round(1.25 * height)), height))
+                part.thumbnail((400, 320))
+                part.save(thumbnail)
+
+
 def setup(app: object) -> None:
     """Make the pages of the Python names, and the table of contents of the front page's links."""
     write_pages()
     command_pages.write_pages()
+    app.connect("build-finished", crop_thumbnails)  # type: ignore[attr-defined]
     app.connect("source-read", command_pages.move_links)  # type: ignore[attr-defined]
     app.connect("source-read", add_contents)  # type: ignore[attr-defined]

@@ -9,6 +9,9 @@ import { fillSection } from "./draw";
 
 const more = object({ picture: nullable(text), next: withDefault(list(text), []) });
 
+/** A longer legend is for the chapter: here it would take more room than its picture. */
+const MOST_NAMED = 6;
+
 export async function drawAnswer(
   frame: HTMLElement,
   section: RawSection,
@@ -27,12 +30,13 @@ export async function drawAnswer(
   await fillSection(room, shown, { ...context, memory: new Map() });
   const drawing = room.querySelector<SVGSVGElement>("svg[role=img]");
   const legend = room.querySelector(".legend");
+  const named = legend !== null && legend.childElementCount <= MOST_NAMED ? legend : null;
   room.remove();
   if (drawing === null) return;
   // A picture and no more: to point and to click is for the chapter.
   drawing.removeAttribute("tabindex");
   const caption = el("figcaption", {}, el("a", { href: `#${shown.id}` }, ...rich(shown.title)));
-  const still = el("div", { inert: true }, drawing, legend);
+  const still = el("div", { inert: true }, drawing, named);
   frame.append(el("figure", { class: "answer-picture" }, still, caption));
 }
 

@@ -8,6 +8,8 @@ import { percent, valueAndInterval } from "../units";
 
 /** How many numbers stand open: a row on a wide page. */
 const MOST_NUMBERS = 4;
+/** How many paragraphs stand open from the verdict on. */
+const MOST_REASONS = 5;
 
 type Item = SummarySection["numbers"][number];
 
@@ -19,7 +21,12 @@ export function drawSummary(section: SummarySection, body: HTMLElement): void {
   const begin = words.findIndex((one) => one.dataset["verdict"] !== undefined);
   body.append(...words.slice(0, begin < 0 ? words.length : begin));
   if (first.length > 0) body.append(el("dl", { class: "numbers" }, ...first.map(card)));
-  if (begin >= 0) body.append(...words.slice(begin));
+  if (begin >= 0) {
+    const reasons = words.slice(begin);
+    body.append(...reasons.slice(0, MOST_REASONS));
+    const rest = reasons.slice(MOST_REASONS);
+    if (rest.length > 0) body.append(details(`${rest.length} more remarks`, () => el("div", {}, ...rest)));
+  }
   if (others.length > 0) {
     body.append(details("More numbers", () => el("dl", { class: "numbers" }, ...others.map(card))));
   }
@@ -28,7 +35,9 @@ export function drawSummary(section: SummarySection, body: HTMLElement): void {
 /** Returns a paragraph; one with the verdict carries it, so that it can be seen. */
 function paragraph(text: string): HTMLElement {
   const [, word, rest] = /^Verdict: (explains|does not explain|cannot tell|not checked)(.*)$/s.exec(text) ?? [];
-  if (word === undefined) return el("p", { class: "lead" }, ...rich(text));
+  if (word === undefined) {
+    return el("p", { class: "lead", "data-verdict": text.startsWith("Verdict: ") && "other" }, ...rich(text));
+  }
   return el("p", { class: "lead verdict", "data-verdict": word }, "Verdict: ", el("b", {}, word), ...rich(rest ?? ""));
 }
 
