@@ -33,7 +33,7 @@ import verify  # noqa: E402
 
 model = mujoco.MjModel.from_xml_path(str(work / "tank" / "tank.xml"))
 own = dict(np.load(work / "tank" / "reference.npz"))
-plt.rcParams["axes.prop_cycle"] = plt.cycler(color=["#0072B2", "#D55E00", "#009E73"])
+plt.rcParams["axes.prop_cycle"] = plt.cycler(color=["#0072B2", "#D55E00", "#009E73", "#CC79A7"])
 figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4.2), layout="constrained")
 for row, replicate in enumerate(own["noisy_replicate"]):
     x, y, theta = (own[f"noisy_{key}"][row] for key in ("x_m", "y_m", "theta_rad"))

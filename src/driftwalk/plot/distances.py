@@ -145,8 +145,8 @@ def plot_refined_map(
     _hatch_causes(ax, edges, status, np.isfinite(score))
     lines = None
     if min(surface.shape) >= 2 and np.isfinite(surface).any():
-        places = [one.values(calibration, "refined_") for one in (across, up)]
-        lines = ax.contour(*_finely(*places, surface), levels=6, colors="white", linewidths=0.6)
+        at_x, at_y = (one.values(calibration, "refined_") for one in (across, up))
+        lines = ax.contour(*_finely(at_x, at_y, surface), levels=6, colors="white", linewidths=0.6)
     _draw_region(ax, calibration)
     draw_optimum(ax, calibration)
     ax.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])

@@ -77,10 +77,10 @@ def plot_class_graph(kinetics: xr.Dataset, ax: Axes | None = None) -> Axes:
             "", xy=tuple(first + 0.8 * (last - first)), xytext=tuple(first + 0.2 * (last - first)),
             arrowprops={"arrowstyle": "-|>", "lw": 0.4 + 2.6 * share, "color": style.MUTED},
         )  # fmt: skip
-        at = _free_place(first, last, [*taken, *map(np.array, place.values())])
-        taken.append(at)
+        free = _free_place(first, last, [*taken, *map(np.array, place.values())])
+        taken.append(free)
         ax.text(
-            float(at[0]), float(at[1]), f"{1e3 * rate:.2g}", fontsize=6.0, ha="center", va="center",
+            float(free[0]), float(free[1]), f"{1e3 * rate:.2g}", fontsize=6.0, ha="center", va="center",
             bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none"},
         )  # fmt: skip
     colors = class_colors(list(place))
