@@ -8,6 +8,7 @@ The sources lie in the root of the repository, so that links between the pages a
 
 from __future__ import annotations
 
+import re
 import sys
 from importlib.metadata import version as version_of
 from pathlib import Path
@@ -80,6 +81,8 @@ sphinx_gallery_conf = {
     "show_signature": False,
     "remove_config_comments": True,
     "min_reported_time": 1e9,
+    # Its page would load programs from elsewhere.
+    "write_computation_times": False,
     "abort_on_example_error": True,
     "matplotlib_animations": False,
     "image_scrapers": ("matplotlib",),
@@ -101,10 +104,23 @@ def crop_thumbnails(app: Any, error: Exception | None) -> None:
                 part.save(thumbnail)
 
 
+def refuse_requests(app: Any, error: Exception | None) -> None:
+    """End a build in which a page loads anything from elsewhere: the site works offline."""
+    from sphinx.errors import ExtensionError
+
+    loads = re.compile(
+        r'<(?:script|img|iframe|source|link)\b[^>]*\b(?:src|href)="(?:https?:)?//[^"]*'
+    )
+    for page in [] if error else Path(app.outdir).rglob("*.html"):
+        if found := loads.search(page.read_text(encoding="utf-8")):
+            raise ExtensionError(f"{page} loads from elsewhere: {found[0]}")
+
+
 def setup(app: object) -> None:
     """Make the pages of the Python names, and the table of contents of the front page's links."""
     write_pages()
     command_pages.write_pages()
     app.connect("build-finished", crop_thumbnails)  # type: ignore[attr-defined]
+    app.connect("build-finished", refuse_requests)  # type: ignore[attr-defined]
     app.connect("source-read", command_pages.move_links)  # type: ignore[attr-defined]
     app.connect("source-read", add_contents)  # type: ignore[attr-defined]

@@ -80,7 +80,8 @@ def plot_class_graph(kinetics: xr.Dataset, ax: Axes | None = None) -> Axes:
         free = _free_place(first, last, [*taken, *map(np.array, place.values())])
         taken.append(free)
         ax.text(
-            float(free[0]), float(free[1]), f"{1e3 * rate:.2g}", fontsize=6.0, ha="center", va="center",
+            float(free[0]), float(free[1]), f"{1e3 * rate:.2g}", fontsize=6.0, ha="center",
+            va="center",
             bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none"},
         )  # fmt: skip
     colors = class_colors(list(place))
