@@ -8,15 +8,20 @@ The sources lie in the root of the repository, so that links between the pages a
 
 from __future__ import annotations
 
+import re
 import sys
 from importlib.metadata import version as version_of
 from pathlib import Path
+from typing import Any
 
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parents[1] / "tests" / "architecture")]
 
+import command_pages  # noqa: E402
 from api_pages import write_pages  # noqa: E402
 from contents import add_contents  # noqa: E402
+
+from driftwalk.cli.main import load_command  # noqa: E402
 
 project = "driftwalk"
 author = "The driftwalk developers"
@@ -38,7 +43,11 @@ include_patterns = [
     "docs/gallery/**",
     "studies/*/README.md",
 ]
-exclude_patterns = ["docs/gallery/**/*.ipynb", "docs/gallery/**/*.py", "docs/gallery/**/*.zip"]
+exclude_patterns = [
+    *("docs/gallery/**/*.ipynb", "docs/gallery/**/*.py", "docs/gallery/**/*.zip"),
+    # A page for each command has its place.
+    "docs/reference/command-line.md",
+]
 
 myst_heading_anchors = 4
 myst_enable_extensions = ["dollarmath"]
@@ -48,7 +57,16 @@ html_title = f"driftwalk {release}"
 html_copy_source = False
 html_show_sourcelink = False
 html_show_copyright = False
-html_extra_path = [str(HERE / "front")]
+html_favicon = str(HERE / "static" / "logo.svg")
+html_static_path = [str(HERE / "static")]
+html_css_files = ["pages.css"]
+templates_path = ["theme"]
+html_additional_pages = {"index": "front.html"}
+html_context = {
+    "loop": (HERE / "theme" / "loop.svg").read_text(encoding="utf-8"),
+    # `make site` saves it next to the front page, with a driftwalk that can.
+    "playground": any("--save" in one.opts for one in load_command("play").params),
+}
 
 copybutton_prompt_text = "$ "
 copybutton_only_copy_prompt_lines = False
@@ -63,6 +81,8 @@ sphinx_gallery_conf = {
     "show_signature": False,
     "remove_config_comments": True,
     "min_reported_time": 1e9,
+    # Its page would load programs from elsewhere.
+    "write_computation_times": False,
     "abort_on_example_error": True,
     "matplotlib_animations": False,
     "image_scrapers": ("matplotlib",),
@@ -70,7 +90,37 @@ sphinx_gallery_conf = {
 }
 
 
+def crop_thumbnails(app: Any, error: Exception | None) -> None:
+    """Show of a wide figure its first panel: shrunk as a whole it could not be read."""
+    from PIL import Image
+
+    for thumbnail in [] if error else Path(app.outdir, "_images").glob("sphx_glr_*_thumb.png"):
+        whole = thumbnail.with_name(thumbnail.name.replace("_thumb", "_001"))
+        if whole.exists():
+            with Image.open(whole) as picture:
+                width, height = picture.size
+                part = picture.crop((0, 0, min(width, round(1.25 * height)), height))
+                part.thumbnail((400, 320))
+                part.save(thumbnail)
+
+
+def refuse_requests(app: Any, error: Exception | None) -> None:
+    """End a build in which a page loads anything from elsewhere: the site works offline."""
+    from sphinx.errors import ExtensionError
+
+    loads = re.compile(
+        r'<(?:script|img|iframe|source|link)\b[^>]*\b(?:src|href)="(?:https?:)?//[^"]*'
+    )
+    for page in [] if error else Path(app.outdir).rglob("*.html"):
+        if found := loads.search(page.read_text(encoding="utf-8")):
+            raise ExtensionError(f"{page} loads from elsewhere: {found[0]}")
+
+
 def setup(app: object) -> None:
     """Make the pages of the Python names, and the table of contents of the front page's links."""
     write_pages()
+    command_pages.write_pages()
+    app.connect("build-finished", crop_thumbnails)  # type: ignore[attr-defined]
+    app.connect("build-finished", refuse_requests)  # type: ignore[attr-defined]
+    app.connect("source-read", command_pages.move_links)  # type: ignore[attr-defined]
     app.connect("source-read", add_contents)  # type: ignore[attr-defined]

@@ -13,7 +13,10 @@ from typing import Any
 FRONT = "docs/index"
 GALLERY = ("Gallery", ["docs/gallery/index"])
 PROJECT = ("Project", ["README", "CHANGELOG", "CONTRIBUTING", "studies/*/README"])
-BELOW = {"docs/reference/python": ("Rooms", ["docs/reference/python/*"])}
+BELOW = {
+    "docs/reference/python": ("Rooms", ["docs/reference/python/*"]),
+    "docs/reference/commands/index": ("Commands", ["docs/reference/commands/*"]),
+}
 """Pages with pages of their own."""
 HEADING = re.compile(r"^## (.+)$")
 LINK = re.compile(r"\]\(([^)#:]+)\.md\)")

@@ -18,35 +18,51 @@ import xarray as xr
 
 import driftwalk as dw
 
-WIDTH_IN, HEIGHT_IN, DOTS_PER_INCH = 10.5, 3.1, 100
+WIDTH_IN, HEIGHT_IN, DOTS_PER_INCH = 8.35, 2.8, 220
+# All three axes stand on one line and have one height: left, width [in].
+BOTTOM_IN, AXES_IN = 0.78, 1.7
+PLACES_IN = ((0.55, 1.7), (3.4, 1.7), (6.35, 1.9))
 EXCERPT_S = 120.0
+LEAST_SHARE = 0.01
 TICKS_CM = (-15, 0, 15)
 
 
 def draw(fit: Path, four: Path, target: Path) -> None:
     """Draw the three panels and write them as a PNG."""
-    plt.rcParams["axes.titlesize"] = "medium"
-    figure, axes = plt.subplots(
-        1,
-        3,
-        figsize=(WIDTH_IN, HEIGHT_IN),
-        width_ratios=(1.0, 1.0, 1.25),
-        layout="constrained",
-    )
+    plt.rcParams.update({"font.size": 8.0, "axes.titlesize": 8.5, "axes.titlepad": 7.0})
+    figure = plt.figure(figsize=(WIDTH_IN, HEIGHT_IN))
+    axes = [
+        figure.add_axes(
+            (left / WIDTH_IN, BOTTOM_IN / HEIGHT_IN, width / WIDTH_IN, AXES_IN / HEIGHT_IN)
+        )
+        for left, width in PLACES_IN
+    ]
     with xr.open_dataset(fit / "recording.nc", engine="h5netcdf") as recording:
         dw.plot.trajectory(recording, axes[0], stop=EXCERPT_S)
-    axes[0].set_title("in: the track of a block (2 of 30 min)")
+    axes[0].set_title("in: a block's track (2 of 30 min)")
     with xr.open_dataset(fit / "flow.nc", engine="h5netcdf") as flow:
         dw.plot.flow(flow, axes[1])
-    axes[1].set_title("out: the flow, with drag and noise")
-    for tank in axes[:2]:
+    axes[1].set_title("out: flow, drag and noise")
+    for tank, (left, width) in zip(axes[:2], PLACES_IN, strict=False):
         tank.set_xticks(TICKS_CM)
         tank.set_yticks(TICKS_CM)
+        tank.set_position(
+            (left / WIDTH_IN, BOTTOM_IN / HEIGHT_IN, width / WIDTH_IN, AXES_IN / HEIGHT_IN)
+        )
+    bars = [ax for ax in figure.axes if ax not in axes]
+    for bar, (left, width) in zip(bars, PLACES_IN, strict=False):
+        place = ((left + width + 0.06) / WIDTH_IN, BOTTOM_IN / HEIGHT_IN)
+        bar.set_axes_locator(None)
+        bar.set_position((*place, 0.09 / WIDTH_IN, AXES_IN / HEIGHT_IN))
+        bar.set_aspect("auto")
     with xr.open_dataset(four / "distribution.nc", engine="h5netcdf") as shares:
-        dw.plot.outcomes(shares, axes[2])
+        # What nearly no run builds needs no bar in a first look: the caption says so.
+        shown = shares.isel({"class": shares["proportion"].values >= LEAST_SHARE})
+        dw.plot.outcomes(shown, axes[2])
     # The caption says how many runs and which intervals.
     axes[2].get_legend().remove()
-    axes[2].set_title("next: what four such blocks build")
+    axes[2].set_title("next: what four blocks build")
+    axes[2].spines[["top", "right"]].set_visible(False)
     figure.savefig(target, dpi=DOTS_PER_INCH)
 
 

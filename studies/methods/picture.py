@@ -85,7 +85,7 @@ def estimates(lines: list[dict[str, Any]]) -> Figure:
             )  # fmt: skip
         if line["method"] != "KS grid, true flow":
             axes[2].plot(100.0 * line["flow_error"], y, marker, color=color, markersize=4.0)
-    for ax, label in zip(axes, ("C_d / truth", "σ_F / truth"), strict=False):
+    for ax, label in zip(axes, ("$C_d$ / truth", r"$\sigma_F$ / truth"), strict=False):
         ax.axvline(1.0, color=INK, linewidth=0.7, zorder=0)
         ax.set_xscale("log")
         ax.set_xticks([0.25, 0.5, 1.0, 2.0, 4.0], ["¼", "½", "1", "2", "4"])
@@ -137,7 +137,7 @@ def distances(lines: list[dict[str, Any]]) -> Figure:
         fontsize=6.5, color=MUTED,
     )  # fmt: skip
     ax.set_xlabel("KS distance D at the estimate / its noise floor")
-    ax.set_ylabel("error of C_d, size (%)")
+    ax.set_ylabel("error of $C_d$, size (%)")
     figure.legend(loc="outside lower center", ncols=2)
     return figure
 

@@ -116,9 +116,9 @@ def main(out: Path) -> None:
     for number, (axes, name) in enumerate(zip(panels.flat, NAMES, strict=True)):
         lines = draw(axes, name, number)
     for axes in panels[-1]:
-        axes.set_xlabel("x [cm]")
+        axes.set_xlabel("x (cm)")
     for axes in panels[:, 0]:
-        axes.set_ylabel("y [cm]")
+        axes.set_ylabel("y (cm)")
     figure.colorbar(lines, ax=panels, label="speed [cm/s]", shrink=0.8, extend="max")
     out.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(out, dpi=110)

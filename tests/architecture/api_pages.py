@@ -21,7 +21,7 @@ from signatures import bases_of, signature_of
 import driftwalk
 
 FOLDER: Final = Path(__file__).resolve().parents[2] / "docs" / "reference" / "python"
-MADE: Final = "Made from the docstrings by `python tests/architecture/api_pages.py`."
+MADE: Final = "% Made from the docstrings by `python tests/architecture/api_pages.py`."
 ALL: Final = "names.md"
 # The calls of a notebook first, then the rooms in the order of the data.
 ROOMS: Final = (
@@ -50,15 +50,24 @@ TABLE: Final = "| name | what |\n|---|---|\n"
 
 
 def all_pages() -> dict[Path, str]:
-    """Return the pages by their paths: one of all names, and one per room."""
-    rooms = {FOLDER / f"{_file(name)}.md": _room_page(name) for name in (*ROOMS, ERRORS)}
-    return {FOLDER / ALL: _page_of_all(), **rooms}
+    """Return the pages by their paths: of all names, of each room, of each function and class."""
+    rooms = (*ROOMS, ERRORS)
+    return {
+        FOLDER / ALL: _page_of_all(),
+        **{FOLDER / f"{_file(name)}.md": _room_page(name) for name in rooms},
+        **{
+            FOLDER / _file(name) / f"{public}.md": _name_page(name, public)
+            for name in rooms
+            for public in _names(name)
+            if _is_documented(getattr(_room(name), public))
+        },
+    }
 
 
 def _page_of_all() -> str:
     parts = [
         "# All names\n\n",
-        f"{MADE}\n"
+        f"{MADE}\n\n"
         "Each name leads to its arguments with units, results, errors and an example, as\n"
         "`help(driftwalk.fit)` shows them. Names in **bold** are also at the top, such as\n"
         "`driftwalk.load`.\n\n",
@@ -75,7 +84,9 @@ def _row(name: str, room: ModuleType, public: str) -> str:
     found = getattr(room, public)
     call = f"{public}{_short_arguments(found)}"
     top = getattr(driftwalk, public, None) is found and public in driftwalk._MODULE_OF
-    shown = f"[`{call}`]({_file(name)}.md#{_anchor(public)})"
+    own = _is_documented(found)
+    place = f"{_file(name)}/{public}.md" if own else f"{_file(name)}.md#{_anchor(public)}"
+    shown = f"[`{call}`]({place})"
     return f"| {f'**{shown}**' if top else shown} | {_first_line(found)} |\n"
 
 
@@ -92,25 +103,37 @@ def _short_arguments(found: Any) -> str:
 def _room_page(name: str) -> str:
     room = _room(name)
     names = _names(name)
+    constants = [one for one in names if not _is_documented(getattr(room, one))]
+    rows = [_row(name, room, public) for public in names if public not in constants]
     parts = [
         f"# {_title(name)}",
-        f"{MADE} [All names]({ALL}).",
+        f"{MADE}\n\n[All names]({ALL})",
         as_markdown(inspect.getdoc(room) or ""),
-        "\n".join(f"- [`{public}`](#{_anchor(public)})" for public in names),
-        *(_entry(room, public) for public in names),
+        TABLE + "".join(rows) if rows else "",
+        *(_constant(room, public) for public in constants),
     ]
-    return "\n\n".join(part.rstrip() for part in parts) + "\n"
+    return "\n\n".join(part.rstrip() for part in parts if part) + "\n"
 
 
-def _entry(room: ModuleType, public: str) -> str:
-    found = getattr(room, public)
-    if not _is_documented(found):
-        value = f"```text\n{public} = {_written_value(room, public)}\n```"
-        return f"## {public}\n\n{_first_line(found)}\n\n{value}"
-    parts = [f"## {public}", _code(public, found), as_markdown(inspect.getdoc(found) or "")]
+def _constant(room: ModuleType, public: str) -> str:
+    value = f"```text\n{public} = {_written_value(room, public)}\n```"
+    return f"## {public}\n\n{_first_line(getattr(room, public))}\n\n{value}"
+
+
+def _name_page(name: str, public: str) -> str:
+    """Return the page of a function or a class; it is found by search, and not in the contents."""
+    found = getattr(_room(name), public)
+    top = getattr(driftwalk, public, None) is found and public in driftwalk._MODULE_OF
+    parts = [
+        "---\norphan: true\n---",
+        f"# {'driftwalk' if top else _module(name)}.{public}",
+        f"{MADE}\n\nIn [{_title(name)}](../{_file(name)}.md)",
+        _code(public, found),
+        as_markdown(inspect.getdoc(found) or ""),
+    ]
     if inspect.isclass(found):
         parts += [_member(public, member, value) for member, value in _members(found)]
-    return "\n\n".join(part.rstrip() for part in parts)
+    return "\n\n".join(part.rstrip() for part in parts) + "\n"
 
 
 def _code(name: str, found: Any) -> str:
@@ -132,7 +155,7 @@ def _members(found: type) -> list[tuple[str, Any]]:
 
 
 def _member(owner: str, name: str, value: Any) -> str:
-    heading = f"### {owner}.{name}"
+    heading = f"## {owner}.{name}"
     text = as_markdown(inspect.getdoc(value) or "")
     if not inspect.isfunction(value):
         return f"{heading}\n\n{text}"
@@ -178,6 +201,10 @@ def _title(name: str) -> str:
     return "Errors" if name == ERRORS else f"driftwalk.{name}"
 
 
+def _module(name: str) -> str:
+    return f"driftwalk.{name}"
+
+
 def _file(name: str) -> str:
     return "errors" if name == ERRORS else name
 
@@ -190,10 +217,10 @@ def _anchor(heading: str) -> str:
 def write_pages() -> None:
     """Write every page that has changed, and remove those of rooms that are gone."""
     found = all_pages()
-    FOLDER.mkdir(exist_ok=True)
-    for path in set(FOLDER.glob("*.md")) - found.keys():
+    for path in set(FOLDER.rglob("*.md")) - found.keys():
         path.unlink()
     for path, text in found.items():
+        path.parent.mkdir(parents=True, exist_ok=True)
         # Sphinx reads a page again when its file is newer.
         if not path.exists() or path.read_text(encoding="utf-8") != text:
             path.write_text(text, encoding="utf-8")

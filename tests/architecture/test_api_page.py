@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import posixpath
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
@@ -19,7 +20,7 @@ import driftwalk
 @pytest.fixture(scope="module")
 def pages() -> dict[str, str]:
     """Return the pages as they are made, by their names."""
-    return {path.name: text for path, text in all_pages().items()}
+    return {path.relative_to(FOLDER).as_posix(): text for path, text in all_pages().items()}
 
 
 @pytest.mark.slow
@@ -31,7 +32,8 @@ def test_pages_are_written_and_those_of_rooms_that_are_gone_are_removed(
     (folder / "gone.md").write_text("A room that is gone.")
     monkeypatch.setattr(api_pages, "FOLDER", folder)
     write_pages()
-    assert {path.name: path.read_text(encoding="utf-8") for path in folder.iterdir()} == pages
+    written = {path.relative_to(folder).as_posix(): path for path in folder.rglob("*.md")}
+    assert {name: path.read_text(encoding="utf-8") for name, path in written.items()} == pages
 
 
 def test_links_between_the_pages_lead_somewhere(pages: dict[str, str]) -> None:
@@ -39,8 +41,11 @@ def test_links_between_the_pages_lead_somewhere(pages: dict[str, str]) -> None:
     for name, text in pages.items():
         for link in links_of(text):
             page, _, anchor = link.partition("#")
-            assert not anchor or anchor in anchors[page or name], f"{name}: {link}"
-            assert page in ("", *pages), f"{name}: {link}"
+            page = (
+                posixpath.normpath(posixpath.join(posixpath.dirname(name), page)) if page else name
+            )
+            assert page in pages, f"{name}: {link}"
+            assert not anchor or anchor in anchors[page], f"{name}: {link}"
 
 
 def test_the_page_in_the_repository_names_every_room() -> None:
@@ -60,7 +65,7 @@ def test_no_page_depends_on_the_machine(pages: dict[str, str]) -> None:
 
 def test_a_page_has_every_part_of_a_docstring(pages: dict[str, str]) -> None:
     """By the docstring of `load`, read here and not by the generator."""
-    text = pages["record.md"].partition("\n## load\n")[2].partition("\n## ")[0]
+    text = pages["record/load.md"]
     for part in (
         "load(\n    path: str | PathLike[str] | pd.DataFrame | Mapping[str, Any] "
         "| npt.NDArray[Any] | Any,\n    *,\n    format: str | None = None,\n",
@@ -71,7 +76,7 @@ def test_a_page_has_every_part_of_a_docstring(pages: dict[str, str]) -> None:
         '>>> load(str(recording), tank="circle:30cm", block="3cm").sizes["time"]\n18001\n```',
     ):
         assert part in text, part
-    assert "| **[`load(path, …)`](record.md#load)** |" in pages[ALL]
+    assert "| **[`load(path, …)`](record/load.md)** |" in pages[ALL]
 
 
 DOCSTRING = """Add ``a`` to a list.

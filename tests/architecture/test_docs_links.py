@@ -9,7 +9,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 # Pages that the site makes have tests of their own.
-MADE = (ROOT / "docs" / "reference" / "python", ROOT / "docs" / "gallery")
+MADE = tuple(ROOT / "docs" / name for name in ("reference/python", "reference/commands", "gallery"))
 PAGES = sorted(
     page
     for page in (*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"))

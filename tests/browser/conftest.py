@@ -97,9 +97,13 @@ class Visit:
             self.complaints.append(message.text)
 
     def open(self, address: str) -> Page:
-        """Open an address and wait until everything has been drawn."""
+        """Open an address and wait until everything has been drawn, all chapters too."""
         self.page.goto(address)
         self.page.wait_for_selector("html[data-ready=yes]")
+        if self.page.locator(".open-all").count():
+            self.page.locator(".open-all").click()
+            self.page.wait_for_selector("html[data-opened=yes]")
+            self.page.evaluate("scrollTo(0, 0)")
         return self.page
 
 

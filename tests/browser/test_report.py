@@ -282,6 +282,7 @@ def test_hostile_words_stay_words(
     page_data["title"] = hostile
     for section in page_data["sections"]:
         section["title"] = section["note"] = hostile
+        section["chapter"] = section["chapter"] and hostile
     path = tmp_path / "report.html"
     dw.write_report(page_data, path)
     one = visit(path.as_uri())

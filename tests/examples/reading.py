@@ -39,13 +39,13 @@ class Command(NamedTuple):
 def pages() -> list[str]:
     """Return the pages with examples, relative to the root of the project.
 
-    The pages of the Python names repeat docstrings, whose examples `make doctest` runs.
+    Those that the site makes repeat others: docstrings, whose examples `make doctest` runs, and the
+    page on the command line.
     """
     found = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]
     names = sorted(page.relative_to(ROOT).as_posix() for page in found)
-    return [
-        name for name in names if not name.startswith("docs/reference/python/") and blocks_of(name)
-    ]
+    made = ("docs/reference/python/", "docs/reference/commands/", "docs/gallery/")
+    return [name for name in names if not name.startswith(made) and blocks_of(name)]
 
 
 def blocks_of(page: str) -> list[Block]:

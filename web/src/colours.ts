@@ -17,9 +17,6 @@ function steps(digits: string): Rgb[] {
 const VIRIDIS = steps(
   "44015448186a472d7b4240863b528b33638d2c728e26828e21918c1fa08828ae803fbc735ec96284d44baddc30d8e219fde725",
 );
-const CIVIDIS = steps(
-  "00224e002e6a1a386f32436d434e6c535a6d61656f6f70737d7c788c88789b9476aba072bcae6ccdbb63dec958f0d846fee838",
-);
 const MAGMA = steps(
   "0000040a08221d114736106b51127c6a1c818326819c2e7fb73779d0416fe75263f56b5cfc8961fea772fec488fde2a3fcfdbf",
 );
@@ -72,11 +69,10 @@ function coloursOf(palette: Palette, dark: boolean): Rgb[] {
     case "distance":
       // Near is bright, as a high score is.
       return [...VIRIDIS].reverse();
-    case "magnitude":
-      return CIVIDIS;
     case "density":
       // Dense is far from the background: dark on light, light on dark.
       return dark ? MAGMA.slice(2) : [...MAGMA].reverse();
+    case "magnitude":
     case "speed":
       return dark ? NIGHT_BLUES : BLUES;
     case "signed":

@@ -376,10 +376,13 @@ export interface RawSection {
   readonly kind: string;
   readonly title: string;
   readonly note: string | null;
+  /** The heading that it is folded under, and the run that it belongs to; null where there is none. */
+  readonly chapter: string | null;
+  readonly run: string | null;
   readonly content: unknown;
 }
 
-const head = object(base);
+const head = object({ ...base, chapter: nullable(text), run: nullable(text) });
 export function checkSectionHead(value: unknown, where: string): RawSection {
   return { ...head(value, where), content: value };
 }

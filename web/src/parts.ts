@@ -66,9 +66,11 @@ export interface Readout {
 
 export function readout(hint: string): Readout {
   const element = el("p", { class: "readout" });
+  // A finger taps, and cannot point.
+  const words = matchMedia("(hover: none)").matches ? hint.replace(/^Point at/, "Tap") : hint;
   const show: Readout["show"] = (parts) => {
     if (parts === null) {
-      element.replaceChildren(el("span", { class: "hint" }, hint));
+      element.replaceChildren(el("span", { class: "hint" }, words));
       return;
     }
     element.replaceChildren(
@@ -107,16 +109,20 @@ export function table(
       el("th", { scope: "col", class: numeric(index) ? "number" : null }, name),
     ),
   );
+  // On a phone each row of a wide table is a block, and each cell names its column.
+  const labels = columns.map((name) => (name instanceof Node ? name.textContent : name || ""));
   const body = rows.map((row) =>
     el(
       "tr",
       {},
-      ...row.map((value, index) => el("td", { class: numeric(index) ? "number" : null }, ...rich(value))),
+      ...row.map((value, index) =>
+        el("td", { class: numeric(index) ? "number" : null, "data-column": labels[index] }, ...rich(value)),
+      ),
     ),
   );
   return el(
     "div",
-    { class: "table", tabindex: 0, role: "region", "aria-label": caption },
+    { class: columns.length > 3 ? "table many" : "table", tabindex: 0, role: "region", "aria-label": caption },
     el(
       "table",
       {},

@@ -6,6 +6,9 @@ import { rich } from "./symbols";
 import { toggleTheme } from "./theme";
 import { percent } from "./units";
 
+/** A line of the contents; the first one of a run stands out. */
+type Link = Pick<RawSection, "id" | "title"> & { readonly first?: boolean };
+
 export interface Shell {
   readonly main: HTMLElement;
   showState(state: State | null): void;
@@ -14,7 +17,7 @@ export interface Shell {
   showConnection(words: string, open: boolean): void;
   /** Offers the page as a file. */
   showSaving(address: string): void;
-  showContents(sections: readonly RawSection[]): void;
+  showContents(sections: readonly Link[]): void;
 }
 
 /** Builds the shell into the document and returns its parts. */
@@ -81,9 +84,9 @@ function showState(now: State | null, words: HTMLElement, bar: HTMLProgressEleme
   root["progress"] = now?.progress === null || now === null ? "" : String(now.progress);
 }
 
-function showContents(sections: readonly RawSection[], contents: HTMLElement): void {
+function showContents(sections: readonly Link[], contents: HTMLElement): void {
   const links = sections.map((section) =>
-    el("li", {}, el("a", { href: `#${section.id}` }, ...rich(section.title))),
+    el("li", { class: section.first && "of-run" }, el("a", { href: `#${section.id}` }, ...rich(section.title))),
   );
   // Folded on a narrow screen, always open on a wide one.
   const fold = el("details", {}, el("summary", {}, "Contents"), el("ol", {}, ...links));

@@ -81,6 +81,8 @@ test("new sections stand where they say, else at the end", () => {
     kind: "empty",
     title: id,
     note: null,
+    chapter: null,
+    run: null,
     content: { after },
   });
   const page = [section("a"), section("b")];
@@ -112,8 +114,8 @@ test("small sections stand in pairs, what is left over stands alone", () => {
 
 test("a table of many columns takes the whole width of the page", () => {
   const columns = (count: number): unknown => ({ columns: Array.from({ length: count }, () => "one") });
-  assert.ok(isSmall({ kind: "table", content: columns(5) }));
-  assert.ok(!isSmall({ kind: "table", content: columns(6) }));
+  assert.ok(isSmall({ kind: "table", content: columns(3) }));
+  assert.ok(!isSmall({ kind: "table", content: columns(4) }));
 });
 
 test("only objects with a type are messages, and pauses grow to a limit", () => {

@@ -28,6 +28,6 @@ for k, ax in zip((0, len(frames) - 1), axes, strict=True):
     time, image = frames[k]
     found, rejected = detector.detect(image)
     ax.imshow(dw.track.explain_frame(image, found, rejected, camera=camera)[:, :, ::-1])
-    ax.set(title=f"{time:.1f} s", xlabel="column [px]", ylabel="row [px]")
+    ax.set(title=f"{time:.1f} s", xlabel="column (px)", ylabel="row (px)")
     x, y = float(recording["x"][k, 0]), float(recording["y"][k, 0])
     print(f"off by {1e3 * np.hypot(found[0].x - x, found[0].y - y):.3f} mm")

@@ -19,5 +19,5 @@ for ax, (seconds, force_std) in zip(
     tank.advance(seconds)
     ax.add_patch(plt.Circle((0, 0), 15, fill=False))
     ax.scatter(100 * tank.x, 100 * tank.y, marker="s", s=260)
-    ax.set(xlim=(-16, 16), ylim=(-16, 16), aspect="equal", xlabel="x [cm]", ylabel="y [cm]")
+    ax.set(xlim=(-16, 16), ylim=(-16, 16), aspect="equal", xlabel="x (cm)", ylabel="y (cm)")
     ax.set_title(f"{tank.time:.0f} s, {tank.outcome}")

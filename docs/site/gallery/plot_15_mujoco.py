@@ -33,6 +33,7 @@ import verify  # noqa: E402
 
 model = mujoco.MjModel.from_xml_path(str(work / "tank" / "tank.xml"))
 own = dict(np.load(work / "tank" / "reference.npz"))
+plt.rcParams["axes.prop_cycle"] = plt.cycler(color=["#0072B2", "#D55E00", "#009E73", "#CC79A7"])
 figure, (left, right) = plt.subplots(1, 2, figsize=(9, 4.2), layout="constrained")
 for row, replicate in enumerate(own["noisy_replicate"]):
     x, y, theta = (own[f"noisy_{key}"][row] for key in ("x_m", "y_m", "theta_rad"))
@@ -49,11 +50,11 @@ mujoco.set_mjcb_passive(None)
 radius = 1e2 * study.tank.radius_m
 left.add_patch(plt.Circle((0, 0), radius, fill=False, color="0.5"))
 left.set(
-    xlabel="x [cm]", ylabel="y [cm]", aspect="equal",
+    xlabel="x (cm)", ylabel="y (cm)", aspect="equal",
     xlim=(-1.04 * radius, 1.04 * radius), ylim=(-1.04 * radius, 1.04 * radius),
     title="driftwalk (wide) and MuJoCo (black)",
 )  # fmt: skip
 right.set(
-    xlabel="time [s]", ylabel="distance [µm]", ylim=(0, None),
+    xlabel="time (s)", ylabel="distance (µm)", ylim=(0, None),
     title="how far apart the two are",
 )  # fmt: skip

@@ -153,13 +153,17 @@ def validation_figure(calibration: xr.Dataset) -> Figure:
     figure, row = style.new_panels(1, len(parameters) + 1, height_mm=68.0)
     plot_validation(calibration, row)
     style.letter_panels(row, [*(f"along {one.symbol}" for one in parameters), "estimates"])
-    handles, labels = row[0].get_legend_handles_labels()
-    more = zip(*row[-1].get_legend_handles_labels(), strict=True)
-    for handle, label in more:
-        if label not in labels and not label.startswith("optimum"):
-            handles.append(handle)
-            labels.append(label)
-    figure.legend(handles, labels, loc="outside upper center", ncols=7)
+    style.legend_above(figure, row[0], 7)
+    # What only the last panel shows is named there.
+    named = row[0].get_legend_handles_labels()[1]
+    own = {
+        label: handle
+        for handle, label in zip(*row[-1].get_legend_handles_labels(), strict=True)
+        if label not in named and not label.startswith("optimum")
+    }
+    row[-1].legend(
+        own.values(), own.keys(), loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2
+    )
     return figure
 
 

@@ -58,6 +58,8 @@ def model_calibration_figures(model_calibration: xr.Dataset) -> Figures:
 
 def pairs_figure(calibration: xr.Dataset) -> Figure:
     """Return the draws of each pair of parameters, with those of each on the diagonal."""
+    from matplotlib.ticker import MaxNLocator
+
     names = [str(name) for name in calibration["parameter"].values]
     count = len(names)
     # 24 mm for a panel, 14 mm for the title.
@@ -80,7 +82,7 @@ def pairs_figure(calibration: xr.Dataset) -> Figure:
         elif column:
             ax.tick_params(labelleft=False)
         ax.tick_params(labelsize="x-small")
-        ax.tick_params(axis="x", labelrotation=45.0)
+        ax.xaxis.set_major_locator(MaxNLocator(2))
     axes[0].set_yticks([])
     counts = calibration.attrs["estimate_from"] == "summaries"
     figure.suptitle(
@@ -182,7 +184,7 @@ def _label(calibration: xr.Dataset, index: int) -> str:
     one = calibration.isel(parameter=index)
     unit = str(one["unit"].values)
     words = fill(str(one["parameter"].values).replace("_", " "), width=11)
-    return words if unit == "1" else f"{words}\n[{unit}]"
+    return words if unit == "1" else f"{words}\n({unit.replace('2', '²')})"
 
 
 def comparison_figures(comparison: xr.Dataset) -> Figures:

@@ -208,7 +208,7 @@ def summary_section(
     numbers: Sequence[dict[str, Any]],
     *,
     id: str = "summary",
-    title: str = "Method and results",
+    title: str = "The answer",
 ) -> Section:
     """Return paragraphs, and results of `card` and `figure`."""
     return section(id, "summary", title, paragraphs=list(paragraphs), numbers=list(numbers))

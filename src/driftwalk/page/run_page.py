@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 from driftwalk.core.errors import InputError
 from driftwalk.core.run_stages import tell_nobody
 from driftwalk.core.text.json_text import json_value
+from driftwalk.page.chapters import in_chapters
 from driftwalk.page.html import page_frame
 from driftwalk.page.parts import (
     FOUND_TITLE,
@@ -44,7 +45,7 @@ if TYPE_CHECKING:
 
 _SHOWN_ONCE: Final = ("trajectory", "flow")
 """Kinds of sections that several runs have in common: what they were made of."""
-_BESIDE_CONTENT: Final = ("id", "note", "facts")
+_BESIDE_CONTENT: Final = ("id", "note", "facts", "run")
 """Keys in which two pages may differ about one thing, such as the noise of a recording."""
 
 
@@ -92,6 +93,8 @@ def report_page(folder: str | Path, *, tell: Callable[[str], None] = tell_nobody
         tell(remark)
     sections = _with_remarks(sections, remarks)
     sections.append(manifest_section(run.manifest))
+    found = None if run.kind is None else run.dataset(run.kind.file)
+    sections = in_chapters(sections, found, run.name)
     created = run.manifest.get("finished_utc")
     return page_frame(
         "report",
@@ -133,7 +136,7 @@ def dataset_page(dataset: xr.Dataset) -> dict[str, Any]:
             f"no page shows a dataset of kind {kind_name(dataset)!r}: give a recording, "
             f"or one of {', '.join(RUN_KINDS)}"
         )
-    sections = _sections_of(RunContents({kind.file: dataset}), kind)
+    sections = in_chapters(_sections_of(RunContents({kind.file: dataset}), kind), dataset)
     return page_frame("report", kind.title, state=_state(), sections=sections)
 
 
@@ -197,7 +200,7 @@ def joined_page(pages: Sequence[Mapping[str, Any]], *, title: str) -> dict[str, 
     -------
     dict
         Plain JSON, as of `report_page`. The identifier of a section begins with the subtitle of its
-        page; with several pages its title names that page.
+        page; with several pages its ``run`` names that page.
 
     Raises
     ------
@@ -220,8 +223,12 @@ def joined_page(pages: Sequence[Mapping[str, Any]], *, title: str) -> dict[str, 
                 if content in shown:
                     continue
                 shown.append(content)
-            heading = part["title"] if len(names) == 1 else f"{page['title']}: {part['title']}"
-            sections.append({**part, "id": f"{name}-{part['id']}", "title": heading})
+            joined = {**part, "id": f"{name}-{part['id']}"}
+            if len(names) > 1:
+                joined["run"] = f"{page['title']} · {name}"
+            if part.get("picture"):
+                joined["picture"] = f"{name}-{part['picture']}"
+            sections.append(joined)
     words = [str(page["state"]["words"]) for page in pages if page["state"]["words"]]
     finished = all(page["state"]["finished"] for page in pages)
     return page_frame(

@@ -145,8 +145,8 @@ def plot_refined_map(
     _hatch_causes(ax, edges, status, np.isfinite(score))
     lines = None
     if min(surface.shape) >= 2 and np.isfinite(surface).any():
-        places = [one.values(calibration, "refined_") for one in (across, up)]
-        lines = ax.contour(*places, surface, levels=6, colors="white", linewidths=0.6)
+        at_x, at_y = (one.values(calibration, "refined_") for one in (across, up))
+        lines = ax.contour(*_finely(at_x, at_y, surface), levels=6, colors="white", linewidths=0.6)
     _draw_region(ax, calibration)
     draw_optimum(ax, calibration)
     ax.set(xlim=edges[0][[0, -1]], ylim=edges[1][[0, -1]])
@@ -154,6 +154,24 @@ def plot_refined_map(
     if bar is not None and lines is not None:
         bar.add_lines(lines)
     return ax
+
+
+def _finely(x: Floats, y: Floats, surface: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return a surface on a grid so fine that its contours are smooth: a cubic spline through it.
+
+    The surface that was fitted is a polynomial, which the spline follows more closely than a line
+    is wide. Where it is not known everywhere its own grid stays.
+    """
+    from scipy.interpolate import RectBivariateSpline
+
+    # A cubic spline needs four points each way.
+    if not np.isfinite(surface).all() or min(surface.shape) < 4:
+        return x, y, surface
+    fine_x, fine_y = (
+        np.interp(np.linspace(0.0, axis.size - 1.0, 10 * axis.size), np.arange(axis.size), axis)
+        for axis in (x, y)
+    )
+    return fine_x, fine_y, RectBivariateSpline(y, x, surface)(fine_y, fine_x)
 
 
 def edges_of(calibration: xr.Dataset, *, prefix: str) -> tuple[Floats, Floats]:

@@ -51,7 +51,8 @@ def plot_flow(
     arena : mapping or str, optional
         Outline of the tank; default: the dataset's own.
     speed_limit : float, optional
-        Top of the colour scale [m/s], so that two fields can share it; default: the largest speed.
+        Top of the colour scale [m/s], so that two fields can share it; default: the largest speed
+        that was measured. Filled nodes may be faster: the colour bar then ends in a tip.
     colorbar : {"beside", "none"}
         Whether to add a colour bar.
 
@@ -82,22 +83,47 @@ def plot_flow(
     x, y = (in_unit(flow[axis], "cm", stored="m") for axis in ("x", "y"))
     ax = style.axes_or_new(ax, layout="compressed")
     speed = np.hypot(u, v)
-    top = float(np.nanmax(speed, initial=0.0)) if speed_limit is None else 100.0 * speed_limit
+    filled = (flag == FLAGS["filled"]) & np.isfinite(speed)
+    top = _top(speed, filled) if speed_limit is None else 100.0 * speed_limit
+    tank = arena_of(flow, arena)
+    shown, hatched = (speed, filled) if tank is None else _to_the_wall(speed, filled, flag)
     mesh = ax.pcolormesh(
-        x, y, speed, cmap=style.speed_colormap(), vmin=0.0, vmax=top or 1.0, shading="nearest"
+        x, y, shown, cmap=style.speed_colormap(), vmin=0.0, vmax=top or 1.0, shading="nearest"
     )
     mesh.set_rasterized(True)
-    filled = (flag == FLAGS["filled"]) & np.isfinite(speed)
-    drawn = [mesh, *_hatch_cells(ax, x, y, filled), *_draw_arrows(ax, x, y, u, v, filled)]
-    outline = draw_arena(ax, arena_of(flow, arena))
+    drawn = [mesh, *_hatch_cells(ax, x, y, hatched), *_draw_arrows(ax, x, y, u, v, filled)]
+    outline = draw_arena(ax, tank)
     if outline is not None:
         # Cells at the wall reach over it by up to a cell; what is drawn ends at the wall.
         for artist in drawn:
             artist.set_clip_path(outline)
     label_position(ax)
     if colorbar == "beside":
-        style.add_colorbar(mesh, ax, SPEED_LABEL)
+        beyond = bool(np.nanmax(speed, initial=0.0) > 1.001 * top)
+        style.add_colorbar(mesh, ax, SPEED_LABEL, extend="max" if beyond else "neither")
     return ax
+
+
+def _top(speed: Floats, filled: Bools) -> float:
+    """Return the largest measured speed: a guess must not make what was measured pale."""
+    known = np.isfinite(speed) & ~filled
+    return float(np.max(speed[known] if known.any() else np.nan_to_num(speed), initial=0.0))
+
+
+def _to_the_wall(speed: Floats, filled: Bools, flag: npt.NDArray[np.int8]) -> tuple[Floats, Bools]:
+    """Return the field with the cells that the wall cuts, as the next node inside has them.
+
+    Their centres lie outside of the tank; without them white corners stay inside of the wall.
+    """
+    from scipy.ndimage import distance_transform_edt
+
+    outside = flag == FLAGS["outside"]
+    if not outside.any() or outside.all():
+        return speed, filled
+    off, (row, column) = distance_transform_edt(outside, return_indices=True)
+    # One cell further, corners included.
+    cut = outside & (off < 1.5)
+    return np.where(cut, speed[row, column], speed), filled | (cut & filled[row, column])
 
 
 def velocity_of(flow: xr.Dataset, field: Field) -> tuple[Floats, Floats, npt.NDArray[np.int8]]:
@@ -137,7 +163,7 @@ def _hatch_cells(ax: Axes, x: Floats, y: Floats, chosen: Bools) -> list[Artist]:
     patch = PathPatch(
         Path(corners.reshape(-1, 2), codes),
         facecolor="none",
-        edgecolor=style.MUTED,
+        edgecolor=style.HATCH,
         linewidth=0.0,
         hatch="/////",
         label="filled, not measured",

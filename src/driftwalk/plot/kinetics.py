@@ -53,7 +53,6 @@ def plot_class_graph(kinetics: xr.Dataset, ax: Axes | None = None) -> Axes:
     ``plot_class_graph(found)``
     """
     check_kind(kinetics, "kinetics", "rate", "count", "share")
-    ax = style.axes_or_new(ax, height_mm=90.0)
     rates, counts = (kinetics[name].isel(source=0).values for name in ("rate", "count"))
     pairs = [str(name).split(" -> ") for name in kinetics["transition"].values]
     leaving: dict[str, int] = {}
@@ -64,10 +63,12 @@ def plot_class_graph(kinetics: xr.Dataset, ax: Axes | None = None) -> Axes:
         for (start, end), rate, count in zip(pairs, rates, counts, strict=True)
         if count > SHOWN_SHARE * leaving[start]
     ]
-    place = _places(list(dict.fromkeys(name for one in kept for name in one[:2])))
+    place, rows = _places(list(dict.fromkeys(name for one in kept for name in one[:2])))
+    ax = _axes_for(len(place), rows) if ax is None else ax
     discs = are_discs(*place)
     shown = {one[:2] for one in kept}
-    for start, end, rate, share in kept:
+    taken: list[Floats] = []
+    for start, end, rate, share in sorted(kept, key=lambda one: -one[3]):
         first, last = np.array(place[start]), np.array(place[end])
         if (end, start) in shown:  # there and back run next to each other
             along = (last - first) / np.hypot(*(last - first))
@@ -76,10 +77,11 @@ def plot_class_graph(kinetics: xr.Dataset, ax: Axes | None = None) -> Axes:
             "", xy=tuple(first + 0.8 * (last - first)), xytext=tuple(first + 0.2 * (last - first)),
             arrowprops={"arrowstyle": "-|>", "lw": 0.4 + 2.6 * share, "color": style.MUTED},
         )  # fmt: skip
-        # Half-way labels of several fans would lie on each other: higher classes have them nearer.
-        at = first + (0.7 - 0.4 * first[1]) * (last - first)
+        free = _free_place(first, last, [*taken, *map(np.array, place.values())])
+        taken.append(free)
         ax.text(
-            float(at[0]), float(at[1]), f"{1e3 * rate:.2g}", fontsize=6.0, ha="center", va="center",
+            float(free[0]), float(free[1]), f"{1e3 * rate:.2g}", fontsize=6.0, ha="center",
+            va="center",
             bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none"},
         )  # fmt: skip
     colors = class_colors(list(place))
@@ -98,8 +100,24 @@ def plot_class_graph(kinetics: xr.Dataset, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def _places(names: list[str]) -> dict[str, tuple[float, float]]:
-    """Return a column for each number of assemblies, the most on the left."""
+def _axes_for(classes: int, rows: int) -> Axes:
+    """Return new axes with room for each class: nine of them crowd one column of a page."""
+    if classes <= 6:
+        return style.axes_or_new(None, height_mm=90.0)
+    figure = style.new_figure(width_mm=style.DOUBLE_COLUMN_MM, height_mm=max(80.0, 20.0 * rows))
+    return figure.add_subplot()
+
+
+def _free_place(first: Floats, last: Floats, taken: list[Floats]) -> Floats:
+    """Return the place along an arrow that is farthest from all labels and classes so far."""
+    places = first + np.linspace(0.25, 0.7, 19)[:, None] * (last - first)
+    off = [min(np.hypot(*(place - other)) for other in taken) for place in places]
+    found: Floats = places[int(np.argmax(off))]
+    return found
+
+
+def _places(names: list[str]) -> tuple[dict[str, tuple[float, float]], int]:
+    """Return a column for each number of assemblies, the most on the left, and the longest."""
     columns = sorted({name.count("+") for name in names}, reverse=True)
     place = {}
     for at, number in enumerate(columns):
@@ -107,7 +125,8 @@ def _places(names: list[str]) -> dict[str, tuple[float, float]]:
         x = at / max(len(columns) - 1, 1)
         for row, name in enumerate(column):
             place[name] = (x, 1.0 - (row + 0.5) / len(column))
-    return place
+    heights = [sum(name.count("+") == number for name in names) for number in columns]
+    return place, max(heights, default=1)
 
 
 def plot_predicted_shares(kinetics: xr.Dataset, ax: Axes | None = None) -> Axes:

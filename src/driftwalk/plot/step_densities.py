@@ -310,7 +310,7 @@ def plot_density_panels(
     for ax, density in zip(row, densities, strict=True):
         mesh = density_mesh(ax, density, length_mm, angle_deg, top=top)
         ax.set(xlim=limits[0], ylim=limits[1])
-        ax.xaxis.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 5, 10]))
+        ax.xaxis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 5, 10]))
         ax.set(xlabel=LENGTH_LABEL, ylabel=ANGLE_LABEL)
         ax.label_outer()
     for ax, setting in zip(row[1:], settings, strict=True):
@@ -320,6 +320,11 @@ def plot_density_panels(
     )
     if colorbar == "beside":
         style.add_colorbar(mesh, row, DENSITY_LABEL)
+    if max(abs(angle_deg[[0, -1]])) < 179.0 and limits[1] == (angle_deg[0], angle_deg[-1]):
+        style.add_footer(
+            style.figure_of(row[0]),
+            f"the outermost bins hold all angles beyond ±{angle_deg[-1]:.0f}°",
+        )
     return row
 
 

@@ -35,7 +35,7 @@ def test_labels_have_units_and_stay_on_the_page(found: xr.Dataset) -> None:
     figure = pairs_figure(found)
     figure.draw_without_rendering()
     labels = [ax.xaxis.label for ax in figure.axes if ax.get_visible() and ax.get_xlabel()]
-    assert [one.get_text().splitlines()[-1] for one in labels] == ["[m/s]", "[s]", "[rad/s]"]
+    assert [one.get_text().splitlines()[-1] for one in labels] == ["(m/s)", "(s)", "(rad/s)"]
     for one in labels:
         box = one.get_window_extent()
         assert 0.0 <= box.x0 < box.x1 <= figure.bbox.width

@@ -11,6 +11,9 @@ from page_reading import numbers_of, part_of, values
 from recovery_worlds import TRUTH, synthetic_recovery
 from synthetic_calibration import bundled_recording
 
+from driftwalk.likelihood.check.criteria import MISFITS
+from driftwalk.page.chapters import in_chapters
+from driftwalk.page.sections.check import LOOKS_FOR
 from driftwalk.page.sections.fit import fit_sections
 from driftwalk.page.sections.recovery import recovery_sections
 from driftwalk.schema.answers.facts import facts_of
@@ -39,7 +42,6 @@ def test_the_answer_of_a_fit_with_its_uncertainty(sections: list[dict[str, Any]]
         assert one["confidence"] == 0.9
     text = " ".join(part["paragraphs"])
     for words in (
-        "C_d = 0.39 (90 % interval 0.351 to 0.429)",
         "2 recordings; 10 min; 990 of 1000 samples used; 1 % of the intervals at the wall",
         "Verdict: does not explain: The flow changes in time.",
         "KS distance of 0.05 to the real one, and of 0.02 among themselves",
@@ -72,10 +74,11 @@ def test_every_flow_of_a_fit_has_a_section() -> None:
 def test_the_check_of_a_fit(sections: list[dict[str, Any]]) -> None:
     check = made_up_check()
     rows = part_of(sections, "check")["rows"]
-    assert rows == [
-        ["autocorrelation", 0.5, "", 0.09, "autocorrelation at one lag"],
-        ["flow_change", 0.0001, "failed", 0.01, "relative change"],
+    assert [[*row[:1], *row[2:]] for row in rows] == [
+        ["autocorrelation", 0.5, "0.09: autocorrelation at one lag"],
+        ["flow_change: failed", 0.0001, "0.01: relative change"],
     ]
+    assert rows[0][1] == LOOKS_FOR["autocorrelation"]
     band, x, _ = part_of(sections, "check-innovations")["series"]
     np.testing.assert_allclose(values(band["low"]), -0.002 - 0.0196)
     np.testing.assert_allclose(values(x["y"]), check["autocorrelation"].values[0])
@@ -117,6 +120,35 @@ def test_a_cell_beyond_chance_says_how_often_chance_gives_one() -> None:
     assert "below 3.8 in 95 % of recordings" in note
     assert "no evidence against the model" in note
     assert "Chance alone stays below" not in note
+
+
+def test_the_answer_comes_first_with_its_picture_and_the_next_step(
+    sections: list[dict[str, Any]],
+) -> None:
+    fit = made_up_fit()
+    made = in_chapters(sections, fit, "tank")
+    chapters = [part["chapter"] for part in made]
+    assert chapters[:2] == [None, None]
+    assert None not in chapters[2:]
+    # Each chapter is one piece, and nothing is lost.
+    pieces = [
+        name for name, before in zip(chapters, [0, *chapters], strict=False) if name != before
+    ]
+    assert len(pieces) == len(set(pieces))
+    assert sorted(part["id"] for part in made) == sorted(part["id"] for part in sections)
+    answer = part_of(made, "summary")
+    assert part_of(made, answer["picture"])["kind"] == "flow"
+    verdict = fit.assign(verdict="explains", verdict_reason=("verdict_reason", np.array([], "U1")))
+    (step,) = part_of(in_chapters(sections, verdict, "tank"), "summary")["next"]
+    assert "`driftwalk assemble tank -o four`" in step
+    (step,) = part_of(
+        in_chapters(sections, verdict.assign(verdict="does not explain"), "tank"), "summary"
+    )["next"]
+    assert "Do not use the numbers yet" in step
+
+
+def test_every_test_of_a_check_says_what_it_looks_for() -> None:
+    assert LOOKS_FOR.keys() == MISFITS.keys()
 
 
 def test_a_fit_that_was_not_checked_says_so() -> None:

@@ -271,8 +271,8 @@ def test_pages_of_runs_that_belong_together_are_joined(
     assert [len(found) for found in of_recording] == [1, 1, 1]
     # That neither run warned of anything stands there for each.
     assert {"fit-warnings", "map-warnings"} <= set(ids)
-    fold = [part["title"] for part in page["sections"] if part["id"] == "map-state"]
-    assert fold == ["Calibration: Not finished"]
+    fold = [(part["run"], part["title"]) for part in page["sections"] if part["id"] == "map-state"]
+    assert fold == [("Calibration · map", "Not finished")]
     for wrong in ([], [first, first]):
         with pytest.raises(InputError, match="names of their own"):
             joined_page(wrong, title="None")

@@ -48,12 +48,12 @@ const DRAWERS: Partial<{ [K in Kind]: Draw<K> }> = {
 };
 
 /** Returns the empty frame of a section; `fillSection` draws into it once it is in the document. */
-export function sectionFrame(section: RawSection): HTMLElement {
+export function sectionFrame(section: RawSection, level: 2 | 3 = 2): HTMLElement {
   const heading = `heading-${section.id}`;
   return el(
     "section",
     { id: section.id, class: "section", "data-kind": section.kind, "aria-labelledby": heading },
-    el("h2", { id: heading, tabindex: -1 }, ...rich(section.title)),
+    el(`h${level}`, { id: heading, class: "title", tabindex: -1 }, ...rich(section.title)),
     el("div", { class: "body" }),
   );
 }

@@ -81,7 +81,11 @@ async function decodeField(section: FlowSection): Promise<Field> {
 
 function drawField(width: number, section: FlowSection, field: Field, line: Readout): Element {
   const display = displayFor("m/s", field.speed);
-  const top = extent(field.speed)?.[1] ?? 1;
+  // A guess must not make what was measured pale.
+  const measured = field.speed.map((value, index) =>
+    at(field.origin.data, index) === MEASURED ? value : Number.NaN,
+  );
+  const top = (extent(measured) ?? extent(field.speed))?.[1] ?? 1;
   const frame = makeTankFrame(width, boxAround(section.arena, field.xEdges, field.yEdges), {
     label: `Flow in the tank, up to ${quantity(top, "m/s")}; hatched cells are filled in, not measured`,
     right: BAR_ROOM,

@@ -3,15 +3,42 @@
 import { el } from "../dom";
 import type { SummarySection } from "../page";
 import { rich } from "../symbols";
+import { details } from "../parts";
 import { percent, valueAndInterval } from "../units";
+
+/** How many numbers stand open: a row on a wide page. */
+const MOST_NUMBERS = 4;
+/** How many paragraphs stand open from the verdict on. */
+const MOST_REASONS = 5;
 
 type Item = SummarySection["numbers"][number];
 
 export function drawSummary(section: SummarySection, body: HTMLElement): void {
-  for (const paragraph of section.paragraphs) body.append(el("p", { class: "lead" }, ...rich(paragraph)));
-  if (section.numbers.length > 0) {
-    body.append(el("dl", { class: "numbers" }, ...section.numbers.map(card)));
+  const words = section.paragraphs.map((text) => paragraph(text));
+  const first = section.numbers.slice(0, MOST_NUMBERS);
+  const others = section.numbers.slice(MOST_NUMBERS);
+  // What was recorded, what came out, and then what is to be said of it.
+  const begin = words.findIndex((one) => one.dataset["verdict"] !== undefined);
+  body.append(...words.slice(0, begin < 0 ? words.length : begin));
+  if (first.length > 0) body.append(el("dl", { class: "numbers" }, ...first.map(card)));
+  if (begin >= 0) {
+    const reasons = words.slice(begin);
+    body.append(...reasons.slice(0, MOST_REASONS));
+    const rest = reasons.slice(MOST_REASONS);
+    if (rest.length > 0) body.append(details(`${rest.length} more remarks`, () => el("div", {}, ...rest)));
   }
+  if (others.length > 0) {
+    body.append(details("More numbers", () => el("dl", { class: "numbers" }, ...others.map(card))));
+  }
+}
+
+/** Returns a paragraph; one with the verdict carries it, so that it can be seen. */
+function paragraph(text: string): HTMLElement {
+  const [, word, rest] = /^Verdict: (explains|does not explain|cannot tell|not checked)(.*)$/s.exec(text) ?? [];
+  if (word === undefined) {
+    return el("p", { class: "lead", "data-verdict": text.startsWith("Verdict: ") && "other" }, ...rich(text));
+  }
+  return el("p", { class: "lead verdict", "data-verdict": word }, "Verdict: ", el("b", {}, word), ...rich(rest ?? ""));
 }
 
 function card(item: Item): HTMLElement {

@@ -19,7 +19,7 @@ export function insertAfter(sections: readonly RawSection[], section: RawSection
 const SMALL: ReadonlySet<string> = new Set(["lines", "image_grid", "biplot", "table"]);
 
 /** A wider table does not fit into half of a page: its last columns, often a verdict, would be hidden. */
-const MOST_COLUMNS = 5;
+const MOST_COLUMNS = 3;
 
 /** Returns whether a section needs only half of a wide page. */
 export function isSmall({ kind, content }: Pick<RawSection, "kind" | "content">): boolean {

@@ -263,34 +263,20 @@ def print_row(label: str, text: object) -> None:
 def print_places(found: xr.Dataset, folder: Path, warnings: Iterable[str]) -> None:
     """Print the warnings, where everything is, and the command that comes next."""
     print_warnings(warnings)
-    from driftwalk.schema.runs import kind_of
+    from driftwalk.schema.runs import kind_of, next_command
 
     kind = kind_of(found)
     assert kind is not None, "the result of a run"
     for label, name in kind.places.items():
         print_row(label, folder / name)
-    following = _following(found, kind.name)
+    following = next_command(found)
     if not following:
         print_report_next(folder)
         return
     print_row("all in one page", command_text("report", folder, "-o", "report.html"))
-    command, *words, result = following
-    print_next(command, folder, *words, "-o", sibling(folder, result))
-
-
-def _following(found: xr.Dataset, kind: str) -> list[str]:
-    """Return the command that takes a run further, its options, and a name for its result."""
-    from driftwalk.schema.answers.parts import undetermined
-    from driftwalk.schema.parameters import is_block
-
-    if kind == "fit" or (kind == "calibration" and is_block(found)):
-        # Nothing can be simulated with what is not known.
-        return [] if kind == "fit" and undetermined(found) else ["assemble", "assembly"]
-    if kind not in ("calibration", "model_calibration"):
-        return []
-    # The user names a model that is none of driftwalk's own.
-    named = ["--model", str(found.attrs["model"])] if "model_source_sha256" in found.attrs else []
-    return ["simulate", *named, "motion.nc"]
+    command, *model, result = following
+    named = ["--model", *model] if model else []
+    print_next(command, folder, *named, "-o", sibling(folder, result))
 
 
 def print_warnings(texts: Iterable[str | None]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from math import isfinite
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -32,6 +33,23 @@ if TYPE_CHECKING:
     import xarray as xr
 
 ABSORBED: Final = "A tenth without a point: the fitted flow has absorbed what would be seen there."
+
+LOOKS_FOR: Final = {
+    "autocorrelation": "An error of prediction that depends on the errors before it.",
+    "tails": "Large errors that are more frequent than normal errors are.",
+    "outliers": "Single positions that the tracker has put elsewhere.",
+    "place": "A part of the tank where the flow pushes otherwise than the fitted one.",
+    "time and place": "A flow that is another one in some part of the recording.",
+    "flow strength": "A flow that gets stronger or weaker.",
+    "drag law": "A drag that fits slow motion and not fast motion, or the other way round.",
+    "noise by place": "A part of the tank where the errors are larger, as under a lamp.",
+    "noise by time": "A part of the recording where the errors are larger.",
+    "change": "A moment at which the flow changes.",
+    "steps": "Steps and turns that differ from those of simulated recordings (KS distance).",
+    "measured flow": "A measured flow that differs from the fitted one.",
+    "measured scale": "A scale that is wrong: measured and fitted flow differ by a factor.",
+}
+"""The fault that each test of a check looks for, in a sentence."""
 
 
 def check_sections(check: xr.Dataset) -> list[Section]:
@@ -64,12 +82,17 @@ def _criteria(check: xr.Dataset) -> Section:
     require(check, "criterion", "p_value", "failed", "detectable", "detectable_of")
     columns = ("criterion", "p_value", "failed", "detectable", "detectable_of")
     rows = [
-        [str(name), number(p), "failed" if failed else "", number(size), str(of)]
+        [
+            f"{name}{': failed' if failed else ''}",
+            LOOKS_FOR.get(str(name), ""),
+            number(p),
+            f"{size:.2g}: {of}" if isfinite(size) else "–",
+        ]
         for name, p, failed, size, of in zip(*(check[one].values for one in columns), strict=True)
     ]
     level = value_of(check, "level")
-    note = "" if level is None else f"A criterion fails where its p value is below {level:.3g}."
-    heads = ["criterion", "p value", "", "misfit found in 9 of 10", "of what"]
+    note = "" if level is None else f"A test fails where its p value is below {level:.3g}."
+    heads = ["test", "what it looks for", "p value", "found nine times in ten"]
     return table_section("", "", heads, rows, note)
 
 

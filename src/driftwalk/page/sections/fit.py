@@ -27,7 +27,6 @@ from driftwalk.page.parts import (
     table_section,
     value_of,
     verdict_paragraphs,
-    with_interval,
 )
 from driftwalk.page.sections.check import check_sections
 from driftwalk.page.sections.flow import flow_sections
@@ -128,11 +127,18 @@ def fit_sections(
 def fit_summary(fit: xr.Dataset, check: xr.Dataset | None = None) -> Section:
     """Return the answer of a fit in words and numbers."""
     paragraphs = [SIMULATED] if is_simulated(fit) else []
-    paragraphs += [_what_was_done(fit), _what_was_found(fit)]
-    paragraphs += _verdict(fit, check)
+    paragraphs += [_what_was_done(fit), *_verdict(fit, check), _how_far_they_hold(fit)]
     error = value_of(fit, "chi_squared_per_dof")
+    # The answer first, then what only some readers need.
+    found = sorted(map(_number, model_estimates(fit)), key=lambda pair: pair[0])
     shown = figure("mean squared error of prediction", error, note="1 if the model is right")
-    return summary_section(paragraphs, [*map(card, model_estimates(fit)), shown])
+    return summary_section(paragraphs, [*(one for _, one in found), shown])
+
+
+def _number(one: Estimate) -> tuple[int, dict[str, Any]]:
+    """Return the place of an estimate among the numbers, and its card."""
+    name = one.number.name
+    return (_ANSWER.index(name) if name in _ANSWER else len(_ANSWER)), card(one)
 
 
 def _what_was_done(fit: xr.Dataset) -> str:
@@ -160,33 +166,33 @@ def _what_was_done(fit: xr.Dataset) -> str:
     words += f" ({'; '.join(parts)})" if parts else ""
     visited = value_of(fit, "visited_share")
     seen = "" if visited is None else f" The block has been over {percent(visited)} of the tank."
-    return (
-        f"{words}. A filter predicts each position from the earlier ones; the fit "
-        f"chooses the parameters that make its errors most likely.{seen}"
-    )
+    return f"{words}.{seen}"
 
 
-def _what_was_found(fit: xr.Dataset) -> str:
-    found = {one.number.name: _value_words(one) for one in estimates(fit)}
+def _how_far_they_hold(fit: xr.Dataset) -> str:
+    """Return under which conditions the numbers hold, and which of them there is none of."""
+    found = {one.number.name: one for one in estimates(fit)}
     lacking = [name for name in _ANSWER if name not in found]
     if lacking:
         raise InputError(f"the fit has no {', '.join(lacking)}")
-    drag, force, noise = (found[name] for name in _ANSWER)
     linear = fit.attrs.get("drag_law") == "linear"
-    of_drag = f": {LINEAR_DRAG_ALONE}" if linear else f" is {drag}"
-    return (
-        f"The drag coefficient{of_drag}. The stochastic force is {force}, the tracking noise "
-        f"{noise}. The intervals hold if the force law is right."
+    said = [f"The drag coefficient: {LINEAR_DRAG_ALONE}."] if linear else []
+    said += [
+        f"The {one.number.words.removesuffix(one.number.symbol).rstrip()} is {NOT_DETERMINED}."
+        for name in _ANSWER
+        if (one := found[name]).unknown and not (linear and name == "drag_coefficient")
+    ]
+    facts = facts_of(fit)
+    reach = facts.get("drag_coefficient_any_added_mass_interval")
+    if reach is None or linear or not isfinite(reach[1]):
+        return " ".join([*said, "The intervals hold if the force law is right."])
+    return " ".join(
+        [
+            *said,
+            "The intervals hold if the force law is right, and for a block without added mass: "
+            f"with the usual one C_d is between {reach[0]:.3g} and {reach[1]:.3g}.",
+        ]
     )
-
-
-def _value_words(one: Estimate) -> str:
-    """Return an estimate with its interval, or that the recording does not determine it."""
-    if one.unknown:
-        return NOT_DETERMINED
-    symbol = f"{one.number.symbol} = " if one.number.symbol else ""
-    value = with_interval(one.value, one.ends, one.number.unit, one.confidence)
-    return f"{symbol}{value}{one.after}"
 
 
 def _verdict(fit: xr.Dataset, check: xr.Dataset | None) -> list[str]:

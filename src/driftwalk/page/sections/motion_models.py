@@ -100,7 +100,7 @@ def calibration_summary(found: xr.Dataset) -> Section:
     if "misfit" in found:
         shown.append(figure("misfit of the summaries", found["misfit"]))
         shown.append(figure("usual misfit", found["usual_misfit"]))
-    return summary_section(paragraphs, shown, title="Results")
+    return summary_section(paragraphs, shown)
 
 
 def values_section(found: xr.Dataset) -> Section:
@@ -222,7 +222,7 @@ def models_summary(comparison: xr.Dataset) -> Section:
         figure("distance of the recording's own parts", own_score(comparison)),
         figure("step interval", required(comparison, "step_interval_s"), "s"),
     ]
-    return summary_section(paragraphs, shown, title="Results")
+    return summary_section(paragraphs, shown)
 
 
 def ranking_section(comparison: xr.Dataset) -> Section:

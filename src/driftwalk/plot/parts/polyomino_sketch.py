@@ -23,7 +23,7 @@ Orientation = Literal["wide", "tall"]
 # Empty space between the shapes of a class, in sides of a block.
 GAP: Final = 0.6
 # Font size of the names under sketches, and how wide its letters are [pt].
-NAME_SIZE_PT: Final = 5.5
+NAME_SIZE_PT: Final = 7.0
 LETTER_PT: Final = 0.74 * NAME_SIZE_PT
 # Space between a sketch and its name [pt].
 NAME_GAP_PT: Final = 2.0
@@ -302,8 +302,7 @@ def draw_sketches_below(ax: Axes, positions: Sequence[float], names: Sequence[st
     ax.tick_params(axis="x", length=0.0)
     deepest = 0.0
     for position, name in zip(positions, names, strict=True):
-        text = name_text(name)
-        upright = len(text) * LETTER_PT > slot_pt
+        lines = _lines(name_text(name), int(slot_pt / LETTER_PT))
         parts: list[Any] = []
         depth = 0.0
         if name in sizes:
@@ -314,10 +313,13 @@ def draw_sketches_below(ax: Axes, positions: Sequence[float], names: Sequence[st
                     discs=discs,
                 )
             )  # fmt: skip
-        if text:
-            depth += NAME_GAP_PT + (len(text) * LETTER_PT if upright else NAME_SIZE_PT)
-            style = {"size": NAME_SIZE_PT, "color": INK, "rotation": 90.0 if upright else 0.0}
-            parts.append(TextArea(text, textprops=style))
+        if lines:
+            # One word that is wider than its place is set smaller, and not turned.
+            widest = LETTER_PT * max(map(len, lines))
+            size = NAME_SIZE_PT * min(1.0, slot_pt / widest)
+            depth += NAME_GAP_PT + 1.2 * size * len(lines)
+            style = {"size": size, "color": INK, "ha": "center"}
+            parts.append(TextArea("\n".join(lines), textprops=style, multilinebaseline=True))
         stacked = VPacker(children=parts, align="center", pad=0.0, sep=NAME_GAP_PT)
         _pinned(
             ax, stacked, (position, 0.0), transform=ax.get_xaxis_transform(),
@@ -326,6 +328,23 @@ def draw_sketches_below(ax: Axes, positions: Sequence[float], names: Sequence[st
         deepest = max(deepest, depth)
     # 4 pt lie above and below the sketches.
     return deepest + 8.0
+
+
+def _lines(text: str, letters: int) -> list[str]:
+    """Return the name of a class in lines of at most so many letters, broken before a plus.
+
+    Examples
+    --------
+    >>> _lines("1+1+1+1", 4), _lines("L3+1", 4), _lines("", 4)
+    (['1+1', '+1+1'], ['L3+1'], [])
+    """
+    lines: list[str] = []
+    for part in text.replace("+", "\n+").splitlines():
+        if lines and len(lines[-1] + part) <= letters:
+            lines[-1] += part
+        else:
+            lines.append(part)
+    return lines
 
 
 def name_text(name: str) -> str:

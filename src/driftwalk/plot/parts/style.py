@@ -40,6 +40,8 @@ DENSITY_COLORMAP = "magma_r"
 INK = "#1a1a1a"
 MUTED = "#6b6b6b"
 PALE = "#e6e6e6"
+# Over a field and under its arrows.
+HATCH = "#a0a0a0"
 # Okabe and Ito's palette for colour-blind readers.
 BLUE = "#0072B2"
 ORANGE = "#D55E00"
@@ -210,10 +212,18 @@ def speed_colormap() -> Colormap:
     return ListedColormap(colormaps["Blues"](np.linspace(0.06, 0.68, 256)), name="light_blues")
 
 
-def add_colorbar(mappable: ScalarMappable, axes: Axes | list[Axes], label: str) -> Colorbar:
-    """Add a slim colour bar to the right of the axes and return it."""
+def add_colorbar(
+    mappable: ScalarMappable,
+    axes: Axes | list[Axes],
+    label: str,
+    *,
+    extend: Literal["neither", "max"] = "neither",
+) -> Colorbar:
+    """Add a slim colour bar to the right of the axes; `extend` gives it a tip for larger values."""
     first = axes[0] if isinstance(axes, list) else axes
-    bar = first.figure.colorbar(mappable, ax=axes, label=label, pad=0.02, aspect=22, fraction=0.06)
+    bar = first.figure.colorbar(
+        mappable, ax=axes, label=label, pad=0.02, aspect=22, fraction=0.06, extend=extend
+    )
     bar.outline.set_linewidth(0.6)
     if bar.solids is not None:
         bar.solids.set_rasterized(True)

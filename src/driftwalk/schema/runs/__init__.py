@@ -8,6 +8,7 @@ from driftwalk.schema.runs.run_kinds import (
     kind_of,
     kind_of_folder,
     load_maker,
+    next_command,
     register,
     run_kind,
 )
@@ -21,6 +22,7 @@ __all__ = [
     "kind_of",
     "kind_of_folder",
     "load_maker",
+    "next_command",
     "open_run_folder",
     "register",
     "run_kind",

@@ -392,6 +392,34 @@ def answer_of(found: xr.Dataset, **more: Any) -> Answer | None:
     return answer
 
 
+def next_command(found: xr.Dataset) -> list[str]:
+    """Return the command that takes a run further, its model, and a name for its result.
+
+    Parameters
+    ----------
+    found : xarray.Dataset
+        The main dataset of a run; nothing follows where the list is empty.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> next_command(xr.Dataset(attrs={"kind": "kinetics"}))
+    []
+    """
+    from driftwalk.schema.answers.parts import undetermined
+    from driftwalk.schema.parameters import is_block
+
+    kind = kind_name(found)
+    if kind == "fit" or (kind == "calibration" and is_block(found)):
+        # Nothing can be simulated with what is not known.
+        return [] if kind == "fit" and undetermined(found) else ["assemble", "assembly"]
+    if kind not in ("calibration", "model_calibration"):
+        return []
+    # The user names a model that is none of driftwalk's own.
+    named = [str(found.attrs["model"])] if "model_source_sha256" in found.attrs else []
+    return ["simulate", *named, "motion.nc"]
+
+
 def kind_of_folder(folder: Path, specification: Mapping[str, Any]) -> RunKind | None:
     """Return the kind of a run by its specification, else by its result file; None if unknown.
 

@@ -1,0 +1,173 @@
+"""The front page of the site and a report: what they weigh, when they show, and who can read them.
+
+The front page is rendered from its template without Sphinx, with the files next to it.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import pytest
+from made_up_fit import made_up_check, made_up_fit
+from synthetic_calibration import bundled_recording
+
+import driftwalk as dw
+from browser.all_kinds import page_of
+from browser.conftest import DESKTOP, PHONE, Visit
+from driftwalk.page.chapters import in_chapters
+from driftwalk.page.sections.fit import fit_sections
+
+pytestmark = pytest.mark.browser
+
+SITE = Path(__file__).resolve().parents[2] / "docs" / "site"
+FRONT_BYTES, REPORT_BYTES = 150_000, 700_000
+"""The front page with all that it loads; a report of a short recording, program included."""
+FIRST_PAINT_MS = 1500
+"""On a machine that does other things too; an idle one needs a tenth of it."""
+
+# Text against the first ground behind it that is not clear, by WCAG 2.2 (AA: 4.5, large text 3).
+CONTRAST = """() => {
+  const parse = (c) => (c.match(/[\\d.]+/g) ?? []).map(Number);
+  const light = ([r, g, b]) => [r, g, b].map((v) => v / 255)
+    .map((v) => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)
+    .reduce((sum, v, k) => sum + v * [0.2126, 0.7152, 0.0722][k], 0);
+  const ground = (e) => {
+    for (let at = e; at; at = at.parentElement) {
+      const c = parse(getComputedStyle(at).backgroundColor);
+      if (c.length === 3 || c[3] === 1) return c;
+    }
+    return [255, 255, 255];
+  };
+  const seen = (e) => e.checkVisibility({ visibilityProperty: true, opacityProperty: true });
+  const bad = [];
+  for (const e of document.querySelectorAll("body *:not(svg *):not(script):not(style)")) {
+    const own = [...e.childNodes].some((n) => n.nodeType === 3 && n.textContent.trim() !== "");
+    if (!own || !seen(e)) continue;
+    const style = getComputedStyle(e);
+    const [a, b] = [light(parse(style.color)), light(ground(e))].sort((x, y) => y - x);
+    const large = parseFloat(style.fontSize) >= 24;
+    if ((a + 0.05) / (b + 0.05) < (large ? 3 : 4.5)) bad.push(e.outerHTML.slice(0, 120));
+  }
+  return bad;
+}"""
+# Everything that takes the focus has a name; every picture says what it shows.
+NAMELESS = """() => [...document.querySelectorAll(
+    "a[href], button, input, select, summary, [tabindex='0'], [role=img], img")]
+  .filter((e) => e.checkVisibility() && !e.closest("[inert]") || e.matches("[role=img]"))
+  .filter((e) => !(e.textContent.trim() || e.getAttribute("aria-label") || e.labels?.length
+    || e.hasAttribute("alt")))
+  .map((e) => e.outerHTML.slice(0, 120))"""
+FIRST_PAINT = (
+    """() => performance.getEntriesByName("first-contentful-paint")[0]?.startTime ?? null"""
+)
+
+
+@pytest.fixture(scope="module")
+def front(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("site")
+    shutil.copytree(SITE / "static", folder / "_static")
+    template = jinja2.Template((SITE / "theme" / "front.html").read_text(encoding="utf-8"))
+    loop = (SITE / "theme" / "loop.svg").read_text(encoding="utf-8")
+    page = folder / "index.html"
+    page.write_text(template.render(loop=loop, playground=True, release="0"), encoding="utf-8")
+    return page
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    fit = made_up_fit()
+    sections = fit_sections(
+        fit, recordings=[bundled_recording(rows=300)], check=made_up_check("the flow changes")
+    )
+    path = tmp_path_factory.mktemp("report") / "report.html"
+    dw.write_report(page_of(in_chapters(sections, fit, "tank")), path)
+    return path
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("viewport", [DESKTOP, PHONE], ids=["desktop", "phone"])
+def test_the_front_page(
+    visit: Callable[..., Visit], front: Path, viewport: dict[str, int], scheme: str
+) -> None:
+    one = visit(front.parent.as_uri(), viewport=viewport, color_scheme=scheme)
+    one.page.goto(front.as_uri())
+    check_readable(one.page)
+    names = {Path(url).name for url in one.requests}
+    assert sorted(names) == ["front.css", "front.js", "index.html", "logo.svg"]
+    loaded = (front, *(front.parent / "_static" / name for name in names if name != front.name))
+    assert sum(path.stat().st_size for path in loaded) < FRONT_BYTES
+
+
+def test_the_loop_can_be_held_and_stands_still_for_those_who_ask(
+    visit: Callable[..., Visit], front: Path
+) -> None:
+    page = visit(front.parent.as_uri()).page
+    page.goto(front.as_uri())
+    running = "document.getAnimations().filter((a) => a.playState === 'running').length"
+    assert page.evaluate(running) > 10
+    page.get_by_role("button", name="Pause").press("Enter")
+    assert page.evaluate(running) == 0
+    calm = visit(front.parent.as_uri(), reduced_motion="reduce").page
+    calm.goto(front.as_uri())
+    assert calm.evaluate(running) == 0
+
+
+def test_four_doors_lead_to_pages_that_are_there(visit: Callable[..., Visit], front: Path) -> None:
+    page = visit(front.parent.as_uri()).page
+    page.goto(front.as_uri())
+    doors = page.locator(".doors h3 a")
+    assert doors.count() == 4
+    root = SITE.parents[1]
+    made = ("docs/gallery", "docs/reference/python", "docs/reference/commands", "playground.html")
+    for link in page.locator("a[href]").all():
+        target = str(link.get_attribute("href")).partition("#")[0]
+        if target and not target.startswith(made):
+            assert (root / target).with_suffix(".md").is_file(), target
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_report_begins_with_its_answer(
+    visit: Callable[..., Visit], report: Path, scheme: str
+) -> None:
+    one = visit(report.as_uri(), viewport={"width": 1280, "height": 900}, color_scheme=scheme)
+    page = one.page
+    page.goto(report.as_uri())
+    page.wait_for_selector("html[data-ready=yes]")
+    assert report.stat().st_size < REPORT_BYTES
+    # On the first screen: verdict, numbers and the picture.
+    for part in (".verdict", ".numbers", ".answer-picture svg"):
+        box = page.locator(part).first.bounding_box()
+        assert box is not None
+        assert box["y"] + box["height"] < 900, part
+    assert page.locator("details.chapter[open]").count() == 0
+    check_readable(page)
+    page.locator("details.chapter > summary").first.press("Enter")
+    page.wait_for_selector("details.chapter[open] .body *")
+    one.open(report.as_uri())
+    check_readable(page)
+
+
+def test_a_link_into_a_chapter_opens_it(visit: Callable[..., Visit], report: Path) -> None:
+    page = visit(report.as_uri(), viewport=PHONE).page
+    page.goto(f"{report.as_uri()}#check")
+    page.wait_for_selector("#check td[data-column]")
+    assert page.locator("details.chapter[open]").count() == 1
+    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+    # On a phone each cell names its column, and none is beyond the edge.
+    for cell in page.locator("#check td").all():
+        box = cell.bounding_box()
+        assert box is not None
+        assert box["x"] + box["width"] <= PHONE["width"]
+
+
+def check_readable(page: Any) -> None:
+    """Check contrast, names and width of what is shown, and when it was first painted."""
+    assert page.evaluate(CONTRAST) == []
+    assert page.evaluate(NAMELESS) == []
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    painted = page.evaluate(FIRST_PAINT)
+    assert painted is None or painted < FIRST_PAINT_MS
