@@ -134,7 +134,7 @@ def plot_data_widths(posterior: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax.set_yticks(place, kinds)
     ax.invert_yaxis()
     ax.set(
-        xlabel=f"median 90 % interval over that without data, {posterior.attrs['runs']} runs",
+        xlabel=f"median 90 % interval over that without data\n{posterior.attrs['runs']} runs",
         xlim=(0.0, 1.1),
     )
     ax.spines[["top", "right"]].set_visible(False)

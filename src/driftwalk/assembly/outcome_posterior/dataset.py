@@ -42,10 +42,10 @@ def posterior_dataset(problem: OutcomeProblem, emulated: Emulated, checked: Chec
     names, observed, predicted = _classes(problem, emulated, weight)
     unit = [_unit(name) for name in problem.names]
     verdict = "determined"
-    if used is None:
-        verdict = "cannot tell: no kind of data has regions that cover"
-    elif not explained:
+    if not explained:
         verdict = "cannot tell: the model does not explain the outcomes"
+    elif used is None:
+        verdict = "cannot tell: no kind of data has regions that cover"
     elif not determined.all():
         verdict = "partly determined" if determined.any() else "cannot tell"
     kinds = list(KINDS)
@@ -128,7 +128,9 @@ def _reasons(
         )
     if used is None:
         lacking = ", ".join(
-            f"{kind} hold {checked.coverage[kind].joint:.0%}" for kind in problem.kinds
+            f"those of {kind} hold {min(one.joint, *one.marginal):.0%}"
+            for kind, one in checked.coverage.items()
+            if kind in problem.kinds
         )
         found.append(f"regions do not cover in the self-check ({lacking}): use narrower ranges")
         return found

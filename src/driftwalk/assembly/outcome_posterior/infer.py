@@ -108,7 +108,8 @@ def infer_outcomes(
     >>> import driftwalk as dw
     >>> study = dw.Study(assembly={"blocks": 2, "duration_s": 20.0})
     >>> few = {"runs": 20, "truths": 20}
-    >>> found = dw.infer_outcomes({"2": 12, "1+1": 8}, dw.tank30_flow(), study, **few)
+    >>> counts = {"2": 12, "1+1": 8}
+    >>> found = dw.assembly.infer_outcomes(counts, dw.tank30_flow(), study, **few)
     >>> found["parameter"].values.tolist()
     ['drag_coefficient', 'force_std']
     """
