@@ -45,12 +45,18 @@ COMMANDS: Final[dict[str, Command]] = {
     "calibrate": Command(_FIT, "Fit any motion model by simulation.", "calibrate"),
     "flow": Command(_FIT, "Extract the flow field alone.", "flow"),
     "simulate": Command(_PREDICT, "Simulate the motion of one body.", "simulate"),
-    "assemble": Command(_PREDICT, "Simulate the self-assembly of many blocks.", "assemble"),
-    "sensitivity": Command(_PREDICT, "Vary the model and see what assembles.", "sensitivity"),
-    "kinetics": Command(_PREDICT, "Estimate rates between outcome classes.", "kinetics"),
-    "infer-outcomes": Command(_PREDICT, "Infer parameters from outcomes alone.", "infer_outcomes"),
-    "yield": Command(_PREDICT, "Find the setting with the largest yield.", "yields"),
-    "control": Command(_PREDICT, "Choose the agitation while blocks assemble.", "control"),
+    "assemble": Command(
+        _PREDICT, "Simulate the self-assembly of many blocks.", "assembly.assemble"
+    ),
+    "sensitivity": Command(
+        _PREDICT, "Vary the model and see what assembles.", "assembly.sensitivity"
+    ),
+    "kinetics": Command(_PREDICT, "Estimate rates between outcome classes.", "assembly.kinetics"),
+    "infer-outcomes": Command(
+        _PREDICT, "Infer parameters from outcomes alone.", "assembly.infer_outcomes"
+    ),
+    "yield": Command(_PREDICT, "Find the setting with the largest yield.", "assembly.yields"),
+    "control": Command(_PREDICT, "Choose the agitation while blocks assemble.", "assembly.control"),
     "play": Command(_PREDICT, "Change parameters while a simulation runs.", "play"),
     "compare": Command(_COMPARE, "Measure the distance between two motions.", "compare"),
     "compare-models": Command(_COMPARE, "Rank motion models on a recording.", "compare_models"),

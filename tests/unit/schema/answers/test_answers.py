@@ -10,8 +10,8 @@ import pytest
 import xarray as xr
 from small_sensitivity import small
 
-from driftwalk.cli.assemble import assembled
-from driftwalk.cli.sensitivity import sensitivity_of
+from driftwalk.cli.assembly.assemble import assembled
+from driftwalk.cli.assembly.sensitivity import sensitivity_of
 from driftwalk.cli.terminal.output import print_parts, print_places, print_prediction, to_json
 from driftwalk.notebook.result import answer_lines
 from driftwalk.runs import AssemblyResult, SensitivityResult

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from driftwalk.cli.assembly.kinetics import files_of, opened_histories
 from driftwalk.cli.inputs.model_source import RUN_NAMES, assembly_source
-from driftwalk.cli.kinetics import files_of, opened_histories
 from driftwalk.cli.options.run import RunOptions, with_run_options
 from driftwalk.cli.options.shared_types import PANEL, FlowFile, argument, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options

@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 from typing import Annotated
 
+from driftwalk.cli.assembly.sensitivity import AXES, VARY_KEYS, flow_paths, vary_overrides
 from driftwalk.cli.inputs.model_source import RUN_NAMES, assembly_source, load_flow_for
 from driftwalk.cli.inputs.recordings import opening_note
 from driftwalk.cli.options.run import RunOptions, with_run_options
 from driftwalk.cli.options.shared_types import PANEL, FlowFile, Run, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.sensitivity import AXES, VARY_KEYS, flow_paths, vary_overrides
 from driftwalk.cli.terminal.output import print_prediction
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.study_keys import SENSITIVITY_KEYS
