@@ -55,6 +55,8 @@ class KineticsPolicy(NamedTuple):
     """Runs without which no model is chosen; chosen by hand, four in each part."""
     replicates: int = 50
     """Bootstrap samples of the runs: their standard deviation is known within a tenth."""
+    reached: int = 5
+    """Samples that reach the target without which its time has no error; chosen by hand."""
     iterations: int = 30
     """Iterations of a replicate, which begins at the estimate."""
     stored: int = 120
@@ -180,7 +182,7 @@ def kinetics(
         way = passage(model, own_target)
         for name, value in way._asdict().items():
             data[name] = ("class", value)
-            data[f"{name}_standard_error"] = ("class", bands[name].std(axis=0, ddof=1))
+            data[f"{name}_standard_error"] = ("class", spread_of_known(bands[name]))
         attrs["target"] = str(target)
     duration = found.recorded_s()
     coords |= {
@@ -384,6 +386,13 @@ def _chosen(model: Model, pairs: Integers, again: Floats) -> dict[str, Any]:
         "hidden_start": (("class", "hidden"), model.start),
         "hidden_change": (("class", "hidden", "hidden_after"), model.switch),
     }
+
+
+def spread_of_known(values: Floats) -> Floats:
+    """Return the standard deviation over the samples that have a number; NaN where few have."""
+    known = np.isfinite(values).sum(axis=0) >= KINETICS_POLICY.reached
+    spread = np.nanstd(np.where(known, values, 0.0), axis=0, ddof=1)
+    return np.where(known, spread, np.nan)
 
 
 def _over_time(sets: Sequence[Histories], model: Model, band: Floats) -> dict[str, Any]:
