@@ -9,7 +9,7 @@ import numpy as np
 from driftwalk.core.arrays import Floats
 from driftwalk.plot.assembly_courses import TIME_LABEL
 from driftwalk.plot.parts import style
-from driftwalk.plot.parts.assembly_labels import check_kind, class_colors
+from driftwalk.plot.parts.assembly_labels import check_kind, class_colors, class_names
 from driftwalk.plot.parts.polyomino_sketch import (
     are_discs,
     class_cells,
@@ -24,6 +24,10 @@ if TYPE_CHECKING:
 
 SHOWN_SHARE = 0.01
 """Classes that reach this share are drawn, and the transitions with this part of what leaves."""
+CLASS_PT = 28.0
+"""Diameter of the circle about the sketch of a class [pt]; chosen by eye."""
+APART_PT = 3.5
+"""Half of the distance between an arrow there and the one back [pt]; chosen by eye."""
 
 
 def plot_class_graph(kinetics: xr.Dataset, ax: Axes | None = None) -> Axes:
@@ -65,39 +69,50 @@ def plot_class_graph(kinetics: xr.Dataset, ax: Axes | None = None) -> Axes:
     ]
     place, rows = _places(list(dict.fromkeys(name for one in kept for name in one[:2])))
     ax = _axes_for(len(place), rows) if ax is None else ax
+    ax.set_xlim(-0.12, 1.12)
+    ax.set_ylim(-0.12, 1.1)
+    ax.set_axis_off()
+    ax.set_title("rates (per 1000 s); width: share of what leaves the class", loc="left")
+    style.settle_layout(ax)
+    unit = style.axes_points(ax) / np.array([np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim())])
     discs = are_discs(*place)
     shown = {one[:2] for one in kept}
     taken: list[Floats] = []
     for start, end, rate, share in sorted(kept, key=lambda one: -one[3]):
         first, last = np.array(place[start]), np.array(place[end])
         if (end, start) in shown:  # there and back run next to each other
-            along = (last - first) / np.hypot(*(last - first))
-            first, last = (at + 0.022 * np.array([-along[1], along[0]]) for at in (first, last))
+            along = unit * (last - first)
+            aside = APART_PT * np.array([-along[1], along[0]]) / np.hypot(*along) / unit
+            first, last = first + aside, last + aside
         ax.annotate(
-            "", xy=tuple(first + 0.8 * (last - first)), xytext=tuple(first + 0.2 * (last - first)),
-            arrowprops={"arrowstyle": "-|>", "lw": 0.4 + 2.6 * share, "color": style.MUTED},
+            "", xy=tuple(last), xytext=tuple(first),
+            arrowprops={
+                "arrowstyle": "-|>", "lw": 0.4 + 2.6 * share, "color": style.MUTED,
+                "shrinkA": CLASS_PT / 2.0 + 2.0, "shrinkB": CLASS_PT / 2.0 + 2.0,
+            },
         )  # fmt: skip
-        free = _free_place(first, last, [*taken, *map(np.array, place.values())])
+        free = _free_place(first, last, [*taken, *map(np.array, place.values())], unit)
         taken.append(free)
         ax.text(
-            float(free[0]), float(free[1]), f"{1e3 * rate:.2g}", fontsize=6.0, ha="center",
+            float(free[0]), float(free[1]), _rate_text(1e3 * rate), fontsize=6.0, ha="center",
             va="center",
             bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none"},
         )  # fmt: skip
-    colors = class_colors(list(place))
+    colors = class_colors(class_names(kinetics))
     for name, at in place.items():
-        ax.plot(*at, "o", ms=28, color="white", mec=colors[name], mew=0.8)
+        ax.plot(*at, "o", ms=CLASS_PT, color="white", mec=colors[name], mew=0.8)
         side = 20.0 / float(sketch_size(class_cells(name)).max())
         place_sketch(ax, name, at, cell_pt=min(side, 6.0), color=colors[name], discs=discs)
         ax.annotate(
             short_class(name), at, xytext=(0, -15), textcoords="offset points", ha="center",
             va="top", fontsize=6.5,
         )  # fmt: skip
-    ax.set_xlim(-0.12, 1.12)
-    ax.set_ylim(-0.12, 1.1)
-    ax.set_axis_off()
-    ax.set_title("rates (1/1000 s)", loc="left")
     return ax
+
+
+def _rate_text(rate: float) -> str:
+    """Return a rate with two digits, or all of those before the point."""
+    return f"{rate:.2g}" if rate < 99.5 else f"{rate:.0f}"
 
 
 def _axes_for(classes: int, rows: int) -> Axes:
@@ -108,10 +123,10 @@ def _axes_for(classes: int, rows: int) -> Axes:
     return figure.add_subplot()
 
 
-def _free_place(first: Floats, last: Floats, taken: list[Floats]) -> Floats:
+def _free_place(first: Floats, last: Floats, taken: list[Floats], unit: Floats) -> Floats:
     """Return the place along an arrow that is farthest from all labels and classes so far."""
     places = first + np.linspace(0.25, 0.7, 19)[:, None] * (last - first)
-    off = [min(np.hypot(*(place - other)) for other in taken) for place in places]
+    off = [min(np.hypot(*(unit * (place - other))) for other in taken) for place in places]
     found: Floats = places[int(np.argmax(off))]
     return found
 
@@ -157,9 +172,9 @@ def plot_predicted_shares(kinetics: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax = style.axes_or_new(ax, height_mm=90.0)
     time: Floats = kinetics["time"].values
     largest = kinetics["share"].values.max(axis=0)
-    names = [str(name) for name in kinetics["class"].values]
+    names = class_names(kinetics)
     shown = [at for at in np.argsort(-largest, kind="stable")[:12] if largest[at] > SHOWN_SHARE]
-    colors = class_colors([names[at] for at in sorted(shown)])
+    colors = class_colors(names)
     for at in sorted(shown):
         one, color = kinetics.isel({"class": at}), colors[names[at]]
         ax.fill_between(time, one["share_low"], one["share_high"], color=color, alpha=0.25, lw=0)
