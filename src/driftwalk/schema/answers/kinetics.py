@@ -28,15 +28,15 @@ def kinetics_answer(found: xr.Dataset) -> Answer:
         f"{facts['duration_s']:g} s at most",
         Row("verdict", str(facts["verdict"])),
         *reasons,
-        Row("model", f"{facts['chosen']}, chosen on held-out runs"),
-        score_table(found),
         *(rate_table(found, at) for at in range(found.sizes["source"])),
+        Row("model", f"{facts['chosen']}, {choice_words(found)}"),
+        score_table(found),
     ]
+    if "target" in facts:
+        parts[:1] = [target_words(found), *parts[:1], target_table(found)]
     if "completion_ks" in facts:
         text = f"{facts['completion_ks']:.3f} (by chance up to {facts['completion_ks_floor']:.3f})"
         parts.append(Row("KS, completion times", text))
-    if "target" in facts:
-        parts.append(target_table(found))
     if "equal_p" in facts:
         parts += [Row("equal rates", equal_words(found)), equal_table(found)]
     if "other_blocks_refused" in facts:
@@ -87,17 +87,55 @@ def rate_table(found: xr.Dataset, source: int) -> Table:
     return Table(rows, ["transition", "seen", "rate [1/s]", share], name)
 
 
+def choice_words(found: xr.Dataset) -> str:
+    """Return why the model was chosen: it is the best, or simpler and about as good."""
+    best = str(found["model"].values[int(found["score"].values.argmax())])
+    if best == found.attrs["chosen"]:
+        return "best on held-out runs"
+    return "simplest within one standard error of the best on held-out runs"
+
+
+def target_words(found: xr.Dataset) -> str:
+    """Return how surely and how soon runs reach the target, from where most of them start."""
+    one = started(found)
+    several = int((found["hidden_start"].sum("hidden") > 0.0).sum()) > 1
+    start = f" from {short_class(str(one['class'].values))}" if several else ""
+    share, error = (100.0 * float(one[f"committor{end}"]) for end in ("", "_standard_error"))
+    time = passage_text(one)
+    return (
+        f"{short_class(str(found.attrs['target']))} is reached{start} in {share:.1f} ± {error:.1f} "
+        f"% of the runs{f', after {time} s on average' if time else ''} (± one standard error)"
+    )
+
+
+def started(found: xr.Dataset) -> xr.Dataset:
+    """Return the part of the class in which most runs start."""
+    return found.isel({"class": int(found["hidden_start"].sum("hidden").values.argmax())})
+
+
+def passage_text(one: xr.Dataset) -> str:
+    """Return the mean first-passage time of a class with its error, nothing without one."""
+    value, error = (float(one[f"passage_time{end}"]) for end in ("", "_standard_error"))
+    if not math.isfinite(error):
+        return ""
+    # Of the error two digits, and of the value the same places.
+    places = max(0, 1 - math.floor(math.log10(error))) if error > 0.0 else 0
+    return f"{value:.{places}f} ± {error:.{places}f}"
+
+
 def target_table(found: xr.Dataset) -> Table:
-    """Return committors and mean first-passage times."""
+    """Return committors and mean first-passage times from the classes that runs left."""
+    left = {str(name).split(" -> ")[0] for name in found["transition"].values}
     rows = [
         [
             short_class(str(one["class"].values)),
-            f"{float(one['committor']):.3f} ± {float(one['committor_standard_error']):.3f}",
-            f"{float(one['passage_time']):.4g} ± {float(one['passage_time_standard_error']):.2g}"
-            if math.isfinite(float(one["passage_time"]))
-            else "",
+            f"{float(one['committor']):.3f} ± {float(one['committor_standard_error']):.3f}"
+            if float(one["committor"]) > 0.0
+            else "no way seen",
+            passage_text(one),
         ]
         for one in each(found, "class")
+        if str(one["class"].values) in left - {str(found.attrs["target"])}
     ]
     target = short_class(str(found.attrs["target"]))
     return Table(rows, ["from", f"reaches {target}", "mean first-passage time [s]"])
@@ -125,14 +163,15 @@ def transition_text(one: xr.Dataset) -> str:
 
 
 def _facts(found: xr.Dataset, reasons: list[str]) -> dict[str, Any]:
+    way = ("committor", "passage_time")
     by: dict[str, Any] = {
         "transitions": ("transition", ("count", "rate", "rate_low", "rate_high", "equal_p")),
         "models": ("model", ("score", "score_behind", "score_behind_standard_error")),
         "tests": ("test", ("statistic", "statistic_low", "statistic_high", "p", "p_corrected")),
-        "classes": ("class", ("committor", "passage_time")),
+        "classes": ("class", (*way, *(f"{name}_standard_error" for name in way))),
     }
     units = {"rate": "rate_per_s", "rate_low": "rate_low_per_s", "rate_high": "rate_high_per_s"}
-    units["passage_time"] = "passage_time_s"
+    units |= {name: f"{name}_s" for name in by["classes"][1] if name.startswith("passage_time")}
     tables = {
         key: [
             {
