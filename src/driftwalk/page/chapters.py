@@ -24,7 +24,7 @@ _CHAPTERS: Final = {
     "manifest": _REPRODUCE,
 }
 """By the first word of an id; all others are results in detail."""
-_PICTURES: Final = ("map", "l1_map", "classes", "flow", "lines", "trajectory")
+_PICTURES: Final = ("map", "l1_map", "classes", "flow", "lines", "class_times", "trajectory")
 """Kinds of sections that can be the one picture of an answer, the best one first."""
 
 

@@ -2,41 +2,39 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-import numpy as np
+import math
+from typing import TYPE_CHECKING, Any
 
 from driftwalk.page.parts import (
     Maker,
     Section,
-    chart,
     figure,
-    label,
+    percent,
     quantity,
     require,
     required,
     sections_of,
-    series,
     summary_section,
     table_section,
     value_of,
 )
+from driftwalk.page.sections.outcomes import class_times_section
 from driftwalk.schema.answers.facts import sentences
 from driftwalk.schema.answers.kinetics import (
+    choice_words,
     equal_table,
     equal_words,
     rate_table,
     score_table,
+    started,
     target_table,
+    target_words,
 )
 from driftwalk.schema.answers.parts import Table, each
 from driftwalk.schema.shapes import short_class
 
 if TYPE_CHECKING:
     import xarray as xr
-
-MOST_CURVES = 12
-"""Classes whose shares are drawn: those with the largest share at some time. Chosen by hand."""
 
 
 def kinetics_sections(*, kinetics: xr.Dataset | None = None) -> list[Section]:
@@ -58,14 +56,15 @@ def kinetics_sections(*, kinetics: xr.Dataset | None = None) -> list[Section]:
     ['empty']
     """
     parts: list[tuple[str, str, Maker]] = [
-        ("shares", "Shares over time", shares_section),
+        ("shares", "Shares over time", shares_sections),
         ("rates", "Rates", rates_sections),
         ("tests", "Tests of a well-mixed tank", mixing_section),
         ("models", "Models", lambda found: _table("models", "Models", score_table(found))),
     ]
     if kinetics is not None and "target" in kinetics.attrs:
         title = "Way to the target"
-        parts.append(("target", title, lambda found: _table("target", title, target_table(found))))
+        way = ("target", title, lambda found: _table("target", title, target_table(found)))
+        parts.insert(0, way)
     if kinetics is not None and kinetics.sizes.get("source") == 2:
         name = "Equal rates"
         parts.append(("equal", name, lambda found: _table("equal", name, equal_table(found))))
@@ -82,8 +81,7 @@ def kinetics_summary(kinetics: xr.Dataset) -> Section:
         "Each run is a history of classes; the rates between them were estimated by likelihood.",
         f"Verdict: {required(kinetics, 'verdict')}.",
         *(f"{text[:1].upper()}{text[1:]}." for text in sentences(kinetics, "reason")),
-        f"The shares are those of the {required(kinetics, 'chosen')}, the simplest model that is "
-        "within a standard error of the best on held-out runs.",
+        f"The shares are those of the {required(kinetics, 'chosen')}, {choice_words(kinetics)}.",
     ]
     if "equal_p" in facts:
         paragraphs.append(f"Equal rates of both data sets: {equal_words(kinetics)}.")
@@ -91,7 +89,11 @@ def kinetics_summary(kinetics: xr.Dataset) -> Section:
         paragraphs.append(f"{str(facts['other_blocks_refused']).capitalize()}.")
     chance = value_of(kinetics, "completion_ks_floor")
     note = None if chance is None else f"by chance up to {quantity(chance)}"
-    shown = [
+    shown = []
+    if "target" in facts:
+        paragraphs.insert(0, f"{target_words(kinetics)}.")
+        shown += _target_figures(kinetics)
+    shown += [
         figure("KS distance of completion times", value_of(kinetics, "completion_ks"), note=note)
     ]
     if "other_blocks_rate_per_s" in facts:
@@ -100,25 +102,43 @@ def kinetics_summary(kinetics: xr.Dataset) -> Section:
     return summary_section(paragraphs, shown)
 
 
-def shares_section(kinetics: xr.Dataset) -> Section:
-    """Return predicted shares with their bands, and those that were seen as points."""
+def _target_figures(kinetics: xr.Dataset) -> list[dict[str, Any]]:
+    """Return committor and mean first-passage time from where most runs start."""
+    one, target = started(kinetics), short_class(str(kinetics.attrs["target"]))
+    words = {
+        "committor": (f"share of runs that reach {target}", "1"),
+        "passage_time": (f"mean time until {target}", "s"),
+    }
+    made = []
+    for name, (text, unit) in words.items():
+        value, error = (float(one[f"{name}{end}"]) for end in ("", "_standard_error"))
+        if math.isfinite(error):
+            note = f"± {quantity(error, unit, digits=2)} (one standard error)"
+            made.append(figure(text, value, unit, note=note))
+    return made
+
+
+def shares_sections(kinetics: xr.Dataset) -> list[Section]:
+    """Return the predicted shares with their bands, and those seen in each data set."""
     require(kinetics, "time", "share", "share_low", "share_high", "empirical")
-    time = kinetics["time"].values
-    largest = np.argsort(-kinetics["share"].values.max(axis=0), kind="stable")[:MOST_CURVES]
-    drawn = []
-    for at in sorted(largest.tolist()):
-        one = kinetics.isel({"class": at})
-        name = short_class(str(one["class"].values))
-        ends = (one["share_low"].values, one["share_high"].values)
-        drawn.append(series(name, time, one["share"].values, ends=ends))
-        for source in each(one, "source"):
-            seen = f"{name}, seen, {source['source'].values} data set"
-            points = source["empirical"].values[::6]
-            drawn.append(series(seen, time[::6], points, style="points"))
-    return chart(
-        "shares", "Shares over time", "Lines are predicted, points were seen.",
-        x=label("time", "s"), y=label("share of runs"), series=drawn,
-    )  # fmt: skip
+    ends = {f"share_{end}": f"proportion_{end}" for end in ("low", "high")}
+    made = [
+        class_times_section(kinetics.rename({"share": "proportion", **ends}))
+        | {"id": "shares", "title": "Predicted shares over time"}
+    ]
+    for at, one in enumerate(each(kinetics, "source"), start=1):
+        name = "" if kinetics.sizes["source"] == 1 else f", {one['source'].values} data set"
+        off = abs(one["empirical"] - one["share"]).max("time")
+        worst = off.isel({"class": int(off.values.argmax())})
+        note = (
+            f"At most {percent(float(worst))} of the runs from the predicted share "
+            f"({short_class(str(worst['class'].values))})."
+        )
+        made.append(
+            class_times_section(one.rename(empirical="proportion"))
+            | {"id": f"seen-{at}", "title": f"Shares seen{name}", "note": note}
+        )
+    return made
 
 
 def rates_sections(kinetics: xr.Dataset) -> list[Section]:
