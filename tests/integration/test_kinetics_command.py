@@ -12,6 +12,9 @@ from chain_runs import chain_runs
 from command_line import RECORDING, here
 
 import driftwalk as dw
+from driftwalk.page.sections.kinetics import kinetics_sections
+from driftwalk.plot.kinetics import plot_class_graph, plot_predicted_shares
+from driftwalk.plot.parts.assembly_labels import class_colors
 
 pytestmark = pytest.mark.slow
 
@@ -28,7 +31,37 @@ def test_a_run_holds_its_answer_and_its_figures(tmp_path: Path) -> None:
     assert sorted(path.stem for path in out.glob("figures/*.png")) == ["class_graph", "shares"]
     again = dw.kinetics(chain_runs(60, 1), target="T")
     assert again["share"].equals(found["share"])
+    assert repr(again).startswith("T is reached in ")
     assert here("report", out, "-o", tmp_path / "page.html").code == 0
+    made = {part["id"]: part for part in kinetics_sections(kinetics=found)}
+    assert made["summary"]["paragraphs"][0].startswith("T is reached in ")
+    shown = {one["label"]: one["value"] for one in made["summary"]["numbers"]}
+    started = found.sel({"class": "1+1+1+1"})
+    assert shown["share of runs that reach T"] == float(started["committor"])
+    assert shown["mean time until T"] == float(started["passage_time"])
+    # The same classes in the same order have the same colours.
+    named = [[one["class"] for one in made[id]["classes"]] for id in ("shares", "seen-1")]
+    assert named == [found["class"].values.tolist()] * 2
+    assert made["seen-1"]["title"] == "Shares seen"
+
+
+def test_a_class_has_one_colour_in_all_figures_of_a_run() -> None:
+    """Also where the graph shows other classes than the curves, and in another order."""
+    found = dw.kinetics(chain_runs(60, 1))
+    colors = class_colors(found["class"].values.tolist())
+    curves = {line.get_label(): line.get_color() for line in plot_predicted_shares(found).lines}
+    graph = plot_class_graph(found)
+    for text in graph.texts:
+        name = text.get_text()
+        if name not in colors:
+            continue
+        [circle] = [one for one in graph.lines if tuple(one.get_xydata()[0]) == tuple(text.xy)]
+        assert circle.get_markeredgecolor() == colors[name] == curves.get(name, colors[name])
+    # Every arrow runs from the middle of a class to the middle of another one, up to its circle.
+    middles = {tuple(line.get_xydata()[0]) for line in graph.lines}
+    arrows = [one for one in graph.texts if getattr(one, "arrow_patch", None)]
+    assert len(arrows) == found.sizes["transition"]
+    assert {one.xy for one in arrows} | {one.xyann for one in arrows} == middles
 
 
 @pytest.mark.parametrize(

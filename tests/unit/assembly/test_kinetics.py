@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+import re
+import statistics
 from itertools import product
 
 import numpy as np
@@ -12,12 +15,19 @@ import xarray as xr
 from chain_runs import CLASSES, RATES, chain_runs, rate_matrix
 
 import driftwalk as dw
-from driftwalk.assembly.chains.estimate import _other_blocks, completion, empirical_shares
+from driftwalk.assembly.chains.estimate import (
+    _other_blocks,
+    completion,
+    empirical_shares,
+    spread_of_known,
+)
 from driftwalk.assembly.chains.hidden import FORMS, Form, Model, fit, log_likelihood
 from driftwalk.assembly.chains.histories import histories
 from driftwalk.assembly.chains.mixing import holm, mixing_tests, score
 from driftwalk.assembly.chains.predicted import passage, shares
 from driftwalk.core.errors import InputError
+from driftwalk.schema.answers.kinetics import kinetics_answer
+from driftwalk.schema.answers.parts import lines_of
 
 CHAIN, SEMI = FORMS[:2]
 HIDDEN = Form("2 hidden states", 1, 2)
@@ -146,6 +156,43 @@ def test_passage_with_partings_and_hidden_states_solves_the_generator() -> None:
     assert way.passage_time[at] == pytest.approx(time[first].mean() / reach[first].mean(), rel=1e-9)
 
 
+def test_the_spread_is_that_of_the_samples_that_have_a_number() -> None:
+    values = np.random.default_rng(3).normal(30.0, 4.0, (50, 4))
+    values[7, 1] = values[4:, 2] = values[:, 3] = np.nan
+    whole, but_one, four, none = spread_of_known(values)
+    assert whole == values.std(axis=0, ddof=1)[0]
+    assert but_one == pytest.approx(statistics.stdev(v for v in values[:, 1] if not math.isnan(v)))
+    assert math.isnan(four)
+    assert math.isnan(none)
+
+
+@pytest.mark.slow
+def test_the_answer_begins_with_the_counted_share_and_time_to_the_target() -> None:
+    """Where every run ends, the committor is a share of runs; errors are known within a tenth."""
+    # From 2+2, a way to T is taken by one run in fifty: some bootstrap samples have none.
+    rates = {**RATES, ("2+2", "T"): 0.0003}
+    runs = chain_runs(200, 4, duration=20_000.0, rates=rates)
+    found = dw.kinetics(runs, target="T")
+    assert found.attrs["chosen"] == "Markov chain"
+    reached = runs["outcome"].values == CLASSES.index("T")
+    share, text = reached.mean(), "\n".join(lines_of(kinetics_answer(found).parts))
+    first = re.match(r"T is reached in (\S+) ± (\S+) % of the runs, after (\S+) ± (\S+) s", text)
+    assert first is not None
+    percent, error, time, spread = map(float, first.groups())
+    # The Markov chain forgets where L3+1 and 2+2 were entered from, and all come from one class.
+    assert percent == pytest.approx(100.0 * share, abs=0.06)
+    # 50 samples: four standard deviations of the error are 40 % of it.
+    assert error == pytest.approx(100.0 * (share * (1.0 - share) / 200) ** 0.5, rel=0.4)
+    taken = np.nanmax(runs["event_time"].values[reached], axis=1)
+    assert abs(time - taken.mean()) < 3.0 * taken.std(ddof=1) / reached.sum() ** 0.5
+    assert spread == pytest.approx(taken.std(ddof=1) / reached.sum() ** 0.5, rel=0.4)
+    assert "nan" not in text
+    [table] = re.findall(r"from +reaches T.*?\n(.*?)\nverdict", text, re.DOTALL)
+    # Classes that no run left, and the target itself, have no row.
+    names = [line.split()[0] for line in table.splitlines()]
+    assert names == ["L3+1", "2+2", "2+1+1", "1+1+1+1"]
+
+
 def test_score_is_that_of_the_log_rank_test() -> None:
     random = np.random.default_rng(4)
     lasted = np.round(random.exponential(3.0, 80), 1) + 0.1
@@ -223,7 +270,8 @@ def test_a_mixed_tank_is_extrapolated_and_another_one_is_not() -> None:
     assert abs(rate - 0.03 * 15 / 6) < 3.0 * error
     assert abs(float(mixed["committor"].sel({"class": "1+1+1+1"})) - 0.476) < 0.09
     text = repr(mixed)
-    assert text.startswith("400 runs of 4 blocks")
+    assert text.startswith("T is reached in ")
+    assert "400 runs of 4 blocks" in text
     other = dw.kinetics(chain_runs(400, 1, memory=0.05), blocks=6)
     assert other.attrs["verdict"] == "waiting times are not exponential, memory across states"
     assert other.attrs["other_blocks_refused"].startswith("no rate for 6 blocks is extrapolated")
