@@ -166,6 +166,16 @@ def test_the_spread_is_that_of_the_samples_that_have_a_number() -> None:
     assert math.isnan(none)
 
 
+def test_no_share_is_seen_after_the_recordings_end() -> None:
+    """Later only complete runs would be left, and all would be complete."""
+    runs = chain_runs(60, 2, duration=100.0)
+    seen = empirical_shares(histories([runs], classes=CLASSES), np.array([99.0, 100.0, 101.0]))
+    outcome = np.bincount(runs["outcome"].values, minlength=len(CLASSES)) / 60
+    assert seen[1] == pytest.approx(outcome)
+    assert np.isfinite(seen[0]).all()
+    assert np.isnan(seen[2]).all()
+
+
 @pytest.mark.slow
 def test_the_answer_begins_with_the_counted_share_and_time_to_the_target() -> None:
     """Where every run ends, the committor is a share of runs; errors are known within a tenth."""

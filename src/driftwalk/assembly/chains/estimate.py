@@ -415,7 +415,8 @@ def _over_time(sets: Sequence[Histories], model: Model, band: Floats) -> dict[st
 def empirical_shares(found: Histories, time: Floats) -> Floats:
     """Return the share of runs in each class at each time, of those that are still watched.
 
-    A run that ended in a class that no run ever left stays in it. NaN where no run is watched.
+    A run that ended in a class that no run ever left stays in it. NaN after the last run that ended
+    in another one: those that stay would be all.
     """
     entry = found.entry
     left = np.bincount(found.state[found.target >= 0], minlength=len(found.classes)) > 0
@@ -423,13 +424,15 @@ def empirical_shares(found: Histories, time: Floats) -> Floats:
     end[(found.target < 0) & ~left[found.state]] = np.inf
     # A run is still watched at its very end.
     end[found.target < 0] *= 1.0 + 1e-9
+    cut = (found.target < 0) & np.isfinite(end)
+    watched = time <= (end[cut].max() if cut.any() else np.inf)
     count = np.empty((time.size, len(found.classes)))
     for state in range(len(found.classes)):
         own = found.state == state
         count[:, state] = np.searchsorted(np.sort(entry[own]), time, side="right")
         count[:, state] -= np.searchsorted(np.sort(end[own]), time, side="right")
     total = count.sum(axis=1, keepdims=True)
-    return np.where(total > 0, count / np.maximum(total, 1.0), np.nan)
+    return np.where((total > 0) & watched[:, None], count / np.maximum(total, 1.0), np.nan)
 
 
 def completion(found: Histories, model: Model) -> dict[str, Any]:
