@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -154,6 +156,26 @@ def test_draws_from_a_fit_are_those_of_its_uncertainty() -> None:
     ratio = drawn.force_std / study.forces.force_std_N
     np.testing.assert_allclose(found.force_std[0], np.r_[2e-4, 2e-4 * ratio])
     np.testing.assert_allclose(found.drag_coefficient[3, 1:], drawn.drag_coefficient)
+
+
+@pytest.mark.parametrize(("arm", "tables"), [("constant", 1), ("policy", 4)])
+def test_modes_and_policies_in_turn_meet_every_draw_equally_often(
+    monkeypatch: pytest.MonkeyPatch, arm: Literal["constant", "policy"], tables: int
+) -> None:
+    # Six draws; four modes, or four policies of one mode each: 24 worlds have each pair once.
+    many = replace(
+        modes(), force_std=np.arange(24.0).reshape(4, 6), drag_coefficient=np.ones((4, 6))
+    )
+    classes = dw.assembly.outcome_classes(3)
+    action = np.broadcast_to(np.arange(tables)[:, None, None, None], (tables, 3, len(classes), 6))
+    given: list[float] = []
+    monkeypatch.setattr(dw.TankBatch, "set", lambda _, **to: given.extend(to["force_std"].tolist()))
+    for first in (0, 24):
+        work = Worlds(many, classes, Setting(0.1, 1), Rules(action), 4, first, turn=4, arm=arm)
+        for unit in grid(world=np.arange(first, first + 24)).units(7):
+            work(unit)
+        assert sorted(given) == list(range(24))
+        given.clear()
 
 
 def test_modes_of_different_tanks_or_blocks_are_refused() -> None:

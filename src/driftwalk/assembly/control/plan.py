@@ -264,10 +264,11 @@ class _Planner:
         """Return the policy."""
         none = np.zeros((1, *cells_like(len(self.classes))), dtype=np.int64)
         # The modes in turn, each in the same number of worlds.
-        each = -(-self.worlds // self.modes.size)
-        alone = self.run("constant", none, worlds=each * self.modes.size, arm="constant")
-        own = np.arange(each * self.modes.size) % self.modes.size
-        hits = np.bincount(own, weights=self.hit(alone), minlength=self.modes.size)
+        size = self.modes.size
+        each = -(-self.worlds // size)
+        alone = self.run("constant", none, worlds=each * size, turn=size, arm="constant")
+        own = np.arange(each * size) % size
+        hits = np.bincount(own, weights=self.hit(alone), minlength=size)
         constant = hits.astype(np.float64)
         self.safe, seen = int(constant.argmax()), [decisions_of(alone)]
         promised, reached = np.full((2, rounds), np.nan)
@@ -278,7 +279,7 @@ class _Planner:
             plans = [self.planned(seen, random if k >= count // 4 else None) for k in range(count)]
             promised[at] = plans[0][1]
             tables = np.stack([gain.argmax(axis=-1) for gain, _ in plans])
-            followed = self.run(f"round_{at}", tables)
+            followed = self.run(f"round_{at}", tables, turn=count)
             seen.append(decisions_of(followed))
             reached[at] = self.hit(followed)[best].mean()
         gain, promise = self.planned(seen)
@@ -287,7 +288,7 @@ class _Planner:
         best = np.arange(self.worlds) % IMPROVEMENT_POLICY.greedy == 0
         for at in range(min(CONTROL_POLICY.modelled, rounds), rounds):
             modes = known.drawn(self.worlds, np.random.default_rng([self.seed, at]))
-            followed = self.run(f"round_{at}", modes)
+            followed = self.run(f"round_{at}", modes, turn=IMPROVEMENT_POLICY.greedy)
             reached[at] = self.hit(followed)[best].mean()
             known = known.faded(prior).updated(followed, modes, self.hit(followed))
         # The policy, that of the model and the best mode alone are compared in the same worlds.

@@ -15,6 +15,7 @@ from driftwalk.core.files.shards import Arrays
 from driftwalk.sweep import WorkUnit
 
 
+
 @dataclass(frozen=True)
 class Setting:
     """Decisions, and how late and how well the tank is seen.
@@ -58,6 +59,9 @@ class Worlds:
         Of the starts, the forces and what is missed.
     first : int
         Number of the world that has the first of several policies, from where they are counted.
+    turn : int
+        Worlds that share a draw of the parameters: those that take modes or policies in turn. So
+        each of these meets the same draws.
     arm : {"policy", "constant", "random"}
         The policy, one mode for each world in turn, or another random mode at each decision.
     only : int or None
@@ -70,6 +74,7 @@ class Worlds:
     rules: Rules
     seed: int
     first: int = 0
+    turn: int = 1
     arm: Literal["policy", "constant", "random"] = "policy"
     only: int | None = None
 
@@ -89,6 +94,7 @@ class Worlds:
         )  # fmt: skip
         wishes, missed = self._drawn(world)
         controller = Controller(self.rules, world - self.first)
+        draw = (world - self.first) // self.turn + self.first // self.turn
         number = {name: at for at, name in enumerate(self.classes)}
         found = {
             name: np.empty((world.size, periods), dtype=np.int16)
@@ -102,7 +108,7 @@ class Worlds:
             mode = controller.decide(known, age, left=periods - period, wish=wishes[:, period])
             if setting.latency_s > 0.0 and period > 0:
                 batch.advance(setting.latency_s)
-            batch.set(**self.modes.settings(mode, world, force_factor=setting.force_factor))
+            batch.set(**self.modes.settings(mode, draw, force_factor=setting.force_factor))
             batch.advance(setting.every_s - (setting.latency_s if period > 0 else 0.0))
             after = numbers(batch.outcome, number)
             entered = (after != seen) | (np.asarray(batch.class_since) > since)
