@@ -14,6 +14,8 @@ from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.files.shards import Arrays
 from driftwalk.sweep import WorkUnit
 
+STREAM = 1
+"""Of the random numbers of a world, apart from those of a round of planning."""
 
 
 @dataclass(frozen=True)
@@ -131,7 +133,7 @@ class Worlds:
             ]
         if self.arm == "random" or self.setting.missed > 0.0:
             for row, number in enumerate(world.tolist()):
-                random = np.random.default_rng([self.seed, number])
+                random = np.random.default_rng([self.seed, number, STREAM])
                 lost[row] = random.random(periods) < self.setting.missed
                 if self.arm == "random":
                     wish[row] = random.integers(modes, size=periods)
