@@ -29,8 +29,8 @@ ARMS = ("policy", "best constant mode", "random switching")
 SAMPLE_S = 0.5
 """Time between two pictures of a film [s]; chosen by hand."""
 CONSTANTS = 5
-"""Constant modes that are run, those with the largest shares in the plan; with three, one
-plan of `studies/control` missed the best of 12."""
+"""Constant modes that the best is chosen from, those with the largest shares in the plan; with
+three, one plan of `studies/control` missed the best of 12."""
 
 
 def try_control(
@@ -51,7 +51,8 @@ def try_control(
     policy : xarray.Dataset
         A `control_policy`.
     worlds : int
-        Worlds of each arm, from 20. The arms share starts and forces.
+        Worlds of each arm, from 20. The arms share starts and forces. The best constant mode is
+        chosen in as many other worlds.
     latency, missed : float, optional
         Over the policy's, see `plan_control`.
     force_factor : float
@@ -78,26 +79,29 @@ def try_control(
     setting = trial_setting(policy, worlds, latency, missed, force_factor)
     classes = tuple(str(name) for name in policy["class"].values)
     target, seed = classes.index(wanted.target), int(policy.attrs["seed"])
-    # Behind all worlds of the plan.
+    # Behind all worlds of the plan; the best constant mode is chosen in the worlds after them.
     first = int(policy.attrs["worlds_used"])
     best = np.argsort(-policy["constant_reached"].values, kind="stable")[:CONSTANTS].tolist()
-    total, done = worlds * (2 + len(best)), 0
+    total, done = worlds * (3 + len(best)), 0
 
-    def ran(name: str, arm: Any, only: int | None = None) -> Arrays:
+    def ran(name: str, arm: Any, only: int | None = None, begin: int = first) -> Arrays:
         nonlocal done
         before, done = done, done + worlds
         return run_sweep(
             Worlds(modes, classes, setting, rules, seed, arm=arm, only=only),
-            grid(world=np.arange(first, first + worlds)).units(CONTROL_POLICY.unit),
+            grid(world=np.arange(begin, begin + worlds)).units(CONTROL_POLICY.unit),
             store=None if store is None else store(name),
             executor=executor,
             progress=None if progress is None else lambda at, _: progress(before + at, total),
         )
 
     policys = ran("policy", "policy")
-    constants = [ran(f"constant_{mode}", "constant", mode) for mode in best]
-    chosen = int(np.argmax([(one["after"][:, -1] == target).sum() for one in constants]))
-    found = [policys, constants[chosen], ran("random", "random")]
+    alone = [
+        (ran(f"chosen_{mode}", "constant", mode, first + worlds)["after"][:, -1] == target).sum()
+        for mode in best
+    ]
+    constant = best[int(np.argmax(alone))]
+    found = [policys, ran("constant", "constant", constant), ran("random", "random")]
     hits = np.stack([one["after"] == target for one in found]).astype(np.float64)
     share = CONTROL_POLICY.confidence
     reached = hits[:, :, -1]
@@ -136,7 +140,7 @@ def try_control(
         "target": wanted.target, "by_s": wanted.by_s, "every_s": wanted.every_s,
         "latency_s": setting.latency_s, "missed": setting.missed, "force_factor": force_factor,
         "stated": stated[0], "verdict": "as stated" if agree else "not as stated",
-        "worlds": worlds, "confidence": share, "constant_mode": modes.name[best[chosen]],
+        "worlds": worlds, "confidence": share, "constant_mode": modes.name[constant],
         "film_world": first + example, "seed": seed,
     })  # fmt: skip
 

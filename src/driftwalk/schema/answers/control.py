@@ -36,16 +36,22 @@ def policy_answer(found: xr.Dataset) -> Answer:
         ),
         mode_table(found),
     ]
-    return Answer(parts, _facts(found, {"modes": ("mode", ("constant_reached",))}), [])
+    names = ("constant_reached", "constant_low", "constant_high")
+    return Answer(parts, _facts(found, {"modes": ("mode", names)}), [])
 
 
 def mode_table(policy: xr.Dataset) -> Table:
     """Return the modes with what each reaches alone."""
     rows = [
-        [str(one["mode"].values), f"{float(one['constant_reached']):.3f}"]
+        [
+            str(one["mode"].values),
+            f"{float(one['constant_reached']):.3f}",
+            f"{float(one['constant_low']):.3f} to {float(one['constant_high']):.3f}",
+        ]
         for one in each(policy, "mode")
     ]
-    return Table(rows, ["mode", "reaches it alone"])
+    share = f"{policy.attrs['confidence']:.0%} interval"
+    return Table(rows, ["mode", "reaches it alone", share])
 
 
 def trial_answer(found: xr.Dataset) -> Answer:

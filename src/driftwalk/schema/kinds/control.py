@@ -29,6 +29,8 @@ variables:
     force_std(mode draw) [N]: stochastic force sigma_F of the mode
     drag_coefficient(mode draw) [1]: drag coefficient C_d of the mode
     constant_reached(mode) [1]: share of the worlds that this mode alone brought to the target
+    constant_low(mode) [1]: lower limit of the share; exact, for each mode apart
+    constant_high(mode) [1]: upper limit of the share
     promised(round) [1]: probability of the target by value iteration; NaN without it
     round_reached(round) [1]: share of the worlds that reached the target under its best policy
     u(field y x) [m s-1]: flow velocity x
