@@ -50,6 +50,11 @@ def test_a_plan_and_its_test_hold_what_they_say(tmp_path: Path) -> None:
     test = xr.load_dataset(tmp_path / "test" / "control_test.nc")
     np.testing.assert_allclose(test["usage"].sum("mode"), 1.0)
     np.testing.assert_allclose(test["share"][:, -1], test["reached"])
+    facts = test.attrs
+    count = [round(40 * float(test["reached"][0])), round(80 * policy.attrs["reached"])]
+    limits = dw.assembly.outcomes.distribution.difference_interval(count, [40, 80], confidence=0.9)
+    assert (facts["difference_low"], facts["difference_high"]) == pytest.approx(limits)
+    assert facts["verdict"] == "not " * (not limits[0] <= 0.0 <= limits[1]) + "as stated"
     again = dw.try_control(policy, worlds=40)
     assert again["share"].equals(test["share"])
     # The film is the run that the test shows: the same classes at the decisions.

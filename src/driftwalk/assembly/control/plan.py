@@ -349,7 +349,6 @@ class _Planner:
         low, high = proportion_interval(fresh.sum(), fresh.size, confidence=share)
         wanted, modes = self.wanted, self.modes
         flow = modes.flows[0]
-        alone = proportion_interval(constant, each, confidence=share)
         data = {
             "action": (("phase", "class", "age"), action.astype(np.int32)),
             "flow": ("mode", modes.flow.astype(np.int32)),
@@ -357,8 +356,6 @@ class _Planner:
             "force_std": (("mode", "draw"), modes.force_std),
             "drag_coefficient": (("mode", "draw"), modes.drag_coefficient),
             "constant_reached": ("mode", constant / each),
-            "constant_low": ("mode", alone[0]),
-            "constant_high": ("mode", alone[1]),
             "promised": ("round", promised),
             "round_reached": ("round", reached),
             **{

@@ -11,7 +11,7 @@ import numpy as np
 from driftwalk.assembly.control.plan import CONTROL_POLICY
 from driftwalk.assembly.control.stored import stored_modes, stored_rules, stored_wanted
 from driftwalk.assembly.control.worlds import Setting, Worlds
-from driftwalk.assembly.outcomes.distribution import proportion_interval
+from driftwalk.assembly.outcomes.distribution import difference_interval, proportion_interval
 from driftwalk.assembly.runs.dataset import build_path
 from driftwalk.assembly.runs.plan import make_plan
 from driftwalk.assembly.tank_batch import TankBatch
@@ -71,6 +71,11 @@ def try_control(
     InputError
         When the dataset is no policy, or a number is out of range.
 
+    Notes
+    -----
+    The verdict is "not as stated" where the interval of the achieved share less the stated one does
+    not hold 0. A policy that reaches what its plan states gets it in one of ten tests.
+
     Examples
     --------
     ``try_control(policy, worlds=2000)["reached"]``
@@ -109,8 +114,9 @@ def try_control(
     gain, half = _paired(reached[0] - reached, share)
     whole = np.array([is_one_assembly(name) for name in classes])
     example = _example(policys, target)
-    stated = [float(policy.attrs[name]) for name in ("reached", "reached_low", "reached_high")]
-    agree = low[0] <= stated[0] <= high[0]
+    stated, planned = float(policy.attrs["reached"]), int(policy.attrs["worlds"])
+    counts = [reached[0].sum(), round(stated * planned)]
+    less, more = difference_interval(counts, [worlds, planned], confidence=share)
     data = {
         "reached": ("arm", reached.mean(axis=1)),
         "reached_low": ("arm", low),
@@ -139,7 +145,9 @@ def try_control(
     return build_dataset("control_test", data, coords, {
         "target": wanted.target, "by_s": wanted.by_s, "every_s": wanted.every_s,
         "latency_s": setting.latency_s, "missed": setting.missed, "force_factor": force_factor,
-        "stated": stated[0], "verdict": "as stated" if agree else "not as stated",
+        "stated": stated, "stated_worlds": planned, "difference_low": float(less),
+        "difference_high": float(more),
+        "verdict": "as stated" if less <= 0.0 <= more else "not as stated",
         "worlds": worlds, "confidence": share, "constant_mode": modes.name[constant],
         "film_world": first + example, "seed": seed,
     })  # fmt: skip

@@ -36,22 +36,16 @@ def policy_answer(found: xr.Dataset) -> Answer:
         ),
         mode_table(found),
     ]
-    names = ("constant_reached", "constant_low", "constant_high")
-    return Answer(parts, _facts(found, {"modes": ("mode", names)}), [])
+    return Answer(parts, _facts(found, {"modes": ("mode", ("constant_reached",))}), [])
 
 
 def mode_table(policy: xr.Dataset) -> Table:
     """Return the modes with what each reaches alone."""
     rows = [
-        [
-            str(one["mode"].values),
-            f"{float(one['constant_reached']):.3f}",
-            f"{float(one['constant_low']):.3f} to {float(one['constant_high']):.3f}",
-        ]
+        [str(one["mode"].values), f"{float(one['constant_reached']):.3f}"]
         for one in each(policy, "mode")
     ]
-    share = f"{policy.attrs['confidence']:.0%} interval"
-    return Table(rows, ["mode", "reaches it alone", share])
+    return Table(rows, ["mode", "reaches it alone"])
 
 
 def trial_answer(found: xr.Dataset) -> Answer:
@@ -65,7 +59,8 @@ def trial_answer(found: xr.Dataset) -> Answer:
     facts = found.attrs
     parts: list[Part] = [
         f"{facts['worlds']} fresh worlds of each arm, with the same starts and forces",
-        Row("verdict", f"{facts['verdict']}: the plan states {facts['stated']:.3f}"),
+        Row("verdict", f"{facts['verdict']}: the plan states {facts['stated']:.3f}, "
+            f"{facts['difference_low']:+.3f} to {facts['difference_high']:+.3f} from it"),
         Row("best constant mode", str(facts["constant_mode"])),
         arm_table(found),
         usage_table(found),

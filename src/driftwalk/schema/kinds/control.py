@@ -29,8 +29,6 @@ variables:
     force_std(mode draw) [N]: stochastic force sigma_F of the mode
     drag_coefficient(mode draw) [1]: drag coefficient C_d of the mode
     constant_reached(mode) [1]: share of the worlds that this mode alone brought to the target
-    constant_low(mode) [1]: lower limit of the share; exact, for each mode apart
-    constant_high(mode) [1]: upper limit of the share
     promised(round) [1]: probability of the target by value iteration; NaN without it
     round_reached(round) [1]: share of the worlds that reached the target under its best policy
     u(field y x) [m s-1]: flow velocity x
@@ -98,7 +96,10 @@ attributes:
     missed number: share of the looks without a class
     force_factor number: factor on sigma_F of the worlds
     stated number: share that the plan states
-    verdict text: whether the stated share is the achieved one
+    stated_worlds number: worlds of that share
+    difference_low number: lower limit of the achieved share less the stated one; Newcombe's
+    difference_high number: upper limit of the difference
+    verdict text: whether the interval of the difference holds 0
     worlds number: worlds of each arm
     confidence number: of the intervals
     constant_mode text: best constant mode
