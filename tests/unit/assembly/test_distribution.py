@@ -11,9 +11,9 @@ from scipy.stats import binom, binomtest
 
 from driftwalk.assembly.outcomes.class_names import outcome_classes
 from driftwalk.assembly.outcomes.distribution import (
-    difference_interval,
     class_at,
     class_names,
+    difference_interval,
     outcome_distribution,
     proportion_interval,
     sampling_variance,

@@ -84,7 +84,8 @@ class Worlds:
         """Return what the worlds of a unit did, shapes (world, period).
 
         ``seen`` and ``after`` are true classes before and after a period, ``age`` whole periods in
-        the class, ``mode`` the mode from the latency on, ``entered`` whether a class was entered.
+        the class, ``mode`` the mode from the latency on, ``entered`` whether a class was entered,
+        ``free`` whether the decision was open: a class was seen and no dwell held the mode.
         """
         from driftwalk.assembly.tank_batch import TankBatch
 
@@ -100,7 +101,7 @@ class Worlds:
         number = {name: at for at, name in enumerate(self.classes)}
         found = {
             name: np.empty((world.size, periods), dtype=np.int16)
-            for name in ("seen", "age", "mode", "after", "entered")
+            for name in ("seen", "age", "mode", "after", "entered", "free")
         }
         seen = numbers(batch.outcome, number)
         for period in range(periods):
@@ -116,7 +117,7 @@ class Worlds:
             entered = (after != seen) | (np.asarray(batch.class_since) > since)
             for name, values in (
                 ("seen", seen), ("age", age), ("mode", mode), ("after", after),
-                ("entered", entered),
+                ("entered", entered), ("free", controller.free),
             ):  # fmt: skip
                 found[name][:, period] = values
             seen = after
