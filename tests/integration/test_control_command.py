@@ -226,6 +226,10 @@ def test_modes_of_different_tanks_or_blocks_are_refused() -> None:
         (["--target", "T"], "target T has 4 blocks, and the tank 2"),
         (["--target", "q"], "target q: no shape"),
         (["--every", "30s"], "need a deadline that is not sooner"),
+        (
+            ["--every", "1ms"],
+            "decisions every 0.001 s are below the 0.0[0-9]+ s between two forces",
+        ),
         (["--every", "6s"], "no whole number of periods of 6 s"),
         (["--latency", "5s"], "latency has to be below the 5 s"),
         (["--missed", "1"], "missed looks is from 0 to below 1"),

@@ -129,7 +129,12 @@ def check_control(modes: Modes, wanted: Wanted) -> tuple[str, ...]:
         if own != blocks:
             raise InputError(f"target {wanted.target} has {own} blocks, and the tank {blocks}")
         raise InputError(f"target {wanted.target} is no class of {blocks} blocks")
-    if not 0.0 < wanted.every_s <= wanted.by_s:
+    interval = modes.study.forces.force_interval_s
+    if not interval <= wanted.every_s < np.inf:
+        raise InputError(
+            f"decisions every {wanted.every_s:g} s are below the {interval:g} s between two forces"
+        )
+    if not wanted.every_s <= wanted.by_s:
         raise InputError(
             f"decisions every {wanted.every_s:g} s need a deadline that is not sooner, got "
             f"{wanted.by_s:g} s"
