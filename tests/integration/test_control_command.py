@@ -22,7 +22,7 @@ from driftwalk.assembly.control.controller import Rules
 from driftwalk.assembly.control.stored import stored_modes, stored_rules
 from driftwalk.assembly.control.worlds import Setting, Worlds
 from driftwalk.core.files.shards import ShardStore
-from driftwalk.runs import ControlPlanWork, run_work
+from driftwalk.runs import ControlPlanWork, ControlTestWork, run_work
 from driftwalk.schema.kinds.fit import FIT
 from driftwalk.sweep import WorkUnit, grid
 
@@ -172,6 +172,23 @@ def test_a_stopped_plan_goes_on_to_the_same_policy(
     again = run_work(work, tmp_path / "stopped")
     assert again["action"].equals(whole["action"])
     assert again.attrs["reached"] == whole.attrs["reached"]
+
+
+def test_a_stopped_test_does_not_go_on_with_another_policy(tmp_path: Path) -> None:
+    policy = every_kind("control_policy")
+    given = ControlTestWork(policy, 20).specification()
+    policy.to_netcdf(tmp_path / "policy.nc")
+    stored = xr.load_dataset(tmp_path / "policy.nc")
+    assert ControlTestWork(policy.copy(deep=True), 20).specification() == given
+    json.dumps(ControlTestWork(stored, 20).specification())
+    for name in policy.data_vars:
+        values = policy[name].values.copy()
+        values.flat[0] += 1
+        other = policy.assign({name: (policy[name].dims, values)})
+        assert ControlTestWork(other, 20).specification() != given, name
+    for name in policy.attrs:
+        other = policy.assign_attrs({name: "another"})
+        assert ControlTestWork(other, 20).specification() != given, name
 
 
 def test_draws_from_a_fit_are_those_of_its_uncertainty() -> None:

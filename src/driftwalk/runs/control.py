@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
+from driftwalk.core.provenance import plain
 from driftwalk.runs.resumable_run import dataset_hash
 
 if TYPE_CHECKING:
@@ -143,16 +144,14 @@ class ControlTestWork:
 
     def specification(self) -> dict[str, Any]:
         """Return what determines the numbers."""
-        names = ("action", "force_std", "drag_coefficient", "flow_scale", "flow", "u", "v")
+        names = tuple(sorted(str(name) for name in self.policy.data_vars))
         return {
             "policy_sha256": dataset_hash(self.policy, names),
-            "study": self.policy.attrs["study"],
-            "worlds_used": int(self.policy.attrs["worlds_used"]),
+            "policy": plain(dict(self.policy.attrs)),
             "worlds": self.worlds,
             "latency_s": self.latency_s,
             "missed": self.missed,
             "force_factor": self.force_factor,
-            "seed": int(self.policy.attrs["seed"]),
         }
 
     def compute(self, run: Run) -> xr.Dataset:
