@@ -240,7 +240,7 @@ def test_modes_of_different_tanks_or_blocks_are_refused() -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--target", "T"], "target T has 4 blocks, and the tank 2"),
+        (["--target", "T"], "target T has 4 blocks, and the runs have 2"),
         (["--target", "q"], "target q: no shape"),
         (["--every", "30s"], "need a deadline that is not sooner"),
         (
@@ -250,6 +250,7 @@ def test_modes_of_different_tanks_or_blocks_are_refused() -> None:
         (["--every", "6s"], "no whole number of periods of 6 s"),
         (["--latency", "5s"], "latency has to be below the 5 s"),
         (["--missed", "1"], "missed looks is from 0 to below 1"),
+        (["--chirality", "distinct"], "control needs chirality merged"),
         (["--dwell", "60s"], "dwell is from 0 s to the deadline"),
         (["--blocks", "8"], "planned for 2 to 7 blocks, got 8"),
         (["--vary", "flow-scale=2"], "flow-scale is varied twice"),
@@ -258,6 +259,11 @@ def test_modes_of_different_tanks_or_blocks_are_refused() -> None:
 )
 def test_bad_plans_are_one_line(tmp_path: Path, words: list[str], said: str) -> None:
     refused("plan", *TWO, *words, out=tmp_path / "out", said=said)
+
+
+def test_the_shapes_of_a_target_come_in_any_order() -> None:
+    work = ControlPlanWork(modes(), Wanted("1+2", 20.0, 5.0), rounds=1, worlds=20, seed=1)
+    assert work.checked().wanted == Wanted("2+1", 20.0, 5.0)
 
 
 def test_bad_policies_are_one_line(tmp_path: Path) -> None:

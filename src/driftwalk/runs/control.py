@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -55,11 +55,10 @@ class ControlPlanWork:
         return {"control": self.seed}
 
     def checked(self) -> Self:
-        """Refuse a target of other blocks, and times that are out of range."""
+        """Refuse a target of other blocks and times out of range; name the target as runs do."""
         from driftwalk.assembly import check_control
 
-        check_control(self.modes, self.wanted)
-        return self
+        return replace(self, wanted=check_control(self.modes, self.wanted))
 
     def specification(self) -> dict[str, Any]:
         """Return what determines the numbers."""

@@ -236,15 +236,7 @@ def trial_setting(
     )
     if worlds < 20:
         raise InputError(f"at least 20 worlds are needed, got {worlds}")
-    if not 0.0 < force_factor < np.inf:
-        raise InputError(f"the factor on sigma_F has to be above 0, got {force_factor:g}")
-    if not 0.0 <= setting.latency_s < setting.every_s:
-        raise InputError(
-            f"the latency has to be below the {setting.every_s:g} s between two decisions, got "
-            f"{setting.latency_s:g} s"
-        )
-    if not 0.0 <= setting.missed < 1.0:
-        raise InputError(f"the share of missed looks is from 0 to below 1, got {setting.missed:g}")
+    setting.require_in_range()
     return setting
 
 

@@ -11,6 +11,7 @@ from driftwalk.assembly.control.controller import UNKNOWN, Controller, Rules
 from driftwalk.assembly.control.decision_process import Decisions
 from driftwalk.assembly.control.modes import Modes
 from driftwalk.core.arrays import Floats, Integers
+from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
 from driftwalk.sweep import WorkUnit
 
@@ -41,6 +42,18 @@ class Setting:
     latency_s: float = 0.0
     missed: float = 0.0
     force_factor: float = 1.0
+
+    def require_in_range(self) -> None:
+        """Refuse a latency, a share of missed looks or a factor out of range."""
+        if not 0.0 <= self.latency_s < self.every_s:
+            raise InputError(
+                f"the latency has to be below the {self.every_s:g} s between two decisions, got "
+                f"{self.latency_s:g} s"
+            )
+        if not 0.0 <= self.missed < 1.0:
+            raise InputError(f"the share of missed looks is from 0 to below 1, got {self.missed:g}")
+        if not 0.0 < self.force_factor < np.inf:
+            raise InputError(f"the factor on sigma_F has to be above 0, got {self.force_factor:g}")
 
 
 @dataclass(frozen=True)
