@@ -22,9 +22,9 @@ from driftwalk.assembly.control.controller import Rules
 from driftwalk.assembly.control.stored import stored_modes, stored_rules
 from driftwalk.assembly.control.worlds import Setting, Worlds
 from driftwalk.core.files.shards import ShardStore
-from driftwalk.runs import ControlPlanWork, ControlTestWork, run_work
+from driftwalk.runs import ControlPlanWork, run_work
 from driftwalk.schema.kinds.fit import FIT
-from driftwalk.sweep import WorkUnit, grid
+from driftwalk.sweep import grid
 
 pytestmark = pytest.mark.slow
 
@@ -66,32 +66,6 @@ def test_a_plan_and_its_test_hold_what_they_say(tmp_path: Path) -> None:
         assert sorted(path.stem for path in tmp_path.glob(f"{folder}/figures/*.png")) == names
     page = tmp_path / "page.html"
     assert here("report", tmp_path / "policy", tmp_path / "test", "-o", page).code == 0
-
-
-def test_the_best_constant_mode_is_chosen_in_other_worlds_than_it_is_reported_in(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    # A mode that is best where it is chosen, and in no world of the report.
-    policy, ran = every_kind("control_policy"), []
-    target = policy["class"].values.tolist().index(policy.attrs["target"])
-
-    def made_up(work: Worlds, unit: WorkUnit) -> dict[str, np.ndarray]:
-        world = unit.settings["world"]
-        ran.append((work.arm, work.only, int(world[0]), int(world[-1])))
-        found = np.zeros((world.size, work.setting.periods), dtype=np.int16)
-        chosen = policy.attrs["worlds_used"] + 20 <= world[0] and work.only == 1
-        after = found + (target if chosen else 0)
-        return {"seen": found, "mode": found, "after": after, "entered": found}
-
-    monkeypatch.setattr(Worlds, "__call__", made_up)
-    found = dw.try_control(policy, worlds=20)
-    assert found.attrs["constant_mode"] == policy["mode"].values[1]
-    first = int(policy.attrs["worlds_used"])
-    assert {one for one in ran if one[2] == first} == {
-        (arm, only, first, first + 19)
-        for arm, only in (("policy", None), ("constant", 1), ("random", None))
-    }
-    assert found["reached"][1] == 0.0
 
 
 def test_a_policy_is_that_of_its_modes_again() -> None:
@@ -172,23 +146,6 @@ def test_a_stopped_plan_goes_on_to_the_same_policy(
     again = run_work(work, tmp_path / "stopped")
     assert again["action"].equals(whole["action"])
     assert again.attrs["reached"] == whole.attrs["reached"]
-
-
-def test_a_stopped_test_does_not_go_on_with_another_policy(tmp_path: Path) -> None:
-    policy = every_kind("control_policy")
-    given = ControlTestWork(policy, 20).specification()
-    policy.to_netcdf(tmp_path / "policy.nc")
-    stored = xr.load_dataset(tmp_path / "policy.nc")
-    assert ControlTestWork(policy.copy(deep=True), 20).specification() == given
-    json.dumps(ControlTestWork(stored, 20).specification())
-    for name in policy.data_vars:
-        values = policy[name].values.copy()
-        values.flat[0] += 1
-        other = policy.assign({name: (policy[name].dims, values)})
-        assert ControlTestWork(other, 20).specification() != given, name
-    for name in policy.attrs:
-        other = policy.assign_attrs({name: "another"})
-        assert ControlTestWork(other, 20).specification() != given, name
 
 
 def test_draws_from_a_fit_are_those_of_its_uncertainty() -> None:
