@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -48,6 +50,11 @@ def test_a_plan_and_its_test_hold_what_they_say(tmp_path: Path) -> None:
     test = xr.load_dataset(tmp_path / "test" / "control_test.nc")
     np.testing.assert_allclose(test["usage"].sum("mode"), 1.0)
     np.testing.assert_allclose(test["share"][:, -1], test["reached"])
+    facts = test.attrs
+    count = [round(40 * float(test["reached"][0])), round(80 * policy.attrs["reached"])]
+    limits = dw.assembly.outcomes.distribution.difference_interval(count, [40, 80], confidence=0.9)
+    assert (facts["difference_low"], facts["difference_high"]) == pytest.approx(limits)
+    assert facts["verdict"] == "not " * (not limits[0] <= 0.0 <= limits[1]) + "as stated"
     again = dw.try_control(policy, worlds=40)
     assert again["share"].equals(test["share"])
     # The film is the run that the test shows: the same classes at the decisions.
@@ -156,6 +163,26 @@ def test_draws_from_a_fit_are_those_of_its_uncertainty() -> None:
     np.testing.assert_allclose(found.drag_coefficient[3, 1:], drawn.drag_coefficient)
 
 
+@pytest.mark.parametrize(("arm", "tables"), [("constant", 1), ("policy", 4)])
+def test_modes_and_policies_in_turn_meet_every_draw_equally_often(
+    monkeypatch: pytest.MonkeyPatch, arm: Literal["constant", "policy"], tables: int
+) -> None:
+    # Six draws; four modes, or four policies of one mode each: 24 worlds have each pair once.
+    many = replace(
+        modes(), force_std=np.arange(24.0).reshape(4, 6), drag_coefficient=np.ones((4, 6))
+    )
+    classes = dw.assembly.outcome_classes(3)
+    action = np.broadcast_to(np.arange(tables)[:, None, None, None], (tables, 3, len(classes), 6))
+    given: list[float] = []
+    monkeypatch.setattr(dw.TankBatch, "set", lambda _, **to: given.extend(to["force_std"].tolist()))
+    for first in (0, 24):
+        work = Worlds(many, classes, Setting(0.1, 1), Rules(action), 4, first, turn=4, arm=arm)
+        for unit in grid(world=np.arange(first, first + 24)).units(7):
+            work(unit)
+        assert sorted(given) == list(range(24))
+        given.clear()
+
+
 def test_modes_of_different_tanks_or_blocks_are_refused() -> None:
     one = dw.ModeSource(small(), STREAM, name="fit-a")
     for other, said in (
@@ -170,12 +197,17 @@ def test_modes_of_different_tanks_or_blocks_are_refused() -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--target", "T"], "target T has 4 blocks, and the tank 2"),
+        (["--target", "T"], "target T has 4 blocks, and the runs have 2"),
         (["--target", "q"], "target q: no shape"),
         (["--every", "30s"], "need a deadline that is not sooner"),
+        (
+            ["--every", "1ms"],
+            "decisions every 0.001 s are below the 0.0[0-9]+ s between two forces",
+        ),
         (["--every", "6s"], "no whole number of periods of 6 s"),
         (["--latency", "5s"], "latency has to be below the 5 s"),
         (["--missed", "1"], "missed looks is from 0 to below 1"),
+        (["--chirality", "distinct"], "control needs chirality merged"),
         (["--dwell", "60s"], "dwell is from 0 s to the deadline"),
         (["--blocks", "8"], "planned for 2 to 7 blocks, got 8"),
         (["--vary", "flow-scale=2"], "flow-scale is varied twice"),
@@ -184,6 +216,11 @@ def test_modes_of_different_tanks_or_blocks_are_refused() -> None:
 )
 def test_bad_plans_are_one_line(tmp_path: Path, words: list[str], said: str) -> None:
     refused("plan", *TWO, *words, out=tmp_path / "out", said=said)
+
+
+def test_the_shapes_of_a_target_come_in_any_order() -> None:
+    work = ControlPlanWork(modes(), Wanted("1+2", 20.0, 5.0), rounds=1, worlds=20, seed=1)
+    assert work.checked().wanted == Wanted("2+1", 20.0, 5.0)
 
 
 def test_bad_policies_are_one_line(tmp_path: Path) -> None:

@@ -82,7 +82,10 @@ def test_a_tracker_that_is_gone_leaves_the_safe_mode(policy: xr.Dataset) -> None
         threading.Thread(target=publish, daemon=True).start()
         said = list(pilot(short, server.host, port, patience_s=0.5))
     assert [one["type"] for one in said[:2]] == ["decision", "safe"]
-    assert {one["type"] for one in said[2:]} <= {"safe"}
+    assert {one["type"] for one in said[1:-1]} == {"safe"}
+    end = said[-1]
+    assert (end["type"], end["time_s"], end["class"]) == ("end", 0.0, "1+1+1")
+    assert (end["reached"], end["flow_scale"]) == (False, 0.0)
 
 
 def test_other_programs_and_other_tanks_are_refused(policy: xr.Dataset) -> None:

@@ -227,13 +227,13 @@ class TankBatch:
         """
         wishes = self._wishes._asdict()
         if flow is not None:
-            index = self._one_each("flow", flow)
+            index = self._one_each("flow", flow, kinds="iu")
             flows = len(self._kept[0])
             if not (np.isin(index, np.arange(flows))).all():
                 raise InputError(f"flow: expected indices of {flows} flows, from 0 on")
             wishes["flow"] = index.astype(np.int32)
         if latching is not None:
-            names = self._one_each("latching", latching, kind=np.str_)
+            names = self._one_each("latching", latching, kinds="U")
             wishes["latching"] = self._latching(names)
         for name, given in (
             ("flow_scale", flow_scale),
@@ -241,7 +241,7 @@ class TankBatch:
             ("drag_coefficient", drag_coefficient),
         ):
             if given is not None:
-                wishes[name] = values = self._one_each(name, given)
+                wishes[name] = values = self._one_each(name, given).astype(np.float64)
                 if not (np.isfinite(values) & (values >= 0)).all():
                     raise InputError(f"{name}: expected finite numbers from 0 on")
         self._wishes = _Settings(**wishes)
@@ -303,8 +303,8 @@ class TankBatch:
 
         Parameters
         ----------
-        worlds : array_like of int
-            Which worlds, in any order; one may come many times.
+        worlds : array_like of int or bool
+            Which worlds, in any order; one may come many times. Or whether to take each of them.
         seed, first : int
             World i of the new batch has the forces of run ``first + i`` with this seed, from the
             next draw on: one draw serves two force intervals.
@@ -312,7 +312,7 @@ class TankBatch:
         Raises
         ------
         InputError
-            When there is no such world.
+            When there is no such world, or none is taken.
 
         Examples
         --------
@@ -325,8 +325,14 @@ class TankBatch:
         (20, 3.0, 1.0)
         """
         index = np.atleast_1d(np.asarray(worlds))
-        if index.ndim != 1 or index.size == 0 or not np.isin(index, np.arange(self.worlds)).all():
-            raise InputError(f"worlds: expected indices of {self.worlds} worlds, from 0 on")
+        if index.dtype == np.bool_ and index.shape == (self.worlds,):
+            index = np.flatnonzero(index)
+        whole = index.ndim == 1 and index.size > 0 and index.dtype.kind in "iu"
+        if not (whole and np.isin(index, np.arange(self.worlds)).all()):
+            raise InputError(
+                f"worlds: expected indices of {self.worlds} worlds, from 0 on, or true or false "
+                "for each, true for one at least"
+            )
         keys = stream_keys("run", seed=seed, trial=0, index=first + np.arange(index.size))
         taken = copy(self)
         taken._batch = self._batch.take(index.tolist(), keys)
@@ -368,9 +374,16 @@ class TankBatch:
         """Whether each world's numbers are: false where the forces were too large for a step."""
         return np.asarray((self._batch.status() & BROKEN) == 0)
 
-    def _one_each(self, name: str, given: Any, *, kind: Any = np.float64) -> npt.NDArray[Any]:
-        """Return one value per world."""
-        values = np.asarray(given, dtype=kind)
+    def _one_each(self, name: str, given: Any, *, kinds: str = "iuf") -> npt.NDArray[Any]:
+        """Return one value per world, of one of numpy's kinds."""
+        try:
+            values = np.asarray(given)
+            values = np.array(values.tolist()) if values.dtype.hasobject else values
+        except ValueError as error:
+            raise InputError(f"{name}: expected one value, or one for each world") from error
+        if values.dtype.kind not in kinds:
+            wanted = {"iu": "whole numbers", "U": "names"}.get(kinds, "numbers")
+            raise InputError(f"{name}: expected {wanted}, got {given!r:.60}")
         if values.shape not in ((), (self.worlds,)):
             raise InputError(
                 f"{name}: expected one value, or one for each of {self.worlds} worlds, got shape "

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
+from driftwalk.core.provenance import plain
 from driftwalk.runs.resumable_run import dataset_hash
 
 if TYPE_CHECKING:
@@ -54,11 +55,10 @@ class ControlPlanWork:
         return {"control": self.seed}
 
     def checked(self) -> Self:
-        """Refuse a target of other blocks, and times that are out of range."""
+        """Refuse a target of other blocks and times out of range; name the target as runs do."""
         from driftwalk.assembly import check_control
 
-        check_control(self.modes, self.wanted)
-        return self
+        return replace(self, wanted=check_control(self.modes, self.wanted))
 
     def specification(self) -> dict[str, Any]:
         """Return what determines the numbers."""
@@ -143,16 +143,14 @@ class ControlTestWork:
 
     def specification(self) -> dict[str, Any]:
         """Return what determines the numbers."""
-        names = ("action", "force_std", "drag_coefficient", "flow_scale", "flow", "u", "v")
+        names = tuple(sorted(str(name) for name in self.policy.data_vars))
         return {
             "policy_sha256": dataset_hash(self.policy, names),
-            "study": self.policy.attrs["study"],
-            "worlds_used": int(self.policy.attrs["worlds_used"]),
+            "policy": plain(dict(self.policy.attrs)),
             "worlds": self.worlds,
             "latency_s": self.latency_s,
             "missed": self.missed,
             "force_factor": self.force_factor,
-            "seed": int(self.policy.attrs["seed"]),
         }
 
     def compute(self, run: Run) -> xr.Dataset:

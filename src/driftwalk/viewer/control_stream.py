@@ -61,6 +61,7 @@ def pilot(
             return
         yield control.safe("the stream has stopped")
         if clock.monotonic() > until:
+            yield control.end()
             return
         clock.sleep(min(patience_s, 1.0))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import beta
 
+from driftwalk.assembly.control.controller import UNKNOWN, Controller, Rules
 from driftwalk.assembly.control.improvement import (
     IMPROVEMENT_POLICY,
     Cells,
@@ -24,6 +25,7 @@ def test_a_world_counts_once_for_every_cell_that_it_visited() -> None:
     found = {
         "seen": np.array([[0, 0, 0, 0, 1, 1], [0, -1, 0, 0, -1, -1]]),
         "age": np.array([[0, 1, 2, 3, 0, 1], [0, 1, 2, 3, 4, 5]]),
+        "free": np.ones((2, 6), dtype=int),
     }
     modes = np.zeros((2, *cells_like(2)), dtype=np.int64)
     modes[0, 0, 0, 2] = 1
@@ -36,6 +38,25 @@ def test_a_world_counts_once_for_every_cell_that_it_visited() -> None:
     assert set(zip(*(at.tolist() for at in np.nonzero(failed)), strict=True)) == {
         (1, 0, 0, 0), (0, 0, 2, 0)
     }  # fmt: skip
+
+
+def test_modes_that_were_not_taken_do_not_count() -> None:
+    # One class and a dwell of 3 periods. Mode 1 is taken at age 0, and held over the looks at ages
+    # 1 and 2; the look at age 3 is missed; mode 2 is taken at age 4, and held.
+    action = np.array([1, 0, 0, 2, 2, 2])
+    rules = Rules(np.broadcast_to(action, (1, *cells_like(1))), safe=0, dwell=3)
+    controller, free, held = Controller(rules, np.zeros(1, int)), [], []
+    for age in range(6):
+        looked = np.array([UNKNOWN if age == 3 else 0])
+        held.append(int(controller.decide(looked, np.array([age]), left=6 - age)[0]))
+        free.append(bool(controller.free[0]))
+    assert (held, free) == ([1, 1, 1, 1, 2, 2], [True, False, False, False, True, False])
+    found = {"seen": np.zeros((1, 6), int), "age": np.arange(6)[None], "free": np.array([free])}
+    shape = (*cells_like(1), 3)
+    flat_one = Cells(np.ones(shape), np.ones(shape))
+    modes = np.broadcast_to(action, (1, *cells_like(1)))
+    counted = np.argwhere(flat_one.updated(found, modes, np.ones(1)).reached > 1.0)
+    assert counted.tolist() == [[0, 0, 3, 2], [1, 0, 0, 1]]
 
 
 def test_fading_leaves_the_prior() -> None:
@@ -70,6 +91,7 @@ def test_the_best_mode_of_a_cell_is_found() -> None:
     random, known = np.random.default_rng(2), flat(3)
     prior, truth = known, np.array([0.5, 0.55, 0.7])
     found = {"seen": np.zeros((500, 1), int), "age": np.zeros((500, 1), int)}
+    found["free"] = np.ones((500, 1), int)
     for _ in range(6):
         modes = known.drawn(500, random)
         hit = (random.random(500) < truth[modes[:, 0, 0, 0]]).astype(float)

@@ -65,10 +65,13 @@ def test_value_iteration_finds_what_a_search_through_all_histories_finds() -> No
             )
         return max(gains)
 
-    plan = value_iteration(rates, target=2, periods=6)
+    # With more periods than there are ages: from 16 periods on they are in one bin.
+    plan = value_iteration(rates, target=2, periods=24)
+    assert plan.value.shape == (25, 3, 17)
     for at in range(3):
-        for age in (0, 1):
-            assert plan.value[5, at, age] == pytest.approx(best(5, at, age))
+        for age in (0, 1, 15, 16):
+            assert plan.value[23, at, age] == pytest.approx(best(23, at, age))
+        assert plan.value[7, at, 16] == pytest.approx(best(7, at, 20))
 
 
 def test_no_other_policy_of_a_small_process_does_better() -> None:

@@ -13,6 +13,7 @@ from driftwalk.assembly.outcomes.class_names import outcome_classes
 from driftwalk.assembly.outcomes.distribution import (
     class_at,
     class_names,
+    difference_interval,
     outcome_distribution,
     proportion_interval,
     sampling_variance,
@@ -64,6 +65,31 @@ def test_the_interval_is_that_of_the_exact_binomial_test(
     expected = binomtest(count, runs).proportion_ci(confidence, method="exact")
     found = proportion_interval(count, runs, confidence=confidence)
     assert found == pytest.approx((expected.low, expected.high), abs=1e-12)
+
+
+@pytest.mark.parametrize("counts", [(56, 48), (9, 3), (10, 0), (0, 0)])
+def test_the_interval_of_a_difference_is_made_of_two_of_wilson(counts: tuple[int, int]) -> None:
+    runs = (70, 80)
+    (p, below, above), (q, less, more) = (
+        (k / n, *binomtest(k, n).proportion_ci(0.9, method="wilson"))
+        for k, n in zip(counts, runs, strict=True)
+    )
+    expected = (
+        p - q - np.hypot(p - below, more - q),
+        p - q + np.hypot(above - p, q - less),
+    )
+    assert difference_interval(counts, runs, confidence=0.9) == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize("share", [0.05, 0.35, 0.7])
+def test_equal_proportions_seem_to_differ_as_often_as_is_stated(share: float) -> None:
+    # A plan of 3000 worlds and a test of 2000, 40,000 times; six standard errors: false alarm below
+    # 1e-8. The plan's share outside of the test's own interval: in one of five.
+    runs = np.array([2000, 3000])[:, None]
+    counts = np.random.default_rng(5).binomial(runs, share, size=(2, 40_000))
+    low, high = difference_interval(counts, runs, confidence=0.9)
+    alarms = float(((low > 0.0) | (high < 0.0)).mean())
+    assert abs(alarms - 0.1) < 6.0 * np.sqrt(0.09 / 40_000)
 
 
 def test_without_trials_nothing_is_known() -> None:

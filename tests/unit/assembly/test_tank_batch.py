@@ -157,6 +157,8 @@ def test_copies_go_on_as_the_worlds_do_with_the_same_forces(backend: Any) -> Non
     same = batch.take(np.arange(6), seed=3)
     other = batch.take([5, 5, 1], seed=8)
     before = batch.state()
+    masked = batch.take(np.arange(6) % 4 == 1, seed=8)
+    assert np.array_equal(masked.state()["pose"], before["pose"][[1, 5]])
     assert np.array_equal(other.state()["pose"], before["pose"][[5, 5, 1]])
     assert (other.time, other.outcome.tolist()) == (batch.time, batch.outcome[[5, 5, 1]].tolist())
     for one in (same, batch, other):
@@ -255,7 +257,11 @@ def test_glued_blocks_start_joined() -> None:
         ({"flow_scale": math.inf}, "from 0 on"),
         ({"flow_scale": [1.0, 1.0, 1.0]}, "one for each of 2 worlds"),
         ({"flow": 1}, "indices of 1 flows"),
-        ({"flow": 0.5}, "indices"),
+        ({"flow": 0.5}, "flow: expected whole numbers, got 0.5"),
+        ({"force_std": "0.2mN"}, "force_std: expected numbers, got '0.2mN'"),
+        ({"force_std": [None, 1e-3]}, "force_std: expected numbers"),
+        ({"drag_coefficient": [[1.0], [1.0, 2.0]]}, "drag_coefficient: expected one value"),
+        ({"latching": 1}, "latching: expected names, got 1"),
         ({"latching": "magnet"}, "latching"),
         ({"latching": ["none", "glue"]}, "latching"),
     ],
@@ -294,8 +300,9 @@ def test_refuses_starts_that_are_none() -> None:
         dw.TankBatch(study, STILL, worlds=2, blocks=2, start=[(0, 0, 0), (0.01, 0, 0)])
     with pytest.raises(InputError, match="does not cover"):
         dw.TankBatch(tank_study(2.0), [dw.tank30_flow()], worlds=2)
-    with pytest.raises(InputError, match="worlds"):
-        batch.take([2], seed=0)
+    for worlds in ([2], [0.0], [], [[0, 1]], [True], [False, False], ["0"], [-1]):
+        with pytest.raises(InputError, match="worlds: expected"):
+            batch.take(worlds, seed=0)
     with pytest.raises(InputError, match="worlds"):
         dw.TankBatch(study, STILL, worlds=0)
     with pytest.raises(InputError, match="duration"):

@@ -56,6 +56,8 @@ class Controller:
         self._rules, self._policy = rules, world % rules.action.shape[0]
         self.mode = np.full(world.size, rules.safe)
         self._held = np.full(world.size, rules.dwell)
+        self.free = np.zeros(world.size, dtype=bool)
+        """Whether the last decision of each world was open: a class was seen, no dwell held it."""
 
     def decide(
         self, seen: Integers, age: Integers, *, left: int, wish: Integers | None = None
@@ -86,8 +88,8 @@ class Controller:
         if wish is not None:
             wanted = np.where(wish >= 0, wish, wanted)
         looked = seen != UNKNOWN if wish is None else (seen != UNKNOWN) | (wish >= 0)
-        free = looked & (self._held >= self._rules.dwell)
-        changed = free & (wanted != self.mode)
+        self.free = looked & (self._held >= self._rules.dwell)
+        changed = self.free & (wanted != self.mode)
         self.mode = np.where(changed, wanted, self.mode)
         self._held = np.where(changed, 1, self._held + 1)
         return self.mode

@@ -166,10 +166,10 @@ def value_iteration(probability: Floats, *, target: int, periods: int) -> Plan:
     (1, 0.36)
     """
     classes = probability.shape[0]
-    ages = age_bin(np.arange(periods + 1))
-    value = np.zeros((periods + 1, classes, periods + 1))
+    ages = age_bin(np.arange(min(periods, PROCESS_POLICY.age_starts[-1]) + 1))
+    value = np.zeros((periods + 1, classes, ages.size))
     value[0, target] = 1.0
-    action = np.zeros((periods, classes, periods + 1), dtype=np.int64)
+    action = np.zeros((periods, classes, ages.size), dtype=np.int64)
     enter, stay = probability[..., :-1], probability[..., -1][:, ages]
     for left in range(periods):
         before = value[left]
@@ -196,14 +196,14 @@ def gains(probability: Floats, plan: Plan) -> Floats:
         Probability of the target when the mode is taken once and the best ones after it, by value
         iteration.
     """
-    periods = plan.action.shape[0]
-    ages = np.minimum(np.array(PROCESS_POLICY.age_starts), periods)
+    periods, _, ages = plan.action.shape
+    older_ages = np.minimum(np.array(PROCESS_POLICY.age_starts) + 1, ages - 1)
     found = []
     starts = (*PROCESS_POLICY.phase_starts, periods + 1)
     for start, end, place in zip(starts, starts[1:], PROCESS_POLICY.phase_places, strict=False):
         left = min(round(start + place * (max(end, start + 1) - 1 - start)), periods)
         before = plan.value[left - 1]
-        older = before[:, np.minimum(ages + 1, periods)]
+        older = before[:, older_ages]
         enter, stay = probability[..., :-1], probability[..., -1]
         found.append((enter * before[:, 0]).sum(axis=-1) + stay * older[:, :, None])
     return np.stack(found)

@@ -53,6 +53,9 @@ class Cells(NamedTuple):
     def updated(self, found: Arrays, modes: Integers, hit: Floats) -> Cells:
         """Return what is known after worlds that had these modes.
 
+        A cell counts where its mode was taken: not after a missed look, nor in the dwell of another
+        mode.
+
         Parameters
         ----------
         found : dict of str to ndarray
@@ -63,7 +66,7 @@ class Cells(NamedTuple):
             1 where the target was reached, else 0.
         """
         seen, periods = found["seen"], found["seen"].shape[1]
-        known = seen >= 0
+        known = (seen >= 0) & (found["free"] > 0)
         world = np.nonzero(known)[0]
         phase = np.array([phase_of(left) for left in range(periods, 0, -1)])
         cell = np.stack([

@@ -92,20 +92,24 @@ class LiveControl:
         if self.ended:
             return None
         spent = time - self._begun
-        reached = self._outcome == self._wanted.target
         done = is_one_assembly(self._outcome or "+") and not self._bonds_break
         if done or spent >= self._wanted.by_s:
-            self.ended = True
-            return {
-                "type": "end", "time_s": time, "class": self._outcome, "reached": reached,
-                **self._mode(self._rules.safe),
-            }  # fmt: skip
+            return self.end()
         if spent < self._due:
             return None
         every = self._wanted.every_s
         period = min(math.floor(spent / every + 1e-6), self._wanted.setting.periods - 1)
         self._due = every * (period + 1)
         return self._decide(outcome, time, self._wanted.setting.periods - period)
+
+    def end(self) -> dict[str, Any]:
+        """Return the line of the end, by the last frame; its time is None where none came."""
+        self.ended = True
+        return {
+            "type": "end", "time_s": self._last if math.isfinite(self._last) else None,
+            "class": self._outcome, "reached": self._outcome == self._wanted.target,
+            **self._mode(self._rules.safe),
+        }  # fmt: skip
 
     def safe(self, why: str) -> dict[str, Any]:
         """Return the line of the safe mode, for a stream that has stopped."""

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from driftwalk.model import Study
 
 DRAWS = 100
-"""Draws from the uncertainty of a fit, one world after the other; chosen by hand."""
+"""Draws from the uncertainty of a fit, one turn of worlds after the other; chosen by hand."""
 MOST_MODES = 100
 """Modes, at most: each needs runs of its own. Chosen by hand."""
 
@@ -71,20 +71,19 @@ class Modes:
         return len(self.name)
 
     def settings(
-        self, mode: Integers, world: Integers, *, force_factor: float = 1.0
+        self, mode: Integers, draw: Integers, *, force_factor: float = 1.0
     ) -> dict[str, Floats | Integers]:
         """Return what `TankBatch.set` takes, for worlds in a mode each.
 
-        Each world has the parameters of one draw, whatever its mode.
-
         Parameters
         ----------
-        mode, world : ndarray of int
-            Mode and number of each world.
+        mode, draw : ndarray of int
+            Mode of each world, and number of its draw, whatever its mode; the first draw comes
+            again after the last.
         force_factor : float
             On sigma_F, to try a model that is wrong.
         """
-        draw = world % self.force_std.shape[1]
+        draw = draw % self.force_std.shape[1]
         return {
             **({"flow": self.flow[mode]} if len(self.flows) > 1 else {}),
             "flow_scale": self.flow_scale[mode],

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -20,7 +20,7 @@ from driftwalk.assembly.control.decision_process import (
 from driftwalk.assembly.control.improvement import IMPROVEMENT_POLICY, cells_like, prior_of
 from driftwalk.assembly.control.modes import Modes
 from driftwalk.assembly.control.worlds import Setting, Worlds, decisions_of
-from driftwalk.assembly.outcomes.class_names import outcome_classes
+from driftwalk.assembly.outcomes.class_names import outcome_classes, target_class
 from driftwalk.assembly.outcomes.distribution import proportion_interval
 from driftwalk.core.arrays import Floats, Integers
 from driftwalk.core.errors import InputError
@@ -88,8 +88,8 @@ class Wanted:
         return max(int(np.ceil(self.dwell_s / self.every_s - 1e-6)), 1)
 
 
-def check_control(modes: Modes, wanted: Wanted) -> tuple[str, ...]:
-    """Return the classes of the blocks; refuse what no policy can be planned for.
+def check_control(modes: Modes, wanted: Wanted) -> Wanted:
+    """Return what is wanted, its target as runs name it; refuse what no policy can be planned for.
 
     Parameters
     ----------
@@ -101,18 +101,17 @@ def check_control(modes: Modes, wanted: Wanted) -> tuple[str, ...]:
     Raises
     ------
     InputError
-        When the target has another number of blocks, or a time is out of range.
+        When the target has another number of blocks, a time is out of range, or mirror images are
+        distinct: the stream of a tracker merges them.
 
     Examples
     --------
     >>> import driftwalk as dw
+    >>> from driftwalk.assembly import ModeSource, make_modes
     >>> modes = make_modes([ModeSource(dw.Study(), dw.tank30_flow())], flow_scales=[0.0, 1.0])
-    ... # doctest: +SKIP
-    >>> check_control(modes, Wanted("T", 60.0, 5.0))[0]  # doctest: +SKIP
-    'I'
+    >>> check_control(modes, Wanted("1+I3", 60.0, 5.0)).target
+    'I3+1'
     """
-    from driftwalk.assembly.chains.histories import blocks_of
-
     blocks = modes.study.assembly.blocks
     if modes.study.block.is_round:
         raise InputError("control needs blocks with faces: discs have no classes of shapes")
@@ -120,16 +119,17 @@ def check_control(modes: Modes, wanted: Wanted) -> tuple[str, ...]:
         raise InputError(
             f"control is planned for 2 to {CONTROL_POLICY.most_blocks} blocks, got {blocks}"
         )
-    classes = outcome_classes(blocks, chirality=modes.study.assembly.chirality)
-    if wanted.target not in classes:
-        try:
-            own = blocks_of(wanted.target)
-        except InputError as error:
-            raise InputError(f"target {wanted.target}: {error}") from error
-        if own != blocks:
-            raise InputError(f"target {wanted.target} has {own} blocks, and the tank {blocks}")
-        raise InputError(f"target {wanted.target} is no class of {blocks} blocks")
-    if not 0.0 < wanted.every_s <= wanted.by_s:
+    if modes.study.assembly.chirality != "merged":
+        raise InputError(
+            "control needs chirality merged: the stream of a tracker names mirror images alike"
+        )
+    target = target_class(wanted.target, [blocks], chirality="merged")
+    interval = modes.study.forces.force_interval_s
+    if not interval <= wanted.every_s < np.inf:
+        raise InputError(
+            f"decisions every {wanted.every_s:g} s are below the {interval:g} s between two forces"
+        )
+    if not wanted.every_s <= wanted.by_s:
         raise InputError(
             f"decisions every {wanted.every_s:g} s need a deadline that is not sooner, got "
             f"{wanted.by_s:g} s"
@@ -140,16 +140,10 @@ def check_control(modes: Modes, wanted: Wanted) -> tuple[str, ...]:
             f"the deadline of {wanted.by_s:g} s is no whole number of periods of "
             f"{wanted.every_s:g} s: choose another deadline or period"
         )
-    if not 0.0 <= wanted.latency_s < wanted.every_s:
-        raise InputError(
-            f"the latency has to be below the {wanted.every_s:g} s between two decisions, got "
-            f"{wanted.latency_s:g} s"
-        )
-    if not 0.0 <= wanted.missed < 1.0:
-        raise InputError(f"the share of missed looks is from 0 to below 1, got {wanted.missed:g}")
+    wanted.setting.require_in_range()
     if not 0.0 <= wanted.dwell_s <= wanted.by_s:
         raise InputError(f"the dwell is from 0 s to the deadline, got {wanted.dwell_s:g} s")
-    return classes
+    return replace(wanted, target=target)
 
 
 def plan_control(
@@ -218,7 +212,7 @@ def plan_control(
 
     Notes
     -----
-    Puterman, Markov decision processes (1994), chapter 4; see docs/control.md.
+    Puterman, Markov decision processes (1994), chapter 4; see docs/how-to/control.md.
 
     Examples
     --------
@@ -232,8 +226,8 @@ def plan_control(
     """
     if rounds < 1 or worlds < 20:
         raise InputError(f"at least 1 round and 20 worlds are needed, got {rounds} and {worlds}")
-    wanted = Wanted(target, by, every, latency, missed, dwell)
-    classes = check_control(modes, wanted)
+    wanted = check_control(modes, Wanted(target, by, every, latency, missed, dwell))
+    classes = outcome_classes(modes.study.assembly.blocks)
     planner = _Planner(
         modes, wanted, classes, worlds, seed,
         (lambda _: None) if store is None else store, executor,
@@ -264,10 +258,11 @@ class _Planner:
         """Return the policy."""
         none = np.zeros((1, *cells_like(len(self.classes))), dtype=np.int64)
         # The modes in turn, each in the same number of worlds.
-        each = -(-self.worlds // self.modes.size)
-        alone = self.run("constant", none, worlds=each * self.modes.size, arm="constant")
-        own = np.arange(each * self.modes.size) % self.modes.size
-        hits = np.bincount(own, weights=self.hit(alone), minlength=self.modes.size)
+        size = self.modes.size
+        each = -(-self.worlds // size)
+        alone = self.run("constant", none, worlds=each * size, turn=size, arm="constant")
+        own = np.arange(each * size) % size
+        hits = np.bincount(own, weights=self.hit(alone), minlength=size)
         constant = hits.astype(np.float64)
         self.safe, seen = int(constant.argmax()), [decisions_of(alone)]
         promised, reached = np.full((2, rounds), np.nan)
@@ -278,7 +273,7 @@ class _Planner:
             plans = [self.planned(seen, random if k >= count // 4 else None) for k in range(count)]
             promised[at] = plans[0][1]
             tables = np.stack([gain.argmax(axis=-1) for gain, _ in plans])
-            followed = self.run(f"round_{at}", tables)
+            followed = self.run(f"round_{at}", tables, turn=count)
             seen.append(decisions_of(followed))
             reached[at] = self.hit(followed)[best].mean()
         gain, promise = self.planned(seen)
@@ -287,7 +282,7 @@ class _Planner:
         best = np.arange(self.worlds) % IMPROVEMENT_POLICY.greedy == 0
         for at in range(min(CONTROL_POLICY.modelled, rounds), rounds):
             modes = known.drawn(self.worlds, np.random.default_rng([self.seed, at]))
-            followed = self.run(f"round_{at}", modes)
+            followed = self.run(f"round_{at}", modes, turn=IMPROVEMENT_POLICY.greedy)
             reached[at] = self.hit(followed)[best].mean()
             known = known.faded(prior).updated(followed, modes, self.hit(followed))
         # The policy, that of the model and the best mode alone are compared in the same worlds.

@@ -11,8 +11,12 @@ from driftwalk.assembly.control.controller import UNKNOWN, Controller, Rules
 from driftwalk.assembly.control.decision_process import Decisions
 from driftwalk.assembly.control.modes import Modes
 from driftwalk.core.arrays import Floats, Integers
+from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
 from driftwalk.sweep import WorkUnit
+
+STREAM = 1
+"""Of the random numbers of a world, apart from those of a round of planning."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +43,18 @@ class Setting:
     missed: float = 0.0
     force_factor: float = 1.0
 
+    def require_in_range(self) -> None:
+        """Refuse a latency, a share of missed looks or a factor out of range."""
+        if not 0.0 <= self.latency_s < self.every_s:
+            raise InputError(
+                f"the latency has to be below the {self.every_s:g} s between two decisions, got "
+                f"{self.latency_s:g} s"
+            )
+        if not 0.0 <= self.missed < 1.0:
+            raise InputError(f"the share of missed looks is from 0 to below 1, got {self.missed:g}")
+        if not 0.0 < self.force_factor < np.inf:
+            raise InputError(f"the factor on sigma_F has to be above 0, got {self.force_factor:g}")
+
 
 @dataclass(frozen=True)
 class Worlds:
@@ -58,6 +74,9 @@ class Worlds:
         Of the starts, the forces and what is missed.
     first : int
         Number of the world that has the first of several policies, from where they are counted.
+    turn : int
+        Worlds that share a draw of the parameters: those that take modes or policies in turn. So
+        each of these meets the same draws.
     arm : {"policy", "constant", "random"}
         The policy, one mode for each world in turn, or another random mode at each decision.
     only : int or None
@@ -70,6 +89,7 @@ class Worlds:
     rules: Rules
     seed: int
     first: int = 0
+    turn: int = 1
     arm: Literal["policy", "constant", "random"] = "policy"
     only: int | None = None
 
@@ -77,7 +97,8 @@ class Worlds:
         """Return what the worlds of a unit did, shapes (world, period).
 
         ``seen`` and ``after`` are true classes before and after a period, ``age`` whole periods in
-        the class, ``mode`` the mode from the latency on, ``entered`` whether a class was entered.
+        the class, ``mode`` the mode from the latency on, ``entered`` whether a class was entered,
+        ``free`` whether the decision was open: a class was seen and no dwell held the mode.
         """
         from driftwalk.assembly.tank_batch import TankBatch
 
@@ -89,10 +110,11 @@ class Worlds:
         )  # fmt: skip
         wishes, missed = self._drawn(world)
         controller = Controller(self.rules, world - self.first)
+        draw = (world - self.first) // self.turn + self.first // self.turn
         number = {name: at for at, name in enumerate(self.classes)}
         found = {
             name: np.empty((world.size, periods), dtype=np.int16)
-            for name in ("seen", "age", "mode", "after", "entered")
+            for name in ("seen", "age", "mode", "after", "entered", "free")
         }
         seen = numbers(batch.outcome, number)
         for period in range(periods):
@@ -102,13 +124,13 @@ class Worlds:
             mode = controller.decide(known, age, left=periods - period, wish=wishes[:, period])
             if setting.latency_s > 0.0 and period > 0:
                 batch.advance(setting.latency_s)
-            batch.set(**self.modes.settings(mode, world, force_factor=setting.force_factor))
+            batch.set(**self.modes.settings(mode, draw, force_factor=setting.force_factor))
             batch.advance(setting.every_s - (setting.latency_s if period > 0 else 0.0))
             after = numbers(batch.outcome, number)
             entered = (after != seen) | (np.asarray(batch.class_since) > since)
             for name, values in (
                 ("seen", seen), ("age", age), ("mode", mode), ("after", after),
-                ("entered", entered),
+                ("entered", entered), ("free", controller.free),
             ):  # fmt: skip
                 found[name][:, period] = values
             seen = after
@@ -125,7 +147,7 @@ class Worlds:
             ]
         if self.arm == "random" or self.setting.missed > 0.0:
             for row, number in enumerate(world.tolist()):
-                random = np.random.default_rng([self.seed, number])
+                random = np.random.default_rng([self.seed, number, STREAM])
                 lost[row] = random.random(periods) < self.setting.missed
                 if self.arm == "random":
                     wish[row] = random.integers(modes, size=periods)

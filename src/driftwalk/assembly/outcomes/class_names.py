@@ -172,6 +172,50 @@ def merge_chirality(name: str) -> str:
     return class_name(merged_shape(shape) for shape in class_shapes(name))
 
 
+def target_class(
+    target: str, blocks: Iterable[int], *, chirality: Chirality | None, vary_blocks: bool = False
+) -> str:
+    """Return a target as runs name it.
+
+    Parameters
+    ----------
+    target : str
+        An outcome class, its shapes in any order.
+    blocks : iterable of int
+        Numbers of blocks of the runs.
+    chirality : {"merged", "distinct"} or None
+        Of the runs; None for discs.
+    vary_blocks : bool
+        Whether runs may have more blocks than the target.
+
+    Raises
+    ------
+    InputError
+        When it is no outcome class, or has another number of blocks than the runs.
+
+    Examples
+    --------
+    >>> target_class("1+J", [5], chirality="merged")
+    'L+1'
+    """
+    try:
+        name = class_name(class_shapes(target.strip()))
+        if chirality == "merged":
+            name = merge_chirality(name)
+        own = sum(map(shape_size, class_shapes(name)))
+    except InputError as error:
+        raise InputError(f"target {target}: {error}") from error
+    for number in sorted(set(blocks)):
+        if number > MOST_NAMED:
+            raise InputError(
+                f"a tank of {number} blocks has no named classes, which a yield needs: take up to "
+                f"{MOST_NAMED}"
+            )
+        if number < own or (number > own and not vary_blocks):
+            raise InputError(f"target {target} has {own} blocks, and the runs have {number}")
+    return name
+
+
 def world_class(
     cell: npt.ArrayLike, assembly: npt.ArrayLike, *, chirality: Chirality = "merged"
 ) -> str:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from driftwalk.assembly.outcomes.class_names import class_name, class_shapes, merge_chirality
+from driftwalk.assembly.outcomes.class_names import class_shapes
 from driftwalk.assembly.runs.dataset import times_of
 from driftwalk.assembly.runs.plan import Plan
 from driftwalk.assembly.sensitivity.settings import (
@@ -24,9 +24,8 @@ from driftwalk.assembly.sensitivity.settings import (
 from driftwalk.assembly.sensitivity.times import kept_times
 from driftwalk.assembly.yields.local_search import starting_points
 from driftwalk.core.arrays import Bools, Floats
-from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
-from driftwalk.schema.shapes import MOST_NAMED, all_single
+from driftwalk.schema.shapes import all_single
 from driftwalk.simulation.backend import BROKEN
 from driftwalk.sweep import MemoryStore, Store, WorkUnit, grid, run_sweep, settings_per_unit
 
@@ -116,34 +115,6 @@ class Arms:
 
     def _value(self, arm: int, name: str, default: float) -> float:
         return float(self.points[arm].get(name, default))
-
-
-def target_class(target: str, plans: Sequence[Plan], *, vary_blocks: bool) -> str:
-    """Return the target as the runs name it.
-
-    Raises
-    ------
-    InputError
-        When it is no outcome class, or has another number of blocks than the runs.
-    """
-    from driftwalk.assembly.chains.histories import blocks_of
-
-    try:
-        name = class_name(class_shapes(target.strip()))
-        if plans[0].chirality == "merged":
-            name = merge_chirality(name)
-        own = blocks_of(name)
-    except InputError as error:
-        raise InputError(f"target {target}: {error}") from error
-    for blocks in sorted({plan.study.assembly.blocks for plan in plans}):
-        if blocks > MOST_NAMED:
-            raise InputError(
-                f"a tank of {blocks} blocks has no named classes, which a yield needs: take up to "
-                f"{MOST_NAMED}"
-            )
-        if blocks < own or (blocks > own and not vary_blocks):
-            raise InputError(f"target {target} has {own} blocks, and the runs have {blocks}")
-    return name
 
 
 def reaches(name: str, target: str) -> bool:

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
+from driftwalk.assembly.outcomes.class_names import target_class
 from driftwalk.assembly.runs.plan import stream_keys
 from driftwalk.assembly.runs.start import place_blocks
 from driftwalk.assembly.sensitivity.settings import FIRST_TRIALS, KEYS, Axes, make_axes
-from driftwalk.assembly.yields.arms import Arms, Ranges, Runs, Stores, target_class
+from driftwalk.assembly.yields.arms import Arms, Ranges, Runs, Stores
 from driftwalk.assembly.yields.dataset import Found, yield_dataset
 from driftwalk.assembly.yields.local_search import compass_search
 from driftwalk.assembly.yields.selection import (
@@ -243,7 +244,10 @@ def _prepared(
             f"by: {moment:g} s does not lie within the runs, which last {duration:g} s (duration)"
         )
     worlds = [arms.world(arm) for arm in range(len(arms.points))]
-    name = target_class(target, worlds, vary_blocks="blocks" in arms.axes.values)
+    name = target_class(
+        target, {one.study.assembly.blocks for one in worlds}, chirality=worlds[0].chirality,
+        vary_blocks="blocks" in arms.axes.values,
+    )  # fmt: skip
     many = len(arms.points)
     each = numbers[0] // (many * max(math.ceil(math.log2(many)), 1))
     if each < SELECTION.least_runs:

@@ -59,7 +59,11 @@ def trial_answer(found: xr.Dataset) -> Answer:
     facts = found.attrs
     parts: list[Part] = [
         f"{facts['worlds']} fresh worlds of each arm, with the same starts and forces",
-        Row("verdict", f"{facts['verdict']}: the plan states {facts['stated']:.3f}"),
+        Row(
+            "verdict",
+            f"{facts['verdict']}: the plan states {facts['stated']:.3f}, "
+            f"{facts['difference_low']:+.3f} to {facts['difference_high']:+.3f} from it",
+        ),
         Row("best constant mode", str(facts["constant_mode"])),
         arm_table(found),
         usage_table(found),

@@ -96,7 +96,10 @@ attributes:
     missed number: share of the looks without a class
     force_factor number: factor on sigma_F of the worlds
     stated number: share that the plan states
-    verdict text: whether the stated share is the achieved one
+    stated_worlds number: worlds of that share
+    difference_low number: lower limit of the achieved share less the stated one; Newcombe's
+    difference_high number: upper limit of the difference
+    verdict text: whether the interval of the difference holds 0
     worlds number: worlds of each arm
     confidence number: of the intervals
     constant_mode text: best constant mode
