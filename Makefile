@@ -23,7 +23,7 @@ CPP := $(shell find cpp -name '*.cpp' -o -name '*.hpp')
 # Every worker imports every test file: with the bytecode of the last run that takes half the time.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-slow test-studies test-fresh test-browser fuzz fuzz-loaders fuzz-dialects doctest lint format cpp-test cpp-test-portable bench studies studies-tracking docs site web wasm wheel cross release-check clean
+.PHONY: demo test test-slow test-studies test-fresh test-browser fuzz fuzz-loaders fuzz-dialects doctest lint format cpp-test cpp-test-portable bench studies studies-tracking docs site web wasm wasm-check wheel cross release-check clean
 
 demo: $(PACKAGE)
 	$(BIN)/driftwalk demo
@@ -150,6 +150,9 @@ studies-tracking: $(TEST_TOOLS)
 # The native core of the saved playground as WebAssembly, into the package; committed like the bundle.
 wasm: $(CROSS_TOOLS)
 	PATH="$(CURDIR)/$(BIN):$$PATH" .ci/wasm write
+
+wasm-check: $(CROSS_TOOLS)
+	PATH="$(CURDIR)/$(BIN):$$PATH" .ci/wasm
 
 wheel: $(DEV_TOOLS)
 	$(BIN)/python -m build
