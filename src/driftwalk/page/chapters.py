@@ -101,10 +101,12 @@ def _next(result: xr.Dataset, name: str) -> list[str]:
 
 def _after_test(test: xr.Dataset) -> str:
     """Return what to do with a policy that was tested."""
-    from driftwalk.schema.answers.control import LIVE, gain_word
+    from driftwalk.schema.answers.control import gain_word
 
     if gain_word(test) == "better":
-        return f"Follow the policy on your tank: `driftwalk control run POLICY --live {LIVE}`"
+        return (
+            "Follow the policy live: `driftwalk control run`, over what `driftwalk track` publishes"
+        )
     constant = test.attrs["constant_mode"]
     return (
         f"Use {constant} all the time, or plan again with more rounds or worlds: "
@@ -118,5 +120,7 @@ def _after_yield(found: xr.Dataset) -> str:
 
     more = more_runs(found)
     if more is not None:
-        return f"Distinguish the settings: the same command with `--runs {more}` and another folder"
+        return (
+            f"Distinguish the settings: the same command with more runs (`selection_runs={more}`)"
+        )
     return "See how much it depends on the model: `driftwalk sensitivity RUN -o sensitivity`"

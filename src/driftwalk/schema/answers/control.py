@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 USED = 0.01
 """Modes that are used in this share of the time are listed; chosen by hand."""
 GAIN = "gain over the best constant mode"
-LIVE = "127.0.0.1:5000"
-"""Where `driftwalk track` publishes in the next command that an answer names."""
 CONSTANT = 1
 """Arm of a test: the best constant mode."""
 
