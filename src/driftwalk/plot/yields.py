@@ -93,6 +93,8 @@ def plot_yield_settings(found: xr.Dataset, ax: Axes | None = None) -> Axes:
     --------
     ``plot_yield_settings(found)``
     """
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
     check_kind(found, "yield", "difference", "standing")
     ax = style.axes_or_new(ax, height_mm=90.0)
     behind = found["difference"].values
@@ -121,7 +123,12 @@ def plot_yield_settings(found: xr.Dataset, ax: Axes | None = None) -> Axes:
     ax.spines[["top", "right"]].set_visible(False)
     handles, texts = ax.get_legend_handles_labels()
     keys = dict(zip(texts, handles, strict=True))
-    style.figure_of(ax).legend(
-        list(keys.values()), list(keys), loc="outside upper center", ncols=2, fontsize=6.0
-    )
+    ax.legend(
+        list(keys.values()), list(keys), loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2,
+        fontsize=6.0,
+    )  # fmt: skip
+    engine = style.figure_of(ax).get_layout_engine()
+    if isinstance(engine, ConstrainedLayoutEngine):
+        # Long labels are wider in the file than as the layout measures them.
+        engine.set(w_pad=0.1)
     return ax
