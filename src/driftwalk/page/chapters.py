@@ -120,7 +120,5 @@ def _after_yield(found: xr.Dataset) -> str:
 
     more = more_runs(found)
     if more is not None:
-        return (
-            f"Distinguish the settings: the same command with more runs (`selection_runs={more}`)"
-        )
+        return f"Distinguish the settings: the same command with {more} runs that choose"
     return "See how much it depends on the model: `driftwalk sensitivity RUN -o sensitivity`"

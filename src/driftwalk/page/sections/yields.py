@@ -83,7 +83,8 @@ def yield_summary(yields: xr.Dataset) -> Section:
         f"{facts['reported_runs']} fresh runs, which chose nothing.",
         f"Most runs reach {target} by {facts['by_s']:g} s at "
         f"{setting_words(yields, required(yields, 'best'))}.",
-        *(f"{text[:1].upper()}{text[1:]}." for text in standing_sentences(yields)),
+        # A paragraph has no code.
+        *(f"{text[:1].upper()}{text[1:]}.".replace("`", "") for text in standing_sentences(yields)),
     ]
     shown = [
         figure(

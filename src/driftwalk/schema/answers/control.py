@@ -100,7 +100,7 @@ def trial_answer(found: xr.Dataset) -> Answer:
 def gain_text(test: xr.Dataset) -> str:
     """Return the gain of the policy over the best constant mode, with its interval."""
     gain, low, high = (float(test[f"gain{end}"][CONSTANT]) for end in ("", "_low", "_high"))
-    return f"{gain:+.3f}   {test.attrs['confidence']:.0%} interval {low:+.3f} to {high:+.3f}"
+    return f"{gain:+.3f} ({low:+.3f} to {high:+.3f})"
 
 
 def gain_word(test: xr.Dataset) -> str:
