@@ -17,13 +17,18 @@ from made_up_fit import made_up_fit
 from small_sensitivity import FLOW as STREAM, small
 
 import driftwalk as dw
-from driftwalk.assembly import Modes, Wanted
+from driftwalk.assembly import Modes, Wanted, proportion_interval
 from driftwalk.assembly.control.controller import Rules
 from driftwalk.assembly.control.stored import stored_modes, stored_rules
 from driftwalk.assembly.control.worlds import Setting, Worlds
 from driftwalk.core.files.shards import ShardStore
+from driftwalk.page.chapters import in_chapters
+from driftwalk.page.sections.control import trial_sections
 from driftwalk.runs import ControlPlanWork, run_work
+from driftwalk.schema.answers.control import exact_interval
+from driftwalk.schema.answers.parts import lines_of
 from driftwalk.schema.kinds.fit import FIT
+from driftwalk.schema.runs import answer_of
 from driftwalk.sweep import grid
 
 pytestmark = pytest.mark.slow
@@ -66,6 +71,35 @@ def test_a_plan_and_its_test_hold_what_they_say(tmp_path: Path) -> None:
         assert sorted(path.stem for path in tmp_path.glob(f"{folder}/figures/*.png")) == names
     page = tmp_path / "page.html"
     assert here("report", tmp_path / "policy", tmp_path / "test", "-o", page).code == 0
+
+
+def test_a_policy_no_better_than_one_mode_is_not_recommended() -> None:
+    policy, test = every_kind("control_policy").copy(), every_kind("control_test").copy()
+    alone = policy["constant_reached"].copy(data=[0.1, 0.5])
+    for reached, warned in ((0.6, 0), (0.5, 1), (0.3, 1)):
+        one = policy.assign(constant_reached=alone).assign_attrs(reached=reached)
+        answer = answer_of(one)
+        assert answer is not None
+        assert len(answer.warnings) == warned
+        assert all(f"use {one['mode'].values[1]} all the time" in said for said in answer.warnings)
+    for low, high, word, next_step in (
+        (0.01, 0.2, "better", "control run"),
+        (-0.1, 0.2, "cannot be distinguished", "all the time"),
+        (-0.2, -0.1, "worse", "all the time"),
+    ):
+        ends = {"gain_low": ("arm", [0.0, low, 0.3]), "gain_high": ("arm", [0.0, high, 0.5])}
+        one = test.assign(ends)
+        answer = answer_of(one)
+        assert answer is not None
+        assert lines_of(answer.parts)[0].endswith(f"({low:+.3f} to {high:+.3f}): {word}")
+        assert answer.facts["standing"] == word
+        assert next_step in str(in_chapters(trial_sections(control_test=one), one)[0]["next"])
+
+
+def test_intervals_of_modes_alone_are_exact() -> None:
+    for share, worlds in ((0.0, 20), (0.45, 20), (1.0, 7)):
+        expected = proportion_interval(share * worlds, worlds, confidence=0.9)
+        np.testing.assert_allclose(exact_interval(share, worlds, 0.9), expected, atol=1e-9)
 
 
 def test_a_policy_is_that_of_its_modes_again() -> None:

@@ -90,4 +90,35 @@ def _next(result: xr.Dataset, name: str) -> list[str]:
         return [f"Simulate the model: `driftwalk simulate {run} -o motion.nc`"]
     if kind is not None and kind.name == "assembly":
         return [f"Learn how fast, and by which steps: `driftwalk kinetics {run} -o kinetics`"]
+    if following == ["control test", "test"]:
+        return [f"Test it in fresh worlds: `driftwalk control test {run} -o test`"]
+    if kind is not None and kind.name == "control_test":
+        return [_after_test(result)]
+    if kind is not None and kind.name == "yield":
+        return [_after_yield(result)]
     return []
+
+
+def _after_test(test: xr.Dataset) -> str:
+    """Return what to do with a policy that was tested."""
+    from driftwalk.schema.answers.control import gain_word
+
+    if gain_word(test) == "better":
+        return (
+            "Follow the policy live: `driftwalk control run`, over what `driftwalk track` publishes"
+        )
+    constant = test.attrs["constant_mode"]
+    return (
+        f"Use {constant} all the time, or plan again with more rounds or worlds: "
+        "`driftwalk control plan`"
+    )
+
+
+def _after_yield(found: xr.Dataset) -> str:
+    """Return what to do after a yield: distinguish the settings, or doubt the model."""
+    from driftwalk.schema.answers.yields import more_runs
+
+    more = more_runs(found)
+    if more is not None:
+        return f"Distinguish the settings: the same command with {more} runs that choose"
+    return "See how much it depends on the model: `driftwalk sensitivity RUN -o sensitivity`"

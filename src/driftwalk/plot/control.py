@@ -40,7 +40,6 @@ def plot_policy(policy: xr.Dataset, ax: Axes | None = None) -> Axes:
     --------
     ``plot_policy(policy)``
     """
-    from matplotlib import colormaps
     from matplotlib.patches import Patch
 
     check_kind(policy, "control_policy", "action", "age", "phase")
@@ -50,19 +49,19 @@ def plot_policy(policy: xr.Dataset, ax: Axes | None = None) -> Axes:
     shown = [at for at, name in enumerate(names) if "+" in name][-12:]
     action = policy["action"].values[-1, shown]
     used = np.unique(action)
-    color = {mode: colormaps["tab20"](k % 20) for k, mode in enumerate(used.tolist())}
     age = policy["age"].values
     width = np.diff(age, append=2.0 * age[-1])
     for row, modes in enumerate(action):
         ax.barh(
             np.full(age.size, row), width, left=age, height=0.8,
-            color=[color[mode] for mode in modes.tolist()],
+            color=[_color(mode) for mode in modes.tolist()],
         )  # fmt: skip
     ax.set_yticks(range(len(shown)), [short_class(names[at]) for at in shown])
     ax.set_xlim(0.0, min(2.0 * float(age[-1]), float(policy.attrs["by_s"])))
     ax.set_xlabel("time in the class (s)")
+    ax.set_title(f"with {policy['phase'].values[-1]:g} s left or more", loc="left")
     labels = policy["mode"].values
-    keys = [Patch(color=color[mode], label=str(labels[mode])) for mode in used.tolist()]
+    keys = [Patch(color=_color(mode), label=str(labels[mode])) for mode in used.tolist()]
     ax.legend(handles=keys, fontsize=6.0, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return ax
 
@@ -140,11 +139,19 @@ def plot_control_run(test: xr.Dataset, ax: Axes | None = None) -> Axes:
         at = np.flatnonzero(modes[:-1] == mode)
         ax.barh(
             [row[one] for one in classes[at].tolist()], time[at + 1] - time[at], left=time[at],
-            height=0.8, label=str(labels[mode]),
+            height=0.8, label=str(labels[mode]), color=_color(mode),
         )  # fmt: skip
     ax.set_yticks(
         range(len(visited)), [short_class(str(test["class"].values[at])) for at in visited]
     )
     ax.set_xlabel(TIME_LABEL)
+    ax.set_xlim(time[0], time[-1])
     ax.legend(fontsize=6.0, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return ax
+
+
+def _color(mode: int) -> tuple[float, float, float, float]:
+    """Return the colour of a mode by its number, the same in all figures of a policy."""
+    from matplotlib import colormaps
+
+    return colormaps["tab20"](mode % 20)

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 MOST_SETTINGS = 16
 """Settings that are drawn as rows; chosen by hand."""
 MARKERS = {"best": "o", "alike": "s", "worse": "x"}
+WORDS = {"alike": "cannot be distinguished"}
 
 
 def plot_yield_front(found: xr.Dataset, ax: Axes | None = None) -> Axes:
@@ -56,7 +57,8 @@ def plot_yield_front(found: xr.Dataset, ax: Axes | None = None) -> Axes:
     ahead[int(found.attrs["best"])] += time.size
     for at in np.argsort(-ahead, kind="stable")[: int((ahead > 0).sum())]:
         ax.plot(time, found["share"].values[at], label=setting_words(found, int(at)))
-    ax.axvline(found.attrs["by_s"], color=style.MUTED, lw=0.6, ls="--")
+    by = found.attrs["by_s"]
+    ax.axvline(by, color=style.MUTED, lw=0.6, ls="--", label=f"deadline {by:g} s")
     target = short_class(str(found.attrs["target"]))
     ax.set(
         xlabel=TIME_LABEL, ylabel=f"share of runs with {target}", xlim=(time[0], time[-1]),
@@ -91,6 +93,8 @@ def plot_yield_settings(found: xr.Dataset, ax: Axes | None = None) -> Axes:
     --------
     ``plot_yield_settings(found)``
     """
+    from matplotlib.layout_engine import ConstrainedLayoutEngine
+
     check_kind(found, "yield", "difference", "standing")
     ax = style.axes_or_new(ax, height_mm=90.0)
     behind = found["difference"].values
@@ -106,12 +110,25 @@ def plot_yield_settings(found: xr.Dataset, ax: Axes | None = None) -> Axes:
         color = style.MUTED if word == "worse" else "C0"
         ax.errorbar(
             -behind[at], row, xerr=reach, fmt=MARKERS[word], color=color, ms=3.0, lw=0.8,
+            label=WORDS.get(word, word),
         )  # fmt: skip
-    ax.axvspan(-found.attrs["indifference"], 0.0, color=style.MUTED, alpha=0.2, lw=0)
+    within = found.attrs["indifference"]
+    ax.axvspan(
+        -within, 0.0, color=style.MUTED, alpha=0.2, lw=0, label=f"grey: within {100 * within:g} %"
+    )
     words = [setting_words(found, int(at)) for at in order]
     ax.set_yticks(range(len(order)), words, fontsize=6.0)
     ax.invert_yaxis()
     ax.set_xlabel("yield less that of the best")
     ax.spines[["top", "right"]].set_visible(False)
-    ax.set_title("o best, □ alike, x worse", loc="left")
+    handles, texts = ax.get_legend_handles_labels()
+    keys = dict(zip(texts, handles, strict=True))
+    ax.legend(
+        list(keys.values()), list(keys), loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2,
+        fontsize=6.0,
+    )  # fmt: skip
+    engine = style.figure_of(ax).get_layout_engine()
+    if isinstance(engine, ConstrainedLayoutEngine):
+        # Long labels are wider in the file than as the layout measures them.
+        engine.set(w_pad=0.1)
     return ax

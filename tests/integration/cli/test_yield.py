@@ -10,9 +10,12 @@ import numpy as np
 import pytest
 import xarray as xr
 from command_line import FLOW, here
+from every_kind import every_kind
 
 import driftwalk as dw
+from driftwalk.cli.assembly.yields import _again
 from driftwalk.core.files.shards import ShardStore
+from driftwalk.schema.answers.yields import more_runs
 from driftwalk.viewer.watch.run_page import RunSource
 
 pytestmark = pytest.mark.slow
@@ -40,6 +43,16 @@ def test_a_run_holds_its_answer_and_its_figures(tmp_path: Path) -> None:
     assert again["reached"].equals(found["reached"])
     assert "best setting" in repr(again)
     assert here("report", out, "-o", tmp_path / "page.html").code == 0
+
+
+def test_the_next_command_has_the_runs_that_distinguish() -> None:
+    found = every_kind("yield").assign_attrs(indifference=0.02, selection_runs=1200)
+    for within, runs in ((0.02, None), (0.021, 2000), (0.036, 4000), (0.2, 200_000)):
+        assert more_runs(found.assign_attrs(within=within)) == runs
+    words = ["fit", "--runs=9", "--runs", "1200", "--by", "2min", "--out", "a"]
+    assert _again(words, 4000, Path("a")) == [
+        *("fit", "--by", "2min", "--runs", "4000", "-o"), Path("a"),
+    ]  # fmt: skip
 
 
 def test_a_range_is_searched(tmp_path: Path) -> None:

@@ -27,6 +27,8 @@ class Found(NamedTuple):
     judge: Tally
     selected: Selection
     rounds: dict[int, int]
+    runs: int
+    """Of halving, at most."""
 
 
 def yield_dataset(found: Found, *, indifference: float, confidence: float) -> xr.Dataset:
@@ -72,6 +74,7 @@ def yield_dataset(found: Found, *, indifference: float, confidence: float) -> xr
         "indifference": indifference,
         "confidence": confidence,
         "searched": ", ".join(arms.ranges),
+        "selection_runs": found.runs,
         "chosen_runs": tally.runs,
         "reported_runs": judge.runs,
         "left_out": found.chosen.broken + found.reported.broken,

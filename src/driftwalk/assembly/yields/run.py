@@ -171,7 +171,7 @@ def maximise_yield(
     judge = Tally(reported.sample)
     some = [selected.best, *selected.alike[: YIELD_POLICY.alike], *_front(chosen, known)]
     judge.extend(list(dict.fromkeys(some)), fresh_runs)
-    found = Found(arms, name, moment, chosen, tally, reported, judge, selected, stayed)
+    found = Found(arms, name, moment, chosen, tally, reported, judge, selected, stayed, runs)
     if progress is not None:
         progress(whole, whole)
     return yield_dataset(found, indifference=indifference, confidence=confidence)

@@ -139,11 +139,17 @@ def try_policy(
     with the same starts and forces.
     """
     from driftwalk.runs import ControlTestWork
+    from driftwalk.schema.answers.control import gain_word
 
     stored, path = _opened(policy)
     work = ControlTestWork(stored, worlds, latency, missed, force_factor, {"policy": path})
     found: xr.Dataset = options.run(work, "control test")
-    print_result(found, options.out, json=options.json)
+    # What is not better than one mode all the time is not worth a run on the tank.
+    live: list[str | Path] = ["control run", policy, "--live", "127.0.0.1:5000"]
+    print_result(
+        found, options.out, json=options.json,
+        following=live if gain_word(found) == "better" else [],
+    )  # fmt: skip
 
 
 @control_app.command(cls=HelpCommand)

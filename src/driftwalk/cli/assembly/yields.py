@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import re
+import sys
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Annotated
 
 from driftwalk.cli.assembly.sensitivity import AXES, VARY_KEYS, flow_paths, vary_overrides
@@ -25,6 +28,8 @@ UNSTATED = {
     "drag_coefficient": "the drag coefficient was not stated",
 }
 """Beginnings of warnings that do not hold where the parameter varies."""
+REPLACED = ("--runs", "-o", "--out")
+"""Options that another run of the command has with other values."""
 Ranges = dict[str, tuple[float, float]]
 
 
@@ -48,7 +53,15 @@ def maximise_yield(
             panel=PANEL,
         ),
     ] = None,
-    runs: Annotated[int, option("--runs N", "Runs that choose by halving.", min=1)] = 6000,
+    runs: Annotated[
+        int,
+        option(
+            "--runs N",
+            "Runs that choose by halving. At most five times as many are simulated to distinguish "
+            "the best (six with a range to search).",
+            min=1,
+        ),
+    ] = 6000,
     fresh_runs: Annotated[
         int, option("--fresh-runs N", "Runs that report the yield of a setting.", min=1)
     ] = 2000,
@@ -66,7 +79,7 @@ def maximise_yield(
     continues it.
     """
     from driftwalk.runs import YieldWork
-    from driftwalk.schema.answers.yields import yield_answer
+    from driftwalk.schema.answers.yields import more_runs, yield_answer
 
     lists, ranges = _varied(vary or [])
     given = given.and_also(vary_overrides(lists), keys=VARY_KEYS)
@@ -95,11 +108,24 @@ def maximise_yield(
     idle = [text for name, text in UNSTATED.items() if name in found]
     kept = [one for one in source.warnings if not one.startswith(tuple(idle))]
     warnings = [*kept, *series, *answer.warnings]
-    print_prediction(answer, options.out, run, warnings, json=options.json)
+    more = more_runs(found)
+    again = [] if more is None else ["yield", *_again(sys.argv[2:], more, options.out)]
+    print_prediction(answer, options.out, run, warnings, json=options.json, following=again)
 
 
 yield_app = maximise_yield
 """The command's name is a word of Python."""
+
+
+def _again(words: Sequence[str], runs: int, out: Path) -> list[str | Path]:
+    """Return the words of this command with more runs, into another folder."""
+    kept, replaced = [], False
+    for word in words:
+        name = word.partition("=")[0]
+        if not replaced and name not in REPLACED:
+            kept.append(word)
+        replaced = word in REPLACED
+    return [*kept, "--runs", str(runs), "-o", out]
 
 
 def _varied(vary: list[str]) -> tuple[list[str], Ranges]:

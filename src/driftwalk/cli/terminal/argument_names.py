@@ -30,7 +30,7 @@ _SAME: Final = (
     "angle backend body box cell_size cells columns delimiter flow format frame_interval "
     "header_line heading host inertia keypoint length_unit mass max_speed "
     "min_confidence min_count missing port position_noise replicate seed sheet side step_interval "
-    "study tank theta topic up window x y y_axis"
+    "rounds study tank theta topic up window worlds x y y_axis"
 )
 _WITHOUT: Final = (
     "area block_length body_b clearance folder like noise outlier_threshold seconds "
@@ -47,6 +47,7 @@ OPTIONS: Final[dict[str, str | None]] = {
     "origin": "--tank",
     "parameters": "--parameter",
     "rate": "--fps",
+    "selection_runs": "--runs",
     "start": "--from",
     "stop": "--to",
     "variables": "--flow-variables",

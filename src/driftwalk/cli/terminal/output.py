@@ -174,7 +174,14 @@ def require_place(path: Path, *, existing: str) -> None:
         raise InputError(f"{path}: permission denied to write in the folder {path.parent}")
 
 
-def print_result(found: xr.Dataset, folder: Path, *, json: bool, **more: Any) -> None:
+def print_result(
+    found: xr.Dataset,
+    folder: Path,
+    *,
+    json: bool,
+    following: Sequence[str | Path] = (),
+    **more: Any,
+) -> None:
     """Print the answer of a run, as one JSON object or for people, and what comes next.
 
     Parameters
@@ -185,6 +192,8 @@ def print_result(found: xr.Dataset, folder: Path, *, json: bool, **more: Any) ->
         The run directory.
     json : bool
         Whether programs read it.
+    following : sequence of str or Path
+        The next command and its words, where the dataset alone does not say it.
     **more
         What else the run made, see `answer_of`.
     """
@@ -198,7 +207,7 @@ def print_result(found: xr.Dataset, folder: Path, *, json: bool, **more: Any) ->
         print_json(answer.facts)
         return
     print_parts(answer.parts)
-    print_places(found, folder, answer.warnings)
+    print_places(found, folder, answer.warnings, following)
 
 
 def print_run(folder: Path, *, json: bool) -> None:
@@ -260,7 +269,9 @@ def print_row(label: str, text: object) -> None:
     print_parts([Row(label, str(text))])
 
 
-def print_places(found: xr.Dataset, folder: Path, warnings: Iterable[str]) -> None:
+def print_places(
+    found: xr.Dataset, folder: Path, warnings: Iterable[str], words: Sequence[str | Path] = ()
+) -> None:
     """Print the warnings, where everything is, and the command that comes next."""
     print_warnings(warnings)
     from driftwalk.schema.runs import kind_of, next_command
@@ -270,10 +281,13 @@ def print_places(found: xr.Dataset, folder: Path, warnings: Iterable[str]) -> No
     for label, name in kind.places.items():
         print_row(label, folder / name)
     following = next_command(found)
-    if not following:
+    if not words and not following:
         print_report_next(folder)
         return
     print_row("all in one page", command_text("report", folder, "-o", "report.html"))
+    if words:
+        print_next(str(words[0]), *words[1:])
+        return
     command, *model, result = following
     named = ["--model", *model] if model else []
     print_next(command, folder, *named, "-o", sibling(folder, result))
@@ -286,16 +300,24 @@ def print_warnings(texts: Iterable[str | None]) -> None:
 
 
 def print_prediction(
-    answer: Answer, folder: Path, run: Path | None, warnings: Sequence[str], *, json: bool
-) -> None:
-    """Print the answer of simulated assemblies; `run` is what their parameters were taken from."""
+    answer: Answer, folder: Path, run: Path | None, warnings: Sequence[str], *, json: bool,
+    following: Sequence[str | Path] = (),
+) -> None:  # fmt: skip
+    """Print the answer of simulated assemblies; `run` is what their parameters were taken from.
+
+    The next command is `following`, else that of their page.
+    """
     if json:
         print_json({**answer.facts, "warnings": warnings})
         return
     print_parts(answer.parts)
     print_row("figures", folder / "figures")
     print_warnings(warnings)
-    print_report_next(*([] if run is None else [run]), folder)
+    page = ["report", *([] if run is None else [run]), folder, "-o", "report.html"]
+    if following:
+        print_row("all in one page", command_text(*map(str, page)))
+    name, *words = following or page
+    print_next(str(name), *words)
 
 
 def print_report_next(*runs: Path) -> None:

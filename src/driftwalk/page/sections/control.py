@@ -22,7 +22,17 @@ from driftwalk.page.parts import (
     table_section,
 )
 from driftwalk.page.sections.replay import replay_section
-from driftwalk.schema.answers.control import arm_table, mode_table, usage_table
+from driftwalk.schema.answers.control import (
+    CONSTANT,
+    GAIN,
+    arm_table,
+    exact_interval,
+    gain_text,
+    gain_word,
+    mode_table,
+    policy_warnings,
+    usage_table,
+)
 from driftwalk.schema.answers.parts import Table
 from driftwalk.schema.shapes import short_class
 
@@ -48,7 +58,7 @@ def policy_sections(*, policy: xr.Dataset | None = None) -> list[Section]:
         ("policy", "Modes chosen", action_sections),
         ("modes", "Modes alone", lambda found: _table("modes", "Modes alone", mode_table(found))),
     ]
-    return sections_of(policy, "There is no policy yet.", policy_summary, lambda _: [], parts)
+    return sections_of(policy, "There is no policy yet.", policy_summary, policy_warnings, parts)
 
 
 def policy_summary(policy: xr.Dataset) -> Section:
@@ -66,17 +76,17 @@ def policy_summary(policy: xr.Dataset) -> Section:
 
 
 def rounds_section(policy: xr.Dataset) -> Section:
-    """Return what each round promised, and what it reached."""
+    """Return what value iteration expects of the first rounds, and what each round reached."""
     require(policy, "promised", "round_reached")
-    number = np.arange(1.0, policy.sizes["round"] + 1.0)
-    drawn = [
-        series("promised", number, policy["promised"].values),
-        series("reached", number, policy["round_reached"].values, style="points"),
-    ]  # fmt: skip
-    note = "The promise of value iteration is too large; only what was reached counts."
-    return chart(
-        "rounds", "Rounds of planning", note, x=label("round"), y=label("share"), series=drawn
-    )  # fmt: skip
+    expected, reached = policy["promised"].values, policy["round_reached"].values
+    rows = [
+        [at, f"{got:.3f}", f"{said:.3f}" if np.isfinite(said) else ""]
+        for at, (said, got) in enumerate(zip(expected, reached, strict=True), start=1)
+    ]
+    target = short_class(str(required(policy, "target")))
+    columns = ["round", f"share of worlds in {target}", "value iteration (first two rounds)"]
+    note = "Value iteration expects too much; only what was reached counts."
+    return table_section("rounds", "Rounds of planning", columns, rows, note)
 
 
 def action_sections(policy: xr.Dataset) -> list[Section]:
@@ -132,32 +142,39 @@ def trial_summary(test: xr.Dataset) -> Section:
         for row in ([str(cell) for cell in one] for one in table.rows)
     ]  # fmt: skip
     ends = (test["reached_low"].values[0], test["reached_high"].values[0])
+    gain, *limits = (float(test[f"gain{end}"][CONSTANT]) for end in ("", "_low", "_high"))
+    gained = figure(
+        GAIN, gain, ends=(limits[0], limits[1]), confidence=facts["confidence"],
+        note=gain_word(test),
+    )  # fmt: skip
     share = figure(
         "reached by the policy", test["reached"].values[0], ends=ends,
         confidence=facts["confidence"],
     )  # fmt: skip
     return summary_section(
         [
+            f"{GAIN.capitalize()}, {facts['constant_mode']}: {gain_text(test)}: {gain_word(test)}.",
             f"{required(test, 'worlds')} fresh worlds of each arm, with the same starts and "
             f"forces. The plan states {facts['stated']:.3f}: {facts['verdict']}.",
-            f"Best constant mode: {facts['constant_mode']}.",
             *words,
         ],
-        [share],
+        [gained, share],
     )
 
 
 def share_section(test: xr.Dataset) -> Section:
     """Return the share of the worlds in the target over time."""
     require(test, "time", "share")
-    time = test["time"].values
-    drawn = [
-        series(str(name), time, test["share"].values[at])
-        for at, name in enumerate(test["arm"].values)
-    ]
+    time, facts = test["time"].values, test.attrs
+    drawn = []
+    for name, share in zip(test["arm"].values, test["share"].values, strict=True):
+        ends = [exact_interval(one, facts["worlds"], facts["confidence"]) for one in share.tolist()]
+        low, high = np.transpose(ends)
+        drawn.append(series(str(name), time, share, ends=(low, high)))
+    target = short_class(str(required(test, "target")))
     return chart(
-        "share", "Target over time", "", x=label("time", "s"), y=label("share of worlds"),
-        series=drawn,
+        "share", "Target over time", f"Bands: {facts['confidence']:.0%} intervals.",
+        x=label("time", "s"), y=label(f"share of worlds in {target}"), series=drawn,
     )  # fmt: skip
 
 

@@ -83,7 +83,8 @@ def yield_summary(yields: xr.Dataset) -> Section:
         f"{facts['reported_runs']} fresh runs, which chose nothing.",
         f"Most runs reach {target} by {facts['by_s']:g} s at "
         f"{setting_words(yields, required(yields, 'best'))}.",
-        *(f"{text[:1].upper()}{text[1:]}." for text in standing_sentences(yields)),
+        # A paragraph has no code.
+        *(f"{text[:1].upper()}{text[1:]}.".replace("`", "") for text in standing_sentences(yields)),
     ]
     shown = [
         figure(
@@ -110,7 +111,7 @@ def front_section(yields: xr.Dataset) -> Section:
         "front", "Front of yield and time",
         "From fresh runs; for each time the setting was chosen by the runs before them.",
         x=label("time", "s"), y=label("share of runs with the target"), series=drawn,
-        marks=[mark("by", x=yields.attrs["by_s"])],
+        marks=[mark(f"deadline {yields.attrs['by_s']:g} s", x=yields.attrs["by_s"])],
     )  # fmt: skip
 
 
@@ -135,7 +136,7 @@ def along_sections(yields: xr.Dataset) -> list[Section]:
         words = name.replace("_", " ")
         found.append(
             chart(
-                f"along-{name}", f"Yield along {words}", "Of the runs that chose.",
+                f"along-{name}", f"Yield along {words}", "In the choosing runs.",
                 x=label(f"{words} ({unit})" if unit else words), y=label("yield"), series=drawn,
             )
         )  # fmt: skip

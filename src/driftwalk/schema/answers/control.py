@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 
 USED = 0.01
 """Modes that are used in this share of the time are listed; chosen by hand."""
+GAIN = "gain over the best constant mode"
+CONSTANT = 1
+"""Arm of a test: the best constant mode."""
 
 
 def policy_answer(found: xr.Dataset) -> Answer:
@@ -36,16 +39,40 @@ def policy_answer(found: xr.Dataset) -> Answer:
         ),
         mode_table(found),
     ]
-    return Answer(parts, _facts(found, {"modes": ("mode", ("constant_reached",))}), [])
+    facts_of_modes = _facts(found, {"modes": ("mode", ("constant_reached",))})
+    return Answer(parts, facts_of_modes, policy_warnings(found))
+
+
+def policy_warnings(policy: xr.Dataset) -> list[str]:
+    """Return that a policy is not worth it, where one mode reaches as much in the plan."""
+    reached = policy["constant_reached"].values
+    alone, stated = float(reached.max()), float(policy.attrs["reached"])
+    if stated > alone:
+        return []
+    best = str(policy["mode"].values[reached.argmax()])
+    return [
+        f"the stated yield of {stated:.3f} does not exceed the {alone:.3f} of the best constant "
+        f"mode: use {best} all the time, or plan with more `rounds` or `worlds`"
+    ]
 
 
 def mode_table(policy: xr.Dataset) -> Table:
-    """Return the modes with what each reaches alone."""
-    rows = [
-        [str(one["mode"].values), f"{float(one['constant_reached']):.3f}"]
-        for one in each(policy, "mode")
-    ]
-    return Table(rows, ["mode", "reaches it alone"])
+    """Return the modes with what each reaches alone, and its exact interval."""
+    count, confidence = int(policy.attrs["constant_worlds"]), float(policy.attrs["confidence"])
+    rows = []
+    for one in each(policy, "mode"):
+        share = float(one["constant_reached"])
+        low, high = exact_interval(share, count, confidence)
+        rows.append([str(one["mode"].values), f"{share:.3f}", f"{low:.3f} to {high:.3f}"])
+    return Table(rows, ["mode", "reaches it alone", f"{confidence:.0%} interval"])
+
+
+def exact_interval(share: float, worlds: int, confidence: float) -> tuple[float, float]:
+    """Return the Clopper-Pearson interval of a share of the worlds."""
+    from scipy.stats import binomtest
+
+    found = binomtest(round(share * worlds), worlds).proportion_ci(confidence)
+    return float(found.low), float(found.high)
 
 
 def trial_answer(found: xr.Dataset) -> Answer:
@@ -58,6 +85,7 @@ def trial_answer(found: xr.Dataset) -> Answer:
     """
     facts = found.attrs
     parts: list[Part] = [
+        Row(GAIN, f"{gain_text(found)}: {gain_word(found)}"),
         f"{facts['worlds']} fresh worlds of each arm, with the same starts and forces",
         Row(
             "verdict",
@@ -69,7 +97,21 @@ def trial_answer(found: xr.Dataset) -> Answer:
         usage_table(found),
     ]
     names = ("reached", "reached_low", "reached_high", "gain", "gain_low", "gain_high")
-    return Answer(parts, _facts(found, {"arms": ("arm", names)}), [])
+    facts_of_arms = _facts(found, {"arms": ("arm", names)})
+    return Answer(parts, {"standing": gain_word(found), **facts_of_arms}, [])
+
+
+def gain_text(test: xr.Dataset) -> str:
+    """Return the gain of the policy over the best constant mode, with its interval."""
+    gain, low, high = (float(test[f"gain{end}"][CONSTANT]) for end in ("", "_low", "_high"))
+    return f"{gain:+.3f} ({low:+.3f} to {high:+.3f})"
+
+
+def gain_word(test: xr.Dataset) -> str:
+    """Return whether the policy is better than the best constant mode, as far as a test says."""
+    if float(test["gain_low"][CONSTANT]) > 0.0:
+        return "better"
+    return "worse" if float(test["gain_high"][CONSTANT]) < 0.0 else "cannot be distinguished"
 
 
 def arm_table(test: xr.Dataset) -> Table:
@@ -111,7 +153,7 @@ def usage_table(test: xr.Dataset) -> Table:
         for at, name in enumerate(test["mode"].values)
         if used[at] >= USED
     ]
-    return Table(rows, ["mode", "time", *(short_class(str(name)) for name in kept)])
+    return Table(rows, ["mode", "share of the time", *(short_class(str(name)) for name in kept)])
 
 
 def _facts(found: xr.Dataset, tables: dict[str, tuple[str, tuple[str, ...]]]) -> dict[str, Any]:

@@ -118,11 +118,25 @@ def standing_sentences(found: xr.Dataset) -> list[str]:
     ]
     if spans:
         said.append(f"of the ranges they take {', '.join(spans)}")
-    if facts["within"] > 1.001 * facts["indifference"]:
+    if (needed := more_runs(found)) is not None:
         said.append(
-            f"to distinguish them within {100 * facts['indifference']:.2g} %, give more runs"
+            f"to distinguish them within {100 * facts['indifference']:.2g} %, give more runs "
+            f"(`selection_runs={needed}`)"
         )
     return said
+
+
+def more_runs(found: xr.Dataset) -> int | None:
+    """Return how many runs of halving distinguish within the indifference; None where these do.
+
+    The reached difference falls with the square root of the runs; one digit, rounded up.
+    """
+    facts = found.attrs
+    if "selection_runs" not in facts or facts["within"] <= 1.001 * facts["indifference"]:
+        return None
+    needed = facts["selection_runs"] * (facts["within"] / facts["indifference"]) ** 2
+    digit = 10 ** math.floor(math.log10(needed))
+    return int(math.ceil(needed / digit) * digit)
 
 
 def setting_table(found: xr.Dataset) -> Table:
@@ -133,7 +147,6 @@ def setting_table(found: xr.Dataset) -> Table:
         (rank[str(word)], -one) for word, one in zip(found["standing"].values, share, strict=True)
     ]
     order = sorted(range(len(keys)), key=keys.__getitem__)
-    names = varied(found)
     rows = []
     for at in order[:LISTED]:
         one = found.isel(setting=at)
@@ -142,7 +155,7 @@ def setting_table(found: xr.Dataset) -> Table:
         )  # fmt: skip
         rows.append(
             [
-                *(value_text(name, found[name].values[at]) for name in names),
+                setting_words(found, at),
                 f"{fresh:.3f}" if math.isfinite(fresh) else "",
                 f"{low:.3f} to {high:.3f}" if math.isfinite(fresh) else "",
                 f"{share[at]:.3f}",
@@ -153,10 +166,10 @@ def setting_table(found: xr.Dataset) -> Table:
             ]
         )
     share_words = f"{found.attrs['confidence']:.0%} interval"
-    columns = [*(name.replace("_", " ") for name in names), "yield", share_words]
+    columns = ["setting", "yield", share_words, "share in the choosing runs", "runs", "standing"]
     left = len(order) - LISTED
     title = f"the best {LISTED} of {len(order)} settings" if left > 0 else ""
-    return Table(rows, [*columns, "of runs that chose", "runs", "standing"], title)
+    return Table(rows, columns, title)
 
 
 def front_table(found: xr.Dataset) -> Table:

@@ -41,6 +41,7 @@ attributes:
     indifference number: difference of yields that does not matter
     confidence number: of the choice and of the intervals
     searched text: axes with a range, which were searched
+    selection_runs number: runs of halving
     chosen_runs number: runs that chose, of all settings
     reported_runs number: fresh runs, of all settings
     left_out number: runs that broke down, which count as without the target

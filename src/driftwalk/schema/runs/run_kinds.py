@@ -413,6 +413,8 @@ def next_command(found: xr.Dataset) -> list[str]:
     if kind == "fit" or (kind == "calibration" and is_block(found)):
         # Nothing can be simulated with what is not known.
         return [] if kind == "fit" and undetermined(found) else ["assemble", "assembly"]
+    if kind == "control_policy":
+        return ["control test", "test"]
     if kind not in ("calibration", "model_calibration"):
         return []
     # The user names a model that is none of driftwalk's own.
