@@ -263,14 +263,16 @@ def print_row(label: str, text: object) -> None:
 def print_places(found: xr.Dataset, folder: Path, warnings: Iterable[str]) -> None:
     """Print the warnings, where everything is, and the command that comes next."""
     print_warnings(warnings)
+    from driftwalk.schema.answers.verdict import DOES_NOT_EXPLAIN, stored_verdict
     from driftwalk.schema.runs import kind_of, next_command
 
-    kind = kind_of(found)
+    kind, verdict = kind_of(found), stored_verdict(found)
     assert kind is not None, "the result of a run"
     for label, name in kind.places.items():
         print_row(label, folder / name)
     following = next_command(found)
-    if not following:
+    # Nothing follows from numbers that are not to be used.
+    if not following or (verdict is not None and verdict.word == DOES_NOT_EXPLAIN):
         print_report_next(folder)
         return
     print_row("all in one page", command_text("report", folder, "-o", "report.html"))
