@@ -86,19 +86,22 @@ def play(
         return
     if parameters:
         raise InputError("--parameter belongs to a --model")
-    found = source.found
+    found, name, said = source.found, "", list[str]()
     bundled = not given.states_tank and flow is None and found is None
     if found is not None:
         chosen = source.study()
         field = flow_of_block(found, chosen, flow)
         beside, body = _of_run(found, recording, chosen, body)
-        print_warnings(found.warnings)
+        name, said = Path(found.name).name, found.warnings
+        print_warnings(said)
     else:
         chosen = given.over(_bundled(), base="the bundled example") if bundled else given.study()
         field = _flow(flow, chosen, bundled=bundled)
         beside = _recording(recording, chosen, body, bundled=bundled)
     seed = chosen.assembly.seed
-    tank = PlaySource(chosen, field, recording=beside, body=body, seed=seed)
+    tank = PlaySource(
+        chosen, field, recording=beside, body=body, seed=seed, run=name, warnings=said
+    )
     if save is not None:
         path = save_playground(tank, save, existing="replace" if overwrite else "error")
         print_note(f"the playground: {path}, {path.stat().st_size / 1e6:.1f} MB")

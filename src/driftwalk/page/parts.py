@@ -15,7 +15,7 @@ from driftwalk.core.errors import DriftwalkError, InputError
 from driftwalk.core.text.json_text import json_value
 from driftwalk.page.arrays import number, numbers
 from driftwalk.plot.parts.arena import arena_of
-from driftwalk.schema.answers.facts import facts_of, sentences
+from driftwalk.schema.answers.facts import facts_of, sentences, source_warnings
 from driftwalk.schema.answers.parts import NOT_DETERMINED, Answer, Estimate, Table
 from driftwalk.schema.answers.verdict import Verdict
 from driftwalk.schema.check import kind_name
@@ -197,7 +197,11 @@ def sections_of(
     if found is None:
         return [empty_section("summary", FOUND_TITLE, nothing)]
     made = attempt("summary", FOUND_TITLE, partial(summary, found))
-    made += attempt("warnings", "Warnings", lambda: warnings_section(warnings(found)))
+    made += attempt(
+        "warnings",
+        "Warnings",
+        lambda: warnings_section([*source_warnings(found), *warnings(found)]),
+    )
     for id, title, make in parts:
         made += attempt(id, title, partial(make, found))
     return made

@@ -187,7 +187,8 @@ def recording_page(
 def joined_page(pages: Sequence[Mapping[str, Any]], *, title: str) -> dict[str, Any]:
     """Return one page with the sections of several, such as the runs that belong together.
 
-    A recording or a flow that an earlier page shows too is not repeated.
+    A recording or a flow that an earlier page shows too is not repeated; the last page says how to
+    cite.
 
     Parameters
     ----------
@@ -224,6 +225,8 @@ def joined_page(pages: Sequence[Mapping[str, Any]], *, title: str) -> dict[str, 
                     continue
                 shown.append(content)
             joined = {**part, "id": f"{name}-{part['id']}"}
+            if part["kind"] == "manifest" and page is not pages[-1]:
+                joined |= {"cite": None, "bibtex": None}
             if len(names) > 1:
                 joined["run"] = f"{page['title']} · {name}"
             if part.get("picture"):

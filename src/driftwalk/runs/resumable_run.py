@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
@@ -12,6 +13,8 @@ from typing import TYPE_CHECKING, Any, Protocol, Self
 
 from driftwalk.core.errors import InputError
 from driftwalk.core.run_stages import Course, tell_nobody
+from driftwalk.schema.description import SOURCE_WARNINGS
+from driftwalk.schema.kinds import find_kind
 from driftwalk.schema.runs import RunContents, run_kind
 from driftwalk.schema.stores.netcdf import netcdf_bytes
 
@@ -79,6 +82,8 @@ class Run(RunContents):
         Computes work units elsewhere.
     drawn : bool
         Whether its figures are there.
+    warnings : sequence of str
+        Warnings of what its parameters were taken from; its results hold them.
     """
 
     directory: RunDirectory
@@ -86,9 +91,13 @@ class Run(RunContents):
     progress: Progress = silent
     executor: Executor | None = None
     drawn: bool = False
+    warnings: Sequence[str] = ()
 
     def keep(self, name: str, dataset: xr.Dataset) -> xr.Dataset:
         """Write a dataset and return it as one that knows its file, as if it were read from it."""
+        kind = find_kind(dataset)
+        if self.warnings and kind is not None and {*SOURCE_WARNINGS} <= {*kind.attributes}:
+            dataset = dataset.assign_attrs(warnings=json.dumps([*self.warnings]))
         path = self.directory.write(name, netcdf_bytes(dataset))
         kept = dataset.copy(deep=False)
         kept.encoding = {**dataset.encoding, "source": str(path.absolute())}
@@ -124,6 +133,7 @@ def run_work(
     executor: Executor | None = None,
     progress: Progress = silent,
     command: str | Sequence[str] = "driftwalk.runs.run_work(...)",
+    warnings: Sequence[str] = (),
 ) -> Any:
     """Do a piece of work in a run directory and return its result.
 
@@ -146,6 +156,8 @@ def run_work(
         Called as ``progress(done, total, text)`` while the work goes on.
     command : str or sequence of str, optional
         The command line or the call, for the manifest.
+    warnings : sequence of str, optional
+        Warnings of what the parameters were taken from, for the results and their pages.
 
     Returns
     -------
@@ -190,6 +202,7 @@ def run_work(
             kind=work.kind,
             progress=progress,
             executor=executor,
+            warnings=warnings,
         )
         result = work.compute(run)
         if not run.drawn:

@@ -334,3 +334,10 @@ def limited(given: Iterable[Attribute], when: str, *, without: str = "") -> Iter
     for one in given:
         if one.name not in without.split():
             yield replace(one, when=one.when or when)
+
+
+SOURCE_WARNINGS: Final = attributes("""
+attributes (what the parameters were taken from has any):
+    warnings
+""")
+"""Of results of simulations."""

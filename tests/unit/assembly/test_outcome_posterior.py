@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from scipy.stats import multinomial, norm
 import driftwalk as dw
 from driftwalk.assembly import check_outcomes, read_outcomes
 from driftwalk.assembly.chains.histories import histories
+from driftwalk.assembly.outcome_posterior.dataset import _reasons
 from driftwalk.assembly.outcome_posterior.emulator import Emulator, log_likelihoods
 from driftwalk.assembly.outcome_posterior.observed import observed_of
 from driftwalk.assembly.outcome_posterior.records import (
@@ -236,3 +239,13 @@ def test_mirror_images_are_one_class() -> None:
     found = check_outcomes({"Z": 2, "J": 1}, FLOW)
     assert {one.final for one in found.observed.records} == {"S", "L"}
     assert found.kinds == (CLASSES,)
+
+
+@pytest.mark.parametrize(("low", "said"), [(0.3, "most in T"), (0.0, "widen the ranges")])
+def test_a_refused_model_asks_for_wider_ranges_only_at_an_edge(low: float, said: str) -> None:
+    problem: Any = SimpleNamespace(names=("drag_coefficient",))
+    checked: Any = SimpleNamespace(explained=False, p=0.02)
+    ends = np.array([[low, low + 0.1, low + 0.2]])
+    reasons = _reasons(problem, ends, [True], checked, CLASSES, "most in T, 0.593 seen")
+    assert said in reasons[0]
+    assert ("widen" in " ".join(reasons)) == (low == 0.0)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from driftwalk.cli.terminal.output import print_parts, print_row
+from driftwalk.cli.terminal.output import print_parts, print_places, print_row
 from driftwalk.schema.answers.parts import Row, Table, estimates, origin
 
 
@@ -69,3 +69,15 @@ def test_what_a_terminal_obeys_is_spelled_out(capsys: pytest.CaptureFixture[str]
         r"\x1b[1m                   \u202eflow.nc".replace("                   ", " " * 19),
         r"\x9bA",
     ]
+
+
+@pytest.mark.parametrize(
+    ("verdict", "following"), [("explains", "assemble fit"), ("does not explain", "report fit")]
+)
+def test_numbers_that_are_not_to_be_used_lead_to_their_report(
+    verdict: str, following: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = answer().isel(parameter=slice(0, 2)).assign_attrs(kind="fit").assign(verdict=verdict)
+    found["interval"][1] = [5e-4, 7e-4]
+    print_places(found, Path("fit"), [])
+    assert f"next: driftwalk {following}" in "".join(capsys.readouterr())

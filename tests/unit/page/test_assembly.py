@@ -62,6 +62,14 @@ def sections() -> list[dict[str, Any]]:
     )
 
 
+def test_warnings_of_the_fit_stand_on_the_page_of_what_was_simulated_from_it() -> None:
+    said = "of the fit: does not explain: the flow changes"
+    found = distribution().assign_attrs(warnings=json.dumps([said]), left_out=3)
+    items = part_of(assembly_sections(distribution=found), "warnings")["items"]
+    assert items[0] == said
+    assert len(items) == 2
+
+
 def test_shares_and_intervals_are_those_of_both_distributions(
     sections: list[dict[str, Any]],
 ) -> None:

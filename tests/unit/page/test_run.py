@@ -269,6 +269,9 @@ def test_pages_of_runs_that_belong_together_are_joined(
         for one in (first, second, page)
     ]
     assert [len(found) for found in of_recording] == [1, 1, 1]
+    cited = [part["cite"] for part in page["sections"] if part["kind"] == "manifest"]
+    assert cited[0] is None
+    assert cited[1]
     # That neither run warned of anything stands there for each.
     assert {"fit-warnings", "map-warnings"} <= set(ids)
     fold = [(part["run"], part["title"]) for part in page["sections"] if part["id"] == "map-state"]

@@ -86,16 +86,16 @@ class Fold {
     private readonly sections: readonly RawSection[],
     private readonly context: Context,
   ) {
-    const only = sections.length === 1 && sections[0]?.title === title;
-    const inside = only ? "" : sections.map((section) => section.title).join(" · ");
+    const named = sections[0]?.title === title;
+    const inside = sections.slice(named ? 1 : 0).map((section) => section.title);
     this.element = el(
       "details",
       { class: "chapter", id: `chapter-${sections[0]?.id ?? title}` },
-      el("summary", {}, el("h2", {}, ...rich(title)), el("small", {}, ...rich(inside))),
+      el("summary", {}, el("h2", {}, ...rich(title)), el("small", {}, ...rich(inside.join(" · ")))),
       this.body,
     );
     this.body.append(...sections.map((section) => sectionFrame(section, 3)));
-    this.body.classList.toggle("single", only);
+    this.body.classList.toggle("named", named);
     arrange(this.body, sections);
     this.element.addEventListener("toggle", () => {
       if (this.element.open) void this.draw();

@@ -4,6 +4,7 @@ import { el } from "../dom";
 import { nullable, number, object, record } from "../check";
 import type { RawSection } from "../page";
 import { cellsOfShape, type Square } from "../polyomino";
+import { isComplete } from "../colours";
 import { drawClasses } from "../sections/classes";
 import { duration, percent } from "../units";
 import type { Link, Message } from "./socket";
@@ -50,7 +51,8 @@ export class OutcomesPanel {
   show(content: Message): void {
     const { counts, done, runs, complete, median_s: median } = countsMessage(content, "");
     const sorted = [...counts].sort(([, one], [, other]) => other - one);
-    const items = sorted.slice(0, MOST).map(([name, count]) => ({
+    const shown = sorted.slice(0, MOST).sort(([one], [other]) => Number(isComplete(other)) - Number(isComplete(one)));
+    const items = shown.map(([name, count]) => ({
       class: name,
       cells: sketchOf(name),
       count,

@@ -12,7 +12,9 @@ from driftwalk.assembly.outcome_posterior.region import REGION_POLICY, intervals
 from driftwalk.core.arrays import Floats
 from driftwalk.core.study_keys import INFERRED_KEYS
 from driftwalk.schema.answers.facts import texts
+from driftwalk.schema.answers.outcome_posterior import REFUSED
 from driftwalk.schema.check import build_dataset
+from driftwalk.schema.shapes import short_class
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,10 +42,14 @@ def posterior_dataset(problem: OutcomeProblem, emulated: Emulated, checked: Chec
     explained = checked.explained
     value = low + emulated.point * span
     names, observed, predicted = _classes(problem, emulated, weight)
+    seen = observed / max(observed.sum(), 1)
+    most = int(np.argmax(np.abs(seen - predicted)))
+    worst = names[most] if names[most] == "rest" else short_class(names[most])
+    unlike = f"most in {worst}, {seen[most]:.3f} seen and {predicted[most]:.3f} predicted"
     unit = [_unit(name) for name in problem.names]
     verdict = "determined"
     if not explained:
-        verdict = "cannot tell: the model does not explain the outcomes"
+        verdict = REFUSED
     elif used is None:
         verdict = "cannot tell: no kind of data has regions that cover"
     elif not determined.all():
@@ -72,7 +78,7 @@ def posterior_dataset(problem: OutcomeProblem, emulated: Emulated, checked: Chec
         "share": ("class", predicted),
         "node_value": (("node", "parameter"), low + emulated.node * span),
         "truth_value": (("truth", "parameter"), low + checked.truth * span),
-        "reason": ("reason", texts(_reasons(problem, chosen, determined, checked, used))),
+        "reason": ("reason", texts(_reasons(problem, chosen, determined, checked, used, unlike))),
     }  # fmt: skip
     coords = {
         "parameter": ("parameter", np.array(problem.names, dtype=object)),
@@ -117,14 +123,20 @@ def _unit(name: str) -> str:
 
 
 def _reasons(
-    problem: OutcomeProblem, ends: Floats, determined: Any, checked: Checked, used: str | None
+    problem: OutcomeProblem,
+    ends: Floats,
+    determined: Any,
+    checked: Checked,
+    used: str | None,
+    unlike: str,
 ) -> list[str]:
-    """Return sentences for what is not determined, and why."""
+    """Return sentences for what is not determined, and why; `unlike`: where the model fails."""
     policy, found = REGION_POLICY, []
+    at_edge = (ends[:, 0] < policy.edge) | (ends[:, 2] > 1.0 - policy.edge)
     if not checked.explained:
+        why = "widen the ranges, or the model is wrong" if at_edge.any() else unlike
         found.append(
-            f"the outcomes agree with no setting of the ranges (p = {checked.p:.2g}): widen the "
-            "ranges, or the model is wrong"
+            f"the outcomes agree with no setting of the ranges (p = {checked.p:.2g}): {why}"
         )
     if used is None:
         lacking = ", ".join(
@@ -134,14 +146,15 @@ def _reasons(
         )
         found.append(f"regions do not cover in the self-check ({lacking}): use narrower ranges")
         return found
-    for name, known, (low, _, high) in zip(problem.names, determined, ends, strict=True):
+    rows = zip(problem.names, determined, ends, at_edge, strict=True)
+    for name, known, (low, _, high), is_cut in rows:
         words = name.replace("_", " ")
         if not known:
             found.append(
                 f"cannot tell {words}: its interval is {(high - low) / policy.confidence:.0%} of "
                 "the one without data"
             )
-        elif low < 0.01 or high > 0.99:
-            side = "lower" if low < 0.01 else "upper"
+        elif is_cut:
+            side = "lower" if low < policy.edge else "upper"
             found.append(f"{words}: the interval reaches the {side} end of its range; widen it")
     return found

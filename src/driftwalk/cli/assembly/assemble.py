@@ -77,10 +77,10 @@ def assemble(
         quantiles,
     )
     begun = opening_note(source.study, given, about="simulation", otherwise=str(run))
-    result = options.run(work, "assemble", begun=begun)
+    said = [*source.warnings, *([] if source.not_drawn is None else [source.not_drawn])]
+    result = options.run(work, "assemble", begun=begun, warnings=said)
     series = flow_series_words(result.distribution.attrs, holds="the intervals hold")
-    drawn = [] if source.not_drawn is None else [source.not_drawn]
-    warnings = [*source.warnings, *drawn, *series, *_left_out(result)]
+    warnings = [*said, *series, *_left_out(result)]
     print_prediction(assembled(work.study, result), options.out, run, warnings, json=options.json)
 
 

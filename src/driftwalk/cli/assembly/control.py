@@ -14,7 +14,7 @@ from driftwalk.cli.options.run import RunOptions
 from driftwalk.cli.options.shared_types import PANEL, FlowFile, argument, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.help import HelpCommand, HelpGroup
-from driftwalk.cli.terminal.output import print_result, print_warnings
+from driftwalk.cli.terminal.output import print_result
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.study_keys import ASSEMBLY_KEYS
 from driftwalk.core.units import parse_quantity
@@ -110,8 +110,8 @@ def plan(
     }
     wanted = Wanted(target, by, every, latency, missed, dwell)
     work = ControlPlanWork(modes, wanted, rounds, worlds, seed, inputs)
-    found: xr.Dataset = options.run(work, "control plan")
-    print_warnings(dict.fromkeys(text for one in sources for text in one.warnings))
+    said = dict.fromkeys(text for one in sources for text in one.warnings)
+    found: xr.Dataset = options.run(work, "control plan", warnings=[*said])
     print_result(found, options.out, json=options.json)
 
 
@@ -140,10 +140,11 @@ def try_policy(
     """
     from driftwalk.runs import ControlTestWork
     from driftwalk.schema.answers.control import gain_word
+    from driftwalk.schema.answers.facts import source_warnings
 
     stored, path = _opened(policy)
     work = ControlTestWork(stored, worlds, latency, missed, force_factor, {"policy": path})
-    found: xr.Dataset = options.run(work, "control test")
+    found: xr.Dataset = options.run(work, "control test", warnings=source_warnings(stored))
     # What is not better than one mode all the time is not worth a run on the tank.
     live: list[str | Path] = ["control run", policy, "--live", "127.0.0.1:5000"]
     print_result(

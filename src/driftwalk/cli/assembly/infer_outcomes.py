@@ -10,7 +10,7 @@ from driftwalk.cli.inputs.model_source import RUN_NAMES, assembly_source
 from driftwalk.cli.options.run import RunOptions, with_run_options
 from driftwalk.cli.options.shared_types import PANEL, FlowFile, argument, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
-from driftwalk.cli.terminal.output import print_result, print_warnings
+from driftwalk.cli.terminal.output import print_result
 from driftwalk.core.errors import ConfigurationError, InputError
 from driftwalk.core.study_keys import ASSEMBLY_KEYS, INFERRED_KEYS, INFERRED_RANGES
 from driftwalk.core.units import parse_quantity
@@ -83,10 +83,8 @@ def infer_outcomes(
     work = OutcomePosteriorWork(
         outcomes, model.flow, model.study, chosen, {**model.inputs, **inputs}, options.threads
     )
-    found: xr.Dataset = options.run(work, "infer-outcomes")
+    found: xr.Dataset = options.run(work, "infer-outcomes", warnings=model.warnings)
     print_result(found, options.out, json=options.json)
-    if not options.json:
-        print_warnings(model.warnings)
 
 
 def _outcomes(source: Path) -> tuple[Any, dict[str, Path]]:

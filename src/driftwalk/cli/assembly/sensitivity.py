@@ -93,7 +93,7 @@ def sensitivity(
         threads=options.threads,
     )
     begun = opening_note(source.study, given, about="simulation", otherwise=str(run))
-    result = options.run(work, "sensitivity", begun=begun)
+    result = options.run(work, "sensitivity", begun=begun, warnings=source.warnings)
     warnings = [*source.warnings, *_warnings(source, result)]
     print_prediction(sensitivity_of(result), options.out, run, warnings, json=options.json)
 

@@ -101,12 +101,13 @@ def maximise_yield(
         options.threads,
     )
     begun = opening_note(source.study, given, about="simulation", otherwise=str(run))
-    found = options.run(work, "yield", begun=begun)
+    # A parameter that varies needs no value of its own.
+    named = {text.partition("=")[0].strip().replace("-", "_") for text in vary or []}
+    idle = [text for name, text in UNSTATED.items() if name in named]
+    kept = [one for one in source.warnings if not one.startswith(tuple(idle))]
+    found = options.run(work, "yield", begun=begun, warnings=kept)
     answer = yield_answer(found)
     series = flow_series_words(found.attrs, holds="yields hold")
-    # A parameter that varies needs no value of its own.
-    idle = [text for name, text in UNSTATED.items() if name in found]
-    kept = [one for one in source.warnings if not one.startswith(tuple(idle))]
     warnings = [*kept, *series, *answer.warnings]
     more = more_runs(found)
     again = [] if more is None else ["yield", *_again(sys.argv[2:], more, options.out)]

@@ -23,6 +23,7 @@ from driftwalk.schema.answers.facts import sentences
 from driftwalk.schema.answers.outcome_posterior import (
     agreement,
     class_table,
+    condition,
     data_table,
     number_of,
 )
@@ -110,7 +111,7 @@ def density_sections(posterior: xr.Dataset) -> list[Section]:
         ]
         made.append(
             chart(
-                f"posterior-{at + 1}", f"Posterior of {name}",
+                f"posterior-{at + 1}", f"Posterior of {name} {condition(posterior)}".rstrip(),
                 x=label(number.words, number.unit), y=label("density over the prior"),
                 series=drawn,
             )

@@ -41,8 +41,7 @@ def replay_section(path: xr.Dataset, assembly: xr.Dataset | None = None) -> Sect
     thin = path.isel(run=slice(0, runs), time=slice(None, None, every))
     # The tank is two thousand steps wide or more; times are known to 0.06 ms, angles to 0.1°.
     step = binary_step(2.0 * float(np.nanmax(np.abs(thin["x"].values))), 2000)
-    known_to = quantity(step, "m", digits=2)
-    note = f"{count(runs, 'run')}, a position every {_interval(thin)}, to {known_to}."
+    note = f"{count(runs, 'run')}, a position every {_interval(thin)}, to {1e3 * step:.2g} mm."
     if runs < path.sizes["run"]:
         note += f" {count(path.sizes['run'] - runs, 'more run')} in the file."
     if path.attrs.get("block_shape") == "disc":

@@ -212,6 +212,18 @@ def sentences(dataset: xr.Dataset, name: str) -> list[str]:
     return [str(text) for text in dataset[name].values] if name in dataset.variables else []
 
 
+def source_warnings(dataset: xr.Dataset) -> list[str]:
+    """Return the warnings of the fit or the study that simulations took their parameters from.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> source_warnings(xr.Dataset(attrs={"warnings": '["of the fit: does not explain"]'}))
+    ['of the fit: does not explain']
+    """
+    return [str(text) for text in parse_json(dataset.attrs.get("warnings", "[]"))]
+
+
 def texts(stored: str | Iterable[str]) -> Any:
     """Return sentences as an array; given as a list or as its JSON text.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from driftwalk.schema.answers.facts import sentences
 from driftwalk.schema.answers.parts import Answer, Estimate, Part, Row, Table, each
@@ -13,6 +13,10 @@ from driftwalk.schema.shapes import short_class
 
 if TYPE_CHECKING:
     import xarray as xr
+
+
+REFUSED: Final = "cannot tell: the model does not explain the outcomes"
+"""The verdict on a model with which the outcomes do not agree."""
 
 
 def outcome_posterior_answer(found: xr.Dataset) -> Answer:
@@ -53,6 +57,14 @@ def estimate_part(one: xr.Dataset, confidence: float) -> Part:
         return Row(number.words, f"cannot tell: between {low:.4g} and {high:.4g} {unit}".rstrip())
     low, high = (float(end) for end in one["interval"].values)
     return Estimate(number, float(one["estimate"]), (low, high), confidence)
+
+
+def condition(found: xr.Dataset) -> str:
+    """Return under what condition a posterior holds whose model is refused; else nothing."""
+    if found.attrs["verdict"] != REFUSED:
+        return ""
+    p = float(found.attrs["p"])
+    return f"if the model were right (the outcomes refuse it, p = {p:.2g})"
 
 
 def agreement(found: xr.Dataset) -> str:

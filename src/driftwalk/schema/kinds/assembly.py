@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from typing import Final
 
-from driftwalk.schema.description import Attribute, Variable, attributes, kind, limited, variables
+from driftwalk.schema.description import (
+    SOURCE_WARNINGS,
+    Attribute,
+    Variable,
+    attributes,
+    kind,
+    limited,
+    variables,
+)
 from driftwalk.schema.kinds.flow import FLOW_SERIES, began_in_flow
 from driftwalk.schema.kinds.motion import WORLD_STATUS
 
@@ -122,6 +130,7 @@ variables (blocks are of several kinds):
 """,
     began_in_flow("run"),
     *SETTINGS,
+    *SOURCE_WARNINGS,
     flags={"status": WORLD_STATUS},
 )
 
@@ -198,6 +207,7 @@ attributes ({_REALISED}):
     force_std_N number: of the reference
 """,
     *_SETTINGS_OF_RUNS,
+    *SOURCE_WARNINGS,
 )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from driftwalk.schema.description import kind
+from driftwalk.schema.description import SOURCE_WARNINGS, kind
 
 CONTROL_POLICY: Final = kind(
     """
@@ -60,7 +60,8 @@ attributes:
     arena
     study
     seed
-"""
+""",
+    *SOURCE_WARNINGS,
 )
 
 CONTROL_TEST: Final = kind(
@@ -105,7 +106,8 @@ attributes:
     constant_mode text: best constant mode
     film_world number: number of the world of the film
     seed
-"""
+""",
+    *SOURCE_WARNINGS,
 )
 
 KINDS: Final = (CONTROL_POLICY, CONTROL_TEST)

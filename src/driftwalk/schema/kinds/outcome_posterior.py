@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from driftwalk.schema.description import kind
+from driftwalk.schema.description import SOURCE_WARNINGS, kind
 
 OUTCOME_POSTERIOR: Final = kind(
     """
@@ -56,7 +56,8 @@ attributes:
     confidence number: of intervals and regions
     seed
     study
-"""
+""",
+    *SOURCE_WARNINGS,
 )
 
 KINDS: Final = (OUTCOME_POSTERIOR,)

@@ -5,7 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
-from driftwalk.schema.description import Variable, attributes, kind, limited, variables
+from driftwalk.schema.description import (
+    SOURCE_WARNINGS,
+    Variable,
+    attributes,
+    kind,
+    limited,
+    variables,
+)
 from driftwalk.schema.kinds.assembly import SETTINGS
 
 AXES: Final = variables("""
@@ -80,6 +87,7 @@ attributes:
     *AXES,
     *_REFERENCE,
     *limited(SETTINGS, "it does not vary", without="trial study"),
+    *SOURCE_WARNINGS,
 )
 
 COMPONENTS: Final = kind(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
-from driftwalk.schema.description import kind
+from driftwalk.schema.description import SOURCE_WARNINGS, kind
 from driftwalk.schema.kinds.sensitivity import AXES
 
 YIELD: Final = kind(
@@ -52,6 +52,7 @@ attributes (their number does not vary):
     blocks number: blocks in the tank
 """,
     *(replace(one, dims="setting", when="it varies") for one in AXES),
+    *SOURCE_WARNINGS,
 )
 
 KINDS: Final = (YIELD,)

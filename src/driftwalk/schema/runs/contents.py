@@ -21,7 +21,14 @@ from driftwalk.core.files.run_layout import (
 )
 from driftwalk.core.files.shards import read_specification
 from driftwalk.core.provenance import read_manifest, refuse_other_version
-from driftwalk.schema.runs.run_kinds import RUN_KINDS, Maker, RunKind, kind_of_folder, load_maker
+from driftwalk.schema.runs.run_kinds import (
+    RUN_KINDS,
+    Maker,
+    RunKind,
+    kind_of_folder,
+    load_maker,
+    with_source_warnings,
+)
 from driftwalk.schema.stores.netcdf import open_netcdf
 
 if TYPE_CHECKING:
@@ -99,8 +106,7 @@ class RunContents:
             return None
         function = load_maker(kind.answer)
         more = self._arguments(function, {*kind.datasets}, "its answer cannot be printed")
-        answer: Answer = function(found, **more)
-        return answer
+        return with_source_warnings(function(found, **more), found)
 
     def _arguments(
         self, function: Callable[..., Any], known: Set[str], lacking: str

@@ -389,7 +389,18 @@ def answer_of(found: xr.Dataset, **more: Any) -> Answer | None:
     if kind is None or kind.answer is None:
         return None
     answer: Answer = load_maker(kind.answer)(found, **more)
-    return answer
+    return with_source_warnings(answer, found)
+
+
+def with_source_warnings(answer: Answer, found: xr.Dataset) -> Answer:
+    """Return an answer with the warnings of what its parameters were taken from."""
+    from driftwalk.schema.answers.facts import source_warnings
+
+    said = source_warnings(found)
+    if not said:
+        return answer
+    warnings = [*said, *answer.warnings]
+    return answer._replace(facts={**answer.facts, "warnings": warnings}, warnings=warnings)
 
 
 def next_command(found: xr.Dataset) -> list[str]:

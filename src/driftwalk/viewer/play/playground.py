@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time as clock
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import numpy as np
@@ -66,6 +66,10 @@ class PlaySource(Playground):
         Its body, where it has several.
     seed : int
         Of the first tank; each restart takes the next.
+    run : str
+        Name of the run that the values were taken from, for the page.
+    warnings : sequence of str
+        Warnings of that run.
 
     Raises
     ------
@@ -96,7 +100,14 @@ class PlaySource(Playground):
         recording: xr.Dataset | None = None,
         body: str | None = None,
         seed: int = 1,
+        run: str = "",
+        warnings: Sequence[str] = (),
     ) -> None:
+        self._warnings = warnings
+        if run:
+            self.title = f"{self.title}: {run}"
+        if recording is not None:
+            self.density_note += " The recording is of one block: compare it with one in the tank."
         self.tank, self.water = LiveTank(study, flow, blocks=blocks, seed=seed), flow
         knobs = knobs_for(self.tank, most_blocks=most_blocks_in(self.tank))
         super().__init__(study, flow, knobs, recording=recording, body=body, seed=seed)
@@ -201,7 +212,8 @@ class PlaySource(Playground):
     def _subtitle(self) -> str:
         study = self.tank.study
         body = "discs" if study.block.is_round else "blocks"
-        return f"{study.tank.describe()}, {body} of {100.0 * study.block.side_m:g} cm"
+        tank = f"{study.tank.describe()}, {body} of {100.0 * study.block.side_m:g} cm"
+        return ". ".join([tank, *(f"Warning {text}" for text in self._warnings)])
 
     def _bodies(self) -> dict[str, Any]:
         study = self.tank.study
