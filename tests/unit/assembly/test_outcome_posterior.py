@@ -34,6 +34,7 @@ from driftwalk.assembly.outcome_posterior.region import (
     weights_of,
 )
 from driftwalk.core.errors import FormatError, InputError
+from driftwalk.schema import build_trajectory
 
 FLOW = dw.tank30_flow()
 
@@ -171,6 +172,37 @@ def test_each_run_is_in_one_category_of_each_kind(runs) -> None:
     assert Categories.of(CLASSES, [records]).counts([Record("q")])[-1] == 1
     assert {label[-1] for label in Categories.of(JOINS, [records]).labels[:-1]} <= {0, 1, 2}
     assert Categories.of(BOTH, [records]).labels[-1] == "rest"
+
+
+def test_classes_are_read_no_later_than_a_run_ends(runs) -> None:
+    """Only a run that is one assembly for good keeps its class."""
+    whole = np.isfinite(runs["completion_time"].values)
+    assert whole.any()
+    assert not whole.all()
+    first = int(np.flatnonzero(~whole)[0]) + 1
+    with pytest.raises(InputError, match=f"run {first} of 20 ends after 30 s, before the final"):
+        observed_of([runs], after=60.0)
+    assert observed_of([runs], after=None).after == 30.0
+    done = runs.isel(run=np.flatnonzero(whole))
+    assert len(observed_of([done], after=60.0).records) == whole.sum()
+    for breaks, given in ((True, done), (False, done.assign(event_kind=done["event_class"] * 0))):
+        with pytest.raises(InputError, match="and could still change"):
+            observed_of([given], after=60.0, breaks=breaks)
+
+
+def test_blocks_of_a_recording_that_came_apart_may_do_so_again() -> None:
+    apart, joined = np.full(30, 0.08), np.full(30, 0.03)
+    distances = {1: [apart, joined], 3: [apart, joined, apart, joined]}
+    for changes, parts in distances.items():
+        x = np.concatenate(parts)
+        x = np.column_stack([0.0 * x, x])
+        recording = build_trajectory(0.1 * np.arange(len(x)), x, 0.0 * x, 0.0 * x)
+        found = dw.classify(recording, side=0.03)
+        if changes == 1:
+            assert observed_of([found], after=60.0).after == 60.0
+            continue
+        with pytest.raises(InputError, match=r"run 1 of 1 ends after 11\.9 s"):
+            observed_of([found], after=60.0)
 
 
 @pytest.mark.parametrize(
