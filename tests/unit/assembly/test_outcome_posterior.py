@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.special import digamma, polygamma, softmax
 from scipy.stats import multinomial, norm
 
 import driftwalk as dw
 from driftwalk.assembly import check_outcomes, read_outcomes
 from driftwalk.assembly.chains.histories import histories
+from driftwalk.assembly.outcome_posterior.dataset import posterior_dataset
 from driftwalk.assembly.outcome_posterior.emulator import Emulator, log_likelihoods
 from driftwalk.assembly.outcome_posterior.observed import observed_of
+from driftwalk.assembly.outcome_posterior.problem import Checked, Emulated
 from driftwalk.assembly.outcome_posterior.records import (
     BOTH,
     CLASSES,
@@ -28,13 +32,17 @@ from driftwalk.assembly.outcome_posterior.records import (
     records_to_text,
 )
 from driftwalk.assembly.outcome_posterior.region import (
+    Coverage,
     intervals_of,
     quantiles_of,
     self_check,
     weights_of,
 )
 from driftwalk.core.errors import FormatError, InputError
+from driftwalk.page.sections.outcome_posterior import posterior_summary
 from driftwalk.schema import build_trajectory
+from driftwalk.schema.answers.outcome_posterior import outcome_posterior_answer
+from driftwalk.schema.answers.parts import Row
 
 FLOW = dw.tank30_flow()
 
@@ -268,3 +276,53 @@ def test_mirror_images_are_one_class() -> None:
     found = check_outcomes({"Z": 2, "J": 1}, FLOW)
     assert {one.final for one in found.observed.records} == {"S", "L"}
     assert found.kinds == (CLASSES,)
+
+
+def posterior_with(p: float) -> xr.Dataset:
+    """Return a posterior that is normal in C_d and exponential in sigma_F, at its lower end."""
+    study = dw.Study(assembly={"blocks": 2, "duration_s": 4.0})
+    problem = check_outcomes({"2": 12, "1+1": 8}, FLOW, study)
+    node, point = problem.sample(32, 0), problem.sample(4096, 1)
+    categories = {CLASSES: Categories(CLASSES, (), ("2", "1+1", "rest"))}
+    count = np.random.default_rng(5).multinomial(50, shares_at(node))
+    emulators = {CLASSES: Emulator.fitted(node, count)}
+    held = Coverage(1.0, 0.9, np.array([0.9, 0.9]), np.array([0.5, 0.5]))
+    level = -0.5 * ((point[:, 0] - 0.5) / 0.05) ** 2 - 10.0 * point[:, 1]
+    emulated = Emulated(node, categories, emulators, point, 0.05)
+    checked = Checked(point[:20], dict.fromkeys(KINDS, held), {CLASSES: level}, p)
+    return posterior_dataset(problem, emulated, checked)
+
+
+def test_an_interval_at_an_end_of_its_range_is_a_limit_from_one_side() -> None:
+    found = posterior_with(0.5)
+    assert found["limit"].values.tolist() == ["both", "upper"]
+    assert found["determined"].values.tolist() == [True, False]
+    assert found.attrs["verdict"] == "partly determined"
+    bound = 0.2e-3 - 1e-4 * np.log(1 - 0.9 * (1 - np.exp(-10.0)))  # 90 % of the exponential
+    assert found["interval"].values[1, 1] == pytest.approx(bound, rel=0.01)
+    answer = outcome_posterior_answer(found)
+    rows = {one.label: one.text for one in answer.parts if isinstance(one, Row)}
+    stated = rows["stochastic force σ_F"]
+    assert float(stated.split()[1]) == pytest.approx(1e3 * bound, rel=0.01)
+    assert re.fullmatch(r"below [.0-9]+ mN \(90 %\)", stated)
+    facts = answer.facts["parameters"]["force_std_N"]
+    assert facts["interval"][0] is None
+    assert facts["interval"][1] == pytest.approx(bound, rel=0.01)
+    assert facts["estimate"] is None
+    (reason,) = found["reason"].values
+    assert "reaches the lower end of its range" in reason
+    notes = [one.get("note") for one in posterior_summary(found)["numbers"]]
+    assert notes == [None, stated]
+
+
+def test_outcomes_that_the_model_does_not_explain_give_no_interval() -> None:
+    found = posterior_with(0.0)
+    assert found.attrs["verdict"] == "cannot tell: the model does not explain the outcomes"
+    assert found.attrs["used"] == "none"
+    for name in ("interval", "estimate", "width"):
+        assert np.isnan(found[name].values).all()
+    assert np.ptp(found["weight"].values) == 0.0
+    (reason,) = found["reason"].values
+    assert "agree with no setting" in reason
+    assert "inferred from" not in str(outcome_posterior_answer(found).parts)
+    assert "Inferred from" not in str(posterior_summary(found))
