@@ -16,6 +16,8 @@ from driftwalk.assembly import check_outcomes, read_outcomes
 from driftwalk.assembly.chains.histories import histories
 from driftwalk.assembly.outcome_posterior.dataset import posterior_dataset
 from driftwalk.assembly.outcome_posterior.emulator import Emulator, log_likelihoods
+from driftwalk.assembly.outcome_posterior.infer import emulate
+from driftwalk.assembly.outcome_posterior.nodes import Nodes
 from driftwalk.assembly.outcome_posterior.observed import observed_of
 from driftwalk.assembly.outcome_posterior.problem import Checked, Emulated
 from driftwalk.assembly.outcome_posterior.records import (
@@ -278,7 +280,7 @@ def test_mirror_images_are_one_class() -> None:
     assert found.kinds == (CLASSES,)
 
 
-def posterior_with(p: float) -> xr.Dataset:
+def posterior_with(p: float, noise: float = 0.05) -> xr.Dataset:
     """Return a posterior that is normal in C_d and exponential in sigma_F, at its lower end."""
     study = dw.Study(assembly={"blocks": 2, "duration_s": 4.0})
     problem = check_outcomes({"2": 12, "1+1": 8}, FLOW, study)
@@ -288,7 +290,7 @@ def posterior_with(p: float) -> xr.Dataset:
     emulators = {CLASSES: Emulator.fitted(node, count)}
     held = Coverage(1.0, 0.9, np.array([0.9, 0.9]), np.array([0.5, 0.5]))
     level = -0.5 * ((point[:, 0] - 0.5) / 0.05) ** 2 - 10.0 * point[:, 1]
-    emulated = Emulated(node, categories, emulators, point, 0.05)
+    emulated = Emulated(node, categories, emulators, point, {CLASSES: noise})
     checked = Checked(point[:20], dict.fromkeys(KINDS, held), {CLASSES: level}, p)
     return posterior_dataset(problem, emulated, checked)
 
@@ -326,3 +328,35 @@ def test_outcomes_that_the_model_does_not_explain_give_no_interval() -> None:
     assert "agree with no setting" in reason
     assert "inferred from" not in str(outcome_posterior_answer(found).parts)
     assert "Inferred from" not in str(posterior_summary(found))
+
+
+def test_an_emulator_that_ends_above_its_aim_is_named() -> None:
+    assert not [one for one in posterior_with(0.5).reason.values if "emulator" in one]
+    found = posterior_with(0.5, noise=0.13)
+    assert found.attrs["emulator_noise"] == 0.13
+    reason = found["reason"].values[-1]
+    assert reason.startswith("the emulator's error is 13% of the sampling error, and not below 10%")
+
+
+@pytest.mark.slow
+def test_the_error_of_the_emulator_is_that_of_each_kind_of_data() -> None:
+    class Course:
+        def simulate(self, name: str, nodes: Nodes) -> list[list[Record]]:
+            time = np.random.default_rng(len(nodes.value)).exponential(3.0, (len(nodes.value), 20))
+            return [
+                [Record("2", t) if t < 4.0 else Record("1+1", np.inf) for t in row] for row in time
+            ]
+
+    study = dw.Study(assembly={"blocks": 2, "duration_s": 4.0})
+    seen = [Record("2", 1.0), Record("2", 3.0), Record("1+1", np.inf)]
+    problem = check_outcomes(seen, FLOW, study)
+    found = emulate(problem, Course(), rounds=0)
+    assert set(found.noise) == {CLASSES, TIMES, BOTH}
+    for kind, noise in found.noise.items():
+        mean, variance = found.emulators[kind].predict(found.point)
+        own = found.categories[kind].counts(seen)
+        weight = weights_of(log_likelihoods(mean, variance, own[None])[0])
+        share = softmax(mean, axis=1)
+        error = 3 * (share * variance).sum(axis=1) / (share.shape[1] - 1)
+        assert noise == pytest.approx(float((weight * error).sum()))
+    assert found.noise[CLASSES] != found.noise[TIMES]

@@ -6,7 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from driftwalk.assembly.outcome_posterior.problem import Checked, Emulated, OutcomeProblem
+from driftwalk.assembly.outcome_posterior.problem import (
+    DESIGN_POLICY,
+    Checked,
+    Emulated,
+    OutcomeProblem,
+)
 from driftwalk.assembly.outcome_posterior.records import BOTH, CLASSES, EARLY, JOINS, KINDS, TIMES
 from driftwalk.assembly.outcome_posterior.region import REGION_POLICY, intervals_of, weights_of
 from driftwalk.core.arrays import Floats
@@ -44,6 +49,13 @@ def posterior_dataset(problem: OutcomeProblem, emulated: Emulated, checked: Chec
     value = low + emulated.point * span
     names, observed, predicted = _classes(problem, emulated, weight)
     unit = [_unit(name) for name in problem.names]
+    noise = emulated.noise[used or CLASSES]
+    reasons = _reasons(problem, chosen, limit, checked, used)
+    if used and noise >= DESIGN_POLICY.noise:
+        reasons.append(
+            f"the emulator's error is {noise:.0%} of the sampling error, and not below "
+            f"{DESIGN_POLICY.noise:.0%}: give more runs of a node (runs)"
+        )
     verdict = "determined"
     if not explained:
         verdict = "cannot tell: the model does not explain the outcomes"
@@ -76,7 +88,7 @@ def posterior_dataset(problem: OutcomeProblem, emulated: Emulated, checked: Chec
         "share": ("class", predicted),
         "node_value": (("node", "parameter"), low + emulated.node * span),
         "truth_value": (("truth", "parameter"), low + checked.truth * span),
-        "reason": ("reason", texts(_reasons(problem, chosen, limit, checked, used))),
+        "reason": ("reason", texts(reasons)),
     }  # fmt: skip
     coords = {
         "parameter": ("parameter", np.array(problem.names, dtype=object)),
@@ -91,7 +103,7 @@ def posterior_dataset(problem: OutcomeProblem, emulated: Emulated, checked: Chec
         "blocks": problem.observed.blocks,
         "after_s": problem.study.assembly.duration_s,
         "p": checked.p,
-        "emulator_noise": emulated.noise,
+        "emulator_noise": noise,
         "node_runs": problem.study.sensitivity.runs,
         "truths": problem.truths,
         "confidence": policy.confidence,

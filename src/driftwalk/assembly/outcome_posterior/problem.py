@@ -191,8 +191,8 @@ class Emulated(NamedTuple):
     emulators: Mapping[str, Emulator]
     point: Floats
     """Sample of the prior in parts of the ranges, shape (point, parameter)."""
-    noise: float
-    """Error of the emulator of the final classes over the sampling error of the data."""
+    noise: Mapping[str, float]
+    """Error of the emulator of each kind of data that was observed, over its sampling error."""
 
 
 class Checked(NamedTuple):

@@ -52,7 +52,7 @@ attributes:
     blocks number: blocks in the tank
     after_s number: when the final classes were read
     p number: share of simulated data sets that agree with the model no better
-    emulator_noise number: error of the emulator over the sampling error of the data
+    emulator_noise number: error of the emulator over the sampling error, of the kind of data used
     node_runs number: simulated runs of a node
     truths number: data sets of the self-check
     confidence number: of intervals and regions
