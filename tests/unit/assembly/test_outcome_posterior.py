@@ -40,11 +40,13 @@ from driftwalk.assembly.outcome_posterior.region import (
     self_check,
     weights_of,
 )
+from driftwalk.assembly.sensitivity.settings import sweep_texts
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.page.sections.outcome_posterior import posterior_summary
 from driftwalk.schema import build_trajectory
 from driftwalk.schema.answers.outcome_posterior import outcome_posterior_answer
 from driftwalk.schema.answers.parts import Row
+from driftwalk.sweep import SweepError, WorkUnit, grid
 
 FLOW = dw.tank30_flow()
 
@@ -222,6 +224,9 @@ def test_blocks_of_a_recording_that_came_apart_may_do_so_again() -> None:
         ("class,count\n", "counts no run"),
         ("class,count\nT,0\n", "counts no run"),
         ("class,count\nT,-3\n", "line 2: count: expected a whole number from 0 on, got '-3'"),
+        ("class,count\nT,²\n", "line 2: count: expected a whole number from 0 on, got '²'"),
+        ("class,count,completion_time_s\nT,2,41\n", "has the columns count and completion_time_s"),
+        ("class,join_times_s,count\nT,9,2\n", "has the columns count and join_times_s"),
         ("class,count\nT,2\nQ9,3\n", "line 3: class Q9: no shape"),
         ("class,count\nT,2,3\n", "3 values in 2 columns"),
         ("shape,count\nT,2\n", "has the columns shape, count"),
@@ -360,3 +365,14 @@ def test_the_error_of_the_emulator_is_that_of_each_kind_of_data() -> None:
         error = 3 * (share * variance).sum(axis=1) / (share.shape[1] - 1)
         assert noise == pytest.approx(float((weight * error).sum()))
     assert found.noise[CLASSES] != found.noise[TIMES]
+
+
+@pytest.mark.parametrize("fault", [InputError("no room for the blocks"), ValueError("a bug")])
+def test_a_mistake_of_the_user_is_raised_as_it_is(fault: Exception) -> None:
+    def fail(unit: WorkUnit) -> dict[str, np.ndarray]:
+        raise fault
+
+    units = grid(node=np.arange(2)).units(1)
+    with pytest.raises(InputError if isinstance(fault, InputError) else SweepError) as caught:
+        sweep_texts(fail, units, store=None)
+    assert fault in (caught.value, caught.value.__cause__)

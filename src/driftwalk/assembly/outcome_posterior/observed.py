@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -170,6 +171,12 @@ def read_outcomes(path: str | Path) -> list[Record]:
             "with class, completion_time_s, join_times_s",
             path=path,
         )
+    if timed := [head for head in heads if "count" in heads and head.endswith("_s")]:
+        raise FormatError(
+            f"has the columns count and {timed[0]}: times belong to one run, so give a row per run "
+            "without count",
+            path=path,
+        )
     found: list[Record] = []
     for line, row in enumerate(rows[1:], start=2):
         if len(row) > len(heads):
@@ -190,7 +197,7 @@ def _row(cell: Mapping[str, str]) -> list[Record]:
     """Return the records of a row: as many as it counts, or one with its times."""
     name = _named(cell["class"])
     if "count" in cell:
-        if not cell["count"].isdigit():
+        if not re.fullmatch("[0-9]+", cell["count"]):
             raise InputError(f"count: expected a whole number from 0 on, got '{cell['count']}'")
         return records_of_counts({name: int(cell["count"])})
     completion, joins = np.nan, None
