@@ -103,10 +103,10 @@ def classify(
         Several at one sample are in order, those that came apart before those that joined.
         ``joining_rate``, ``parting_rate`` (class) [1/s]: events in this class over the time in it,
         with counts and intervals: exact Poisson ones, of joinings widened as far as they cluster.
-        ``attrs``: the tolerances, ``dropped_joins``, ``unknown_samples``, ``known_s`` (time in
-        which the class is known), ``closest_m`` (smallest distance of two centres), and
-        ``bond_rate_per_s`` (partings per bond and second in classes without loops) with its ends
-        ``bond_rate_low_per_s`` and ``bond_rate_high_per_s``.
+        ``attrs``: the tolerances, ``dropped_joins``, ``left_out_contacts`` (at rest, but no joins),
+        ``unknown_samples``, ``known_s`` (time in which the class is known), ``closest_m`` (smallest
+        distance of two centres), and ``bond_rate_per_s`` (partings per bond and second in classes
+        without loops) with its ends ``bond_rate_low_per_s`` and ``bond_rate_high_per_s``.
 
     Raises
     ------
@@ -118,7 +118,8 @@ def classify(
     -----
     Of the contacts in which the faces do not move, those are joins that lie as most of the joined
     time lies: their distance from fitting exactly is at most the 90 % quantile over that time, and
-    play/sqrt(samples) for noise. One of 10 s or more is a join wherever the faces lie.
+    play/sqrt(samples) for the noise of their median. One of 10 s or more is a join wherever the
+    faces lie, and the further joins of its two blocks may lie as far off.
 
     Examples
     --------
@@ -140,9 +141,9 @@ def classify(
     )
     if play is not None and not play > 0:
         raise ConfigurationError(f"play must be more than 0, got {play:g}")
-    joins, play = rigid_joins(poses, find_joins(poses, rules), rules, play)
+    joins, play, left_out = rigid_joins(poses, find_joins(poses, rules), rules, play)
     history = JoinHistory(poses.x.shape, joins, chirality=chirality)
-    return _dataset(recording, poses, rules, history, play)
+    return _dataset(recording, poses, rules, history, play, left_out)
 
 
 def _checked_poses(recording: xr.Dataset) -> Poses:
@@ -191,7 +192,12 @@ def _shares(outcome: npt.NDArray[np.int32], lasts: Floats, classes: int) -> Floa
 
 
 def _dataset(
-    recording: xr.Dataset, poses: Poses, rules: JoinRules, history: JoinHistory, play: float
+    recording: xr.Dataset,
+    poses: Poses,
+    rules: JoinRules,
+    history: JoinHistory,
+    play: float,
+    left_out: int,
 ) -> xr.Dataset:
     joined, blocks = history.joined, poses.x.shape[1]
     names = {*history.outcome, *(event.outcome for event in (*joined, *history.split))}
@@ -241,6 +247,7 @@ def _dataset(
             "hold_s": rules.hold,
             "play_m": play,
             "dropped_joins": len(history.dropped),
+            "left_out_contacts": left_out,
             "closest_m": smallest_distance(poses),
             "unknown_samples": int((~sound).sum()),
             "known_s": float(lasts.sum()),

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from fractions import Fraction
 from typing import Final, NamedTuple
 
@@ -200,6 +201,29 @@ def _expected(unit: str) -> str:
     return f"a number in {unit} or a quantity{example}"
 
 
+def share_unit(words: Sequence[str]) -> list[str]:
+    """Return quantities in which a bare number has the unit of the next one that has a unit.
+
+    Raises
+    ------
+    ConfigurationError
+        When a number that is not 0 has no unit, and one before it does.
+
+    Examples
+    --------
+    >>> share_unit(["0.2", "0.55", "1.2 mN", "0"])
+    ['0.2 mN', '0.55 mN', '1.2 mN', '0']
+    """
+    found: list[str] = []
+    units = [match[2] if (match := _NUMBER.fullmatch(word)) else None for word in words]
+    for at, (word, own) in enumerate(zip(words, units, strict=True)):
+        unit = next((one for one in units[at:] if one), "")
+        if own == "" and not unit and any(units) and float(word):
+            raise ConfigurationError(f"'{word}' has no unit, and a number before it has one")
+        found.append(f"{word} {unit}" if own == "" and unit else word)
+    return found
+
+
 SIGNS: Final = ("±", "+-", "+/-")
 
 
@@ -225,7 +249,5 @@ def split_uncertain(text: str) -> Uncertain | None:
     for sign in SIGNS:
         value, found, std = (part.strip() for part in text.partition(sign))
         if found:
-            unit = std.lstrip("0123456789.eE+-").strip()
-            has_unit = value.lstrip("0123456789.eE+-").strip() != ""
-            return Uncertain(value if has_unit or not unit else f"{value} {unit}", std)
+            return Uncertain(*share_unit([value, std]))
     return None

@@ -206,7 +206,7 @@ def test_figures_of_three_axes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         (["--vary", "force-std=1mm"], "expected a number in N"),
         (["--vary", "force-std=0:1mN"], "expected a number or FROM:TO:STEP, got '0:1mN'"),
         (["--vary", "force-std=0:1mN:0"], "no value from 0 N to 0.001 N in steps of 0 N"),
-        (["--vary", "force-std=0.4:0.6mN:0.2mN"], "'0.4' without a unit is 0.4 N"),
+        (["--vary", "force-std=0.2mN,0.55"], "'0.55' has no unit, and a number before it has one"),
         (["--vary", "blocks=4:2:1"], "no value from 4 to 2 in steps of 1"),
         (["--vary", "drag-coefficient=0:1:1e-9"], "more than 1000000 values"),
         (["--vary", "latching=glue"], '"collision" or "connector" or "none"'),

@@ -98,7 +98,8 @@ def test_a_stopped_run_is_continued(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         (["--target", "L3", "--vary", "colour=1,2"], "--vary colour=1,2: expected NAME=VALUES"),
         (["--target", "L3", "--vary", "blocks=2:4"], "blocks has no range"),
         (["--target", "L3", "--vary", "drag-coefficient=0.2:0.6m"], "drag-coefficient=0.2:0.6m: "),
-        (["--target", "L3", "--vary", "flow-scale=1:2"], "flow_scale has values and a range"),
+        (["--target", "L3", "--vary", "flow-scale=1:2"], "flow-scale is varied twice"),
+        (["--target", "L3", "--vary", "drag-coefficient=1:1.0001"], "is too narrow"),
         (["--target", "L3", "--runs", "10"], "4 settings need at least 160 runs"),
     ],
 )

@@ -333,6 +333,23 @@ def test_blocks_that_drift_past_each_other_are_not_joined(offset: float) -> None
         classify(recording, side=SIDE, play=0.0)
 
 
+@pytest.mark.parametrize("offset", [0.0, 0.002, -0.002])
+def test_short_joins_of_a_badly_marked_block_are_kept(offset: float) -> None:
+    """Its joined time is 7 % of all: a cut at the 90 % quantile alone leaves its short join out."""
+    x = np.zeros((1200, 8))
+    x[:, [0, 2, 4, 6]] = np.arange(4.0)
+    x[:, [1, 3, 5, 7]] = np.arange(4.0) + 2 * SIDE
+    x[100:1100, [1, 3]] -= SIDE
+    for begin, lasts in ((200, 120), (600, 30)):
+        x[begin : begin + lasts, 5] += offset - SIDE
+    x[400:420, 7] += 0.002 - SIDE  # others rest 2 mm off their places for 2 s and never join
+    found = classify(build_trajectory(np.arange(1200) / RATE, x, 0 * x, 0 * x), side=SIDE)
+    pairs = found["event_block"].values.tolist()
+    assert pairs.count([4, 5]) == 2
+    assert [6, 7] not in pairs
+    assert found.attrs["left_out_contacts"] == 1
+
+
 def test_the_rate_of_bonds_counts_each_bond() -> None:
     """A row of three for 10 s loses a block; the two others stay together for 10 s."""
     x = np.tile([0.0, SIDE, 2 * SIDE], (201, 1))

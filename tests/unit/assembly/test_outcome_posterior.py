@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.special import digamma, polygamma, softmax
 from scipy.stats import multinomial, norm
 
 import driftwalk as dw
 from driftwalk.assembly import check_outcomes, read_outcomes
 from driftwalk.assembly.chains.histories import histories
-from driftwalk.assembly.outcome_posterior.dataset import _reasons
+from driftwalk.assembly.outcome_posterior.dataset import posterior_dataset
 from driftwalk.assembly.outcome_posterior.emulator import Emulator, log_likelihoods
+from driftwalk.assembly.outcome_posterior.infer import emulate
+from driftwalk.assembly.outcome_posterior.nodes import Nodes
 from driftwalk.assembly.outcome_posterior.observed import observed_of
+from driftwalk.assembly.outcome_posterior.problem import Checked, Emulated
 from driftwalk.assembly.outcome_posterior.records import (
     BOTH,
     CLASSES,
@@ -31,12 +34,19 @@ from driftwalk.assembly.outcome_posterior.records import (
     records_to_text,
 )
 from driftwalk.assembly.outcome_posterior.region import (
+    Coverage,
     intervals_of,
     quantiles_of,
     self_check,
     weights_of,
 )
+from driftwalk.assembly.sensitivity.settings import sweep_texts
 from driftwalk.core.errors import FormatError, InputError
+from driftwalk.page.sections.outcome_posterior import posterior_summary
+from driftwalk.schema import build_trajectory
+from driftwalk.schema.answers.outcome_posterior import outcome_posterior_answer
+from driftwalk.schema.answers.parts import Row
+from driftwalk.sweep import SweepError, WorkUnit, grid
 
 FLOW = dw.tank30_flow()
 
@@ -176,6 +186,37 @@ def test_each_run_is_in_one_category_of_each_kind(runs) -> None:
     assert Categories.of(BOTH, [records]).labels[-1] == "rest"
 
 
+def test_classes_are_read_no_later_than_a_run_ends(runs) -> None:
+    """Only a run that is one assembly for good keeps its class."""
+    whole = np.isfinite(runs["completion_time"].values)
+    assert whole.any()
+    assert not whole.all()
+    first = int(np.flatnonzero(~whole)[0]) + 1
+    with pytest.raises(InputError, match=f"run {first} of 20 ends after 30 s, before the final"):
+        observed_of([runs], after=60.0)
+    assert observed_of([runs], after=None).after == 30.0
+    done = runs.isel(run=np.flatnonzero(whole))
+    assert len(observed_of([done], after=60.0).records) == whole.sum()
+    for breaks, given in ((True, done), (False, done.assign(event_kind=done["event_class"] * 0))):
+        with pytest.raises(InputError, match="and could still change"):
+            observed_of([given], after=60.0, breaks=breaks)
+
+
+def test_blocks_of_a_recording_that_came_apart_may_do_so_again() -> None:
+    apart, joined = np.full(30, 0.08), np.full(30, 0.03)
+    distances = {1: [apart, joined], 3: [apart, joined, apart, joined]}
+    for changes, parts in distances.items():
+        x = np.concatenate(parts)
+        x = np.column_stack([0.0 * x, x])
+        recording = build_trajectory(0.1 * np.arange(len(x)), x, 0.0 * x, 0.0 * x)
+        found = dw.classify(recording, side=0.03)
+        if changes == 1:
+            assert observed_of([found], after=60.0).after == 60.0
+            continue
+        with pytest.raises(InputError, match=r"run 1 of 1 ends after 11\.9 s"):
+            observed_of([found], after=60.0)
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -183,6 +224,9 @@ def test_each_run_is_in_one_category_of_each_kind(runs) -> None:
         ("class,count\n", "counts no run"),
         ("class,count\nT,0\n", "counts no run"),
         ("class,count\nT,-3\n", "line 2: count: expected a whole number from 0 on, got '-3'"),
+        ("class,count\nT,²\n", "line 2: count: expected a whole number from 0 on, got '²'"),
+        ("class,count,completion_time_s\nT,2,41\n", "has the columns count and completion_time_s"),
+        ("class,join_times_s,count\nT,9,2\n", "has the columns count and join_times_s"),
         ("class,count\nT,2\nQ9,3\n", "line 3: class Q9: no shape"),
         ("class,count\nT,2,3\n", "3 values in 2 columns"),
         ("shape,count\nT,2\n", "has the columns shape, count"),
@@ -241,11 +285,94 @@ def test_mirror_images_are_one_class() -> None:
     assert found.kinds == (CLASSES,)
 
 
-@pytest.mark.parametrize(("low", "said"), [(0.3, "most in T"), (0.0, "widen the ranges")])
-def test_a_refused_model_asks_for_wider_ranges_only_at_an_edge(low: float, said: str) -> None:
-    problem: Any = SimpleNamespace(names=("drag_coefficient",))
-    checked: Any = SimpleNamespace(explained=False, p=0.02)
-    ends = np.array([[low, low + 0.1, low + 0.2]])
-    reasons = _reasons(problem, ends, [True], checked, CLASSES, "most in T, 0.593 seen")
-    assert said in reasons[0]
-    assert ("widen" in " ".join(reasons)) == (low == 0.0)
+def posterior_with(p: float, noise: float = 0.05) -> xr.Dataset:
+    """Return a posterior that is normal in C_d and exponential in sigma_F, at its lower end."""
+    study = dw.Study(assembly={"blocks": 2, "duration_s": 4.0})
+    problem = check_outcomes({"2": 12, "1+1": 8}, FLOW, study)
+    node, point = problem.sample(32, 0), problem.sample(4096, 1)
+    categories = {CLASSES: Categories(CLASSES, (), ("2", "1+1", "rest"))}
+    count = np.random.default_rng(5).multinomial(50, shares_at(node))
+    emulators = {CLASSES: Emulator.fitted(node, count)}
+    held = Coverage(1.0, 0.9, np.array([0.9, 0.9]), np.array([0.5, 0.5]))
+    level = -0.5 * ((point[:, 0] - 0.5) / 0.05) ** 2 - 10.0 * point[:, 1]
+    emulated = Emulated(node, categories, emulators, point, {CLASSES: noise})
+    checked = Checked(point[:20], dict.fromkeys(KINDS, held), {CLASSES: level}, p)
+    return posterior_dataset(problem, emulated, checked)
+
+
+def test_an_interval_at_an_end_of_its_range_is_a_limit_from_one_side() -> None:
+    found = posterior_with(0.5)
+    assert found["limit"].values.tolist() == ["both", "upper"]
+    assert found["determined"].values.tolist() == [True, False]
+    assert found.attrs["verdict"] == "partly determined"
+    bound = 0.2e-3 - 1e-4 * np.log(1 - 0.9 * (1 - np.exp(-10.0)))  # 90 % of the exponential
+    assert found["interval"].values[1, 1] == pytest.approx(bound, rel=0.01)
+    answer = outcome_posterior_answer(found)
+    rows = {one.label: one.text for one in answer.parts if isinstance(one, Row)}
+    stated = rows["stochastic force σ_F"]
+    assert float(stated.split()[1]) == pytest.approx(1e3 * bound, rel=0.01)
+    assert re.fullmatch(r"below [.0-9]+ mN \(90 %\)", stated)
+    facts = answer.facts["parameters"]["force_std_N"]
+    assert facts["interval"][0] is None
+    assert facts["interval"][1] == pytest.approx(bound, rel=0.01)
+    assert facts["estimate"] is None
+    (reason,) = found["reason"].values
+    assert "reaches the lower end of its range" in reason
+    notes = [one.get("note") for one in posterior_summary(found)["numbers"]]
+    assert notes == [None, stated]
+
+
+def test_outcomes_that_the_model_does_not_explain_give_no_interval() -> None:
+    found = posterior_with(0.0)
+    assert found.attrs["verdict"] == "cannot tell: the model does not explain the outcomes"
+    assert found.attrs["used"] == "none"
+    for name in ("interval", "estimate", "width"):
+        assert np.isnan(found[name].values).all()
+    (reason,) = found["reason"].values
+    assert "agree with no setting" in reason
+    assert "widen the ranges" in reason  # sigma_F is at its lower end
+    assert "inferred from" not in str(outcome_posterior_answer(found).parts)
+    assert "Inferred from" not in str(posterior_summary(found))
+
+
+def test_an_emulator_that_ends_above_its_aim_is_named() -> None:
+    assert not [one for one in posterior_with(0.5).reason.values if "emulator" in one]
+    found = posterior_with(0.5, noise=0.13)
+    assert found.attrs["emulator_noise"] == 0.13
+    reason = found["reason"].values[-1]
+    assert reason.startswith("the emulator's error is 13% of the sampling error, and not below 10%")
+
+
+@pytest.mark.slow
+def test_the_error_of_the_emulator_is_that_of_each_kind_of_data() -> None:
+    class Course:
+        def simulate(self, name: str, nodes: Nodes) -> list[list[Record]]:
+            time = np.random.default_rng(len(nodes.value)).exponential(3.0, (len(nodes.value), 20))
+            return [
+                [Record("2", t) if t < 4.0 else Record("1+1", np.inf) for t in row] for row in time
+            ]
+
+    study = dw.Study(assembly={"blocks": 2, "duration_s": 4.0})
+    seen = [Record("2", 1.0), Record("2", 3.0), Record("1+1", np.inf)]
+    problem = check_outcomes(seen, FLOW, study)
+    found = emulate(problem, Course(), rounds=0)
+    assert set(found.noise) == {CLASSES, TIMES, BOTH}
+    for kind, noise in found.noise.items():
+        mean, variance = found.emulators[kind].predict(found.point)
+        own = found.categories[kind].counts(seen)
+        weight = weights_of(log_likelihoods(mean, variance, own[None])[0])
+        share = softmax(mean, axis=1)
+        error = 3 * (share * variance).sum(axis=1) / (share.shape[1] - 1)
+        assert noise == pytest.approx(float((weight * error).sum()))
+    assert found.noise[CLASSES] != found.noise[TIMES]
+
+
+@pytest.mark.parametrize("fault", [InputError("no room for the blocks"), ValueError("a bug")])
+def test_a_mistake_of_the_user_is_raised_as_it_is(fault: Exception) -> None:
+    def fail(unit: WorkUnit) -> dict[str, np.ndarray]:
+        raise fault
+
+    units = grid(node=np.arange(2)).units(1)
+    with pytest.raises(InputError if isinstance(fault, InputError) else SweepError) as caught:
+        sweep_texts(fail, units, store=None)
+    assert fault in (caught.value, caught.value.__cause__)

@@ -133,6 +133,12 @@ def test_a_compass_search_climbs_a_smooth_hill() -> None:
     assert tally.runs <= 40_000
 
 
+def test_a_compass_search_ends_where_its_neighbours_are_one_setting() -> None:
+    tally = chances(0.5)
+    assert compass_search(tally, np.array([0.5]), lambda place: 0, budget=10_000) == 0
+    assert tally.runs == 0
+
+
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
@@ -146,6 +152,7 @@ def test_a_compass_search_climbs_a_smooth_hill() -> None:
         ({"ranges": {"blocks": (2, 4)}}, "'blocks' has no range"),
         ({"ranges": {"force_std": (1e-4, 1e-3)}}, "force_std has values and a range"),
         ({"ranges": {"flow_scale": (2.0, 1.0)}}, "the lower one first"),
+        ({"ranges": {"flow_scale": (1.0, 1.0001)}}, "flow_scale from 1 to 1.0001 is too narrow"),
         ({"runs": 30}, "2 settings need at least 40 runs, got 30"),
         ({"runs": 0}, "runs must be at least 1"),
         ({"indifference": 2.0}, "indifference must lie between 0 and 1"),

@@ -88,8 +88,10 @@ class Stretch(NamedTuple):
 
 def rigid_joins(
     poses: Poses, joins: Sequence[Join], rules: JoinRules, play: float | None
-) -> tuple[list[Join], float]:
+) -> tuple[list[Join], float, int]:
     """Return the joins in which faces hold their place, and by how much they may move [m].
+
+    The last number is that of the contacts at rest that are left out, as their faces lie otherwise.
 
     Parameters
     ----------
@@ -103,14 +105,15 @@ def rigid_joins(
         How far joined faces may move [m]; infinity: all joins hold; None: as far as noise does.
     """
     if play == math.inf:
-        return list(joins), play
+        return list(joins), play, 0
     contacts = [Contact.of(join, poses, rules) for join in joins]
     if play is None:
         moves = np.concatenate([np.empty(0), *(contact.moves(rules) for contact in contacts)])
         usual = float(np.median(moves)) if moves.size else 0.0
         play = max(PLAY_POLICY.moves * usual, PLAY_POLICY.least * rules.side)
     found = [one for contact in contacts for one in _stretches(contact, rules, play)]
-    return [one.join for one in _alike(found, play)], play
+    kept = _alike(found, play)
+    return [one.join for one in kept], play, len(found) - len(kept)
 
 
 def _size(lie: Floats) -> Floats:
@@ -141,14 +144,21 @@ def _stretches(contact: Contact, rules: JoinRules, play: float) -> Iterator[Stre
 
 
 def _alike(found: list[Stretch], play: float) -> list[Stretch]:
-    """Return the stretches whose faces lie as those do that are joined most of the time."""
+    """Return the stretches whose faces lie as those do that are joined most of the time.
+
+    A block whose sure joins lie further off is badly marked: its other joins may lie as far off.
+    """
     if not found:
         return []
     near = sorted(found, key=lambda one: one.place)
     seen = np.cumsum([one.samples for one in near])
     usual = near[int(np.searchsorted(seen, PLAY_POLICY.taught * seen[-1]))].place
+    sure = [one for one in near if one.lasts >= PLAY_POLICY.sure_s]
+    furthest = {block: one.place for one in sure for block in one.join.blocks}
     return [
         one
         for one in found
-        if one.place <= usual + play / math.sqrt(one.samples) or one.lasts >= PLAY_POLICY.sure_s
+        if one.lasts >= PLAY_POLICY.sure_s
+        or one.place - play / math.sqrt(one.samples)
+        <= max(usual, *(furthest.get(block, 0.0) for block in one.join.blocks))
     ]

@@ -166,14 +166,10 @@ def emulate(problem: OutcomeProblem, course: _Course, *, rounds: int | None = No
     records = course.simulate("nodes", problem.nodes(node, FIRST_TRIALS.emulator))
     categories = {kind: Categories.of(kind, records) for kind in KINDS}
     point = problem.sample(policy.points, 1)
-    own = categories[CLASSES].counts(problem.observed.records)
     for number in range(1, 2 + (policy.rounds if rounds is None else rounds)):
         emulator = Emulator.fitted(node, categories[CLASSES].table(records))
-        mean, variance = emulator.predict(point)
-        weight = weights_of(log_likelihoods(mean, variance, own[None])[0])
-        each = _relative_error(mean, variance, runs=max(int(own.sum()), 1))
-        noise = float(weight @ each)
-        if number > policy.rounds or noise < policy.noise:
+        weight, each = _errors(problem, emulator, categories[CLASSES], point)
+        if number > policy.rounds or weight @ each < policy.noise:
             break
         chance = weight**policy.spread * each
         random = np.random.default_rng([problem.seed, number])
@@ -187,7 +183,21 @@ def emulate(problem: OutcomeProblem, course: _Course, *, rounds: int | None = No
         kind: emulator if kind == CLASSES else Emulator.fitted(node, one.table(records))
         for kind, one in categories.items()
     }
+    noise = {}
+    for kind in problem.kinds:
+        weight, each = _errors(problem, emulators[kind], categories[kind], point)
+        noise[kind] = float(weight @ each)
     return Emulated(node, categories, emulators, point, noise)
+
+
+def _errors(
+    problem: OutcomeProblem, emulator: Emulator, categories: Categories, point: Floats
+) -> tuple[Floats, Floats]:
+    """Return the posterior weights of points, and the emulator's relative errors there."""
+    own = categories.counts(problem.observed.records)
+    mean, variance = emulator.predict(point)
+    weight = weights_of(log_likelihoods(mean, variance, own[None])[0])
+    return weight, _relative_error(mean, variance, runs=max(int(own.sum()), 1))
 
 
 def _relative_error(mean: Floats, variance: Floats, *, runs: int) -> Floats:

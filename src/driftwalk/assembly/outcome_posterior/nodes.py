@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,25 +20,17 @@ from driftwalk.assembly.sensitivity.settings import (
     OF_EACH_RUN,
     Piece,
     Settings,
-    TextStore,
     make_settings,
     simulate_pieces,
+    sweep_texts,
     world_plan,
 )
 from driftwalk.core.arrays import Floats
-from driftwalk.core.errors import DriftwalkError, InputError
+from driftwalk.core.errors import InputError
 from driftwalk.core.files.shards import Arrays
 from driftwalk.core.study_keys import INFERRED_KEYS
 from driftwalk.simulation.backend import BROKEN
-from driftwalk.sweep import (
-    MemoryStore,
-    Store,
-    SweepError,
-    WorkUnit,
-    grid,
-    run_sweep,
-    settings_per_unit,
-)
+from driftwalk.sweep import Store, WorkUnit, grid, settings_per_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -138,14 +130,7 @@ class Nodes:
         steps = self.study.sensitivity.runs * assembly.duration_s / self.study.time_step_s
         nodes = len(self.value)
         units = grid(node=np.arange(nodes)).units(settings_per_unit(nodes, steps * assembly.blocks))
-        kept: Any = TextStore(MemoryStore() if store is None else store)
-        try:
-            found = run_sweep(self, units, store=kept, progress=progress, executor=executor)
-        except SweepError as error:
-            # A mistake in the study is the user's, whichever node shows it.
-            if isinstance(error.__cause__, DriftwalkError):
-                raise error.__cause__ from None
-            raise
+        found = sweep_texts(self, units, store=store, progress=progress, executor=executor)
         records = [records_from_text(text) for text in found["records"].tolist()]
         if not all(records):
             raise InputError("all runs of a node broke down: use a smaller time step")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -16,6 +17,8 @@ from driftwalk.assembly.outcome_posterior.records import (
     records_of_histories,
 )
 from driftwalk.assembly.outcomes.class_names import class_name, class_shapes, merge_chirality
+from driftwalk.assembly.runs.dataset import DECIMALS
+from driftwalk.core.arrays import Floats
 from driftwalk.core.errors import FormatError, InputError
 from driftwalk.core.units import parse_quantity
 from driftwalk.schema.shapes import is_one_assembly
@@ -36,7 +39,7 @@ class Observed(NamedTuple):
     """When the classes were read, as far as the data say [s]."""
 
 
-def observed_of(given: Outcomes, *, after: float | None) -> Observed:
+def observed_of(given: Outcomes, *, after: float | None, breaks: bool = False) -> Observed:
     """Return observed outcomes in their common form.
 
     Parameters
@@ -45,11 +48,14 @@ def observed_of(given: Outcomes, *, after: float | None) -> Observed:
         Counts by class, records of runs, or `assembly` and `classification` datasets.
     after : float or None
         When the final classes are read [s].
+    breaks : bool
+        Whether bonds break, so that a complete run may change.
 
     Raises
     ------
     InputError
-        When there is no run, a name is no class, a count is no number from 0 on, or blocks differ.
+        When there is no run, a name is no class, a count is no number from 0 on, blocks differ, or
+        a run that may still change ends before the classes are read.
     """
     if isinstance(given, Mapping):
         for name, number in given.items():
@@ -59,8 +65,19 @@ def observed_of(given: Outcomes, *, after: float | None) -> Observed:
     elif all(isinstance(one, Record) for one in given):
         records = [one for one in given if isinstance(one, Record)]
     else:
-        found = histories([one for one in given if not isinstance(one, Record)])
-        after = _shortest(found) if after is None else after
+        datasets = [one for one in given if not isinstance(one, Record)]
+        found = histories(datasets)
+        breaks |= any("event_kind" in one for one in datasets)
+        length, until = _known_until(found, breaks=breaks)
+        earliest = int(until.argmin())
+        if after is None:
+            after = float(min(until[earliest], length.max()))
+        if after > until[earliest]:
+            raise InputError(
+                f"run {earliest + 1} of {found.runs} ends after {until[earliest]:g} s, before the "
+                f"final classes are read ({after:g} s), and could still change: give a time up to "
+                "its end (after), or leave it out"
+            )
         records = records_of_histories(found, after)
     if not records:
         raise InputError("no run was counted: there is nothing to infer from")
@@ -92,13 +109,16 @@ def _named(name: str) -> str:
         raise InputError(f"class {name}: {error}") from error
 
 
-def _shortest(found: Histories) -> float:
-    """Return the length of the shortest run that did not end as one assembly [s]."""
-    last = found.target < 0
+def _known_until(found: Histories, *, breaks: bool) -> tuple[Floats, Floats]:
+    """Return the lengths of the runs [s], and until when their classes are known, inf: for good."""
+    length: Floats = np.round(np.bincount(found.run, found.duration), DECIMALS)
+    parts = np.array([len(class_shapes(name)) for name in found.classes])
     whole = np.array([is_one_assembly(name) for name in found.classes])
-    length = np.bincount(found.run, found.duration)
-    open_runs = np.unique(found.run[last & ~whole[found.state]])
-    return float(length[open_runs].min() if open_runs.size else length.max())
+    known, ends = length.copy(), found.target < 0
+    parted = parts[found.target[~ends]] > parts[found.state[~ends]]
+    if not (breaks or parted.any()):
+        known[whole[found.state[ends]]] = np.inf
+    return length, known
 
 
 def merged(records: Sequence[Record]) -> list[Record]:
@@ -151,6 +171,12 @@ def read_outcomes(path: str | Path) -> list[Record]:
             "with class, completion_time_s, join_times_s",
             path=path,
         )
+    if timed := [head for head in heads if "count" in heads and head.endswith("_s")]:
+        raise FormatError(
+            f"has the columns count and {timed[0]}: times belong to one run, so give a row per run "
+            "without count",
+            path=path,
+        )
     found: list[Record] = []
     for line, row in enumerate(rows[1:], start=2):
         if len(row) > len(heads):
@@ -171,7 +197,7 @@ def _row(cell: Mapping[str, str]) -> list[Record]:
     """Return the records of a row: as many as it counts, or one with its times."""
     name = _named(cell["class"])
     if "count" in cell:
-        if not cell["count"].isdigit():
+        if not re.fullmatch("[0-9]+", cell["count"]):
             raise InputError(f"count: expected a whole number from 0 on, got '{cell['count']}'")
         return records_of_counts({name: int(cell["count"])})
     completion, joins = np.nan, None

@@ -137,11 +137,11 @@ def check_outcomes(
     from driftwalk.model import Study, apply_overrides
 
     given: Any = [outcomes] if isinstance(outcomes, xr.Dataset) else outcomes
-    observed = observed_of(given, after=after)
+    chosen = Study() if study is None else study
+    observed = observed_of(given, after=after, breaks=chosen.assembly.bonds_break)
     for name, number in (("runs", runs), ("truths", truths)):
         if number < 20:
             raise InputError(f"{name}: expected at least 20, got {number}")
-    chosen = Study() if study is None else study
     if observed.blocks != chosen.assembly.blocks:
         raise InputError(
             f"the outcomes have {observed.blocks} blocks, and the study has "
@@ -191,8 +191,8 @@ class Emulated(NamedTuple):
     emulators: Mapping[str, Emulator]
     point: Floats
     """Sample of the prior in parts of the ranges, shape (point, parameter)."""
-    noise: float
-    """Error of the emulator of the final classes over the sampling error of the data."""
+    noise: Mapping[str, float]
+    """Error of the emulator of each kind of data that was observed, over its sampling error."""
 
 
 class Checked(NamedTuple):

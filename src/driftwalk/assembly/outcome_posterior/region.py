@@ -24,7 +24,7 @@ class RegionPolicy(NamedTuple):
     prior_like: float = 0.8
     """A parameter whose interval is this part of the prior's one is not determined."""
     edge: float = 0.01
-    """Share of a range at each end within which an interval reaches it; chosen by hand."""
+    """Share of a range within which an end of an interval is that of the range; chosen by hand."""
     unlike: float = 0.01
     """p-value of the outcomes below which no region is stated: one false alarm in a hundred. With
     few data sets in the self-check, less than all of them."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -180,15 +180,8 @@ def simulate_settings(
     longest = max(w.index.size * w.steps * w.study.assembly.blocks for w in settings.worlds)
     design = grid(setting=np.arange(settings.size))
     units = design.units(settings_per_unit(settings.size, longest))
-    kept = TextStore(MemoryStore() if store is None else store)
-    try:
-        function = partial(_compute, settings)
-        found = run_sweep(function, units, store=kept, progress=progress, executor=executor)
-    except SweepError as error:
-        # A mistake in the study is the user's, whichever setting shows it.
-        if isinstance(error.__cause__, DriftwalkError):
-            raise error.__cause__ from None
-        raise
+    function = partial(_compute, settings)
+    found = sweep_texts(function, units, store=store, progress=progress, executor=executor)
     return Outcomes(
         [json.loads(text) for text in found["count"]],
         found["left_out"],
@@ -196,6 +189,23 @@ def simulate_settings(
         found["completion_median"],
         found["courses"].tolist(),
     )
+
+
+def sweep_texts(
+    function: Callable[[WorkUnit], Arrays],
+    units: Sequence[WorkUnit],
+    *,
+    store: Store | None,
+    **how: Any,
+) -> Arrays:
+    """Run a sweep whose results hold texts; a mistake in the study is raised as it is."""
+    try:
+        return run_sweep(function, units, store=TextStore(store or MemoryStore()), **how)
+    except SweepError as error:
+        # The user's mistake, whichever setting shows it.
+        if isinstance(error.__cause__, DriftwalkError):
+            raise error.__cause__ from None
+        raise
 
 
 def place_first(settings: Settings) -> None:

@@ -22,7 +22,7 @@ from driftwalk.assembly.sensitivity.settings import (
     simulate_pieces,
 )
 from driftwalk.assembly.sensitivity.times import kept_times
-from driftwalk.assembly.yields.local_search import starting_points
+from driftwalk.assembly.yields.local_search import SEARCH, starting_points
 from driftwalk.core.arrays import Bools, Floats
 from driftwalk.core.files.shards import Arrays
 from driftwalk.schema.shapes import all_single
@@ -74,8 +74,8 @@ class Arms:
         """Return the arm with listed values, and at a place of the unit cube of the ranges."""
         point = dict(listed)
         for share, (name, (low, high)) in zip(place, self.ranges.items(), strict=True):
-            # Four digits are more than anyone can set.
-            point[name] = min(max(float(f"{low + share * (high - low):.4g}"), low), high)
+            rounded = float(f"{low + share * (high - low):.{SEARCH.digits}g}")
+            point[name] = min(max(rounded, low), high)
         if point not in self.points:
             self.points.append(point)
         return self.points.index(point)

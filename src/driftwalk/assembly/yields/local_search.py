@@ -23,6 +23,8 @@ class SearchPolicy(NamedTuple):
     """Steps below this share of the range are not taken; chosen by hand, three halvings."""
     runs: int = 250
     """Runs of a setting at the first step; doubled with every halving, for smaller gains."""
+    digits: int = 4
+    """Digits of a setting: more than anyone can set."""
 
 
 SEARCH: Final = SearchPolicy()
@@ -67,6 +69,8 @@ def compass_search(
         moves = [sign * step * axis for axis in np.eye(at.size) for sign in (1.0, -1.0)]
         places = {arm_at(place): place for place in (np.clip(at + one, 0.0, 1.0) for one in moves)}
         places.pop(here, None)
+        if not places:  # the step is finer than the digits of a setting
+            break
         arms = [here, *places]
         if tally.cost(arms, runs) > end - tally.runs:
             break

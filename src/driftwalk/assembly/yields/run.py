@@ -15,7 +15,7 @@ from driftwalk.assembly.runs.start import place_blocks
 from driftwalk.assembly.sensitivity.settings import FIRST_TRIALS, KEYS, Axes, make_axes
 from driftwalk.assembly.yields.arms import Arms, Ranges, Runs, Stores
 from driftwalk.assembly.yields.dataset import Found, yield_dataset
-from driftwalk.assembly.yields.local_search import compass_search
+from driftwalk.assembly.yields.local_search import SEARCH, compass_search
 from driftwalk.assembly.yields.selection import (
     SELECTION,
     Tally,
@@ -278,6 +278,12 @@ def _arms(
             raise InputError(f"{name} has values and a range: give one")
         if not 0 <= low < high < math.inf:
             raise InputError(f"ranges: {name} needs two numbers from 0 on, the lower one first")
+        least = SEARCH.points * 10.0 ** (math.floor(math.log10(high)) + 1 - SEARCH.digits)
+        if high - low < least:
+            raise InputError(
+                f"ranges: {name} from {low:.9g} to {high:.9g} is too narrow, as settings have "
+                f"{SEARCH.digits} digits: widen it to {least:g}"
+            )
     if not listed.values and not ranges:
         raise InputError(f"nothing varies: name settings to compare, out of {', '.join(KEYS)}")
     arms = Arms(listed, ranges, flow, threads)

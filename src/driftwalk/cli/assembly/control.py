@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from driftwalk.cli.inputs.model_source import Source, assembly_source
+from driftwalk.cli.inputs.varied import listed, read_varied
 from driftwalk.cli.options.flatten_options import with_options
 from driftwalk.cli.options.run import RunOptions
 from driftwalk.cli.options.shared_types import PANEL, FlowFile, argument, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.help import HelpCommand, HelpGroup
 from driftwalk.cli.terminal.output import print_result
-from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import ASSEMBLY_KEYS
-from driftwalk.core.units import parse_quantity
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -183,24 +183,12 @@ def vary_strengths(given: list[str]) -> dict[str, list[float]]:
 
     Examples
     --------
-    >>> vary_strengths(["flow-scale=0,1", "force-std=0.2mN"])
-    {'flow-scale': [0.0, 1.0], 'force-std': [0.0002]}
+    >>> vary_strengths(["flow-scale=0:1:0.5", "force-std=0.2,1.2mN"])
+    {'flow-scale': [0.0, 0.5, 1.0], 'force-std': [0.0002, 0.0012]}
     """
-    found: dict[str, list[float]] = {}
-    for text in given:
-        name, sign, values = text.partition("=")
-        name = name.strip().replace("_", "-")
-        if name not in UNITS or not sign:
-            raise InputError(
-                f"--vary {text}: expected NAME=VALUES with a name out of {', '.join(UNITS)}"
-            )
-        if name in found:
-            raise InputError(f"--vary {text}: {name} is varied twice; name all values at once")
-        try:
-            found[name] = [parse_quantity(word, UNITS[name]) for word in values.split(",")]
-        except ConfigurationError as error:
-            raise InputError(f"--vary {text}: {error}") from error
-    return found
+    return read_varied(
+        given, {name: name for name in UNITS}, lambda name, words: listed(words, UNITS[name])
+    )
 
 
 def _opened(policy: Path) -> tuple[Any, Path]:

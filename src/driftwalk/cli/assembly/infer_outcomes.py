@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from driftwalk.cli.assembly.kinetics import files_of, opened_histories
 from driftwalk.cli.inputs.model_source import RUN_NAMES, assembly_source
+from driftwalk.cli.inputs.varied import parted_numbers, read_varied
 from driftwalk.cli.options.run import RunOptions, with_run_options
 from driftwalk.cli.options.shared_types import PANEL, FlowFile, argument, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_result
-from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.study_keys import ASSEMBLY_KEYS, INFERRED_KEYS, INFERRED_RANGES
-from driftwalk.core.units import parse_quantity
 from driftwalk.model import declared
 
 if TYPE_CHECKING:
@@ -21,8 +21,11 @@ if TYPE_CHECKING:
 
 NAMES = tuple(name for name in RUN_NAMES if name not in ("duration", "seed", "confidence"))
 """Options for the study: the duration is that of the data, the others have no effect here."""
-SYMBOLS = {"C_d": "drag_coefficient", "sigma_F": "force_std", "σ_F": "force_std"}
-"""Symbols of parameters, and their names."""
+VARIED = {
+    **{name.replace("_", "-"): name for name in INFERRED_KEYS},
+    **{"C_d": "drag_coefficient", "sigma_F": "force_std", "σ_F": "force_std"},
+}
+"""Parameters by their names and symbols."""
 
 
 @with_run_options
@@ -73,7 +76,7 @@ def infer_outcomes(
     from driftwalk.runs import OutcomePosteriorWork
 
     outcomes, inputs = _outcomes(source)
-    ranges = _ranges(vary) if vary else INFERRED_RANGES
+    ranges = read_varied(vary, VARIED, _range) if vary else INFERRED_RANGES
     # What varies is stated: no default of it is assumed.
     middle = {INFERRED_KEYS[name]: 0.5 * sum(ends) for name, ends in ranges.items()}
     model = assembly_source(None, flow, given.and_also(middle, keys=ASSEMBLY_KEYS))
@@ -98,24 +101,10 @@ def _outcomes(source: Path) -> tuple[Any, dict[str, Path]]:
     return [opened_histories(path) for path in paths], inputs
 
 
-def _ranges(given: list[str]) -> dict[str, tuple[float, float]]:
-    """Return the ranges of ``NAME=FROM:TO``; a unit after the end holds for the start too."""
-    found: dict[str, tuple[float, float]] = {}
-    for text in given:
-        words, sign, ends = text.partition("=")
-        name, parts = words.strip().replace("-", "_"), ends.split(":")
-        name = SYMBOLS.get(name, name)
-        if name not in INFERRED_KEYS or not sign or len(parts) != 2:
-            names = ", ".join(one.replace("_", "-") for one in INFERRED_KEYS)
-            raise InputError(f"--vary {text}: expected NAME=FROM:TO with a name out of {names}")
-        if name in found:
-            raise InputError(f"--vary {text}: {words} is named twice")
-        quantity = declared(INFERRED_KEYS[name]).quantity
-        unit = "1" if quantity is None else quantity.unit
-        tail = parts[1].strip().lstrip("0123456789.eE+-")
-        first = parts[0].strip() + ("" if parts[0].strip()[-1:].isalpha() else tail)
-        try:
-            found[name] = (parse_quantity(first, unit), parse_quantity(parts[1], unit))
-        except ConfigurationError as error:
-            raise InputError(f"--vary {text}: {error}") from error
-    return found
+def _range(name: str, words: list[str]) -> tuple[float, float]:
+    """Return the ends of FROM:TO."""
+    quantity = declared(INFERRED_KEYS[name]).quantity
+    (ends, *more) = parted_numbers(words, "1" if quantity is None else quantity.unit)
+    if more or len(ends) != 2:
+        raise ConfigurationError("expected NAME=FROM:TO")
+    return ends[0], ends[1]

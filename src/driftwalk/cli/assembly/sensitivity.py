@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -12,13 +11,13 @@ import numpy as np
 
 from driftwalk.cli.inputs.model_source import RUN_NAMES, Source, assembly_source, load_flow_for
 from driftwalk.cli.inputs.recordings import opening_note
+from driftwalk.cli.inputs.varied import listed, read_varied
 from driftwalk.cli.options.run import RunOptions, with_run_options
 from driftwalk.cli.options.shared_types import PANEL, FlowFile, Run, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_prediction
-from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.core.errors import InputError
 from driftwalk.core.study_keys import SENSITIVITY_KEYS
-from driftwalk.core.units import parse_quantity
 from driftwalk.model import declared
 from driftwalk.schema.kinds.flow import flow_series_words
 
@@ -54,7 +53,6 @@ AXES: Final = {
     "force-std": "sensitivity.force_std_N",
 }
 """From an input that can be varied to the key of the study that holds the list of its values."""
-MOST_VALUES: Final = 1_000_000
 VARY_KEYS: Final = {f"vary {name}": key for name, key in AXES.items()}
 """From what an error calls the option to the key that it sets."""
 
@@ -81,7 +79,7 @@ def sensitivity(
     """
     from driftwalk.runs import SensitivityWork
 
-    given = given.and_also(vary_overrides(vary or []), keys=VARY_KEYS)
+    given = given.and_also(read_varied(vary or [], AXES, listed_values), keys=VARY_KEYS)
     source = assembly_source(run, flow, given)
     paths = flow_paths(source.study, given, run)
     work = SensitivityWork(
@@ -165,92 +163,17 @@ def _warnings(source: Source, result: SensitivityResult) -> list[str]:
     return [*series, *(text for holds, text in said if holds)]
 
 
-def vary_overrides(given: Sequence[str]) -> dict[str, Any]:
-    """Return the keys of the study that the options set.
-
-    Parameters
-    ----------
-    given : sequence of str
-        Such as ``"blocks=2,3,4"``, ``"drag-coefficient=0:1.5:0.05"`` (from, to, step),
-        ``"latching=collision,connector"``.
-
-    Raises
-    ------
-    InputError
-        When there is no such input, it is named twice, or a value cannot be read.
+def listed_values(key: str, words: list[str]) -> list[Any]:
+    """Return the values of a list of [sensitivity]: words, numbers, or those of FROM:TO:STEP.
 
     Examples
     --------
-    >>> vary_overrides(["blocks=2:4:1", "force-std=0.2mN,1mN"])
-    {'sensitivity.blocks': [2, 3, 4], 'sensitivity.force_std_N': [0.0002, 0.001]}
+    >>> listed_values("sensitivity.blocks", ["2:4:1"])
+    [2, 3, 4]
     """
-    found: dict[str, Any] = {}
-    for text in given:
-        name, sign, values = text.partition("=")
-        key = AXES.get(name.strip().replace("_", "-"))
-        if key is None or not sign:
-            raise InputError(
-                f"--vary {text}: expected NAME=VALUES with a name out of {', '.join(AXES)}"
-            )
-        if key in found:
-            raise InputError(f"--vary {text}: {name} is varied twice; name all values at once")
-        # The values of magnets, and of faces, have commas of their own: "none; 3x3x1mm,1.2T".
-        parted = name == "magnets" or ";" in values
-        words = [word.strip() for word in values.split(";" if parted else ",")]
-        if not all(words):
-            raise InputError(f"--vary {text}: a value is missing after '{name}='")
-        try:
-            found[key] = [value for word in words for value in _values(word, key)]
-        except ConfigurationError as error:
-            raise InputError(f"--vary {text}: {error}") from error
-    return found
-
-
-def _values(word: str, key: str) -> Iterator[Any]:
-    """Return the values of one word: itself, a number, or the numbers of a range."""
-    quantity, known = declared(key).quantity, declared(key).words
-    if quantity is None or word in known:
-        yield word
-        return
-    parts = word.split(":")
-    numbers = [parse_quantity(part, quantity.unit) for part in parts]
-    if len(numbers) == 3:
-        numbers = _range(*numbers, parts=parts, unit=quantity.unit)
-    elif len(numbers) != 1:
-        raise ConfigurationError(f"expected a number or FROM:TO:STEP, got '{word}'")
-    for number in numbers:
-        # The study refuses a part of a block.
-        yield int(number) if quantity.whole and number.is_integer() else number
-
-
-def _range(
-    first: float, last: float, step: float, *, parts: Sequence[str], unit: str
-) -> list[float]:
-    """Return the numbers of a range, end included, rounded to the decimals of the step."""
-    shown = [f"{number:g}" + ("" if unit == "1" else f" {unit}") for number in (first, last, step)]
-    bare = [_is_bare(part) for part in parts]
-    # "0.4:0.6mN:0.2mN": whoever writes this means 0.4 mN.
-    advice = "".join(
-        f"; '{part}' without a unit is {text}"
-        for part, text, alone in zip(parts, shown, bare, strict=True)
-        if alone and not all(bare) and float(part)
-    )
-    if not (step > 0 and last >= first):
-        raise ConfigurationError(
-            f"no value from {shown[0]} to {shown[1]} in steps of {shown[2]}{advice}"
-        )
-    steps = (last - first) / step
-    if steps > MOST_VALUES:
-        raise ConfigurationError(
-            f"a step of {shown[2]} gives more than {MOST_VALUES} values{advice}"
-        )
-    return [float(f"{first + k * step:.12g}") for k in range(math.floor(steps + 1e-6) + 1)]
-
-
-def _is_bare(part: str) -> bool:
-    """Whether a text is a number without a unit."""
-    try:
-        float(part)
-    except ValueError:
-        return False
-    return True
+    quantity = declared(key).quantity
+    if quantity is None:
+        return words
+    found = listed(words, quantity.unit, known=declared(key).words)
+    # The study refuses a part of a block.
+    return [int(one) if quantity.whole and one == int(one) else one for one in found]

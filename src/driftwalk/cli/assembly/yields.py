@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
-from driftwalk.cli.assembly.sensitivity import AXES, VARY_KEYS, flow_paths, vary_overrides
+from driftwalk.cli.assembly.sensitivity import AXES, VARY_KEYS, flow_paths, listed_values
 from driftwalk.cli.inputs.model_source import RUN_NAMES, assembly_source, load_flow_for
 from driftwalk.cli.inputs.recordings import opening_note
+from driftwalk.cli.inputs.varied import parted_numbers, read_varied
 from driftwalk.cli.options.run import RunOptions, with_run_options
 from driftwalk.cli.options.shared_types import PANEL, FlowFile, Run, option
 from driftwalk.cli.options.study import StudyOptions, with_study_options
 from driftwalk.cli.terminal.output import print_prediction
-from driftwalk.core.errors import ConfigurationError, InputError
+from driftwalk.core.errors import ConfigurationError
 from driftwalk.core.study_keys import SENSITIVITY_KEYS
 from driftwalk.core.units import parse_quantity
 from driftwalk.model import declared
 from driftwalk.schema.kinds.flow import flow_series_words
 
-_RANGE = re.compile(r"[^:;]+:[^:;]+")
-"""Two ends; three parts are a range with a step, which is a list."""
+NAMES = {key: axis.replace("-", "_").replace("tank", "tank_diameter") for axis, key in AXES.items()}
+"""Names of the settings of a search by their keys."""
 UNSTATED = {
     "force_std": "the force was not stated",
     "drag_coefficient": "the drag coefficient was not stated",
@@ -30,7 +30,6 @@ UNSTATED = {
 """Beginnings of warnings that do not hold where the parameter varies."""
 REPLACED = ("--runs", "-o", "--out")
 """Options that another run of the command has with other values."""
-Ranges = dict[str, tuple[float, float]]
 
 
 @with_run_options
@@ -81,8 +80,10 @@ def maximise_yield(
     from driftwalk.runs import YieldWork
     from driftwalk.schema.answers.yields import more_runs, yield_answer
 
-    lists, ranges = _varied(vary or [])
-    given = given.and_also(vary_overrides(lists), keys=VARY_KEYS)
+    varied = read_varied(vary or [], AXES, _varied)
+    lists = {key: one for key, one in varied.items() if isinstance(one, list)}
+    ranges = {NAMES[key]: one for key, one in varied.items() if key not in lists}
+    given = given.and_also(lists, keys=VARY_KEYS)
     source = assembly_source(run, flow, given)
     paths = flow_paths(source.study, given, run)
     work = YieldWork(
@@ -129,41 +130,12 @@ def _again(words: Sequence[str], runs: int, out: Path) -> list[str | Path]:
     return [*kept, "--runs", str(runs), "-o", out]
 
 
-def _varied(vary: list[str]) -> tuple[list[str], Ranges]:
-    """Return the options with listed values, and the ranges of the others.
-
-    Raises
-    ------
-    InputError
-        When a range is of no number, or named twice.
-    """
-    lists: list[str] = []
-    ranges: Ranges = {}
-    for text in vary:
-        name, _, values = text.partition("=")
-        axis = name.strip().replace("_", "-")
-        key = AXES.get(axis)
-        if key is None or not _RANGE.fullmatch(values):
-            lists.append(text)
-            continue
-        quantity, own = (
-            declared(key).quantity,
-            axis.replace("-", "_").replace("tank", "tank_diameter"),
-        )
-        if quantity is None or quantity.whole:
-            raise InputError(f"--vary {text}: {axis} has no range; name its values")
-        if own in ranges:
-            raise InputError(f"--vary {text}: {axis} is varied twice")
-        low, high = (word.strip() for word in values.split(":"))
-        # "0.2:1.2mN" has one unit for both.
-        unit = high.lstrip("+0123456789.eE-")
-        try:
-            first = parse_quantity(low + unit if _is_bare(low) else low, quantity.unit)
-            ranges[own] = (first, parse_quantity(high, quantity.unit))
-        except ConfigurationError as error:
-            raise InputError(f"--vary {text}: {error}") from error
-    return lists, ranges
-
-
-def _is_bare(word: str) -> bool:
-    return re.fullmatch(r"[+-]?[0-9.]+(e[+-]?[0-9]+)?", word, re.IGNORECASE) is not None
+def _varied(key: str, words: list[str]) -> list[Any] | tuple[float, float]:
+    """Return listed values, or the ends of a range."""
+    quantity = declared(key).quantity
+    if len(words) != 1 or words[0].count(":") != 1:
+        return listed_values(key, words)
+    if quantity is None or quantity.whole:
+        raise ConfigurationError(f"{NAMES[key].replace('_', '-')} has no range; name its values")
+    ((low, high),) = parted_numbers(words, quantity.unit)
+    return low, high

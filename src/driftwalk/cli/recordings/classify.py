@@ -268,6 +268,11 @@ def _warnings(found: xr.Dataset) -> list[str]:
         said.append(
             f"{facts['dropped_joins']} joins contradict others on the lattice and were dropped"
         )
+    if facts["left_out_contacts"]:
+        said.append(
+            f"{facts['left_out_contacts']} contacts at rest are left out, as their faces lie "
+            "otherwise than those of joins; a wider --play counts more of them"
+        )
     if facts["unknown_samples"]:
         said.append(
             f"at {facts['unknown_samples']} of {found.sizes['time']} samples the class is unknown: "

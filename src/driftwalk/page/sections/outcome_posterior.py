@@ -25,6 +25,7 @@ from driftwalk.schema.answers.outcome_posterior import (
     class_table,
     condition,
     data_table,
+    limit_words,
     number_of,
 )
 from driftwalk.schema.answers.parts import Table, each
@@ -72,8 +73,9 @@ def posterior_summary(posterior: xr.Dataset) -> Section:
         "learned from simulated runs how the shares of the outcomes depend on the parameters.",
         f"Verdict: {required(posterior, 'verdict')}.",
         *(f"{text[:1].upper()}{text[1:]}." for text in sentences(posterior, "reason")),
-        f"Inferred from {facts['used']}; {agreement(posterior)}.",
     ]
+    if facts["used"] != "none":
+        paragraphs.append(f"Inferred from {facts['used']}; {agreement(posterior)}.")
     shown = []
     for one in each(posterior, "parameter"):
         number, known = number_of(one), bool(one["determined"])
@@ -84,7 +86,7 @@ def posterior_summary(posterior: xr.Dataset) -> Section:
                 float(one["estimate"]) if known else None,
                 number.unit,
                 symbol=number.symbol,
-                note=None if known else "cannot tell",
+                note=None if known else limit_words(one, confidence).split(":")[0],
                 ends=ends,
                 confidence=confidence if known else None,
             )

@@ -17,6 +17,11 @@ if TYPE_CHECKING:
 
 REFUSED: Final = "cannot tell: the model does not explain the outcomes"
 """The verdict on a model with which the outcomes do not agree."""
+BOTH_ENDS: Final = "both"
+UPPER_END: Final = "upper"
+LOWER_END: Final = "lower"
+NO_END: Final = "none"
+"""Ends of an interval that are limits, and not those of the range."""
 
 
 def outcome_posterior_answer(found: xr.Dataset) -> Answer:
@@ -49,12 +54,10 @@ def number_of(one: xr.Dataset) -> Number:
 
 
 def estimate_part(one: xr.Dataset, confidence: float) -> Part:
-    """Return the estimate of a parameter with its interval, or that the data cannot tell."""
+    """Return the estimate of a parameter with its interval, or what else the data say of it."""
     number = number_of(one)
     if not bool(one["determined"]):
-        low, high = (number.factor * float(one[end]) for end in ("low", "high"))
-        unit = number.reader_unit
-        return Row(number.words, f"cannot tell: between {low:.4g} and {high:.4g} {unit}".rstrip())
+        return Row(number.words, limit_words(one, confidence))
     low, high = (float(end) for end in one["interval"].values)
     return Estimate(number, float(one["estimate"]), (low, high), confidence)
 
@@ -65,6 +68,19 @@ def condition(found: xr.Dataset) -> str:
         return ""
     p = float(found.attrs["p"])
     return f"if the model were right (the outcomes refuse it, p = {p:.2g})"
+
+
+def limit_words(one: xr.Dataset, confidence: float) -> str:
+    """Return a limit from one side, such as "below 0.39 mN (90 %)", or that data cannot tell."""
+    number, side = number_of(one), str(one["limit"].values)
+    low, high = (number.factor * float(end) for end in one["interval"].values)
+    unit = f" {number.reader_unit}".rstrip()
+    if side == UPPER_END:
+        return f"below {high:.4g}{unit} ({100 * confidence:.0f} %)"
+    if side == LOWER_END:
+        return f"above {low:.4g}{unit} ({100 * confidence:.0f} %)"
+    low, high = (number.factor * float(one[end]) for end in ("low", "high"))
+    return f"cannot tell: between {low:.4g} and {high:.4g}{unit}"
 
 
 def agreement(found: xr.Dataset) -> str:
@@ -115,12 +131,16 @@ def _facts(found: xr.Dataset, reasons: list[str]) -> dict[str, Any]:
     parameters = {}
     for one in each(found, "parameter"):
         number = number_of(one)
-        known = bool(one["determined"])
-        ends = one["interval"].values.tolist() if known else [None, None]
+        known, side = bool(one["determined"]), str(one["limit"].values)
+        low, high = one["interval"].values.tolist()
         parameters[number.key] = {
             "estimate": float(one["estimate"]) if known else None,
-            "interval": ends,
+            "interval": [
+                low if side in (BOTH_ENDS, LOWER_END) else None,
+                high if side in (BOTH_ENDS, UPPER_END) else None,
+            ],
             "determined": known,
+            "limit": side,
             "range": [float(one["low"]), float(one["high"])],
         }
     data = [

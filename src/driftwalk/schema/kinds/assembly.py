@@ -386,6 +386,7 @@ attributes:
     hold_s number: how long a pose holds without a sample
     play_m number: how far joined faces may move against each other
     dropped_joins number: joinings that contradict others
+    left_out_contacts number: contacts at rest that are no joins, as their faces lie otherwise
     closest_m number: smallest distance of two centres
     unknown_samples number: samples of unknown class
     known_s number: time in which the class is known

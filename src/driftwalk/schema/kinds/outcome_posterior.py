@@ -23,8 +23,10 @@ variables:
     value(point parameter): parameters of the sample; in the units of the coordinate unit
     weight(point) [1]: posterior weight of a point of the sample
     estimate(parameter): posterior median
-    interval(parameter bound): shortest interval of the posterior; at the confidence
-    determined(parameter) bool: whether the outcomes determine the parameter
+    interval(parameter bound): shortest interval of the posterior; at the confidence; NaN where \
+        none is stated
+    determined(parameter) bool: whether the outcomes determine the parameter from both sides
+    limit(parameter) text: which ends of the interval the outcomes set: both, lower, upper or none
     low(parameter): lower end of the range
     high(parameter): upper end of the range
     observed(data) bool: whether the observed runs hold this kind of data
@@ -45,12 +47,12 @@ variables:
     class text
 attributes:
     verdict text: determined, partly determined, or cannot tell
-    used text: kind of data that the posterior is from
+    used text: kind of data that the posterior is from, or none: then the sample is the prior's
     runs number: observed runs
     blocks number: blocks in the tank
     after_s number: when the final classes were read
     p number: share of simulated data sets that agree with the model no better
-    emulator_noise number: error of the emulator over the sampling error of the data
+    emulator_noise number: error of the emulator over the sampling error, of the kind of data used
     node_runs number: simulated runs of a node
     truths number: data sets of the self-check
     confidence number: of intervals and regions
