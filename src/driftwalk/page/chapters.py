@@ -104,9 +104,7 @@ def _after_test(test: xr.Dataset) -> str:
     from driftwalk.schema.answers.control import gain_word
 
     if gain_word(test) == "better":
-        return (
-            "Follow the policy live: `driftwalk control run`, over what `driftwalk track` publishes"
-        )
+        return "Follow the policy over what a tracker publishes: `driftwalk control run`"
     constant = test.attrs["constant_mode"]
     return (
         f"Use {constant} all the time, or plan again with more rounds or worlds: "
