@@ -67,7 +67,7 @@ class Reader:
                 match command.words:
                     case ["cp", *sources, target]:
                         _copy(sources, target)
-                    case ["driftwalk", name, *_] if name in SERVERS:
+                    case ["driftwalk", name, *words] if name in SERVERS and "--save" not in words:
                         server = servers.enter_context(served(*command.words[1:]))
                         answer = server.get("/")
                         assert answer.status == 200, where

@@ -17,6 +17,7 @@ MAIN_OPTIONS: Final[dict[str, str]] = {
     "compare": "body body-b step-interval permutations out json",
     "compare-models": "out flow study body models parameter threads",
     "control plan": "out target by every vary flow blocks",
+    "control test": "out worlds latency missed force-factor json",
     "fit": "out study body switching-times wall compare-laws json",
     "flow": "out study body tracers window cells",
     "infer-outcomes": "out flow vary after blocks truths cluster json",

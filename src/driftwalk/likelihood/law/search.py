@@ -321,12 +321,13 @@ class LawSearch:
 def _mode_in(begin: ModeSearch, start: Point, weights: Weights, paper: Mode | None) -> Mode | None:
     """Return the mode of a law in the beginning, by way of the paper's where that leads to it.
 
-    Evidences are compared at the maxima alone: after as many steps as the paper's law takes, the
-    right law of a small orbit was still hundreds of nats behind.
+    Evidences are compared at the maxima: after as many steps as the paper's law takes, the right
+    law of a small orbit was still hundreds of nats behind. Where none is reached the first steps
+    have to do.
     """
-    mode = begin.shortened().find(start, weights)
-    if mode is not None and mode.converged:
-        return mode
+    few = begin.shortened().find(start, weights)
+    if few is not None and few.converged:
+        return few
     mode = begin.find(start, weights)
     if (mode is None or not mode.converged) and paper is not None:
         near = replace(paper.point, opened=start.opened, fixed=start.fixed)
@@ -334,5 +335,5 @@ def _mode_in(begin: ModeSearch, start: Point, weights: Weights, paper: Mode | No
             near = replace(near, log_drag=math.log(LAW.drag_from_paper))
         mode = begin.find(near, paper.weights) or mode
     if mode is not None and not mode.converged:
-        mode = begin.find(mode.point, mode.weights, held=FROM_NEAR) or mode
-    return mode
+        mode = begin.find(mode.point, mode.weights, held=FROM_NEAR)
+    return mode if mode is not None and mode.converged else few
