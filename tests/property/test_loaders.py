@@ -87,8 +87,6 @@ ROWS = st.lists(
 ).map(b"\n".join)
 # Positions that are all nearer to the origin than an atom are refused, as no camera sees them.
 FINITE = st.floats(-1e3, 1e3, allow_nan=False).map(lambda x: x if abs(x) > 1e-6 else 0.0)
-    lambda value: value if abs(value) > 1e-6 else 0.0
-)
 
 
 def load_or_refuse(path: Path, name: str | None) -> None:
