@@ -152,7 +152,7 @@ wasm: $(CROSS_TOOLS)
 	PATH="$(CURDIR)/$(BIN):$$PATH" .ci/wasm write
 
 wasm-check: $(CROSS_TOOLS)
-	PATH="$(CURDIR)/$(BIN):$$PATH" .ci/wasm
+	PATH="$(CURDIR)/$(BIN):$$PATH" .ci/wasm rebuild
 
 wheel: $(DEV_TOOLS)
 	$(BIN)/python -m build

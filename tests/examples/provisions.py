@@ -506,7 +506,7 @@ PAGES: dict[str, Page] = {
         },
         makes=("run/model_calibration.nc", "known/model_calibration.nc", "drawn/posterior.csv"),
         draws=False,
-        slow=True,
+        weekly=True,
     ),
     "docs/how-to/calibrate-your-own-model.md": Page(
         provide=_files(_minutes(recording=0.5), _tumble_search),
@@ -730,7 +730,7 @@ PAGES: dict[str, Page] = {
         needs=("mujoco",),
         draws=False,
         little=True,
-        slow=True,
+        weekly=True,
     ),
     "docs/how-to/view.md": Page(
         provide=_files(_recording(60.0), _calibrated, _markers, _search("study.toml")),
@@ -765,7 +765,7 @@ PAGES: dict[str, Page] = {
         numbers_of={"driftwalk compare *": Numbers.ANY},
         by_chance={"KS distance": KS_SCATTER},
         draws=False,
-        slow=True,
+        weekly=True,
     ),
     "docs/tutorials/your-own-model.md": Page(
         holds=("len(track) == 2000",),
