@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from html import escape
 from os import PathLike
@@ -53,6 +54,8 @@ def run_in_folder(
     overwrite: bool,
     progress: Progress,
     executor: Executor | None = None,
+    *,
+    warnings: Sequence[str] = (),
 ) -> Any:
     """Make or continue the run of a call in a run directory, and return what it found."""
     return run_work(
@@ -61,6 +64,7 @@ def run_in_folder(
         overwrite=overwrite,
         executor=executor,
         progress=progress,
+        warnings=warnings,
         command=f"driftwalk.{call}(..., folder={str(folder)!r})",
     )
 

@@ -112,7 +112,7 @@ def simulate(
     if parameters is not None or study is not None:
         raise InputError("`parameters` and `study` are for a motion model: `motion_model(...)`")
     _refuse_numbers_alone(model)
-    chosen, field, _ = model_of(model, flow, {})
+    chosen, field, *_ = model_of(model, flow, {})
     if like is None:
         if body is not None:
             raise InputError("`body` names a body of the recording `like`, and none is given")
@@ -305,7 +305,9 @@ def assemble(
     say = progress or silent
     if folder is not None:
         work = AssemblyWork(found.study, found.flow, found.uncertainty, {}, threads)
-        done = run_in_folder(folder, "assemble", work, overwrite, say, executor)
+        done = run_in_folder(
+            folder, "assemble", work, overwrite, say, executor, warnings=found.warnings
+        )
         made: xr.Dataset = done.assembly
         return made
     return assemble_study(
@@ -325,6 +327,8 @@ class FoundModel(NamedTuple):
     """A `flow_field`."""
     uncertainty: xr.Dataset | None
     """The `fit` or `calibration` where parameters can be drawn from it."""
+    warnings: tuple[str, ...] = ()
+    """Sentences on what was found, for whoever simulates with it."""
 
 
 def model_of(
@@ -370,7 +374,8 @@ def model_of(
     found = read_found(source)
     study = found.block_study(overrides)
     field = found.flow(study) if flow is None else _flow(flow)
-    return FoundModel(study, field, found.uncertainty)
+    undrawn = () if found.not_drawn is None else (found.not_drawn,)
+    return FoundModel(study, field, found.uncertainty, (*found.warnings, *undrawn))
 
 
 def flow_field_of(flow: xr.Dataset) -> xr.Dataset:

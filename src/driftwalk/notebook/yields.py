@@ -119,7 +119,11 @@ def maximise_yield(
         chosen = make_axes(found.study, axes) if axes else None
         study, flows = (found.study, {}) if chosen is None else (chosen.study, chosen.flows)
         work = YieldWork(study, found.flow, options, flows, {}, threads)
-        return as_result(run_in_folder(folder, "maximise_yield", work, overwrite, say, executor))
+        return as_result(
+            run_in_folder(
+                folder, "maximise_yield", work, overwrite, say, executor, warnings=found.warnings
+            )
+        )
     return as_result(
         maximise(
             found.study, found.flow, axes=axes, threads=threads, executor=executor,
