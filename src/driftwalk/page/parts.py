@@ -226,6 +226,16 @@ def table_section(
     return section(id, "table", title, note or None, columns=list(columns), rows=filled)
 
 
+def section_of_table(id: str, title: str, table: Table, note: str = "") -> Section:
+    """Return a table of an answer as a section."""
+    return table_section(id, title, table.columns, table.rows, note)
+
+
+def table_part(id: str, title: str, table_of: Callable[[Any], Table]) -> tuple[str, str, Maker]:
+    """Return a part of a page that is one table of an answer, for `sections_of`."""
+    return id, title, lambda found: section_of_table(id, title, table_of(found))
+
+
 def answer_table(answer: Answer) -> Table:
     """Return the first table of an answer."""
     return next(part for part in answer.parts if isinstance(part, Table))

@@ -19,6 +19,7 @@ from driftwalk.page.parts import (
     sections_of,
     series,
     summary_section,
+    table_part,
     table_section,
 )
 from driftwalk.page.sections.replay import replay_section
@@ -33,7 +34,6 @@ from driftwalk.schema.answers.control import (
     policy_warnings,
     usage_table,
 )
-from driftwalk.schema.answers.parts import Table
 from driftwalk.schema.shapes import short_class
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def policy_sections(*, policy: xr.Dataset | None = None) -> list[Section]:
     parts: list[tuple[str, str, Maker]] = [
         ("rounds", "Rounds of planning", rounds_section),
         ("policy", "Modes chosen", action_sections),
-        ("modes", "Modes alone", lambda found: _table("modes", "Modes alone", mode_table(found))),
+        table_part("modes", "Modes alone", mode_table),
     ]
     return sections_of(policy, "There is no policy yet.", policy_summary, policy_warnings, parts)
 
@@ -123,7 +123,7 @@ def trial_sections(
     parts: list[tuple[str, str, Maker]] = [
         ("share", "Target over time", share_section),
         ("film", "One run", film_section),
-        ("usage", "Modes used", lambda found: _table("usage", "Modes used", usage_table(found))),
+        table_part("usage", "Modes used", usage_table),
     ]
     nothing = "There is no test yet."
     made = sections_of(control_test, nothing, trial_summary, lambda _: [], parts)
@@ -189,7 +189,3 @@ def film_section(test: xr.Dataset) -> Section:
         mode = "" if modes[at] < 0 else str(test["mode"].values[modes[at]])
         rows.append([f"{time:g}", short_class(str(test["class"].values[classes[at]])), mode])
     return table_section("film", "One run", ["time [s]", "class", "mode from then on"], rows)
-
-
-def _table(id: str, title: str, table: Table) -> Section:
-    return table_section(id, title, table.columns, table.rows)

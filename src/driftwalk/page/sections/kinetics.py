@@ -13,8 +13,10 @@ from driftwalk.page.parts import (
     quantity,
     require,
     required,
+    section_of_table,
     sections_of,
     summary_section,
+    table_part,
     table_section,
     value_of,
 )
@@ -30,7 +32,7 @@ from driftwalk.schema.answers.kinetics import (
     target_table,
     target_words,
 )
-from driftwalk.schema.answers.parts import Table, each
+from driftwalk.schema.answers.parts import each
 from driftwalk.schema.shapes import short_class
 
 if TYPE_CHECKING:
@@ -59,15 +61,15 @@ def kinetics_sections(*, kinetics: xr.Dataset | None = None) -> list[Section]:
         ("shares", "Shares over time", shares_sections),
         ("rates", "Rates", rates_sections),
         ("tests", "Tests of a well-mixed tank", mixing_section),
-        ("models", "Models", lambda found: _table("models", "Models", score_table(found))),
+        table_part("models", "Models", score_table),
     ]
     if kinetics is not None and "target" in kinetics.attrs:
         title = "Way to the target"
-        way = ("target", title, lambda found: _table("target", title, target_table(found)))
+        way = table_part("target", title, target_table)
         parts.insert(0, way)
     if kinetics is not None and kinetics.sizes.get("source") == 2:
         name = "Equal rates"
-        parts.append(("equal", name, lambda found: _table("equal", name, equal_table(found))))
+        parts.append(table_part("equal", name, equal_table))
     nothing = "There are no rates yet."
     return sections_of(kinetics, nothing, kinetics_summary, lambda _: [], parts)
 
@@ -146,7 +148,7 @@ def rates_sections(kinetics: xr.Dataset) -> list[Section]:
     require(kinetics, "count", "rate", "rate_low", "rate_high")
     tables = (rate_table(kinetics, at) for at in range(kinetics.sizes["source"]))
     return [
-        _table(f"rates-{at}", f"Rates, {one.title}" if one.title else "Rates", one)
+        section_of_table(f"rates-{at}", f"Rates, {one.title}" if one.title else "Rates", one)
         for at, one in enumerate(tables, start=1)
     ]
 
@@ -165,7 +167,3 @@ def mixing_section(kinetics: xr.Dataset) -> Section:
     )
     columns = ["test", "events", "statistic", "from", "to (90 %)", "p", "p, corrected"]
     return table_section("tests", "Tests of a well-mixed tank", columns, rows, note)
-
-
-def _table(id: str, title: str, table: Table) -> Section:
-    return table_section(id, title, table.columns, table.rows)

@@ -17,6 +17,7 @@ from driftwalk.page.parts import (
     quantity,
     require,
     required,
+    section_of_table,
     sections_of,
     series,
     stated_warnings,
@@ -230,7 +231,7 @@ def ranking_section(comparison: xr.Dataset) -> Section:
     require(comparison, "score", "score_std", "behind", "behind_std", "held_out_distance")
     table = ranking_table(comparison)
     note = "Distance from blocks of time that no model was fitted to."
-    return table_section("ranking", "Ranking", table.columns, table.rows, note)
+    return section_of_table("ranking", "Ranking", table, note)
 
 
 def summaries_section(comparison: xr.Dataset) -> Section:

@@ -14,10 +14,11 @@ from driftwalk.page.parts import (
     label,
     require,
     required,
+    section_of_table,
     sections_of,
     series,
     summary_section,
-    table_section,
+    table_part,
 )
 from driftwalk.schema.answers.facts import sentences
 from driftwalk.schema.answers.outcome_posterior import (
@@ -28,7 +29,7 @@ from driftwalk.schema.answers.outcome_posterior import (
     limit_words,
     number_of,
 )
-from driftwalk.schema.answers.parts import Table, each
+from driftwalk.schema.answers.parts import each
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -57,7 +58,7 @@ def outcome_posterior_sections(*, posterior: xr.Dataset | None = None) -> list[S
     """
     parts: list[tuple[str, str, Maker]] = [
         ("posterior", "Posterior", density_sections),
-        ("classes", "Classes", lambda found: _table("classes", "Classes", class_table(found))),
+        table_part("classes", "Classes", class_table),
         ("data", "Information in each kind of data", _data_section),
     ]
     nothing = "The emulator is not checked yet: there is no posterior."
@@ -128,10 +129,4 @@ def _data_section(posterior: xr.Dataset) -> Section:
         "intervals are medians, over those that hold without data."
     )
     table = data_table(posterior)
-    return table_section(
-        "data", "Information in each kind of data", table.columns, table.rows, note
-    )
-
-
-def _table(id: str, title: str, table: Table) -> Section:
-    return table_section(id, title, table.columns, table.rows)
+    return section_of_table("data", "Information in each kind of data", table, note)

@@ -24,6 +24,7 @@ from driftwalk.page.parts import (
     quantity,
     require,
     required,
+    section_of_table,
     sections_of,
     series,
     summary_section,
@@ -144,7 +145,7 @@ def errors_section(recovery: xr.Dataset) -> Section:
     """Return the table of errors and coverage."""
     table = answer_table(recovery_answer(recovery))
     note = "Errors are relative to the truth."
-    return table_section("errors", "Errors and intervals", table.columns, table.rows, note)
+    return section_of_table("errors", "Errors and intervals", table, note)
 
 
 def by_length_section(recovery: xr.Dataset) -> Section:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from driftwalk.page.parts import Section, chart, label, mark, require, series, table_section
+from driftwalk.page.parts import Section, chart, label, mark, require, section_of_table, series
 from driftwalk.schema.answers.parts import Table
 from driftwalk.schema.answers.steady_state import steady_parts, steady_words
 from driftwalk.schema.shapes import short_class
@@ -45,7 +45,7 @@ def steady_sections(steady: xr.Dataset) -> list[Section]:
             name = short_class(str(one["class"].values))
             drawn.append(series(name, steady["age"].values, one["survival"].values, ends=ends))
     return [
-        table_section("steady-state", "Steady state", table.columns, table.rows, note),
+        section_of_table("steady-state", "Steady state", table, note),
         chart(
             "lifetimes", "Lifetimes of the classes",
             "Kaplan-Meier, censored at the end of a run; a stay ends with a joining or a parting.",

@@ -19,9 +19,8 @@ from driftwalk.page.parts import (
     sections_of,
     series,
     summary_section,
-    table_section,
+    table_part,
 )
-from driftwalk.schema.answers.parts import Table
 from driftwalk.schema.answers.yields import (
     front_table,
     setting_table,
@@ -61,13 +60,9 @@ def yield_sections(*, yields: xr.Dataset | None = None) -> list[Section]:
     """
     parts: list[tuple[str, str, Maker]] = [
         ("front", "Front of yield and time", front_section),
-        (
-            "settings",
-            "Settings",
-            lambda found: _table("settings", "Settings", setting_table(found)),
-        ),
+        table_part("settings", "Settings", setting_table),
         ("along", "Along each setting", along_sections),
-        ("times", BY_TIME, lambda found: _table("times", BY_TIME, front_table(found))),
+        table_part("times", BY_TIME, front_table),
     ]
     return sections_of(yields, "There is no yield yet.", yield_summary, _warnings, parts)
 
@@ -145,7 +140,3 @@ def along_sections(yields: xr.Dataset) -> list[Section]:
 
 def _warnings(found: xr.Dataset) -> list[str]:
     return yield_answer(found).warnings
-
-
-def _table(id: str, title: str, table: Table) -> Section:
-    return table_section(id, title, table.columns, table.rows)
