@@ -115,8 +115,8 @@ class Shortlist(NamedTuple):
     models: tuple[int, ...]
     """Those that tie first, the closest before the others; their places among all models."""
     tied: int
-    """How many are asked in any case. The others are asked until one gives the summaries: a search
-    by distances may have missed the place of the true model."""
+    """How many are asked in any case. The others are asked until one with no more numbers gives the
+    summaries: a search by distances may have missed the place of the true model."""
 
 
 def shortlist_models(entries: Sequence[Candidate], held_out: Sequence[HeldOutScore]) -> Shortlist:
