@@ -104,8 +104,8 @@ format: $(DEV_TOOLS)
 	$(BIN)/ruff format .
 	$(BIN)/clang-format -i $(CPP)
 
-# The native core alone, no Python: once under the address and undefined-behaviour sanitizers, once
-# without any processor-specific code.
+# The native core alone, no Python, under the address and undefined-behaviour sanitizers: every instruction
+# set (once a week in CI), or without any processor-specific code, which takes half the time.
 cpp-test: $(DEV_TOOLS)
 	PATH="$(CURDIR)/$(BIN):$$PATH" .ci/cpp-test sanitize
 
