@@ -1,5 +1,5 @@
 """Benchmarks and studies start: a benchmark at its smallest size, a study, which takes hours, with
-``--help``, and what they use of driftwalk exists."""
+``--help``, and what they and the gallery use of driftwalk exists."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 ALIASES = {"dw": "driftwalk", "_core": "driftwalk._core"}
-SCRIPTS = [path for folder in ("benchmarks", "studies") for path in (ROOT / folder).rglob("*.py")]
+FOLDERS = ("benchmarks", "studies", "docs/site/gallery")
+SCRIPTS = [path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py")]
 
 
 def used_names(path: Path) -> Iterator[tuple[str, str]]:
