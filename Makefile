@@ -38,9 +38,11 @@ test: $(TEST_TOOLS)
 test-slow: $(TEST_TOOLS)
 	$(BIN)/python -m pytest $(SIDE_BY_SIDE) -m slow
 
-# Once a week in CI: tests that are more of a study, each with a faster one among the slow tests.
+# Once a week in CI: tests that are more of a study, each with a faster one among the slow tests. Those in
+# Chromium measure times, so they come last, alone.
 test-studies: $(TEST_TOOLS)
-	$(BIN)/python -m pytest $(SIDE_BY_SIDE) -m study
+	$(BIN)/python -m pytest $(SIDE_BY_SIDE) -m "study and not browser"
+	$(BIN)/python -m pytest tests/browser -m study
 
 # The property and statistical tests, slow ones too, with new examples and new seeds: some minutes.
 # The seed is printed first; the same run again: make test-fresh SEED=123
@@ -52,7 +54,7 @@ test-fresh: $(TEST_TOOLS)
 
 # In Chromium, which has to be installed; without it the tests are skipped.
 test-browser: $(TEST_TOOLS)
-	$(BIN)/python -m pytest tests/browser -m browser
+	$(BIN)/python -m pytest tests/browser -m "browser and not study"
 
 # Damaged files against the command line, some 2 a second; the same seed gives the same cases. What
 # it finds lies in run/fuzz/findings. The first round makes the valid files, for a minute or two.
