@@ -10,8 +10,8 @@ import json
 import shlex
 import shutil
 import sys
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -69,12 +69,16 @@ class Page:
     slow: bool = False
     """Whether the page takes more than 0.3 s of processor time."""
     weekly: bool = False
-    """Whether it takes half a minute or more of commands that other tests run in CI."""
+    """Whether it takes long for commands that other tests run in CI."""
+    parts_weekly: tuple[str, ...] = ()
+    """Texts of single commands, or of other examples, of which the same holds."""
 
     @property
-    def marks(self) -> list[pytest.MarkDecorator]:
-        """When the page runs."""
-        return [pytest.mark.study] * self.weekly or [pytest.mark.slow] * self.slow
+    def runs(self) -> Iterator[tuple[str, Page, list[pytest.MarkDecorator]]]:
+        """What is appended to the name of each run of the page, what runs, and when."""
+        yield "", self, [pytest.mark.study] * self.weekly or [pytest.mark.slow] * self.slow
+        if self.parts_weekly:
+            yield " whole", replace(self, parts_weekly=()), [pytest.mark.study]
 
 
 def _files(*provisions: Callable[[Path], Names]) -> Callable[[Path], Names]:
@@ -552,7 +556,7 @@ PAGES: dict[str, Page] = {
         instead={"circle:30cm": "circle:32cm"},
         holds=("len(known) == 2",),
         draws=False,
-        slow=True,
+        weekly=True,
     ),
     "docs/how-to/fit.md": Page(
         provide=_files(
@@ -583,6 +587,10 @@ PAGES: dict[str, Page] = {
         holds=("bool(fit['converged'])", "flow.attrs['kind'] == 'flow_field'"),
         draws=False,
         slow=True,
+        parts_weekly=(
+            *("sensitivity fit/", "simulate fit/", "-o raft/", "-o both/", "--switching-times"),
+            *("switched/fit.nc", "-o paper/", "--compare-laws"),
+        ),
     ),
     "docs/how-to/flow-field.md": Page(
         provide=_files(_recording(), _tracks),
@@ -717,7 +725,7 @@ PAGES: dict[str, Page] = {
         },
         holds=("0.99 < data.time < 1.01", "mujoco.set_mjcb_passive(None) is None"),
         needs=("mujoco",),
-        slow=True,
+        weekly=True,
     ),
     "docs/how-to/use-a-simulator.md": Page(
         provide=_robot_in_mujoco,
@@ -740,6 +748,7 @@ PAGES: dict[str, Page] = {
         },
         draws=False,
         slow=True,
+        parts_weekly=("play run/", "play --study", "play --tank", "play --live", "play --model"),
     ),
     "docs/reference/datasets.md": Page(
         provide=_files(_search("search.toml"), _with_intervals, _minutes(recording=0.5)),
