@@ -21,11 +21,10 @@ from driftwalk.assembly import Modes, Wanted
 from driftwalk.assembly.control.controller import Rules
 from driftwalk.assembly.control.stored import stored_modes, stored_rules
 from driftwalk.assembly.control.worlds import Setting, Worlds
-from driftwalk.core.files.shards import ShardStore
 from driftwalk.core.intervals import difference_interval
 from driftwalk.page.chapters import in_chapters
 from driftwalk.page.sections.control import trial_sections
-from driftwalk.runs import ControlPlanWork, run_work
+from driftwalk.runs import ControlPlanWork
 from driftwalk.schema.answers.parts import lines_of
 from driftwalk.schema.kinds.fit import FIT
 from driftwalk.schema.runs import answer_of
@@ -148,32 +147,6 @@ def test_missed_looks_hold_the_mode() -> None:
         share = 0.5 ** (period + 1)
         seen = (found["mode"][:, period] == 0).mean()
         assert abs(seen - share) < 4.0 * np.sqrt(share * (1.0 - share) / 200)
-
-
-def test_a_stopped_plan_goes_on_to_the_same_policy(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    class Stopped(Exception):
-        """Represents a kill."""
-
-    written: list[str] = []
-    write = ShardStore.write
-
-    def some(store: ShardStore, *words: object) -> None:
-        if len(written) == 3:
-            raise Stopped
-        written.append("")
-        write(store, *words)  # type: ignore[arg-type]
-
-    work = ControlPlanWork(modes(), Wanted("L3", 20.0, 5.0), rounds=4, worlds=20, seed=1)
-    whole = run_work(work, tmp_path / "whole")
-    with monkeypatch.context() as patch:
-        patch.setattr(ShardStore, "write", some)
-        with pytest.raises(Exception):  # noqa: B017, PT011
-            run_work(work, tmp_path / "stopped")
-    again = run_work(work, tmp_path / "stopped")
-    assert again["action"].equals(whole["action"])
-    assert again.attrs["reached"] == whole.attrs["reached"]
 
 
 def test_draws_from_a_fit_are_those_of_its_uncertainty() -> None:
