@@ -174,6 +174,23 @@ def number_codes(values: Array) -> tuple[Codes, list[str]]:
     return codes.ravel().astype(np.int32), names
 
 
+def codes_in_arenas(
+    arenas: tuple[Codes, list[str]], targets: tuple[Codes, list[str]]
+) -> tuple[Codes, list[str]]:
+    """Return the index of each row's body, and the names of bodies that each arena numbers anew.
+
+    Examples
+    --------
+    >>> one = np.array([0, 0, 1], dtype=np.int32)
+    >>> codes_in_arenas((one, ["A", "B"]), (0 * one, ["1"]))[1]
+    ['A/1', 'B/1']
+    """
+    pairs, codes = np.unique(np.stack([arenas[0], targets[0]]), axis=1, return_inverse=True)
+    several = len(arenas[1]) > 1
+    names = [(f"{arenas[1][a]}/" if several else "") + targets[1][t] for a, t in pairs.T.tolist()]
+    return codes.ravel().astype(np.int32), names
+
+
 def order_in_frame(frame: npt.ArrayLike) -> Codes:
     """Return, for rows in the order of their frames, the place of each row within its frame."""
     values = np.asarray(frame)

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from driftwalk.core.errors import FormatError
-from driftwalk.record.cleaning.several_bodies import split_bodies
+from driftwalk.record.cleaning.several_bodies import codes_in_arenas, split_bodies
 from driftwalk.record.loaders.plain import side_by_side
 from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import read_table
@@ -71,17 +71,10 @@ class AnimalTALoader:
 
 def _stacked(path: Path, names: list[str], skip: int) -> tuple[list[RawBody], Array, Array]:
     table = read_table(path, TableLayout(";", names, skip, (0, 1, 4, 5), (2, 3)))
-    arenas, targets = table.labels[2], table.labels[3]
-    pairs = table.codes[2].astype(np.int64) * len(targets) + table.codes[3]
-    found, codes = np.unique(pairs, return_inverse=True)
-    labels = [
-        f"{arenas[pair // len(targets)]}/Ind{targets[pair % len(targets)]}"
-        if len(arenas) > 1
-        else f"Ind{targets[pair % len(targets)]}"
-        for pair in found.tolist()
-    ]
+    targets = [f"Ind{label}" for label in table.labels[3]]
+    codes, labels = codes_in_arenas((table.codes[2], table.labels[2]), (table.codes[3], targets))
     frame, time, x, y = (table.numbers[column] for column in (0, 1, 4, 5))
-    bodies = split_bodies(codes.ravel().astype(np.int32), labels, clock=frame, x=x, y=y)
+    bodies = split_bodies(codes, labels, clock=frame, x=x, y=y)
     return bodies, frame.copy(), time
 
 
