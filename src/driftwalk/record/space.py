@@ -45,7 +45,10 @@ class Plane:
     @property
     def vectors(self) -> Array:
         """Unit vectors of x, y and up in the axes of the file, shape (3, 3)."""
-        return np.array([_vector(name) for name in (self.x, self.y, self.up)])
+        vectors = np.zeros((3, 3))  # so that no axis gets a minus zero
+        for vector, name in zip(vectors, (self.x, self.y, self.up), strict=True):
+            vector["xyz".index(name[-1])] = -1.0 if name.startswith("-") else 1.0
+        return vectors
 
     def describe(self) -> str:
         """Return the plane in words.
@@ -80,13 +83,6 @@ def plane_of(up: str) -> Plane:
     if name not in _PLANES:
         raise InputError(f"`up` is one of {', '.join(_PLANES)}; got '{up}'")
     return Plane(name, *_PLANES[name])
-
-
-def _vector(name: str) -> Array:
-    # Added to zeros, so that no axis gets a minus zero.
-    vector = np.zeros(3)
-    vector["xyz".index(name[-1])] = -1.0 if name.startswith("-") else 1.0
-    return vector
 
 
 QUATERNION: Final = "quaternion"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -135,13 +136,11 @@ def split_bodies(
         When there are more labels than bodies are read.
     """
     refuse_many_bodies(labels)
+    rows = RawBody(labels[0] if labels else "", clock, x, y, theta)
     if len(labels) == 1:
-        return [RawBody(labels[0], clock, x, y, theta)]
-    return [
-        RawBody(name, clock[at], x[at], y[at], None if theta is None else theta[at])
-        for name, at in zip(labels, rows_of_bodies(codes, number=len(labels)), strict=True)
-        if at.size
-    ]
+        return [rows]
+    places = zip(labels, rows_of_bodies(codes, number=len(labels)), strict=True)
+    return [replace(rows.take(at), name=name) for name, at in places if at.size]
 
 
 def rows_of_bodies(codes: Codes, *, number: int = 0) -> list[Integers]:

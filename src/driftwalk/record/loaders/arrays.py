@@ -62,15 +62,15 @@ def _holds_positions(path: Path) -> bool:
             if "#refs#" in contents.file:
                 # Cells and structs of MATLAB: its own loader knows which of them are recordings.
                 return False
-            inner = [one for one in contents.file.values() if hasattr(one, "keys")]
-            return any(_are_positions(_names_but_axes(one)) for one in (contents.file, *inner))
+            groups = [one for one in contents.file.values() if hasattr(one, "keys")]
+            # The axes of a grid are no positions.
+            names = (
+                {str(name) for name, one in group.items() if not getattr(one, "is_scale", False)}
+                for group in (contents.file, *groups)
+            )
+            return any(map(_are_positions, names))
     except InputError:
         return False
-
-
-def _names_but_axes(group: Any) -> set[str]:
-    """Return the names in a group of an HDF5 file, without those of the axes of a grid."""
-    return {str(name) for name, one in group.items() if not getattr(one, "is_scale", False)}
 
 
 def _of_array(path: Path, options: ReadOptions) -> RawRecording:

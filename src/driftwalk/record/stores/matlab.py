@@ -51,24 +51,19 @@ def matlab_variables_of(path: Path) -> Iterator[dict[str, Value]]:
         start = file.read(len(OLD))
     if start == HDF5_BASED:
         with opened_hdf5(path) as contents:
-            yield _of_hdf5(contents)
+            names = [str(name) for name in contents.file if not str(name).startswith("#")]
+            yield {name: _hdf5_value(contents, name) for name in names}
     elif start == OLD:
-        yield _of_old(path)
+        with damaged_as("as a MATLAB file", path):
+            content = read_old(path)
+        # The name of an opaque object is inside it.
+        names = {
+            name: text_of(value["s0"].ravel()[0]) if _is_opaque(value) else ""
+            for name, value in content.items()
+        }
+        yield {names[name] or name: _old_value(value) for name, value in content.items()}
     else:
         raise FormatError("is no MATLAB file of version 5 or 7.3")
-
-
-def _of_old(path: Path) -> dict[str, Value]:
-    with damaged_as("as a MATLAB file", path):
-        content = read_old(path)
-    return {_own_name(value) or name: _old_value(value) for name, value in content.items()}
-
-
-def _own_name(value: Any) -> str:
-    """Return the name of an opaque object, which is inside it."""
-    if not _is_opaque(value):
-        return ""
-    return text_of(value["s0"].ravel()[0])
 
 
 def _is_opaque(value: Any) -> bool:
@@ -94,11 +89,6 @@ def _old_value(value: Any) -> Value:
     if value.dtype.kind == "U":
         return _texts([str(row) for row in value.ravel()])
     return value if value.dtype.kind in "fiub" else None
-
-
-def _of_hdf5(contents: Hdf5Contents) -> dict[str, Value]:
-    names = [str(name) for name in contents.file if not str(name).startswith("#")]
-    return {name: _hdf5_value(contents, name) for name in names}
 
 
 def _hdf5_value(contents: Hdf5Contents, name: str) -> Value:

@@ -240,7 +240,10 @@ class _Reader(NamedColumns):
             chosen = part is not None and self.meanings[part].rank < 0
             if part is not None and (chosen or self._is_fraction(time, part)):
                 result.numbers = (time, part)
-            if meaning.rank == 0 and not meaning.unit and self._is_of_ros(time):
+            first = next(iter(self._sampled(time)), "")
+            # The stamp of a header of ROS counts whole nanoseconds since 1970.
+            of_ros = meaning.rank == 0 and first.isdecimal() and len(first) >= 18
+            if of_ros and not meaning.unit:
                 result.clock_unit, result.bare_clock = "ns", False
                 self.meanings[time] = replace(meaning, unit="ns")
             return
@@ -266,11 +269,6 @@ class _Reader(NamedColumns):
         digits = {"ns": 9, "us": 6, "ms": 3}.get(self.meanings[part].unit, 0)
         parts = self._sampled(part)
         return whole and all(one.isdecimal() and int(one) < 10**digits for one in parts)
-
-    def _is_of_ros(self, time: int) -> bool:
-        """Whether the stamp of a header counts whole nanoseconds since 1970."""
-        first = next(iter(self._sampled(time)), "")
-        return first.isdecimal() and len(first) >= 18
 
     def _find_units(self) -> None:
         result = self.result

@@ -116,7 +116,8 @@ def _of_fields(fields: dict[str, Value], what: str) -> MemorySource | None:
         if several and (meaning is None or meaning.quantity not in _OF_BODIES):
             continue
         for number, column in enumerate(_columns(value, rows), start=1):
-            names.append(_numbered(name, number) if several else name)
+            # The number follows the quantity, before a unit.
+            names.append(re.sub(r"^([A-Za-z]+)", rf"\g<1>{number}", name) if several else name)
             columns.append(column)
             matrices |= several
         _refuse_wide(len(columns), what)
@@ -161,17 +162,14 @@ def _columns(value: Value, rows: int) -> list[Values]:
     return [across[:, at] for at in range(across.shape[1])]
 
 
-def _numbered(name: str, number: int) -> str:
-    """Return the name of a body's column: the number follows the quantity, before a unit."""
-    return re.sub(r"^([A-Za-z]+)", rf"\g<1>{number}", name)
-
-
 def _of_elements(elements: list[dict[str, Value]], what: str) -> MemorySource | None:
     """Return an array of structs as a table: a row each, or the rows of a body each."""
     if not elements:
         return None
     if all(_is_single(value) for element in elements for value in element.values()):
-        return _of_rows(elements, what)
+        names = list(elements[0])
+        columns = [objects([_single(one.get(name)) for one in elements]) for name in names]
+        return MemorySource(what, names, columns)
     parts = [_of_fields(element, what) for element in elements]
     known = [(at, part) for at, part in enumerate(parts, start=1) if part is not None]
     if not known:
@@ -185,12 +183,6 @@ def _of_elements(elements: list[dict[str, Value]], what: str) -> MemorySource | 
         np.concatenate([part.column(part.names.index(name)) for _, part in known]) for name in names
     ]
     return MemorySource(what, [*names, _BODY], [*columns, np.concatenate(bodies)])
-
-
-def _of_rows(elements: list[dict[str, Value]], what: str) -> MemorySource | None:
-    names = list(elements[0])
-    columns = [objects([_single(one.get(name)) for one in elements]) for name in names]
-    return MemorySource(what, names, columns)
 
 
 def _is_single(value: Value) -> bool:
