@@ -204,22 +204,17 @@ def refuse_far(bodies: Sequence[RawBody], scale: float) -> None:
     for body in bodies:
         for name, values in (("x", body.x), ("y", body.y)):
             _refuse_beyond(body, name, values, EXTENT.farthest_m / scale)
-        _refuse_within(body, EXTENT.nearest_m / scale)
+        known = [
+            np.abs(axis).max(where=np.isfinite(axis), initial=0.0) for axis in (body.x, body.y)
+        ]
+        if 0.0 < max(known) < EXTENT.nearest_m / scale:
+            raise InputError(
+                f"body '{body.name}' has no position that is further than {max(known):.3g} from "
+                "the origin, in the file's unit: no camera sees that; are these the right columns, "
+                "and is the unit right (`length_unit`)?"
+            )
         if body.theta is not None:
             _refuse_beyond(body, "angle", body.theta, EXTENT.largest_angle)
-
-
-def _refuse_within(body: RawBody, least: float) -> None:
-    farthest = max(
-        float(np.abs(values).max(where=np.isfinite(values), initial=0.0))
-        for values in (body.x, body.y)
-    )
-    if 0.0 < farthest < least:
-        raise InputError(
-            f"body '{body.name}' has no position that is further than {farthest:.3g} from the "
-            "origin, in the file's unit: no camera sees that; are these the right columns, and is "
-            "the unit right (`length_unit`)?"
-        )
 
 
 def _refuse_beyond(body: RawBody, name: str, values: Array, most: float) -> None:

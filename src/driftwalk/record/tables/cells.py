@@ -102,17 +102,12 @@ def _plain(cell: Any) -> float | str:
     if isinstance(cell, (bool, np.bool_)):
         return str(cell)
     if isinstance(cell, numbers.Real) or hasattr(cell, "as_integer_ratio"):
-        return _float(cell)
+        try:
+            return float(cell)
+        except OverflowError:  # infinite, as a text of it would be
+            return math.inf if cell > 0 else -math.inf
     text = text_of_cell(cell)
     return float("nan") if text in MISSING else text
-
-
-def _float(number: Any) -> float:
-    """Return a number as float64, infinite where it is too large, as a text of it would be."""
-    try:
-        return float(number)
-    except OverflowError:
-        return math.inf if number > 0 else -math.inf
 
 
 def text_of_cell(cell: Any) -> str:

@@ -214,7 +214,9 @@ def _of_array(data: Values) -> MemorySource:
 
 def _of_pandas(frame: Any) -> MemorySource:
     """Return the columns of a DataFrame, and its index where that has a name or holds times."""
-    names = [_joined(name) for name in frame.columns]
+    # Of a column with several levels those count that have a name.
+    parts = [name if isinstance(name, tuple) else (name,) for name in frame.columns]
+    names = [" ".join(filter(None, map(str, one))) for one in parts]
     columns = [frame.iloc[:, at] for at in range(len(names))]
     for level in range(frame.index.nlevels):
         index = frame.index.get_level_values(level)
@@ -225,13 +227,6 @@ def _of_pandas(frame: Any) -> MemorySource:
     zoned = frozenset(at for at, one in enumerate(columns) if getattr(one.dtype, "tz", None))
     values = [_of_series(one) for one in columns]
     return _checked("the DataFrame", names, values, zoned)
-
-
-def _joined(name: Any) -> str:
-    """Return the name of a column; of one with several levels those that have a name."""
-    return (
-        " ".join(str(part) for part in name if str(part)) if isinstance(name, tuple) else str(name)
-    )
 
 
 def _of_series(series: Any) -> Values:

@@ -79,11 +79,17 @@ def other_order(source: TableSource, reading: TableReading, names: list[str]) ->
         own = [at for at in free if len(table.labels[at]) >= _ORDER.own * table.rows]
         for at in own:
             if at in counters and _skips_rows(counters[at]):
-                return _counts_up(names[at])
+                frame, time = (
+                    argument_text("columns", {what: names[at]}) for what in ("frame", "t")
+                )
+                return (
+                    f"no column is known to hold times or frames, but '{names[at]}' counts up and "
+                    f"skips some: add {frame} if it counts frames, {time} if it holds times"
+                )
     apart = _tracks(table, counters, free, reading.body_column)
     if apart is not None:
-        body, frame = apart
-        what, columns = f"'{names[frame]}' counts frames", {"frame": names[frame]}
+        body, counter = apart
+        what, columns = f"'{names[counter]}' counts frames", {"frame": names[counter]}
         if body is not None and body != reading.body_column:
             what += f" and '{names[body]}' names bodies"
             columns["body"] = names[body]
@@ -100,14 +106,6 @@ def other_order(source: TableSource, reading: TableReading, names: list[str]) ->
                     f"{add} if so, {skip} if it is one body, whose rows are its frames"
                 )
     return None
-
-
-def _counts_up(name: str) -> str:
-    frame, time = (argument_text("columns", {what: name}) for what in ("frame", "t"))
-    return (
-        f"no column is known to hold times or frames, but '{name}' counts up and skips some: "
-        f"add {frame} if it counts frames, {time} if it holds times"
-    )
 
 
 def _position(reading: TableReading) -> tuple[int, int]:

@@ -57,9 +57,10 @@ class AnimalTALoader:
         rate = None if options.frame_rate_hz is not None else _rate(frame, time)
         timed = rate is None and options.frame_rate_hz is None
         if timed:
-            bodies = [
-                RawBody(one.name, _times(one.clock, frame, time), one.x, one.y) for one in bodies
-            ]
+            order = np.argsort(frame, kind="stable")
+            for one in bodies:
+                places = np.searchsorted(frame[order], one.clock).clip(0, frame.size - 1)
+                one.clock = time[order][places]
         return RawRecording(
             bodies,
             clock_unit="s" if timed else "frame",
@@ -97,13 +98,6 @@ def _rate(frame: Array, time: Array) -> float | None:
         ):
             return rate
     return None
-
-
-def _times(clock: Array, frame: Array, time: Array) -> Array:
-    """Return the times of frames."""
-    order = np.argsort(frame, kind="stable")
-    times: Array = time[order][np.searchsorted(frame[order], clock).clip(0, frame.size - 1)]
-    return times
 
 
 LOADER = AnimalTALoader()

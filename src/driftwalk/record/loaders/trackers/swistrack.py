@@ -56,7 +56,9 @@ class SwisTrackTracksLoader:
         files = _track_files(path) if path.is_dir() else [path]
         if not files:
             raise FormatError("the folder holds no track files (track_00000000.txt)")
-        tables = {_track_name(file): _read_one(file) for file in files}
+        matches = [_FILE_NAME.fullmatch(file.name) for file in files]
+        names = [str(int(match[1])) if match else "0" for match in matches]
+        tables = dict(zip(names, map(_read_one, files), strict=True))
         first = next(iter(tables.values()))
         if any(set(table.numbers) != set(first.numbers) for table in tables.values()):
             raise FormatError("the folder mixes track files of two SwisTrack versions")
@@ -122,11 +124,6 @@ def _read_one(path: Path) -> Table:
 
 def _track_files(folder: Path) -> list[Path]:
     return sorted(file for file in folder.iterdir() if _FILE_NAME.fullmatch(file.name))
-
-
-def _track_name(path: Path) -> str:
-    match = _FILE_NAME.fullmatch(path.name)
-    return str(int(match.group(1))) if match else "0"
 
 
 PARTICLES = [
