@@ -11,10 +11,9 @@ from driftwalk.core.errors import FormatError, InputError, damaged_as
 from driftwalk.record.column_names import column_meaning
 from driftwalk.record.raw import RawRecording, ReadOptions
 from driftwalk.record.stores.hdf5 import Hdf5Contents, opened_hdf5, text_of
-from driftwalk.record.stores.matlab import Struct, Value
 from driftwalk.record.stores.npz import NPY, ZIP, members, opened_npz
 from driftwalk.record.tables.in_memory import table_in_memory
-from driftwalk.record.tables.matlab import matlab_tables
+from driftwalk.record.tables.matlab import Struct, Value, matlab_tables
 from driftwalk.record.tables.rows import recording_of, the_one_that_fits
 from driftwalk.record.vocabulary import ALLOWED
 from driftwalk.schema.stores.netcdf import HDF5, file_start

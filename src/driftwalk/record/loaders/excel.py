@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any, Final
 from driftwalk.core.errors import FormatError, InputError, damaged_as
 from driftwalk.record.raw import RawRecording, ReadOptions, TableLayout
 from driftwalk.record.stores.npz import ZIP, refuse_huge_zip, zip_names
-from driftwalk.record.tables.cells import CellError, form_of, objects, text_of_cell
 from driftwalk.record.tables.heading import header_advice, heading_of, is_data, units_below
-from driftwalk.record.tables.in_memory import table_of
+from driftwalk.record.tables.in_memory import CellError, form_of, objects, table_of, text_of_cell
 from driftwalk.record.tables.rows import recording_of, the_one_that_fits
 from driftwalk.record.tables.source import TABLE
 from driftwalk.record.tables.stamps import StampError, StampForm

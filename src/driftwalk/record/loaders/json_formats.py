@@ -12,8 +12,7 @@ from driftwalk.core.errors import FormatError
 from driftwalk.core.files.bounded import MIB
 from driftwalk.core.text.json_text import MOST_BYTES, parse_json
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
-from driftwalk.record.tables.cells import objects
-from driftwalk.record.tables.in_memory import MemorySource
+from driftwalk.record.tables.in_memory import MemorySource, objects
 from driftwalk.record.tables.rows import recording_of
 from driftwalk.record.text import open_binary
 from driftwalk.record.vocabulary import words

@@ -14,8 +14,13 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError, listed
 from driftwalk.record.raw import Array, RawBody, RawRecording, ReadOptions
-from driftwalk.record.stores.matlab import Struct, Value, matlab_variables_of
-from driftwalk.record.tables.matlab import matlab_tables, only_matlab
+from driftwalk.record.tables.matlab import (
+    Struct,
+    Value,
+    matlab_tables,
+    matlab_variables_of,
+    only_matlab,
+)
 from driftwalk.record.tables.rows import recording_of, the_one_that_fits
 from driftwalk.schema.stores.matlab import HDF5_BASED, OLD, matlab_variables
 

@@ -8,8 +8,7 @@ from typing import Final, NamedTuple
 from driftwalk.core.errors import InputError, argument_text, listed
 from driftwalk.record.column_names import ColumnMeaning, column_meaning, unit_of_name
 from driftwalk.record.raw import ReadOptions
-from driftwalk.record.tables.column_reading import ColumnReading, TableReading
-from driftwalk.record.tables.source import TableSource
+from driftwalk.record.tables.source import ColumnReading, TableReading, TableSource
 from driftwalk.record.vocabulary import (
     ALLOWED,
     FRONT,

@@ -86,15 +86,15 @@ class MovementLoader:
         if own and "orientation" in dataset and chosen.heading is None:
             angles = _orientation(dataset, individuals)
             for body in raw.bodies:
-                known = np.isfinite(angles[body.name]).any()
-                body.theta = angles[body.name] if known else None
+                theta = angles[body.name]
+                body.theta = theta if np.isfinite(theta).any() else None
         rate = dataset.attrs.get("fps")
-        stated = position.attrs.get("units")
-        known = isinstance(stated, str) and stated in (*LENGTH_UNITS, "px")
+        units = (*LENGTH_UNITS, "px")
+        stated = next((one for one in units if one == position.attrs.get("units")), None)
         return replace(
             raw,
             clock_unit=unit,
-            length_unit=stated if known else options.length_unit or "px",
+            length_unit=stated or options.length_unit or "px",
             frame_rate_hz=float(rate) if rate is not None and unit == "frame" else None,
             attrs=_known(dataset, path) if own else {},
         )
