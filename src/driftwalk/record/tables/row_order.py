@@ -231,8 +231,13 @@ def body_columns(
     x_column, y_column = _position(reading)
     numbers = {x_column, y_column, *reading.numbers[:1]}
     taken = {*numbers, *reading.numbers, *reading.stamps, reading.body_column}
+    # "min" next to "sec" names no body, and neither does a column of another known meaning.
     free = tuple(
-        index for index, name in enumerate(names) if index not in taken and _may_be_a_name(name)
+        index
+        for index, name in enumerate(names)
+        if index not in taken
+        and UNITS.get(name.strip().lower()) not in ALLOWED["t"]
+        and ((meaning := column_meaning(name)) is None or meaning.quantity == "body")
     )
     # The first rows tell the columns of measurements, which have another value in every row.
     wanted = TableLayout(
@@ -249,13 +254,6 @@ def body_columns(
         and _tells_apart(table.codes[index], times, x, y, in_order=in_order)
     }
     return [names[index] for index in sorted(found, key=lambda index: found[index])[:3]]
-
-
-def _may_be_a_name(column: str) -> bool:
-    if UNITS.get(column.strip().lower()) in ALLOWED["t"]:
-        return False  # "min" next to "sec"
-    meaning = column_meaning(column)
-    return meaning is None or meaning.quantity == "body"
 
 
 def _are_names(labels: list[str], *, rows: int) -> bool:

@@ -82,7 +82,11 @@ class TumLoader:
         named = any(line.lstrip("# ").split() == _NAMES for line in lines if line[:1] == "#")
         if not rows or not all(len(row) == len(_NAMES) and is_numeric_row(row) for row in rows):
             return 0.0
-        return 0.9 if named or all(_is_unit(row[4:]) for row in rows) else 0.0
+        try:
+            lengths = [math.hypot(*map(float, row[4:])) for row in rows]
+        except ValueError:
+            lengths = [0.0]
+        return 0.9 if named or all(abs(one - 1.0) < 0.02 for one in lengths) else 0.0
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the one body."""
@@ -90,13 +94,6 @@ class TumLoader:
         layout = TableLayout(" ", _NAMES, len([*comments]))
         columns = dict(zip(("x", "y", "z", *PARTS), _NAMES[1:], strict=True))
         return _in_space(path, options, columns, layout, "s")
-
-
-def _is_unit(fields: list[str]) -> bool:
-    try:
-        return abs(math.hypot(*map(float, fields)) - 1.0) < 0.02
-    except ValueError:
-        return False
 
 
 LOADERS = (EurocLoader(), TumLoader())
