@@ -408,7 +408,7 @@ def test_trex_csv(tmp_path: Path) -> None:
     np.testing.assert_allclose(dataset["x"].values[:, 0], [0.02, np.nan, 0.025])
     np.testing.assert_allclose(body_track(dataset).theta, -0.5)
     lost = write(tmp_path / "x.csv", "frame,X#wcentroid (cm),blobid", "0,1,2")
-    with pytest.raises(FormatError, match="has no point .wcentroid. in x and y"):
+    with pytest.raises(FormatError, match="has no point 'wcentroid' in x and y"):
         load(lost, frame_rate=10.0)
 
 

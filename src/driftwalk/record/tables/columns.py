@@ -49,7 +49,12 @@ class _Reader(NamedColumns):
         self.choose()
         box = find_box(self.source, self.options, self.meanings, self.chosen)
         if box is not None:
-            self.drop(box.replaced, box.why)
+            around = [
+                at
+                for at, one in self.meanings.items()
+                if one.body.lower() in ("bbox", "bb", "box") and at not in box.sides.values()
+            ]
+            self.drop((*box.replaced, *around), box.why)
             self.result.box = box if box.sides else None
             self.result.notes += box.notes
         self.leave_out_other_pairs()
@@ -82,7 +87,13 @@ class _Reader(NamedColumns):
         if box is not None and (not bodies or not {"x", "y"} <= set(box.sides)):
             name = next((body for body in bodies if not body), "")
             bodies = {name: {**places.get(name, {}), **box.sides}}
-        elif box is not None and len(bodies) == 1:
+        elif box is not None:
+            if len(bodies) > 1:
+                raise InputError(
+                    f"a box stands next to several bodies, {listed([*map(repr, bodies)])}: leave "
+                    'out what it does not surround by `columns={"skip": "NAME+NAME"}`, or add '
+                    '`box="none"`'
+                )
             bodies = {name: {**one, **box.sides} for name, one in bodies.items()}
         if not bodies:
             raise InputError(
