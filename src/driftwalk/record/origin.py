@@ -77,8 +77,8 @@ def origin_of(
     InputError
         When it is nothing that can be read, or an option is about something else.
     """
-    table = table_in_memory(data)
-    if table is not None:
+    if not (isinstance(data, str) or hasattr(data, "__fspath__")):
+        table = table_in_memory(data)
         return _of_table(table, options, format=format, replicate=replicate)
     path = Path(data)
     if replicate is not None and kind_of_file(path) != "simulation":

@@ -325,7 +325,9 @@ class _Collected:
                 values = self._from_origin(values)
             self._parts[column].append(values.astype(np.float64))
         for column, seen in self._labels.items():
-            self._parts[column].append(_encode(frame[column], seen))
+            local, texts = frame[column].fillna("").astype(str).factorize()
+            index = [seen.setdefault(str(text), len(seen)) for text in texts]
+            self._parts[column].append(np.array(index, dtype=np.int32)[local])
         if self._stamps:
             self._parts[self._layout.stamps[0]].append(self._clock(frame, block, line))
 
@@ -510,12 +512,3 @@ def _quoted(characters: npt.NDArray[np.uint8], starts: Integers) -> Bools:
     within = before - np.repeat(before[starts] - marks[starts], lengths)
     closed = np.repeat(per_line % 2 == 0, lengths)
     return np.asarray((within % 2 == 1) & closed)
-
-
-def _encode(values: Any, seen: dict[str, int]) -> Codes:
-    """Turn the texts of a column into numbers, adding new ones to `seen`."""
-    import pandas as pd
-
-    local, found = pd.factorize(values.fillna("").astype(str))
-    index = np.array([seen.setdefault(str(text), len(seen)) for text in found], dtype=np.int32)
-    return index[local]

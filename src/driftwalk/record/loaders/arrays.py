@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from driftwalk.core.errors import FormatError, InputError, damaged_as
+from driftwalk.core.errors import InputError, damaged_as
 from driftwalk.record.column_names import column_meaning
 from driftwalk.record.raw import RawRecording, ReadOptions
 from driftwalk.record.stores.hdf5 import Hdf5Contents, opened_hdf5, text_of
@@ -80,8 +80,6 @@ def _of_array(path: Path, options: ReadOptions) -> RawRecording:
         # There are more samples than quantities, whichever way they lie.
         array = array.T
     table = table_in_memory(array.ravel() if array.dtype.names is not None else array)
-    if table is None:
-        raise FormatError("holds no table")
     return recording_of(table, options)
 
 
@@ -158,23 +156,16 @@ class ArrowLoader:
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the columns."""
-        table = table_in_memory(_frame(path))
-        if table is None:
-            raise FormatError("holds no table")
-        return recording_of(table, options)
-
-
-def _frame(path: Path) -> Any:
-    """Return the columns as a DataFrame of pandas."""
-    try:
-        from pyarrow import feather, parquet
-    except ImportError as error:
-        raise InputError(
-            "Parquet and Feather need pyarrow: pip install 'driftwalk[arrow]', or save CSV"
-        ) from error
-    with damaged_as("by pyarrow", path):
-        is_parquet = file_start(path).startswith(_PARQUET)
-        return (parquet if is_parquet else feather).read_table(path).to_pandas()
+        try:
+            from pyarrow import feather, parquet
+        except ImportError as error:
+            raise InputError(
+                "Parquet and Feather need pyarrow: pip install 'driftwalk[arrow]', or save CSV"
+            ) from error
+        with damaged_as("by pyarrow", path):
+            is_parquet = file_start(path).startswith(_PARQUET)
+            frame = (parquet if is_parquet else feather).read_table(path).to_pandas()
+        return recording_of(table_in_memory(frame), options)
 
 
 LOADERS = (ArraysLoader(), ArrowLoader())

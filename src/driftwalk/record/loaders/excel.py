@@ -54,25 +54,20 @@ class ExcelLoader:
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the sheet that holds positions."""
-        _refuse_other(path)
+        if file_start(path).startswith(_OLD):
+            raise FormatError(
+                "is a workbook of Excel before 2007 (.xls), or one with a password: save it as "
+                ".xlsx without a password, or as CSV"
+            )
+        members = zip_names(path)
+        if _WORKBOOK not in members:
+            advice = next((text for name, text in _OTHERS.items() if name in members), None)
+            raise FormatError(advice or "is no Excel workbook, or a damaged one")
         with _opened(path) as book:
             titles = [sheet.title for sheet in book.worksheets]
         sources = [SheetSource(path, title, options) for title in titles]
         filled = {one.sheet: one for one in sources if one.names}
         return recording_of(the_one_that_fits(filled, options, "sheet"), options)
-
-
-def _refuse_other(path: Path) -> None:
-    """Refuse workbooks of other formats, by name."""
-    if file_start(path).startswith(_OLD):
-        raise FormatError(
-            "is a workbook of Excel before 2007 (.xls), or one with a password: save it as "
-            ".xlsx without a password, or as CSV"
-        )
-    members = zip_names(path)
-    if _WORKBOOK not in members:
-        advice = next((text for name, text in _OTHERS.items() if name in members), None)
-        raise FormatError(advice or "is no Excel workbook, or a damaged one")
 
 
 @contextmanager

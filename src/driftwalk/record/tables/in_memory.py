@@ -334,8 +334,8 @@ def table_of(
     )
 
 
-def table_in_memory(data: Any) -> MemorySource | None:
-    """Return a table of what a caller in Python holds, None of a path.
+def table_in_memory(data: Any) -> MemorySource:
+    """Return a table of what a caller in Python holds.
 
     Parameters
     ----------
@@ -353,8 +353,6 @@ def table_in_memory(data: Any) -> MemorySource | None:
     >>> table_in_memory({"t": [0.0, 0.1], "x": [1.0, 2.0], "y": [0.0, 0.0]}).names
     ['t', 'x', 'y']
     """
-    if isinstance(data, str) or hasattr(data, "__fspath__"):
-        return None
     if hasattr(data, "data_vars"):
         raise InputError("this is a dataset: a recording is loaded of " + TAKEN)
     if isinstance(data, np.ndarray):
