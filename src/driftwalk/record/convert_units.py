@@ -43,22 +43,15 @@ def detect_quantum(values: Array) -> float:
     >>> detect_quantum(np.arange(100) % 7 * 0.25)
     0.25
     """
-    known = _some_known(values)
+    present = np.isfinite(values)
+    count = int(present.sum())
+    every = count // 50_000 + 1 if count > 50_000 else 1  # of many every second, third, ... one
+    known = values[::every] if count == values.size else values[np.flatnonzero(present)[::every]]
     if known.size < 2:
         return 0.0
     decimal = _decimal_quantum(known)
     coarse = _lattice_quantum(known, decimal)
     return coarse if coarse > 0.0 else decimal
-
-
-def _some_known(values: Array) -> Array:
-    """Return the finite values, of many every second, third, ... one."""
-    present = np.isfinite(values)
-    count = int(present.sum())
-    if count <= 50_000:
-        return values[present]
-    every = count // 50_000 + 1
-    return values[::every] if count == values.size else values[np.flatnonzero(present)[::every]]
 
 
 def common_quantum(series: Iterable[Array]) -> float:

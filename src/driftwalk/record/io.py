@@ -312,7 +312,10 @@ def _assemble(
     totals = {key: sum(getattr(one, key) for one in counts.values()) for key in vars(Counts())}
     time, x, y, theta = _one_clock(bodies)
     if "sample_rate_Hz" not in attrs and time.size > 1:
-        attrs["sample_rate_Hz"] = _usual_rate(bodies)
+        # The differences are the median's own to sort: a long recording is not to be held twice.
+        steps = (np.diff(body.clock) for body in bodies if body.clock.size > 1)
+        intervals = [float(np.median(step, overwrite_input=True)) for step in steps]
+        attrs["sample_rate_Hz"] = float(1.0 / np.median(intervals)) if intervals else 0.0
     if twice := totals["times_in_two_places"]:
         notes.append(f"times with rows in different places, of which the last is kept: {twice}")
     notes += [*plausibility_warnings(bodies), *jumps]
@@ -386,13 +389,6 @@ def _on_clock(time: Array, bodies: list[RawBody], values: Sequence[Array | None]
         if one is not None:
             columns[np.searchsorted(time, body.clock), index] = one
     return columns
-
-
-def _usual_rate(bodies: list[RawBody]) -> float:
-    # The differences are the median's own to sort: a long recording is not to be held once more.
-    steps = [np.diff(body.clock) for body in bodies if body.clock.size > 1]
-    intervals = [float(np.median(step, overwrite_input=True)) for step in steps]
-    return float(1.0 / np.median(intervals)) if intervals else 0.0
 
 
 CSV_COLUMNS = ["t_s", "x_m", "y_m", "theta_rad", "body"]

@@ -360,7 +360,10 @@ def table_in_memory(data: Any) -> MemorySource:
     if hasattr(data, "iloc") and hasattr(data, "columns"):
         return _of_pandas(data)
     if hasattr(data, "get_column") and hasattr(data, "columns"):
-        return _of_polars(data)
+        series = [data.get_column(name) for name in data.columns]
+        zoned = {at for at, one in enumerate(series) if getattr(one.dtype, "time_zone", None)}
+        columns = [np.asarray(one.to_numpy()) for one in series]
+        return _checked("the DataFrame", list(data.columns), columns, frozenset(zoned))
     if isinstance(data, Mapping):
         columns = [
             np.ma.asarray(one) if np.ma.isMA(one) else np.asarray(one) for one in data.values()
@@ -426,10 +429,3 @@ def _of_series(series: Any) -> Values:
     return np.asarray(
         series.to_numpy(np.float64, na_value=np.nan) if missing else series.to_numpy()
     )
-
-
-def _of_polars(frame: Any) -> MemorySource:
-    names = list(frame.columns)
-    columns = [frame.get_column(name) for name in names]
-    zoned = frozenset(at for at, one in enumerate(columns) if getattr(one.dtype, "time_zone", None))
-    return _checked("the DataFrame", names, [np.asarray(one.to_numpy()) for one in columns], zoned)

@@ -209,9 +209,14 @@ def only_matlab(variables: dict[str, Value]) -> str:
     >>> only_matlab({"T": Opaque("table")}).split(":")[0]
     "'T' is a MATLAB table, which only MATLAB can read"
     """
-    found = [
-        (name, value.kind) for name, value in _with_fields(variables) if isinstance(value, Opaque)
-    ]
+    inner = {
+        f"{name}.{field}": one
+        for name, value in variables.items()
+        if isinstance(value, Struct) and value.elements
+        for field, one in value.elements[0].items()
+    }
+    everything = [*variables.items(), *inner.items()]
+    found = [(name, value.kind) for name, value in everything if isinstance(value, Opaque)]
     if not found:
         return ""
     name, kind = next((one for one in found if one[1] in _TABLES), found[0])
@@ -223,17 +228,6 @@ def only_matlab(variables: dict[str, Value]) -> str:
             f"S = table2struct({change}, 'ToScalar', true)"
         )
     return f"{what}: save {_SAVED.get(kind, 'it as numbers')} in its place"
-
-
-def _with_fields(variables: dict[str, Value]) -> list[tuple[str, Value]]:
-    """Return variables, and the fields of those that are structs."""
-    inner = [
-        (f"{name}.{field}", one)
-        for name, value in variables.items()
-        if isinstance(value, Struct) and value.elements
-        for field, one in value.elements[0].items()
-    ]
-    return [*variables.items(), *inner]
 
 
 def _table(value: Value, what: str) -> MemorySource | None:
