@@ -13,7 +13,7 @@ from scipy.io import savemat
 
 import driftwalk as dw
 from driftwalk.core.errors import FormatError, InputError
-from driftwalk.record.tables.cells import as_numbers
+from driftwalk.record.tables.in_memory import as_numbers
 
 PIXELS = ("--scale", "0.001")
 

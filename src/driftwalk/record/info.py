@@ -96,7 +96,12 @@ def _describe_body(trajectory: xr.Dataset, name: str) -> dict[str, Any]:
         "samples": int(track.time.size),
         "has_orientation": track.has_orientation,
         **_clock(track),
-        **_extent(track),
+        **{
+            f"{axis}_{side}_m": float(getattr(np, side)(getattr(track, axis)))
+            for axis in ("x", "y")
+            for side in ("min", "max")
+            if track.time.size
+        },
         **_speed(track),
         **noise._asdict(),
     }
@@ -129,16 +134,6 @@ def _clock(track: Track) -> dict[str, Any]:
         "gaps": int(gaps.sum()),
         "longest_gap_s": float(interval[gaps].max()) if gaps.any() else 0.0,
         "gap_time_share": float((interval[gaps] - usual).sum()) / duration,
-    }
-
-
-def _extent(track: Track) -> dict[str, Any]:
-    if not track.time.size:
-        return {}
-    return {
-        f"{axis}_{side}_m": float(getattr(np, side)(getattr(track, axis)))
-        for axis in ("x", "y")
-        for side in ("min", "max")
     }
 
 

@@ -88,7 +88,7 @@ INNER: Final = words("mm cm um µm μm nm dm px pixel pixels deg degrees rad mra
 """Units that never name a body: they also count in the middle of a name (x_mm_filtered)."""
 
 IMAGE_WORDS: Final = words(
-    "p pos posn position center centre centroid image coord coordinate mitte schwerpunkt "
+    "is p pos posn position center centre centroid image coord coordinate mitte schwerpunkt "
     "mittelpunkt posición posicion centro posizione centroide"
 )
 """Words next to x or y that name no body. They hint at an image: such lengths are not metres."""

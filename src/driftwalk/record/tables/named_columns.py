@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Final, NamedTuple
+from typing import Final
 
 from driftwalk.core.errors import InputError, argument_text, listed
 from driftwalk.record.column_names import ColumnMeaning, column_meaning, unit_of_name
 from driftwalk.record.raw import ReadOptions
-from driftwalk.record.tables.column_reading import ColumnReading, TableReading
-from driftwalk.record.tables.source import TableSource
+from driftwalk.record.tables.source import ColumnReading, TableReading, TableSource
 from driftwalk.record.vocabulary import (
     ALLOWED,
     FRONT,
@@ -118,10 +117,13 @@ class NamedColumns:
         """Leave out pairs that are not a body, or repeat one, where there is another pair."""
         ys, thetas = self.bodies_with("y"), self.bodies_with("theta")
         bodies = [body for body in self.bodies_with("x") if body in ys]
-        kinds = {one.body: _kinds(one.body) for one in self.meanings.values()}
-        real = [body for body in bodies if not any(kinds[body])]
-        setpoints = [body for body in bodies if kinds[body].setpoint]
-        variants = [body for body in bodies if kinds[body] == (False, True)]
+        words = {
+            one.body: {word.lower().rstrip("0123456789") for word in one.body.split("_")}
+            for one in self.meanings.values()
+        }
+        setpoints = [body for body in bodies if words[body] & SETPOINTS]
+        variants = [body for body in bodies if words[body] & VARIANTS and body not in setpoints]
+        real = [body for body in bodies if body not in (*setpoints, *variants)]
         left: dict[str, str] = {}
         if real or variants or self.result.box is not None:
             left = dict.fromkeys(setpoints, _OTHER_BODY)
@@ -133,11 +135,11 @@ class NamedColumns:
                 "there is no other pair of x and y"
             )
         left |= self._computed(variants, real)
-        for body, kind in kinds.items():
+        for body in [one for one in words if one not in bodies]:
             # An angle of a setpoint stands alone where its position has other names.
-            if kind.setpoint and body not in bodies:
+            if words[body] & SETPOINTS:
                 left[body] = _OTHER_BODY
-            if kind.variant and body not in bodies and _base(body) in thetas:
+            if words[body] & VARIANTS and _base(body) in thetas:
                 left[body] = _SAME_BODY
         for at, meaning in list(self.meanings.items()):
             if meaning.body in left:
@@ -241,18 +243,6 @@ class NamedColumns:
             f"columns '{self.names[first]}' and '{self.names[second]}' could both be "
             f"{quantity}: name one with {argument_text('columns', {quantity: 'NAME'})}"
         )
-
-
-class _Kinds(NamedTuple):
-    """Whether the name of a body has words of a setpoint, and of a computation."""
-
-    setpoint: bool
-    variant: bool
-
-
-def _kinds(body: str) -> _Kinds:
-    words = {word.lower().rstrip("0123456789") for word in body.split("_")}
-    return _Kinds(bool(words & SETPOINTS), bool(words & VARIANTS))
 
 
 def _base(body: str) -> str:

@@ -25,10 +25,9 @@ from driftwalk.record.raw import (
 )
 from driftwalk.record.space import Plane, body_in_plane, on_the_ground, plane_of_columns
 from driftwalk.record.tables.boxes import box_angle, box_centre
-from driftwalk.record.tables.column_reading import TableReading
 from driftwalk.record.tables.columns import read_columns
 from driftwalk.record.tables.row_order import body_columns, other_order
-from driftwalk.record.tables.source import TableSource
+from driftwalk.record.tables.source import TableReading, TableSource
 from driftwalk.record.tables.stamps import DAY, count_days
 from driftwalk.record.text import Table
 from driftwalk.record.vocabulary import words
@@ -70,7 +69,12 @@ def recording_of(source: TableSource, options: ReadOptions) -> RawRecording:
     reading, planes = columns_of(source, options)
     labels = [column.name for column in reading.columns]
     if reading.clock is None:
-        _require_rows_are_frames(source, reading, labels, options)
+        found = other_order(source, reading, labels)
+        if found is not None:
+            raise source.error(found)
+        if options.frame_rate_hz is None:
+            scale = scale_wanted(reading.length_unit, bare_is_si=False, options=options)
+            raise source.error(NAME_THE_CLOCK + (f"; {scale}" if scale else ""))
     table = _read(source, reading, labels)
     clock = _clock(table, reading)
     notes = [*reading.notes, *_unread_angles(reading)]
@@ -226,18 +230,6 @@ def _clock(table: Table, reading: TableReading) -> Array:
     return clock
 
 
-def _require_rows_are_frames(
-    source: TableSource, reading: TableReading, labels: list[str], options: ReadOptions
-) -> None:
-    """Refuse a table without a known clock whose rows cannot, or need not, be frames."""
-    found = other_order(source, reading, labels)
-    if found is not None:
-        raise source.error(found)
-    if options.frame_rate_hz is None:
-        scale = scale_wanted(reading.length_unit, bare_is_si=False, options=options)
-        raise source.error(NAME_THE_CLOCK + (f"; {scale}" if scale else ""))
-
-
 def _unread_angles(reading: TableReading) -> list[str]:
     """Say which columns look like the orientation by their unit alone, where none was found."""
     if any({"theta", "qw"} & set(places) for places in reading.bodies.values()):
@@ -379,8 +371,14 @@ def the_one_that_fits(
     """
     if not tables:
         raise FormatError(f"has no {what} that is a table")
-    if options.sheet is not None:
-        return _named(tables, options.sheet, what)
+    wanted = options.sheet
+    if wanted is not None:
+        number = int(wanted) if wanted.isdecimal() and wanted not in tables else 0
+        if wanted not in tables and not 1 <= number <= len(tables):
+            raise FormatError(
+                f"{argument_text('sheet', wanted)}: no such {what}; it has {listed(list(tables))}"
+            )
+        return [*tables.values()][number - 1] if number else tables[wanted]
     if len(tables) == 1:
         return next(iter(tables.values()))
     fitting: list[str] = []
@@ -401,13 +399,3 @@ def the_one_that_fits(
             f"has no {what} with positions among {listed(list(tables))}; {reasons[0]}"
         )
     return tables[fitting[0]]
-
-
-def _named(tables: Mapping[str, TableSource], wanted: str, what: str) -> TableSource:
-    if wanted in tables:
-        return tables[wanted]
-    if wanted.isdecimal() and 1 <= int(wanted) <= len(tables):
-        return list(tables.values())[int(wanted) - 1]
-    raise FormatError(
-        f"{argument_text('sheet', wanted)}: no such {what}; it has {listed(list(tables))}"
-    )

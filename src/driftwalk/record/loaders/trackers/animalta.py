@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from driftwalk.core.errors import FormatError
-from driftwalk.record.cleaning.several_bodies import split_bodies
+from driftwalk.record.cleaning.several_bodies import codes_in_arenas, split_bodies
 from driftwalk.record.loaders.plain import side_by_side
 from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.text import read_table
@@ -57,9 +57,10 @@ class AnimalTALoader:
         rate = None if options.frame_rate_hz is not None else _rate(frame, time)
         timed = rate is None and options.frame_rate_hz is None
         if timed:
-            bodies = [
-                RawBody(one.name, _times(one.clock, frame, time), one.x, one.y) for one in bodies
-            ]
+            order = np.argsort(frame, kind="stable")
+            for one in bodies:
+                places = np.searchsorted(frame[order], one.clock).clip(0, frame.size - 1)
+                one.clock = time[order][places]
         return RawRecording(
             bodies,
             clock_unit="s" if timed else "frame",
@@ -71,17 +72,10 @@ class AnimalTALoader:
 
 def _stacked(path: Path, names: list[str], skip: int) -> tuple[list[RawBody], Array, Array]:
     table = read_table(path, TableLayout(";", names, skip, (0, 1, 4, 5), (2, 3)))
-    arenas, targets = table.labels[2], table.labels[3]
-    pairs = table.codes[2].astype(np.int64) * len(targets) + table.codes[3]
-    found, codes = np.unique(pairs, return_inverse=True)
-    labels = [
-        f"{arenas[pair // len(targets)]}/Ind{targets[pair % len(targets)]}"
-        if len(arenas) > 1
-        else f"Ind{targets[pair % len(targets)]}"
-        for pair in found.tolist()
-    ]
+    targets = [f"Ind{label}" for label in table.labels[3]]
+    codes, labels = codes_in_arenas((table.codes[2], table.labels[2]), (table.codes[3], targets))
     frame, time, x, y = (table.numbers[column] for column in (0, 1, 4, 5))
-    bodies = split_bodies(codes.ravel().astype(np.int32), labels, clock=frame, x=x, y=y)
+    bodies = split_bodies(codes, labels, clock=frame, x=x, y=y)
     return bodies, frame.copy(), time
 
 
@@ -104,13 +98,6 @@ def _rate(frame: Array, time: Array) -> float | None:
         ):
             return rate
     return None
-
-
-def _times(clock: Array, frame: Array, time: Array) -> Array:
-    """Return the times of frames."""
-    order = np.argsort(frame, kind="stable")
-    times: Array = time[order][np.searchsorted(frame[order], clock).clip(0, frame.size - 1)]
-    return times
 
 
 LOADER = AnimalTALoader()

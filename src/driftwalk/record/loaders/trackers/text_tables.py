@@ -21,21 +21,19 @@ import numpy as np
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.bad_row import is_number, split_fields
-from driftwalk.record.cleaning.several_bodies import split_bodies
+from driftwalk.record.cleaning.several_bodies import (
+    codes_in_arenas,
+    number_codes,
+    split_bodies,
+)
 from driftwalk.record.column_names import unit_of_name
 from driftwalk.record.loaders.json_formats import bounded_text, column_of
-from driftwalk.record.loaders.plain import HeadedFormat, side_by_side
-from driftwalk.record.raw import Marks, RawBody, RawRecording, ReadOptions, TableLayout
+from driftwalk.record.loaders.plain import HeadedFormat, described, side_by_side
+from driftwalk.record.raw import Marks, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.tables.in_memory import MemorySource
 from driftwalk.record.tables.rows import recording_of
 from driftwalk.record.text import header_rows, read_head, read_table
-from driftwalk.record.text_head import (
-    first_line,
-    first_lines,
-    first_row,
-    is_numeric_row,
-    read_header,
-)
+from driftwalk.record.text_head import first_line, first_lines, first_row, is_numeric_row
 
 _DLTDV = re.compile(r"(?P<body>pt\d+_cam\d+)_(?P<axis>[XY])", re.IGNORECASE)
 
@@ -83,17 +81,9 @@ class SmarticlesLoader:
 
     def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the three robots."""
-        names, delimiter, skip, has_header = read_header(path, delimiter=options.delimiter)
-        if has_header or len(names) != 11:
-            raise FormatError("expected eleven columns without a header", line=1)
-        table = read_table(path, TableLayout(delimiter, SMARTICLES, skip, tuple(range(1, 11))))
-        bodies = [
-            RawBody(
-                str(at), *(table.numbers[column] for column in (1, *range(3 * at - 1, 3 * at + 2)))
-            )
-            for at in (1, 2, 3)
-        ]
-        return RawRecording(bodies, clock_unit="s", bare_clock="", separate=True, length_unit="px")
+        layout = TableLayout(options.delimiter or ",", SMARTICLES)
+        own = {"bare_clock": "", "separate": True, "length_unit": "px"}
+        return described(path, options, {}, layout, **own)
 
 
 TOXTRAC: Final = ["frame", "arena", "track", "x", "y", "label"]
@@ -129,13 +119,8 @@ class ToxTracLoader:
         clock, arena, track, x, y, label = (table.numbers[column] for column in range(6))
         if not (np.isfinite(arena) & np.isfinite(track)).all():
             raise FormatError("a row names no arena or no track")
-        pairs, codes = np.unique(np.stack([arena, track]), axis=1, return_inverse=True)
-        several = np.unique(pairs[0]).size > 1
-        labels = [
-            f"{place:g}/{number:g}" if several else f"{number:g}"
-            for place, number in pairs.T.tolist()
-        ]
-        bodies = split_bodies(codes.ravel().astype(np.int32), labels, clock=clock, x=x, y=y)
+        codes, labels = codes_in_arenas(number_codes(arena), number_codes(track))
+        bodies = split_bodies(codes, labels, clock=clock, x=x, y=y)
         # Label 0 is a position that was predicted, not seen.
         predicted = int((label == 0.0).sum())
         return RawRecording(
@@ -168,26 +153,19 @@ class UbiTrailLoader:
         lines = first_lines(head, 2)
         return 0.95 if len(lines) == 2 and lines[1].split(",") == UBITRAIL else 0.0
 
-    def read(self, path: Path, _options: ReadOptions) -> RawRecording:
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read every area and turn widths of the area into pixels."""
         widths = _area_widths(path)
-        table = read_table(path, TableLayout(",", UBITRAIL, 2, (2, 3, 4), (0,)))
-        areas = table.labels[0]
-        unknown = [area for area in areas if area not in widths]
-        if unknown:
-            raise FormatError(f"the metadata give no width for area {unknown[0]}", line=1)
-        scale = np.array([widths[area] for area in areas])[table.codes[0]]
-        with np.errstate(over="ignore"):  # an infinite position is a gap
-            x, y = (table.numbers[column] * scale for column in (2, 3))
-        bodies = split_bodies(table.codes[0], areas, clock=table.numbers[4], x=x, y=y)
+        columns = {"t": "time:ms", "x": "X", "y": "Y", "body": "Area"}
         # An area is a body. The clock, of a video's file, often says the same of two frames.
-        return RawRecording(
-            bodies,
-            clock_unit="ms",
-            length_unit="px",
-            separate=True,
-            attrs={"bodies_apart": "yes"},
-        )
+        own = {"length_unit": "px", "separate": True, "attrs": {"bodies_apart": "yes"}}
+        raw = described(path, options, columns, TableLayout(",", UBITRAIL, 2), **own)
+        for body in raw.bodies:
+            if body.name not in widths:
+                raise FormatError(f"the metadata give no width for area {body.name}", line=1)
+            with np.errstate(over="ignore"):  # an infinite position is a gap
+                body.x, body.y = (axis * widths[body.name] for axis in (body.x, body.y))
+        return raw
 
 
 def _area_widths(path: Path) -> dict[str, float]:
@@ -227,7 +205,7 @@ class YupiLoader:
         )
         return 0.9 if known else 0.0
 
-    def read(self, path: Path, _options: ReadOptions) -> RawRecording:
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
         """Read the trajectory."""
         rows = [split_fields(line, ",") or [""] for line in header_rows(path, 20)]
         second = bool(rows) and rows[0][0] == "v2"
@@ -241,9 +219,11 @@ class YupiLoader:
         if len(axes) < 2:
             raise FormatError(f"has {len(axes)} dimensions, and a path in the plane needs two")
         names = [*axes, "t", *(one for one in further if one)]
-        table = read_table(path, TableLayout(",", names, skip, (0, 1, len(axes))))
-        body = RawBody(name or "0", table.numbers[len(axes)], table.numbers[0], table.numbers[1])
-        return RawRecording([body], clock_unit="s", bare_clock="")
+        columns = {"t": "t:s", "x": "x", "y": "y"}
+        layout = TableLayout(",", names, skip)
+        raw = described(path, options, columns, layout, bare_clock="", length_unit="")
+        raw.bodies[0].name = name or "0"
+        return raw
 
 
 _KINOVEA: Final = b"#Kinovea Trajectory"
