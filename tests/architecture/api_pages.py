@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import importlib
 import inspect
+import os
 import re
 from functools import cached_property
 from pathlib import Path
@@ -20,7 +21,8 @@ from signatures import bases_of, signature_of
 
 import driftwalk
 
-FOLDER: Final = Path(__file__).resolve().parents[2] / "docs" / "reference" / "python"
+DOCS: Final = Path(__file__).resolve().parents[2] / "docs"
+FOLDER: Final = DOCS / "reference" / "python"
 MADE: Final = "% Made from the docstrings by `python tests/architecture/api_pages.py`."
 ALL: Final = "names.md"
 # The calls of a notebook first, then the rooms in the order of the data.
@@ -52,7 +54,7 @@ TABLE: Final = "| name | what |\n|---|---|\n"
 def all_pages() -> dict[Path, str]:
     """Return the pages by their paths: of all names, of each room, of each function and class."""
     rooms = (*ROOMS, ERRORS)
-    return {
+    pages = {
         FOLDER / ALL: _page_of_all(),
         **{FOLDER / f"{_file(name)}.md": _room_page(name) for name in rooms},
         **{
@@ -62,6 +64,16 @@ def all_pages() -> dict[Path, str]:
             if _is_documented(getattr(_room(name), public))
         },
     }
+    return {path: _with_links(path, text) for path, text in pages.items()}
+
+
+def _with_links(path: Path, text: str) -> str:
+    """Return a page on which each other page that a docstring names is a link."""
+
+    def link(found: re.Match[str]) -> str:
+        return f"[{found[1]}]({os.path.relpath(DOCS.parent / found[1], path.parent)})"
+
+    return re.sub(r"`?\b(docs/[\w/-]+\.md)`?(?![\w)\]])", link, text)
 
 
 def _page_of_all() -> str:

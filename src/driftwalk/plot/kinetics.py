@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -28,6 +28,9 @@ CLASS_PT = 28.0
 """Diameter of the circle about the sketch of a class [pt]; chosen by eye."""
 APART_PT = 3.5
 """Half of the distance between an arrow there and the one back [pt]; chosen by eye."""
+GROUND: Final[dict[str, Any]] = {"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none"}
+WORDS_ZORDER: Final = 5.0
+"""Above all arrows, on a white ground: none crosses a word."""
 
 
 def plot_class_graph(kinetics: xr.Dataset, ax: Axes | None = None) -> Axes:
@@ -94,9 +97,8 @@ def plot_class_graph(kinetics: xr.Dataset, ax: Axes | None = None) -> Axes:
         free = _free_place(first, last, [*taken, *map(np.array, place.values())], unit)
         taken.append(free)
         ax.text(
-            float(free[0]), float(free[1]), _rate_text(1e3 * rate), fontsize=6.0, ha="center",
-            va="center",
-            bbox={"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none"},
+            float(free[0]), float(free[1]), _rate_text(1e3 * rate), ha="center", va="center",
+            zorder=WORDS_ZORDER, bbox=GROUND,
         )  # fmt: skip
     colors = class_colors(class_names(kinetics))
     for name, at in place.items():
@@ -105,7 +107,7 @@ def plot_class_graph(kinetics: xr.Dataset, ax: Axes | None = None) -> Axes:
         place_sketch(ax, name, at, cell_pt=min(side, 6.0), color=colors[name], discs=discs)
         ax.annotate(
             short_class(name), at, xytext=(0, -15), textcoords="offset points", ha="center",
-            va="top", fontsize=6.5,
+            va="top", zorder=WORDS_ZORDER, bbox=GROUND,
         )  # fmt: skip
     return ax
 
@@ -183,7 +185,7 @@ def plot_predicted_shares(kinetics: xr.Dataset, ax: Axes | None = None) -> Axes:
             seen = one["empirical"].values[source]
             ax.plot(time[::6], seen[::6], marker, color=color, ms=2.5, mew=0.7)
     ax.set(xlabel=TIME_LABEL, ylabel="share of runs", xlim=(time[0], time[-1]), ylim=(0.0, None))
-    ax.legend(ncols=2, fontsize=6.0)
+    ax.legend(ncols=2)
     ax.spines[["top", "right"]].set_visible(False)
     ax.set_title("predicted (lines), seen (points)", loc="left")
     return ax
