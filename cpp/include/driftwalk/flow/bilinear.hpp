@@ -145,8 +145,8 @@ inline void load_between(const LaneTables<float>& lanes, const Int32* at, IntPac
 }
 
 // Keeps the compiler from extracting numbers lane by lane that it has just seen stored: slower.
-template <int Count>
-inline void keep_stored([[maybe_unused]] Int32 (&numbers)[Count]) {
+template <class T>
+inline void keep_stored([[maybe_unused]] T& numbers) {
 #if defined(DRIFTWALK_USE_X86)
   __asm__("" : "+m"(numbers));
 #endif
@@ -257,10 +257,95 @@ inline void look_up(const FlowView<double>& flow, double x, double y, double& u,
   v = (record[2] * (1 - fx) + next[2] * fx) * (1 - fy) + (record[3] * (1 - fx) + next[3] * fx) * fy;
 }
 
+// The same for some lanes of a pack, from `first` on: of a cell both components are weighed at once,
+// which saves to sort its eight numbers by lanes.
+template <int N>
+[[gnu::always_inline]] inline void look_up_lanes(const FlowView<double>& flow, int first,
+                                                 DoublePack<N> x, DoublePack<N> y, double* u,
+                                                 double* v) {
+  using Record = typename VectorOf<double, flow_record>::type;
+  const IntPack<N> column = narrow(x), row = narrow(y);
+  const DoublePack<N> right = x - to_real(x, column), above = y - to_real(y, row);
+  const DoublePack<N> left = 1.0 - right, below = 1.0 - above;
+  // Stored in the least pieces that are read back, and (below, above) of a lane together.
+  alignas(32) Int32 at[N];
+  alignas(32) double across[2][N], up[2][N];
+  store_cells((row << flow.stride_bits) + column, at);
+  std::memcpy(across[0], &left.v, sizeof left.v);
+  std::memcpy(across[1], &right.v, sizeof right.v);
+  if constexpr (N == 4) {
+    const Record even = __builtin_shufflevector(below.v, above.v, 0, 4, 2, 6);
+    const Record odd = __builtin_shufflevector(below.v, above.v, 1, 5, 3, 7);
+    std::memcpy(up[0], &even, sizeof even);
+    std::memcpy(up[1], &odd, sizeof odd);
+  } else {
+    for (int lane = 0; lane < N; ++lane) {
+      up[lane & 1][lane & ~1] = below.v[lane];
+      up[lane & 1][lane | 1] = above.v[lane];
+    }
+  }
+  keep_stored(at);
+  keep_stored(across);
+  keep_stored(up);
+  Record part[N];
+  for (int lane = 0; lane < N; ++lane) {
+    const std::int64_t place = flow_record * std::int64_t(at[lane]);
+    const auto record = [&](int k) {
+      const auto in = [&](const double* table) {
+        Record found;
+        std::memcpy(&found, table + place + k, sizeof found);
+        return found;
+      };
+      if (flow.lanes == nullptr) {
+        return in(flow.table);
+      }
+      const Record before = in(flow.lanes->before[first + lane]);
+      return before +
+             (in(flow.lanes->after[first + lane]) - before) * flow.lanes->weight[first + lane];
+    };
+    const Record along = record(0) * across[0][lane] + record(flow_record) * across[1][lane];
+    const double* const weight = &up[lane & 1][lane & ~1];
+    part[lane] = along * Record{weight[0], weight[1], weight[0], weight[1]};
+  }
+  for (int lane = 0; lane < N; lane += 2) {
+    const Record sum = __builtin_shufflevector(part[lane], part[lane + 1], 0, 4, 2, 6) +
+                       __builtin_shufflevector(part[lane], part[lane + 1], 1, 5, 3, 7);
+    std::memcpy(u + lane, &sum, 2 * sizeof(double));
+    std::memcpy(v + lane, reinterpret_cast<const double*>(&sum) + 2, 2 * sizeof(double));
+  }
+}
+
+template <int N>
+[[gnu::always_inline]] inline void look_up(const FlowView<double>& flow, DoublePack<N> x,
+                                           DoublePack<N> y, DoublePack<N>& u, DoublePack<N>& v) {
+  double* const to_u = reinterpret_cast<double*>(&u);
+  double* const to_v = reinterpret_cast<double*>(&v);
+  if constexpr (N == 8) {
+    using Half = DoublePack<4>;
+    look_up_lanes(flow, 0, Half(__builtin_shufflevector(x.v, x.v, 0, 1, 2, 3)),
+                  Half(__builtin_shufflevector(y.v, y.v, 0, 1, 2, 3)), to_u, to_v);
+    look_up_lanes(flow, 4, Half(__builtin_shufflevector(x.v, x.v, 4, 5, 6, 7)),
+                  Half(__builtin_shufflevector(y.v, y.v, 4, 5, 6, 7)), to_u + 4, to_v + 4);
+  } else {
+    look_up_lanes(flow, 0, x, y, to_u, to_v);
+  }
+}
+
 // Walks along a row and reads the flow at each place. Velocities come out divided by the table's
 // unit.
 template <class Real>
-class FlowCursor;
+class FlowCursor {
+public:
+  FlowCursor(const FlowView<double>& flow, Real x, Real y, Real step_x, Real step_y)
+      : flow_(flow), row_(x, y, step_x, step_y) {}
+
+  void read(Real& u, Real& v) const { look_up(flow_, row_.x, row_.y, u, v); }
+  void advance() { row_.advance(); }
+
+private:
+  const FlowView<double>& flow_;
+  FlowRow<Real> row_;
+};
 
 template <int N>
 class FlowCursor<FloatPack<N>> {
@@ -289,20 +374,6 @@ private:
   const FlowView<float>& flow_;
   FlowRow<Real> row_;
   FlowWeights<N> weights_;
-};
-
-template <>
-class FlowCursor<double> {
-public:
-  FlowCursor(const FlowView<double>& flow, double x, double y, double step_x, double step_y)
-      : flow_(flow), row_(x, y, step_x, step_y) {}
-
-  void read(double& u, double& v) const { look_up(flow_, row_.x, row_.y, u, v); }
-  void advance() { row_.advance(); }
-
-private:
-  const FlowView<double>& flow_;
-  FlowRow<double> row_;
 };
 
 // Reads the cells that have been found along rows.
@@ -345,10 +416,11 @@ template <int N>
   }
 }
 
-inline void read_rows(const FlowView<double>& flow, const FlowRow<double>* rows, int row_count,
-                      int count, double* u, double* v) {
+template <class Real>
+[[gnu::noinline]] void read_rows(const FlowView<double>& flow, const FlowRow<Real>* rows,
+                                 int row_count, int count, Real* u, Real* v) {
   for (int r = 0; r < row_count; ++r) {
-    FlowRow<double> row = rows[r];
+    FlowRow<Real> row = rows[r];
     for (int k = 0; k < count; ++k) {
       look_up(flow, row.x, row.y, *u++, *v++);
       row.advance();
