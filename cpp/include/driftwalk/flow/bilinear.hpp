@@ -257,78 +257,84 @@ inline void look_up(const FlowView<double>& flow, double x, double y, double& u,
   v = (record[2] * (1 - fx) + next[2] * fx) * (1 - fy) + (record[3] * (1 - fx) + next[3] * fx) * fy;
 }
 
-// The same for some lanes of a pack, from `first` on: of a cell both components are weighed at once,
-// which saves to sort its eight numbers by lanes.
-template <int N>
-[[gnu::always_inline]] inline void look_up_lanes(const FlowView<double>& flow, int first,
-                                                 DoublePack<N> x, DoublePack<N> y, double* u,
-                                                 double* v) {
-  using Record = typename VectorOf<double, flow_record>::type;
-  const IntPack<N> column = narrow(x), row = narrow(y);
-  const DoublePack<N> right = x - to_real(x, column), above = y - to_real(y, row);
-  const DoublePack<N> left = 1.0 - right, below = 1.0 - above;
-  // Stored in the least pieces that are read back, and (below, above) of a lane together.
-  alignas(32) Int32 at[N];
-  alignas(32) double across[2][N], up[2][N];
-  store_cells((row << flow.stride_bits) + column, at);
-  std::memcpy(across[0], &left.v, sizeof left.v);
-  std::memcpy(across[1], &right.v, sizeof right.v);
-  if constexpr (N == 4) {
-    const Record even = __builtin_shufflevector(below.v, above.v, 0, 4, 2, 6);
-    const Record odd = __builtin_shufflevector(below.v, above.v, 1, 5, 3, 7);
-    std::memcpy(up[0], &even, sizeof even);
-    std::memcpy(up[1], &odd, sizeof odd);
+// The four numbers of each lane's record, `from` of them further on than its cell's first.
+template <int N, class Tables>
+[[gnu::always_inline]] inline void load_record(Tables tables, const Int32* at, int from,
+                                               DoublePack<N>* out) {
+  using Record = VectorOf<double, flow_record>::type;
+  const auto of = [&](int lane) {
+    const double* table;
+    if constexpr (std::is_same_v<Tables, const double*>) {
+      table = tables;
+    } else {
+      table = tables[lane];
+    }
+    Record found;
+    std::memcpy(&found, table + flow_record * std::int64_t(at[lane]) + from, sizeof found);
+    return found;
+  };
+  if constexpr (N == 8) {
+    const auto two = [&](int k) {
+      return __builtin_shufflevector(of(k), of(k + 2), 0, 1, 2, 3, 4, 5, 6, 7);
+    };
+    const auto a = two(0), b = two(1), c = two(4), d = two(5);
+    const auto even_low = __builtin_shufflevector(a, b, 0, 8, 2, 10, 4, 12, 6, 14);
+    const auto odd_low = __builtin_shufflevector(a, b, 1, 9, 3, 11, 5, 13, 7, 15);
+    const auto even_high = __builtin_shufflevector(c, d, 0, 8, 2, 10, 4, 12, 6, 14);
+    const auto odd_high = __builtin_shufflevector(c, d, 1, 9, 3, 11, 5, 13, 7, 15);
+    out[0].v = __builtin_shufflevector(even_low, even_high, 0, 1, 4, 5, 8, 9, 12, 13);
+    out[1].v = __builtin_shufflevector(odd_low, odd_high, 0, 1, 4, 5, 8, 9, 12, 13);
+    out[2].v = __builtin_shufflevector(even_low, even_high, 2, 3, 6, 7, 10, 11, 14, 15);
+    out[3].v = __builtin_shufflevector(odd_low, odd_high, 2, 3, 6, 7, 10, 11, 14, 15);
+  } else if constexpr (N == 4) {
+    const Record a = of(0), b = of(1), c = of(2), d = of(3);
+    const Record even_low = __builtin_shufflevector(a, b, 0, 4, 2, 6);
+    const Record odd_low = __builtin_shufflevector(a, b, 1, 5, 3, 7);
+    const Record even_high = __builtin_shufflevector(c, d, 0, 4, 2, 6);
+    const Record odd_high = __builtin_shufflevector(c, d, 1, 5, 3, 7);
+    out[0].v = __builtin_shufflevector(even_low, even_high, 0, 1, 4, 5);
+    out[1].v = __builtin_shufflevector(odd_low, odd_high, 0, 1, 4, 5);
+    out[2].v = __builtin_shufflevector(even_low, even_high, 2, 3, 6, 7);
+    out[3].v = __builtin_shufflevector(odd_low, odd_high, 2, 3, 6, 7);
   } else {
     for (int lane = 0; lane < N; ++lane) {
-      up[lane & 1][lane & ~1] = below.v[lane];
-      up[lane & 1][lane | 1] = above.v[lane];
-    }
-  }
-  keep_stored(at);
-  keep_stored(across);
-  keep_stored(up);
-  Record part[N];
-  for (int lane = 0; lane < N; ++lane) {
-    const std::int64_t place = flow_record * std::int64_t(at[lane]);
-    const auto record = [&](int k) {
-      const auto in = [&](const double* table) {
-        Record found;
-        std::memcpy(&found, table + place + k, sizeof found);
-        return found;
-      };
-      if (flow.lanes == nullptr) {
-        return in(flow.table);
+      const Record found = of(lane);
+      for (int k = 0; k < flow_record; ++k) {
+        out[k].v[lane] = found[k];
       }
-      const Record before = in(flow.lanes->before[first + lane]);
-      return before +
-             (in(flow.lanes->after[first + lane]) - before) * flow.lanes->weight[first + lane];
-    };
-    const Record along = record(0) * across[0][lane] + record(flow_record) * across[1][lane];
-    const double* const weight = &up[lane & 1][lane & ~1];
-    part[lane] = along * Record{weight[0], weight[1], weight[0], weight[1]};
-  }
-  for (int lane = 0; lane < N; lane += 2) {
-    const Record sum = __builtin_shufflevector(part[lane], part[lane + 1], 0, 4, 2, 6) +
-                       __builtin_shufflevector(part[lane], part[lane + 1], 1, 5, 3, 7);
-    std::memcpy(u + lane, &sum, 2 * sizeof(double));
-    std::memcpy(v + lane, reinterpret_cast<const double*>(&sum) + 2, 2 * sizeof(double));
+    }
   }
 }
 
+// The same for a pack.
 template <int N>
 [[gnu::always_inline]] inline void look_up(const FlowView<double>& flow, DoublePack<N> x,
                                            DoublePack<N> y, DoublePack<N>& u, DoublePack<N>& v) {
-  double* const to_u = reinterpret_cast<double*>(&u);
-  double* const to_v = reinterpret_cast<double*>(&v);
-  if constexpr (N == 8) {
-    using Half = DoublePack<4>;
-    look_up_lanes(flow, 0, Half(__builtin_shufflevector(x.v, x.v, 0, 1, 2, 3)),
-                  Half(__builtin_shufflevector(y.v, y.v, 0, 1, 2, 3)), to_u, to_v);
-    look_up_lanes(flow, 4, Half(__builtin_shufflevector(x.v, x.v, 4, 5, 6, 7)),
-                  Half(__builtin_shufflevector(y.v, y.v, 4, 5, 6, 7)), to_u + 4, to_v + 4);
+  using Real = DoublePack<N>;
+  const IntPack<N> column = narrow(x), row = narrow(y);
+  alignas(32) Int32 at[N];
+  store_cells((row << flow.stride_bits) + column, at);
+  keep_stored(at);
+  const Real fx = x - to_real(x, column), fy = y - to_real(y, row);
+  Real near[flow_record], next[flow_record];
+  if (flow.lanes == nullptr) {
+    load_record(flow.table, at, 0, near);
+    load_record(flow.table, at, flow_record, next);
   } else {
-    look_up_lanes(flow, 0, x, y, to_u, to_v);
+    Real after[2 * flow_record], weight;
+    load_record(flow.lanes->before, at, 0, near);
+    load_record(flow.lanes->before, at, flow_record, next);
+    load_record(flow.lanes->after, at, 0, after);
+    load_record(flow.lanes->after, at, flow_record, after + flow_record);
+    load_lanes(flow.lanes->weight, weight);
+    for (int k = 0; k < flow_record; ++k) {
+      near[k] = blend(near[k], after[k], weight);
+      next[k] = blend(next[k], after[k + flow_record], weight);
+    }
   }
+  const Real left = 1.0 - fx, below = 1.0 - fy;
+  u = (near[0] * left + next[0] * fx) * below + (near[1] * left + next[1] * fx) * fy;
+  v = (near[2] * left + next[2] * fx) * below + (near[3] * left + next[3] * fx) * fy;
 }
 
 // Walks along a row and reads the flow at each place. Velocities come out divided by the table's
