@@ -275,7 +275,12 @@ template <int N, class Tables>
   };
   if constexpr (N == 8) {
     const auto two = [&](int k) {
+#if defined(DRIFTWALK_USE_X86) && defined(__AVX512F__)
+      return (typename DoublePack<8>::Vector)_mm512_insertf64x4(
+          _mm512_castpd256_pd512((__m256d)of(k)), (__m256d)of(k + 2), 1);
+#else
       return __builtin_shufflevector(of(k), of(k + 2), 0, 1, 2, 3, 4, 5, 6, 7);
+#endif
     };
     const auto a = two(0), b = two(1), c = two(4), d = two(5);
     const auto even_low = __builtin_shufflevector(a, b, 0, 8, 2, 10, 4, 12, 6, 14);

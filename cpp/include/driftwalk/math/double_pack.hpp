@@ -93,8 +93,12 @@ inline IntPack<N> narrow(DoublePack<N> a) {
   return __builtin_convertvector(a.v, typename IntPack<N>::Vector);
 }
 template <int N>
+inline Pack<std::int64_t, N> widen(IntPack<N> a) {
+  return __builtin_convertvector(a.v, typename Pack<std::int64_t, N>::Vector);
+}
+template <int N>
 inline Pack<std::int64_t, N> truncate(DoublePack<N> a) {
-  return __builtin_convertvector(narrow(a).v, typename Pack<std::int64_t, N>::Vector);
+  return widen(narrow(a));
 }
 template <int N>
 inline DoublePack<N> to_real(DoublePack<N>, IntPack<N> a) {
@@ -156,9 +160,10 @@ inline void sincos(DoublePack<N> x, DoublePack<N>& sine, DoublePack<N>& cosine) 
     return;
   }
   const Real scaled = x * 6.36619772367581382433e-01;
-  const auto quadrant = truncate(scaled + select(scaled < 0.0, Real(-0.5), Real(0.5)));
+  const IntPack<N> nearest = narrow(scaled + select(scaled < 0.0, Real(-0.5), Real(0.5)));
   Real s, c;
-  sincos_past(x, to_real(x, quadrant), s, c);
+  sincos_past(x, to_real(x, nearest), s, c);
+  const auto quadrant = widen(nearest);
   const auto swapped = (quadrant & 1) != 0;
   const Real turned_sine = select(swapped, c, s), turned_cosine = select(swapped, s, c);
   sine = select((quadrant & 2) != 0, -turned_sine, turned_sine);
