@@ -10,6 +10,7 @@ from typing import Final
 
 from driftwalk.record.vocabulary import (
     ALLOWED,
+    DIRECTIONS,
     IMAGE_WORDS,
     INNER,
     NO_POSITION,
@@ -25,7 +26,7 @@ QUATERNION: Final = ("qx", "qy", "qz", "qw")
 OF_BODY: Final = ("x", "y", "z", "theta", *QUATERNION, "lon", "lat", "confidence")
 """Quantities that a table may have once for each body."""
 # Words before x, y, z or w that make them a part of a quaternion: "orientation.x", "q_w".
-_QUATERNION_WORDS = frozenset({"q", "quat", "quaternion", "orientation"})
+_QUATERNION_WORDS = words("q quat quaternion orientation rot rotation")
 _FRAME_WORDS = words("number no index stamp col num")
 # Of several columns of a quantity, one with such a word comes before one with any other.
 _FIRST = words(
@@ -112,6 +113,8 @@ def column_meaning(name: str, unit_below: str = "") -> ColumnMeaning | None:
     if quantity not in OF_BODY and lower - allowed - ({"date"} if quantity == "t" else set()):
         return None
     if quantity in OF_BODY and lower & NO_POSITION:
+        return None
+    if quantity in ("x", "y", "z") and lower & DIRECTIONS:
         return None
     if (unit and unit not in ALLOWED[quantity]) or (unknown and not ALLOWED[quantity]):
         return None
