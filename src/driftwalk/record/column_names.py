@@ -77,7 +77,7 @@ def column_meaning(name: str, unit_below: str = "") -> ColumnMeaning | None:
     >>> column_meaning("robot2 theta (deg)").body
     'robot2'
     """
-    text, inside = _split_brackets(name)
+    text, inside = split_brackets(name)
     inside = inside or unit_below.strip("[]() ").lower()
     unit, unknown = UNITS.get(inside, ""), "" if inside in UNITS else inside
     tokens = _join_quaternion(words_of(_JOINED.sub(r"\1_\2", text)))
@@ -200,12 +200,12 @@ def unit_of_name(name: str) -> str:
     >>> unit_of_name("Winkel [°]")
     'deg'
     """
-    text, unit = _split_brackets(name)
+    text, unit = split_brackets(name)
     last = re.split(r"[\s_.\-/]+", text)[-1].lower()
     return UNITS.get(unit, "") if unit else (UNITS.get(last, "") if last != text.lower() else "")
 
 
-def _split_brackets(name: str) -> tuple[str, str]:
+def split_brackets(name: str) -> tuple[str, str]:
     """Split ``"x (mm)"`` into the name and what stands in the brackets, in small letters."""
     name = name.strip().strip("\"'").strip().lstrip("#%").strip()
     match = _BRACKETS.match(name)
