@@ -109,7 +109,8 @@ SETPOINTS: Final = words(
 """Words of pairs that are not a body if there is another pair: setpoints, and what moves it."""
 VARIANTS: Final = words(
     "raw filt filtered smooth smoothed est estimate estimated true truth gt meas measured "
-    "pred predicted kf ekf interp interpolated corrected mean hat odom odometry gps imu"
+    "pred predicted kf ekf interp interpolated corrected mean hat odom odometry gps imu "
+    "cam world screen img global local"
 )
 """Words of pairs that repeat a body, from before or after processing."""
 TIME_WORDS: Final = words(

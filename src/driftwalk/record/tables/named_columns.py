@@ -275,11 +275,10 @@ class NamedColumns:
             raise InputError(self.no_unit(at, meaning.unknown))
         if stated or self.lenient:
             return
-        bodies = self.bodies_with("y")
+        bodies = {"x": self.bodies_with("y"), "lon": self.bodies_with("lat")}
+        bodies |= {"y": bodies["x"], "lat": bodies["lon"]}
         pairs = {
-            at: one
-            for at, one in self.meanings.items()
-            if one.quantity in ("x", "y") and one.body in bodies
+            at: one for at, one in self.meanings.items() if one.body in bodies.get(one.quantity, ())
         }
         words = {one.ending for one in pairs.values()}
         word = next(iter(words)) if len(words) == 1 else ""

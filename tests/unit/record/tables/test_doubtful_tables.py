@@ -250,3 +250,17 @@ def test_a_rotation_of_four_parts_is_an_orientation(tmp_path: Path) -> None:
     turns = {f"rotation.{axis}": values for axis, values in parts}
     dataset = load(columns(tmp_path, {"t": T, "x": X, "y": Y, **turns}))
     np.testing.assert_allclose(np.unwrap(dataset.theta.values[:, 0]), ANGLE, atol=1e-12)
+
+
+def test_longitudes_in_radians_are_refused(tmp_path: Path) -> None:
+    path = columns(tmp_path, {"t": T, "lon_rad": 0.2 + 1e-8 * X, "lat_rad": 0.8 + 1e-8 * Y})
+    with pytest.raises(InputError, match="'rad' in column 'lon_rad' is not a known unit"):
+        load(path)
+
+
+def test_of_a_body_in_the_image_and_in_the_world_one_is_to_be_named(tmp_path: Path) -> None:
+    values = {"t": T, "x_cam": PX, "y_cam": PY, "x_world": X, "y_world": Y}
+    path = columns(tmp_path, values)
+    with pytest.raises(InputError, match="'x_cam', 'x_world' may be one body several times"):
+        load(path)
+    check(load(path, columns={"x": "x_world:m", "y": "y_world:m"}))
