@@ -139,17 +139,12 @@ def _clock(track: Track) -> dict[str, Any]:
 
 def _circle(track: Track) -> dict[str, Any] | None:
     """Return the circle of the centres, None when there is none to fit."""
+    names = ("radius_m", "sectors_visited_share", "residual_m", "samples_astray")
     try:
-        fit = fit_circle(track.x, track.y)
+        x, y, *rest = fit_circle(track.x, track.y)
     except InputError:
         return None
-    return {
-        "center_m": [fit.center_x, fit.center_y],
-        "radius_m": fit.radius,
-        "sectors_visited_share": fit.coverage,
-        "residual_m": fit.residual,
-        "samples_astray": fit.astray,
-    }
+    return {"center_m": [x, y], **dict(zip(names, rest, strict=True))}
 
 
 def _speed(track: Track) -> dict[str, Any]:

@@ -176,7 +176,7 @@ def number_codes(values: Array) -> tuple[Codes, list[str]]:
 def codes_in_arenas(
     arenas: tuple[Codes, list[str]], targets: tuple[Codes, list[str]]
 ) -> tuple[Codes, list[str]]:
-    """Return the index of each row's body, and the names of bodies that each arena numbers anew.
+    """Return the index of each row's body, and names; each arena numbers its bodies from the first.
 
     Examples
     --------

@@ -26,8 +26,9 @@ from driftwalk.record.raw import (
 from driftwalk.record.space import Plane, body_in_plane, on_the_ground, plane_of_columns
 from driftwalk.record.tables.boxes import box_angle, box_centre
 from driftwalk.record.tables.columns import read_columns
+from driftwalk.record.tables.named_columns import TableReading
 from driftwalk.record.tables.row_order import body_columns, other_order
-from driftwalk.record.tables.source import TableReading, TableSource
+from driftwalk.record.tables.source import TableSource
 from driftwalk.record.tables.stamps import DAY, count_days
 from driftwalk.record.text import Table
 from driftwalk.record.vocabulary import words
@@ -157,21 +158,19 @@ def _detector_advice(source: TableSource) -> str:
         return ""
     width = rows.shape[1] if rows.ndim == 2 else 0
     if width in (9, 10) and not (rows[:, :2] % 1.0).any() and (rows[:, 4:6] > 0.0).all():
-        named = dict(
-            zip(("frame", "body", "x", "y", "w", "h", "confidence"), "1234567", strict=True)
-        )
-        return (
-            "; if they are those of MOT (frame, identity, left, top, width, height, confidence), "
-            f'{argument_text("columns", named)} and `box="xywh"`'
-        )
-    shares = width in (5, 6, 7) and bool(((rows[:, 1:5] >= 0.0) & (rows[:, 1:5] <= 1.0)).all())
-    if shares and not (rows[:, 0] % 1.0).any():
-        named = dict(zip(("x", "y", "w", "h"), "2345", strict=True))
-        return (
-            "; if they are those of YOLO (class, centre and size as shares of the image), "
-            f'{argument_text("columns", named)} and `box="cxcywh@1920x1080"`, its size in pixels'
-        )
-    return ""
+        program = "MOT (frame, identity, left, top, width, height, confidence)"
+        names, first, box = "frame body x y w h confidence", 1, "xywh"
+    elif (
+        width in (5, 6, 7)
+        and ((rows[:, 1:5] >= 0.0) & (rows[:, 1:5] <= 1.0)).all()
+        and not (rows[:, 0] % 1.0).any()
+    ):
+        program = "YOLO (class, centre, size as shares of the image; state its pixels)"
+        names, first, box = "x y w h", 2, "cxcywh@1920x1080"
+    else:
+        return ""
+    named = {name: str(at) for at, name in enumerate(names.split(), start=first)}
+    return f'; if they are those of {program}, {argument_text("columns", named)} and `box="{box}"`'
 
 
 def _read(source: TableSource, reading: TableReading, labels: list[str]) -> Table:

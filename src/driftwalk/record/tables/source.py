@@ -1,13 +1,11 @@
-"""Interface of a table to its reader, and the reading: what each column was taken for, and why."""
+"""Interface of a table to the reader: names, units, first rows, and columns to read."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import Final, NamedTuple, Protocol
 
 from driftwalk.core.errors import FormatError
 from driftwalk.record.raw import TableLayout
-from driftwalk.record.tables.boxes import Box
 from driftwalk.record.tables.stamps import StampForm
 from driftwalk.record.text import Table
 
@@ -58,63 +56,3 @@ class TableSource(Protocol):
 
     def error(self, message: str, /) -> FormatError:
         """Return an error about the header, or the table where it has none."""
-
-
-_WORDS: Final = {"t": "time", "t+": "fraction of the time", "frame": "frame number", "w": "width"}
-_WORDS_MORE: Final = {"h": "height", "theta": "orientation", "body": "name of the body"}
-
-
-@dataclass
-class ColumnReading:
-    """Reading of one column."""
-
-    name: str
-    role: str = ""
-    """A quantity of `ALLOWED`, ``"t+"``, or ``""``: it is not read."""
-    body: str = ""
-    unit: str = ""
-    """Of `UNITS`; ``""`` where nothing names it."""
-    why: str = "its name is not known"
-
-    def described(self) -> dict[str, str]:
-        """Return the reading for people."""
-        words = {**_WORDS, **_WORDS_MORE}.get(self.role, self.role)
-        meaning = f"{words} of '{self.body}'" if self.body and words else words
-        return {
-            "column": self.name,
-            "meaning": meaning or "not read",
-            "unit": self.unit,
-            "why": self.why,
-        }
-
-
-@dataclass
-class TableReading:
-    """Reading of the columns (from 0) of a table, as the reader executes it."""
-
-    columns: list[ColumnReading]
-    bodies: dict[str, dict[str, int]] = field(default_factory=dict)
-    """Body to quantity (x, y, theta, ..., sides of a box) to column."""
-    numbers: tuple[int, ...] = ()
-    """The clock: one column of numbers, or seconds and their fraction; empty: none, or stamps."""
-    stamps: tuple[int, ...] = ()
-    """The clock: time stamps, or dates and times of day."""
-    clock_unit: str = "frame"
-    bare_clock: bool = False
-    """Whether the clock has times of an unnamed unit."""
-    body_column: int | None = None
-    length_unit: str = ""
-    factors: dict[int, float] = field(default_factory=dict)
-    """Columns of positions in another unit than that, and what makes it of them."""
-    angle_unit: str = ""
-    bare: bool = True
-    """Whether the names of positions are plain symbols, which mean metres next to seconds."""
-    box: Box | None = None
-    parts: tuple[str, str, str] | None = None
-    """Bodies that are parts of one: its middle, and those from and to which it points."""
-    notes: list[str] = field(default_factory=list)
-
-    @property
-    def clock(self) -> int | None:
-        """The column whose values are the clock's once the table is read."""
-        return next(iter((*self.stamps, *self.numbers)), None)

@@ -52,11 +52,11 @@ class TextSource:
             here = self._delimiter if not at else None
             delimiter = options.delimiter or here or detect_delimiter(lines[at : at + 2])
             below_at = [n for n in range(at + 1, len(lines)) if lines[n].strip()][:2]
-            texts = [line.lstrip("# "), *(lines[n] for n in below_at)]
+            texts = [line.lstrip("# ").removeprefix("% "), *(lines[n] for n in below_at)]
             rows = [split_fields(one, delimiter) for one in texts]
             found = heading_of(rows, options)
             if found is not None:
-                if at or found.rows > 1:
+                if at or found.rows > 1 or line.startswith("% "):
                     self.names, self.units, self._delimiter = found.names, found.units, delimiter
                     self._skip = begin + [at, *below_at][found.rows - 1] + 1
                 # LabVIEW names a last column "Comment" and leaves it out.

@@ -1,4 +1,4 @@
-"""Texts of tracking programs: DLTdv, smarticles, ToxTrac, UbiTrail, yupi, Kinovea.
+"""Texts of tracking programs: AnimalTA, DLTdv, smarticles, ToxTrac, UbiTrail, yupi, Kinovea.
 
 DLTdv: ``pt1_cam1_X,pt1_cam1_Y,...``, pixels, one row per frame. Smarticles: eleven columns without
 header: sync pulse, time, then x, y, theta of three robots. ToxTrac: image space without header
@@ -7,6 +7,10 @@ header: sync pulse, time, then x, y, theta of three robots. ToxTrac: image space
 ``x,y,z,t``) and what else; version 2 begins with ``v2,N``, N rows before the data, version 1 with
 name, interval, dimensions. Kinovea: rows of T X Y, and a line with ``#`` above each track.
 Programs with one header line are descriptions for `HeadedFormat`.
+
+AnimalTA: semicolons, pixels, ``Frame;Time`` and the targets. They stand side by side,
+``X_Arena0_Ind0;Y_Arena0_Ind0``, where their number is fixed, and stacked, ``Arena;Ind;X;Y``, where
+it varies. A target is named by its arena where there are several.
 """
 
 from __future__ import annotations
@@ -29,11 +33,98 @@ from driftwalk.record.cleaning.several_bodies import (
 from driftwalk.record.column_names import unit_of_name
 from driftwalk.record.loaders.json_formats import bounded_text, column_of
 from driftwalk.record.loaders.plain import HeadedFormat, described, side_by_side
-from driftwalk.record.raw import Marks, RawRecording, ReadOptions, TableLayout
+from driftwalk.record.raw import Array, Marks, RawBody, RawRecording, ReadOptions, TableLayout
 from driftwalk.record.tables.in_memory import MemorySource
 from driftwalk.record.tables.rows import recording_of
 from driftwalk.record.text import header_rows, read_head, read_table
-from driftwalk.record.text_head import first_line, first_lines, first_row, is_numeric_row
+from driftwalk.record.text_head import (
+    first_line,
+    first_lines,
+    first_row,
+    is_numeric_row,
+    read_header,
+)
+
+ANIMALTA: Final = ("Frame", "Time", "Arena", "Ind", "X", "Y")
+HALF_DIGIT_S: Final = 0.0051
+"""Times are rounded to 0.01 s."""
+_PLACE: Final = re.compile(r"(?P<axis>[XY])_Arena(?P<arena>\d+)_(?P<body>.+)")
+
+
+class AnimalTALoader:
+    """Pixels; the frame rate comes of frames and times, which are rounded."""
+
+    name = "animalta"
+    description = "AnimalTA coordinates (Frame;Time;X_Arena0_Ind0;... or Frame;Time;Arena;Ind;X;Y)"
+    marks = (
+        Marks("table", ("Frame", "Time", "X_Arena0_Ind0", "Y_Arena0_Ind0")),
+        Marks("table", ANIMALTA),
+    )
+
+    def sniff(self, head: bytes, _path: Path) -> float:
+        """Recognise the header."""
+        names = first_line(head).split(";")
+        known = names[:2] == ["Frame", "Time"] and (
+            tuple(names[:6]) == ANIMALTA or any(map(_PLACE.fullmatch, names[2:]))
+        )
+        return 0.95 if known else 0.0
+
+    def read(self, path: Path, options: ReadOptions) -> RawRecording:
+        """Read every target."""
+        names, _, skip, _ = read_header(path, delimiter=";")
+        if names[:2] != ["Frame", "Time"]:
+            raise FormatError("the first columns are not Frame and Time", line=1)
+        stacked = tuple(names[:6]) == ANIMALTA
+        if stacked:
+            bodies, frame, time = _stacked(path, names, skip)
+        else:
+            bodies, columns = side_by_side(path, _PLACE, ";", clock=0)
+            frame, time = columns["Frame"], columns["Time"]
+        rate = None if options.frame_rate_hz is not None else _rate_of_frames(frame, time)
+        timed = rate is None and options.frame_rate_hz is None
+        if timed:
+            order = np.argsort(frame, kind="stable")
+            for one in bodies:
+                places = np.searchsorted(frame[order], one.clock).clip(0, frame.size - 1)
+                one.clock = time[order][places]
+        return RawRecording(
+            bodies,
+            clock_unit="s" if timed else "frame",
+            length_unit="px",
+            frame_rate_hz=rate,
+            rows=frame.size,
+        )
+
+
+def _stacked(path: Path, names: list[str], skip: int) -> tuple[list[RawBody], Array, Array]:
+    table = read_table(path, TableLayout(";", names, skip, (0, 1, 4, 5), (2, 3)))
+    targets = [f"Ind{label}" for label in table.labels[3]]
+    codes, labels = codes_in_arenas((table.codes[2], table.labels[2]), (table.codes[3], targets))
+    frame, time, x, y = (table.numbers[column] for column in (0, 1, 4, 5))
+    bodies = split_bodies(codes, labels, clock=frame, x=x, y=y)
+    return bodies, frame.copy(), time
+
+
+def _rate_of_frames(frame: Array, time: Array) -> float | None:
+    """Return the rate that agrees with all rounded times, None where there is none.
+
+    The whole number that is nearest is taken where it agrees as well: times are short of digits.
+    """
+    known = np.isfinite(frame) & np.isfinite(time)
+    frame, time = frame[known], time[known]
+    if frame.size < 2 or np.ptp(time) <= 0.0:
+        return None
+    exact = float(np.ptp(frame) / np.ptp(time))
+    if exact * 2 * HALF_DIGIT_S > 0.5 * np.ptp(time):
+        return None  # too short a recording: several whole numbers agree
+    for rate in (float(round(exact)), exact):
+        if (
+            rate > 0.0
+            and (np.abs(time - time[0] - (frame - frame[0]) / rate) < 2 * HALF_DIGIT_S).all()
+        ):
+            return rate
+    return None
+
 
 _DLTDV = re.compile(r"(?P<body>pt\d+_cam\d+)_(?P<axis>[XY])", re.IGNORECASE)
 
@@ -277,6 +368,7 @@ LOADERS = (
         header=("Frame", "Time", "TrackId", "x", "y"),
         columns={"t": "Time:s", "x": "x", "y": "y", "body": "TrackId"},
     ),
+    AnimalTALoader(),
     DltdvLoader(),
     SmarticlesLoader(),
     ToxTracLoader(),
