@@ -500,6 +500,7 @@ PAGES: dict[str, Page] = {
         numbers=Numbers.SAME,
         draws=False,
         slow=True,
+        parts_weekly=("-o discs/", "-o many/"),
     ),
     "docs/how-to/calibrate-a-moving-body.md": Page(
         provide=_active_body,

@@ -23,7 +23,7 @@ CHAINS = 400
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("runs", [40, 400])
+@pytest.mark.parametrize("runs", [40, pytest.param(400, marks=pytest.mark.study)])
 def test_a_well_mixed_tank_is_refused_in_five_percent_at_most(runs: int) -> None:
     """More than the 99.9 % quantile of 5 % would be no chance."""
     words = [judge_mixing(histories([chain_runs(runs, seed)])).word for seed in range(CHAINS)]
@@ -44,7 +44,7 @@ def test_a_tank_that_is_not_is_refused(shape: float, memory: float) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("memory", [1.0, 0.1])
+@pytest.mark.parametrize("memory", [1.0, pytest.param(0.1, marks=pytest.mark.study)])
 def test_equal_rates_are_refused_in_five_percent_at_most(memory: float) -> None:
     """Of 300 simulated runs and 30 others of half the length, with memory or without."""
     refused, sets = 0, 100
