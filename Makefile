@@ -36,7 +36,7 @@ test: $(TEST_TOOLS)
 	$(BIN)/python -m pytest $(SIDE_BY_SIDE)
 
 test-slow: $(TEST_TOOLS)
-	$(BIN)/python -m pytest $(SIDE_BY_SIDE) -m slow
+	$(BIN)/python -m pytest $(SIDE_BY_SIDE) -m "slow and not study"
 
 # Once a week in CI: tests that are more of a study, each with a faster one among the slow tests. Those in
 # Chromium measure times, so they come last, alone.

@@ -500,6 +500,7 @@ PAGES: dict[str, Page] = {
         numbers=Numbers.SAME,
         draws=False,
         slow=True,
+        parts_weekly=("-o discs/", "-o many/"),
     ),
     "docs/how-to/calibrate-a-moving-body.md": Page(
         provide=_active_body,
@@ -531,7 +532,7 @@ PAGES: dict[str, Page] = {
         makes=("compare/comparison.nc",),
         draws=False,
         little=True,
-        slow=True,
+        weekly=True,
     ),
     "docs/how-to/design-an-experiment.md": Page(
         provide=_files(_flow("flow_true.csv"), _truth),
@@ -614,7 +615,7 @@ PAGES: dict[str, Page] = {
     "docs/how-to/take-your-tracks-elsewhere.md": Page(
         provide=_files(_one_recording, _several_worlds, _calibrated),
         makes=("tracks/README.md", "one/replicate_3.csv", "film/recording.gif", "paper/ks_map.pdf"),
-        slow=True,
+        weekly=True,
     ),
     "docs/how-to/control.md": Page(
         provide=_files(_fitted),
@@ -649,7 +650,7 @@ PAGES: dict[str, Page] = {
         holds=("found.attrs['blocks'] == 2",),
         makes=("posterior.html", "from-real/posterior.nc"),
         draws=False,
-        slow=True,
+        weekly=True,
     ),
     "docs/how-to/sensitivity.md": Page(
         provide=_files(_calibrated, _flow("flow_true.csv", "flow.nc", "piv.csv")),
@@ -666,7 +667,7 @@ PAGES: dict[str, Page] = {
             "rules['l1_distance'].shape == (2,)",
         ),
         draws=False,
-        slow=True,
+        weekly=True,
     ),
     "docs/how-to/yield.md": Page(
         provide=_files(_fitted),
@@ -703,7 +704,7 @@ PAGES: dict[str, Page] = {
         },
         makes=("markers.png", "recording.html", "video.mkv"),
         draws=False,
-        slow=True,
+        weekly=True,
     ),
     "docs/how-to/use-as-a-library.md": Page(
         provide=_files(_recording(120.0), _search("study.toml")),
