@@ -9,7 +9,6 @@ from __future__ import annotations
 import ast
 import importlib
 import inspect
-import os
 import re
 from functools import cached_property
 from pathlib import Path
@@ -21,8 +20,7 @@ from signatures import bases_of, signature_of
 
 import driftwalk
 
-DOCS: Final = Path(__file__).resolve().parents[2] / "docs"
-FOLDER: Final = DOCS / "reference" / "python"
+FOLDER: Final = Path(__file__).resolve().parents[2] / "docs" / "reference" / "python"
 MADE: Final = "% Made from the docstrings by `python tests/architecture/api_pages.py`."
 ALL: Final = "names.md"
 # The calls of a notebook first, then the rooms in the order of the data.
@@ -69,11 +67,8 @@ def all_pages() -> dict[Path, str]:
 
 def _with_links(path: Path, text: str) -> str:
     """Return a page on which each other page that a docstring names is a link."""
-
-    def link(found: re.Match[str]) -> str:
-        return f"[{found[1]}]({os.path.relpath(DOCS.parent / found[1], path.parent)})"
-
-    return re.sub(r"`?\b(docs/[\w/-]+\.md)`?(?![\w)\]])", link, text)
+    up = "../" * (len(path.relative_to(FOLDER).parts) + 1)
+    return re.sub(r"`?\bdocs/([\w/-]+\.md)`?(?![\w)\]])", rf"[docs/\1]({up}\1)", text)
 
 
 def _page_of_all() -> str:
