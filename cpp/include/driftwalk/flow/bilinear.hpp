@@ -428,8 +428,8 @@ template <int N>
 }
 
 template <class Real>
-[[gnu::noinline]] void read_rows(const FlowView<double>& flow, const FlowRow<Real>* rows,
-                                 int row_count, int count, Real* u, Real* v) {
+inline void walk_rows(const FlowView<double>& flow, const FlowRow<Real>* rows, int row_count,
+                      int count, Real* u, Real* v) {
   for (int r = 0; r < row_count; ++r) {
     FlowRow<Real> row = rows[r];
     for (int k = 0; k < count; ++k) {
@@ -437,6 +437,15 @@ template <class Real>
       row.advance();
     }
   }
+}
+inline void read_rows(const FlowView<double>& flow, const FlowRow<double>* rows, int row_count,
+                      int count, double* u, double* v) {
+  walk_rows(flow, rows, row_count, count, u, v);
+}
+template <int N>
+[[gnu::noinline]] void read_rows(const FlowView<double>& flow, const FlowRow<DoublePack<N>>* rows,
+                                 int row_count, int count, DoublePack<N>* u, DoublePack<N>* v) {
+  walk_rows(flow, rows, row_count, count, u, v);
 }
 
 DRIFTWALK_LANES_END
