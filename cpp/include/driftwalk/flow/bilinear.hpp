@@ -302,11 +302,10 @@ template <int N, class Tables>
     out[2].v = __builtin_shufflevector(even_low, even_high, 2, 3, 6, 7);
     out[3].v = __builtin_shufflevector(odd_low, odd_high, 2, 3, 6, 7);
   } else {
-    for (int lane = 0; lane < N; ++lane) {
-      const Record found = of(lane);
-      for (int k = 0; k < flow_record; ++k) {
-        out[k].v[lane] = found[k];
-      }
+    static_assert(N == 2);
+    const Record a = of(0), b = of(1);
+    for (int k = 0; k < flow_record; ++k) {
+      out[k].v = typename DoublePack<N>::Vector{a[k], b[k]};
     }
   }
 }
