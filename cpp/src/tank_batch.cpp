@@ -140,22 +140,23 @@ void TankBatch::run(const TankSettings& settings, TankGroup group, int threads) 
   const auto run_packs = [&](const auto& kernel, const auto& run_of) {
     const Packs packs(settings, worlds(), blocks() > most_blocks_all_pairs ? 1 : kernel.lanes);
     run_tasks(static_cast<std::int64_t>(packs.begin.size()) - 1, threads, [&] {
-      return [&, memory = std::make_unique<AssemblyMemory>(blocks(), kernel.scratch_bytes(blocks())),
-              room = EventRoom(blocks(), kernel.lanes)](std::int64_t pack) mutable {
-        const std::size_t begin = packs.begin[static_cast<std::size_t>(pack)];
-        const std::size_t end = packs.begin[static_cast<std::size_t>(pack) + 1];
-        const std::int64_t first = packs.world[begin];
-        const TankFlow& flow = flows_[static_cast<std::size_t>(settings.flow[first])];
-        AssemblyRules rules = flow.rules;
-        rules.latching = static_cast<Latching>(settings.latching[first]);
-        TankGroup own = group;
-        own.flow_scale = settings.flow_scale[first];
-        own.world = packs.world.data() + begin;
-        own.count = static_cast<int>(end - begin);
-        own.flow_start = flow.start.empty() ? nullptr : flow.start.data();
-        own.events = room.outputs();
-        kernel.go_on(run_of(flow), rules, own, memory->scratch());
-      };
+      return
+          [&, memory = std::make_unique<AssemblyMemory>(blocks(), kernel.scratch_bytes(blocks())),
+           room = EventRoom(blocks(), kernel.lanes)](std::int64_t pack) mutable {
+            const std::size_t begin = packs.begin[static_cast<std::size_t>(pack)];
+            const std::size_t end = packs.begin[static_cast<std::size_t>(pack) + 1];
+            const std::int64_t first = packs.world[begin];
+            const TankFlow& flow = flows_[static_cast<std::size_t>(settings.flow[first])];
+            AssemblyRules rules = flow.rules;
+            rules.latching = static_cast<Latching>(settings.latching[first]);
+            TankGroup own = group;
+            own.flow_scale = settings.flow_scale[first];
+            own.world = packs.world.data() + begin;
+            own.count = static_cast<int>(end - begin);
+            own.flow_start = flow.start.empty() ? nullptr : flow.start.data();
+            own.events = room.outputs();
+            kernel.go_on(run_of(flow), rules, own, memory->scratch());
+          };
     });
   };
   const TankKernels kernels = chosen_kernels();

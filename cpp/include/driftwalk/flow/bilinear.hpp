@@ -302,11 +302,10 @@ template <int N, class Tables>
     out[2].v = __builtin_shufflevector(even_low, even_high, 2, 3, 6, 7);
     out[3].v = __builtin_shufflevector(odd_low, odd_high, 2, 3, 6, 7);
   } else {
-    for (int lane = 0; lane < N; ++lane) {
-      const Record found = of(lane);
-      for (int k = 0; k < flow_record; ++k) {
-        out[k].v[lane] = found[k];
-      }
+    static_assert(N == 2);
+    const Record a = of(0), b = of(1);
+    for (int k = 0; k < flow_record; ++k) {
+      out[k].v = typename DoublePack<N>::Vector{a[k], b[k]};
     }
   }
 }
@@ -428,8 +427,8 @@ template <int N>
 }
 
 template <class Real>
-[[gnu::noinline]] void read_rows(const FlowView<double>& flow, const FlowRow<Real>* rows,
-                                 int row_count, int count, Real* u, Real* v) {
+inline void walk_rows(const FlowView<double>& flow, const FlowRow<Real>* rows, int row_count,
+                      int count, Real* u, Real* v) {
   for (int r = 0; r < row_count; ++r) {
     FlowRow<Real> row = rows[r];
     for (int k = 0; k < count; ++k) {
@@ -437,6 +436,15 @@ template <class Real>
       row.advance();
     }
   }
+}
+inline void read_rows(const FlowView<double>& flow, const FlowRow<double>* rows, int row_count,
+                      int count, double* u, double* v) {
+  walk_rows(flow, rows, row_count, count, u, v);
+}
+template <int N>
+[[gnu::noinline]] void read_rows(const FlowView<double>& flow, const FlowRow<DoublePack<N>>* rows,
+                                 int row_count, int count, DoublePack<N>* u, DoublePack<N>* v) {
+  walk_rows(flow, rows, row_count, count, u, v);
 }
 
 DRIFTWALK_LANES_END

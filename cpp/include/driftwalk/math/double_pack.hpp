@@ -114,7 +114,7 @@ inline DoublePack<N> to_real(DoublePack<N> like, Pack<std::int64_t, N> a) {
   return to_real(like, IntPack<N>(__builtin_convertvector(a.v, typename IntPack<N>::Vector)));
 }
 
-// Of the low words of 64-bit lanes. What is above the low words of the result is void.
+// Of the low words of 64-bit lanes; the high words of the products are void.
 template <int N>
 inline void multiply_wide(UInt32 a, Pack<std::uint64_t, N> b, Pack<std::uint64_t, N>& high,
                           Pack<std::uint64_t, N>& low) {
@@ -138,7 +138,7 @@ inline void multiply_wide(UInt32 a, Pack<std::uint64_t, N> b, Pack<std::uint64_t
   high = low >> 32;
 }
 
-// What a function of one number gives lane by lane.
+// A function of one number, lane by lane.
 template <int N, class Function>
 inline DoublePack<N> by_lanes(DoublePack<N> x, const Function& function) {
   for (int lane = 0; lane < N; ++lane) {
