@@ -127,8 +127,9 @@ def test_a_recording_with_holes_gives_the_same_within_errors(
     assert facts_of(found)["samples"] == np.count_nonzero(~lost)
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_two_recordings_are_better_than_one(track: xr.Dataset, fit: xr.Dataset) -> None:
+    """In every run: `test_several_recordings` of the command line."""
     both = dw.fit_motion([track, recording(600.0, "second")], coarse_study())
     ratio = np.sqrt(np.diag(both["covariance"].values) / np.diag(fit["covariance"].values))
     # Twice the data: 1 / sqrt(2), as far as the information does not vary from one to the other.
@@ -138,8 +139,9 @@ def test_two_recordings_are_better_than_one(track: xr.Dataset, fit: xr.Dataset) 
     assert np.abs(deviations(both)).max() < 4.0
 
 
-@pytest.mark.slow
+@pytest.mark.study
 def test_without_angles_the_drag_is_averaged(track: xr.Dataset) -> None:
+    """In every run: `test_people_read_the_answer` of the command line fits without angles."""
     blind = track.copy(deep=True)
     blind["theta"].values[:] = np.nan
     found = dw.fit_motion(blind, coarse_study())
