@@ -63,7 +63,9 @@ def test_the_truth_is_within_the_errors(fit: xr.Dataset) -> None:
     )
     # 90 % of a normal: 1.645 sd on either side, in logarithms; a face without strips besides.
     low, high = np.log(facts_of(fit)["drag_coefficient_interval"])
-    assert high - low + np.log(1.0 - 2.0 / 192.0) == pytest.approx(2 * 1.644854 * np.sqrt(fit["covariance"].values[0, 0]))
+    assert high - low + np.log(1.0 - 2.0 / 192.0) == pytest.approx(
+        2 * 1.644854 * np.sqrt(fit["covariance"].values[0, 0])
+    )
 
 
 def test_restricted_likelihood_lowers_the_drag(fit: xr.Dataset) -> None:
