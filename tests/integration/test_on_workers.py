@@ -123,7 +123,7 @@ def test_recovery_studies(workers: Cluster) -> None:
 def test_self_assembly_and_its_sensitivity(workers: Cluster) -> None:
     flow = dw.tank30_flow()
     study = dw.Study(
-        assembly={"blocks": 4, "runs": 200, "duration_s": 20.0},
+        assembly={"blocks": 4, "runs": 200, "duration_s": 5.0},
         sensitivity={"runs": 20, "reference_realisations": 4},
     )
     axes = {"drag_coefficient": np.array([0.2, 0.4]), "force_std": np.array([2e-4, 6e-4, 1e-3])}
