@@ -59,7 +59,9 @@ def test_the_file_is_small_and_moves_at_once(
     picture(page, "saved-playground-desktop")
 
 
+@pytest.mark.study
 def test_twenty_times_real_time_with_16_blocks(saved: Path, visit: Callable[..., Visit]) -> None:
+    """In every run: that it moves, and how soon."""
     page = visit(LOCAL).open(f"{saved.as_uri()}#blocks=16&speed=20&latching=none")
     page.wait_for_function(MOVING)
     best = [0.0, 0.0]

@@ -256,7 +256,7 @@ def _client(address: ClusterAddress, stack: ExitStack) -> Any:
 
 
 def _replace_lost(begun: Any, workers: int, stack: ExitStack) -> None:
-    """Begin workers anew that Dask gave up: those that take over 15 s to come back."""
+    """Replace workers that Dask gave up: those that take over 15 s to come back."""
     ended = threading.Event()
 
     def look() -> None:

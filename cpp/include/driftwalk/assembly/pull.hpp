@@ -67,6 +67,11 @@ inline FloatPack<N> look_up(const RadialTable& table, FloatPack<N> squared) {
   return value + slope * max(squared - start, FloatPack<N>(0.0f));
 }
 
+template <int N>
+inline DoublePack<N> look_up(const RadialTable& table, DoublePack<N> squared) {
+  return by_lanes(squared, [&](double one) { return look_up(table, one); });
+}
+
 // An attraction `strength` times the way (dx, dy) from the first to the second.
 template <class Real>
 inline void attract(Real strength, Real dx, Real dy, Pulled<Real>& a, Pulled<Real>& b) {
