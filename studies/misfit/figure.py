@@ -58,7 +58,7 @@ def drawn(after: list[dict[str, Any]], before: list[dict[str, Any]]) -> Figure:
     ax.set_xscale("log")
     ax.set_xlim(LEAST, 20.0)
     ax.set_yticks(place, names)
-    ax.set_xlabel("size of the error of C_d, estimate over truth minus one")
+    ax.set_xlabel("size of the error of $C_d$, estimate over truth minus one")
     figure.legend(loc="outside upper center", ncols=3)
     return figure
 

@@ -32,7 +32,11 @@ class Result(xr.Dataset):  # type: ignore[no-untyped-call]
     __slots__ = ()
 
     def __repr__(self) -> str:
-        return "\n".join([*answer_lines(self), super().__repr__()])
+        lines = answer_lines(self)
+        if not lines:
+            return super().__repr__()
+        held = f"{len(self.data_vars)} variables, {len(self.attrs)} attributes"
+        return "\n".join([*lines, f"<{type(self).__name__}: {held}>"])
 
     def _repr_html_(self) -> str:
         lines = answer_lines(self)

@@ -171,8 +171,10 @@ def _classes(found: xr.Dataset, drawn: xr.Dataset | None) -> Table:
     ]
     shares = [by_name(one, "class", "proportion") for one in both]
     counts = [by_name(one, "class", "count") for one in both]
-    names = dict.fromkeys(name for one in shares for name in one)
-    seen = [name for name in names if any(one.get(name, 0) for one in counts)]
+    names = list(dict.fromkeys(name for one in shares for name in one))
+    # Those too that never came, where there is room: two runs list the same classes.
+    few = len(names) <= MOST_ROWS
+    seen = [name for name in names if few or any(one.get(name, 0) for one in counts)]
     most = {name: max(one.get(name, 0.0) for one in shares) for name in seen}
     frequent = sorted(seen, key=lambda name: -most[name])[:MOST_ROWS]
     rest = [name for name in seen if name not in frequent]
